@@ -1,0 +1,64 @@
+# Two commands do everything on a machine with Python 3.11+ and Rust from rustup:
+#   make demo   one shot on the virtual bench, one shape, a report and a PLY in out/demo
+#   make test   every check that CI runs
+
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DELETE_ON_ERROR:
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+STAMPS := $(VENV)/stamps
+KERNEL := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
+
+.PHONY: demo test figures rust python stubs format bench clean
+
+demo: $(STAMPS)/built
+	$(BIN)/quadfringe demo --out out/demo
+
+test: rust python
+
+rust: $(STAMPS)/tools
+	cargo fmt --all --check
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets -- -D warnings
+	cargo test
+	for example in $$(find crates/quadfringe/examples -name '*.rs' -printf '%f\n' 2>/dev/null); do \
+		cargo run --release --quiet --package quadfringe --example "$${example%.rs}"; done
+	RUSTDOCFLAGS="-D warnings" cargo doc --package quadfringe --no-deps --quiet
+
+python: $(STAMPS)/built stubs
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+	$(BIN)/pytest
+
+stubs: $(STAMPS)/built
+	$(BIN)/python -m mypy.stubtest quadfringe._core
+
+# Pictures and figures of the README; nothing in it is drawn or typed by hand.
+figures: $(STAMPS)/built
+	$(BIN)/python docs/make_figures.py
+
+bench: $(STAMPS)/built
+	$(BIN)/python benches/first_frame.py
+
+format: $(STAMPS)/tools
+	cargo fmt --all
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+$(STAMPS)/tools: pyproject.toml scripts/set-up
+	scripts/set-up "$(PYTHON)" "$(VENV)"
+	mkdir -p $(STAMPS)
+	touch $@
+
+# An editable install: Python changes need nothing, Rust changes rebuild here, always optimised.
+$(STAMPS)/built: $(STAMPS)/tools $(KERNEL)
+	@echo "building the kernel and installing the package (some minutes the first time)"
+	PIP_QUIET=1 PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --extras test
+	touch $@
+
+clean:
+	rm -rf $(VENV) target out

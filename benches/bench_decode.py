@@ -1,0 +1,152 @@
+"""Time per frame of the product against a plain NumPy version of the same chain, in one run.
+
+    python benches/bench_decode.py [--json FILE] [--repeats 15] [--surface face]
+
+Frames: one shot of the virtual bench, 1024 x 768, 8 bit, 3 % noise; every contender gets the same
+arrays and gives absolute phase, order, quality and X, Y, Z. They take turns, so that a busy moment of
+the machine hits all of them; the median counts. Planning (once per bench) is outside the clock.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy_chain
+from numpy.typing import NDArray
+
+import quadfringe as qf
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+import scoring
+
+Maps = tuple[NDArray[Any], NDArray[Any]]  # phase_rad, xyz_mm
+Contender = Callable[[], Maps]
+
+
+def geometry_from(calibration: qf.Calibration) -> numpy_chain.Geometry:
+    camera, projector = calibration.camera, calibration.projector
+
+    def matrix(device: qf.DeviceModel) -> NDArray[np.float64]:
+        (fx, fy), (cx, cy) = device.focal_px, device.centre_px
+        return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
+
+    return numpy_chain.Geometry(
+        camera_k=matrix(camera),
+        projector_k=matrix(projector),
+        rotation=np.array(projector.rotation),
+        translation_mm=np.array(projector.translation_mm, dtype=np.float64),
+    )
+
+
+def numpy_contender(shot: qf.Shot, calibration: qf.Calibration, dtype: Any) -> Contender:
+    geometry = geometry_from(calibration)
+
+    def run() -> Maps:
+        found = numpy_chain.decode(shot.red, shot.green, shot.blue, shot.ir, geometry=geometry, dtype=dtype)
+        assert found.xyz_mm is not None
+        return found.phase_rad, found.xyz_mm
+
+    return run
+
+
+def product_contender(
+    shot: qf.Shot, config: qf.SystemConfig, calibration: qf.Calibration, **settings: Any
+) -> Contender:
+    plan = qf.Plan(
+        projector_width_px=calibration.projector.width_px,
+        fringes=config.fringes,
+        calibration=calibration,
+        settings=qf.DecodeConfig(**settings),
+    )
+    decoder = qf.ShotDecoder(shot, plan)
+
+    def run() -> Maps:
+        shape = decoder.decode(shot)
+        assert shape.xyz_mm is not None
+        return shape.phase_rad, shape.xyz_mm
+
+    return run
+
+
+def timed(contenders: dict[str, Contender], repeats: int) -> dict[str, float]:
+    """Median milliseconds of each contender; one round to warm up, then `repeats` rounds in turn."""
+    spent: dict[str, list[float]] = {name: [] for name in contenders}
+    for turn in range(repeats + 1):
+        for name, run in contenders.items():
+            start = time.perf_counter()
+            run()
+            if turn > 0:
+                spent[name].append(1e3 * (time.perf_counter() - start))
+    return {name: float(np.median(values)) for name, values in spent.items()}
+
+
+def scene_from(shot: qf.Shot, config: qf.SystemConfig) -> scoring.Scene:
+    assert shot.truth is not None
+    numbers, width = config.fringes.numbers, config.projector.width_px
+    return scoring.Scene(
+        name=config.scene.surface,
+        red=shot.red,
+        green=shot.green,
+        blue=shot.blue,
+        ir=shot.ir,
+        fringe_numbers=numbers,
+        projector_width=width,
+        phase_rad=2 * np.pi * numbers[0] * shot.truth.column_px.astype(np.float64) / width,
+        scored=np.isfinite(shot.truth.column_px) & ~shot.truth.edge & ~shot.truth.shadow,
+        depth_mm=shot.truth.depth_mm,
+        shadow=shot.truth.shadow,
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--repeats", type=int, default=15)
+    parser.add_argument("--surface", default="peaks", help="a surface of the virtual bench")
+    options = parser.parse_args()
+
+    config = qf.SystemConfig(scene=qf.SceneConfig(surface=options.surface, noise=0.03))
+    with qf.open(config) as scanner:
+        shot, calibration = scanner.grab(), scanner.calibration
+    contenders = {
+        "numpy_float32": numpy_contender(shot, calibration, np.float32),
+        "numpy_float64": numpy_contender(shot, calibration, np.float64),
+    }
+    for method in ("published", "best"):
+        for threads in (1, 2):
+            contenders[f"{method}_{threads}_threads"] = product_contender(
+                shot, config, calibration, method=method, threads=threads
+            )
+    times = timed(contenders, options.repeats)
+    scene = scene_from(shot, config)
+
+    figures: dict[str, float] = {}
+    print(f"{options.surface}, {shot.red.shape[1]} x {shot.red.shape[0]}, {shot.red.dtype}")
+    print(f"{'':22}{'ms':>8}{'x f32':>8}{'x f64':>8}{'right %':>9}{'phase rad':>11}{'depth mm':>10}")
+    for name, ms in times.items():
+        score = scoring.score(scene, *contenders[name]())
+        ratios = (times["numpy_float32"] / ms, times["numpy_float64"] / ms)
+        print(
+            f"{name:22}{ms:8.2f}{ratios[0]:8.1f}{ratios[1]:8.1f}{score.right_percent:9.3f}"
+            f"{score.right_phase_rms_rad:11.4f}{score.depth_rms_mm:10.4f}"
+        )
+        figures |= {
+            f"{name}_ms": ms,
+            f"{name}_times_numpy_float32": ratios[0],
+            f"{name}_times_numpy_float64": ratios[1],
+            f"{name}_right_percent": score.right_percent,
+            f"{name}_phase_rms_rad": score.right_phase_rms_rad,
+        }
+    if options.json:
+        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,91 @@
+//! NumPy arrays as the kernel sees them: borrowed, never copied; a wrong dtype is named in our own words.
+
+use numpy::ndarray::{Dim, Dimension, Ix};
+use numpy::{
+    Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods,
+};
+use pyo3::exceptions::{PyTypeError, PyValueError};
+use pyo3::prelude::*;
+
+/// Every error of the kernel is a value that cannot be used.
+pub fn value_error(error: quadfringe::Error) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+/// Borrow `object` as an array of this type and number of axes; `None` when it is something else.
+pub fn borrowed<'py, T: Element, const N: usize>(
+    object: &Bound<'py, PyAny>,
+) -> PyResult<Option<PyReadonlyArray<'py, T, Dim<[Ix; N]>>>>
+where
+    Dim<[Ix; N]>: Dimension,
+{
+    let Ok(array) = object.cast::<PyArray<T, Dim<[Ix; N]>>>() else {
+        return Ok(None);
+    };
+    let borrowed = array
+        .try_readonly()
+        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    Ok(Some(borrowed))
+}
+
+/// Borrow `object` as an array of this type and number of axes, or say what was expected and what came.
+pub fn expected<'py, T: Element, const N: usize>(
+    name: &str,
+    object: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArray<'py, T, Dim<[Ix; N]>>>
+where
+    Dim<[Ix; N]>: Dimension,
+{
+    borrowed(object)?.ok_or_else(|| {
+        let dtype = T::get_dtype(object.py());
+        wrong_array(name, &format!("a {N}D {dtype} array"), object)
+    })
+}
+
+/// The TypeError that names the argument, what it should be and what it is.
+pub fn wrong_array(name: &str, expected: &str, object: &Bound<'_, PyAny>) -> PyErr {
+    let actual = match object.cast::<PyUntypedArray>() {
+        Ok(array) => format!("a {}D {} array", array.ndim(), array.dtype()),
+        Err(_) => object.get_type().to_string(),
+    };
+    PyTypeError::new_err(format!("{name}: expected {expected}, got {actual}"))
+}
+
+/// Images of one type, borrowed from NumPy.
+pub enum Images<'py, const COUNT: usize> {
+    /// 8 bit.
+    U8([PyReadonlyArray<'py, u8, Dim<[Ix; 2]>>; COUNT]),
+    /// 9 to 16 bit.
+    U16([PyReadonlyArray<'py, u16, Dim<[Ix; 2]>>; COUNT]),
+    /// Fractions of full scale.
+    F32([PyReadonlyArray<'py, f32, Dim<[Ix; 2]>>; COUNT]),
+}
+
+impl<'py, const COUNT: usize> Images<'py, COUNT> {
+    /// Borrow images; the first decides the type that the others must have.
+    pub fn borrow(names: [&str; COUNT], objects: [&Bound<'py, PyAny>; COUNT]) -> PyResult<Self> {
+        if borrowed::<u8, 2>(objects[0])?.is_some() {
+            all(names, objects).map(Self::U8)
+        } else if borrowed::<u16, 2>(objects[0])?.is_some() {
+            all(names, objects).map(Self::U16)
+        } else if borrowed::<f32, 2>(objects[0])?.is_some() {
+            all(names, objects).map(Self::F32)
+        } else {
+            let kinds = "a 2D uint8, uint16 or float32 array";
+            Err(wrong_array(names[0], kinds, objects[0]))
+        }
+    }
+}
+
+fn all<'py, T: Element, const COUNT: usize>(
+    names: [&str; COUNT],
+    objects: [&Bound<'py, PyAny>; COUNT],
+) -> PyResult<[PyReadonlyArray<'py, T, Dim<[Ix; 2]>>; COUNT]> {
+    let mut found = Vec::with_capacity(COUNT);
+    for (name, object) in names.into_iter().zip(objects) {
+        found.push(expected::<T, 2>(name, object)?);
+    }
+    Ok(found
+        .try_into()
+        .unwrap_or_else(|_| unreachable!("one array for each name")))
+}

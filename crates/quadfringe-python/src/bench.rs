@@ -1,0 +1,213 @@
+//! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` knows the truth.
+
+use crate::arrays::{expected, value_error};
+use crate::device::{Device, layout_named, unknown};
+use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
+use pyo3::exceptions::PyTypeError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use quadfringe::fringe::FringeCode;
+use quadfringe::rig::{self, Albedo, BayerOrder, Beam, BitDepth, Light, Planes, RenderOptions};
+use quadfringe::surface::{HeightMap, Interpolation, Peaks, Surface, scene};
+
+/// Camera and two projectors before a surface.
+#[pyclass(frozen, module = "quadfringe._core")]
+pub struct Bench(rig::Bench);
+
+#[pymethods]
+impl Bench {
+    #[new]
+    #[pyo3(signature = (*, camera = None, visible = None, infrared = None, layout = "regular"))]
+    fn new(
+        camera: Option<Device>,
+        visible: Option<Device>,
+        infrared: Option<Device>,
+        layout: &str,
+    ) -> PyResult<Self> {
+        let reference = rig::Bench::reference_with(layout_named(layout)?);
+        let visible = visible.map_or(reference.visible, |device| device.0);
+        Ok(Self(rig::Bench {
+            camera: camera.map_or(reference.camera, |device| device.0),
+            infrared: infrared.map_or_else(|| visible.clone(), |device| device.0),
+            visible,
+            layout: reference.layout,
+        }))
+    }
+
+    #[getter]
+    fn camera(&self) -> Device {
+        Device(self.0.camera.clone())
+    }
+
+    #[getter]
+    fn visible(&self) -> Device {
+        Device(self.0.visible.clone())
+    }
+
+    #[getter]
+    fn infrared(&self) -> Device {
+        Device(self.0.infrared.clone())
+    }
+
+    /// One ray through each pixel of a scene with this name.
+    #[pyo3(signature = (surface, *, time_s = 0.0))]
+    fn cast(&self, py: Python<'_>, surface: &str, time_s: f64) -> PyResult<Cast> {
+        let surface = scene(surface, time_s).map_err(value_error)?;
+        Ok(self.cast_surface(py, surface.as_ref()))
+    }
+
+    /// One ray through each pixel of the peaks function over the plane z.
+    #[pyo3(signature = (*, z_mm, scale_mm))]
+    fn cast_peaks(&self, py: Python<'_>, z_mm: f64, scale_mm: f64) -> PyResult<Cast> {
+        let surface = Peaks::new(z_mm, scale_mm).map_err(value_error)?;
+        Ok(self.cast_surface(py, &surface))
+    }
+
+    /// One ray through each pixel of a relief.
+    #[pyo3(signature = (heights_mm, *, pitch_mm, origin_mm, z_mm))]
+    fn cast_height_map(
+        &self,
+        py: Python<'_>,
+        heights_mm: &Bound<'_, PyAny>,
+        pitch_mm: [f64; 2],
+        origin_mm: [f64; 2],
+        z_mm: f64,
+    ) -> PyResult<Cast> {
+        let heights = expected::<f64, 2>("heights_mm", heights_mm)?.to_owned_array();
+        let surface = HeightMap::new(heights, origin_mm, pitch_mm, z_mm, Interpolation::default());
+        Ok(self.cast_surface(py, &surface.map_err(value_error)?))
+    }
+
+    /// The four images of a shot, by channel name.
+    #[pyo3(signature = (cast, fringe_numbers, **options))]
+    fn render<'py>(
+        &self,
+        py: Python<'py>,
+        cast: &Cast,
+        fringe_numbers: [f64; 3],
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let code = FringeCode::new(fringe_numbers, self.0.visible.width).map_err(value_error)?;
+        self.render_lights(py, cast, &Light::shot(&code), options)
+    }
+
+    /// The four images with the same fringes in all channels: one step of an N-step capture.
+    #[pyo3(signature = (cast, fringe_number, shift_rad, **options))]
+    fn render_step<'py>(
+        &self,
+        py: Python<'py>,
+        cast: &Cast,
+        fringe_number: f64,
+        shift_rad: f64,
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        self.render_lights(py, cast, &Light::step(fringe_number, shift_rad), options)
+    }
+}
+
+impl Bench {
+    fn cast_surface(&self, py: Python<'_>, surface: &dyn Surface) -> Cast {
+        Cast(py.detach(|| self.0.cast(surface)))
+    }
+
+    fn render_lights<'py>(
+        &self,
+        py: Python<'py>,
+        cast: &Cast,
+        lights: &[Light<'_>; 4],
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let options = render_options(options)?;
+        let planes = py
+            .detach(|| self.0.render(&cast.0, lights, &options))
+            .map_err(value_error)?;
+        let images = match planes {
+            Planes::U8(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
+            Planes::U16(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
+            Planes::F32(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
+        };
+        let named = PyDict::new(py);
+        for (name, image) in ["red", "green", "blue", "ir"].into_iter().zip(images) {
+            named.set_item(name, image)?;
+        }
+        Ok(named)
+    }
+}
+
+/// What the bench sees of a scene, and where each pixel is lit from.
+#[pyclass(frozen, module = "quadfringe._core")]
+pub struct Cast(rig::Cast);
+
+#[pymethods]
+impl Cast {
+    /// Points in the camera frame, (H, W, 3) float32 mm.
+    fn xyz_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
+        py.detach(|| self.0.xyz_mm()).into_pyarray(py)
+    }
+
+    /// Column of the visible projector that lights each pixel, (H, W) float32.
+    fn column_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        py.detach(|| self.0.column_px(Beam::Visible))
+            .into_pyarray(py)
+    }
+
+    /// Where a surface is seen that a projector does not light, (H, W) bool.
+    fn shadow<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<bool>> {
+        py.detach(|| self.0.shadow()).into_pyarray(py)
+    }
+
+    /// Distance to the nearest edge of depth, light or surface, (H, W) float32 pixels.
+    fn edge_distance_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
+        py.detach(|| self.0.edge_distance_px()).into_pyarray(py)
+    }
+}
+
+/// The kernel's defaults with what is given put in their place.
+fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> {
+    let mut options = RenderOptions::default();
+    let mut patch_mm = None;
+    for (name, value) in given.into_iter().flatten() {
+        let name: String = name.extract()?;
+        match name.as_str() {
+            "albedo" => options.albedo = Albedo::Uniform(value.extract()?),
+            "patch_mm" => patch_mm = Some(value.extract()?),
+            "ambient" => options.ambient = value.extract()?,
+            "shading" => options.shading = value.extract()?,
+            "projector_exponent" => options.projector_exponent = value.extract()?,
+            "crosstalk" => options.crosstalk = value.extract()?,
+            "gain" => options.gain = value.extract()?,
+            "blur_px" => options.blur_px = value.extract()?,
+            "infrared_from_visible" => options.infrared_from_visible = value.extract()?,
+            "noise" => options.noise = value.extract()?,
+            "camera_offset" => options.camera_offset = value.extract()?,
+            "camera_exponent" => options.camera_exponent = value.extract()?,
+            "bayer" => options.bayer = Some(bayer_named(value.extract()?)?),
+            "bit_depth" => {
+                options.bit_depth = BitDepth::from_bits(value.extract()?).map_err(value_error)?
+            }
+            "seed" => options.seed = value.extract()?,
+            _ => {
+                return Err(PyTypeError::new_err(format!(
+                    "render: no option is called {name:?}"
+                )));
+            }
+        }
+    }
+    if let (Some(side_mm), Albedo::Uniform(albedo)) = (patch_mm, &options.albedo) {
+        options.albedo = Albedo::Patches {
+            side_mm,
+            albedo: *albedo,
+        };
+    }
+    Ok(options)
+}
+
+fn bayer_named(name: &str) -> PyResult<BayerOrder> {
+    match name {
+        "rggb" => Ok(BayerOrder::Rggb),
+        "bggr" => Ok(BayerOrder::Bggr),
+        "grbg" => Ok(BayerOrder::Grbg),
+        "gbrg" => Ok(BayerOrder::Gbrg),
+        _ => Err(unknown("bayer", name, "rggb, bggr, grbg or gbrg")),
+    }
+}

@@ -1,0 +1,154 @@
+//! `Decoder`: one call from four images to a shape.
+
+use crate::arrays::{Images, value_error};
+use crate::device::{Device, unknown};
+use ndarray::ArrayView2;
+use numpy::{IntoPyArray, PyReadonlyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use quadfringe::condition::Sample;
+use quadfringe::height::Triangulator;
+use quadfringe::{Conditioner, Decoded, FringeCode, Method, Options, Response, Shot};
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::sync::{Mutex, PoisonError};
+
+/// Decodes shots of one size; planned and checked when made.
+#[pyclass(frozen, module = "quadfringe._core")]
+pub struct Decoder {
+    kernel: Mutex<quadfringe::Decoder>,
+    pool: Option<ThreadPool>,
+    full_scale: Option<f32>,
+}
+
+#[pymethods]
+impl Decoder {
+    #[new]
+    #[pyo3(signature = (shape, fringe_numbers, projector_width, *, full_scale = None, method = None,
+        modulation_min = None, quality_min = None, period_px = None, threads = None, dark = None, response = None,
+        crosstalk = None, ir_registration = None, camera = None, projector = None))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+    fn new(
+        py: Python<'_>,
+        shape: [usize; 2],
+        fringe_numbers: [f64; 3],
+        projector_width: usize,
+        full_scale: Option<f32>,
+        method: Option<&str>,
+        modulation_min: Option<f32>,
+        quality_min: Option<f32>,
+        period_px: Option<f64>,
+        threads: Option<usize>,
+        dark: Option<[f32; 4]>,
+        response: Option<[(f32, f32, f32); 4]>,
+        crosstalk: Option<[[f64; 4]; 4]>,
+        ir_registration: Option<[[f64; 3]; 2]>,
+        camera: Option<Device>,
+        projector: Option<Device>,
+    ) -> PyResult<Self> {
+        let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+        let plain = Options::default();
+        let options = Options {
+            method: method.map_or(Ok(plain.method), method_named)?,
+            modulation_min: modulation_min.unwrap_or(plain.modulation_min),
+            quality_min: quality_min.unwrap_or(plain.quality_min),
+            period_px: period_px.or(plain.period_px),
+        };
+        let ideal = Conditioner::default();
+        let conditioner = Conditioner {
+            dark: dark.unwrap_or(ideal.dark),
+            response: response.map_or(ideal.response, |four| four.map(response_of)),
+            crosstalk: crosstalk.unwrap_or(ideal.crosstalk),
+            ir_registration: ir_registration.unwrap_or(ideal.ir_registration),
+        };
+        let kernel = py.detach(|| {
+            let decoder = quadfringe::Decoder::new(code, shape, &conditioner, options)?;
+            match (&camera, &projector) {
+                (Some(camera), Some(projector)) => {
+                    decoder.triangulate_with(Triangulator::new(&camera.0, &projector.0)?)
+                }
+                _ => Ok(decoder),
+            }
+        });
+        Ok(Self {
+            kernel: Mutex::new(kernel.map_err(value_error)?),
+            pool: threads.map(pool_of).transpose()?,
+            full_scale,
+        })
+    }
+
+    /// Maps by name, float32.
+    fn decode<'py>(
+        &self,
+        py: Python<'py>,
+        red: &Bound<'py, PyAny>,
+        green: &Bound<'py, PyAny>,
+        blue: &Bound<'py, PyAny>,
+        ir: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let names = ["red", "green", "blue", "ir"];
+        let decoded = match Images::borrow(names, [red, green, blue, ir])? {
+            Images::U8(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
+            Images::U16(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
+            Images::F32(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
+        }?;
+        maps_by_name(py, decoded)
+    }
+}
+
+impl Decoder {
+    fn run<T: Sample>(&self, py: Python<'_>, planes: [ArrayView2<'_, T>; 4]) -> PyResult<Decoded> {
+        let work = || {
+            let mut shot = Shot::new(planes)?;
+            if let Some(full_scale) = self.full_scale {
+                shot = shot.with_full_scale(full_scale)?;
+            }
+            // A panic in an earlier shot leaves nothing behind that the next one does not write again.
+            self.kernel
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner)
+                .decode(&shot)
+        };
+        let decoded = py.detach(|| match &self.pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        });
+        decoded.map_err(value_error)
+    }
+}
+
+fn maps_by_name(py: Python<'_>, decoded: Decoded) -> PyResult<Bound<'_, PyDict>> {
+    let named = PyDict::new(py);
+    named.set_item("phase_rad", decoded.phase_rad.into_pyarray(py))?;
+    named.set_item("column_px", decoded.column_px.into_pyarray(py))?;
+    named.set_item("order", decoded.order.into_pyarray(py))?;
+    named.set_item("modulation", decoded.modulation.into_pyarray(py))?;
+    named.set_item("quality", decoded.quality.into_pyarray(py))?;
+    if let Some(xyz_mm) = decoded.xyz_mm {
+        named.set_item("xyz_mm", xyz_mm.into_pyarray(py))?;
+    }
+    Ok(named)
+}
+
+fn response_of((offset, exponent, knee): (f32, f32, f32)) -> Response {
+    Response {
+        offset,
+        exponent,
+        knee,
+    }
+}
+
+fn method_named(name: &str) -> PyResult<Method> {
+    match name {
+        "published" => Ok(Method::Published),
+        "best" => Ok(Method::Best),
+        _ => Err(unknown("method", name, "published or best")),
+    }
+}
+
+fn pool_of(threads: usize) -> PyResult<ThreadPool> {
+    let built = ThreadPoolBuilder::new().num_threads(threads).build();
+    built.map_err(|error| {
+        PyValueError::new_err(format!("threads: {threads} cannot be started: {error}"))
+    })
+}

@@ -1,0 +1,146 @@
+//! What is projected and through which optics: `optimum`, `check_code`, `pattern`, `Device`.
+
+use crate::arrays::value_error;
+use numpy::{IntoPyArray, PyArray2};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use quadfringe::fringe::{Channel, DmdLayout, FringeCode};
+use quadfringe::optics;
+
+/// A camera or a projector.
+#[pyclass(frozen, from_py_object, module = "quadfringe._core")]
+#[derive(Clone)]
+pub struct Device(pub optics::Device);
+
+#[pymethods]
+impl Device {
+    #[new]
+    #[pyo3(signature = (width, height, focal_px, centre_px, *, distortion = [0.0; 5],
+        rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], translation_mm = [0.0; 3]))]
+    fn new(
+        width: usize,
+        height: usize,
+        focal_px: [f64; 2],
+        centre_px: [f64; 2],
+        distortion: [f64; 5],
+        rotation: [[f64; 3]; 3],
+        translation_mm: [f64; 3],
+    ) -> PyResult<Self> {
+        optics::Device::new(
+            width,
+            height,
+            focal_px,
+            centre_px,
+            distortion,
+            rotation,
+            translation_mm,
+        )
+        .map(Self)
+        .map_err(value_error)
+    }
+
+    #[getter]
+    fn width(&self) -> usize {
+        self.0.width
+    }
+
+    #[getter]
+    fn height(&self) -> usize {
+        self.0.height
+    }
+
+    #[getter]
+    fn focal_px(&self) -> [f64; 2] {
+        self.0.focal_px
+    }
+
+    #[getter]
+    fn centre_px(&self) -> [f64; 2] {
+        self.0.centre_px
+    }
+
+    #[getter]
+    fn distortion(&self) -> [f64; 5] {
+        self.0.distortion
+    }
+
+    #[getter]
+    fn rotation(&self) -> [[f64; 3]; 3] {
+        self.0.rotation
+    }
+
+    #[getter]
+    fn translation_mm(&self) -> [f64; 3] {
+        self.0.translation_mm
+    }
+
+    /// Pixel (column, row) at which a point of the camera frame is seen; None when it is not in front.
+    fn project(&self, point_mm: [f64; 3]) -> Option<[f64; 2]> {
+        self.0.project(point_mm)
+    }
+
+    /// Origin (mm) and unit direction, in the camera frame, of the ray of a pixel (column, row).
+    fn ray(&self, pixel: [f64; 2]) -> ([f64; 3], [f64; 3]) {
+        let ray = self.0.ray(pixel);
+        (ray.origin_mm, ray.direction)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Device({} x {}, focal_px={:?})",
+            self.0.width, self.0.height, self.0.focal_px
+        )
+    }
+}
+
+/// Fringe numbers N, N - 1, N - sqrt(N).
+#[pyfunction]
+pub fn optimum(n: u32, projector_width: usize) -> PyResult<[f64; 3]> {
+    let code = FringeCode::optimum(n, projector_width).map_err(value_error)?;
+    Ok(code.numbers())
+}
+
+/// The ambiguity margin in rad of fringe numbers over a projector.
+#[pyfunction]
+pub fn check_code(fringe_numbers: [f64; 3], projector_width: usize) -> PyResult<f64> {
+    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+    Ok(code.ambiguity_margin_rad())
+}
+
+/// Ideal image of a channel, (height, width) float32.
+#[pyfunction]
+#[pyo3(signature = (channel, fringe_numbers, width, height, *, layout = "regular"))]
+pub fn pattern<'py>(
+    py: Python<'py>,
+    channel: &str,
+    fringe_numbers: [f64; 3],
+    width: usize,
+    height: usize,
+    layout: &str,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let code = FringeCode::new(fringe_numbers, width).map_err(value_error)?;
+    let (channel, layout) = (channel_named(channel)?, layout_named(layout)?);
+    let image = py.detach(|| quadfringe::fringe::pattern(&code, channel, height, layout));
+    Ok(image.into_pyarray(py))
+}
+
+fn channel_named(name: &str) -> PyResult<Channel> {
+    let found = Channel::ALL
+        .into_iter()
+        .find(|channel| channel.name() == name);
+    found.ok_or_else(|| unknown("channel", name, "R, G, B or IR"))
+}
+
+/// The mirror layout of this name.
+pub fn layout_named(name: &str) -> PyResult<DmdLayout> {
+    match name {
+        "regular" => Ok(DmdLayout::Regular),
+        "diamond" => Ok(DmdLayout::Diamond),
+        _ => Err(unknown("layout", name, "regular or diamond")),
+    }
+}
+
+/// The error for a name that is not in a list.
+pub fn unknown(what: &str, name: &str, known: &str) -> PyErr {
+    PyValueError::new_err(format!("{what}: expected {known}, got {name:?}"))
+}

@@ -1,0 +1,29 @@
+//! The Python border of quadfringe: borrow, release the GIL, call the kernel, map the error, hand over. No decisions.
+
+mod arrays;
+mod bench;
+mod decoder;
+mod device;
+mod stages;
+
+use pyo3::prelude::*;
+
+#[pymodule(gil_used = true)]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<device::Device>()?;
+    module.add_class::<bench::Bench>()?;
+    module.add_class::<bench::Cast>()?;
+    module.add_class::<decoder::Decoder>()?;
+    module.add_function(wrap_pyfunction!(device::optimum, module)?)?;
+    module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
+    module.add_function(wrap_pyfunction!(device::pattern, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::background, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::carrier, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::two_step, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::fourier, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::n_step, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::unwrap, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,154 @@
+//! The stages one by one, for those who teach or debug; all on (H, W) float32.
+
+use crate::arrays::{expected, value_error};
+use crate::device::unknown;
+use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use quadfringe::FringeCode;
+use quadfringe::demod::{self, Background, Band};
+
+type Map<'py> = Bound<'py, PyArray2<f32>>;
+
+fn map<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f32>> {
+    expected::<f32, 2>(name, object)
+}
+
+/// Background of every row.
+#[pyfunction]
+#[pyo3(signature = (image, period_px, *, kind = None))]
+pub fn background<'py>(
+    py: Python<'py>,
+    image: &Bound<'py, PyAny>,
+    period_px: f64,
+    kind: Option<&str>,
+) -> PyResult<Map<'py>> {
+    let image = map("image", image)?;
+    let (view, kind) = (image.as_array(), background_named(kind)?);
+    let found = py
+        .detach(|| demod::background(view, kind, period_px))
+        .map_err(value_error)?;
+    Ok(found.into_pyarray(py))
+}
+
+/// Fringe period in camera pixels along rows and along columns; infinite where no carrier stands out.
+#[pyfunction]
+pub fn carrier(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
+    let image = map("image", image)?;
+    let view = image.as_array();
+    let found = py.detach(|| demod::carrier(view));
+    Ok((found.row_px, found.column_px))
+}
+
+/// Wrapped phase from R and B without their backgrounds, of equal modulation.
+#[pyfunction]
+pub fn two_step<'py>(
+    py: Python<'py>,
+    red: &Bound<'py, PyAny>,
+    blue: &Bound<'py, PyAny>,
+) -> PyResult<Map<'py>> {
+    let (red, blue) = (map("red", red)?, map("blue", blue)?);
+    let views = (red.as_array(), blue.as_array());
+    let found = py
+        .detach(|| demod::two_step(views.0, views.1))
+        .map_err(value_error)?;
+    Ok(found.into_pyarray(py))
+}
+
+/// Wrapped phase of an image with fringes along its rows, by a Fourier filter.
+#[pyfunction]
+#[pyo3(signature = (image, period_px, *, band = None, kind = None))]
+pub fn fourier<'py>(
+    py: Python<'py>,
+    image: &Bound<'py, PyAny>,
+    period_px: f64,
+    band: Option<&str>,
+    kind: Option<&str>,
+) -> PyResult<Map<'py>> {
+    let image = map("image", image)?;
+    let (view, band, kind) = (image.as_array(), band_named(band)?, background_named(kind)?);
+    let found = py
+        .detach(|| demod::fourier(view, band, kind, period_px))
+        .map_err(value_error)?;
+    Ok(found.into_pyarray(py))
+}
+
+/// Absolute phase and order margin from three wrapped phases, point by point.
+#[pyfunction]
+pub fn unwrap<'py>(
+    py: Python<'py>,
+    first: &Bound<'py, PyAny>,
+    second: &Bound<'py, PyAny>,
+    third: &Bound<'py, PyAny>,
+    fringe_numbers: [f64; 3],
+    projector_width: usize,
+) -> PyResult<(Map<'py>, Map<'py>)> {
+    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+    let maps = [
+        map("first", first)?,
+        map("second", second)?,
+        map("third", third)?,
+    ];
+    let views = maps.each_ref().map(PyReadonlyArray2::as_array);
+    let found = py
+        .detach(|| quadfringe::unwrap::unwrap(&code, views))
+        .map_err(value_error)?;
+    Ok((found.0.into_pyarray(py), found.1.into_pyarray(py)))
+}
+
+/// Wrapped phase, background and modulation from a stack of equal steps over one period, (steps, H, W).
+#[pyfunction]
+pub fn n_step<'py>(
+    py: Python<'py>,
+    stack: &Bound<'py, PyAny>,
+) -> PyResult<(Map<'py>, Map<'py>, Map<'py>)> {
+    let stack = expected::<f32, 3>("stack", stack)?;
+    let view = stack.as_array();
+    let found = py.detach(|| demod::n_step(view)).map_err(value_error)?;
+    let maps = [found.phase_rad, found.background, found.modulation];
+    let [phase, background, modulation] = maps.map(|map| map.into_pyarray(py));
+    Ok((phase, background, modulation))
+}
+
+/// Response of a channel from N-step stacks, each (steps, H, W), fractions of full scale.
+#[pyfunction]
+pub fn estimate_response<'py>(
+    py: Python<'py>,
+    stacks: Vec<Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let stacks: PyResult<Vec<_>> = stacks
+        .iter()
+        .map(|stack| expected::<f32, 3>("stack", stack))
+        .collect();
+    let stacks = stacks?;
+    let views: Vec<_> = stacks.iter().map(PyReadonlyArray3::as_array).collect();
+    let found = py
+        .detach(|| quadfringe::condition::estimate_response(&views))
+        .map_err(value_error)?;
+    let named = PyDict::new(py);
+    named.set_item("offset", found.response.offset)?;
+    named.set_item("exponent", found.response.exponent)?;
+    named.set_item("knee", found.response.knee)?;
+    named.set_item("two_step_rms_before_rad", found.two_step_rms_before_rad)?;
+    named.set_item("two_step_rms_after_rad", found.two_step_rms_after_rad)?;
+    named.set_item("pixels", found.pixels)?;
+    Ok(named)
+}
+
+fn background_named(name: Option<&str>) -> PyResult<Background> {
+    match name {
+        None => Ok(Background::default()),
+        Some("mean_envelope") => Ok(Background::MeanEnvelope),
+        Some("moving_mean") => Ok(Background::MovingMean),
+        Some(name) => Err(unknown("background", name, "mean_envelope or moving_mean")),
+    }
+}
+
+fn band_named(name: Option<&str>) -> PyResult<Band> {
+    match name {
+        None => Ok(Band::default()),
+        Some("traditional") => Ok(Band::Traditional),
+        Some("improved") => Ok(Band::Improved),
+        Some(name) => Err(unknown("band", name, "traditional or improved")),
+    }
+}

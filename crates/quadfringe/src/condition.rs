@@ -1,0 +1,379 @@
+//! Raw shot -> linear planes: dark level, response, crosstalk, registration (step 1 of the recipe, system (S1)).
+//!
+//! A [`Conditioner`] is what a calibration knows about the four channels; a [`Shot`] is four borrowed images of one
+//! instant. Conditioning turns intensities into fractions of full scale that are linear in the projected light.
+
+mod estimate;
+mod response;
+mod sample;
+
+pub use estimate::{ResponseEstimate, estimate_response};
+pub use response::Response;
+pub use sample::Sample;
+
+use crate::{Channel, Error, Result};
+use ndarray::ArrayView2;
+
+/// Fraction of full scale from which on an intensity counts as saturated.
+const CLIPPED: f32 = 0.998;
+
+/// Four images of one exposure in the order R, G, B, IR, all `(rows, columns)` of one type; views may be strided.
+#[derive(Debug, Clone)]
+pub struct Shot<'a, T> {
+    planes: [ArrayView2<'a, T>; 4],
+    full_scale: f32,
+}
+
+impl<'a, T: Sample> Shot<'a, T> {
+    /// A shot whose white is the greatest value of the type (255, 65535; 1.0 for `f32`).
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the four images differ in size or are empty; [`Error::NotFinite`] for NaN or infinity.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use quadfringe::Shot;
+    /// let image = Array2::<u8>::zeros((4, 8));
+    /// let shot = Shot::new([image.view(), image.view(), image.view(), image.view()])?;
+    /// assert_eq!(shot.shape(), [4, 8]);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    pub fn new(planes: [ArrayView2<'a, T>; 4]) -> Result<Self> {
+        let shape = planes[0].shape().to_vec();
+        if shape.contains(&0) {
+            return Err(Error::shape("red image", &[1, 1], &shape));
+        }
+        for (plane, channel) in planes.iter().zip(Channel::ALL) {
+            if plane.shape() != shape {
+                let what = format!("{} image", channel.name());
+                return Err(Error::shape(what, &shape, plane.shape()));
+            }
+            T::check_finite(plane, channel.name())?;
+        }
+        Ok(Self {
+            planes,
+            full_scale: T::FULL_SCALE,
+        })
+    }
+
+    /// The value that stands for full scale, for example 4095 for 12 bit data in 16 bit words.
+    ///
+    /// # Errors
+    /// [`Error::Value`] unless positive and finite.
+    pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
+        if !(full_scale.is_finite() && full_scale > 0.0) {
+            return Err(Error::value(
+                "full_scale",
+                "a positive intensity",
+                full_scale,
+            ));
+        }
+        self.full_scale = full_scale;
+        Ok(self)
+    }
+
+    /// Rows and columns.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 2] {
+        [self.planes[0].nrows(), self.planes[0].ncols()]
+    }
+
+    /// The image of one channel.
+    #[must_use]
+    pub fn plane(&self, channel: Channel) -> ArrayView2<'a, T> {
+        self.planes[channel.index()]
+    }
+
+    /// The intensity that stands for full scale.
+    #[must_use]
+    pub fn full_scale(&self) -> f32 {
+        self.full_scale
+    }
+}
+
+/// What a calibration knows about the intensities of the four channels.
+///
+/// The default leaves intensities as they are.
+///
+/// ```
+/// use quadfringe::{Conditioner, Response};
+/// let conditioner = Conditioner {
+///     response: [Response { exponent: 0.5, ..Response::default() }; 4],
+///     ..Conditioner::default()
+/// };
+/// conditioner.check()?;
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conditioner {
+    /// Dark level per channel, as a fraction of full scale.
+    pub dark: [f32; 4],
+    /// Inverse response per channel.
+    pub response: [Response; 4],
+    /// Captured from projected light: rows captured R, G, B, IR; columns projected R, G, B, IR.
+    pub crosstalk: [[f64; 4]; 4],
+    /// Affine map from a visible pixel (x, y, 1) to the infrared pixel (x, y) that sees the same point.
+    pub ir_registration: [[f64; 3]; 2],
+}
+
+impl Default for Conditioner {
+    fn default() -> Self {
+        let mut crosstalk = [[0.0; 4]; 4];
+        (0..4).for_each(|i| crosstalk[i][i] = 1.0);
+        Self {
+            dark: [0.0; 4],
+            response: [Response::default(); 4],
+            crosstalk,
+            ir_registration: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+        }
+    }
+}
+
+impl Conditioner {
+    /// Whether every number can be used.
+    ///
+    /// # Errors
+    /// [`Error::Value`] that names the first number out of range, a crosstalk matrix without inverse included.
+    pub fn check(&self) -> Result<()> {
+        for (channel, dark) in Channel::ALL.iter().zip(self.dark) {
+            if !(0.0..1.0).contains(&dark) {
+                let name = format!("dark level of {}", channel.name());
+                return Err(Error::value(name, "a fraction of full scale in [0, 1)", dark));
+            }
+        }
+        for (channel, response) in Channel::ALL.iter().zip(self.response) {
+            response.check(channel.name())?;
+        }
+        if self.ir_registration.iter().flatten().any(|v| !v.is_finite()) {
+            let actual = format!("{:?}", self.ir_registration);
+            return Err(Error::value("ir_registration", "finite numbers", actual));
+        }
+        self.crosstalk_inverse().map(|_| ())
+    }
+
+    fn crosstalk_inverse(&self) -> Result<[[f32; 4]; 4]> {
+        let inverse = invert_4x4(&self.crosstalk).ok_or_else(|| {
+            let actual = format!("{:?}", self.crosstalk);
+            Error::value("crosstalk", "an invertible 4 x 4 matrix", actual)
+        })?;
+        Ok(inverse.map(|row| row.map(|v| v as f32)))
+    }
+
+    pub(crate) fn plan(&self) -> Result<Plan> {
+        self.check()?;
+        let identity = Self::default();
+        Ok(Plan {
+            dark: self.dark,
+            response: self.response,
+            unmix: (self.crosstalk != identity.crosstalk)
+                .then(|| self.crosstalk_inverse())
+                .transpose()?,
+            registration: (self.ir_registration != identity.ir_registration)
+                .then_some(self.ir_registration),
+            tables: std::array::from_fn(|_| Vec::new()),
+            tables_for: None,
+        })
+    }
+}
+
+/// A conditioner made ready for one type of sample.
+#[derive(Debug, Clone)]
+pub(crate) struct Plan {
+    dark: [f32; 4],
+    response: [Response; 4],
+    unmix: Option<[[f32; 4]; 4]>,
+    registration: Option<[[f64; 3]; 2]>,
+    tables: [Vec<f32>; 4],
+    tables_for: Option<(usize, f32)>,
+}
+
+impl Plan {
+    /// Fill the look-up tables when the type or the full scale has changed since the last shot.
+    pub fn prepare<T: Sample>(&mut self, full_scale: f32) {
+        if self.tables_for == Some((T::LEVELS, full_scale)) {
+            return;
+        }
+        for c in 0..4 {
+            let linear = |level: usize| self.linear(c, level as f32 / full_scale);
+            self.tables[c] = (0..T::LEVELS).map(linear).collect();
+        }
+        self.tables_for = Some((T::LEVELS, full_scale));
+    }
+
+    fn linear(&self, c: usize, fraction: f32) -> f32 {
+        self.response[c].linear(fraction - self.dark[c])
+    }
+
+    fn value<T: Sample>(&self, c: usize, raw: T, full_scale: f32) -> f32 {
+        match raw.level() {
+            Some(level) => self.tables[c][level],
+            None => self.linear(c, raw.intensity() / full_scale),
+        }
+    }
+
+    /// One row of the shot as four rows of linear light.
+    #[inline]
+    pub fn row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [&mut [f32]; 4]) {
+        for (c, target) in out.iter_mut().enumerate() {
+            if c == 3 && self.registration.is_some() {
+                continue;
+            }
+            let row = shot.planes[c].row(y);
+            for (value, &raw) in target.iter_mut().zip(row) {
+                *value = self.value(c, raw, shot.full_scale);
+            }
+        }
+        if let Some(map) = &self.registration {
+            self.registered_row(shot, map, y, out[3]);
+        }
+        if let Some(unmix) = &self.unmix {
+            unmix_row(unmix, out);
+        }
+    }
+
+    /// Which pixels of a row are saturated in no channel.
+    pub fn usable_row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [bool]) {
+        let limit = CLIPPED * shot.full_scale;
+        out.fill(true);
+        for plane in &shot.planes {
+            let row = plane.row(y);
+            out.iter_mut().zip(row).for_each(|(o, v)| *o &= v.intensity() < limit);
+        }
+    }
+
+    /// Infrared light at the visible pixels; no data outside the infrared chip.
+    fn registered_row<T: Sample>(
+        &self,
+        shot: &Shot<'_, T>,
+        map: &[[f64; 3]; 2],
+        y: usize,
+        out: &mut [f32],
+    ) {
+        let plane = &shot.planes[3];
+        let (rows, columns) = plane.dim();
+        for (x, value) in out.iter_mut().enumerate() {
+            let at = map.map(|m| m[0] * x as f64 + m[1] * y as f64 + m[2]);
+            let inside = at[0] >= 0.0
+                && at[1] >= 0.0
+                && at[0] <= (columns - 1) as f64
+                && at[1] <= (rows - 1) as f64;
+            *value = f32::NAN;
+            if inside {
+                let (x0, y0) = (at[0] as usize, at[1] as usize);
+                let (x1, y1) = ((x0 + 1).min(columns - 1), (y0 + 1).min(rows - 1));
+                let (fx, fy) = ((at[0] - x0 as f64) as f32, (at[1] - y0 as f64) as f32);
+                let tap = |r: usize, c: usize| self.value(3, plane[[r, c]], shot.full_scale);
+                let top = tap(y0, x0) * (1.0 - fx) + tap(y0, x1) * fx;
+                let bottom = tap(y1, x0) * (1.0 - fx) + tap(y1, x1) * fx;
+                *value = top * (1.0 - fy) + bottom * fy;
+            }
+        }
+    }
+}
+
+fn unmix_row(unmix: &[[f32; 4]; 4], rows: &mut [&mut [f32]; 4]) {
+    for x in 0..rows[0].len() {
+        let seen = [rows[0][x], rows[1][x], rows[2][x], rows[3][x]];
+        for (row, weights) in rows.iter_mut().zip(unmix) {
+            row[x] = weights.iter().zip(seen).map(|(w, s)| w * s).sum();
+        }
+    }
+}
+
+/// Gauss-Jordan with row pivoting; `None` when singular or badly conditioned.
+fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
+    let mut a = [[0.0; 8]; 4];
+    for i in 0..4 {
+        a[i][..4].copy_from_slice(&matrix[i]);
+        a[i][4 + i] = 1.0;
+    }
+    for column in 0..4 {
+        let pivot = (column..4).max_by(|&p, &q| a[p][column].abs().total_cmp(&a[q][column].abs()))?;
+        a.swap(column, pivot);
+        let head = a[column][column];
+        if !head.is_finite() || head.abs() < 1e-6 {
+            return None;
+        }
+        a[column].iter_mut().for_each(|v| *v /= head);
+        let lead = a[column];
+        for (row, values) in a.iter_mut().enumerate() {
+            if row != column {
+                let factor = values[column];
+                values.iter_mut().zip(lead).for_each(|(v, l)| *v -= factor * l);
+            }
+        }
+    }
+    Some(std::array::from_fn(|i| std::array::from_fn(|j| a[i][4 + j])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+
+    fn planes<T: Sample>(image: &Array2<T>) -> [ArrayView2<'_, T>; 4] {
+        [image.view(), image.view(), image.view(), image.view()]
+    }
+
+    #[test]
+    fn crosstalk_is_undone() {
+        let mut mix = Conditioner::default().crosstalk;
+        mix[0][1] = 0.15;
+        mix[2][3] = 0.1;
+        let conditioner = Conditioner {
+            crosstalk: mix,
+            ..Conditioner::default()
+        };
+        let light = [0.2f32, 0.4, 0.6, 0.8];
+        let seen: Vec<Array2<f32>> = (0..4)
+            .map(|i| (0..4).map(|j| mix[i][j] as f32 * light[j]).sum())
+            .map(|v: f32| Array2::from_elem((1, 3), v))
+            .collect();
+        let shot = Shot::new(std::array::from_fn(|c| seen[c].view())).unwrap();
+        let mut plan = conditioner.plan().unwrap();
+        plan.prepare::<f32>(shot.full_scale());
+        let mut out = [[0.0f32; 3]; 4];
+        let [r, g, b, ir] = &mut out;
+        plan.row(&shot, 0, &mut [r, g, b, ir]);
+        for (row, expected) in out.iter().zip(light) {
+            assert!(row.iter().all(|v| (v - expected).abs() < 1e-6));
+        }
+    }
+
+    #[test]
+    fn registration_shifts_infrared_and_marks_what_it_cannot_see() {
+        let image = Array2::from_shape_fn((2, 4), |(_, x)| x as f32 / 10.0);
+        let conditioner = Conditioner {
+            ir_registration: [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0]],
+            ..Conditioner::default()
+        };
+        let shot = Shot::new(planes(&image)).unwrap();
+        let plan = conditioner.plan().unwrap();
+        let mut out = [[0.0f32; 4]; 4];
+        let [r, g, b, ir] = &mut out;
+        plan.row(&shot, 0, &mut [r, g, b, ir]);
+        assert!((out[3][1] - 0.15).abs() < 1e-6);
+        assert!(out[3][3].is_nan());
+    }
+
+    #[test]
+    fn bad_conditioning_is_named() {
+        let singular = Conditioner {
+            crosstalk: [[1.0; 4]; 4],
+            ..Conditioner::default()
+        };
+        assert!(singular.check().unwrap_err().to_string().contains("invertible"));
+        let dark = Conditioner {
+            dark: [0.0, 1.5, 0.0, 0.0],
+            ..Conditioner::default()
+        };
+        assert!(dark.check().unwrap_err().to_string().contains("dark level of G"));
+    }
+
+    #[test]
+    fn images_of_two_sizes_are_refused() {
+        let (a, b) = (Array2::<u8>::zeros((4, 8)), Array2::<u8>::zeros((4, 9)));
+        let error = Shot::new([a.view(), a.view(), b.view(), a.view()]).unwrap_err();
+        assert!(error.to_string().contains("B image"), "{error}");
+    }
+}

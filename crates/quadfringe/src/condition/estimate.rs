@@ -1,0 +1,168 @@
+//! The response of a projector and camera from an N-step capture, with no truth but the capture itself.
+//!
+//! N steps over one period give the phase almost free of the response; two steps a quarter period apart do not. The
+//! response sought is the one whose inverse makes the two agree. That is the error a single-shot measurement suffers,
+//! so noise is weighed against curvature as the measurement will weigh it: on noisy captures the exponent comes out
+//! somewhat above 1 / gamma, on purpose. On gamma in fringe projection: Guo, He and Chen, "Gamma correction for digital
+//! fringe projection profilometry", Applied Optics 43, 2906 (2004).
+
+mod order;
+mod samples;
+mod select;
+mod simplex;
+
+use super::{Response, Sample};
+use crate::{Error, Result};
+use ndarray::ArrayView3;
+use order::{check_order, root_mean_square};
+use samples::Samples;
+use select::select;
+use simplex::minimise;
+
+/// Fewest steps that show a second harmonic.
+const STEPS_MIN: usize = 5;
+/// Greatest offset that is sought; black above a fifth of full scale leaves no room for fringes.
+const OFFSET_MAX: f64 = 0.2;
+/// Exponents that are sought: gamma 0.4 to 10.
+const EXPONENT: std::ops::Range<f64> = 0.1..2.5;
+const KNEE_MAX: f64 = 0.98;
+/// A knee has to lower the cost by this share, and by the square of 2 mrad, to be believed.
+const KNEE_GAIN: f64 = 0.02;
+const KNEE_GAIN_RAD2: f64 = 4e-6;
+/// A response and what it is worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ResponseEstimate {
+    /// Inverse response, ready for a conditioner.
+    pub response: Response,
+    /// RMS error of a two-step phase with the intensities as captured, rad.
+    pub two_step_rms_before_rad: f64,
+    /// The same after the response is inverted, rad; what remains is noise and drift.
+    pub two_step_rms_after_rad: f64,
+    /// Pixels that took part.
+    pub pixels: usize,
+}
+
+/// Inverse response from stacks of equally spaced phase steps over one period, each `(steps, rows, columns)`, in
+/// fractions of full scale (255 of 8 bit is 1.0), dark level subtracted if it is known.
+///
+/// Five steps or more; a multiple of four (8, 12, 16) separates the harmonics best. Several stacks, of other fringe
+/// numbers or other objects but of one size and one exposure, are pooled. Every object will do, best one with dark and
+/// bright areas that fills the image, unsaturated. The knee stays 0 unless the captures show one. The result does not
+/// depend on the number of threads.
+///
+/// # Errors
+/// [`Error::Value`] for no stack, fewer than 5 steps, intensities outside [0, 1], fewer than 1000 usable pixels (too
+/// dark, saturated, without fringes) or images out of order; [`Error::Shape`] when stacks differ in size;
+/// [`Error::NotFinite`] for NaN or infinity.
+///
+/// ```
+/// use ndarray::Array3;
+/// use quadfringe::condition::estimate_response;
+/// use std::f32::consts::TAU;
+/// let stack = Array3::from_shape_fn((12, 40, 50), |(s, y, x)| {
+///     let albedo = 0.5 + 0.01 * y as f32;
+///     let projected = 0.5 + 0.4 * (0.3 * x as f32 + TAU * s as f32 / 12.0).cos();
+///     albedo * projected.powf(2.2)
+/// });
+/// let estimate = estimate_response(&[stack.view()])?;
+/// assert!((estimate.response.exponent - 1.0 / 2.2).abs() < 0.01);
+/// assert!(estimate.two_step_rms_after_rad < 0.01);
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
+pub fn estimate_response(stacks: &[ArrayView3<'_, f32>]) -> Result<ResponseEstimate> {
+    check(stacks)?;
+    let traces = select(stacks)?;
+    let offset_max = offset_bound(&traces);
+    let samples = Samples::new(&traces);
+    let response = fit(&samples, offset_max);
+    let before = samples.rms_rad(&Response::default());
+    let after = samples.rms_rad(&response);
+    check_order(&after)?;
+    Ok(ResponseEstimate {
+        response,
+        two_step_rms_before_rad: root_mean_square(&before),
+        two_step_rms_after_rad: root_mean_square(&after),
+        pixels: samples.len(),
+    })
+}
+
+/// Offset, exponent and knee of least cost, the knee only if it pays.
+fn fit(samples: &Samples, offset_max: f64) -> Response {
+    let cost = |[offset, exponent, knee]: [f64; 3]| {
+        let inside = (0.0..=offset_max).contains(&offset)
+            && EXPONENT.contains(&exponent)
+            && (0.0..=KNEE_MAX).contains(&knee);
+        if inside {
+            samples.cost(&response([offset, exponent, knee]))
+        } else {
+            f64::INFINITY
+        }
+    };
+    let (start, step) = ((offset_max / 2.0).min(0.01), (offset_max / 2.0).min(0.03));
+    let bent = minimise([start, 0.5, 0.5], [step, 0.15, 0.3], cost);
+    let plain = minimise([start, 0.5], [step, 0.15], |[o, e]| cost([o, e, 0.0]));
+    if plain.1 * (1.0 - KNEE_GAIN) <= bent.1 + KNEE_GAIN_RAD2 {
+        response([plain.0[0], plain.0[1], 0.0])
+    } else {
+        response(bent.0)
+    }
+}
+
+fn response([offset, exponent, knee]: [f64; 3]) -> Response {
+    Response {
+        offset: offset as f32,
+        exponent: exponent as f32,
+        knee: knee as f32,
+    }
+}
+
+/// The offset may make hardly any pixel negative: at most the first percentile of the darkest steps.
+fn offset_bound(traces: &[samples::Trace<'_>]) -> f64 {
+    let darkest = |t: &samples::Trace<'_>| t.steps.iter().copied().fold(1.0, f32::min);
+    let mut floor: Vec<f32> = traces.iter().map(darkest).collect();
+    floor.sort_by(f32::total_cmp);
+    f64::from(floor[floor.len() / 100]).clamp(0.002, OFFSET_MAX)
+}
+
+fn check(stacks: &[ArrayView3<'_, f32>]) -> Result<()> {
+    let Some(first) = stacks.first() else {
+        return Err(Error::value(
+            "stacks",
+            "at least one stack of phase steps",
+            "none",
+        ));
+    };
+    for (i, stack) in stacks.iter().enumerate() {
+        if stack.shape() != first.shape() {
+            return Err(Error::shape(
+                format!("stack {i}"),
+                first.shape(),
+                stack.shape(),
+            ));
+        }
+        if stack.shape()[0] < STEPS_MIN {
+            let expected =
+                format!("at least {STEPS_MIN} phase steps along the first axis, best 8, 12 or 16");
+            return Err(Error::value(
+                format!("stack {i}"),
+                expected,
+                stack.shape()[0],
+            ));
+        }
+        for (s, image) in stack.outer_iter().enumerate() {
+            f32::check_finite(&image, &format!("stack {i}, step {s}"))?;
+            if let Some(value) = image.iter().find(|v| !(0.0..=1.0).contains(*v)) {
+                let expected = "fractions of full scale in [0, 1] (divide 8 bit by 255, 12 bit by 4095, 16 bit by 65535)";
+                return Err(Error::value(
+                    format!("stack {i}, step {s}"),
+                    expected,
+                    value,
+                ));
+            }
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,91 @@
+//! The types a camera delivers.
+
+use crate::{Error, Result};
+use ndarray::ArrayView2;
+
+mod sealed {
+    pub trait Sealed {}
+    impl Sealed for u8 {}
+    impl Sealed for u16 {}
+    impl Sealed for f32 {}
+}
+
+/// An intensity: `u8`, `u16` or `f32`.
+pub trait Sample: sealed::Sealed + Copy + Send + Sync + 'static {
+    /// Number of levels that a look-up table needs; 0 when there are too many.
+    const LEVELS: usize;
+    /// Intensity of white unless told otherwise.
+    const FULL_SCALE: f32;
+
+    /// Index into a look-up table, where there is one.
+    fn level(self) -> Option<usize>;
+
+    /// The intensity as a number.
+    fn intensity(self) -> f32;
+
+    /// Refuse NaN and infinity, where the type has them.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] with the count and the first place.
+    fn check_finite(_plane: &ArrayView2<'_, Self>, _channel: &str) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl Sample for u8 {
+    const LEVELS: usize = 1 << 8;
+    const FULL_SCALE: f32 = 255.0;
+
+    #[inline]
+    fn level(self) -> Option<usize> {
+        Some(self as usize)
+    }
+
+    #[inline]
+    fn intensity(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+impl Sample for u16 {
+    const LEVELS: usize = 1 << 16;
+    const FULL_SCALE: f32 = 65535.0;
+
+    #[inline]
+    fn level(self) -> Option<usize> {
+        Some(self as usize)
+    }
+
+    #[inline]
+    fn intensity(self) -> f32 {
+        f32::from(self)
+    }
+}
+
+impl Sample for f32 {
+    const LEVELS: usize = 0;
+    const FULL_SCALE: f32 = 1.0;
+
+    #[inline]
+    fn level(self) -> Option<usize> {
+        None
+    }
+
+    #[inline]
+    fn intensity(self) -> f32 {
+        self
+    }
+
+    fn check_finite(plane: &ArrayView2<'_, Self>, channel: &str) -> Result<()> {
+        let mut bad = plane.indexed_iter().filter(|(_, v)| !v.is_finite());
+        match bad.next() {
+            None => Ok(()),
+            Some(((row, column), _)) => Err(Error::NotFinite {
+                what: format!("{channel} image"),
+                count: 1 + bad.count(),
+                row,
+                column,
+            }),
+        }
+    }
+}

@@ -1,0 +1,21 @@
+//! Planes -> wrapped phase: background, two-step (TPS), Fourier (FTP), N-step, and the local fit of all channels.
+
+mod background;
+mod carrier;
+mod fourier;
+pub(crate) mod grid;
+pub(crate) mod joint;
+pub(crate) mod light;
+pub(crate) mod local_fit;
+mod n_step;
+
+mod two_step;
+pub(crate) mod window;
+
+pub use background::{Background, background};
+pub(crate) use background::{Scratch as BackgroundScratch, background_row};
+pub use carrier::{Carrier, carrier};
+pub use fourier::{Band, fourier};
+pub(crate) use fourier::{RowFilter, RowScratch};
+pub use n_step::{NStep, n_step};
+pub use two_step::two_step;

@@ -1,0 +1,103 @@
+//! Where the mirrors lie, and the ideal images for them.
+
+use ndarray::Array2;
+
+use super::{Channel, FringeCode, phase_at};
+
+/// How the mirrors of a projector's micromirror array lie.
+///
+/// ```
+/// use quadfringe::DmdLayout;
+/// assert_eq!(DmdLayout::Diamond.pitch_um(), [10.8, 5.4]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum DmdLayout {
+    /// Square grid: mirror (row, column) lies at (row, column).
+    #[default]
+    Regular,
+    /// Diamond array: odd rows lie half a column to the right.
+    Diamond,
+}
+
+impl DmdLayout {
+    /// Spacing of columns and of rows in um for the 912 x 1140 array: 7.63 and 7.63, or 10.8 and 5.4 (diamond).
+    #[must_use]
+    pub const fn pitch_um(self) -> [f64; 2] {
+        match self {
+            Self::Regular => [7.63, 7.63],
+            Self::Diamond => [10.8, 5.4],
+        }
+    }
+}
+
+/// Where the mirror stored at (row, column) lies, in columns.
+///
+/// ```
+/// use quadfringe::fringe::{DmdLayout, mirror_column};
+/// assert_eq!(mirror_column(DmdLayout::Diamond, 3, 10), 10.5);
+/// assert_eq!(mirror_column(DmdLayout::Regular, 3, 10), 10.0);
+/// ```
+#[must_use]
+pub fn mirror_column(layout: DmdLayout, row: usize, column: usize) -> f64 {
+    column as f64 + row_shift(layout, row)
+}
+
+/// How far a row of mirrors lies to the right, in columns.
+pub(crate) fn row_shift(layout: DmdLayout, row: usize) -> f64 {
+    match layout {
+        DmdLayout::Diamond if row % 2 == 1 => 0.5,
+        _ => 0.0,
+    }
+}
+
+/// Ideal image of a channel, `(height, projector width)`, linear light from 0 to 1 (S1).
+///
+/// ```
+/// use quadfringe::fringe::{Channel, DmdLayout, FringeCode, pattern};
+/// let code = FringeCode::optimum(36, 912)?;
+/// let red = pattern(&code, Channel::R, 1140, DmdLayout::Regular);
+/// assert_eq!((red.dim(), red[[0, 0]]), ((1140, 912), 1.0));
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[must_use]
+pub fn pattern(
+    code: &FringeCode,
+    channel: Channel,
+    height: usize,
+    layout: DmdLayout,
+) -> Array2<f32> {
+    let level = |row: usize, column: usize| {
+        let phase = phase_at(
+            code,
+            channel.phase_index(),
+            mirror_column(layout, row, column),
+        );
+        (0.5 + 0.5 * (phase + channel.shift_rad()).cos()) as f32
+    };
+    let kinds: Vec<Vec<f32>> = (0..2)
+        .map(|row| {
+            (0..code.projector_width)
+                .map(|column| level(row, column))
+                .collect()
+        })
+        .collect();
+    Array2::from_shape_fn((height, code.projector_width), |(row, column)| {
+        kinds[row % 2][column]
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    #[test]
+    fn diamond_rows_are_shifted() {
+        let code = FringeCode::optimum(36, 912).expect("valid code");
+        let image = pattern(&code, Channel::B, 4, DmdLayout::Diamond);
+        let expected = 0.5 + 0.5 * (phase_at(&code, 0, 7.5) + PI / 2.0).cos();
+        assert!((f64::from(image[[3, 7]]) - expected).abs() < 1e-7);
+        assert_eq!(image.row(0), image.row(2));
+    }
+}

@@ -1,0 +1,137 @@
+//! One ray through each camera pixel, and where the point it meets is lit from (S9).
+
+use ndarray::{Array2, Axis};
+use rayon::prelude::*;
+
+use super::{Beam, Bench};
+use crate::optics::{Device, Ray, dot};
+use crate::surface::Surface;
+
+/// How far before a point a shadow ray stops, mm, so that the point does not shade itself.
+const SHADOW_GAP_MM: f64 = 1e-3;
+
+/// What one camera pixel sees.
+///
+/// ```
+/// use quadfringe::{Device, rig::{Beam, Bench}, surface::Plane};
+/// let mut bench = Bench::reference();
+/// bench.camera = Device::pinhole(8, 6, [20.0, 20.0], [3.5, 2.5])?;
+/// let cast = bench.cast(&Plane::at_z(800.0));
+/// assert!(cast.hits()[[3, 4]].is_lit(Beam::Visible));
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hit {
+    /// Point of the surface in the camera frame, mm; NaN where the ray meets nothing.
+    pub xyz_mm: [f64; 3],
+    /// Projector column and row that light the point, for each [`Beam`]; NaN in shadow and outside the projected image.
+    pub lit_from_px: [[f64; 2]; 2],
+    /// Cosine between the surface normal and the direction to each projector.
+    pub facing: [f64; 2],
+}
+
+impl Hit {
+    const NOTHING: Self = Self {
+        xyz_mm: [f64::NAN; 3],
+        lit_from_px: [[f64::NAN; 2]; 2],
+        facing: [f64::NAN; 2],
+    };
+
+    /// Whether the pixel sees a surface.
+    #[must_use]
+    pub fn is_surface(&self) -> bool {
+        !self.xyz_mm[2].is_nan()
+    }
+
+    /// Whether a projector lights the point.
+    #[must_use]
+    pub fn is_lit(&self, beam: Beam) -> bool {
+        !self.lit_from_px[beam.index()][0].is_nan()
+    }
+}
+
+/// A scene as the bench sees it: made once by [`Bench::cast`], rendered as often as needed, and the truth to judge by.
+///
+/// ```
+/// use quadfringe::{Device, rig::{Beam, Bench}, surface::Plane};
+/// let mut bench = Bench::reference();
+/// bench.camera = Device::pinhole(8, 6, [20.0, 20.0], [3.5, 2.5])?;
+/// let cast = bench.cast(&Plane::at_z(800.0));
+/// assert_eq!(cast.depth_mm()[[3, 4]], 800.0);
+/// assert!(cast.column_px(Beam::Visible)[[3, 4]] > 400.0);
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Cast {
+    pub(super) hits: Array2<Hit>,
+    /// Depth difference of neighbouring pixels above which a step lies between them, in mm per mm of depth.
+    pub(super) step_per_depth: f64,
+}
+
+impl Bench {
+    /// Traces the camera pixels to the surface and the surface to both projectors; rows in parallel.
+    ///
+    /// A point is lit by a projector when it faces it, lies within the projected image and nothing stands between.
+    #[must_use]
+    pub fn cast(&self, surface: &dyn Surface) -> Cast {
+        let size = (self.camera.height, self.camera.width);
+        let mut hits = Array2::from_elem(size, Hit::NOTHING);
+        let coaxial = self.visible == self.infrared;
+        let projectors = Beam::ALL.map(|beam| {
+            let device = self.projector(beam);
+            (device, device.centre_mm())
+        });
+        hits.axis_iter_mut(Axis(0))
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(row, mut line)| {
+                for (column, hit) in line.iter_mut().enumerate() {
+                    let ray = self.camera.ray([column as f64, row as f64]);
+                    let Some(t) = surface.hit(&ray, [0.0, f64::INFINITY]) else {
+                        continue;
+                    };
+                    let point = ray.at(t);
+                    let normal = surface.normal(point);
+                    hit.xyz_mm = point;
+                    for (index, (device, centre)) in projectors.iter().enumerate() {
+                        if index == 1 && coaxial {
+                            hit.lit_from_px[1] = hit.lit_from_px[0];
+                            hit.facing[1] = hit.facing[0];
+                            continue;
+                        }
+                        let (facing, lit_from) = light_at(surface, device, *centre, point, normal);
+                        hit.facing[index] = facing;
+                        hit.lit_from_px[index] = lit_from.unwrap_or([f64::NAN; 2]);
+                    }
+                }
+            });
+        // Four pixels' footprint per pixel: a wall steeper than 76 degrees.
+        let step_per_depth = 4.0 / self.camera.focal_px[0].min(self.camera.focal_px[1]);
+        Cast {
+            hits,
+            step_per_depth,
+        }
+    }
+}
+
+/// Cosine towards the projector, and the projector pixel that lights the point.
+fn light_at(
+    surface: &dyn Surface,
+    projector: &Device,
+    centre: [f64; 3],
+    point: [f64; 3],
+    normal: [f64; 3],
+) -> (f64, Option<[f64; 2]>) {
+    let away: [f64; 3] = std::array::from_fn(|i| point[i] - centre[i]);
+    let distance = dot(away, away).sqrt();
+    let ray = Ray {
+        origin_mm: centre,
+        direction: away.map(|c| c / distance),
+    };
+    let facing = -dot(normal, ray.direction);
+    let pixel = projector
+        .project(point)
+        .filter(|pixel| facing > 0.0 && projector.contains(*pixel));
+    let lit = pixel.filter(|_| surface.hit(&ray, [0.0, distance - SHADOW_GAP_MM]).is_none());
+    (facing, lit)
+}

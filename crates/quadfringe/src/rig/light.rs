@@ -1,0 +1,159 @@
+//! What a projector shows in one channel.
+
+use std::f64::consts::TAU;
+
+use ndarray::ArrayView2;
+
+use crate::error::{Error, Result};
+use crate::fringe::{Channel, DmdLayout, FringeCode, row_shift};
+use crate::optics::Device;
+
+/// Direction in which fringes count.
+///
+/// ```
+/// use quadfringe::rig::{Axis, Light};
+/// let horizontal = Light::Fringes { number: 45.0, shift_rad: 0.0, axis: Axis::Rows };
+/// assert_ne!(horizontal, Light::fringes(45.0, 0.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Axis {
+    /// Vertical fringes, counted over the columns.
+    #[default]
+    Columns,
+    /// Horizontal fringes, counted over the rows; for calibrating a projector.
+    Rows,
+}
+
+/// Light of one channel before the projector's response, 0 to 1.
+///
+/// ```
+/// use quadfringe::{FringeCode, rig::Light};
+/// let lights = Light::shot(&FringeCode::optimum(36, 912)?);
+/// assert_eq!(lights[1], Light::fringes(35.0, 0.0));
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub enum Light<'a> {
+    /// The same everywhere: 1 for white, 0 for black.
+    Uniform(f64),
+    /// The continuous sinusoid `0.5 + 0.5 cos(2 pi number u / size + shift)` (S1), not sampled by mirrors.
+    Fringes {
+        /// Fringes over the full width (or height) of the projector.
+        number: f64,
+        /// Shift, rad.
+        shift_rad: f64,
+        /// Whether they count over columns or rows.
+        axis: Axis,
+    },
+    /// An image of the projector's size (rows, columns), read between mirrors by straight interpolation.
+    Image(ArrayView2<'a, f32>),
+}
+
+impl Light<'_> {
+    /// Vertical fringes.
+    #[must_use]
+    pub const fn fringes(number: f64, shift_rad: f64) -> Self {
+        Self::Fringes {
+            number,
+            shift_rad,
+            axis: Axis::Columns,
+        }
+    }
+
+    /// The four channels of a shot: R, G, B, IR.
+    #[must_use]
+    pub fn shot(code: &FringeCode) -> [Self; 4] {
+        Channel::ALL.map(|channel| {
+            Self::fringes(code.numbers()[channel.phase_index()], channel.shift_rad())
+        })
+    }
+
+    /// The same fringes in all four channels: one step of an N-step capture.
+    #[must_use]
+    pub fn step(number: f64, shift_rad: f64) -> [Self; 4] {
+        [(); 4].map(|()| Self::fringes(number, shift_rad))
+    }
+
+    pub(super) fn check(&self, projector: &Device) -> Result<()> {
+        match self {
+            Self::Image(image) if image.dim() != (projector.height, projector.width) => {
+                Err(Error::shape(
+                    "pattern image",
+                    &[projector.height, projector.width],
+                    image.shape(),
+                ))
+            }
+            Self::Uniform(level) if !(0.0..=1.0).contains(level) => {
+                Err(Error::value("uniform light", "0 to 1", level))
+            }
+            Self::Fringes {
+                number, shift_rad, ..
+            } if !(number.is_finite() && shift_rad.is_finite()) => {
+                let actual = format!("number {number}, shift {shift_rad} rad");
+                Err(Error::value("fringes", "a finite number and shift", actual))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Light that leaves the projector at (column, row).
+    pub(super) fn level(&self, projector: &Device, layout: DmdLayout, at: [f64; 2]) -> f64 {
+        match self {
+            Self::Uniform(level) => *level,
+            Self::Fringes {
+                number,
+                shift_rad,
+                axis,
+            } => {
+                let cycles = match axis {
+                    Axis::Columns => at[0] / projector.width as f64,
+                    Axis::Rows => at[1] / projector.height as f64,
+                };
+                0.5 + 0.5 * (TAU * number * cycles + shift_rad).cos()
+            }
+            Self::Image(image) => sample(image, layout, at),
+        }
+    }
+}
+
+/// Straight interpolation along the mirrors of the two nearest rows, then between the rows.
+fn sample(image: &ArrayView2<'_, f32>, layout: DmdLayout, [column, row]: [f64; 2]) -> f64 {
+    let (rows, columns) = image.dim();
+    let split = |position: f64, n: usize| {
+        let held = position.clamp(0.0, (n - 1) as f64);
+        let first = held as usize;
+        (first, (first + 1).min(n - 1), held - first as f64)
+    };
+    let (upper, lower, v) = split(row, rows);
+    let along = |row: usize| {
+        let (left, right, u) = split(column - row_shift(layout, row), columns);
+        let [a, b] = [image[[row, left]], image[[row, right]]].map(f64::from);
+        a + u * (b - a)
+    };
+    let first = along(upper);
+    first + v * (along(lower) - first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fringe::pattern;
+
+    #[test]
+    fn images_follow_the_continuous_fringes_in_both_layouts() {
+        let code = FringeCode::optimum(36, 912).expect("valid code");
+        let device = Device::pinhole(912, 20, [1500.0; 2], [455.5, 9.5]).expect("valid device");
+        for layout in [DmdLayout::Regular, DmdLayout::Diamond] {
+            let image = pattern(&code, Channel::R, 20, layout);
+            let (image, fringes) = (Light::Image(image.view()), Light::fringes(36.0, 0.0));
+            for i in 0..500 {
+                let at = [1.0 + 1.8 * f64::from(i), 0.036 * f64::from(i)];
+                let level = |light: &Light<'_>| light.level(&device, layout, at);
+                assert!(
+                    (level(&image) - level(&fringes)).abs() < 5e-3,
+                    "{layout:?} {at:?}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,212 @@
+//! A cast scene under four patterns, as the camera delivers it.
+
+use ndarray::{Array2, Axis};
+use rayon::prelude::*;
+
+use super::{Beam, Bench, Cast, Hit, Light, RenderOptions, expose, mosaic, resample};
+use crate::error::{Error, Result};
+use crate::fringe::Channel;
+
+/// The four images of a shot in the order R, G, B, IR, each `(rows, columns)`.
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::rig::Planes;
+/// let planes = Planes::U8([(); 4].map(|()| Array2::zeros((6, 8))));
+/// assert_eq!(planes.shape(), (6, 8));
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub enum Planes {
+    /// 8 bit, full scale 255.
+    U8([Array2<u8>; 4]),
+    /// 10, 12 or 16 bit, full scale 1023, 4095 or 65535.
+    U16([Array2<u16>; 4]),
+    /// Not rounded, full scale 1.
+    F32([Array2<f32>; 4]),
+}
+
+impl Planes {
+    /// Size of each image (rows, columns).
+    #[must_use]
+    pub fn shape(&self) -> (usize, usize) {
+        match self {
+            Self::U8(planes) => planes[0].dim(),
+            Self::U16(planes) => planes[0].dim(),
+            Self::F32(planes) => planes[0].dim(),
+        }
+    }
+
+    fn from_counts(planes: [Array2<f32>; 4], full_scale: f32) -> Self {
+        if full_scale <= 1.0 {
+            Self::F32(planes)
+        } else if full_scale <= 255.0 {
+            Self::U8(planes.map(|plane| plane.mapv(|count| count as u8)))
+        } else {
+            Self::U16(planes.map(|plane| plane.mapv(|count| count as u16)))
+        }
+    }
+}
+
+impl Bench {
+    /// The shot of a scene at rest.
+    ///
+    /// Light, projector response, albedo, shading and room light, crosstalk, exposure, blur, chip offset, noise, camera
+    /// response, saturation, rounding, Bayer chip: in this order. Bit-identical for any number of threads.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the cast, a pattern image or an albedo image has the wrong size; [`Error::Value`] when an
+    /// option is out of range.
+    ///
+    /// ```
+    /// use quadfringe::{Device, rig::{Bench, Light, Planes, RenderOptions}, surface::Plane};
+    /// let mut bench = Bench::reference();
+    /// bench.camera = Device::pinhole(8, 6, [20.0, 20.0], [3.5, 2.5])?;
+    /// let cast = bench.cast(&Plane::at_z(800.0));
+    /// let white = [(); 4].map(|()| Light::Uniform(1.0));
+    /// let Planes::U8(planes) = bench.render(&cast, &white, &RenderOptions::default())? else { unreachable!() };
+    /// assert_eq!(planes[0][[3, 4]], 242);
+    /// # Ok::<(), quadfringe::error::Error>(())
+    /// ```
+    pub fn render(
+        &self,
+        cast: &Cast,
+        lights: &[Light<'_>; 4],
+        options: &RenderOptions,
+    ) -> Result<Planes> {
+        self.render_moving([cast; 3], lights, options)
+    }
+
+    /// The shot of a scene that moves while the visible projector shows R, then G, then B: one cast for each of the three
+    /// instants. The infrared projector shows its pattern throughout, so that the infrared image is their mean.
+    ///
+    /// # Errors
+    /// As [`Bench::render`].
+    pub fn render_moving(
+        &self,
+        casts: [&Cast; 3],
+        lights: &[Light<'_>; 4],
+        options: &RenderOptions,
+    ) -> Result<Planes> {
+        let shape = (self.camera.height, self.camera.width);
+        for cast in casts {
+            if cast.shape() != shape {
+                let (rows, columns) = cast.shape();
+                return Err(Error::shape("cast", &[shape.0, shape.1], &[rows, columns]));
+            }
+        }
+        for (channel, light) in Channel::ALL.into_iter().zip(lights) {
+            light.check(self.projector(Beam::of(channel)))?;
+        }
+        options.check(shape)?;
+        let mut planes = self.light_on_sensor(casts, lights, options);
+        if options.blur_px > 0.0 {
+            planes = planes.map(|plane| resample::blur(&plane, options.blur_px));
+        }
+        if let Some(affine) = options.infrared_from_visible {
+            planes[3] = resample::warp(&planes[3], resample::inverse(affine)?);
+        }
+        for (channel, plane) in planes.iter_mut().enumerate() {
+            expose::expose(plane, channel, options);
+        }
+        if let Some(order) = options.bayer {
+            mosaic::sample_and_interpolate(&mut planes[..3], order);
+            let rounds = options.bit_depth.full_scale() > 1.0;
+            if rounds {
+                planes[..3]
+                    .iter_mut()
+                    .for_each(|plane| plane.par_mapv_inplace(f32::round));
+            }
+        }
+        Ok(Planes::from_counts(planes, options.bit_depth.full_scale()))
+    }
+
+    /// Linear light of the four captured channels, 1 = full scale.
+    fn light_on_sensor(
+        &self,
+        casts: [&Cast; 3],
+        lights: &[Light<'_>; 4],
+        options: &RenderOptions,
+    ) -> [Array2<f32>; 4] {
+        let shape = casts[0].shape();
+        let mut planes = [(); 4].map(|()| Array2::zeros(shape));
+        let [red, green, blue, infrared] = &mut planes;
+        let moving = casts.iter().any(|cast| !std::ptr::eq(*cast, casts[0]));
+        let painter = Painter {
+            bench: self,
+            lights,
+            options,
+        };
+        red.axis_iter_mut(Axis(0))
+            .into_par_iter()
+            .zip(green.axis_iter_mut(Axis(0)))
+            .zip(blue.axis_iter_mut(Axis(0)))
+            .zip(infrared.axis_iter_mut(Axis(0)))
+            .enumerate()
+            .for_each(|(row, (((mut red, mut green), mut blue), mut infrared))| {
+                for column in 0..shape.1 {
+                    let pixel = [row, column];
+                    let hits = casts.map(|cast| &cast.hits[pixel]);
+                    let captured = painter.captured(pixel, hits, moving);
+                    red[column] = captured[0];
+                    green[column] = captured[1];
+                    blue[column] = captured[2];
+                    infrared[column] = captured[3];
+                }
+            });
+        planes
+    }
+}
+
+/// What one pixel receives.
+struct Painter<'a, 'image> {
+    bench: &'a Bench,
+    lights: &'a [Light<'image>; 4],
+    options: &'a RenderOptions,
+}
+
+impl Painter<'_, '_> {
+    /// Light of the four captured channels; R, G and B each have their own instant.
+    fn captured(&self, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f32; 4] {
+        let mut light = [0.0; 4];
+        for (channel, hit) in Channel::ALL.into_iter().zip(hits) {
+            light[channel.index()] = self.reflected(channel, pixel, hit);
+        }
+        let infrared = |hit: &Hit| self.reflected(Channel::Ir, pixel, hit);
+        light[3] = if moving {
+            hits.into_iter().map(infrared).sum::<f64>() / 3.0
+        } else {
+            infrared(hits[0])
+        };
+        std::array::from_fn(|c| {
+            let mixed = (0..4)
+                .map(|p| self.options.crosstalk[c][p] * light[p])
+                .sum::<f64>();
+            (self.options.gain[c] * mixed) as f32
+        })
+    }
+
+    fn reflected(&self, channel: Channel, pixel: [usize; 2], hit: &Hit) -> f64 {
+        if !hit.is_surface() {
+            return 0.0;
+        }
+        let (index, beam) = (channel.index(), Beam::of(channel));
+        let mut light = self.options.ambient[index];
+        if hit.is_lit(beam) {
+            let at = hit.lit_from_px[beam.index()];
+            let projector = self.bench.projector(beam);
+            let level = self.lights[index].level(projector, self.bench.layout, at);
+            let exponent = self.options.projector_exponent[index];
+            let sent = if exponent == 1.0 {
+                level
+            } else {
+                level.max(0.0).powf(exponent)
+            };
+            light += if self.options.shading {
+                sent * hit.facing[beam.index()]
+            } else {
+                sent
+            };
+        }
+        light * f64::from(self.options.albedo.at(pixel, hit.xyz_mm)[index])
+    }
+}

@@ -1,0 +1,174 @@
+//! The truth of a cast scene, as maps.
+
+use ndarray::{Array2, Array3};
+
+use super::{Beam, Cast, Hit};
+use crate::fringe::{FringeCode, phase_at};
+
+impl Cast {
+    /// Size of the maps (rows, columns).
+    #[must_use]
+    pub fn shape(&self) -> (usize, usize) {
+        self.hits.dim()
+    }
+
+    /// What each pixel sees, in double precision.
+    #[must_use]
+    pub const fn hits(&self) -> &Array2<Hit> {
+        &self.hits
+    }
+
+    /// Depth z in mm, NaN where nothing is seen.
+    #[must_use]
+    pub fn depth_mm(&self) -> Array2<f32> {
+        self.hits.map(|hit| hit.xyz_mm[2] as f32)
+    }
+
+    /// Points in the camera frame, `(rows, columns, 3)` in mm, NaN where nothing is seen.
+    #[must_use]
+    pub fn xyz_mm(&self) -> Array3<f32> {
+        let (rows, columns) = self.shape();
+        Array3::from_shape_fn((rows, columns, 3), |(row, column, axis)| {
+            self.hits[[row, column]].xyz_mm[axis] as f32
+        })
+    }
+
+    /// Projector column that lights each pixel, NaN where the projector lights nothing that is seen.
+    #[must_use]
+    pub fn column_px(&self, beam: Beam) -> Array2<f32> {
+        self.hits.map(|hit| hit.lit_from_px[beam.index()][0] as f32)
+    }
+
+    /// Projector row that lights each pixel, NaN where the projector lights nothing that is seen.
+    #[must_use]
+    pub fn row_px(&self, beam: Beam) -> Array2<f32> {
+        self.hits.map(|hit| hit.lit_from_px[beam.index()][1] as f32)
+    }
+
+    /// Absolute phase in rad of the first fringe number, 0 at column 0 of the visible projector; NaN where dark.
+    #[must_use]
+    pub fn phase_rad(&self, code: &FringeCode) -> Array2<f32> {
+        self.hits
+            .map(|hit| phase_at(code, 0, hit.lit_from_px[0][0]) as f32)
+    }
+
+    /// Fringe order of the first fringe number: the whole periods in the absolute phase; NaN where dark.
+    #[must_use]
+    pub fn order(&self, code: &FringeCode) -> Array2<f32> {
+        let period = code.period_px(0);
+        self.hits
+            .map(|hit| (hit.lit_from_px[0][0] / period).floor() as f32)
+    }
+
+    /// Where a surface is seen that at least one projector does not light.
+    #[must_use]
+    pub fn shadow(&self) -> Array2<bool> {
+        self.hits
+            .map(|hit| hit.is_surface() && Beam::ALL.iter().any(|beam| !hit.is_lit(*beam)))
+    }
+
+    /// Distance in pixels to the nearest edge: a step in depth, a border of shadow, or a border of the surface. Pixels on
+    /// either side of an edge have 0; without any edge all are infinite.
+    #[must_use]
+    pub fn edge_distance_px(&self) -> Array2<f32> {
+        let edges = self.edges();
+        let (rows, columns) = self.shape();
+        let mut squared = Array2::from_elem((rows, columns), f32::INFINITY);
+        for (mut line, marks) in squared.columns_mut().into_iter().zip(edges.columns()) {
+            let marks: Vec<f32> = marks
+                .iter()
+                .map(|edge| if *edge { 0.0 } else { f32::INFINITY })
+                .collect();
+            line.iter_mut()
+                .zip(squared_distance(&marks))
+                .for_each(|(out, d)| *out = d);
+        }
+        for mut line in squared.rows_mut() {
+            let before = line.to_vec();
+            line.iter_mut()
+                .zip(squared_distance(&before))
+                .for_each(|(out, d)| *out = d.sqrt());
+        }
+        squared
+    }
+
+    fn edges(&self) -> Array2<bool> {
+        let (rows, columns) = self.shape();
+        let mut edges = Array2::from_elem((rows, columns), false);
+        for row in 0..rows {
+            for column in 0..columns {
+                for next in [[row, column + 1], [row + 1, column]] {
+                    if next[0] < rows && next[1] < columns {
+                        let pair = [&self.hits[[row, column]], &self.hits[next]];
+                        if self.is_edge(pair) {
+                            edges[[row, column]] = true;
+                            edges[next] = true;
+                        }
+                    }
+                }
+            }
+        }
+        edges
+    }
+
+    fn is_edge(&self, [a, b]: [&Hit; 2]) -> bool {
+        let differs = |beam: &Beam| a.is_lit(*beam) != b.is_lit(*beam);
+        let (za, zb) = (a.xyz_mm[2], b.xyz_mm[2]);
+        a.is_surface() != b.is_surface()
+            || Beam::ALL.iter().any(differs)
+            || (za - zb).abs() > self.step_per_depth * za.min(zb)
+    }
+}
+
+/// Squared distance transform along a line: the lower envelope of the parabolas `values[q] + (p - q)^2`
+/// (Felzenszwalb and Huttenlocher, 2012).
+fn squared_distance(values: &[f32]) -> Vec<f32> {
+    let mut hull: Vec<(usize, f32)> = Vec::new();
+    for (q, value) in values
+        .iter()
+        .enumerate()
+        .filter(|(_, value)| value.is_finite())
+    {
+        let height = |at: usize, value: f32| value + (at * at) as f32;
+        let mut from = f32::NEG_INFINITY;
+        while let Some((last, start)) = hull.last().copied() {
+            from = (height(q, *value) - height(last, values[last])) / (2 * (q - last)) as f32;
+            if from > start {
+                break;
+            }
+            hull.pop();
+            from = f32::NEG_INFINITY;
+        }
+        hull.push((q, from));
+    }
+    let mut segment = 0;
+    (0..values.len())
+        .map(|p| {
+            while segment + 1 < hull.len() && hull[segment + 1].1 < p as f32 {
+                segment += 1;
+            }
+            hull.get(segment).map_or(f32::INFINITY, |(q, _)| {
+                let step = p.abs_diff(*q) as f32;
+                values[*q] + step * step
+            })
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn distance_along_a_line_is_exact() {
+        let far = f32::INFINITY;
+        let values = [far, 4.0, far, far, far, 0.0, far, 1.0, far, far];
+        for (p, fast) in squared_distance(&values).into_iter().enumerate() {
+            let slow = (0..values.len())
+                .map(|q| values[q] + (p.abs_diff(q) * p.abs_diff(q)) as f32)
+                .fold(far, f32::min);
+            assert_eq!(fast, slow);
+        }
+        assert!(squared_distance(&[far; 4]).iter().all(|d| d.is_infinite()));
+    }
+}

@@ -1,0 +1,223 @@
+//! What is measured: implicit surfaces in the camera frame, composed, not meshed.
+//!
+//! A [`Surface`] is a function that is positive in free space and negative inside the body (S9). Boxes, spheres and planes
+//! are met in closed form; all others by marching along the ray in steps that cannot pass the surface, then closing a
+//! bracket around the crossing to far below 1e-6 mm. [`scene`] gives the ready scenes by name, near z = 800 mm.
+
+mod blend;
+mod face;
+mod hand;
+mod march;
+mod peaks;
+mod relief;
+mod solids;
+
+pub use face::Face;
+pub use hand::Hand;
+pub use peaks::Peaks;
+pub use relief::{HeightMap, Interpolation};
+pub use solids::{Cuboid, Plane, Sphere};
+
+use crate::error::{Error, Result};
+use crate::optics::Ray;
+
+/// Distance of the reference plane of the ready scenes from the camera, mm.
+pub const REFERENCE_Z_MM: f64 = 800.0;
+
+/// Names that [`scene`] knows.
+pub const SCENES: [&str; 6] = ["plane", "peaks", "steps", "sphere", "face", "hand"];
+
+/// Step of the finite differences behind the default normal, mm.
+const NORMAL_STEP_MM: f64 = 1e-3;
+
+/// A body bounded by an implicit surface.
+///
+/// ```
+/// use quadfringe::{optics::Ray, surface::Surface};
+/// /// An endless rod along y.
+/// #[derive(Debug)]
+/// struct Rod;
+/// impl Surface for Rod {
+///     fn value(&self, [x, _, z]: [f64; 3]) -> f64 {
+///         x.hypot(z - 800.0) - 10.0
+///     }
+///     fn bounds_mm(&self) -> [[f64; 3]; 2] {
+///         [[-10.0, f64::NEG_INFINITY, 790.0], [10.0, f64::INFINITY, 810.0]]
+///     }
+/// }
+/// let ray = Ray { origin_mm: [0.0; 3], direction: [0.0, 0.0, 1.0] };
+/// let t = Rod.hit(&ray, [0.0, f64::INFINITY]).expect("straight ahead");
+/// assert!((t - 790.0).abs() < 1e-9);
+/// ```
+pub trait Surface: Send + Sync + std::fmt::Debug {
+    /// Positive in free space, zero on the surface, negative inside; for a point of the camera frame in mm.
+    fn value(&self, p_mm: [f64; 3]) -> f64;
+
+    /// Least and greatest corner of a box that holds the surface, mm; infinite where it has no end.
+    fn bounds_mm(&self) -> [[f64; 3]; 2];
+
+    /// Upper bound of the change of [`Surface::value`] per mm along a unit direction; 1 for distance functions.
+    fn rate_limit(&self, _direction: [f64; 3]) -> f64 {
+        1.0
+    }
+
+    /// Distance in mm along the ray, within `[from, to]`, at which it enters the body; `None` when it stays outside.
+    fn hit(&self, ray: &Ray, range_mm: [f64; 2]) -> Option<f64> {
+        march::first_crossing(self, ray, range_mm)
+    }
+
+    /// Unit normal at a point of the surface, into free space.
+    fn normal(&self, p_mm: [f64; 3]) -> [f64; 3] {
+        let slope = std::array::from_fn(|axis| {
+            let at = |step: f64| {
+                let mut p = p_mm;
+                p[axis] += step;
+                self.value(p)
+            };
+            at(NORMAL_STEP_MM) - at(-NORMAL_STEP_MM)
+        });
+        unit(slope)
+    }
+}
+
+/// Several bodies as one: a ray meets the nearest.
+///
+/// ```
+/// use quadfringe::surface::{Plane, Sphere, Surface, Union};
+/// let scene = Union(vec![Box::new(Plane::at_z(800.0)), Box::new(Sphere::new([0.0, 0.0, 750.0], 30.0)?)]);
+/// assert_eq!(scene.value([0.0, 0.0, 700.0]), 20.0);
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[derive(Debug)]
+pub struct Union(pub Vec<Box<dyn Surface>>);
+
+impl Surface for Union {
+    fn value(&self, p_mm: [f64; 3]) -> f64 {
+        self.0
+            .iter()
+            .fold(f64::INFINITY, |least, body| least.min(body.value(p_mm)))
+    }
+
+    fn bounds_mm(&self) -> [[f64; 3]; 2] {
+        let nothing = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
+        self.0.iter().fold(nothing, |[low, high], body| {
+            let [l, h] = body.bounds_mm();
+            [
+                std::array::from_fn(|i| low[i].min(l[i])),
+                std::array::from_fn(|i| high[i].max(h[i])),
+            ]
+        })
+    }
+
+    fn rate_limit(&self, direction: [f64; 3]) -> f64 {
+        self.0
+            .iter()
+            .fold(0.0, |most, body| most.max(body.rate_limit(direction)))
+    }
+
+    fn hit(&self, ray: &Ray, [from, to]: [f64; 2]) -> Option<f64> {
+        let mut nearest = None;
+        for body in &self.0 {
+            nearest = body.hit(ray, [from, nearest.unwrap_or(to)]).or(nearest);
+        }
+        nearest
+    }
+
+    fn normal(&self, p_mm: [f64; 3]) -> [f64; 3] {
+        let nearest = self
+            .0
+            .iter()
+            .min_by(|a, b| a.value(p_mm).total_cmp(&b.value(p_mm)));
+        nearest.map_or([f64::NAN; 3], |body| body.normal(p_mm))
+    }
+}
+
+/// A ready scene near z = 800 mm, seen whole by the reference bench.
+///
+/// `plane`: z = 800. `peaks`: the peaks function, 40 mm from peak to valley. `steps`: twelve blocks of 5 to 50 mm with
+/// vertical walls on the plane. `sphere`: radius 34 mm, in front of the plane. `face`: a mask 140 x 190 mm on the plane.
+/// `hand`: a hand that waves and closes as `time_s` goes on, in front of the plane; the other scenes stand still.
+///
+/// # Errors
+/// [`Error::Value`] when there is no scene of that name or the time is not finite.
+///
+/// ```
+/// use quadfringe::{optics::Ray, surface::{Surface, scene}};
+/// let steps = scene("steps", 0.0)?;
+/// let ray = Ray { origin_mm: [20.0, -40.0, 0.0], direction: [0.0, 0.0, 1.0] };
+/// assert_eq!(steps.hit(&ray, [0.0, f64::INFINITY]), Some(750.0));
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+pub fn scene(name: &str, time_s: f64) -> Result<Box<dyn Surface>> {
+    let on_plane = |body: Box<dyn Surface>| -> Box<dyn Surface> {
+        Box::new(Union(vec![Box::new(Plane::at_z(REFERENCE_Z_MM)), body]))
+    };
+    Ok(match name {
+        "plane" => Box::new(Plane::at_z(REFERENCE_Z_MM)),
+        "peaks" => Box::new(Peaks::default()),
+        "steps" => Box::new(solids::steps()),
+        "sphere" => on_plane(Box::new(Sphere::new([-62.0, -22.0, 738.0], 34.0)?)),
+        "face" => on_plane(Box::<Face>::default()),
+        "hand" => on_plane(Box::new(Hand::at(time_s)?)),
+        _ => {
+            let expected = format!("one of {}", SCENES.join(", "));
+            return Err(Error::value("scene", expected, name));
+        }
+    })
+}
+
+/// The vector scaled to unit length.
+fn unit(v: [f64; 3]) -> [f64; 3] {
+    let scale = 1.0 / crate::optics::dot(v, v).sqrt();
+    v.map(|c| c * scale)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_scene_is_met_where_its_value_is_zero() {
+        for name in SCENES {
+            let body = scene(name, 0.4).expect("known scene");
+            for i in 0..400 {
+                let (x, y) = (f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5);
+                let ray = Ray {
+                    origin_mm: [0.0; 3],
+                    direction: unit([0.019 * x, 0.014 * y, 1.0]),
+                };
+                let t = body
+                    .hit(&ray, [0.0, f64::INFINITY])
+                    .expect("a full-field scene");
+                assert!(body.value(ray.at(t)).abs() < 1e-7, "{name} {i}");
+                assert!(body.value(ray.at(t - 1e-3)) > 0.0, "{name} {i}");
+                let normal = body.normal(ray.at(t));
+                assert!(
+                    crate::optics::dot(normal, ray.direction) < 1e-6,
+                    "{name} {i}"
+                );
+            }
+        }
+        assert!(scene("teapot", 0.0).is_err());
+        assert!(scene("hand", f64::NAN).is_err());
+    }
+
+    #[test]
+    fn values_change_no_faster_than_stated() {
+        for name in SCENES {
+            let body = scene(name, 1.3).expect("known scene");
+            for i in 0..20_000u32 {
+                let noise =
+                    |k: u32| f64::from((i * 4 + k).wrapping_mul(2_654_435_761)) / 4.3e9 - 0.5;
+                let p = [250.0 * noise(0), 220.0 * noise(1), 770.0 + 120.0 * noise(2)];
+                let direction = unit([noise(3), noise(1) * noise(2), 0.05 + noise(0)]);
+                let q: [f64; 3] = std::array::from_fn(|c| p[c] + 0.01 * direction[c]);
+                let rate = (body.value(q) - body.value(p)).abs() / 0.01;
+                assert!(
+                    rate <= body.rate_limit(direction) * (1.0 + 1e-6),
+                    "{name} {p:?} {rate}"
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,118 @@
+//! A hand that moves, composed of capsules.
+
+use std::f64::consts::TAU;
+
+use super::Surface;
+use super::blend::{Capsule, join};
+use crate::error::{Error, Result};
+
+/// A hand in front of the reference plane, as it stands at one instant: it waves about the wrist once in 2 s, the
+/// fingers close and open once in 3 s, and it comes nearer and goes back once in 4 s.
+///
+/// ```
+/// use quadfringe::surface::{Hand, Surface};
+/// let palm = [0.0, 30.0, 750.0];
+/// assert!(Hand::at(0.0)?.value(palm) < 0.0);
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[derive(Debug, Clone, PartialEq)]
+pub struct Hand {
+    capsules: Vec<Capsule>,
+    bounds_mm: [[f64; 3]; 2],
+}
+
+const WRIST_MM: [f64; 3] = [0.0, 82.0, 752.0];
+/// Rounding where capsules meet, mm.
+const ROUNDING_MM: f64 = 7.0;
+/// Knuckle (x, y from the wrist), length of the first joint, spread angle in rad, radius; index finger to little finger.
+const FINGERS: [([f64; 2], f64, f64, f64); 4] = [
+    ([-31.0, -78.0], 36.0, -0.16, 9.5),
+    ([-10.0, -84.0], 40.0, -0.04, 10.0),
+    ([11.0, -80.0], 37.0, 0.07, 9.5),
+    ([30.0, -70.0], 29.0, 0.20, 8.0),
+];
+/// Length of each joint of a finger over that of the first.
+const JOINTS: [f64; 3] = [1.0, 0.68, 0.5];
+
+impl Hand {
+    /// The hand at an instant in seconds.
+    ///
+    /// # Errors
+    /// [`Error::Value`] when the time is not finite.
+    pub fn at(time_s: f64) -> Result<Self> {
+        if !time_s.is_finite() {
+            return Err(Error::value("time_s", "a finite time in seconds", time_s));
+        }
+        let wave = 0.22 * (TAU * time_s / 2.0).sin();
+        let curl = 0.30 - 0.22 * (TAU * time_s / 3.0).cos();
+        let nearer = 12.0 * (TAU * time_s / 4.0).sin();
+        let mut capsules = Vec::new();
+        let mut add = |start: [f64; 3], end: [f64; 3], radius: f64| {
+            capsules.push(Capsule::new(
+                placed(start, wave, nearer),
+                placed(end, wave, nearer),
+                radius,
+            ));
+        };
+        for ([x, y], length, spread, radius) in FINGERS {
+            add([0.45 * x, -6.0, 0.0], [x, y, 0.0], radius + 3.5);
+            let mut joint = [x, y, 0.0];
+            for (index, share) in JOINTS.into_iter().enumerate() {
+                let bend = curl * (index as f64 + 0.6);
+                let end = step(joint, length * share, spread, bend);
+                add(joint, end, radius - 0.8 * index as f64);
+                joint = end;
+            }
+        }
+        let thumb = step([-34.0, -34.0, -4.0], 30.0, -0.75, 0.5 * curl);
+        add([-10.0, -8.0, 0.0], [-34.0, -34.0, -4.0], 13.0);
+        add([-34.0, -34.0, -4.0], thumb, 10.5);
+        add(thumb, step(thumb, 24.0, -0.5, curl), 9.5);
+        Ok(Self::from_capsules(capsules))
+    }
+
+    fn from_capsules(capsules: Vec<Capsule>) -> Self {
+        // Blending swells the body by a fraction of the rounding.
+        let extreme = |axis: usize, end: usize, pick: fn(f64, f64) -> f64| {
+            let ends = capsules.iter().map(|capsule| capsule.extent(axis)[end]);
+            ends.reduce(pick).unwrap_or(0.0)
+        };
+        let bounds_mm = [
+            std::array::from_fn(|axis| extreme(axis, 0, f64::min) - ROUNDING_MM),
+            std::array::from_fn(|axis| extreme(axis, 1, f64::max) + ROUNDING_MM),
+        ];
+        Self {
+            capsules,
+            bounds_mm,
+        }
+    }
+}
+
+/// Point of the resting hand (from the wrist) turned by the wave, brought nearer, and put in the camera frame.
+fn placed([x, y, z]: [f64; 3], wave_rad: f64, nearer_mm: f64) -> [f64; 3] {
+    let (s, c) = wave_rad.sin_cos();
+    let [wx, wy, wz] = WRIST_MM;
+    [wx + c * x - s * y, wy + s * x + c * y, wz + z - nearer_mm]
+}
+
+/// End of a joint that leans sideways by `spread` and towards the camera by `bend`.
+fn step([x, y, z]: [f64; 3], length_mm: f64, spread_rad: f64, bend_rad: f64) -> [f64; 3] {
+    let flat = length_mm * bend_rad.cos();
+    [
+        x + flat * spread_rad.sin(),
+        y - flat * spread_rad.cos(),
+        z - length_mm * bend_rad.sin(),
+    ]
+}
+
+impl Surface for Hand {
+    fn value(&self, p_mm: [f64; 3]) -> f64 {
+        let mut capsules = self.capsules.iter().map(|capsule| capsule.value(p_mm));
+        let first = capsules.next().unwrap_or(f64::INFINITY);
+        capsules.fold(first, |hand, capsule| join(hand, capsule, ROUNDING_MM))
+    }
+
+    fn bounds_mm(&self) -> [[f64; 3]; 2] {
+        self.bounds_mm
+    }
+}

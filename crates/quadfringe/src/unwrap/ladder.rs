@@ -1,0 +1,204 @@
+//! Fringe orders point by point.
+
+use crate::angle::{round, wrap_positive};
+use crate::{Error, FringeCode, Result};
+use ndarray::{Array2, ArrayView2, Zip};
+use std::f32::consts::TAU;
+
+/// Orders of one pixel at a time: the beat of the first two fringe numbers has at most one fringe over the field; it
+/// orders the beat of the first and the third, which orders the first (S4). A triple without such a beat is
+/// searched order by order instead.
+#[derive(Debug, Clone)]
+pub struct Ladder {
+    numbers: [f32; 3],
+    columns_per_turn: f32,
+    width: f32,
+    /// Orders after which all three phases repeat, when the whole field is one such cycle.
+    cycle: Option<f32>,
+    climbs: bool,
+    orders: usize,
+}
+
+/// Absolute phase of one pixel.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ordered {
+    /// Phase of the first fringe number in rad, 0 at column 0.
+    pub phase_rad: f32,
+    /// 1 when every order was hit in the middle, 0 when one was a coin's toss.
+    pub margin: f32,
+}
+
+impl Ladder {
+    /// Plan for one code.
+    #[must_use]
+    pub fn new(code: &FringeCode) -> Self {
+        let numbers = code.numbers();
+        let beat = (numbers[0] - numbers[1]).abs();
+        let whole = numbers.iter().all(|n| n.fract() == 0.0);
+        Self {
+            numbers: numbers.map(|n| n as f32),
+            columns_per_turn: (code.projector_width() as f64 / numbers[0]) as f32,
+            width: code.projector_width() as f32,
+            cycle: (whole && beat == 1.0).then_some(numbers[0] as f32),
+            climbs: beat > 0.0 && beat <= 1.0 && numbers[2] != numbers[0],
+            orders: code.orders(),
+        }
+    }
+
+    /// Order one pixel from its three wrapped phases in rad.
+    ///
+    /// ```
+    /// use quadfringe::{FringeCode, unwrap::Ladder};
+    /// let code = FringeCode::optimum(36, 912)?;
+    /// let at = |n: f64| (std::f64::consts::TAU * n * 700.25 / 912.0) as f32;
+    /// let found = Ladder::new(&code).order(code.numbers().map(at));
+    /// assert!((found.phase_rad - at(36.0)).abs() < 1e-3);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    #[must_use]
+    #[inline]
+    pub fn order(&self, phases: [f32; 3]) -> Ordered {
+        let found = if self.climbs { self.climb(phases) } else { self.search(phases) };
+        let turns = found.phase_rad / TAU;
+        // Column 0 and the end of the field look alike; the field starts half a column before 0.
+        match self.cycle {
+            Some(cycle) if turns * self.columns_per_turn >= self.width - 0.5 => Ordered {
+                phase_rad: found.phase_rad - cycle * TAU,
+                ..found
+            },
+            _ => found,
+        }
+    }
+
+    #[inline]
+    fn climb(&self, [first, second, third]: [f32; 3]) -> Ordered {
+        let [n1, n2, n3] = self.numbers;
+        let (coarse, middle) = (n1 - n2, n1 - n3);
+        let start = wrap_positive((first - second) * coarse.signum()) * coarse.signum();
+        let (beat, low) = nearest(first - third, start * (middle / coarse));
+        let (phase, high) = nearest(first, beat * (n1 / middle));
+        Ordered {
+            phase_rad: phase,
+            margin: low.min(high),
+        }
+    }
+
+    fn search(&self, [first, second, third]: [f32; 3]) -> Ordered {
+        let start = wrap_positive(first);
+        let ratios = [self.numbers[1] / self.numbers[0], self.numbers[2] / self.numbers[0]];
+        let cost = |order: usize| {
+            let phase = start + TAU * order as f32;
+            let miss = |ratio: f32, seen: f32| 1.0 - (phase * ratio - seen).cos();
+            miss(ratios[0], second) + miss(ratios[1], third)
+        };
+        let (mut best, mut least, mut next) = (0, f32::INFINITY, f32::INFINITY);
+        for order in 0..self.orders {
+            let c = cost(order);
+            if c < least {
+                (best, next, least) = (order, least, c);
+            } else {
+                next = next.min(c);
+            }
+        }
+        Ordered {
+            phase_rad: start + TAU * best as f32,
+            margin: if next > 0.0 { 1.0 - (least / next).sqrt() } else { 0.0 },
+        }
+    }
+}
+
+/// The angle nearest to `guess` that differs from `wrapped` by whole turns, and how far the choice was from a toss-up.
+#[inline]
+fn nearest(wrapped: f32, guess: f32) -> (f32, f32) {
+    let turns = (guess - wrapped) / TAU;
+    let whole = round(turns);
+    (wrapped + TAU * whole, 1.0 - 2.0 * (turns - whole).abs())
+}
+
+/// Absolute phase in rad and order margin in [0, 1], both `(rows, columns)`, from three wrapped phases in rad; NaN in,
+/// NaN out.
+///
+/// # Errors
+/// [`Error::Shape`] when the maps differ in size.
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::{FringeCode, unwrap::unwrap};
+/// let code = FringeCode::optimum(36, 912)?;
+/// let wrapped = |n: f64| Array2::from_shape_fn((1, 912), |(_, u)| {
+///     let phase = std::f64::consts::TAU * n * u as f64 / 912.0;
+///     phase.sin().atan2(phase.cos()) as f32
+/// });
+/// let [a, b, c] = code.numbers().map(wrapped);
+/// let (phase, margin) = unwrap(&code, [a.view(), b.view(), c.view()])?;
+/// assert!((phase[[0, 500]] / std::f32::consts::TAU * 912.0 / 36.0 - 500.0).abs() < 1e-2);
+/// assert!(margin[[0, 500]] > 0.9);
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
+pub fn unwrap(code: &FringeCode, wrapped: [ArrayView2<'_, f32>; 3]) -> Result<(Array2<f32>, Array2<f32>)> {
+    let [first, second, third] = &wrapped;
+    for (map, name) in [(second, "second wrapped phase"), (third, "third wrapped phase")] {
+        if map.dim() != first.dim() {
+            return Err(Error::shape(name, first.shape(), map.shape()));
+        }
+    }
+    let ladder = Ladder::new(code);
+    let mut phase = Array2::from_elem(first.raw_dim(), f32::NAN);
+    let mut margin = Array2::from_elem(first.raw_dim(), f32::NAN);
+    Zip::from(&mut phase)
+        .and(&mut margin)
+        .and(first)
+        .and(second)
+        .and(third)
+        .par_for_each(|p, m, &a, &b, &c| {
+            if (a + b + c).is_finite() {
+                let found = ladder.order([a, b, c]);
+                (*p, *m) = (found.phase_rad, found.margin);
+            }
+        });
+    Ok((phase, margin))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn phases(code: &FringeCode, column: f64) -> [f32; 3] {
+        code.numbers().map(|n| {
+            let phase = std::f64::consts::TAU * n * column / code.projector_width() as f64;
+            phase.sin().atan2(phase.cos()) as f32
+        })
+    }
+
+    #[test]
+    fn every_column_of_every_kind_of_code_is_found() {
+        let codes = [
+            FringeCode::optimum(36, 912).unwrap(),
+            FringeCode::optimum(64, 1280).unwrap(),
+            FringeCode::new([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920).unwrap(),
+            FringeCode::new([30.0, 31.0, 36.0], 912).unwrap(),
+        ];
+        for code in codes {
+            let ladder = Ladder::new(&code);
+            for i in 0..2 * code.projector_width() {
+                let column = i as f64 / 2.0 + 0.1;
+                if column >= code.projector_width() as f64 - 0.5 {
+                    continue;
+                }
+                let found = ladder.order(phases(&code, column)).phase_rad / TAU * ladder.columns_per_turn;
+                assert!((f64::from(found) - column).abs() < 0.01, "{code:?} {column} {found}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_column_does_not_jump_to_the_last_under_noise() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let ladder = Ladder::new(&code);
+        for noise in [-0.05f32, 0.05] {
+            let wrapped = phases(&code, 0.0).map(|p| p + noise);
+            let found = ladder.order([wrapped[0], wrapped[1] - 2.0 * noise, wrapped[2]]);
+            assert!(found.phase_rad.abs() < 0.1, "{noise} {found:?}");
+        }
+    }
+}

@@ -1,0 +1,278 @@
+//! Fringe orders by likelihood with spatial support.
+//!
+//! Every order of a pixel predicts the beats of G and of IR against R and B; the misfit, cut off so that a wrong beat
+//! near an edge cannot shout, is its cost. Costs are aggregated along rows and columns as in semi-global matching
+//! (Hirschmueller, IEEE TPAMI 30, 328 (2008)), with one change: where the wrapped phase jumps by a turn the order
+//! changes for free, and only a change of the surface costs.
+
+use crate::FringeCode;
+use ndarray::{Array3, ArrayViewMut2, Axis};
+use rayon::prelude::*;
+
+/// Misfit (sum of squared beat errors over 2) beyond which evidence says nothing more: 0.1, both beats 0.3 rad off.
+const CUT: i16 = 333;
+/// Cost of any change of the surface, in units of [`CUT`].
+const JUMP: i16 = 30 * CUT;
+/// Cost of a change by one order.
+const STEP: i16 = JUMP / 2;
+/// Labels are padded to whole vectors.
+const LANES: usize = 16;
+/// Room beside the labels, so that shifted reads stay inside.
+const PAD: usize = 8;
+/// A label outside the field.
+const NEVER: i16 = 16000;
+/// Columns that one task sweeps vertically.
+const BLOCK: usize = 32;
+
+/// What is known of one node before its neighbours are asked; angles in turns, 65536 to a turn.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Evidence {
+    /// Wrapped phase of the first fringe number.
+    pub phase: u16,
+    /// Beats of G and of IR against it.
+    pub beats: [u16; 2],
+    /// Whether there is light to judge by; a dark node stops all support.
+    pub lit: bool,
+}
+
+impl Evidence {
+    pub fn turns(angle_rad: f32) -> u16 {
+        (angle_rad * (65536.0 / std::f32::consts::TAU)).round() as i32 as u16
+    }
+}
+
+/// Order, margin and own cost of every node.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct SupportMaps {
+    pub order: Vec<i16>,
+    /// Lead over the next best order, 1 for a lead that a change of surface would cost.
+    pub margin: Vec<f32>,
+    /// Misfit of the node's own beats at the chosen order, in [0, 1] of the cut.
+    pub misfit: Vec<f32>,
+}
+
+/// The orders of one code and what they predict.
+#[derive(Debug, Clone)]
+pub(crate) struct Support {
+    ratios: [f64; 2],
+    /// Prediction of every label for a wrapped phase of 0, by beat.
+    offsets: [Vec<u16>; 2],
+    /// Extra cost of labels that leave the field, for a wrapped phase of 0 and of one turn.
+    labels: usize,
+    /// Greatest wrapped phase that the last order may have, least that the order before the first may have.
+    last_turn: f64,
+    first_turn: f64,
+    last_label: usize,
+}
+
+impl Support {
+    pub fn new(code: &FringeCode) -> Self {
+        let n = code.numbers();
+        let ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
+        let labels = (code.orders() + 2).div_ceil(LANES) * LANES;
+        let per_column = n[0] / code.projector_width() as f64;
+        let end = n[0] + 0.5 * per_column;
+        let predict = |ratio: f64| {
+            let turn = |label: usize| (ratio * (label as f64 - 1.0) * 65536.0).round() as i64 as u16;
+            (0..labels).map(turn).collect()
+        };
+        Self {
+            ratios,
+            offsets: ratios.map(predict),
+            labels,
+            last_turn: end - end.floor(),
+            first_turn: 1.0 - 1.5 * per_column,
+            last_label: end.floor() as usize + 1,
+        }
+    }
+
+    /// Choose the orders of `evidence`, row-major with `columns` nodes a row.
+    pub fn choose(&self, evidence: &[Evidence], columns: usize, sums: &mut Array3<u16>, maps: &mut SupportMaps) {
+        let rows = evidence.len() / columns;
+        if sums.dim() != (rows, columns, self.labels) {
+            *sums = Array3::zeros((rows, columns, self.labels));
+        }
+        self.sweep_rows(evidence, columns, sums);
+        self.sweep_columns(evidence, columns, sums);
+        self.read_out(evidence, columns, sums, maps);
+    }
+
+    fn sweep_rows(&self, evidence: &[Evidence], columns: usize, sums: &mut Array3<u16>) {
+        sums.axis_iter_mut(Axis(0))
+            .into_par_iter()
+            .zip(evidence.par_chunks(columns))
+            .for_each_init(
+                || Path::new(self.labels),
+                |path, (mut row, nodes)| {
+                    path.restart();
+                    for x in 0..columns {
+                        path.advance(self, &nodes[x], &mut row.row_mut(x).into_slice().expect("labels are contiguous")[..], true);
+                    }
+                    path.restart();
+                    for x in (0..columns).rev() {
+                        path.advance(self, &nodes[x], row.row_mut(x).into_slice().expect("labels are contiguous"), false);
+                    }
+                },
+            );
+    }
+
+    fn sweep_columns(&self, evidence: &[Evidence], columns: usize, sums: &mut Array3<u16>) {
+        let rows = evidence.len() / columns;
+        sums.axis_chunks_iter_mut(Axis(1), BLOCK)
+            .into_par_iter()
+            .enumerate()
+            .for_each(|(block, mut part)| {
+                let width = part.len_of(Axis(1));
+                let mut paths: Vec<Path> = (0..width).map(|_| Path::new(self.labels)).collect();
+                let mut visit = |y: usize, paths: &mut [Path]| {
+                    let nodes = &evidence[y * columns + block * BLOCK..][..width];
+                    let mut line: ArrayViewMut2<'_, u16> = part.index_axis_mut(Axis(0), y);
+                    for (x, path) in paths.iter_mut().enumerate() {
+                        let sum = line.row_mut(x).into_slice().expect("labels are contiguous");
+                        path.advance(self, &nodes[x], sum, false);
+                    }
+                };
+                (0..rows).for_each(|y| visit(y, &mut paths));
+                paths.iter_mut().for_each(Path::restart);
+                (0..rows).rev().for_each(|y| visit(y, &mut paths));
+            });
+    }
+
+    fn read_out(&self, evidence: &[Evidence], columns: usize, sums: &Array3<u16>, maps: &mut SupportMaps) {
+        maps.order.resize(evidence.len(), 0);
+        maps.margin.resize(evidence.len(), 0.0);
+        maps.misfit.resize(evidence.len(), 0.0);
+        let all = sums.as_slice().expect("sums are contiguous");
+        let per_row = columns * self.labels;
+        maps.order
+            .par_chunks_mut(columns)
+            .zip(maps.margin.par_chunks_mut(columns))
+            .zip(maps.misfit.par_chunks_mut(columns))
+            .zip(evidence.par_chunks(columns).zip(all.par_chunks(per_row)))
+            .for_each_init(
+                || vec![0i16; self.labels],
+                |own, (((order, margin), misfit), (nodes, sums))| {
+                    for (x, sums) in sums.chunks_exact(self.labels).enumerate() {
+                        let (best, lead) = least(sums);
+                        self.costs(&nodes[x], own);
+                        order[x] = best as i16 - 1;
+                        margin[x] = f32::from(lead) / f32::from(JUMP);
+                        misfit[x] = f32::from(own[best]) / f32::from(CUT);
+                    }
+                },
+            );
+    }
+
+    /// Cost of every label of a node.
+    #[inline]
+    fn costs(&self, node: &Evidence, out: &mut [i16]) {
+        if !node.lit {
+            out.fill(0);
+            return;
+        }
+        let phase = f64::from(node.phase);
+        let base = [0, 1].map(|i| {
+            node.beats[i].wrapping_sub((self.ratios[i] * phase).round() as i64 as u16)
+        });
+        let predictions = self.offsets[0].iter().zip(&self.offsets[1]);
+        for (cost, (&second, &third)) in out.iter_mut().zip(predictions) {
+            let miss = |seen: u16, predicted: u16| {
+                let error = (seen.wrapping_sub(predicted) as i16 >> 6).unsigned_abs().min(127) as i16;
+                error * error
+            };
+            let sum = miss(base[0], second) + miss(base[1], third);
+            *cost = (sum >> 4).min(CUT);
+        }
+        let turn = phase / 65536.0;
+        if turn < self.first_turn {
+            out[0] = NEVER;
+        }
+        let end = self.last_label + usize::from(turn <= self.last_turn);
+        if let Some(beyond) = out.get_mut(end..) {
+            beyond.fill(NEVER);
+        }
+    }
+}
+
+/// Least sum and its lead over the next.
+fn least(sums: &[u16]) -> (usize, u16) {
+    let (mut best, mut first, mut second) = (0, u16::MAX, u16::MAX);
+    for (label, &sum) in sums.iter().enumerate() {
+        if sum < first {
+            (best, second, first) = (label, first, sum);
+        } else if sum < second {
+            second = sum;
+        }
+    }
+    (best, second - first)
+}
+
+/// Aggregated costs of the last node of one path.
+struct Path {
+    previous: Vec<i16>,
+    current: Vec<i16>,
+    own: Vec<i16>,
+    least: i16,
+    phase: u16,
+    labels: usize,
+}
+
+impl Path {
+    fn new(labels: usize) -> Self {
+        let mut path = Self {
+            previous: vec![NEVER; labels + 2 * PAD],
+            current: vec![NEVER; labels + 2 * PAD],
+            own: vec![0; labels],
+            least: 0,
+            phase: 0,
+            labels,
+        };
+        path.restart();
+        path
+    }
+
+    fn restart(&mut self) {
+        self.least = 0;
+        self.previous[PAD..PAD + self.labels].fill(0);
+    }
+
+    /// One node further; its aggregated costs replace or join `sums`.
+    #[inline]
+    fn advance(&mut self, support: &Support, node: &Evidence, sums: &mut [u16], first: bool) {
+        if !node.lit {
+            self.restart();
+            if first {
+                sums.fill(0);
+            }
+            return;
+        }
+        support.costs(node, &mut self.own);
+        let step = i32::from(node.phase) - i32::from(self.phase);
+        // A wrapped phase that jumps up by more than half a turn has come from the order above.
+        let shift = if step > 32768 { 1 } else if step < -32768 { -1isize } else { 0 };
+        let at = (PAD as isize + shift) as usize;
+        let n = self.labels;
+        let same = &self.previous[at..at + n];
+        let below = &self.previous[at - 1..at - 1 + n];
+        let above = &self.previous[at + 1..at + 1 + n];
+        let limit = self.least.saturating_add(JUMP);
+        let mut least = i16::MAX;
+        let target = &mut self.current[PAD..PAD + n];
+        for k in 0..n {
+            let neighbour = below[k].min(above[k]).saturating_add(STEP);
+            let best = same[k].min(neighbour).min(limit);
+            let value = self.own[k].saturating_add(best - self.least);
+            target[k] = value;
+            least = least.min(value);
+        }
+        self.least = least;
+        self.phase = node.phase;
+        let values = &self.current[PAD..PAD + n];
+        if first {
+            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = v as u16);
+        } else {
+            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = s.saturating_add(v as u16));
+        }
+        std::mem::swap(&mut self.previous, &mut self.current);
+    }
+}

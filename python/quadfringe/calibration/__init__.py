@@ -1,0 +1,1 @@
+"""What a bench must know of itself before it measures."""

@@ -1,0 +1,71 @@
+"""The commands in the order of a session, and the one place where errors become exit statuses."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from quadfringe.cli import bench, calibrate, decode, demo, info, reproduce
+from quadfringe.cli.output import complain
+from quadfringe.errors import DecodeError, MissingExtraError
+
+__all__ = ["app"]
+
+USAGE, FAILED = 2, 1
+
+
+class Commands(TyperGroup):
+    """Bad input exits with 2, a failed run with 1; both say why in one message, without a traceback."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the command and translate its errors."""
+        try:
+            return super().invoke(ctx)
+        except DecodeError as error:
+            complain(str(error))
+            raise typer.Exit(FAILED) from error
+        except BrokenPipeError:
+            raise  # a reader that left early, as `head` does, is no error
+        except (ValueError, OSError, MissingExtraError) as error:
+            complain(str(error))
+            raise typer.Exit(USAGE) from error
+
+
+app = typer.Typer(
+    cls=Commands,
+    name="quadfringe",
+    help="Single-shot 3D: four fringe images of one exposure to absolute phase and millimetres.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from quadfringe import _core
+
+        typer.echo(f"quadfringe {_core.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Single-shot 3D: four fringe images of one exposure to absolute phase and millimetres."""
+
+
+app.command("demo")(demo.demo)
+app.command("pattern")(bench.pattern)
+app.command("simulate")(bench.simulate)
+app.command("decode")(decode.decode)
+app.command("measure")(bench.measure)
+app.command("info")(info.info)
+app.command("reproduce")(reproduce.reproduce)
+app.add_typer(calibrate.app, name="calibrate")

@@ -1,0 +1,73 @@
+"""`pattern`, `simulate`, `measure`: the fringes, a simulated shot of them, and the whole way at once."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quadfringe.cli.output import Fringes3, say
+
+__all__ = ["measure", "pattern", "simulate"]
+
+OutFolder = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the files; made when missing.")]
+SystemFile = Annotated[Path | None, typer.Argument(metavar="[SYSTEM.toml]", help="Default: the virtual bench.")]
+
+
+class Layout(StrEnum):
+    """How the mirrors of the projector are arranged."""
+
+    regular = "regular"
+    diamond = "diamond"
+
+
+def pattern(
+    out: OutFolder,
+    fringes: Fringes3 = (36.0, 35.0, 30.0),
+    width: Annotated[int, typer.Option(min=2, help="Columns of the projector.")] = 912,
+    height: Annotated[int, typer.Option(min=1, help="Rows of the projector.")] = 1140,
+    layout: Annotated[Layout, typer.Option(help="Mirror layout.")] = Layout.regular,
+) -> None:
+    """Write the two images to project: visible.png (red, green, blue) and infrared.png, 8 bit."""
+    from quadfringe.patterns import write_patterns
+
+    for path in write_patterns(out, fringes, (width, height), layout.value):
+        say(str(path))
+
+
+def simulate(
+    out: OutFolder,
+    system: SystemFile = None,
+    surface: Annotated[str | None, typer.Option(help="What stands on the bench, in place of the file's.")] = None,
+    noise: Annotated[float | None, typer.Option(min=0, help="Noise, fraction of full scale.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the noise.")] = None,
+) -> None:
+    """Render one shot of the virtual bench: four images, calibration.json, truth.npz."""
+    from quadfringe.simulate import bench_config, write_simulation
+
+    config = bench_config(system, surface=surface, noise=noise, seed=seed)
+    for path in write_simulation(out, config):
+        say(str(path))
+
+
+def measure(
+    out: Annotated[
+        list[Path],
+        typer.Option(metavar="FILE", help="Result: .ply, .tif or .npz; may be repeated."),
+    ],
+    system: SystemFile = None,
+) -> None:
+    """Take one shot with a system and save its shape."""
+    from quadfringe.data import SUFFIXES
+    from quadfringe.files import require_suffix
+    from quadfringe.scanner import open_system
+
+    for path in out:
+        require_suffix(path, SUFFIXES)
+    with open_system(system) as scanner:
+        shape = scanner.measure()
+    for path in out:
+        shape.save(path)
+        say(f"{path}: {int(shape.returned.sum())} points")

@@ -1,0 +1,22 @@
+"""`quadfringe info`: what a file holds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quadfringe.cli.output import say
+
+__all__ = ["info"]
+
+
+def info(
+    file: Annotated[Path, typer.Argument(help="A shape, calibration, response, system file or image.")],
+) -> None:
+    """Say what a file holds: maps and their ranges, settings, calibration."""
+    from quadfringe.inspection import lines_about
+
+    for line in lines_about(file):
+        say(line)

@@ -1,0 +1,205 @@
+"""The one place for settings: frozen models with units in their names; a key that is not known is an error.
+
+A system file is TOML. Every table may be left out; an algorithm setting that is left out takes the
+kernel's own default, which is written once, in Rust.
+
+>>> from quadfringe.config import SystemConfig
+>>> SystemConfig().fringes.numbers
+(36.0, 35.0, 30.0)
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+
+from quadfringe.errors import ConfigError
+from quadfringe.files import read_bytes
+
+__all__ = [
+    "ChannelResponse",
+    "DecodeConfig",
+    "DeviceModel",
+    "Fringes",
+    "HeightMapConfig",
+    "Model",
+    "Response",
+    "SceneConfig",
+    "SystemConfig",
+    "checked",
+    "load_system",
+]
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Pixels = Annotated[int, Field(gt=0, le=65536)]
+Triple = tuple[Finite, Finite, Finite]
+Matrix3 = tuple[Triple, Triple, Triple]
+Row4 = tuple[Finite, Finite, Finite, Finite]
+Matrix4 = tuple[Row4, Row4, Row4, Row4]
+PerChannel = Annotated[Row4, BeforeValidator(lambda v: (v,) * 4 if isinstance(v, (int, float)) else v)]
+Affine = tuple[Triple, Triple]
+IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+class Model(BaseModel):
+    """Frozen data; an unknown key is refused."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class DeviceModel(Model):
+    """A pinhole device, camera or projector: P_device = rotation P_camera + translation_mm, then the lens (S8).
+
+    Distortion is OpenCV's k1, k2, p1, p2, k3; pixel centres are at integers.
+    """
+
+    width_px: Pixels
+    height_px: Pixels
+    focal_px: tuple[Positive, Positive]
+    centre_px: tuple[Finite, Finite]
+    distortion: tuple[Finite, Finite, Finite, Finite, Finite] = (0.0, 0.0, 0.0, 0.0, 0.0)
+    rotation: Matrix3 = IDENTITY
+    translation_mm: Triple = (0.0, 0.0, 0.0)
+
+
+class ChannelResponse(Model):
+    """Inverse response of one channel: linear = max(I / (1 - knee I^20) - offset, 0) ^ exponent.
+
+    I is the captured intensity as a fraction of full scale; the knee is the compression of highlights.
+    """
+
+    offset: NotNegative = 0.0
+    exponent: Positive = 1.0
+    knee: NotNegative = 0.0
+
+
+class Response(Model):
+    """Responses of the four channels; a channel that is left out is linear."""
+
+    red: ChannelResponse = ChannelResponse()
+    green: ChannelResponse = ChannelResponse()
+    blue: ChannelResponse = ChannelResponse()
+    ir: ChannelResponse = ChannelResponse()
+
+    def rows(self) -> list[tuple[float, float, float]]:
+        """Offset, exponent and knee of R, G, B, IR."""
+        return [(c.offset, c.exponent, c.knee) for c in (self.red, self.green, self.blue, self.ir)]
+
+
+class Fringes(Model):
+    """Fringe numbers over the full projector width: red and blue, green, infrared. The kernel checks them."""
+
+    numbers: tuple[float, float, float] = (36.0, 35.0, 30.0)
+    layout: Literal["regular", "diamond"] = "regular"
+
+
+class HeightMapConfig(Model):
+    """A relief of your own: an NPY file of heights in mm over a plane, towards the camera; rows along y."""
+
+    file: Path
+    pitch_mm: tuple[Positive, Positive]
+    origin_mm: tuple[Finite, Finite]
+    z_mm: Positive = 800.0
+
+
+class SceneConfig(Model):
+    """What stands on the virtual bench, and what the bench adds to the light (shares of full scale).
+
+    A setting for each channel (R, G, B, IR) may be one number for all four. What is absent is ideal, or takes
+    the kernel's default.
+    """
+
+    surface: str = "face"
+    height_map: HeightMapConfig | None = None
+    time_s: Finite | None = None
+    albedo: PerChannel | None = None
+    patch_mm: Positive | None = None
+    ambient: PerChannel | None = None
+    shading: bool | None = None
+    projector_exponent: PerChannel | None = None
+    crosstalk: Matrix4 | None = None
+    gain: PerChannel | None = None
+    blur_px: NotNegative | None = None
+    infrared_from_visible: Affine | None = None
+    noise: NotNegative | None = None
+    camera_offset: PerChannel | None = None
+    camera_exponent: PerChannel | None = None
+    bayer: Literal["rggb", "bggr", "grbg", "gbrg"] | None = None
+    bit_depth: Literal[8, 10, 12, 16] = 8
+    seed: Annotated[int, Field(ge=0)] | None = None
+
+
+class DecodeConfig(Model):
+    """Settings of the decoder; what is absent takes the kernel's default."""
+
+    method: Literal["published", "best"] | None = None
+    modulation_min: NotNegative | None = None
+    quality_min: NotNegative | None = None
+    threads: Annotated[int, Field(gt=0)] | None = None
+
+
+class SystemConfig(Model):
+    """A whole system: devices, fringes, what is measured, how it is decoded.
+
+    Devices that are absent are those of the published bench; `infrared` is coaxial with `projector` when absent.
+    """
+
+    schema_version: Literal[1] = 1
+    kind: Literal["virtual"] = "virtual"
+    camera: DeviceModel | None = None
+    projector: DeviceModel | None = None
+    infrared: DeviceModel | None = None
+    calibration: Path | None = None
+    fringes: Fringes = Fringes()
+    scene: SceneConfig = SceneConfig()
+    decode: DecodeConfig = DecodeConfig()
+
+
+AnyModel = TypeVar("AnyModel", bound=Model)
+
+
+def checked(model: type[AnyModel], values: Mapping[str, Any], source: str) -> AnyModel:
+    """Validate `values`; raise `ConfigError` that lists every problem of `source` with its path."""
+    try:
+        return model.model_validate(values)
+    except ValidationError as error:
+        problems = [f"  {_path(p['loc'])}: {_reason(p)}" for p in error.errors(include_url=False)]
+        count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
+        raise ConfigError("\n".join([f"{source}: {count}", *problems])) from error
+
+
+def _path(location: tuple[int | str, ...]) -> str:
+    return ".".join(str(part) for part in location) or "(top level)"
+
+
+def _reason(problem: Any) -> str:
+    if problem["type"] == "extra_forbidden":
+        return "this key is not known"
+    if problem["type"] == "missing":
+        return "this key is required and missing"
+    return f"{problem['msg']}, got {problem['input']!r}"
+
+
+def load_system(path: Path) -> SystemConfig:
+    """Read a system file; paths inside it are relative to it. Raises `ConfigError` or `InputError`."""
+    try:
+        values = tomllib.loads(read_bytes(path).decode())
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    config = checked(SystemConfig, values, str(path))
+    return _with_absolute_paths(config, path.resolve().parent)
+
+
+def _with_absolute_paths(config: SystemConfig, folder: Path) -> SystemConfig:
+    scene = config.scene
+    if scene.height_map is not None:
+        file = folder / scene.height_map.file
+        scene = scene.model_copy(update={"height_map": scene.height_map.model_copy(update={"file": file})})
+    calibration = None if config.calibration is None else folder / config.calibration
+    return config.model_copy(update={"scene": scene, "calibration": calibration})

@@ -1,0 +1,143 @@
+"""From a shot to a shape: the kernel's decoder planned once, and a verdict on what came out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from quadfringe import _core
+from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response
+from quadfringe.data import Calibration, Shape, Shot
+from quadfringe.errors import InputError
+from quadfringe.verdict import judge
+
+__all__ = ["Plan", "ShotDecoder", "core_device", "decode", "device_model"]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a decoder is made from: the fringes, the calibration, and settings of the method.
+
+    `response` stands in for the calibration's own when both are given.
+    """
+
+    projector_width_px: int
+    fringes: Fringes = Fringes()
+    calibration: Calibration | None = None
+    response: Response | None = None
+    settings: DecodeConfig = DecodeConfig()
+
+    def described(self) -> dict[str, Any]:
+        """Everything that decides the result, as plain data for a saved file."""
+        response = self.response.model_dump(include=set(Response.model_fields)) if self.response else None
+        return {
+            "projector_width_px": self.projector_width_px,
+            "fringes": self.fringes.model_dump(mode="json"),
+            "response": response,
+            "decode": self.settings.model_dump(mode="json", exclude_none=True),
+        }
+
+
+def core_device(model: DeviceModel) -> _core.Device:
+    """Make the kernel's device from its settings."""
+    return _core.Device(
+        model.width_px,
+        model.height_px,
+        model.focal_px,
+        model.centre_px,
+        distortion=model.distortion,
+        rotation=model.rotation,
+        translation_mm=model.translation_mm,
+    )
+
+
+def device_model(device: _core.Device) -> DeviceModel:
+    """Write out a device of the kernel as settings."""
+    return DeviceModel(
+        width_px=device.width,
+        height_px=device.height,
+        focal_px=device.focal_px,
+        centre_px=device.centre_px,
+        distortion=device.distortion,
+        rotation=device.rotation,
+        translation_mm=device.translation_mm,
+    )
+
+
+class ShotDecoder:
+    """Decodes shots of one size; planned and checked when made.
+
+    The first shot is looked at for exchanged channels too, which do not come and go afterwards.
+    Raises `InputError` or ValueError when the plan cannot work: fringes that do not cover the field, a
+    calibration for another size.
+    """
+
+    def __init__(self, like: Shot, plan: Plan) -> None:
+        self.plan = plan
+        self._described = plan.described()
+        self._channels_known = False
+        _check_sizes(like, plan)
+        self._core = _core.Decoder(
+            like.red.shape,
+            plan.fringes.numbers,
+            plan.projector_width_px,
+            full_scale=like.full_scale_value,
+            **_conditioning(plan),
+            **_geometry(plan.calibration),
+            **plan.settings.model_dump(exclude_none=True),
+        )
+
+    def decode(self, shot: Shot) -> Shape:
+        """Give the shape; raises `DecodeError` when the orders cannot be trusted, naming the likely cause."""
+        shape = self._shape(shot)
+        judge(shape, shot, None if self._channels_known else self._shape)
+        self._channels_known = True
+        return shape
+
+    def _shape(self, shot: Shot) -> Shape:
+        maps = self._core.decode(shot.red, shot.green, shot.blue, shot.ir)
+        return Shape(**maps, config=self._described, calibration=self.plan.calibration)
+
+
+def decode(shot: Shot, plan: Plan) -> Shape:
+    """Decode one shot: plan, decode, judge. For many shots make one `ShotDecoder`."""
+    return ShotDecoder(shot, plan).decode(shot)
+
+
+def _check_sizes(shot: Shot, plan: Plan) -> None:
+    if shot.red.ndim != 2:
+        raise InputError(f"red: expected one grey image (H, W), got an array of shape {shot.red.shape}")
+    if plan.calibration is None:
+        return
+    camera, projector = plan.calibration.camera, plan.calibration.projector
+    if shot.red.shape != (camera.height_px, camera.width_px):
+        raise InputError(
+            f"the calibration is for images of {camera.width_px} x {camera.height_px} pixels, "
+            f"the shot has {shot.red.shape[1]} x {shot.red.shape[0]}; calibrate at the size in use"
+        )
+    if projector.width_px != plan.projector_width_px:
+        raise InputError(
+            f"the calibration's projector has {projector.width_px} columns, "
+            f"the fringes are said to cover {plan.projector_width_px}; the two must agree"
+        )
+
+
+def _conditioning(plan: Plan) -> dict[str, Any]:
+    calibration = plan.calibration
+    response = plan.response or (calibration.response if calibration else None)
+    known = {
+        "response": response.rows() if response else None,
+        "dark": calibration.dark if calibration else None,
+        "crosstalk": calibration.crosstalk if calibration else None,
+        "ir_registration": calibration.ir_registration if calibration else None,
+    }
+    return {name: value for name, value in known.items() if value is not None}
+
+
+def _geometry(calibration: Calibration | None) -> dict[str, Any]:
+    if calibration is None:
+        return {}
+    return {
+        "camera": core_device(calibration.camera),
+        "projector": core_device(calibration.projector),
+    }

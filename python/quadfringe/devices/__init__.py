@@ -1,0 +1,30 @@
+"""What a system is made of: a projector that shows fringes and a camera that grabs a shot of them."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from quadfringe.config import Fringes
+from quadfringe.data import Shot
+
+__all__ = ["Camera", "Projector"]
+
+
+class Projector(Protocol):
+    """Shows the fringes of one shot: a composite colour image and an infrared one, at the same instant."""
+
+    def show(self, fringes: Fringes) -> None:
+        """Project these fringes until told otherwise."""
+
+    def close(self) -> None:
+        """Release the device; closing twice is allowed."""
+
+
+class Camera(Protocol):
+    """Takes four channels in one exposure."""
+
+    def grab(self) -> Shot:
+        """Expose once and return the shot."""
+
+    def close(self) -> None:
+        """Release the device; closing twice is allowed."""

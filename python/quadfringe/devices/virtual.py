@@ -1,0 +1,114 @@
+"""A bench without hardware: a projector and a camera that share one simulated world."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from quadfringe import _core
+from quadfringe.config import ChannelResponse, Fringes, Response, SceneConfig, SystemConfig
+from quadfringe.data import Calibration, Shot, Truth
+from quadfringe.decoding import core_device, device_model
+from quadfringe.errors import DecodeError, InputError
+from quadfringe.export import read_npy
+
+__all__ = ["VirtualBench", "VirtualCamera", "VirtualProjector"]
+
+EDGE_PX = 2.0  # pixels nearer to an edge than this belong to it: lens and pixel mix both sides
+CHANNELS = ("red", "green", "blue", "ir")
+
+
+class VirtualBench:
+    """The world of one system file: what stands there, who lights it, who looks at it."""
+
+    def __init__(self, config: SystemConfig) -> None:
+        given = {"camera": config.camera, "visible": config.projector, "infrared": config.infrared}
+        devices = {name: core_device(model) for name, model in given.items() if model is not None}
+        self._bench = _core.Bench(**devices, layout=config.fringes.layout)
+        self._scene = config.scene
+        self._cast: _core.Cast | None = None
+        self.projected: Fringes | None = None
+
+    def resolved(self, config: SystemConfig) -> SystemConfig:
+        """Give the config with every device written out."""
+        devices = {"camera": self._bench.camera, "projector": self._bench.visible, "infrared": self._bench.infrared}
+        return config.model_copy(update={name: device_model(device) for name, device in devices.items()})
+
+    def calibration(self) -> Calibration:
+        """Give what a perfect calibration of this bench would find."""
+        scene = self._scene
+        pairs = zip(
+            scene.camera_offset or (0.0,) * 4,
+            scene.camera_exponent or (1.0,) * 4,
+            scene.projector_exponent or (1.0,) * 4,
+            strict=True,
+        )
+        responses = [ChannelResponse(offset=o, exponent=camera / projector) for o, camera, projector in pairs]
+        return Calibration(
+            camera=device_model(self._bench.camera),
+            projector=device_model(self._bench.visible),
+            response=Response(**dict(zip(CHANNELS, responses, strict=True))),
+            crosstalk=scene.crosstalk,
+            ir_registration=scene.infrared_from_visible,
+        )
+
+    def expose(self) -> Shot:
+        """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected."""
+        if self.projected is None:
+            raise DecodeError("the projector shows nothing: call show(fringes) before grab()")
+        if self._cast is None:
+            self._cast = self._look()
+        images = self._bench.render(self._cast, self.projected.numbers, **_light(self._scene))
+        full_scale = float(2**self._scene.bit_depth - 1)
+        return Shot(**images, full_scale=full_scale, truth=self._truth(self._cast))
+
+    def _look(self) -> _core.Cast:
+        relief = self._scene.height_map
+        if relief is None:
+            return self._bench.cast(self._scene.surface, time_s=self._scene.time_s or 0.0)
+        heights_mm = read_npy(relief.file)
+        if heights_mm.ndim != 2:
+            raise InputError(f"{relief.file}: expected heights (rows, columns), got shape {heights_mm.shape}")
+        place = relief.model_dump(exclude={"file"})
+        return self._bench.cast_height_map(heights_mm.astype("float64"), **place)
+
+    def _truth(self, cast: _core.Cast) -> Truth:
+        return Truth(
+            column_px=cast.column_px(),
+            xyz_mm=cast.xyz_mm(),
+            shadow=cast.shadow(),
+            edge=cast.edge_distance_px() < EDGE_PX,
+        )
+
+
+def _light(scene: SceneConfig) -> dict[str, Any]:
+    """Give the settings of light and camera that are present, as the kernel names them."""
+    return scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+
+
+class VirtualProjector:
+    """The projectors of the virtual bench."""
+
+    def __init__(self, bench: VirtualBench) -> None:
+        self._bench = bench
+
+    def show(self, fringes: Fringes) -> None:
+        """Light the bench with these fringes."""
+        self._bench.projected = fringes
+
+    def close(self) -> None:
+        """Switch the light off."""
+        self._bench.projected = None
+
+
+class VirtualCamera:
+    """The camera of the virtual bench; its shots know the truth."""
+
+    def __init__(self, bench: VirtualBench) -> None:
+        self._bench = bench
+
+    def grab(self) -> Shot:
+        """Render one shot of the bench."""
+        return self._bench.expose()
+
+    def close(self) -> None:
+        """Nothing to release."""

@@ -1,0 +1,72 @@
+"""Arrays to files of other programs: PLY for MeshLab and CloudCompare, TIFF for image tools, NPZ for NumPy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.errors import InputError, require
+from quadfringe.files import atomic, read_bytes
+
+__all__ = ["read_npy", "read_npz", "write_depth", "write_npz", "write_ply"]
+
+
+def write_ply(
+    path: Path,
+    points_mm: NDArray[np.float32],
+    colour: NDArray[np.uint8],
+    quality: NDArray[np.float32],
+) -> None:
+    """Write N points as binary PLY: x, y, z in mm (N, 3), colour (N, 3), and a scalar `quality` (N,)."""
+    require("trimesh", "export")
+    from trimesh import PointCloud
+    from trimesh.exchange.ply import export_ply
+
+    cloud = PointCloud(points_mm, colors=colour)
+    cloud.vertex_attributes = {"quality": np.ascontiguousarray(quality, np.float32)}
+    with atomic(path) as temporary:
+        temporary.write_bytes(export_ply(cloud))
+
+
+def write_depth(path: Path, depth_mm: NDArray[np.float32]) -> None:
+    """Write a depth map (H, W) as 32-bit float TIFF in mm; no data stays NaN."""
+    tifffile = require("tifffile", "export")
+    with atomic(path) as temporary:
+        tifffile.imwrite(temporary, depth_mm.astype(np.float32), metadata={"unit": "mm"})
+
+
+def write_npz(path: Path, maps: Mapping[str, NDArray[Any]], texts: Mapping[str, str]) -> None:
+    """Write named maps and named JSON texts into one NPZ."""
+    arrays: dict[str, Any] = {**maps, **{name: np.array(text) for name, text in texts.items()}}
+    with atomic(path) as temporary, temporary.open("wb") as stream:
+        np.savez(stream, **arrays)
+
+
+def read_npz(path: Path) -> dict[str, NDArray[Any]]:
+    """Read every array of an NPZ; raises `InputError` when the file is not one."""
+    stored = _load(path, "NPZ")
+    if isinstance(stored, np.ndarray):
+        raise InputError(f"{path}: expected an archive of arrays (.npz), got one array")
+    return stored
+
+
+def read_npy(path: Path) -> NDArray[Any]:
+    """Read one array from an NPY file; raises `InputError` when the file is not one."""
+    stored = _load(path, "NPY")
+    if isinstance(stored, dict):
+        raise InputError(f"{path}: expected one array (.npy), got an archive of several")
+    return stored
+
+
+def _load(path: Path, kind: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
+    stream = BytesIO(read_bytes(path))
+    try:
+        stored = np.load(stream, allow_pickle=False)
+        return stored if isinstance(stored, np.ndarray) else {name: stored[name] for name in stored.files}
+    except Exception as error:  # zipfile, zlib and numpy each raise their own on a damaged file
+        raise InputError(f"{path}: not a readable {kind} file: {error}") from error

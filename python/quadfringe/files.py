@@ -1,0 +1,67 @@
+"""Files that are either whole or not there: written beside their place, then renamed into it."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from quadfringe.errors import InputError
+
+__all__ = ["atomic", "figures_text", "folder_for", "read_bytes", "require_suffix"]
+
+
+@contextmanager
+def atomic(path: Path) -> Iterator[Path]:
+    """Give a temporary path beside `path`; rename it to `path` when the block ends well, else remove it."""
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
+    handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
+    os.close(handle)
+    temporary = Path(name)
+    try:
+        yield temporary
+        temporary.chmod(0o666 & ~_umask())  # mkstemp makes files private; a result is for all
+        temporary.replace(path)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def folder_for(path: Path) -> Path:
+    """Create the folder `path` when it is missing; raise `InputError` when a file stands in its place."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be made a folder: {error.strerror}") from error
+    return path
+
+
+def read_bytes(path: Path) -> bytes:
+    """Read a whole file; raise `InputError` naming the file and the reason."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+
+
+def require_suffix(path: Path, allowed: tuple[str, ...]) -> str:
+    """Return the lower-case suffix of `path`; raise `InputError` unless it is one of `allowed`."""
+    suffix = path.suffix.lower()
+    if suffix not in allowed:
+        raise InputError(f"{path}: expected a name that ends in {', '.join(allowed)}")
+    return suffix
+
+
+def figures_text(figures: Mapping[str, float]) -> str:
+    """Render `{"figures": {name_with_unit: number}}` as JSON; a number that is not finite becomes null."""
+    finite = {k: (v if abs(v) != float("inf") and v == v else None) for k, v in figures.items()}
+    return json.dumps({"figures": finite}, indent=2) + "\n"

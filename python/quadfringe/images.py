@@ -1,0 +1,72 @@
+"""Image files to arrays and back: 8 and 16 bit PNG, TIFF and BMP, colour in R, G, B order."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.errors import InputError
+from quadfringe.files import atomic, read_bytes
+
+__all__ = ["full_scale", "read_grey", "read_image", "read_rgb", "write_image"]
+
+DTYPES = ("uint8", "uint16", "float32")
+
+
+def read_image(path: Path) -> NDArray[Any]:
+    """Read an image as (H, W) or (H, W, 3), uint8, uint16 or float32; raises `InputError` naming the file."""
+    import cv2
+
+    data = np.frombuffer(read_bytes(path), np.uint8)
+    try:
+        image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
+    except cv2.error:
+        image = None
+    if image is None:
+        raise InputError(f"{path}: not a readable image; expected PNG, TIFF or BMP ({data.size} bytes)")
+    if image.dtype.name not in DTYPES:
+        raise InputError(f"{path}: expected {', '.join(DTYPES)} pixels, got {image.dtype.name}")
+    if image.ndim == 3 and image.shape[2] == 4:
+        image = image[:, :, :3]  # transparency says nothing about light
+    colour: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, ::-1])
+    return colour
+
+
+def full_scale(image: NDArray[Any]) -> np.float32:
+    """Give the intensity of a full pixel by type: 255, 65535, or 1 for float32."""
+    return np.float32(np.iinfo(image.dtype).max if image.dtype.kind == "u" else 1.0)
+
+
+def read_grey(path: Path) -> NDArray[Any]:
+    """Read one channel, (H, W); a colour file passes only when its three planes are equal."""
+    image = read_image(path)
+    if image.ndim == 2:
+        return image
+    if (image == image[:, :, :1]).all():
+        return image[:, :, 0]
+    raise InputError(f"{path}: expected one grey channel, got a colour image; give it as --rgb")
+
+
+def read_rgb(path: Path) -> NDArray[Any]:
+    """Read a colour image, (H, W, 3) in R, G, B order."""
+    image = read_image(path)
+    if image.ndim != 3:
+        raise InputError(f"{path}: expected a colour image, got one grey channel")
+    return image
+
+
+def write_image(path: Path, image: NDArray[Any]) -> None:
+    """Write (H, W) or (H, W, 3) in R, G, B order, whole or not at all."""
+    import cv2
+
+    stored = image if image.ndim == 2 else image[:, :, ::-1]
+    with atomic(path) as temporary:
+        try:
+            done = cv2.imwrite(str(temporary), np.ascontiguousarray(stored))
+        except cv2.error:
+            done = False
+        if not done:
+            raise InputError(f"{path}: cannot be written as an image; use .png, .tif or .bmp")

@@ -1,0 +1,104 @@
+"""One page about one shot: fringes, wrapped maps, absolute phase, depth, error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import Shape, Shot
+from quadfringe.errors import require
+from quadfringe.files import atomic
+from quadfringe.truth import Comparison
+
+__all__ = ["Panel", "draw_panels", "write_report"]
+
+NO_DATA = "#d8d8d8"
+
+
+class Panel:
+    """One picture of a page: an array with its title, unit, colours and range."""
+
+    def __init__(
+        self,
+        title: str,
+        image: NDArray[Any],
+        unit: str = "",
+        colours: str = "viridis",
+        limits: tuple[float, float] | None = None,
+    ) -> None:
+        self.title, self.image, self.unit = title, image, unit
+        self.colours, self.limits = colours, limits or _limits(image)
+
+
+def _limits(image: NDArray[Any]) -> tuple[float, float]:
+    finite = image[np.isfinite(image)]
+    if not finite.size:
+        return (0.0, 1.0)
+    low, high = (float(v) for v in np.quantile(finite, (0.005, 0.995)))
+    return (low, high if high > low else low + 1.0)
+
+
+def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel]]) -> None:
+    """Write rows of panels as one PNG; needs matplotlib (extra `plot`)."""
+    require("matplotlib", "plot")
+    from matplotlib.figure import Figure
+
+    columns = max(len(row) for row in rows)
+    figure = Figure(figsize=(4.2 * columns, 3.4 * len(rows)), layout="constrained")
+    figure.suptitle(title, fontsize=14)
+    grid = figure.add_gridspec(len(rows), columns)
+    for i, row in enumerate(rows):
+        for j, panel in enumerate(row):
+            _draw(figure, figure.add_subplot(grid[i, j]), panel)
+    with atomic(path) as temporary:
+        figure.savefig(temporary, format="png")
+
+
+def _draw(figure: Any, axes: Any, panel: Panel) -> None:
+    low, high = panel.limits
+    drawn = axes.imshow(panel.image, cmap=panel.colours, vmin=low, vmax=high, interpolation="nearest")
+    axes.set_facecolor(NO_DATA)
+    axes.set_title(panel.title, fontsize=10)
+    axes.tick_params(labelsize=7)
+    if panel.unit:
+        bar = figure.colorbar(drawn, ax=axes, shrink=0.85)
+        bar.set_label(panel.unit, fontsize=8)
+        bar.ax.tick_params(labelsize=7)
+
+
+def fringe_panels(shot: Shot) -> list[Panel]:
+    """Give the four channels as they were captured."""
+    full = (0.0, shot.full_scale_value)
+    return [Panel(f"captured {name}", image, "", "gray", full) for name, image in shot.channels.items()]
+
+
+def write_report(
+    path: Path,
+    title: str,
+    shot: Shot,
+    shape: Shape,
+    wrapped: Sequence[NDArray[np.float32]],
+    found: Comparison,
+) -> None:
+    """Write the report of a calibrated shape and its comparison with the truth as PNG."""
+    names = ("red and blue, two-step", "green, Fourier", "infrared, Fourier")
+    turn = (-np.pi, np.pi)
+    error_mm = 4 * found.depth_rms_mm if np.isfinite(found.depth_rms_mm) else 1.0
+    rows = [
+        fringe_panels(shot),
+        [
+            *(Panel(f"wrapped: {n}", w, "rad", "twilight", turn) for n, w in zip(names, wrapped, strict=True)),
+            Panel("modulation", shape.modulation, "fraction of full scale", "gray"),
+        ],
+        [
+            Panel("absolute phase", shape.phase_rad, "rad", "turbo"),
+            Panel("quality", shape.quality, "", "viridis"),
+            Panel("depth", shape.depth_mm, "mm", "viridis_r"),
+            Panel("depth error", found.depth_error_mm, "mm", "coolwarm", (-error_mm, error_mm)),
+        ],
+    ]
+    draw_panels(path, f"{title}: depth RMS {found.depth_rms_mm:.3f} mm", rows)

@@ -1,0 +1,88 @@
+"""One call from light to shape: project, grab, decode.
+
+>>> import quadfringe as qf
+>>> with qf.open() as scanner:          # no system file: the virtual bench
+...     shape = scanner.measure()
+>>> shape.xyz_mm.shape
+(768, 1024, 3)
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import TracebackType
+
+from quadfringe.config import SystemConfig, load_system
+from quadfringe.data import Calibration, Shape, Shot
+from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.devices import Camera, Projector
+from quadfringe.devices.virtual import VirtualBench, VirtualCamera, VirtualProjector
+
+__all__ = ["Scanner", "open_system"]
+
+
+class Scanner:
+    """A projector, a camera and a decoder that belong together; close it, or use it in a `with` block."""
+
+    def __init__(self, config: SystemConfig, projector: Projector, camera: Camera, calibration: Calibration) -> None:
+        self.config = config
+        self.calibration = calibration
+        self._projector = projector
+        self._camera = camera
+        self._decoder: ShotDecoder | None = None
+
+    def grab(self) -> Shot:
+        """Project the fringes and take one shot of them."""
+        self._projector.show(self.config.fringes)
+        return self._camera.grab()
+
+    def decode(self, shot: Shot) -> Shape:
+        """Give the shape of a shot of this system; raises `DecodeError` when none can be trusted."""
+        if self._decoder is None:
+            self._decoder = ShotDecoder(shot, self._plan())
+        shape = self._decoder.decode(shot)
+        return shape.with_settings(self.config.model_dump(mode="json", exclude_none=True), self.calibration)
+
+    def measure(self) -> Shape:
+        """Project, grab, decode: one exposure in, one metric shape out."""
+        return self.decode(self.grab())
+
+    def _plan(self) -> Plan:
+        return Plan(
+            projector_width_px=self.calibration.projector.width_px,
+            fringes=self.config.fringes,
+            calibration=self.calibration,
+            settings=self.config.decode,
+        )
+
+    def close(self) -> None:
+        """Release the devices."""
+        self._camera.close()
+        self._projector.close()
+
+    def __enter__(self) -> Scanner:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
+    """Open the system of a TOML file, of a config, or the virtual bench as it comes.
+
+    Raises `ConfigError` when the file has unknown keys or wrong values.
+    """
+    if system is None:
+        config = SystemConfig()
+    elif isinstance(system, SystemConfig):
+        config = system
+    else:
+        config = load_system(Path(system))
+    bench = VirtualBench(config)
+    calibration = bench.calibration() if config.calibration is None else Calibration.load(config.calibration)
+    return Scanner(bench.resolved(config), VirtualProjector(bench), VirtualCamera(bench), calibration)

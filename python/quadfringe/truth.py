@@ -1,0 +1,51 @@
+"""A shape against the simulator's truth: the figures by which a run is judged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import Shape, Truth
+
+__all__ = ["Comparison", "compare", "rms"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Figures of one shape; `depth_error_mm` is (H, W), NaN where nothing was returned.
+
+    `depth_rms_mm` is over returned pixels away from edges and shadow borders, wrong orders included.
+    """
+
+    depth_error_mm: NDArray[np.float32]
+    depth_rms_mm: float
+    wrong_order_percent: float
+    returned_percent: float
+
+
+def rms(values: NDArray[np.floating]) -> float:
+    """Root mean square of the finite values; NaN when there are none."""
+    finite = values[np.isfinite(values)].astype(np.float64)
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
+
+
+def compare(shape: Shape, truth: Truth, fringe_period_px: float) -> Comparison:
+    """Compare a calibrated shape with the truth; an order is wrong when the column is off by half a fringe."""
+    error = shape.depth_mm - truth.depth_mm
+    lit = np.isfinite(truth.column_px) & ~truth.shadow
+    smooth = lit & ~truth.edge
+    returned = shape.returned
+    wrong = ~(np.abs(shape.column_px - truth.column_px) < fringe_period_px / 2)
+    return Comparison(
+        depth_error_mm=error,
+        depth_rms_mm=rms(error[smooth]),
+        wrong_order_percent=_percent(wrong & returned, returned),
+        returned_percent=_percent(returned & lit, lit),
+    )
+
+
+def _percent(part: NDArray[np.bool_], whole: NDArray[np.bool_]) -> float:
+    count = int(whole.sum())
+    return 100.0 * int(part.sum()) / count if count else float("nan")

@@ -1,0 +1,47 @@
+"""What every test may ask for."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from scoring import data_folder
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The folder of captures and renders; without it a test is skipped, and fails in CI."""
+    folder = data_folder()
+    if not (folder / "renders" / "rig.json").is_file():
+        reason = f"no test data in {folder}; set QUADFRINGE_DATA to the folder that holds renders/"
+        if os.environ.get("CI"):
+            pytest.fail(reason)
+        pytest.skip(reason)
+    return folder
+
+
+SMALL_SYSTEM = """
+[camera]
+width_px = 512
+height_px = 384
+focal_px = [1290.0, 1290.0]
+centre_px = [255.5, 191.5]
+
+[scene]
+surface = "steps"
+noise = 0.01
+"""
+
+
+@pytest.fixture(scope="session")
+def small_bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one simulated shot of 512 x 384 pixels as files, its system file, calibration and truth."""
+    from quadfringe.simulate import bench_config, write_simulation
+
+    folder = tmp_path_factory.mktemp("bench")
+    (folder / "system.toml").write_text(SMALL_SYSTEM)
+    write_simulation(folder, bench_config(folder / "system.toml"))
+    return folder

@@ -1,0 +1,100 @@
+"""Real captures of a projector with uncorrected response, decoded as any user would decode them."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import scoring
+
+from quadfringe import ResponseCalibration
+
+RIGHT_PERCENT = 90.0  # of all object pixels; a missing pixel counts as wrong
+RIGHT_OF_RETURNED_PERCENT = 97.0
+
+
+def quadfringe(*words: object) -> None:
+    command = [str(Path(sys.executable).with_name("quadfringe")), *map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module", params=scoring.CAPTURES)
+def scene(request: pytest.FixtureRequest, data_dir: Path) -> scoring.Scene:
+    return scoring.capture(data_dir, request.param)
+
+
+@pytest.fixture(scope="module")
+def response_file(scene: scoring.Scene, data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp(scene.name) / "response.json"
+    files = scoring.step_files(data_dir, scene.name)
+    quadfringe("calibrate", "response", "--steps", scoring.STEPS, *files, "--out", out)
+    return out
+
+
+def assert_bars(score: scoring.Score) -> None:
+    assert score.right_percent >= RIGHT_PERCENT
+    assert score.right_of_returned_percent >= RIGHT_OF_RETURNED_PERCENT
+
+
+def test_command_line_decodes_a_capture(scene: scoring.Scene, response_file: Path, tmp_path: Path) -> None:
+    words: list[object] = []
+    for name, image in scene.channels.items():
+        cv2.imwrite(str(tmp_path / f"{name}.png"), image)
+        words += [f"--{name}", tmp_path / f"{name}.png"]
+    words += ["--fringes", 45.714285714, 42.666666667, 40, "--projector-width", 1920]
+    out = tmp_path / "shape.npz"
+    quadfringe("decode", *words, "--response", response_file, "--out", out)
+    with np.load(out) as maps:
+        assert_bars(scoring.score(scene, maps["phase_rad"]))
+        for name in ("phase_rad", "column_px", "order", "modulation", "quality"):
+            assert maps[name].shape == scene.red.shape
+            assert maps[name].dtype == np.float32
+        returned = np.isfinite(maps["phase_rad"])
+        order = np.floor(maps["phase_rad"][returned] / (2 * np.pi))
+        assert (np.abs(maps["order"][returned] - order) <= 1).all()  # equal but for rounding
+        assert "xyz_mm" not in maps
+
+
+def test_package_decodes_a_capture(scene: scoring.Scene, response_file: Path) -> None:
+    response = ResponseCalibration.load(response_file)
+    shape = scoring.shape_of(scene, response=response)
+    assert_bars(scoring.score(scene, shape.phase_rad))
+
+
+def test_a_capture_without_its_response_is_still_ordered(scene: scoring.Scene) -> None:
+    shape = scoring.shape_of(scene)
+    score = scoring.score(scene, shape.phase_rad)
+    assert score.right_of_returned_percent >= 90.0
+    assert score.right_percent >= 60.0
+
+
+def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file: Path) -> None:
+    response = ResponseCalibration.load(response_file)
+    raw = scoring.score(scene, scoring.shape_of(scene).phase_rad)
+    linear = scoring.score(scene, scoring.shape_of(scene, response=response).phase_rad)
+    assert linear.right_phase_rms_rad < 0.8 * raw.right_phase_rms_rad
+
+
+def test_both_captures_tell_of_the_same_projector(data_dir: Path, tmp_path: Path) -> None:
+    exponents = []
+    for name in scoring.CAPTURES:
+        out = tmp_path / f"{name}.json"
+        files = scoring.step_files(data_dir, name)
+        quadfringe("calibrate", "response", "--steps", scoring.STEPS, *files, "--out", out)
+        exponents.append(json.loads(out.read_text())["red"]["exponent"])
+    assert 0.3 < min(exponents) <= max(exponents) < 0.65
+    assert abs(exponents[0] - exponents[1]) < 0.1
+
+
+def test_all_three_stacks_may_be_given_at_once(data_dir: Path, tmp_path: Path) -> None:
+    files = [f for k in range(3) for f in scoring.step_files(data_dir, "plate", k)]
+    assert len(files) == 3 * scoring.STEPS
+    out = tmp_path / "response.json"
+    quadfringe("calibrate", "response", "--steps", scoring.STEPS, *files, "--out", out)
+    assert 0.3 < json.loads(out.read_text())["ir"]["exponent"] < 0.65

@@ -1,0 +1,68 @@
+"""The demonstration and the reproduction keep their contract and their bars."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import cv2
+import pytest
+import trimesh
+from typer.testing import CliRunner
+
+from quadfringe.cli import app
+from quadfringe.demo import SCENES
+
+Figures = dict[str, float]
+
+
+def figures_of(*arguments: str) -> Figures:
+    result = CliRunner().invoke(app, [*arguments, "--json", "-"])
+    assert result.exit_code == 0, result.output
+    stored = json.loads(result.stdout)
+    assert list(stored) == ["figures"]
+    figures: Figures = stored["figures"]
+    return figures
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("demo")
+
+
+@pytest.fixture(scope="module")
+def demo(folder: Path) -> Figures:
+    return figures_of("demo", "--out", str(folder))
+
+
+@pytest.fixture(scope="module")
+def peaks(folder: Path) -> Figures:
+    return figures_of("reproduce", "peaks", "--out", str(folder))
+
+
+def test_demo_names_its_figures(demo: Figures, folder: Path) -> None:
+    kinds = ("depth_rms_mm", "wrong_order_percent", "returned_percent")
+    assert set(demo) == {f"{scene}_{kind}" for scene in SCENES for kind in kinds} | {"decode_ms"}
+    assert json.loads((folder / "figures.json").read_text())["figures"] == demo
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_demo_is_metric(demo: Figures, folder: Path, scene: str) -> None:
+    assert demo[f"{scene}_depth_rms_mm"] <= 0.10
+    assert demo[f"{scene}_wrong_order_percent"] <= 0.1
+    assert demo[f"{scene}_returned_percent"] >= 95
+    cloud = trimesh.load(folder / f"{scene}.ply")
+    assert len(cloud.vertices) > 500_000
+    report = cv2.imread(str(folder / f"{scene}.png"))
+    assert report is not None
+    assert report.shape[1] > 1000
+
+
+def test_peaks_stand_as_published(peaks: Figures, folder: Path) -> None:
+    names = {f"{method}_rms_rad" for method in ("traditional_ftp", "improved_ftp", "proposed")}
+    assert set(peaks) == names | {f"{name}_row760" for name in names}
+    for row in ("", "_row760"):
+        assert peaks[f"traditional_ftp_rms_rad{row}"] > 0.0408
+        assert peaks[f"improved_ftp_rms_rad{row}"] <= 0.0408
+        assert peaks[f"proposed_rms_rad{row}"] <= 0.0099
+    assert cv2.imread(str(folder / "peaks.png")) is not None

@@ -1,0 +1,125 @@
+"""Records: what is saved is what is read back."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tifffile
+import trimesh
+
+from quadfringe.config import ChannelResponse, DeviceModel, Response
+from quadfringe.data import Calibration, ResponseCalibration, Shape
+from quadfringe.errors import ConfigError, InputError
+
+CALIBRATION = Calibration(
+    camera=DeviceModel(width_px=8, height_px=6, focal_px=(20.0, 20.0), centre_px=(3.5, 2.5)),
+    projector=DeviceModel(
+        width_px=912,
+        height_px=1140,
+        focal_px=(1572.7, 1572.7),
+        centre_px=(455.5, 569.5),
+        distortion=(-0.1, 0.02, 1e-4, -1e-4, 0.0),
+        rotation=((0.8, 0.0, 0.6), (0.0, 1.0, 0.0), (-0.6, 0.0, 0.8)),
+        translation_mm=(-252.6, 22.4, -126.1),
+    ),
+    response=Response(red=ChannelResponse(exponent=0.5)),
+    dark=(0.01, 0.0, 0.0, 0.02),
+)
+
+
+@pytest.fixture
+def shape() -> Shape:
+    rng = np.random.default_rng(7)
+    maps = rng.random((5, 6, 8), np.float32)
+    maps[:, 2, 3] = np.nan
+    xyz = rng.random((6, 8, 3), np.float32) * 800
+    xyz[2, 3] = np.nan
+    return Shape(*maps, xyz_mm=xyz, config={"fringes": [36, 35, 30]}, calibration=CALIBRATION)
+
+
+def test_npz_gives_everything_back(tmp_path: Path, shape: Shape) -> None:
+    shape.save(tmp_path / "shape.npz")
+    back = Shape.load(tmp_path / "shape.npz")
+    for name, values in shape.maps.items():
+        np.testing.assert_array_equal(back.maps[name], values)
+        assert back.maps[name].dtype == np.float32
+    assert back.config == shape.config
+    assert back.calibration == CALIBRATION
+
+
+def test_ply_is_binary_and_holds_valid_points_only(tmp_path: Path, shape: Shape) -> None:
+    shape.save(tmp_path / "shape.ply")
+    assert b"format binary_little_endian" in (tmp_path / "shape.ply").read_bytes()[:80]
+    cloud = trimesh.load(tmp_path / "shape.ply")
+    assert shape.xyz_mm is not None
+    valid = np.isfinite(shape.quality)
+    np.testing.assert_array_equal(cloud.vertices, shape.xyz_mm[valid])
+    stored = cloud.metadata["_ply_raw"]["vertex"]["data"]
+    np.testing.assert_array_equal(stored["quality"], shape.quality[valid])
+
+
+@pytest.mark.parametrize("name", ["depth.tif", "depth.tiff"])
+def test_tiff_keeps_no_data(tmp_path: Path, shape: Shape, name: str) -> None:
+    shape.save(tmp_path / name)
+    depth = tifffile.imread(tmp_path / name)
+    assert depth.dtype == np.float32
+    np.testing.assert_array_equal(depth, shape.depth_mm)
+
+
+@pytest.mark.parametrize("name", ["shape.ply", "shape.tif"])
+def test_a_shape_without_millimetres_says_so(tmp_path: Path, shape: Shape, name: str) -> None:
+    with pytest.raises(InputError, match="decode with a calibration"):
+        replace(shape, xyz_mm=None).save(tmp_path / name)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_unknown_suffix_is_refused(tmp_path: Path, shape: Shape) -> None:
+    with pytest.raises(InputError, match=r"\.npz, \.ply, \.tif"):
+        shape.save(tmp_path / "shape.stl")
+
+
+@pytest.mark.parametrize("keep", [0, 1, 100, 1000, -1])
+def test_a_truncated_npz_is_named(tmp_path: Path, shape: Shape, keep: int) -> None:
+    path = tmp_path / "shape.npz"
+    shape.save(path)
+    path.write_bytes(path.read_bytes()[:keep])
+    with pytest.raises(InputError, match=r"shape\.npz"):
+        Shape.load(path)
+
+
+def test_an_npz_of_something_else_is_named(tmp_path: Path) -> None:
+    np.savez(tmp_path / "other.npz", a=np.zeros(3))
+    with pytest.raises(InputError, match="not a saved shape: no phase_rad"):
+        Shape.load(tmp_path / "other.npz")
+
+
+def test_calibration_gives_everything_back(tmp_path: Path) -> None:
+    CALIBRATION.save(tmp_path / "c.json")
+    assert Calibration.load(tmp_path / "c.json") == CALIBRATION
+
+
+def test_response_gives_everything_back(tmp_path: Path) -> None:
+    response = ResponseCalibration(ir=ChannelResponse(exponent=2.0), steps=12, inputs=("a.bmp",))
+    response.save(tmp_path / "r.json")
+    assert ResponseCalibration.load(tmp_path / "r.json") == response
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("{", "not valid JSON"),
+        ("[]", "expected a JSON object, got list"),
+        ('{"red": {"exponet": 2}}', "red.exponet: this key is not known"),
+        ('{"red": {"exponent": -2}}', "red.exponent: Input should be greater than 0, got -2"),
+        ('{"schema_version": 9}', "schema_version"),
+    ],
+)
+def test_a_bad_calibration_file_is_explained(tmp_path: Path, text: str, reason: str) -> None:
+    path = tmp_path / "r.json"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"r\.json") as caught:
+        ResponseCalibration.load(path)
+    assert reason in str(caught.value)

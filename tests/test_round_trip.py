@@ -1,0 +1,93 @@
+"""decode(simulate(h)) gives h back, whatever the rig."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import quadfringe as qf
+from quadfringe.config import DeviceModel
+from quadfringe.decoding import core_device
+from quadfringe.truth import compare
+
+WIDTH, HEIGHT = 480, 360
+DEPTH_MM = 800.0
+FIELD_MM = 300.0
+
+surfaces = st.sampled_from(["plane", "peaks", "steps", "sphere", "face"])
+codes = st.sampled_from([(36.0, 35.0, 30.0), (25.0, 24.0, 20.0), (28.25, 27.3, 23.1), (45.714, 42.667, 40.0)])
+
+
+@st.composite
+def projectors(draw: st.DrawFn) -> DeviceModel:
+    """Draw a projector 10 to 22 degrees beside the camera that lights the whole field through some lens."""
+    angle = math.radians(draw(st.floats(10, 22))) * draw(st.sampled_from([1, -1]))
+    distance_mm = draw(st.floats(600, 1500))
+    columns = draw(st.sampled_from([912, 1280, 1920]))
+    sine, cosine = math.sin(angle), math.cos(angle)
+    focal = columns / (1.3 * FIELD_MM) * distance_mm
+    return DeviceModel(
+        width_px=columns,
+        height_px=columns,
+        focal_px=(focal, focal),
+        centre_px=((columns - 1) / 2, (columns - 1) / 2),
+        distortion=(draw(st.floats(-0.1, 0.1)), 0.0, 0.0, 0.0, 0.0),
+        rotation=((cosine, 0.0, sine), (0.0, 1.0, 0.0), (-sine, 0.0, cosine)),
+        translation_mm=(-DEPTH_MM * sine, 0.0, distance_mm - DEPTH_MM * cosine),
+    )
+
+
+CAMERA = DeviceModel(
+    width_px=WIDTH,
+    height_px=HEIGHT,
+    focal_px=(WIDTH / FIELD_MM * DEPTH_MM,) * 2,
+    centre_px=((WIDTH - 1) / 2, (HEIGHT - 1) / 2),
+)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
+@given(surface=surfaces, numbers=codes, projector=projectors(), noise=st.sampled_from([0.0, 0.01]))
+def test_simulated_shapes_come_back(
+    surface: str, numbers: tuple[float, float, float], projector: DeviceModel, noise: float
+) -> None:
+    config = qf.SystemConfig(
+        camera=CAMERA,
+        projector=projector,
+        fringes=qf.Fringes(numbers=numbers),
+        scene=qf.SceneConfig(surface=surface, noise=noise, seed=3),
+    )
+    with qf.open(config) as scanner:
+        shot = scanner.grab()
+        shape = scanner.decode(shot)
+    assert shot.truth is not None
+    found = compare(shape, shot.truth, projector.width_px / numbers[0])
+    assert found.returned_percent > 90
+    smooth = np.isfinite(shot.truth.column_px) & ~shot.truth.edge & shape.returned
+    half_fringe_px = projector.width_px / numbers[0] / 2
+    wrong = np.abs(shape.column_px - shot.truth.column_px)[smooth] > half_fringe_px
+    assert wrong.mean() < 0.02
+    assert np.nanmedian(np.abs(found.depth_error_mm)) < 0.5
+
+
+@settings(max_examples=10, deadline=None, derandomize=True)
+@given(projector=projectors())
+def test_points_lie_where_the_camera_sees_them(projector: DeviceModel) -> None:
+    """X, Y, Z of each pixel project back onto it, and onto the decoded column of the projector."""
+    config = qf.SystemConfig(camera=CAMERA, projector=projector, scene=qf.SceneConfig(surface="plane"))
+    with qf.open(config) as scanner:
+        shape = scanner.measure()
+    assert shape.xyz_mm is not None
+    camera, beam = core_device(CAMERA), core_device(projector)
+    for row, column in ((5, 7), (180, 240), (350, 470)):
+        point = shape.xyz_mm[row, column]
+        if np.isnan(point).any():
+            continue
+        x, y, z = (float(v) for v in point)
+        seen_at, lit_from = camera.project((x, y, z)), beam.project((x, y, z))
+        assert seen_at is not None
+        assert lit_from is not None
+        np.testing.assert_allclose(seen_at, (column, row), atol=1e-3)
+        assert abs(lit_from[0] - shape.column_px[row, column]) < 0.02
