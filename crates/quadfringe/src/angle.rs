@@ -17,7 +17,7 @@ const ATAN: [f32; 9] = [
 ];
 
 /// sin(2 pi t) / t over |t| <= 1/4 in powers of t^2, found in the same way; greatest error of the polynomial 4e-9.
-const SINE: [f32; 5] = [6.283_185_2, -41.341_656, 81.601_01, -76.549_85, 39.537_205];
+const SINE: [f32; 5] = [6.283_185, -41.341_656, 81.601_01, -76.549_85, 39.537_205];
 
 /// Sine and cosine, greatest error 4e-7 for |angle| < 1000 rad. Free of branches, so that loops vectorise.
 #[inline]

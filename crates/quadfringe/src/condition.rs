@@ -138,13 +138,22 @@ impl Conditioner {
         for (channel, dark) in Channel::ALL.iter().zip(self.dark) {
             if !(0.0..1.0).contains(&dark) {
                 let name = format!("dark level of {}", channel.name());
-                return Err(Error::value(name, "a fraction of full scale in [0, 1)", dark));
+                return Err(Error::value(
+                    name,
+                    "a fraction of full scale in [0, 1)",
+                    dark,
+                ));
             }
         }
         for (channel, response) in Channel::ALL.iter().zip(self.response) {
             response.check(channel.name())?;
         }
-        if self.ir_registration.iter().flatten().any(|v| !v.is_finite()) {
+        if self
+            .ir_registration
+            .iter()
+            .flatten()
+            .any(|v| !v.is_finite())
+        {
             let actual = format!("{:?}", self.ir_registration);
             return Err(Error::value("ir_registration", "finite numbers", actual));
         }
@@ -237,7 +246,9 @@ impl Plan {
         out.fill(true);
         for plane in &shot.planes {
             let row = plane.row(y);
-            out.iter_mut().zip(row).for_each(|(o, v)| *o &= v.intensity() < limit);
+            out.iter_mut()
+                .zip(row)
+                .for_each(|(o, v)| *o &= v.intensity() < limit);
         }
     }
 
@@ -288,7 +299,8 @@ fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
         a[i][4 + i] = 1.0;
     }
     for column in 0..4 {
-        let pivot = (column..4).max_by(|&p, &q| a[p][column].abs().total_cmp(&a[q][column].abs()))?;
+        let pivot =
+            (column..4).max_by(|&p, &q| a[p][column].abs().total_cmp(&a[q][column].abs()))?;
         a.swap(column, pivot);
         let head = a[column][column];
         if !head.is_finite() || head.abs() < 1e-6 {
@@ -299,11 +311,16 @@ fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
         for (row, values) in a.iter_mut().enumerate() {
             if row != column {
                 let factor = values[column];
-                values.iter_mut().zip(lead).for_each(|(v, l)| *v -= factor * l);
+                values
+                    .iter_mut()
+                    .zip(lead)
+                    .for_each(|(v, l)| *v -= factor * l);
             }
         }
     }
-    Some(std::array::from_fn(|i| std::array::from_fn(|j| a[i][4 + j])))
+    Some(std::array::from_fn(|i| {
+        std::array::from_fn(|j| a[i][4 + j])
+    }))
 }
 
 #[cfg(test)]
@@ -362,12 +379,23 @@ mod tests {
             crosstalk: [[1.0; 4]; 4],
             ..Conditioner::default()
         };
-        assert!(singular.check().unwrap_err().to_string().contains("invertible"));
+        assert!(
+            singular
+                .check()
+                .unwrap_err()
+                .to_string()
+                .contains("invertible")
+        );
         let dark = Conditioner {
             dark: [0.0, 1.5, 0.0, 0.0],
             ..Conditioner::default()
         };
-        assert!(dark.check().unwrap_err().to_string().contains("dark level of G"));
+        assert!(
+            dark.check()
+                .unwrap_err()
+                .to_string()
+                .contains("dark level of G")
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@
 //! ```
 
 mod best;
+mod islands;
 mod output;
 mod published;
 
@@ -49,7 +50,7 @@ impl Default for Options {
         Self {
             method: Method::default(),
             modulation_min: 0.02,
-            quality_min: 0.1,
+            quality_min: 0.15,
             period_px: None,
         }
     }
@@ -57,16 +58,21 @@ impl Default for Options {
 
 impl Options {
     fn check(&self) -> Result<()> {
-        let fractions = [("modulation_min", self.modulation_min), ("quality_min", self.quality_min)];
+        let fractions = [
+            ("modulation_min", self.modulation_min),
+            ("quality_min", self.quality_min),
+        ];
         for (name, value) in fractions {
             if !(0.0..1.0).contains(&value) {
                 return Err(Error::value(name, "a fraction in [0, 1)", value));
             }
         }
         match self.period_px {
-            Some(period) if !(period.is_finite() && period >= 3.0) => {
-                Err(Error::value("period_px", "at least 3 camera pixels", period))
-            }
+            Some(period) if !(period.is_finite() && period >= 3.0) => Err(Error::value(
+                "period_px",
+                "at least 3 camera pixels",
+                period,
+            )),
             _ => Ok(()),
         }
     }
@@ -105,7 +111,12 @@ impl Decoder {
     ///
     /// # Errors
     /// [`Error::Shape`] for images smaller than 16 x 16; [`Error::Value`] for a conditioner or options out of range.
-    pub fn new(code: FringeCode, shape: [usize; 2], conditioner: &Conditioner, options: Options) -> Result<Self> {
+    pub fn new(
+        code: FringeCode,
+        shape: [usize; 2],
+        conditioner: &Conditioner,
+        options: Options,
+    ) -> Result<Self> {
         if shape[0] < 16 || shape[1] < 16 {
             return Err(Error::shape("decoder", &[16, 16], &shape));
         }
@@ -131,7 +142,11 @@ impl Decoder {
     pub fn triangulate_with(mut self, triangulator: Triangulator) -> Result<Self> {
         let (rows, columns) = triangulator.shape();
         if [rows, columns] != self.shape {
-            return Err(Error::shape("calibrated camera", &self.shape, &[rows, columns]));
+            return Err(Error::shape(
+                "calibrated camera",
+                &self.shape,
+                &[rows, columns],
+            ));
         }
         self.triangulator = Some(triangulator);
         Ok(self)

@@ -7,19 +7,19 @@
 
 pub mod error;
 pub mod fringe;
-pub mod optics;
-pub mod surface;
-pub mod rig;
 pub mod height;
+pub mod optics;
+pub mod rig;
+pub mod surface;
 
 mod angle;
 pub mod condition;
+pub mod decode;
 pub mod demod;
 pub mod unwrap;
-pub mod decode;
 
+pub use condition::{Conditioner, Response, Shot};
+pub use decode::{Decoded, Decoder, Method, Options};
 pub use error::{Error, Result};
 pub use fringe::{Channel, DmdLayout, FringeCode};
 pub use optics::Device;
-pub use condition::{Conditioner, Response, Shot};
-pub use decode::{Decoded, Decoder, Method, Options};

@@ -1,11 +1,12 @@
 //! The best chain: local fit, noise-aware phase, orders with support.
 
+use super::islands::{mark_seams, remove_islands, remove_slivers};
 use super::{Decoded, Options};
-use crate::angle::{atan2, round, wrap_positive};
+use crate::angle::{atan2, round, sin_cos, wrap_positive};
 use crate::condition::{Plan, Sample};
 use crate::demod::carrier;
 use crate::demod::grid::Grid;
-use crate::demod::joint::Joint;
+use crate::demod::joint::{Channels, Joint, fit as fit_channels};
 use crate::demod::light::find_light;
 use crate::demod::local_fit::{LocalFit, PixelMaps, Planes, RowMaps};
 use crate::demod::window::{Window, noise};
@@ -17,17 +18,21 @@ use std::f32::consts::TAU;
 
 /// Least contrast (modulation over background) of light that comes from the projector.
 const CONTRAST_MIN: f32 = 0.1;
+/// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 when B repeats R.
+const SPREAD_MIN: f32 = 0.02;
 /// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
 const NOISE_MAX: f32 = 1.5;
-const MISFIT_MAX: f32 = 0.15;
+const MISFIT_MAX: f32 = 0.2;
+/// Greatest square of a pixel's own misfit, in units of what its neighbours may have on average.
+const OWN_MISFIT_MAX: f32 = 3.0;
+/// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
+const NEIGHBOURS_MIN: u8 = 10;
 /// Fringe period in pixels from which on orders are chosen on every second pixel.
 const COARSE_FROM_PX: f64 = 14.0;
 
 pub(super) struct Best {
     support: Support,
     numbers: [f64; 3],
-    columns_per_turn: f32,
-    columns: f32,
     shape: [usize; 2],
     light: [Vec<f32>; 4],
     lit: Vec<bool>,
@@ -38,6 +43,10 @@ pub(super) struct Best {
     phase: Vec<f32>,
     joint: Joint,
     noise: f32,
+    quality: Vec<f32>,
+    memory: Vec<u32>,
+    seams: Vec<bool>,
+    counts: Vec<u8>,
     evidence: Vec<Evidence>,
     sums: Array3<u16>,
     orders: SupportMaps,
@@ -50,8 +59,6 @@ impl Best {
         Self {
             support: Support::new(code),
             numbers: code.numbers(),
-            columns_per_turn: code.period_px(0) as f32,
-            columns: code.projector_width() as f32,
             shape,
             light: [plane(), plane(), plane(), plane()],
             lit: vec![false; pixels],
@@ -62,24 +69,58 @@ impl Best {
             phase: plane(),
             joint: Joint::default(),
             noise: 0.0,
+            quality: plane(),
+            memory: Vec::new(),
+            seams: Vec::new(),
+            counts: Vec::new(),
             evidence: Vec::new(),
             sums: Array3::zeros((0, 0, 0)),
             orders: SupportMaps::default(),
         }
     }
 
-    pub fn run<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>, options: &Options, out: &mut Decoded) {
+    pub fn run<T: Sample>(
+        &mut self,
+        plan: &Plan,
+        shot: &Shot<'_, T>,
+        options: &Options,
+        out: &mut Decoded,
+    ) {
         self.condition(plan, shot);
         let width = self.shape[1];
         let light = self.light.each_ref().map(Vec::as_slice);
-        let planes = Planes { light, usable: &self.usable, width };
+        let planes = Planes {
+            light,
+            usable: &self.usable,
+            width,
+        };
         let period = options.period_px.unwrap_or_else(|| period_px(&planes));
         let grid = Grid::new(self.shape[0], width, ((period / 8.0) as usize).clamp(1, 16));
-        find_light(&grid, &planes, period, 2.0 * options.modulation_min, &mut self.lit);
-        self.usable.par_iter_mut().zip(&self.lit).for_each(|(usable, lit)| *usable &= lit);
-        let planes = Planes { light, usable: &self.usable, width };
+        find_light(
+            &grid,
+            &planes,
+            period,
+            2.0 * options.modulation_min,
+            &mut self.lit,
+        );
+        self.usable
+            .par_iter_mut()
+            .zip(&self.lit)
+            .for_each(|(usable, lit)| *usable &= lit);
+        let planes = Planes {
+            light,
+            usable: &self.usable,
+            width,
+        };
         let fit = LocalFit::new(grid, &planes, period, &mut self.maps);
-        find_modulation(&fit, &self.maps, &self.lit, width, options.modulation_min, &mut self.modulation);
+        find_modulation(
+            &fit,
+            &self.maps,
+            &self.lit,
+            width,
+            options.modulation_min,
+            &mut self.modulation,
+        );
         wrapped_phase(&self.maps, &mut self.rough);
         let noise = noise(&self.rough, &self.modulation, width);
         self.noise = noise;
@@ -87,15 +128,57 @@ impl Best {
         let window = Window::new(&fit.grid, &slopes, &self.modulation, width, period, noise);
         window.smooth(&self.rough, &mut self.phase);
         let stride = if period < COARSE_FROM_PX { 1 } else { 2 };
-        gather(&fit, &self.phase, &self.modulation, self.shape, stride, &mut self.evidence);
-        self.support.choose(&self.evidence, width.div_ceil(stride), &mut self.sums, &mut self.orders);
-        self.lift(stride);
-        let light = self.light.each_ref().map(Vec::as_slice);
-        let planes = Planes { light, usable: &self.usable, width };
+        gather(
+            &fit,
+            &self.phase,
+            &self.modulation,
+            self.shape,
+            stride,
+            &mut self.evidence,
+        );
+        self.support.choose(
+            &self.evidence,
+            width.div_ceil(stride),
+            &mut self.sums,
+            &mut self.orders,
+        );
+        lift(&self.evidence, &self.orders, stride, width, &mut self.phase);
+        let channels = fit_channels(
+            &fit.grid,
+            &planes,
+            self.numbers,
+            period,
+            &self.maps.albedo,
+            &self.phase,
+        );
+        witness(
+            &fit.grid,
+            &channels,
+            &planes,
+            &self.phase,
+            stride,
+            &mut self.evidence,
+        );
+        self.support.choose(
+            &self.evidence,
+            width.div_ceil(stride),
+            &mut self.sums,
+            &mut self.orders,
+        );
+        lift(&self.evidence, &self.orders, stride, width, &mut self.phase);
         let window = Window::new(&fit.grid, &slopes, &self.modulation, width, period, noise);
         let numbers = self.numbers;
-        self.joint.run(&fit.grid, &window, &planes, numbers, period, &mut self.maps.albedo, &mut self.phase);
-        self.write(stride, options, out);
+        self.joint.run(
+            &fit.grid,
+            &window,
+            &planes,
+            numbers,
+            period,
+            &mut self.maps.albedo,
+            &mut self.phase,
+        );
+        self.judge(&fit.grid, stride, period, options);
+        self.write(out);
     }
 
     /// Step 1: linear light.
@@ -104,7 +187,10 @@ impl Best {
         let [red, green, blue, infrared] = &mut self.light;
         red.par_chunks_mut(width)
             .zip(green.par_chunks_mut(width))
-            .zip(blue.par_chunks_mut(width).zip(infrared.par_chunks_mut(width)))
+            .zip(
+                blue.par_chunks_mut(width)
+                    .zip(infrared.par_chunks_mut(width)),
+            )
             .zip(self.usable.par_chunks_mut(width))
             .enumerate()
             .for_each(|(y, (((red, green), (blue, infrared)), usable))| {
@@ -120,26 +206,9 @@ impl Best {
             });
     }
 
-    /// Wrapped to absolute: every pixel takes the order of its node, one more or less where the wrapped phase turns
-    /// over in between.
-    fn lift(&mut self, stride: usize) {
-        let width = self.shape[1];
-        let columns = width.div_ceil(stride);
-        let (evidence, orders) = (&self.evidence, &self.orders.order);
-        self.phase.par_chunks_mut(width).enumerate().for_each(|(y, phase)| {
-            for (x, value) in phase.iter_mut().enumerate() {
-                let node = y / stride * columns + x / stride;
-                let own = wrap_positive(*value);
-                let other = f32::from(evidence[node].phase) * (TAU / 65536.0);
-                let turned = round((other - own) / TAU);
-                *value = own + TAU * (f32::from(orders[node]) + turned);
-            }
-        });
-    }
-
     /// Pixels whose four channels, with their neighbours', agree with the model of the chosen order; a wrong order has G
     /// and IR wrong.
-    fn agrees(&self, y: usize, noise: f32, mean: &mut Vec<f32>, out: &mut Vec<bool>) {
+    fn agrees(&self, y: usize, mean: &mut Vec<f32>, out: &mut Vec<bool>) {
         let [height, width] = self.shape;
         let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|row| row * width);
         let misfit = &self.joint.misfit;
@@ -149,32 +218,147 @@ impl Best {
         out.extend((0..width).map(|x| {
             let sum = mean[x.saturating_sub(1)] + mean[x] + mean[(x + 1).min(width - 1)];
             let modulation = self.modulation[y * width + x];
-            let most = (NOISE_MAX * noise).powi(2) + (MISFIT_MAX * modulation).powi(2);
-            sum <= 9.0 * most
+            let most = (NOISE_MAX * self.noise).powi(2) + (MISFIT_MAX * modulation).powi(2);
+            sum <= 9.0 * most && misfit[y * width + x] <= OWN_MISFIT_MAX * most
         }));
     }
 
-    fn write(&self, stride: usize, options: &Options, out: &mut Decoded) {
+    /// Absolute phase of the pixels that can be trusted, NaN elsewhere; quality of all that are lit.
+    fn judge(&mut self, grid: &Grid, stride: usize, period_px: f64, options: &Options) {
         let width = self.shape[1];
         let columns = width.div_ceil(stride);
-        let field = -1.5..self.columns + 0.5;
-        let noise = self.noise;
-        out.rows().enumerate().for_each_init(|| (Vec::new(), Vec::new()), |(mean, agrees), (y, [phase, modulation, quality])| {
-            self.agrees(y, noise, mean, agrees);
-            let from = y * width;
-            for x in 0..width {
+        let support = self.support_cells(grid, stride, period_px);
+        mark_seams(
+            &self.phase,
+            |i| self.modulation[i] > 0.0,
+            width,
+            &mut self.seams,
+        );
+        let mut trusted = std::mem::take(&mut self.rough);
+        let mut quality = std::mem::take(&mut self.quality);
+        trusted
+            .par_chunks_mut(width)
+            .zip(quality.par_chunks_mut(width))
+            .enumerate()
+            .for_each_init(
+                Default::default,
+                |(mean, agrees, maps): &mut (Vec<f32>, Vec<bool>, RowMaps),
+                 (y, (trusted, quality))| {
+                    self.agrees(y, mean, agrees);
+                    let [backing, ..] = maps.sample(grid, y, [&support; 4], width);
+                    for x in 0..width {
+                        let (node, at) = (y / stride * columns + x / stride, y * width + x);
+                        let lit = self.modulation[at] > 0.0 && self.evidence[node].lit;
+                        quality[x] = self.orders.margin[node].min(1.0) * backing[x].clamp(0.0, 1.0);
+                        let sure = lit
+                            && agrees[x]
+                            && !self.seams[at]
+                            && quality[x] >= options.quality_min;
+                        trusted[x] = if sure { self.phase[at] } else { f32::NAN };
+                        if !lit {
+                            quality[x] = f32::NAN;
+                        }
+                    }
+                },
+            );
+        remove_slivers(&mut trusted, width, NEIGHBOURS_MIN, &mut self.counts);
+        let least = (period_px / 4.0).powi(2) as usize;
+        remove_islands(&mut trusted, width, least, &mut self.memory);
+        (self.rough, self.quality) = (trusted, quality);
+    }
+
+    /// Share of the surroundings whose own light speaks for the chosen order, on the cells.
+    fn support_cells(&self, grid: &Grid, stride: usize, period_px: f64) -> Vec<f32> {
+        let columns = self.shape[1].div_ceil(stride);
+        let mut sums = [vec![1e-6f32; grid.cells()], vec![1e-6f32; grid.cells()]];
+        for (i, (node, misfit)) in self.evidence.iter().zip(&self.orders.misfit).enumerate() {
+            if node.lit {
+                let (y, x) = (i / columns * stride, i % columns * stride);
+                let cell = y / grid.step * grid.columns + x / grid.step;
+                sums[0][cell] += 1.0;
+                sums[1][cell] += 1.0 - misfit;
+            }
+        }
+        grid.smooth_all(&mut sums, period_px as f32 / grid.step as f32);
+        sums[1]
+            .iter()
+            .zip(&sums[0])
+            .map(|(for_it, all)| for_it / all)
+            .collect()
+    }
+
+    fn write(&self, out: &mut Decoded) {
+        let width = self.shape[1];
+        out.rows()
+            .enumerate()
+            .for_each(|(y, [phase, modulation, quality])| {
+                let at = y * width..(y + 1) * width;
+                phase.copy_from_slice(&self.rough[at.clone()]);
+                modulation.copy_from_slice(&self.modulation[at.clone()]);
+                quality.copy_from_slice(&self.quality[at]);
+            });
+    }
+}
+
+/// Wrapped to absolute: every pixel takes the order of its node, one more or less where the wrapped phase turns over in
+/// between.
+fn lift(
+    evidence: &[Evidence],
+    orders: &SupportMaps,
+    stride: usize,
+    width: usize,
+    phase: &mut [f32],
+) {
+    let columns = width.div_ceil(stride);
+    phase
+        .par_chunks_mut(width)
+        .enumerate()
+        .for_each(|(y, phase)| {
+            for (x, value) in phase.iter_mut().enumerate() {
                 let node = y / stride * columns + x / stride;
-                let absolute = self.phase[from + x];
-                let lit = self.modulation[from + x] > 0.0;
-                let margin = self.orders.margin[node].min(1.0);
-                let inside = field.contains(&(absolute / TAU * self.columns_per_turn));
-                let sure = lit && agrees[x] && self.evidence[node].lit && inside && margin >= options.quality_min;
-                phase[x] = if sure { absolute } else { f32::NAN };
-                modulation[x] = self.modulation[from + x];
-                quality[x] = if lit { margin } else { f32::NAN };
+                let own = wrap_positive(*value);
+                let other = f32::from(evidence[node].phase) * (TAU / 65536.0);
+                let turned = round((other - own) / TAU);
+                *value = own + TAU * (f32::from(orders.order[node]) + turned);
             }
         });
-    }
+}
+
+/// What every node itself sees of G and IR: their cosines, once R and B have told the albedo.
+fn witness(
+    grid: &Grid,
+    channels: &Channels,
+    planes: &Planes<'_>,
+    phase: &[f32],
+    stride: usize,
+    evidence: &mut [Evidence],
+) {
+    let width = planes.width;
+    let columns = width.div_ceil(stride);
+    evidence.par_chunks_mut(columns).enumerate().for_each_init(
+        <[RowMaps; 2]>::default,
+        |[visible, others], (row, nodes)| {
+            let y = row * stride;
+            let [r, g, b, ir] = channels;
+            let [a_r, b_r, a_b, b_b] = visible.sample(grid, y, [&r.a, &r.p, &b.a, &b.p], width);
+            let [a_g, b_g, a_i, b_i] = others.sample(grid, y, [&g.a, &g.p, &ir.a, &ir.p], width);
+            let [red, green, blue, infrared] = planes.rows(y);
+            for (node, x) in nodes.iter_mut().zip((0..width).step_by(stride)) {
+                let (s, c) = sin_cos(phase[y * width + x]);
+                let (model_r, model_b) = (a_r[x] + b_r[x] * c, a_b[x] - b_b[x] * s);
+                let norm = (model_r * model_r + model_b * model_b).max(1e-6);
+                let albedo = (red[x] * model_r + blue[x] * model_b) / norm;
+                let cosine = |light: f32, a: f32, b: f32| {
+                    let seen = (light - albedo * a) / (albedo * b).max(1e-6);
+                    (seen.clamp(-2.0, 2.0) * 128.0) as i16
+                };
+                node.cosines = Some([
+                    cosine(green[x], a_g[x], b_g[x]),
+                    cosine(infrared[x], a_i[x], b_i[x]),
+                ]);
+            }
+        },
+    );
 }
 
 /// What every node knows of its order.
@@ -188,10 +372,9 @@ fn gather(
 ) {
     let columns = width.div_ceil(stride);
     evidence.resize(height.div_ceil(stride) * columns, Evidence::default());
-    evidence
-        .par_chunks_mut(columns)
-        .enumerate()
-        .for_each_init(RowMaps::default, |row_maps, (row, nodes)| {
+    evidence.par_chunks_mut(columns).enumerate().for_each_init(
+        RowMaps::default,
+        |row_maps, (row, nodes)| {
             let y = row * stride;
             let [g, ir] = [fit.beat(1), fit.beat(3)];
             let slow = row_maps.sample(&fit.grid, y, [g[0], g[1], ir[0], ir[1]], width);
@@ -200,10 +383,12 @@ fn gather(
                 *node = Evidence {
                     phase: Evidence::turns(wrap_positive(phase[y * width + x])),
                     beats: [beat(0), beat(2)],
+                    cosines: None,
                     lit: modulation[y * width + x] > 0.0,
                 };
             }
-        });
+        },
+    );
 }
 
 fn wrapped_phase(maps: &PixelMaps, phase: &mut [f32]) {
@@ -234,21 +419,31 @@ fn find_modulation(
     least: f32,
     modulation: &mut [f32],
 ) {
-    let strength = |channel: usize| -> Vec<f32> {
-        let h = &fit.channels[channel];
-        h.p.iter().zip(&h.q).map(|(p, q)| p.hypot(*q)).collect()
-    };
-    let (red, blue) = (strength(0), strength(2));
-    modulation
-        .par_chunks_mut(width)
-        .enumerate()
-        .for_each_init(RowMaps::default, |row_maps, (y, out)| {
-            let slow = [&fit.channels[0].a, &red, &fit.channels[2].a, &blue];
-            let [a_r, b_r, a_b, b_b] = row_maps.sample(&fit.grid, y, slow, width);
+    let strengths: [Vec<f32>; 4] = fit.channels.each_ref().map(|h| {
+        let cells = h.a.iter().zip(h.p.iter().zip(&h.q)).zip(&fit.spread);
+        cells
+            .map(|((a, (p, q)), spread)| {
+                let strength = p.hypot(*q);
+                let fringes = strength > CONTRAST_MIN * a && *spread > SPREAD_MIN;
+                if fringes { strength } else { 0.0 }
+            })
+            .collect()
+    });
+    modulation.par_chunks_mut(width).enumerate().for_each_init(
+        RowMaps::default,
+        |row_maps, (y, out)| {
+            let [red, green, blue, infrared] =
+                row_maps.sample(&fit.grid, y, strengths.each_ref(), width);
             for x in 0..width {
-                let seen = 0.5 * maps.albedo[y * width + x] * (b_r[x] + b_b[x]);
-                let contrast = b_r[x] > CONTRAST_MIN * a_r[x] && b_b[x] > CONTRAST_MIN * a_b[x];
-                out[x] = if lit[y * width + x] && contrast && seen >= least { seen } else { 0.0 };
+                let albedo = maps.albedo[y * width + x];
+                let weakest = red[x].min(blue[x]).min(green[x]).min(infrared[x]);
+                let enough = lit[y * width + x] && albedo * weakest >= least;
+                out[x] = if enough {
+                    0.5 * albedo * (red[x] + blue[x])
+                } else {
+                    0.0
+                };
             }
-        });
+        },
+    );
 }

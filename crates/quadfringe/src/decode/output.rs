@@ -39,7 +39,13 @@ impl Decoded {
     }
 
     pub(super) fn check(&self, shape: [usize; 2], calibrated: bool) -> Result<()> {
-        for map in [&self.phase_rad, &self.column_px, &self.order, &self.modulation, &self.quality] {
+        for map in [
+            &self.phase_rad,
+            &self.column_px,
+            &self.order,
+            &self.modulation,
+            &self.quality,
+        ] {
             if map.shape() != shape || !map.is_standard_layout() {
                 return Err(Error::shape("output map", &shape, map.shape()));
             }
@@ -71,17 +77,22 @@ impl Decoded {
     pub(super) fn finish(&mut self, code: &FringeCode, triangulator: Option<&Triangulator>) {
         let width = self.phase_rad.ncols();
         let per_rad = code.period_px(0) as f32 / TAU;
-        let phase = self.phase_rad.as_slice().expect("checked layout");
+        let field = -1.5..code.projector_width() as f32 + 0.5;
+        let phase = self.phase_rad.as_slice_mut().expect("checked layout");
         let column = self.column_px.as_slice_mut().expect("checked layout");
         let order = self.order.as_slice_mut().expect("checked layout");
         column
             .par_chunks_mut(width)
             .zip(order.par_chunks_mut(width))
-            .zip(phase.par_chunks(width))
+            .zip(phase.par_chunks_mut(width))
             .for_each(|((column, order), phase)| {
-                for ((column, order), &phase) in column.iter_mut().zip(order).zip(phase) {
-                    *column = phase * per_rad;
-                    *order = (phase * (1.0 / TAU)).floor();
+                for ((column, order), phase) in column.iter_mut().zip(order).zip(phase) {
+                    // No light comes from beside the projector's image; a column on each side is noise.
+                    if !field.contains(&(*phase * per_rad)) {
+                        *phase = f32::NAN;
+                    }
+                    *column = *phase * per_rad;
+                    *order = (*phase * (1.0 / TAU)).floor();
                 }
             });
         if let (Some(triangulator), Some(xyz)) = (triangulator, &mut self.xyz_mm) {

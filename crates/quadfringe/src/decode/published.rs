@@ -3,7 +3,9 @@
 use super::{Decoded, Options};
 use crate::angle::atan2;
 use crate::condition::{Plan, Sample};
-use crate::demod::{Background, BackgroundScratch, Band, RowFilter, RowScratch, background_row, carrier};
+use crate::demod::{
+    Background, BackgroundScratch, Band, RowFilter, RowScratch, background_row, carrier,
+};
 use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
 use ndarray::Array2;
@@ -38,8 +40,16 @@ impl Published {
         }
     }
 
-    pub fn run<T: Sample>(&self, plan: &Plan, shot: &Shot<'_, T>, options: &Options, out: &mut Decoded) {
-        let period = options.period_px.unwrap_or_else(|| self.period_px(plan, shot));
+    pub fn run<T: Sample>(
+        &self,
+        plan: &Plan,
+        shot: &Shot<'_, T>,
+        options: &Options,
+        out: &mut Decoded,
+    ) {
+        let period = options
+            .period_px
+            .unwrap_or_else(|| self.period_px(plan, shot));
         let periods = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
         let weights = [1, 2].map(|i: usize| self.filter.weights(Band::Improved, periods[i]));
         out.rows().enumerate().for_each_init(
@@ -107,7 +117,14 @@ impl Rows {
     }
 
     /// Step 4: G or IR by the improved Fourier filter (S3).
-    fn fourier(&mut self, filter: &RowFilter, index: usize, period_px: f32, weights: &[f32], modulation: &mut [f32]) {
+    fn fourier(
+        &mut self,
+        filter: &RowFilter,
+        index: usize,
+        period_px: f32,
+        weights: &[f32],
+        modulation: &mut [f32],
+    ) {
         let channel = [0, 1, 3][index];
         self.remove_background(channel, period_px);
         self.fourier.input.copy_from_slice(&self.light[channel]);
@@ -122,7 +139,13 @@ impl Rows {
     /// Step 2: half the sum of the envelopes.
     fn remove_background(&mut self, channel: usize, period_px: f32) {
         let light = &mut self.light[channel];
-        background_row(light, Background::MeanEnvelope, period_px, &mut self.background, &mut self.level);
+        background_row(
+            light,
+            Background::MeanEnvelope,
+            period_px,
+            &mut self.background,
+            &mut self.level,
+        );
         light.iter_mut().zip(&self.level).for_each(|(v, l)| *v -= l);
     }
 }

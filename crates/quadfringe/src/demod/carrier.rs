@@ -54,13 +54,21 @@ fn line_period(image: ArrayView2<'_, f32>) -> f64 {
     let mut scratch = filter.scratch();
     let mut power = vec![0.0f32; length / 2 + 1];
     let window: Vec<f32> = (0..length)
-        .map(|x| (std::f32::consts::PI * (x as f32 + 0.5) / length as f32).sin().powi(2))
+        .map(|x| {
+            (std::f32::consts::PI * (x as f32 + 0.5) / length as f32)
+                .sin()
+                .powi(2)
+        })
         .collect();
     for line in (0..lines).step_by(lines.div_ceil(LINES)) {
         let row = image.row(line);
         let mean = row.sum() / length as f32;
         for ((value, &sample), weight) in scratch.input.iter_mut().zip(row).zip(&window) {
-            *value = if sample.is_finite() { (sample - mean) * weight } else { 0.0 };
+            *value = if sample.is_finite() {
+                (sample - mean) * weight
+            } else {
+                0.0
+            };
         }
         filter.add_power(&mut scratch, &mut power);
     }
@@ -73,9 +81,6 @@ fn strongest(power: &[f32]) -> Option<f64> {
     let peak = (FEWEST..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
     let around = peak.saturating_sub(3).max(FEWEST)..(peak + 4).min(power.len());
     let near: f32 = power[around.clone()].iter().sum();
-    if !(near > SHARE * total) {
-        return None;
-    }
     let moment: f32 = around.map(|bin| bin as f32 * power[bin]).sum();
-    Some(f64::from(moment / near))
+    (near > SHARE * total).then(|| f64::from(moment / near))
 }

@@ -71,13 +71,16 @@ pub fn fourier(
         .into_par_iter()
         .zip(image.axis_iter(Axis(0)))
         .zip(level.axis_iter(Axis(0)))
-        .for_each_init(|| plan.scratch(), |scratch, ((mut target, row), level)| {
-            let fringes = scratch.input.iter_mut().zip(row.iter().zip(level));
-            fringes.for_each(|(i, (r, l))| *i = r - l);
-            plan.analytic(&weights, scratch);
-            let found = target.iter_mut().zip(&scratch.output);
-            found.for_each(|(t, z)| *t = atan2(z.im, z.re));
-        });
+        .for_each_init(
+            || plan.scratch(),
+            |scratch, ((mut target, row), level)| {
+                let fringes = scratch.input.iter_mut().zip(row.iter().zip(level));
+                fringes.for_each(|(i, (r, l))| *i = r - l);
+                plan.analytic(&weights, scratch);
+                let found = target.iter_mut().zip(&scratch.output);
+                found.for_each(|(t, z)| *t = atan2(z.im, z.re));
+            },
+        );
     Ok(out)
 }
 
@@ -140,7 +143,13 @@ impl RowFilter {
 
     /// Positive frequencies of `input`, weighted, into `output`. The input is destroyed.
     pub fn analytic(&self, weights: &[f32], scratch: &mut RowScratch) {
-        let RowScratch { input, output, spectrum, forward, inverse } = scratch;
+        let RowScratch {
+            input,
+            output,
+            spectrum,
+            forward,
+            inverse,
+        } = scratch;
         self.forward
             .process_with_scratch(input, spectrum, forward)
             .expect("buffers were made by this plan");
@@ -154,7 +163,11 @@ impl RowFilter {
     /// Power of each non-negative frequency of `input`, added to `power`.
     pub fn add_power(&self, scratch: &mut RowScratch, power: &mut [f32]) {
         self.forward
-            .process_with_scratch(&mut scratch.input, &mut scratch.spectrum, &mut scratch.forward)
+            .process_with_scratch(
+                &mut scratch.input,
+                &mut scratch.spectrum,
+                &mut scratch.forward,
+            )
             .expect("buffers were made by this plan");
         for (p, s) in power.iter_mut().zip(&scratch.spectrum) {
             *p += s.norm_sqr();
@@ -185,7 +198,10 @@ mod tests {
     fn the_improved_band_follows_slopes_where_the_traditional_one_fails() {
         let (image, phase) = swinging(0.75);
         let run = |band| fourier(image.view(), band, Background::MovingMean, 32.0).unwrap();
-        let (old, new) = (rms(&run(Band::Traditional), &phase), rms(&run(Band::Improved), &phase));
+        let (old, new) = (
+            rms(&run(Band::Traditional), &phase),
+            rms(&run(Band::Improved), &phase),
+        );
         assert!(old > 0.1, "{old}");
         assert!(new < old / 3.0, "{new} against {old}");
     }
@@ -195,7 +211,11 @@ mod tests {
         let (image, phase) = swinging(0.1);
         for band in [Band::Traditional, Band::Improved] {
             let found = fourier(image.view(), band, Background::MeanEnvelope, 32.0).unwrap();
-            assert!(rms(&found, &phase) < 0.02, "{band:?} {}", rms(&found, &phase));
+            assert!(
+                rms(&found, &phase) < 0.02,
+                "{band:?} {}",
+                rms(&found, &phase)
+            );
         }
     }
 }

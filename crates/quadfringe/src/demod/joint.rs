@@ -15,7 +15,7 @@ use rayon::prelude::*;
 /// Width (sigma) of the window of backgrounds and modulations, in fringe periods.
 const WINDOW: f32 = 1.0;
 /// Rounds of albedo, background and phase.
-const ROUNDS: usize = 2;
+const ROUNDS: usize = 4;
 /// Ridge of the normal equations relative to the weight in the window.
 const RIDGE: f32 = 1e-3;
 /// Sums of one cell: the weight, then per channel w e, w e e, w I, w I e with e = cos(Phi_c + delta_c).
@@ -32,7 +32,7 @@ pub(crate) struct Joint {
 }
 
 /// Background `a` and modulation `p` of the four channels on the cells.
-type Channels = [Harmonic; 4];
+pub(crate) type Channels = [Harmonic; 4];
 
 impl Joint {
     /// Fit `phase` (absolute, rad) in place; `albedo` comes in as a first guess.
@@ -46,13 +46,17 @@ impl Joint {
         albedo: &mut Vec<f32>,
         phase: &mut Vec<f32>,
     ) {
-        for map in [&mut self.numerator, &mut self.denominator, &mut self.next, &mut self.misfit] {
+        for map in [
+            &mut self.numerator,
+            &mut self.denominator,
+            &mut self.next,
+            &mut self.misfit,
+        ] {
             map.resize(phase.len(), 0.0);
         }
-        let ratios = Channel::ALL.map(|c| (numbers[c.phase_index()] / numbers[0]) as f32);
-        let sigma_cells = WINDOW * period_px as f32 / grid.step as f32;
+        let ratios = ratios(numbers);
         for _ in 0..ROUNDS {
-            let channels = fit(grid, planes, ratios, sigma_cells, albedo, phase);
+            let channels = fit(grid, planes, numbers, period_px, albedo, phase);
             self.update_albedo(grid, planes, &channels, ratios, albedo, phase);
             self.linearise(grid, planes, &channels, ratios, albedo, phase);
             window.step(phase, &self.numerator, &self.denominator, &mut self.next);
@@ -109,30 +113,39 @@ impl Joint {
             .zip(self.denominator.par_chunks_mut(width))
             .zip(self.misfit.par_chunks_mut(width))
             .enumerate()
-            .for_each_init(Row::default, |row, (y, ((numerator, denominator), misfit))| {
-                row.start(width);
-                let at = y * width..(y + 1) * width;
-                let (phase, albedo) = (&phase[at.clone()], &albedo[at]);
-                numerator.fill(0.0);
-                denominator.fill(0.0);
-                misfit.fill(0.0);
-                for (c, light) in planes.rows(y).into_iter().enumerate() {
-                    row.model(grid, &channels[c], c, ratios[c], y, phase);
-                    for x in 0..width {
-                        let error = light[x] - albedo[x] * row.model[x];
-                        let slope = albedo[x] * row.slope[x];
-                        numerator[x] += slope * error;
-                        denominator[x] += slope * slope;
-                        misfit[x] += 0.25 * error * error;
-                        row.top[x] += albedo[x] * slope * row.model[x];
-                        row.bottom[x] += albedo[x] * albedo[x] * row.model[x] * row.model[x];
+            .for_each_init(
+                Row::default,
+                |row, (y, ((numerator, denominator), misfit))| {
+                    row.start(width);
+                    let at = y * width..(y + 1) * width;
+                    let (phase, albedo) = (&phase[at.clone()], &albedo[at]);
+                    numerator.fill(0.0);
+                    denominator.fill(0.0);
+                    misfit.fill(0.0);
+                    for (c, light) in planes.rows(y).into_iter().enumerate() {
+                        row.model(grid, &channels[c], c, ratios[c], y, phase);
+                        for x in 0..width {
+                            let error = light[x] - albedo[x] * row.model[x];
+                            let slope = albedo[x] * row.slope[x];
+                            numerator[x] += slope * error;
+                            denominator[x] += slope * slope;
+                            misfit[x] += 0.25 * error * error;
+                            row.top[x] += albedo[x] * slope * row.model[x];
+                            row.bottom[x] += albedo[x] * albedo[x] * row.model[x] * row.model[x];
+                        }
                     }
-                }
-                for x in 0..width {
-                    denominator[x] = (denominator[x] - row.top[x] * row.top[x] / row.bottom[x].max(1e-9)).max(0.1 * denominator[x]);
-                }
-            });
+                    for x in 0..width {
+                        denominator[x] = (denominator[x]
+                            - row.top[x] * row.top[x] / row.bottom[x].max(1e-9))
+                        .max(0.1 * denominator[x]);
+                    }
+                },
+            );
     }
+}
+
+fn ratios(numbers: [f64; 3]) -> [f32; 4] {
+    Channel::ALL.map(|c| (numbers[c.phase_index()] / numbers[0]) as f32)
 }
 
 /// Working rows.
@@ -148,13 +161,26 @@ struct Row {
 
 impl Row {
     fn start(&mut self, width: usize) {
-        for row in [&mut self.model, &mut self.slope, &mut self.top, &mut self.bottom] {
+        for row in [
+            &mut self.model,
+            &mut self.slope,
+            &mut self.top,
+            &mut self.bottom,
+        ] {
             row.clear();
             row.resize(width, 0.0);
         }
     }
 
-    fn model(&mut self, grid: &Grid, channel: &Harmonic, c: usize, ratio: f32, y: usize, phase: &[f32]) {
+    fn model(
+        &mut self,
+        grid: &Grid,
+        channel: &Harmonic,
+        c: usize,
+        ratio: f32,
+        y: usize,
+        phase: &[f32],
+    ) {
         let width = phase.len();
         let slow = [&channel.a, &channel.p, &channel.p, &channel.p];
         let [a, b, ..] = self.maps.sample(grid, y, slow, width);
@@ -170,19 +196,25 @@ impl Row {
 #[inline]
 fn carrier(c: usize, ratio: f32, phase: f32) -> (f32, f32) {
     let (s, e) = sin_cos(ratio * phase);
-    if c == Channel::B.index() { (e, -s) } else { (s, e) }
+    if c == Channel::B.index() {
+        (e, -s)
+    } else {
+        (s, e)
+    }
 }
 
 /// Background and modulation of every channel on the cells, intensities divided by the albedo and weighted by its
 /// square, as additive noise asks for.
-fn fit(
+pub(crate) fn fit(
     grid: &Grid,
     planes: &Planes<'_>,
-    ratios: [f32; 4],
-    sigma_cells: f32,
+    numbers: [f64; 3],
+    period_px: f64,
     albedo: &[f32],
     phase: &[f32],
 ) -> Channels {
+    let ratios = ratios(numbers);
+    let sigma_cells = WINDOW * period_px as f32 / grid.step as f32;
     let width = planes.width;
     let mut sums = cell_sums_at::<SUMS>(grid, planes, |rows, usable, y, x| {
         let mut sums = [0.0; SUMS];
@@ -193,7 +225,12 @@ fn fit(
             for (c, row) in rows.iter().enumerate() {
                 let (_, e) = carrier(c, ratios[c], phase[at]);
                 let light = rho * row[x];
-                sums[1 + 4 * c..5 + 4 * c].copy_from_slice(&[rho * rho * e, rho * rho * e * e, light, light * e]);
+                sums[1 + 4 * c..5 + 4 * c].copy_from_slice(&[
+                    rho * rho * e,
+                    rho * rho * e * e,
+                    light,
+                    light * e,
+                ]);
             }
         }
         sums
@@ -214,5 +251,8 @@ fn fit(
 fn solve([w, e, ee, light, light_e]: [f32; 5]) -> [f32; 2] {
     let (w, ee) = (w * (1.0 + RIDGE) + 1e-9, ee + w * RIDGE + 1e-9);
     let scale = 1.0 / (w * ee - e * e).max(f32::MIN_POSITIVE);
-    [(ee * light - e * light_e) * scale, (w * light_e - e * light) * scale]
+    [
+        (ee * light - e * light_e) * scale,
+        (w * light_e - e * light) * scale,
+    ]
 }

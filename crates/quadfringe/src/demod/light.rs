@@ -16,10 +16,18 @@ const LEAST: f32 = 0.02;
 const NOISE_STRIDE: usize = 11;
 
 /// Writes true for every pixel that is lit. `range_min` is the least range of fringes, in linear light.
-pub(crate) fn find_light(grid: &Grid, planes: &Planes<'_>, period_px: f64, range_min: f32, lit: &mut [bool]) {
+pub(crate) fn find_light(
+    grid: &Grid,
+    planes: &Planes<'_>,
+    period_px: f64,
+    range_min: f32,
+    lit: &mut [bool],
+) {
     let width = planes.width;
     let noise = noise(planes);
-    let sums = cell_sums_at::<5>(grid, planes, |rows, _, _, x| [1.0, rows[0][x], rows[1][x], rows[2][x], rows[3][x]]);
+    let sums = cell_sums_at::<5>(grid, planes, |rows, _, _, x| {
+        [1.0, rows[0][x], rows[1][x], rows[2][x], rows[3][x]]
+    });
     let reach = (SURROUNDINGS * period_px / grid.step as f64).ceil() as usize;
     let surroundings: Vec<[Vec<f32>; 2]> = (1..5)
         .into_par_iter()
@@ -33,10 +41,9 @@ pub(crate) fn find_light(grid: &Grid, planes: &Planes<'_>, period_px: f64, range
         })
         .collect();
     let mut heights = vec![0.0f32; lit.len()];
-    heights
-        .par_chunks_mut(width)
-        .enumerate()
-        .for_each_init(RowMaps::default, |row_maps, (y, out)| {
+    heights.par_chunks_mut(width).enumerate().for_each_init(
+        RowMaps::default,
+        |row_maps, (y, out)| {
             out.fill(0.0);
             for (light, [bottom, top]) in planes.rows(y).into_iter().zip(&surroundings) {
                 let [low, high, ..] = row_maps.sample(grid, y, [bottom, top, top, top], width);
@@ -46,23 +53,35 @@ pub(crate) fn find_light(grid: &Grid, planes: &Planes<'_>, period_px: f64, range
                     out[x] += (height * height - noise * noise) / (range * range);
                 }
             }
-        });
+        },
+    );
     let mut sums = vec![0.0f32; lit.len()];
     neighbourhoods(&heights, width, &mut sums, |sum, near| sum + near);
     heights.copy_from_slice(&sums);
     // The mean reaches one pixel into a shadow: the least of the means does not.
     neighbourhoods(&heights, width, &mut sums, f32::min);
-    lit.iter_mut().zip(&sums).for_each(|(lit, sum)| *lit = *sum > 9.0 * LEAST);
+    lit.iter_mut()
+        .zip(&sums)
+        .for_each(|(lit, sum)| *lit = *sum > 9.0 * LEAST);
 }
 
 /// Every pixel and its eight neighbours, folded; borders repeat.
-fn neighbourhoods(map: &[f32], width: usize, out: &mut [f32], fold: impl Fn(f32, f32) -> f32 + Sync) {
+fn neighbourhoods(
+    map: &[f32],
+    width: usize,
+    out: &mut [f32],
+    fold: impl Fn(f32, f32) -> f32 + Sync,
+) {
     let height = map.len() / width;
     out.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
-        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)].map(|row| &map[row * width..][..width]);
+        let rows = [y.saturating_sub(1), y, (y + 1).min(height - 1)]
+            .map(|row| &map[row * width..][..width]);
         let column = |x: usize| fold(fold(rows[0][x], rows[1][x]), rows[2][x]);
         for (x, value) in out.iter_mut().enumerate() {
-            *value = fold(fold(column(x.saturating_sub(1)), column(x)), column((x + 1).min(width - 1)));
+            *value = fold(
+                fold(column(x.saturating_sub(1)), column(x)),
+                column((x + 1).min(width - 1)),
+            );
         }
     });
 }

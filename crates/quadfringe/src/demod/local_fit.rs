@@ -35,6 +35,8 @@ pub(crate) struct Harmonic {
 pub(crate) struct LocalFit {
     pub grid: Grid,
     pub channels: [Harmonic; 4],
+    /// Least mean square of the phasor in any direction, on the cells: whether R and B are two views or one.
+    pub spread: Vec<f32>,
     window_cells: f32,
 }
 
@@ -53,7 +55,8 @@ impl<'a> Planes<'a> {
     }
 
     pub fn rows(&self, y: usize) -> [&'a [f32]; 4] {
-        self.light.map(|plane| &plane[y * self.width..][..self.width])
+        self.light
+            .map(|plane| &plane[y * self.width..][..self.width])
     }
 }
 
@@ -75,9 +78,15 @@ impl LocalFit {
         let mut fit = Self {
             grid,
             channels: Default::default(),
+            spread: Vec::new(),
             window_cells: WINDOW * period_px as f32 / step as f32,
         };
-        for map in [&mut maps.cos, &mut maps.sin, &mut maps.albedo, &mut maps.raw] {
+        for map in [
+            &mut maps.cos,
+            &mut maps.sin,
+            &mut maps.albedo,
+            &mut maps.raw,
+        ] {
             map.resize(height * width, 0.0);
         }
         maps.albedo.fill(1.0);
@@ -156,7 +165,12 @@ impl LocalFit {
     fn update_phase(&self, planes: &Planes<'_>, maps: &mut PixelMaps) {
         let modulation: [Vec<f32>; 2] = [0, 2].map(|c: usize| {
             let harmonic = &self.channels[c];
-            harmonic.p.iter().zip(&harmonic.q).map(|(p, q)| p.hypot(*q)).collect()
+            harmonic
+                .p
+                .iter()
+                .zip(&harmonic.q)
+                .map(|(p, q)| p.hypot(*q))
+                .collect()
         });
         let width = planes.width;
         maps.cos
@@ -165,7 +179,12 @@ impl LocalFit {
             .zip(maps.albedo.par_chunks(width))
             .enumerate()
             .for_each_init(RowMaps::default, |row_maps, (y, ((cos, sin), albedo))| {
-                let slow = [&self.channels[0].a, &modulation[0], &self.channels[2].a, &modulation[1]];
+                let slow = [
+                    &self.channels[0].a,
+                    &modulation[0],
+                    &self.channels[2].a,
+                    &modulation[1],
+                ];
                 let [a_r, b_r, a_b, b_b] = row_maps.sample(&self.grid, y, slow, width);
                 let [red, _, blue, _] = planes.rows(y);
                 for x in 0..width {
@@ -181,10 +200,15 @@ impl LocalFit {
     /// Albedo of every pixel: the factor that brings the model of all four channels closest to what was seen.
     fn update_albedo(&self, planes: &Planes<'_>, maps: &mut PixelMaps) {
         let width = planes.width;
-        let PixelMaps { cos, sin, albedo, raw } = maps;
-        raw.par_chunks_mut(width)
-            .enumerate()
-            .for_each_init(RowMaps::default, |row_maps, (y, target)| {
+        let PixelMaps {
+            cos,
+            sin,
+            albedo,
+            raw,
+        } = maps;
+        raw.par_chunks_mut(width).enumerate().for_each_init(
+            RowMaps::default,
+            |row_maps, (y, target)| {
                 let rows = planes.rows(y);
                 let at = y * width..(y + 1) * width;
                 let (cos, sin) = (&cos[at.clone()], &sin[at]);
@@ -199,8 +223,12 @@ impl LocalFit {
                         norm[x] += model * model;
                     }
                 }
-                target.iter_mut().zip(norm).for_each(|(t, n)| *t = (*t / n).max(1e-4));
-            });
+                target
+                    .iter_mut()
+                    .zip(norm)
+                    .for_each(|(t, n)| *t = (*t / n).max(1e-4));
+            },
+        );
         std::mem::swap(albedo, raw);
     }
 
@@ -234,8 +262,11 @@ impl LocalFit {
                 map.resize(cells, 0.0);
             }
         }
+        self.spread.resize(cells, 0.0);
         for i in 0..cells {
             let [w, wc, ws, wcc, wcs] = [0, 1, 2, 3, 4].map(|k| sums[k][i]);
+            let middle = 0.5 * w;
+            self.spread[i] = (middle - (wcc - middle).hypot(wcs)) / w.max(1e-9);
             let ridge = RIDGE * w + 1e-12;
             let normal = Symmetric3::new(w + ridge, wc, ws, wcc + ridge, wcs, w - wcc + ridge);
             for (k, harmonic) in self.channels.iter_mut().enumerate() {
@@ -259,7 +290,11 @@ impl Symmetric3 {
 
     fn solve(&self, [u, v, w]: [f32; 3]) -> [f32; 3] {
         let [xx, xy, xz, yy, yz, zz] = self.0;
-        [xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w]
+        [
+            xx * u + xy * v + xz * w,
+            xy * u + yy * v + yz * w,
+            xz * u + yz * v + zz * w,
+        ]
     }
 }
 
@@ -272,7 +307,13 @@ pub(crate) struct RowMaps {
 
 impl RowMaps {
     /// Four maps at row `y`.
-    pub fn sample<M: AsRef<[f32]>>(&mut self, grid: &Grid, y: usize, maps: [M; 4], width: usize) -> [&[f32]; 4] {
+    pub fn sample<M: AsRef<[f32]>>(
+        &mut self,
+        grid: &Grid,
+        y: usize,
+        maps: [M; 4],
+        width: usize,
+    ) -> [&[f32]; 4] {
         for (row, map) in self.rows.iter_mut().zip(maps) {
             row.resize(width, 0.0);
             grid.sample_row(map.as_ref(), y, &mut self.mix, row);
@@ -286,7 +327,11 @@ pub(crate) fn smooth_albedo(albedo: &mut Vec<f32>, raw: &mut Vec<f32>, width: us
     let height = albedo.len() / width;
     raw.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
         let line = |row: usize| &albedo[row * width..][..width];
-        let (above, here, below) = (line(y.saturating_sub(1)), line(y), line((y + 1).min(height - 1)));
+        let (above, here, below) = (
+            line(y.saturating_sub(1)),
+            line(y),
+            line((y + 1).min(height - 1)),
+        );
         let column = |x: usize| above[x] + 2.0 * here[x] + below[x];
         for (x, value) in out.iter_mut().enumerate() {
             let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));

@@ -83,7 +83,13 @@ impl<'a> Window<'a> {
     /// The phase, smoothed.
     pub fn smooth(&self, phase: &[f32], out: &mut [f32]) {
         self.run(phase, out, |rows, at| {
-            let Rows { weight, offset, top, bottom, .. } = rows;
+            let Rows {
+                weight,
+                offset,
+                top,
+                bottom,
+                ..
+            } = rows;
             for x in at.from..at.to {
                 top[x] += weight[x] * offset[x];
                 bottom[x] += weight[x];
@@ -94,10 +100,18 @@ impl<'a> Window<'a> {
     /// The phase plus the ratio of two maps, each summed over the window: a Gauss-Newton step that neighbours share.
     pub fn step(&self, phase: &[f32], numerator: &[f32], denominator: &[f32], out: &mut [f32]) {
         self.run(phase, out, |rows, at| {
-            let Rows { weight, offset, top, bottom, .. } = rows;
+            let Rows {
+                weight,
+                offset,
+                top,
+                bottom,
+                ..
+            } = rows;
             let (numerator, denominator) = (&numerator[at.start..], &denominator[at.start..]);
             let n = at.to - at.from;
-            let sums = top[at.from..at.to].iter_mut().zip(&mut bottom[at.from..at.to]);
+            let sums = top[at.from..at.to]
+                .iter_mut()
+                .zip(&mut bottom[at.from..at.to]);
             let terms = numerator[..n].iter().zip(&denominator[..n]);
             let seen = weight[at.from..at.to].iter().zip(&offset[at.from..at.to]);
             for (((top, bottom), (w, d)), (num, den)) in sums.zip(seen).zip(terms) {
@@ -123,7 +137,13 @@ impl<'a> Window<'a> {
                         let from = dx.min(0).unsigned_abs().min(width);
                         let to = (width as isize - dx.max(0)).max(from as isize) as usize;
                         let start = (row * width + from).wrapping_add_signed(dx);
-                        let at = Neighbour { dx: dx as f32, dy: dy as f32, from, to, start };
+                        let at = Neighbour {
+                            dx: dx as f32,
+                            dy: dy as f32,
+                            from,
+                            to,
+                            start,
+                        };
                         self.weigh(here, phase, &at, rows);
                         gather(rows, &at);
                     }
@@ -136,12 +156,26 @@ impl<'a> Window<'a> {
 
     fn start(&self, y: usize, rows: &mut Rows) {
         let width = self.width;
-        let Rows { maps, along, down, sharpness, weight, offset, top, bottom } = rows;
+        let Rows {
+            maps,
+            along,
+            down,
+            sharpness,
+            weight,
+            offset,
+            top,
+            bottom,
+        } = rows;
         for row in [&mut *along, down, sharpness, weight, offset, top, bottom] {
             row.clear();
             row.resize(width, 0.0);
         }
-        let slow = [&self.slopes.along, &self.slopes.down, &self.slopes.down, &self.slopes.down];
+        let slow = [
+            &self.slopes.along,
+            &self.slopes.down,
+            &self.slopes.down,
+            &self.slopes.down,
+        ];
         let [a, d, ..] = maps.sample(self.grid, y, slow, width);
         along.copy_from_slice(a);
         down.copy_from_slice(d);
@@ -167,7 +201,11 @@ impl<'a> Window<'a> {
             let turns = (there[x] - here[x] - along[x] * at.dx - down[x] * at.dy) * (1.0 / TAU);
             let d = (turns - round(turns)) * TAU;
             let fits = (1.0 - d * d * sharpness[x]).max(0.0);
-            weight[x] = if lit[x] > 0.0 { spatial * fits * fits } else { 0.0 };
+            weight[x] = if lit[x] > 0.0 {
+                spatial * fits * fits
+            } else {
+                0.0
+            };
             offset[x] = d;
         }
     }

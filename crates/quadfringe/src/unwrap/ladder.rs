@@ -58,7 +58,11 @@ impl Ladder {
     #[must_use]
     #[inline]
     pub fn order(&self, phases: [f32; 3]) -> Ordered {
-        let found = if self.climbs { self.climb(phases) } else { self.search(phases) };
+        let found = if self.climbs {
+            self.climb(phases)
+        } else {
+            self.search(phases)
+        };
         let turns = found.phase_rad / TAU;
         // Column 0 and the end of the field look alike; the field starts half a column before 0.
         match self.cycle {
@@ -85,7 +89,10 @@ impl Ladder {
 
     fn search(&self, [first, second, third]: [f32; 3]) -> Ordered {
         let start = wrap_positive(first);
-        let ratios = [self.numbers[1] / self.numbers[0], self.numbers[2] / self.numbers[0]];
+        let ratios = [
+            self.numbers[1] / self.numbers[0],
+            self.numbers[2] / self.numbers[0],
+        ];
         let cost = |order: usize| {
             let phase = start + TAU * order as f32;
             let miss = |ratio: f32, seen: f32| 1.0 - (phase * ratio - seen).cos();
@@ -102,7 +109,11 @@ impl Ladder {
         }
         Ordered {
             phase_rad: start + TAU * best as f32,
-            margin: if next > 0.0 { 1.0 - (least / next).sqrt() } else { 0.0 },
+            margin: if next > 0.0 {
+                1.0 - (least / next).sqrt()
+            } else {
+                0.0
+            },
         }
     }
 }
@@ -135,9 +146,15 @@ fn nearest(wrapped: f32, guess: f32) -> (f32, f32) {
 /// assert!(margin[[0, 500]] > 0.9);
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
-pub fn unwrap(code: &FringeCode, wrapped: [ArrayView2<'_, f32>; 3]) -> Result<(Array2<f32>, Array2<f32>)> {
+pub fn unwrap(
+    code: &FringeCode,
+    wrapped: [ArrayView2<'_, f32>; 3],
+) -> Result<(Array2<f32>, Array2<f32>)> {
     let [first, second, third] = &wrapped;
-    for (map, name) in [(second, "second wrapped phase"), (third, "third wrapped phase")] {
+    for (map, name) in [
+        (second, "second wrapped phase"),
+        (third, "third wrapped phase"),
+    ] {
         if map.dim() != first.dim() {
             return Err(Error::shape(name, first.shape(), map.shape()));
         }
@@ -185,8 +202,12 @@ mod tests {
                 if column >= code.projector_width() as f64 - 0.5 {
                     continue;
                 }
-                let found = ladder.order(phases(&code, column)).phase_rad / TAU * ladder.columns_per_turn;
-                assert!((f64::from(found) - column).abs() < 0.01, "{code:?} {column} {found}");
+                let found =
+                    ladder.order(phases(&code, column)).phase_rad / TAU * ladder.columns_per_turn;
+                assert!(
+                    (f64::from(found) - column).abs() < 0.01,
+                    "{code:?} {column} {found}"
+                );
             }
         }
     }

@@ -29,8 +29,10 @@ const BLOCK: usize = 32;
 pub(crate) struct Evidence {
     /// Wrapped phase of the first fringe number.
     pub phase: u16,
-    /// Beats of G and of IR against it.
+    /// Beats of G and IR against it, from a window: little noise, blurred at edges.
     pub beats: [u16; 2],
+    /// Cosines of G and IR as seen at the node itself, 128 for 1: noisy, sharp; none in the first round.
+    pub cosines: Option<[i16; 2]>,
     /// Whether there is light to judge by; a dark node stops all support.
     pub lit: bool,
 }
@@ -73,7 +75,8 @@ impl Support {
         let per_column = n[0] / code.projector_width() as f64;
         let end = n[0] + 0.5 * per_column;
         let predict = |ratio: f64| {
-            let turn = |label: usize| (ratio * (label as f64 - 1.0) * 65536.0).round() as i64 as u16;
+            let turn =
+                |label: usize| (ratio * (label as f64 - 1.0) * 65536.0).round() as i64 as u16;
             (0..labels).map(turn).collect()
         };
         Self {
@@ -87,7 +90,13 @@ impl Support {
     }
 
     /// Choose the orders of `evidence`, row-major with `columns` nodes a row.
-    pub fn choose(&self, evidence: &[Evidence], columns: usize, sums: &mut Array3<u16>, maps: &mut SupportMaps) {
+    pub fn choose(
+        &self,
+        evidence: &[Evidence],
+        columns: usize,
+        sums: &mut Array3<u16>,
+        maps: &mut SupportMaps,
+    ) {
         let rows = evidence.len() / columns;
         if sums.dim() != (rows, columns, self.labels) {
             *sums = Array3::zeros((rows, columns, self.labels));
@@ -106,11 +115,21 @@ impl Support {
                 |path, (mut row, nodes)| {
                     path.restart();
                     for x in 0..columns {
-                        path.advance(self, &nodes[x], &mut row.row_mut(x).into_slice().expect("labels are contiguous")[..], true);
+                        path.advance(
+                            self,
+                            &nodes[x],
+                            &mut row.row_mut(x).into_slice().expect("labels are contiguous")[..],
+                            true,
+                        );
                     }
                     path.restart();
                     for x in (0..columns).rev() {
-                        path.advance(self, &nodes[x], row.row_mut(x).into_slice().expect("labels are contiguous"), false);
+                        path.advance(
+                            self,
+                            &nodes[x],
+                            row.row_mut(x).into_slice().expect("labels are contiguous"),
+                            false,
+                        );
                     }
                 },
             );
@@ -138,7 +157,13 @@ impl Support {
             });
     }
 
-    fn read_out(&self, evidence: &[Evidence], columns: usize, sums: &Array3<u16>, maps: &mut SupportMaps) {
+    fn read_out(
+        &self,
+        evidence: &[Evidence],
+        columns: usize,
+        sums: &Array3<u16>,
+        maps: &mut SupportMaps,
+    ) {
         maps.order.resize(evidence.len(), 0);
         maps.margin.resize(evidence.len(), 0.0);
         maps.misfit.resize(evidence.len(), 0.0);
@@ -171,17 +196,24 @@ impl Support {
             return;
         }
         let phase = f64::from(node.phase);
-        let base = [0, 1].map(|i| {
-            node.beats[i].wrapping_sub((self.ratios[i] * phase).round() as i64 as u16)
-        });
-        let predictions = self.offsets[0].iter().zip(&self.offsets[1]);
-        for (cost, (&second, &third)) in out.iter_mut().zip(predictions) {
-            let miss = |seen: u16, predicted: u16| {
-                let error = (seen.wrapping_sub(predicted) as i16 >> 6).unsigned_abs().min(127) as i16;
-                error * error
-            };
-            let sum = miss(base[0], second) + miss(base[1], third);
-            *cost = (sum >> 4).min(CUT);
+        let start = self
+            .ratios
+            .map(|ratio| (ratio * phase).round() as i64 as u16);
+        let predictions = out
+            .iter_mut()
+            .zip(self.offsets[0].iter().zip(&self.offsets[1]));
+        let [g, ir] = [0, 1].map(|i| node.beats[i].wrapping_sub(start[i]));
+        let beats = |p: u16, q: u16| ((beat_miss(g, p) + beat_miss(ir, q)) >> 4).min(CUT);
+        match node.cosines {
+            None => predictions.for_each(|(cost, (&p, &q))| *cost = beats(p, q)),
+            Some(seen) => {
+                let [second, third] = start.map(|s| s.wrapping_add(node.phase));
+                predictions.for_each(|(cost, (&p, &q))| {
+                    let miss = cosine_miss(seen[0], second.wrapping_add(p))
+                        + cosine_miss(seen[1], third.wrapping_add(q));
+                    *cost = (beats(p, q) + (miss >> 3).min(CUT)) >> 1;
+                });
+            }
         }
         let turn = phase / 65536.0;
         if turn < self.first_turn {
@@ -192,6 +224,26 @@ impl Support {
             beyond.fill(NEVER);
         }
     }
+}
+
+/// Squared distance of two beats, 127 for 45 degrees or more.
+#[inline]
+fn beat_miss(seen: u16, predicted: u16) -> i16 {
+    let error = (seen.wrapping_sub(predicted) as i16 >> 6)
+        .unsigned_abs()
+        .min(127) as i16;
+    error * error
+}
+
+/// Squared distance of a cosine from that of a predicted phase, 128 for 1. The parabola through zeros and peaks is
+/// within 0.06 of the cosine, less than noise and albedo leave.
+#[inline]
+fn cosine_miss(seen: i16, predicted: u16) -> i16 {
+    let from_zero = (16384 - i32::from((predicted as i16).unsigned_abs())) >> 7;
+    let y = from_zero as i16;
+    let cosine = (y * (256 - y.abs())) >> 7;
+    let error = (seen - cosine).abs().min(127);
+    error * error
 }
 
 /// Least sum and its lead over the next.
@@ -249,7 +301,13 @@ impl Path {
         support.costs(node, &mut self.own);
         let step = i32::from(node.phase) - i32::from(self.phase);
         // A wrapped phase that jumps up by more than half a turn has come from the order above.
-        let shift = if step > 32768 { 1 } else if step < -32768 { -1isize } else { 0 };
+        let shift = if step > 32768 {
+            1
+        } else if step < -32768 {
+            -1isize
+        } else {
+            0
+        };
         let at = (PAD as isize + shift) as usize;
         let n = self.labels;
         let same = &self.previous[at..at + n];
@@ -269,9 +327,13 @@ impl Path {
         self.phase = node.phase;
         let values = &self.current[PAD..PAD + n];
         if first {
-            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = v as u16);
+            sums.iter_mut()
+                .zip(values)
+                .for_each(|(s, &v)| *s = v as u16);
         } else {
-            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = s.saturating_add(v as u16));
+            sums.iter_mut()
+                .zip(values)
+                .for_each(|(s, &v)| *s = s.saturating_add(v as u16));
         }
         std::mem::swap(&mut self.previous, &mut self.current);
     }
