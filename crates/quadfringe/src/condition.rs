@@ -50,10 +50,7 @@ impl<'a, T: Sample> Shot<'a, T> {
             }
             T::check_finite(plane, channel.name())?;
         }
-        Ok(Self {
-            planes,
-            full_scale: T::FULL_SCALE,
-        })
+        Ok(Self { planes, full_scale: T::FULL_SCALE })
     }
 
     /// The value that stands for full scale, for example 4095 for 12 bit data in 16 bit words.
@@ -62,11 +59,7 @@ impl<'a, T: Sample> Shot<'a, T> {
     /// [`Error::Value`] unless positive and finite.
     pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
         if !(full_scale.is_finite() && full_scale > 0.0) {
-            return Err(Error::value(
-                "full_scale",
-                "a positive intensity",
-                full_scale,
-            ));
+            return Err(Error::value("full_scale", "a positive intensity", full_scale));
         }
         self.full_scale = full_scale;
         Ok(self)
@@ -138,22 +131,13 @@ impl Conditioner {
         for (channel, dark) in Channel::ALL.iter().zip(self.dark) {
             if !(0.0..1.0).contains(&dark) {
                 let name = format!("dark level of {}", channel.name());
-                return Err(Error::value(
-                    name,
-                    "a fraction of full scale in [0, 1)",
-                    dark,
-                ));
+                return Err(Error::value(name, "a fraction of full scale in [0, 1)", dark));
             }
         }
         for (channel, response) in Channel::ALL.iter().zip(self.response) {
             response.check(channel.name())?;
         }
-        if self
-            .ir_registration
-            .iter()
-            .flatten()
-            .any(|v| !v.is_finite())
-        {
+        if self.ir_registration.iter().flatten().any(|v| !v.is_finite()) {
             let actual = format!("{:?}", self.ir_registration);
             return Err(Error::value("ir_registration", "finite numbers", actual));
         }
@@ -174,11 +158,8 @@ impl Conditioner {
         Ok(Plan {
             dark: self.dark,
             response: self.response,
-            unmix: (self.crosstalk != identity.crosstalk)
-                .then(|| self.crosstalk_inverse())
-                .transpose()?,
-            registration: (self.ir_registration != identity.ir_registration)
-                .then_some(self.ir_registration),
+            unmix: (self.crosstalk != identity.crosstalk).then(|| self.crosstalk_inverse()).transpose()?,
+            registration: (self.ir_registration != identity.ir_registration).then_some(self.ir_registration),
             tables: std::array::from_fn(|_| Vec::new()),
             tables_for: None,
         })
@@ -241,33 +222,23 @@ impl Plan {
     }
 
     /// Which pixels of a row are saturated in no channel.
-    pub fn usable_row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [bool]) {
+    pub fn unsaturated_row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [bool]) {
         let limit = CLIPPED * shot.full_scale;
         out.fill(true);
         for plane in &shot.planes {
             let row = plane.row(y);
-            out.iter_mut()
-                .zip(row)
-                .for_each(|(o, v)| *o &= v.intensity() < limit);
+            out.iter_mut().zip(row).for_each(|(o, v)| *o &= v.intensity() < limit);
         }
     }
 
     /// Infrared light at the visible pixels; no data outside the infrared chip.
-    fn registered_row<T: Sample>(
-        &self,
-        shot: &Shot<'_, T>,
-        map: &[[f64; 3]; 2],
-        y: usize,
-        out: &mut [f32],
-    ) {
+    fn registered_row<T: Sample>(&self, shot: &Shot<'_, T>, map: &[[f64; 3]; 2], y: usize, out: &mut [f32]) {
         let plane = &shot.planes[3];
         let (rows, columns) = plane.dim();
         for (x, value) in out.iter_mut().enumerate() {
             let at = map.map(|m| m[0] * x as f64 + m[1] * y as f64 + m[2]);
-            let inside = at[0] >= 0.0
-                && at[1] >= 0.0
-                && at[0] <= (columns - 1) as f64
-                && at[1] <= (rows - 1) as f64;
+            let inside =
+                at[0] >= 0.0 && at[1] >= 0.0 && at[0] <= (columns - 1) as f64 && at[1] <= (rows - 1) as f64;
             *value = f32::NAN;
             if inside {
                 let (x0, y0) = (at[0] as usize, at[1] as usize);
@@ -299,8 +270,7 @@ fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
         a[i][4 + i] = 1.0;
     }
     for column in 0..4 {
-        let pivot =
-            (column..4).max_by(|&p, &q| a[p][column].abs().total_cmp(&a[q][column].abs()))?;
+        let pivot = (column..4).max_by(|&p, &q| a[p][column].abs().total_cmp(&a[q][column].abs()))?;
         a.swap(column, pivot);
         let head = a[column][column];
         if !head.is_finite() || head.abs() < 1e-6 {
@@ -311,16 +281,11 @@ fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
         for (row, values) in a.iter_mut().enumerate() {
             if row != column {
                 let factor = values[column];
-                values
-                    .iter_mut()
-                    .zip(lead)
-                    .for_each(|(v, l)| *v -= factor * l);
+                values.iter_mut().zip(lead).for_each(|(v, l)| *v -= factor * l);
             }
         }
     }
-    Some(std::array::from_fn(|i| {
-        std::array::from_fn(|j| a[i][4 + j])
-    }))
+    Some(std::array::from_fn(|i| std::array::from_fn(|j| a[i][4 + j])))
 }
 
 #[cfg(test)]
@@ -337,10 +302,7 @@ mod tests {
         let mut mix = Conditioner::default().crosstalk;
         mix[0][1] = 0.15;
         mix[2][3] = 0.1;
-        let conditioner = Conditioner {
-            crosstalk: mix,
-            ..Conditioner::default()
-        };
+        let conditioner = Conditioner { crosstalk: mix, ..Conditioner::default() };
         let light = [0.2f32, 0.4, 0.6, 0.8];
         let seen: Vec<Array2<f32>> = (0..4)
             .map(|i| (0..4).map(|j| mix[i][j] as f32 * light[j]).sum())
@@ -360,10 +322,8 @@ mod tests {
     #[test]
     fn registration_shifts_infrared_and_marks_what_it_cannot_see() {
         let image = Array2::from_shape_fn((2, 4), |(_, x)| x as f32 / 10.0);
-        let conditioner = Conditioner {
-            ir_registration: [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0]],
-            ..Conditioner::default()
-        };
+        let conditioner =
+            Conditioner { ir_registration: [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0]], ..Conditioner::default() };
         let shot = Shot::new(planes(&image)).unwrap();
         let plan = conditioner.plan().unwrap();
         let mut out = [[0.0f32; 4]; 4];
@@ -375,27 +335,10 @@ mod tests {
 
     #[test]
     fn bad_conditioning_is_named() {
-        let singular = Conditioner {
-            crosstalk: [[1.0; 4]; 4],
-            ..Conditioner::default()
-        };
-        assert!(
-            singular
-                .check()
-                .unwrap_err()
-                .to_string()
-                .contains("invertible")
-        );
-        let dark = Conditioner {
-            dark: [0.0, 1.5, 0.0, 0.0],
-            ..Conditioner::default()
-        };
-        assert!(
-            dark.check()
-                .unwrap_err()
-                .to_string()
-                .contains("dark level of G")
-        );
+        let singular = Conditioner { crosstalk: [[1.0; 4]; 4], ..Conditioner::default() };
+        assert!(singular.check().unwrap_err().to_string().contains("invertible"));
+        let dark = Conditioner { dark: [0.0, 1.5, 0.0, 0.0], ..Conditioner::default() };
+        assert!(dark.check().unwrap_err().to_string().contains("dark level of G"));
     }
 
     #[test]

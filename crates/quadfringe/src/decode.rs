@@ -10,6 +10,8 @@
 
 mod best;
 mod islands;
+mod judge;
+mod nodes;
 mod output;
 mod published;
 
@@ -47,32 +49,22 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            method: Method::default(),
-            modulation_min: 0.02,
-            quality_min: 0.15,
-            period_px: None,
-        }
+        Self { method: Method::default(), modulation_min: 0.02, quality_min: 0.15, period_px: None }
     }
 }
 
 impl Options {
     fn check(&self) -> Result<()> {
-        let fractions = [
-            ("modulation_min", self.modulation_min),
-            ("quality_min", self.quality_min),
-        ];
+        let fractions = [("modulation_min", self.modulation_min), ("quality_min", self.quality_min)];
         for (name, value) in fractions {
             if !(0.0..1.0).contains(&value) {
                 return Err(Error::value(name, "a fraction in [0, 1)", value));
             }
         }
         match self.period_px {
-            Some(period) if !(period.is_finite() && period >= 3.0) => Err(Error::value(
-                "period_px",
-                "at least 3 camera pixels",
-                period,
-            )),
+            Some(period) if !(period.is_finite() && period >= 3.0) => {
+                Err(Error::value("period_px", "at least 3 camera pixels", period))
+            }
             _ => Ok(()),
         }
     }
@@ -125,14 +117,7 @@ impl Decoder {
             Method::Published => Engine::Published(Box::new(Published::new(&code, shape))),
             Method::Best => Engine::Best(Box::new(Best::new(&code, shape))),
         };
-        Ok(Self {
-            code,
-            shape,
-            plan: conditioner.plan()?,
-            options,
-            engine,
-            triangulator: None,
-        })
+        Ok(Self { code, shape, plan: conditioner.plan()?, options, engine, triangulator: None })
     }
 
     /// Go on to millimetres with a calibrated camera and projector.
@@ -142,11 +127,7 @@ impl Decoder {
     pub fn triangulate_with(mut self, triangulator: Triangulator) -> Result<Self> {
         let (rows, columns) = triangulator.shape();
         if [rows, columns] != self.shape {
-            return Err(Error::shape(
-                "calibrated camera",
-                &self.shape,
-                &[rows, columns],
-            ));
+            return Err(Error::shape("calibrated camera", &self.shape, &[rows, columns]));
         }
         self.triangulator = Some(triangulator);
         Ok(self)

@@ -8,6 +8,7 @@ pub(crate) mod joint;
 pub(crate) mod light;
 pub(crate) mod local_fit;
 mod n_step;
+pub(crate) mod scene;
 
 mod two_step;
 pub(crate) mod window;

@@ -64,19 +64,11 @@ impl Error {
         expected: impl Into<String>,
         actual: impl std::fmt::Display,
     ) -> Self {
-        Self::Value {
-            name: name.into(),
-            expected: expected.into(),
-            actual: actual.to_string(),
-        }
+        Self::Value { name: name.into(), expected: expected.into(), actual: actual.to_string() }
     }
 
     /// An array of the wrong size.
     pub(crate) fn shape(what: impl Into<String>, expected: &[usize], actual: &[usize]) -> Self {
-        Self::Shape {
-            what: what.into(),
-            expected: format!("{expected:?}"),
-            actual: format!("{actual:?}"),
-        }
+        Self::Shape { what: what.into(), expected: format!("{expected:?}"), actual: format!("{actual:?}") }
     }
 }

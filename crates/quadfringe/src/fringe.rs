@@ -97,24 +97,16 @@ impl FringeCode {
     /// two columns); [`Error::JointRange`] when two columns of the field have nearly the same three phases.
     pub fn new(numbers: [f64; 3], projector_width: usize) -> Result<Self> {
         if projector_width < 2 {
-            return Err(Error::value(
-                "projector_width (columns)",
-                "at least 2",
-                projector_width,
-            ));
+            return Err(Error::value("projector_width (columns)", "at least 2", projector_width));
         }
         let limit = projector_width as f64 / 2.0;
         for number in numbers {
             if !(number.is_finite() && number > 0.0 && number < limit) {
-                let expected =
-                    format!("a number above 0 and below {limit} (half the projector width)");
+                let expected = format!("a number above 0 and below {limit} (half the projector width)");
                 return Err(Error::value("fringe number", expected, number));
             }
         }
-        let code = Self {
-            numbers,
-            projector_width,
-        };
+        let code = Self { numbers, projector_width };
         let (margin_rad, distance_px) = code.closest_columns();
         if margin_rad < MARGIN_NEEDED_RAD {
             return Err(Error::JointRange {
@@ -236,24 +228,11 @@ mod tests {
         for (numbers, width) in accepted {
             assert!(FringeCode::new(numbers, width).is_ok(), "{numbers:?}");
         }
-        for numbers in [
-            [16.0, 8.0, 4.0],
-            [30.0, 30.0, 30.0],
-            [36.0, 34.0, 30.0],
-            [36.0, 36.0, 36.0],
-        ] {
+        for numbers in [[16.0, 8.0, 4.0], [30.0, 30.0, 30.0], [36.0, 34.0, 30.0], [36.0, 36.0, 36.0]] {
             let refused = FringeCode::new(numbers, 912);
-            assert!(
-                matches!(refused, Err(Error::JointRange { .. })),
-                "{numbers:?}"
-            );
+            assert!(matches!(refused, Err(Error::JointRange { .. })), "{numbers:?}");
         }
-        for numbers in [
-            [f64::NAN, 35.0, 30.0],
-            [-1.0, 35.0, 30.0],
-            [456.0, 35.0, 30.0],
-            [0.0, 1.0, 2.0],
-        ] {
+        for numbers in [[f64::NAN, 35.0, 30.0], [-1.0, 35.0, 30.0], [456.0, 35.0, 30.0], [0.0, 1.0, 2.0]] {
             let refused = FringeCode::new(numbers, 912);
             assert!(matches!(refused, Err(Error::Value { .. })), "{numbers:?}");
         }

@@ -87,19 +87,10 @@ impl Device {
     ///
     /// # Errors
     /// [`Error::Value`] when the size is zero, a focal length is not positive, or a number is not finite.
-    pub fn pinhole(
-        width: usize,
-        height: usize,
-        focal_px: [f64; 2],
-        centre_px: [f64; 2],
-    ) -> Result<Self> {
+    pub fn pinhole(width: usize, height: usize, focal_px: [f64; 2], centre_px: [f64; 2]) -> Result<Self> {
         if width == 0 || height == 0 {
             let actual = format!("{width} x {height}");
-            return Err(Error::value(
-                "device size (columns x rows)",
-                "at least 1 x 1",
-                actual,
-            ));
+            return Err(Error::value("device size (columns x rows)", "at least 1 x 1", actual));
         }
         if !focal_px.iter().all(|f| f.is_finite() && *f > 0.0) {
             let expected = "two positive focal lengths in pixels";
@@ -133,11 +124,7 @@ impl Device {
     pub fn with_pose(self, rotation: [[f64; 3]; 3], translation_mm: [f64; 3]) -> Result<Self> {
         check_finite("translation_mm", &translation_mm)?;
         rotation::check(&rotation)?;
-        Ok(Self {
-            rotation,
-            translation_mm,
-            ..self
-        })
+        Ok(Self { rotation, translation_mm, ..self })
     }
 
     /// Pixel (column, row) at which a point of the camera frame (mm) is seen, inside the image or not; `None` when the
@@ -153,10 +140,7 @@ impl Device {
             return None;
         }
         let [xd, yd] = self.distort(ideal);
-        let pixel = [
-            self.focal_px[0] * xd + self.centre_px[0],
-            self.focal_px[1] * yd + self.centre_px[1],
-        ];
+        let pixel = [self.focal_px[0] * xd + self.centre_px[0], self.focal_px[1] * yd + self.centre_px[1]];
         Some(pixel)
     }
 
@@ -249,19 +233,13 @@ mod tests {
         let mirrored = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, -1.0]];
         assert!(device().with_pose(mirrored, [0.0; 3]).is_err());
         assert!(device().with_pose([[2.0, 0.0, 0.0]; 3], [0.0; 3]).is_err());
-        assert!(
-            device()
-                .with_distortion([f64::INFINITY, 0.0, 0.0, 0.0, 0.0])
-                .is_err()
-        );
+        assert!(device().with_distortion([f64::INFINITY, 0.0, 0.0, 0.0, 0.0]).is_err());
     }
 
     #[test]
     fn behind_or_folded_is_none() {
         assert_eq!(device().project([0.0, 0.0, -5.0]), None);
-        let barrel = device()
-            .with_distortion([-0.4, 0.0, 0.0, 0.0, 0.0])
-            .expect("valid device");
+        let barrel = device().with_distortion([-0.4, 0.0, 0.0, 0.0, 0.0]).expect("valid device");
         assert!(barrel.project([0.5, 0.0, 1.0]).is_some());
         assert_eq!(barrel.project([2.0, 0.0, 1.0]), None);
         assert!(barrel.undistort([1e5, 0.0])[0].is_nan());
@@ -270,10 +248,7 @@ mod tests {
     #[test]
     fn the_centre_is_where_rays_start() {
         let posed = device()
-            .with_pose(
-                rotation_from_vector([0.1, -0.2, 0.05]),
-                [-250.0, 20.0, -120.0],
-            )
+            .with_pose(rotation_from_vector([0.1, -0.2, 0.05]), [-250.0, 20.0, -120.0])
             .expect("valid device");
         let centre = posed.device_from_camera(posed.centre_mm());
         assert!(centre.iter().all(|c| c.abs() < 1e-9));

@@ -119,12 +119,7 @@ impl Bench {
         let projector = centred(PROJECTOR_SIZE, layout.pitch_um())
             .and_then(|device| device.with_pose(rotation, translation_mm))
             .expect(reason);
-        Self {
-            camera,
-            visible: projector.clone(),
-            infrared: projector,
-            layout,
-        }
+        Self { camera, visible: projector.clone(), infrared: projector, layout }
     }
 
     /// The same bench with an infrared projector that deviates from the visible one: `T_infrared_visible` is the rotation
@@ -172,11 +167,7 @@ fn pose_towards(centre: [f64; 3], target: [f64; 3], roll_rad: f64) -> ([[f64; 3]
         v.map(|c| c / length)
     };
     let cross = |a: [f64; 3], b: [f64; 3]| {
-        [
-            a[1] * b[2] - a[2] * b[1],
-            a[2] * b[0] - a[0] * b[2],
-            a[0] * b[1] - a[1] * b[0],
-        ]
+        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
     };
     let forward = unit(std::array::from_fn(|i| target[i] - centre[i]));
     let level = unit(cross([0.0, 1.0, 0.0], forward));
@@ -199,10 +190,7 @@ mod tests {
         assert!((0..3).all(|i| (centre[i] - PROJECTOR_CENTRE_MM[i]).abs() < 1e-9));
         for corner in [[0.0, 0.0], [1023.0, 0.0], [0.0, 767.0], [1023.0, 767.0]] {
             let ray = bench.camera.ray(corner);
-            let pixel = bench
-                .visible
-                .project(ray.at(800.0 / ray.direction[2]))
-                .expect("in front");
+            let pixel = bench.visible.project(ray.at(800.0 / ray.direction[2])).expect("in front");
             assert!(bench.visible.contains(pixel), "{corner:?} -> {pixel:?}");
         }
     }

@@ -93,26 +93,19 @@ pub struct Union(pub Vec<Box<dyn Surface>>);
 
 impl Surface for Union {
     fn value(&self, p_mm: [f64; 3]) -> f64 {
-        self.0
-            .iter()
-            .fold(f64::INFINITY, |least, body| least.min(body.value(p_mm)))
+        self.0.iter().fold(f64::INFINITY, |least, body| least.min(body.value(p_mm)))
     }
 
     fn bounds_mm(&self) -> [[f64; 3]; 2] {
         let nothing = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
         self.0.iter().fold(nothing, |[low, high], body| {
             let [l, h] = body.bounds_mm();
-            [
-                std::array::from_fn(|i| low[i].min(l[i])),
-                std::array::from_fn(|i| high[i].max(h[i])),
-            ]
+            [std::array::from_fn(|i| low[i].min(l[i])), std::array::from_fn(|i| high[i].max(h[i]))]
         })
     }
 
     fn rate_limit(&self, direction: [f64; 3]) -> f64 {
-        self.0
-            .iter()
-            .fold(0.0, |most, body| most.max(body.rate_limit(direction)))
+        self.0.iter().fold(0.0, |most, body| most.max(body.rate_limit(direction)))
     }
 
     fn hit(&self, ray: &Ray, [from, to]: [f64; 2]) -> Option<f64> {
@@ -124,10 +117,7 @@ impl Surface for Union {
     }
 
     fn normal(&self, p_mm: [f64; 3]) -> [f64; 3] {
-        let nearest = self
-            .0
-            .iter()
-            .min_by(|a, b| a.value(p_mm).total_cmp(&b.value(p_mm)));
+        let nearest = self.0.iter().min_by(|a, b| a.value(p_mm).total_cmp(&b.value(p_mm)));
         nearest.map_or([f64::NAN; 3], |body| body.normal(p_mm))
     }
 }
@@ -182,20 +172,12 @@ mod tests {
             let body = scene(name, 0.4).expect("known scene");
             for i in 0..400 {
                 let (x, y) = (f64::from(i % 20) - 9.5, f64::from(i / 20) - 9.5);
-                let ray = Ray {
-                    origin_mm: [0.0; 3],
-                    direction: unit([0.019 * x, 0.014 * y, 1.0]),
-                };
-                let t = body
-                    .hit(&ray, [0.0, f64::INFINITY])
-                    .expect("a full-field scene");
+                let ray = Ray { origin_mm: [0.0; 3], direction: unit([0.019 * x, 0.014 * y, 1.0]) };
+                let t = body.hit(&ray, [0.0, f64::INFINITY]).expect("a full-field scene");
                 assert!(body.value(ray.at(t)).abs() < 1e-7, "{name} {i}");
                 assert!(body.value(ray.at(t - 1e-3)) > 0.0, "{name} {i}");
                 let normal = body.normal(ray.at(t));
-                assert!(
-                    crate::optics::dot(normal, ray.direction) < 1e-6,
-                    "{name} {i}"
-                );
+                assert!(crate::optics::dot(normal, ray.direction) < 1e-6, "{name} {i}");
             }
         }
         assert!(scene("teapot", 0.0).is_err());
@@ -207,16 +189,12 @@ mod tests {
         for name in SCENES {
             let body = scene(name, 1.3).expect("known scene");
             for i in 0..20_000u32 {
-                let noise =
-                    |k: u32| f64::from((i * 4 + k).wrapping_mul(2_654_435_761)) / 4.3e9 - 0.5;
+                let noise = |k: u32| f64::from((i * 4 + k).wrapping_mul(2_654_435_761)) / 4.3e9 - 0.5;
                 let p = [250.0 * noise(0), 220.0 * noise(1), 770.0 + 120.0 * noise(2)];
                 let direction = unit([noise(3), noise(1) * noise(2), 0.05 + noise(0)]);
                 let q: [f64; 3] = std::array::from_fn(|c| p[c] + 0.01 * direction[c]);
                 let rate = (body.value(q) - body.value(p)).abs() / 0.01;
-                assert!(
-                    rate <= body.rate_limit(direction) * (1.0 + 1e-6),
-                    "{name} {p:?} {rate}"
-                );
+                assert!(rate <= body.rate_limit(direction) * (1.0 + 1e-6), "{name} {p:?} {rate}");
             }
         }
     }

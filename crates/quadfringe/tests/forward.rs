@@ -11,8 +11,8 @@ fn small(bench: Bench, shrink: usize) -> Bench {
     let (width, height) = (camera.width / shrink, camera.height / shrink);
     let scale = 1.0 / shrink as f64;
     let centre = [0.5 * (width as f64 - 1.0), 0.5 * (height as f64 - 1.0)];
-    let camera = Device::pinhole(width, height, camera.focal_px.map(|f| f * scale), centre)
-        .expect("valid camera");
+    let camera =
+        Device::pinhole(width, height, camera.focal_px.map(|f| f * scale), centre).expect("valid camera");
     Bench { camera, ..bench }
 }
 
@@ -33,9 +33,7 @@ fn floats(planes: Planes) -> [Array2<f32>; 4] {
 }
 
 fn worst(a: &Array2<f32>, b: &Array2<f32>) -> f32 {
-    a.iter()
-        .zip(b)
-        .fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
+    a.iter().zip(b).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
 }
 
 /// Section 5 of the method: identical camera and projector capture what was projected.
@@ -52,13 +50,9 @@ fn identical_camera_and_projector_capture_the_projected_image() {
     let code = FringeCode::optimum(36, 1024).expect("valid code");
     let cast = bench.cast(&Plane::at_z(800.0));
     let images = Channel::ALL.map(|channel| pattern(&code, channel, 768, DmdLayout::Regular));
-    let continuous = bench
-        .render(&cast, &Light::shot(&code), &clean())
-        .expect("valid scene");
+    let continuous = bench.render(&cast, &Light::shot(&code), &clean()).expect("valid scene");
     let sampled = images.each_ref().map(|image| Light::Image(image.view()));
-    let sampled = bench
-        .render(&cast, &sampled, &clean())
-        .expect("valid scene");
+    let sampled = bench.render(&cast, &sampled, &clean()).expect("valid scene");
     for shot in [floats(continuous), floats(sampled)] {
         for (captured, projected) in shot.iter().zip(&images) {
             let difference = worst(captured, projected);
@@ -79,27 +73,17 @@ fn rows_do_not_depend_on_the_number_of_threads() {
     };
     let code = FringeCode::optimum(36, 912).expect("valid code");
     let shots = [1, 2, 5].map(|threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("a pool");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
             let cast = bench.cast(scene("face", 0.0).expect("known scene").as_ref());
-            bench
-                .render(&cast, &Light::shot(&code), &options)
-                .expect("valid scene")
+            bench.render(&cast, &Light::shot(&code), &options).expect("valid scene")
         })
     });
     assert_eq!(shots[0], shots[1]);
     assert_eq!(shots[0], shots[2]);
-    let other = RenderOptions {
-        seed: 12,
-        ..options
-    };
+    let other = RenderOptions { seed: 12, ..options };
     let cast = bench.cast(scene("face", 0.0).expect("known scene").as_ref());
-    let again = bench
-        .render(&cast, &Light::shot(&code), &other)
-        .expect("valid scene");
+    let again = bench.render(&cast, &Light::shot(&code), &other).expect("valid scene");
     assert_ne!(shots[0], again);
 }
 
@@ -107,20 +91,14 @@ fn rows_do_not_depend_on_the_number_of_threads() {
 fn noise_has_the_stated_spread() {
     let bench = small(Bench::reference(), 4);
     let cast = bench.cast(&Plane::at_z(800.0));
-    let options = RenderOptions {
-        noise: 0.03,
-        ..clean()
-    };
+    let options = RenderOptions { noise: 0.03, ..clean() };
     let grey = [(); 4].map(|()| Light::Uniform(0.5));
     let shot = floats(bench.render(&cast, &grey, &options).expect("valid scene"));
     for plane in &shot {
         let n = plane.len() as f32;
         let mean = plane.sum() / n;
         let sigma = (plane.mapv(|v| (v - mean) * (v - mean)).sum() / n).sqrt();
-        assert!(
-            (mean - 0.5).abs() < 5e-4 && (sigma - 0.03).abs() < 3e-4,
-            "{mean} {sigma}"
-        );
+        assert!((mean - 0.5).abs() < 5e-4 && (sigma - 0.03).abs() < 3e-4, "{mean} {sigma}");
     }
     assert!(worst(&shot[0], &shot[1]) > 0.05);
 }
@@ -136,34 +114,15 @@ fn options_do_what_they_say() {
     let close = |a: [f32; 4], b: [f32; 4]| a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-5);
     let mut crosstalk = clean().crosstalk;
     crosstalk[1][0] = 0.1;
-    let options = RenderOptions {
-        crosstalk,
-        ..clean()
-    };
-    assert!(close(
-        level(&options, [1.0, 0.5, 0.0, 0.2]),
-        [1.0, 0.6, 0.0, 0.2]
-    ));
-    let options = RenderOptions {
-        projector_exponent: [2.0; 4],
-        ..clean()
-    };
+    let options = RenderOptions { crosstalk, ..clean() };
+    assert!(close(level(&options, [1.0, 0.5, 0.0, 0.2]), [1.0, 0.6, 0.0, 0.2]));
+    let options = RenderOptions { projector_exponent: [2.0; 4], ..clean() };
     assert!(close(level(&options, [0.5; 4]), [0.25; 4]));
-    let options = RenderOptions {
-        camera_exponent: [2.0; 4],
-        camera_offset: [0.1; 4],
-        ..clean()
-    };
+    let options = RenderOptions { camera_exponent: [2.0; 4], camera_offset: [0.1; 4], ..clean() };
     assert!(close(level(&options, [0.25; 4]), [0.6; 4]));
-    let options = RenderOptions {
-        gain: [3.0; 4],
-        ..clean()
-    };
+    let options = RenderOptions { gain: [3.0; 4], ..clean() };
     assert!(close(level(&options, [0.5; 4]), [1.0; 4]));
-    let options = RenderOptions {
-        shading: true,
-        ..clean()
-    };
+    let options = RenderOptions { shading: true, ..clean() };
     let shaded = level(&options, [1.0; 4]);
     assert!(shaded[0] > 0.9 && shaded[0] < 0.99);
 }
@@ -174,34 +133,15 @@ fn bad_input_is_refused() {
     let cast = bench.cast(&Plane::at_z(800.0));
     let white = || [(); 4].map(|()| Light::Uniform(1.0));
     let refused = |options: RenderOptions| bench.render(&cast, &white(), &options).is_err();
-    assert!(refused(RenderOptions {
-        noise: -0.1,
-        ..clean()
-    }));
-    assert!(refused(RenderOptions {
-        blur_px: f64::NAN,
-        ..clean()
-    }));
-    assert!(refused(RenderOptions {
-        camera_exponent: [0.0; 4],
-        ..clean()
-    }));
-    assert!(refused(RenderOptions {
-        albedo: Albedo::Image(Array3::zeros((2, 2, 4))),
-        ..clean()
-    }));
-    assert!(refused(RenderOptions {
-        infrared_from_visible: Some([[0.0; 3]; 2]),
-        ..clean()
-    }));
+    assert!(refused(RenderOptions { noise: -0.1, ..clean() }));
+    assert!(refused(RenderOptions { blur_px: f64::NAN, ..clean() }));
+    assert!(refused(RenderOptions { camera_exponent: [0.0; 4], ..clean() }));
+    assert!(refused(RenderOptions { albedo: Albedo::Image(Array3::zeros((2, 2, 4))), ..clean() }));
+    assert!(refused(RenderOptions { infrared_from_visible: Some([[0.0; 3]; 2]), ..clean() }));
     let image = Array2::zeros((3, 3));
     let lights = [(); 4].map(|()| Light::Image(image.view()));
     assert!(bench.render(&cast, &lights, &clean()).is_err());
-    assert!(
-        Bench::reference()
-            .render(&cast, &white(), &clean())
-            .is_err()
-    );
+    assert!(Bench::reference().render(&cast, &white(), &clean()).is_err());
     assert!(bench.predeform(&Light::Uniform(1.0), -1.0).is_err());
 }
 
@@ -226,17 +166,9 @@ fn a_moving_hand_is_seen_at_three_instants() {
     let cast = |time_s: f64| bench.cast(scene("hand", time_s).expect("known scene").as_ref());
     let (a, b, c) = (cast(0.0), cast(0.1), cast(0.2));
     let white = [(); 4].map(|()| Light::Uniform(1.0));
-    let options = RenderOptions {
-        shading: true,
-        ..clean()
-    };
-    let moving = floats(
-        bench
-            .render_moving([&a, &b, &c], &white, &options)
-            .expect("valid scene"),
-    );
-    let still =
-        [&a, &b, &c].map(|cast| floats(bench.render(cast, &white, &options).expect("valid scene")));
+    let options = RenderOptions { shading: true, ..clean() };
+    let moving = floats(bench.render_moving([&a, &b, &c], &white, &options).expect("valid scene"));
+    let still = [&a, &b, &c].map(|cast| floats(bench.render(cast, &white, &options).expect("valid scene")));
     assert_eq!((&moving[0], &moving[1]), (&still[0][0], &still[1][1]));
     assert_eq!(moving[2], still[2][2]);
     let mean = (&still[0][3] + &still[1][3] + &still[2][3]) / 3.0;
@@ -245,21 +177,14 @@ fn a_moving_hand_is_seen_at_three_instants() {
 
 #[test]
 fn predeformed_infrared_matches_the_visible_fringes_on_the_plane() {
-    let bench = small(Bench::reference(), 4)
-        .deviated([1f64.to_radians(); 3], [0.5; 3])
-        .expect("finite");
-    let image = bench
-        .predeform(&Light::fringes(30.0, 0.0), 800.0)
-        .expect("valid plane");
+    let bench = small(Bench::reference(), 4).deviated([1f64.to_radians(); 3], [0.5; 3]).expect("finite");
+    let image = bench.predeform(&Light::fringes(30.0, 0.0), 800.0).expect("valid plane");
     let wave = || Light::fringes(30.0, 0.0);
     let cast = bench.cast(&Plane::at_z(800.0));
     let lights = [wave(), wave(), wave(), Light::Image(image.view())];
     let corrected = floats(bench.render(&cast, &lights, &clean()).expect("valid scene"));
-    let plain = floats(
-        bench
-            .render(&cast, &[wave(), wave(), wave(), wave()], &clean())
-            .expect("valid scene"),
-    );
+    let plain =
+        floats(bench.render(&cast, &[wave(), wave(), wave(), wave()], &clean()).expect("valid scene"));
     assert!(worst(&plain[3], &plain[0]) > 0.5);
     assert!(worst(&corrected[3], &corrected[0]) < 6e-3);
 }

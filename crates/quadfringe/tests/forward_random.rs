@@ -52,12 +52,11 @@ fn any_surface() -> impl Strategy<Value = Box<dyn Surface>> {
     let plane = (tilt, 700.0..950.0f64).prop_map(|([x, y], z)| -> Box<dyn Surface> {
         Box::new(Plane::new([0.0, 0.0, z], [x, y, -1.0]).expect("valid plane"))
     });
-    let ball = (prop::array::uniform2(-60.0..60.0f64), 10.0..60.0f64).prop_map(
-        |([x, y], r)| -> Box<dyn Surface> {
+    let ball =
+        (prop::array::uniform2(-60.0..60.0f64), 10.0..60.0f64).prop_map(|([x, y], r)| -> Box<dyn Surface> {
             let ball = Sphere::new([x, y, 750.0], r).expect("valid sphere");
             Box::new(Union(vec![Box::new(Plane::at_z(850.0)), Box::new(ball)]))
-        },
-    );
+        });
     let map = prop::collection::vec(-20.0..20.0f64, 36).prop_map(|heights| -> Box<dyn Surface> {
         let grid = Array2::from_shape_vec((6, 6), heights).expect("36 heights");
         let map = HeightMap::new(grid, [-250.0; 2], [100.0; 2], 800.0, Interpolation::Bicubic);

@@ -17,12 +17,7 @@ fn crossed_axes_bench(distance_mm: f64, baseline_mm: f64) -> Bench {
     let projector = Device::pinhole(912, 1140, [1570.0; 2], [455.5, 569.5])
         .and_then(|device| device.with_pose(rotation, translation))
         .expect("valid projector");
-    Bench {
-        camera,
-        visible: projector.clone(),
-        infrared: projector,
-        layout: DmdLayout::Regular,
-    }
+    Bench { camera, visible: projector.clone(), infrared: projector, layout: DmdLayout::Regular }
 }
 
 #[test]
@@ -42,8 +37,7 @@ fn analytic_geometry_agrees_with_a_ray_cast_of_its_layout() {
                 continue;
             }
             let phase = |column_px: f64| quadfringe::fringe::phase_at(&code, 0, column_px);
-            let difference_rad =
-                phase(on_object.lit_from_px[0][0]) - phase(on_plane.lit_from_px[0][0]);
+            let difference_rad = phase(on_object.lit_from_px[0][0]) - phase(on_plane.lit_from_px[0][0]);
             let found = layout.height_from_phase(difference_rad, on_plane.xyz_mm[0]);
             assert!((found - height_mm).abs() < 1e-9, "{found} for {height_mm}");
             compared += 1;
@@ -61,19 +55,10 @@ fn polynomial_from_planes_measures_a_plane_between_them() {
     let phase = |height_mm: f64| bench.cast(&Plane::at_z(800.0 - height_mm)).phase_rad(&code);
     let heights: Vec<f64> = (0..7).map(|i| 10.0 * f64::from(i)).collect();
     let maps: Vec<Array2<f32>> = heights.iter().map(|h| phase(*h)).collect();
-    let planes: Vec<_> = heights
-        .iter()
-        .copied()
-        .zip(maps.iter().map(|map| map.view()))
-        .collect();
+    let planes: Vec<_> = heights.iter().copied().zip(maps.iter().map(|map| map.view())).collect();
     let fitted = PolynomialHeight::fit(maps[0].view(), &planes, 3).expect("enough planes");
-    let measured = fitted
-        .height_from_phase(phase(27.5).view())
-        .expect("same size");
-    let worst = measured
-        .iter()
-        .filter(|h| h.is_finite())
-        .fold(0f32, |w, h| w.max((h - 27.5).abs()));
+    let measured = fitted.height_from_phase(phase(27.5).view()).expect("same size");
+    let worst = measured.iter().filter(|h| h.is_finite()).fold(0f32, |w, h| w.max((h - 27.5).abs()));
     assert!(worst < 2e-3, "{worst} mm");
     assert!(measured.iter().filter(|h| h.is_finite()).count() > 10_000);
 }
@@ -82,21 +67,13 @@ fn polynomial_from_planes_measures_a_plane_between_them() {
 #[test]
 fn triangulation_is_exact_over_depth_with_both_distortions() {
     let mut bench = crossed_axes_bench(800.0, 230.0);
-    bench.camera = bench
-        .camera
-        .with_distortion([-0.25, 0.1, 1e-3, -2e-3, 0.02])
-        .expect("valid");
-    bench.visible = bench
-        .visible
-        .with_distortion([-0.2, 0.1, 2e-3, 1e-3, -0.03])
-        .expect("valid");
+    bench.camera = bench.camera.with_distortion([-0.25, 0.1, 1e-3, -2e-3, 0.02]).expect("valid");
+    bench.visible = bench.visible.with_distortion([-0.2, 0.1, 2e-3, 1e-3, -0.03]).expect("valid");
     let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("beside the camera");
     let mut worst = 0f64;
     for z_mm in [650.0, 725.0, 800.0, 875.0, 950.0] {
         let cast = bench.cast(&Plane::at_z(z_mm));
-        let xyz = triangulator
-            .xyz_mm(cast.column_px(Beam::Visible).view())
-            .expect("same size");
+        let xyz = triangulator.xyz_mm(cast.column_px(Beam::Visible).view()).expect("same size");
         for (found, expected) in xyz.index_axis(Axis(2), 2).iter().zip(&cast.depth_mm()) {
             if found.is_finite() {
                 worst = worst.max(f64::from((found - expected).abs()));
@@ -113,9 +90,7 @@ fn triangulation_refuses_pairs_without_depth() {
     assert!(Triangulator::new(&bench.visible, &bench.visible).is_err());
     let above = bench.camera.clone();
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-    let above = above
-        .with_pose(identity, [0.0, 200.0, 0.0])
-        .expect("valid pose");
+    let above = above.with_pose(identity, [0.0, 200.0, 0.0]).expect("valid pose");
     assert!(Triangulator::new(&bench.camera, &above).is_err());
     let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("beside the camera");
     assert!(triangulator.xyz_mm(Array2::zeros((3, 3)).view()).is_err());

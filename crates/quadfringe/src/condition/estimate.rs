@@ -92,11 +92,7 @@ fn fit(samples: &Samples, offset_max: f64) -> Response {
         let inside = (0.0..=offset_max).contains(&offset)
             && EXPONENT.contains(&exponent)
             && (0.0..=KNEE_MAX).contains(&knee);
-        if inside {
-            samples.cost(&response([offset, exponent, knee]))
-        } else {
-            f64::INFINITY
-        }
+        if inside { samples.cost(&response([offset, exponent, knee])) } else { f64::INFINITY }
     };
     let (start, step) = ((offset_max / 2.0).min(0.01), (offset_max / 2.0).min(0.03));
     let bent = minimise([start, 0.5, 0.5], [step, 0.15, 0.3], cost);
@@ -109,11 +105,7 @@ fn fit(samples: &Samples, offset_max: f64) -> Response {
 }
 
 fn response([offset, exponent, knee]: [f64; 3]) -> Response {
-    Response {
-        offset: offset as f32,
-        exponent: exponent as f32,
-        knee: knee as f32,
-    }
+    Response { offset: offset as f32, exponent: exponent as f32, knee: knee as f32 }
 }
 
 /// The offset may make hardly any pixel negative: at most the first percentile of the darkest steps.
@@ -126,38 +118,21 @@ fn offset_bound(traces: &[samples::Trace<'_>]) -> f64 {
 
 fn check(stacks: &[ArrayView3<'_, f32>]) -> Result<()> {
     let Some(first) = stacks.first() else {
-        return Err(Error::value(
-            "stacks",
-            "at least one stack of phase steps",
-            "none",
-        ));
+        return Err(Error::value("stacks", "at least one stack of phase steps", "none"));
     };
     for (i, stack) in stacks.iter().enumerate() {
         if stack.shape() != first.shape() {
-            return Err(Error::shape(
-                format!("stack {i}"),
-                first.shape(),
-                stack.shape(),
-            ));
+            return Err(Error::shape(format!("stack {i}"), first.shape(), stack.shape()));
         }
         if stack.shape()[0] < STEPS_MIN {
-            let expected =
-                format!("at least {STEPS_MIN} phase steps along the first axis, best 8, 12 or 16");
-            return Err(Error::value(
-                format!("stack {i}"),
-                expected,
-                stack.shape()[0],
-            ));
+            let expected = format!("at least {STEPS_MIN} phase steps along the first axis, best 8, 12 or 16");
+            return Err(Error::value(format!("stack {i}"), expected, stack.shape()[0]));
         }
         for (s, image) in stack.outer_iter().enumerate() {
             f32::check_finite(&image, &format!("stack {i}, step {s}"))?;
             if let Some(value) = image.iter().find(|v| !(0.0..=1.0).contains(*v)) {
                 let expected = "fractions of full scale in [0, 1] (divide 8 bit by 255, 12 bit by 4095, 16 bit by 65535)";
-                return Err(Error::value(
-                    format!("stack {i}, step {s}"),
-                    expected,
-                    value,
-                ));
+                return Err(Error::value(format!("stack {i}, step {s}"), expected, value));
             }
         }
     }

@@ -29,11 +29,7 @@ pub struct Response {
 
 impl Default for Response {
     fn default() -> Self {
-        Self {
-            offset: 0.0,
-            exponent: 1.0,
-            knee: 0.0,
-        }
+        Self { offset: 0.0, exponent: 1.0, knee: 0.0 }
     }
 }
 

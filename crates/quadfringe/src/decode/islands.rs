@@ -5,12 +5,7 @@ use std::f32::consts::PI;
 
 /// Marks every lit pixel whose absolute phase (rad, row-major) differs by half a turn or more from that of a lit
 /// neighbour - there one of the two has the wrong order, or sees two surfaces at once - and the pixels around it.
-pub(super) fn mark_seams(
-    phase: &[f32],
-    lit: impl Fn(usize) -> bool,
-    width: usize,
-    seams: &mut Vec<bool>,
-) {
+pub(super) fn mark_seams(phase: &[f32], lit: impl Fn(usize) -> bool, width: usize, seams: &mut Vec<bool>) {
     seams.clear();
     seams.resize(phase.len(), false);
     for i in 0..phase.len() {
@@ -39,30 +34,24 @@ pub(super) fn remove_slivers(phase: &mut [f32], width: usize, least: u8, memory:
     let height = phase.len() / width;
     memory.clear();
     memory.resize(phase.len(), 0);
-    memory
-        .par_chunks_mut(width)
-        .zip(phase.par_chunks(width))
-        .for_each(|(counts, row)| {
-            for x in 0..width {
-                let near = &row[x.saturating_sub(2)..(x + 3).min(width)];
-                counts[x] = near.iter().map(|v| u8::from(!v.is_nan())).sum();
+    memory.par_chunks_mut(width).zip(phase.par_chunks(width)).for_each(|(counts, row)| {
+        for x in 0..width {
+            let near = &row[x.saturating_sub(2)..(x + 3).min(width)];
+            counts[x] = near.iter().map(|v| u8::from(!v.is_nan())).sum();
+        }
+    });
+    phase.par_chunks_mut(width).enumerate().for_each(|(y, row)| {
+        let near = y.saturating_sub(2)..(y + 3).min(height);
+        // What the border of the image cuts off counts as present.
+        let missing = 5 * (5 - near.len()) as u8;
+        for (x, value) in row.iter_mut().enumerate() {
+            let cut = (2usize.saturating_sub(x) + (x + 3).saturating_sub(width)) * near.len();
+            let count: u8 = near.clone().map(|r| memory[r * width + x]).sum();
+            if count + missing + (cut as u8) < least {
+                *value = f32::NAN;
             }
-        });
-    phase
-        .par_chunks_mut(width)
-        .enumerate()
-        .for_each(|(y, row)| {
-            let near = y.saturating_sub(2)..(y + 3).min(height);
-            // What the border of the image cuts off counts as present.
-            let missing = 5 * (5 - near.len()) as u8;
-            for (x, value) in row.iter_mut().enumerate() {
-                let cut = (2usize.saturating_sub(x) + (x + 3).saturating_sub(width)) * near.len();
-                let count: u8 = near.clone().map(|r| memory[r * width + x]).sum();
-                if count + missing + (cut as u8) < least {
-                    *value = f32::NAN;
-                }
-            }
-        });
+        }
+    });
 }
 
 /// Sets to NaN every connected region of fewer than `least` pixels; neighbours more than half a turn apart are not
@@ -117,9 +106,7 @@ mod tests {
 
     #[test]
     fn seams_are_marked_on_both_sides() {
-        let phase: Vec<f32> = (0..20 * 20)
-            .map(|i| if i % 20 < 15 { 10.0 } else { 30.0 })
-            .collect();
+        let phase: Vec<f32> = (0..20 * 20).map(|i| if i % 20 < 15 { 10.0 } else { 30.0 }).collect();
         let mut seams = Vec::new();
         mark_seams(&phase, |_| true, 20, &mut seams);
         let row: Vec<usize> = (0..20).filter(|x| seams[7 * 20 + x]).collect();

@@ -39,13 +39,7 @@ impl Decoded {
     }
 
     pub(super) fn check(&self, shape: [usize; 2], calibrated: bool) -> Result<()> {
-        for map in [
-            &self.phase_rad,
-            &self.column_px,
-            &self.order,
-            &self.modulation,
-            &self.quality,
-        ] {
+        for map in [&self.phase_rad, &self.column_px, &self.order, &self.modulation, &self.quality] {
             if map.shape() != shape || !map.is_standard_layout() {
                 return Err(Error::shape("output map", &shape, map.shape()));
             }

@@ -3,9 +3,7 @@
 use super::{Decoded, Options};
 use crate::angle::atan2;
 use crate::condition::{Plan, Sample};
-use crate::demod::{
-    Background, BackgroundScratch, Band, RowFilter, RowScratch, background_row, carrier,
-};
+use crate::demod::{Background, BackgroundScratch, Band, RowFilter, RowScratch, background_row, carrier};
 use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
 use ndarray::Array2;
@@ -32,24 +30,11 @@ struct Rows {
 
 impl Published {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
-        Self {
-            ladder: Ladder::new(code),
-            filter: RowFilter::new(shape[1]),
-            numbers: code.numbers(),
-            shape,
-        }
+        Self { ladder: Ladder::new(code), filter: RowFilter::new(shape[1]), numbers: code.numbers(), shape }
     }
 
-    pub fn run<T: Sample>(
-        &self,
-        plan: &Plan,
-        shot: &Shot<'_, T>,
-        options: &Options,
-        out: &mut Decoded,
-    ) {
-        let period = options
-            .period_px
-            .unwrap_or_else(|| self.period_px(plan, shot));
+    pub fn run<T: Sample>(&self, plan: &Plan, shot: &Shot<'_, T>, options: &Options, out: &mut Decoded) {
+        let period = options.period_px.unwrap_or_else(|| self.period_px(plan, shot));
         let periods = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
         let weights = [1, 2].map(|i: usize| self.filter.weights(Band::Improved, periods[i]));
         out.rows().enumerate().for_each_init(
@@ -139,13 +124,7 @@ impl Rows {
     /// Step 2: half the sum of the envelopes.
     fn remove_background(&mut self, channel: usize, period_px: f32) {
         let light = &mut self.light[channel];
-        background_row(
-            light,
-            Background::MeanEnvelope,
-            period_px,
-            &mut self.background,
-            &mut self.level,
-        );
+        background_row(light, Background::MeanEnvelope, period_px, &mut self.background, &mut self.level);
         light.iter_mut().zip(&self.level).for_each(|(v, l)| *v -= l);
     }
 }

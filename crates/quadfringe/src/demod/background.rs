@@ -30,22 +30,18 @@ pub enum Background {
 /// assert!((found[[1, 120]] - 0.5).abs() < 0.02);
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
-pub fn background(
-    image: ArrayView2<'_, f32>,
-    kind: Background,
-    period_px: f64,
-) -> Result<Array2<f32>> {
+pub fn background(image: ArrayView2<'_, f32>, kind: Background, period_px: f64) -> Result<Array2<f32>> {
     let (rows, columns) = image.dim();
     check_period(period_px, columns)?;
     let mut out = Array2::zeros((rows, columns));
-    out.axis_iter_mut(Axis(0))
-        .into_par_iter()
-        .zip(image.axis_iter(Axis(0)))
-        .for_each_init(Scratch::default, |scratch, (mut target, row)| {
+    out.axis_iter_mut(Axis(0)).into_par_iter().zip(image.axis_iter(Axis(0))).for_each_init(
+        Scratch::default,
+        |scratch, (mut target, row)| {
             let row = row.to_vec();
             let target = target.as_slice_mut().expect("a fresh array is contiguous");
             background_row(&row, kind, period_px as f32, scratch, target);
-        });
+        },
+    );
     Ok(out)
 }
 
@@ -111,24 +107,12 @@ fn mean_envelope(row: &[f32], period_px: f32, scratch: &mut Scratch, out: &mut [
     scratch.middle.resize(n, 0.0);
     moving_mean(row, period_px / 5.0, &mut scratch.sums, &mut scratch.smooth);
     moving_mean(row, period_px, &mut scratch.sums, &mut scratch.middle);
-    find_extrema(
-        &scratch.smooth,
-        &scratch.middle,
-        (period_px / 5.0) as usize,
-        &mut scratch.extrema,
-    );
+    find_extrema(&scratch.smooth, &scratch.middle, (period_px / 5.0) as usize, &mut scratch.extrema);
     out.fill(0.0);
     for upper in [true, false] {
-        let mut knots = scratch
-            .extrema
-            .iter()
-            .filter(|e| e.1 == upper)
-            .map(|e| e.0)
-            .peekable();
+        let mut knots = scratch.extrema.iter().filter(|e| e.1 == upper).map(|e| e.0).peekable();
         if knots.peek().is_none() {
-            out.iter_mut()
-                .zip(&scratch.middle)
-                .for_each(|(o, m)| *o += 0.5 * m);
+            out.iter_mut().zip(&scratch.middle).for_each(|(o, m)| *o += 0.5 * m);
             continue;
         }
         add_envelope(&scratch.smooth, knots, out);
@@ -171,9 +155,7 @@ fn add_envelope(smooth: &[f32], knots: impl Iterator<Item = usize>, out: &mut [f
         previous = Some(knot);
     }
     if let Some(from) = previous {
-        out[from..]
-            .iter_mut()
-            .for_each(|o| *o += 0.5 * smooth[from]);
+        out[from..].iter_mut().for_each(|o| *o += 0.5 * smooth[from]);
     }
 }
 
@@ -191,10 +173,7 @@ mod tests {
     #[test]
     fn both_ways_find_a_sloping_background() {
         let image = fringes(3e-4);
-        for (kind, bound) in [
-            (Background::MovingMean, 2e-3),
-            (Background::MeanEnvelope, 8e-3),
-        ] {
+        for (kind, bound) in [(Background::MovingMean, 2e-3), (Background::MeanEnvelope, 8e-3)] {
             let found = background(image.view(), kind, 25.3).unwrap();
             let worst = (40..472)
                 .map(|x| (found[[0, x]] - 0.5 - 3e-4 * (x as f32 - 256.0)).abs())

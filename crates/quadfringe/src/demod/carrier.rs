@@ -39,10 +39,7 @@ impl Carrier {
 /// ```
 #[must_use]
 pub fn carrier(image: ArrayView2<'_, f32>) -> Carrier {
-    Carrier {
-        row_px: line_period(image),
-        column_px: line_period(image.reversed_axes()),
-    }
+    Carrier { row_px: line_period(image), column_px: line_period(image.reversed_axes()) }
 }
 
 fn line_period(image: ArrayView2<'_, f32>) -> f64 {
@@ -54,21 +51,13 @@ fn line_period(image: ArrayView2<'_, f32>) -> f64 {
     let mut scratch = filter.scratch();
     let mut power = vec![0.0f32; length / 2 + 1];
     let window: Vec<f32> = (0..length)
-        .map(|x| {
-            (std::f32::consts::PI * (x as f32 + 0.5) / length as f32)
-                .sin()
-                .powi(2)
-        })
+        .map(|x| (std::f32::consts::PI * (x as f32 + 0.5) / length as f32).sin().powi(2))
         .collect();
     for line in (0..lines).step_by(lines.div_ceil(LINES)) {
         let row = image.row(line);
         let mean = row.sum() / length as f32;
         for ((value, &sample), weight) in scratch.input.iter_mut().zip(row).zip(&window) {
-            *value = if sample.is_finite() {
-                (sample - mean) * weight
-            } else {
-                0.0
-            };
+            *value = if sample.is_finite() { (sample - mean) * weight } else { 0.0 };
         }
         filter.add_power(&mut scratch, &mut power);
     }

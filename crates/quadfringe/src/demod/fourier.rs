@@ -85,9 +85,7 @@ pub fn fourier(
 }
 
 fn row_means(image: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
-    let means = image
-        .mean_axis(Axis(1))
-        .ok_or_else(|| Error::shape("image", &[1, 1], image.shape()))?;
+    let means = image.mean_axis(Axis(1)).ok_or_else(|| Error::shape("image", &[1, 1], image.shape()))?;
     Ok(means
         .insert_axis(Axis(1))
         .broadcast(image.raw_dim())
@@ -125,9 +123,7 @@ impl RowFilter {
     pub fn weights(&self, band: Band, period_px: f32) -> Vec<f32> {
         let carrier = self.columns as f32 / period_px;
         let scale = 2.0 / self.columns as f32;
-        (0..=self.columns / 2)
-            .map(|bin| scale * band.weight(bin as f32 / carrier))
-            .collect()
+        (0..=self.columns / 2).map(|bin| scale * band.weight(bin as f32 / carrier)).collect()
     }
 
     pub fn scratch(&self) -> RowScratch {
@@ -143,16 +139,8 @@ impl RowFilter {
 
     /// Positive frequencies of `input`, weighted, into `output`. The input is destroyed.
     pub fn analytic(&self, weights: &[f32], scratch: &mut RowScratch) {
-        let RowScratch {
-            input,
-            output,
-            spectrum,
-            forward,
-            inverse,
-        } = scratch;
-        self.forward
-            .process_with_scratch(input, spectrum, forward)
-            .expect("buffers were made by this plan");
+        let RowScratch { input, output, spectrum, forward, inverse } = scratch;
+        self.forward.process_with_scratch(input, spectrum, forward).expect("buffers were made by this plan");
         output.fill(Complex32::new(0.0, 0.0));
         for ((o, s), w) in output.iter_mut().zip(&*spectrum).zip(weights) {
             *o = s * w;
@@ -163,11 +151,7 @@ impl RowFilter {
     /// Power of each non-negative frequency of `input`, added to `power`.
     pub fn add_power(&self, scratch: &mut RowScratch, power: &mut [f32]) {
         self.forward
-            .process_with_scratch(
-                &mut scratch.input,
-                &mut scratch.spectrum,
-                &mut scratch.forward,
-            )
+            .process_with_scratch(&mut scratch.input, &mut scratch.spectrum, &mut scratch.forward)
             .expect("buffers were made by this plan");
         for (p, s) in power.iter_mut().zip(&scratch.spectrum) {
             *p += s.norm_sqr();
@@ -182,9 +166,8 @@ mod tests {
 
     /// Fringes whose local frequency swings between (1 - s) and (1 + s) times the carrier.
     fn swinging(s: f32) -> (Array2<f32>, Vec<f32>) {
-        let phase: Vec<f32> = (0..1024)
-            .map(|x| TAU * x as f32 / 32.0 + s * 4.0 * (TAU * x as f32 / 128.0).sin())
-            .collect();
+        let phase: Vec<f32> =
+            (0..1024).map(|x| TAU * x as f32 / 32.0 + s * 4.0 * (TAU * x as f32 / 128.0).sin()).collect();
         let image = Array2::from_shape_fn((1, 1024), |(_, x)| 0.5 + 0.4 * phase[x].cos());
         (image, phase)
     }
@@ -198,10 +181,7 @@ mod tests {
     fn the_improved_band_follows_slopes_where_the_traditional_one_fails() {
         let (image, phase) = swinging(0.75);
         let run = |band| fourier(image.view(), band, Background::MovingMean, 32.0).unwrap();
-        let (old, new) = (
-            rms(&run(Band::Traditional), &phase),
-            rms(&run(Band::Improved), &phase),
-        );
+        let (old, new) = (rms(&run(Band::Traditional), &phase), rms(&run(Band::Improved), &phase));
         assert!(old > 0.1, "{old}");
         assert!(new < old / 3.0, "{new} against {old}");
     }
@@ -211,11 +191,7 @@ mod tests {
         let (image, phase) = swinging(0.1);
         for band in [Band::Traditional, Band::Improved] {
             let found = fourier(image.view(), band, Background::MeanEnvelope, 32.0).unwrap();
-            assert!(
-                rms(&found, &phase) < 0.02,
-                "{band:?} {}",
-                rms(&found, &phase)
-            );
+            assert!(rms(&found, &phase) < 0.02, "{band:?} {}", rms(&found, &phase));
         }
     }
 }

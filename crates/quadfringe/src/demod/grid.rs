@@ -16,12 +16,7 @@ impl Grid {
     pub fn new(height: usize, width: usize, step: usize) -> Self {
         let columns = width.div_ceil(step);
         let taps = (0..width).map(|x| taps(x, step, columns)).collect();
-        Self {
-            step,
-            rows: height.div_ceil(step),
-            columns,
-            taps,
-        }
+        Self { step, rows: height.div_ceil(step), columns, taps }
     }
 
     pub fn cells(&self) -> usize {
@@ -49,10 +44,7 @@ impl Grid {
         scratch.resize(map.len(), 0.0);
         let (rows, columns) = (self.rows, self.columns);
         let reach = kernel.len() / 2;
-        for (source, target) in map
-            .chunks_exact(columns)
-            .zip(scratch.chunks_exact_mut(columns))
-        {
+        for (source, target) in map.chunks_exact(columns).zip(scratch.chunks_exact_mut(columns)) {
             for (k, weight) in kernel.iter().enumerate() {
                 let (from, to) = (reach.saturating_sub(k), (columns + reach - k).min(columns));
                 if from < to {
@@ -67,10 +59,7 @@ impl Grid {
             for (k, weight) in kernel.iter().enumerate() {
                 if let Some(other) = (row + k).checked_sub(reach).filter(|&r| r < rows) {
                     let source = &scratch[other * columns..][..columns];
-                    target
-                        .iter_mut()
-                        .zip(source)
-                        .for_each(|(t, s)| *t += weight * s);
+                    target.iter_mut().zip(source).for_each(|(t, s)| *t += weight * s);
                 }
             }
         }
@@ -88,10 +77,7 @@ impl Grid {
     pub fn extreme(&self, map: &[f32], reach: usize, pick: fn(f32, f32) -> f32) -> Vec<f32> {
         let (rows, columns) = (self.rows, self.columns);
         let mut along = map.to_vec();
-        for (source, target) in map
-            .chunks_exact(columns)
-            .zip(along.chunks_exact_mut(columns))
-        {
+        for (source, target) in map.chunks_exact(columns).zip(along.chunks_exact_mut(columns)) {
             for (x, value) in target.iter_mut().enumerate() {
                 let near = &source[x.saturating_sub(reach)..(x + reach + 1).min(columns)];
                 *value = near.iter().copied().fold(*value, pick);
@@ -101,10 +87,7 @@ impl Grid {
         for (row, target) in out.chunks_exact_mut(columns).enumerate() {
             for other in row.saturating_sub(reach)..(row + reach + 1).min(rows) {
                 let source = &along[other * columns..][..columns];
-                target
-                    .iter_mut()
-                    .zip(source)
-                    .for_each(|(t, &s)| *t = pick(*t, s));
+                target.iter_mut().zip(source).for_each(|(t, &s)| *t = pick(*t, s));
             }
         }
         out
@@ -112,8 +95,7 @@ impl Grid {
 
     /// [`Self::smooth`] for many maps at once.
     pub fn smooth_all(&self, maps: &mut [Vec<f32>], sigma: f32) {
-        maps.par_iter_mut()
-            .for_each_init(Vec::new, |scratch, map| self.smooth(map, sigma, scratch));
+        maps.par_iter_mut().for_each_init(Vec::new, |scratch, map| self.smooth(map, sigma, scratch));
     }
 }
 
@@ -139,9 +121,7 @@ mod tests {
     #[test]
     fn a_slope_on_the_cells_is_a_slope_on_the_pixels() {
         let grid = Grid::new(20, 30, 4);
-        let map: Vec<f32> = (0..grid.cells())
-            .map(|i| (i % grid.columns) as f32 * 4.0 + 1.5)
-            .collect();
+        let map: Vec<f32> = (0..grid.cells()).map(|i| (i % grid.columns) as f32 * 4.0 + 1.5).collect();
         let mut row = vec![0.0; 30];
         grid.sample_row(&map, 7, &mut Vec::new(), &mut row);
         for (x, value) in row.iter().enumerate().take(28).skip(2) {
@@ -155,10 +135,6 @@ mod tests {
         let (mut one, mut three) = (vec![1.0; 100], vec![3.0; 100]);
         grid.smooth(&mut one, 2.0, &mut Vec::new());
         grid.smooth(&mut three, 2.0, &mut Vec::new());
-        assert!(
-            one.iter()
-                .zip(&three)
-                .all(|(a, b)| (b / a - 3.0).abs() < 1e-5)
-        );
+        assert!(one.iter().zip(&three).all(|(a, b)| (b / a - 3.0).abs() < 1e-5));
     }
 }

@@ -6,7 +6,7 @@
 //! No direction, no band and no slope is preferred, which a Fourier filter along rows must do. Sums are kept once per
 //! cell of an eighth of a fringe.
 
-use super::grid::Grid;
+use super::scene::{RowMaps, Scene, smooth_albedo};
 use super::window::Slopes;
 use crate::angle::atan2;
 use rayon::prelude::*;
@@ -15,12 +15,14 @@ use rayon::prelude::*;
 const WINDOW: f32 = 0.3;
 /// Width (sigma) of the first window, which has to average whole fringes away.
 const FIRST_WINDOW: f32 = 0.5;
-/// Rounds of phase, albedo and fit.
-const ROUNDS: usize = 1;
 /// Ridge of the normal equations relative to the weight in the window.
 const RIDGE: f32 = 1e-3;
 /// Sums of one cell: w, wc, ws, wcc, wcs, then w I, w I c, w I s of four channels.
 const SUMS: usize = 17;
+/// Least contrast (modulation over background) of light that comes from the projector.
+const CONTRAST_MIN: f32 = 0.1;
+/// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 when B repeats R.
+const SPREAD_MIN: f32 = 0.02;
 
 /// `a`, `p`, `q` of one channel on the cells.
 #[derive(Debug, Clone, Default)]
@@ -30,250 +32,190 @@ pub(crate) struct Harmonic {
     pub q: Vec<f32>,
 }
 
-/// What the local fit knows after the last round.
+impl Harmonic {
+    fn modulation(&self) -> Vec<f32> {
+        self.p.iter().zip(&self.q).map(|(p, q)| p.hypot(*q)).collect()
+    }
+}
+
+/// What the fit knows on the cells.
 #[derive(Debug, Clone)]
 pub(crate) struct LocalFit {
-    pub grid: Grid,
-    pub channels: [Harmonic; 4],
-    /// Least mean square of the phasor in any direction, on the cells: whether R and B are two views or one.
-    pub spread: Vec<f32>,
-    window_cells: f32,
+    channels: [Harmonic; 4],
+    /// Least mean square of the phasor in any direction: whether R and B are two views or one.
+    spread: Vec<f32>,
 }
 
-/// Four planes of linear light, row-major, with their width.
-#[derive(Clone, Copy)]
-pub(crate) struct Planes<'a> {
-    pub light: [&'a [f32]; 4],
-    /// Pixels that may take part in a fit: lit and not saturated.
-    pub usable: &'a [bool],
-    pub width: usize,
-}
-
-impl<'a> Planes<'a> {
-    pub fn height(&self) -> usize {
-        self.light[0].len() / self.width
-    }
-
-    pub fn rows(&self, y: usize) -> [&'a [f32]; 4] {
-        self.light
-            .map(|plane| &plane[y * self.width..][..self.width])
-    }
-}
-
-/// Pixel maps of the fit: unit phasor of R and B, and albedo.
+/// What the fit knows of every pixel: unit phasor of R and B, and albedo relative to the surroundings.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct PixelMaps {
     pub cos: Vec<f32>,
     pub sin: Vec<f32>,
-    /// Albedo relative to its surroundings, as fitted.
     pub albedo: Vec<f32>,
-    raw: Vec<f32>,
+    spare: Vec<f32>,
 }
 
 impl LocalFit {
-    /// Fit a shot whose fringes are about `period_px` apart, in any direction.
-    pub fn new(grid: Grid, planes: &Planes<'_>, period_px: f64, maps: &mut PixelMaps) -> Self {
-        let (height, width) = (planes.height(), planes.width);
-        let step = grid.step;
-        let mut fit = Self {
-            grid,
-            channels: Default::default(),
-            spread: Vec::new(),
-            window_cells: WINDOW * period_px as f32 / step as f32,
-        };
-        for map in [
-            &mut maps.cos,
-            &mut maps.sin,
-            &mut maps.albedo,
-            &mut maps.raw,
-        ] {
-            map.resize(height * width, 0.0);
+    /// Fit a scene with fringes in any direction.
+    pub fn new(scene: &Scene<'_>, maps: &mut PixelMaps) -> Self {
+        for map in [&mut maps.cos, &mut maps.sin, &mut maps.albedo, &mut maps.spare] {
+            map.resize(scene.pixels(), 0.0);
         }
         maps.albedo.fill(1.0);
-        fit.start(planes, FIRST_WINDOW * period_px as f32 / step as f32);
-        fit.update_phase(planes, maps);
-        for _ in 0..ROUNDS {
-            let sums = fit.sums(planes, maps);
-            fit.solve(&sums);
-            fit.update_albedo(planes, maps);
-            smooth_albedo(&mut maps.albedo, &mut maps.raw, width);
-            fit.update_phase(planes, maps);
-        }
+        let mut fit = Self::start(scene);
+        fit.update_phase(scene, maps);
+        fit.solve(scene, maps);
+        fit.update_albedo(scene, maps);
+        smooth_albedo(&mut maps.albedo, &mut maps.spare, scene.width);
+        fit.update_phase(scene, maps);
         fit
     }
 
-    /// Beat of G (`channel` 1) or IR (3) against R and B on the cells: real and imaginary part.
-    pub fn beat(&self, channel: usize) -> [&[f32]; 2] {
-        [&self.channels[channel].p, &self.channels[channel].q]
+    /// Beats of G and of IR against R and B on the cells: real and negative imaginary part of each.
+    pub fn beats(&self) -> [&Vec<f32>; 4] {
+        let [_, g, _, ir] = &self.channels;
+        [&g.p, &g.q, &ir.p, &ir.q]
     }
 
-    /// Slopes of the phase on the cells; `modulation` is 0 where there is no light.
-    pub fn slopes(&self, planes: &Planes<'_>, maps: &PixelMaps, modulation: &[f32]) -> Slopes {
-        let width = planes.width;
-        let mut sums = cell_sums_at::<4>(&self.grid, planes, |_, _, y, x| {
-            let at = y * width + x;
-            let step = |inside: bool, other: usize| {
-                if !inside || modulation[at] <= 0.0 || modulation[other] <= 0.0 {
-                    return [0.0, 0.0];
-                }
-                let (c, s, c2, s2) = (maps.cos[at], maps.sin[at], maps.cos[other], maps.sin[other]);
-                [c2 * c + s2 * s, s2 * c - c2 * s]
+    /// Modulation of R and B at every pixel in linear light; 0 where any channel has less than `least`, hardly any
+    /// contrast, or nothing of its own to say.
+    pub fn modulation(&self, scene: &Scene<'_>, maps: &PixelMaps, lit: &[bool], least: f32, out: &mut [f32]) {
+        let strengths: [Vec<f32>; 4] = self.channels.each_ref().map(|h| {
+            let fringes = |((strength, a), spread): ((f32, &f32), &f32)| {
+                let seen = strength > CONTRAST_MIN * a && *spread > SPREAD_MIN;
+                if seen { strength } else { 0.0 }
             };
-            let [a, b] = step(x + 1 < width, at + 1);
-            let [d, e] = step(at + width < modulation.len(), at + width);
-            [a, b, d, e]
+            h.modulation().into_iter().zip(&h.a).zip(&self.spread).map(fringes).collect()
         });
-        self.grid.smooth_all(&mut sums, 1.0);
-        let angle = |real: &[f32], imaginary: &[f32]| {
-            let pairs = real.iter().zip(imaginary);
-            pairs.map(|(&re, &im)| atan2(im, re)).collect()
-        };
-        Slopes {
-            along: angle(&sums[0], &sums[1]),
-            down: angle(&sums[2], &sums[3]),
-        }
+        let width = scene.width;
+        out.par_chunks_mut(width).enumerate().for_each_init(RowMaps::default, |row_maps, (y, out)| {
+            let [red, green, blue, infrared] = row_maps.sample(scene, y, strengths.each_ref());
+            for x in 0..width {
+                let albedo = maps.albedo[y * width + x];
+                let weakest = red[x].min(blue[x]).min(green[x]).min(infrared[x]);
+                let enough = lit[y * width + x] && albedo * weakest >= least;
+                out[x] = if enough { 0.5 * albedo * (red[x] + blue[x]) } else { 0.0 };
+            }
+        });
     }
 
-    /// Mean and amplitude in a window that holds whole fringes; only R and B are needed to start.
-    fn start(&mut self, planes: &Planes<'_>, sigma_cells: f32) {
-        let grid = &self.grid;
-        let mut maps = cell_sums::<9>(grid, planes, |rows, usable, x| {
-            let mut sums = [0.0; 9];
-            if usable[x] {
-                sums[0] = 1.0;
-                for c in 0..4 {
-                    sums[1 + 2 * c] = rows[c][x];
-                    sums[2 + 2 * c] = rows[c][x] * rows[c][x];
-                }
-            }
-            sums
+    /// Mean and amplitude in a window that holds whole fringes.
+    fn start(scene: &Scene<'_>) -> Self {
+        let sums = scene.window_sums::<9>(FIRST_WINDOW, |light, _| {
+            let [r, g, b, ir] = light;
+            [1.0, r, r * r, g, g * g, b, b * b, ir, ir * ir]
         });
-        grid.smooth_all(&mut maps, sigma_cells);
-        for (c, harmonic) in self.channels.iter_mut().enumerate() {
-            let cells = (0..grid.cells()).map(|i| {
-                let weight = maps[0][i].max(1e-6);
-                let mean = maps[1 + 2 * c][i] / weight;
-                let variance = (maps[2 + 2 * c][i] / weight - mean * mean).max(0.0);
+        let cells = scene.grid.cells();
+        let channels = std::array::from_fn(|c| {
+            let statistics = (0..cells).map(|i| {
+                let weight = sums[0][i].max(1e-6);
+                let mean = sums[1 + 2 * c][i] / weight;
+                let variance = (sums[2 + 2 * c][i] / weight - mean * mean).max(0.0);
                 (mean, (2.0 * variance).sqrt())
             });
-            (harmonic.a, harmonic.p) = cells.unzip();
-            harmonic.q = vec![0.0; grid.cells()];
-        }
+            let (a, p) = statistics.unzip();
+            Harmonic { a, p, q: vec![0.0; cells] }
+        });
+        Self { channels, spread: vec![0.0; cells] }
     }
 
     /// Two-step phase (S2) of every pixel from the present backgrounds, modulations and albedo.
-    fn update_phase(&self, planes: &Planes<'_>, maps: &mut PixelMaps) {
-        let modulation: [Vec<f32>; 2] = [0, 2].map(|c: usize| {
-            let harmonic = &self.channels[c];
-            harmonic
-                .p
-                .iter()
-                .zip(&harmonic.q)
-                .map(|(p, q)| p.hypot(*q))
-                .collect()
-        });
-        let width = planes.width;
+    fn update_phase(&self, scene: &Scene<'_>, maps: &mut PixelMaps) {
+        let [red, _, blue, _] = &self.channels;
+        let (b_red, b_blue) = (red.modulation(), blue.modulation());
+        let width = scene.width;
         maps.cos
             .par_chunks_mut(width)
             .zip(maps.sin.par_chunks_mut(width))
             .zip(maps.albedo.par_chunks(width))
             .enumerate()
             .for_each_init(RowMaps::default, |row_maps, (y, ((cos, sin), albedo))| {
-                let slow = [
-                    &self.channels[0].a,
-                    &modulation[0],
-                    &self.channels[2].a,
-                    &modulation[1],
-                ];
-                let [a_r, b_r, a_b, b_b] = row_maps.sample(&self.grid, y, slow, width);
-                let [red, _, blue, _] = planes.rows(y);
+                let [a_r, b_r, a_b, b_b] = row_maps.sample(scene, y, [&red.a, &b_red, &blue.a, &b_blue]);
+                let [red, _, blue, _] = scene.rows(y);
                 for x in 0..width {
                     // (R / rho - a) / b, times rho b_r b_b: only the direction counts.
                     let real = (red[x] - albedo[x] * a_r[x]) * b_b[x];
                     let imaginary = (albedo[x] * a_b[x] - blue[x]) * b_r[x];
-                    let length = real.hypot(imaginary).max(f32::MIN_POSITIVE);
+                    let length = (real * real + imaginary * imaginary).sqrt().max(f32::MIN_POSITIVE);
                     (cos[x], sin[x]) = (real / length, imaginary / length);
                 }
             });
     }
 
     /// Albedo of every pixel: the factor that brings the model of all four channels closest to what was seen.
-    fn update_albedo(&self, planes: &Planes<'_>, maps: &mut PixelMaps) {
-        let width = planes.width;
-        let PixelMaps {
-            cos,
-            sin,
-            albedo,
-            raw,
-        } = maps;
-        raw.par_chunks_mut(width).enumerate().for_each_init(
-            RowMaps::default,
-            |row_maps, (y, target)| {
-                let rows = planes.rows(y);
+    fn update_albedo(&self, scene: &Scene<'_>, maps: &mut PixelMaps) {
+        let width = scene.width;
+        let PixelMaps { cos, sin, albedo, .. } = maps;
+        albedo.par_chunks_mut(width).enumerate().for_each_init(
+            <(RowMaps, Vec<f32>)>::default,
+            |(row_maps, norm), (y, albedo)| {
                 let at = y * width..(y + 1) * width;
                 let (cos, sin) = (&cos[at.clone()], &sin[at]);
-                let mut norm = vec![1e-9f32; width];
-                target.fill(0.0);
-                for (harmonic, light) in self.channels.iter().zip(rows) {
-                    let slow = [&harmonic.a, &harmonic.p, &harmonic.q, &harmonic.q];
-                    let [a, p, q, _] = row_maps.sample(&self.grid, y, slow, width);
+                norm.clear();
+                norm.resize(width, 1e-9);
+                albedo.fill(0.0);
+                for (h, light) in self.channels.iter().zip(scene.rows(y)) {
+                    let [a, p, q] = row_maps.sample(scene, y, [&h.a, &h.p, &h.q]);
                     for x in 0..width {
                         let model = (a[x] + p[x] * cos[x] + q[x] * sin[x]).max(0.0);
-                        target[x] += model * light[x];
+                        albedo[x] += model * light[x];
                         norm[x] += model * model;
                     }
                 }
-                target
-                    .iter_mut()
-                    .zip(norm)
-                    .for_each(|(t, n)| *t = (*t / n).max(1e-4));
+                albedo.iter_mut().zip(norm).for_each(|(t, n)| *t = (*t / *n).max(1e-4));
             },
         );
-        std::mem::swap(albedo, raw);
-    }
-
-    /// The seventeen sums of every cell, smoothed over the window; intensities are divided by the albedo and
-    /// weighted by its square, as additive noise asks for.
-    fn sums(&self, planes: &Planes<'_>, maps: &PixelMaps) -> Vec<Vec<f32>> {
-        let width = planes.width;
-        let mut sums = cell_sums_at::<SUMS>(&self.grid, planes, |rows, usable, y, x| {
-            let mut sums = [0.0; SUMS];
-            if usable[x] {
-                let at = y * width + x;
-                let (c, s, rho) = (maps.cos[at], maps.sin[at], maps.albedo[at]);
-                let w = rho * rho;
-                sums[..5].copy_from_slice(&[w, w * c, w * s, w * c * c, w * c * s]);
-                for (k, row) in rows.iter().enumerate() {
-                    let light = rho * row[x];
-                    sums[5 + 3 * k..8 + 3 * k].copy_from_slice(&[light, light * c, light * s]);
-                }
-            }
-            sums
-        });
-        self.grid.smooth_all(&mut sums, self.window_cells);
-        sums
     }
 
     /// Normal equations of every cell for `a`, `p`, `q` of the four channels.
-    fn solve(&mut self, sums: &[Vec<f32>]) {
-        let cells = self.grid.cells();
-        for harmonic in &mut self.channels {
-            for map in [&mut harmonic.a, &mut harmonic.p, &mut harmonic.q] {
-                map.resize(cells, 0.0);
-            }
-        }
-        self.spread.resize(cells, 0.0);
-        for i in 0..cells {
+    fn solve(&mut self, scene: &Scene<'_>, maps: &PixelMaps) {
+        let sums = scene.window_sums::<SUMS>(WINDOW, |light, at| {
+            let (c, s) = (maps.cos[at], maps.sin[at]);
+            let [r, g, b, ir] = light;
+            [1.0, c, s, c * c, c * s, r, r * c, r * s, g, g * c, g * s, b, b * c, b * s, ir, ir * c, ir * s]
+        });
+        for i in 0..scene.grid.cells() {
             let [w, wc, ws, wcc, wcs] = [0, 1, 2, 3, 4].map(|k| sums[k][i]);
-            let middle = 0.5 * w;
-            self.spread[i] = (middle - (wcc - middle).hypot(wcs)) / w.max(1e-9);
+            let half = 0.5 * w;
+            self.spread[i] = (half - (wcc - half).hypot(wcs)) / w.max(1e-9);
             let ridge = RIDGE * w + 1e-12;
             let normal = Symmetric3::new(w + ridge, wc, ws, wcc + ridge, wcs, w - wcc + ridge);
-            for (k, harmonic) in self.channels.iter_mut().enumerate() {
+            for (k, h) in self.channels.iter_mut().enumerate() {
                 let right = [5 + 3 * k, 6 + 3 * k, 7 + 3 * k].map(|m| sums[m][i]);
-                [harmonic.a[i], harmonic.p[i], harmonic.q[i]] = normal.solve(right);
+                [h.a[i], h.p[i], h.q[i]] = normal.solve(right);
             }
         }
+    }
+}
+
+impl PixelMaps {
+    /// Wrapped phase of R and B in rad.
+    pub fn phase(&self, out: &mut [f32]) {
+        let phasors = self.cos.par_iter().zip(&self.sin);
+        out.par_iter_mut().zip(phasors).for_each(|(phase, (&c, &s))| *phase = atan2(s, c));
+    }
+
+    /// Slopes of the phase on the cells; `modulation` is 0 where there is no light.
+    pub fn slopes(&self, scene: &Scene<'_>, modulation: &[f32]) -> Slopes {
+        let width = scene.width;
+        let mut sums = scene.sums::<4>(|_, at| {
+            let step = |inside: bool, other: usize| {
+                if !inside || modulation[at] <= 0.0 || modulation[other] <= 0.0 {
+                    return [0.0, 0.0];
+                }
+                let (c, s, c2, s2) = (self.cos[at], self.sin[at], self.cos[other], self.sin[other]);
+                [c2 * c + s2 * s, s2 * c - c2 * s]
+            };
+            let [a, b] = step(at % width + 1 < width, at + 1);
+            let [d, e] = step(at + width < modulation.len(), at + width);
+            [a, b, d, e]
+        });
+        scene.grid.smooth_all(&mut sums, 1.0);
+        let angle = |real: &[f32], imaginary: &[f32]| {
+            let pairs = real.iter().zip(imaginary);
+            pairs.map(|(&re, &im)| atan2(im, re)).collect()
+        };
+        Slopes { along: angle(&sums[0], &sums[1]), down: angle(&sums[2], &sums[3]) }
     }
 }
 
@@ -290,89 +232,6 @@ impl Symmetric3 {
 
     fn solve(&self, [u, v, w]: [f32; 3]) -> [f32; 3] {
         let [xx, xy, xz, yy, yz, zz] = self.0;
-        [
-            xx * u + xy * v + xz * w,
-            xy * u + yy * v + yz * w,
-            xz * u + yz * v + zz * w,
-        ]
+        [xx * u + xy * v + xz * w, xy * u + yy * v + yz * w, xz * u + yz * v + zz * w]
     }
-}
-
-/// Slow maps interpolated along one row.
-#[derive(Debug, Default)]
-pub(crate) struct RowMaps {
-    mix: Vec<f32>,
-    rows: [Vec<f32>; 4],
-}
-
-impl RowMaps {
-    /// Four maps at row `y`.
-    pub fn sample<M: AsRef<[f32]>>(
-        &mut self,
-        grid: &Grid,
-        y: usize,
-        maps: [M; 4],
-        width: usize,
-    ) -> [&[f32]; 4] {
-        for (row, map) in self.rows.iter_mut().zip(maps) {
-            row.resize(width, 0.0);
-            grid.sample_row(map.as_ref(), y, &mut self.mix, row);
-        }
-        self.rows.each_ref().map(Vec::as_slice)
-    }
-}
-
-/// [1 2 1] / 4 in both directions: the albedo is not sharper than the lens.
-pub(crate) fn smooth_albedo(albedo: &mut Vec<f32>, raw: &mut Vec<f32>, width: usize) {
-    let height = albedo.len() / width;
-    raw.par_chunks_mut(width).enumerate().for_each(|(y, out)| {
-        let line = |row: usize| &albedo[row * width..][..width];
-        let (above, here, below) = (
-            line(y.saturating_sub(1)),
-            line(y),
-            line((y + 1).min(height - 1)),
-        );
-        let column = |x: usize| above[x] + 2.0 * here[x] + below[x];
-        for (x, value) in out.iter_mut().enumerate() {
-            let (left, right) = (x.saturating_sub(1), (x + 1).min(width - 1));
-            *value = (column(left) + 2.0 * column(x) + column(right)) / 16.0;
-        }
-    });
-    std::mem::swap(albedo, raw);
-}
-
-fn cell_sums<const N: usize>(
-    grid: &Grid,
-    planes: &Planes<'_>,
-    terms: impl Fn(&[&[f32]; 4], &[bool], usize) -> [f32; N] + Sync,
-) -> Vec<Vec<f32>> {
-    cell_sums_at(grid, planes, |rows, usable, _, x| terms(rows, usable, x))
-}
-
-/// Sums over the pixels of every cell of `N` terms given per pixel (rows, usable, y, x).
-pub(crate) fn cell_sums_at<const N: usize>(
-    grid: &Grid,
-    planes: &Planes<'_>,
-    terms: impl Fn(&[&[f32]; 4], &[bool], usize, usize) -> [f32; N] + Sync,
-) -> Vec<Vec<f32>> {
-    let (step, width, height) = (grid.step, planes.width, planes.height());
-    let rows: Vec<Vec<[f32; N]>> = (0..grid.rows)
-        .into_par_iter()
-        .map(|cell_row| {
-            let mut sums = vec![[0.0f32; N]; grid.columns];
-            for y in cell_row * step..((cell_row + 1) * step).min(height) {
-                let lines = planes.rows(y);
-                let usable = &planes.usable[y * width..][..width];
-                for x in 0..width {
-                    let add = terms(&lines, usable, y, x);
-                    let cell = &mut sums[x / step];
-                    cell.iter_mut().zip(add).for_each(|(c, a)| *c += a);
-                }
-            }
-            sums
-        })
-        .collect();
-    (0..N)
-        .map(|k| rows.iter().flatten().map(|cell| cell[k]).collect())
-        .collect()
 }

@@ -61,17 +61,9 @@ pub fn n_step(stack: ArrayView3<'_, f32>) -> Result<NStep> {
         .and(modulation.rows_mut())
         .into_par_iter()
         .for_each(|(y, phase, mean, amplitude)| {
-            demodulate_row(
-                stack.index_axis(Axis(1), y),
-                &waves,
-                [phase, mean, amplitude],
-            );
+            demodulate_row(stack.index_axis(Axis(1), y), &waves, [phase, mean, amplitude]);
         });
-    Ok(NStep {
-        phase_rad,
-        background,
-        modulation,
-    })
+    Ok(NStep { phase_rad, background, modulation })
 }
 
 fn check(stack: &ArrayView3<'_, f32>) -> Result<()> {
@@ -110,11 +102,7 @@ fn demodulate_row(
     for (x, [re, im, change]) in sums.into_iter().enumerate() {
         mean[x] = (f64::from(first[x]) + change / waves.len() as f64) as f32;
         amplitude[x] = (re * re + im * im).sqrt() as f32;
-        phase[x] = if amplitude[x] == 0.0 {
-            f32::NAN
-        } else {
-            half_open(atan2(im as f32, re as f32))
-        };
+        phase[x] = if amplitude[x] == 0.0 { f32::NAN } else { half_open(atan2(im as f32, re as f32)) };
     }
 }
 
@@ -199,9 +187,6 @@ mod tests {
         let mut broken = stack(4);
         broken[[2, 1, 5]] = f32::NAN;
         let text = message(broken);
-        assert!(
-            text.contains("step 2") && text.contains("row 1, column 5"),
-            "{text}"
-        );
+        assert!(text.contains("step 2") && text.contains("row 1, column 5"), "{text}");
     }
 }

@@ -22,9 +22,6 @@ pub fn two_step(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Result<A
         return Err(Error::shape("blue fringes", red.shape(), blue.shape()));
     }
     let mut phase = Array2::zeros(red.raw_dim());
-    Zip::from(&mut phase)
-        .and(red)
-        .and(blue)
-        .par_for_each(|p, &r, &b| *p = atan2(-b, r));
+    Zip::from(&mut phase).and(red).and(blue).par_for_each(|p, &r, &b| *p = atan2(-b, r));
     Ok(phase)
 }

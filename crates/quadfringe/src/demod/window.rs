@@ -3,8 +3,7 @@
 //! Neighbours count as far as their phase fits the plane through the pixel within the noise (a plane-compensated
 //! bilateral window, Tukey's biweight); phases are compared modulo a turn, so they may be wrapped or absolute.
 
-use super::grid::Grid;
-use super::local_fit::RowMaps;
+use super::scene::{RowMaps, Scene};
 use crate::angle::{round, wrap};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -27,10 +26,9 @@ pub(crate) struct Slopes {
 
 /// The window and the pixels it may use: `modulation` is 0 where there is no light to measure by.
 pub(crate) struct Window<'a> {
-    grid: &'a Grid,
+    scene: &'a Scene<'a>,
     slopes: &'a Slopes,
     modulation: &'a [f32],
-    width: usize,
     radius: isize,
     sigma: f32,
     noise: f32,
@@ -59,37 +57,16 @@ struct Neighbour {
 }
 
 impl<'a> Window<'a> {
-    /// A window for fringes `period_px` apart and intensities with `noise` (standard deviation in linear light).
-    pub fn new(
-        grid: &'a Grid,
-        slopes: &'a Slopes,
-        modulation: &'a [f32],
-        width: usize,
-        period_px: f64,
-        noise: f32,
-    ) -> Self {
-        let sigma = (WIDTH * period_px as f32).clamp(0.8, 4.0);
-        Self {
-            grid,
-            slopes,
-            modulation,
-            width,
-            radius: (2.0 * sigma).ceil() as isize,
-            sigma,
-            noise,
-        }
+    /// A window over lit pixels of a scene whose intensities have `noise` (standard deviation in linear light).
+    pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
+        let sigma = (WIDTH * scene.period_px as f32).clamp(0.8, 4.0);
+        Self { scene, slopes, modulation, radius: (2.0 * sigma).ceil() as isize, sigma, noise }
     }
 
     /// The phase, smoothed.
     pub fn smooth(&self, phase: &[f32], out: &mut [f32]) {
         self.run(phase, out, |rows, at| {
-            let Rows {
-                weight,
-                offset,
-                top,
-                bottom,
-                ..
-            } = rows;
+            let Rows { weight, offset, top, bottom, .. } = rows;
             for x in at.from..at.to {
                 top[x] += weight[x] * offset[x];
                 bottom[x] += weight[x];
@@ -100,18 +77,10 @@ impl<'a> Window<'a> {
     /// The phase plus the ratio of two maps, each summed over the window: a Gauss-Newton step that neighbours share.
     pub fn step(&self, phase: &[f32], numerator: &[f32], denominator: &[f32], out: &mut [f32]) {
         self.run(phase, out, |rows, at| {
-            let Rows {
-                weight,
-                offset,
-                top,
-                bottom,
-                ..
-            } = rows;
+            let Rows { weight, offset, top, bottom, .. } = rows;
             let (numerator, denominator) = (&numerator[at.start..], &denominator[at.start..]);
             let n = at.to - at.from;
-            let sums = top[at.from..at.to]
-                .iter_mut()
-                .zip(&mut bottom[at.from..at.to]);
+            let sums = top[at.from..at.to].iter_mut().zip(&mut bottom[at.from..at.to]);
             let terms = numerator[..n].iter().zip(&denominator[..n]);
             let seen = weight[at.from..at.to].iter().zip(&offset[at.from..at.to]);
             for (((top, bottom), (w, d)), (num, den)) in sums.zip(seen).zip(terms) {
@@ -122,61 +91,38 @@ impl<'a> Window<'a> {
     }
 
     fn run(&self, phase: &[f32], out: &mut [f32], gather: impl Fn(&mut Rows, &Neighbour) + Sync) {
-        let width = self.width;
+        let width = self.scene.width;
         let height = phase.len() / width;
-        out.par_chunks_mut(width)
-            .enumerate()
-            .for_each_init(Rows::default, |rows, (y, out)| {
-                self.start(y, rows);
-                let here = &phase[y * width..][..width];
-                for dy in -self.radius..=self.radius {
-                    let Some(row) = y.checked_add_signed(dy).filter(|&r| r < height) else {
-                        continue;
-                    };
-                    for dx in -self.radius..=self.radius {
-                        let from = dx.min(0).unsigned_abs().min(width);
-                        let to = (width as isize - dx.max(0)).max(from as isize) as usize;
-                        let start = (row * width + from).wrapping_add_signed(dx);
-                        let at = Neighbour {
-                            dx: dx as f32,
-                            dy: dy as f32,
-                            from,
-                            to,
-                            start,
-                        };
-                        self.weigh(here, phase, &at, rows);
-                        gather(rows, &at);
-                    }
+        out.par_chunks_mut(width).enumerate().for_each_init(Rows::default, |rows, (y, out)| {
+            self.start(y, rows);
+            let here = &phase[y * width..][..width];
+            for dy in -self.radius..=self.radius {
+                let Some(row) = y.checked_add_signed(dy).filter(|&r| r < height) else {
+                    continue;
+                };
+                for dx in -self.radius..=self.radius {
+                    let from = dx.min(0).unsigned_abs().min(width);
+                    let to = (width as isize - dx.max(0)).max(from as isize) as usize;
+                    let start = (row * width + from).wrapping_add_signed(dx);
+                    let at = Neighbour { dx: dx as f32, dy: dy as f32, from, to, start };
+                    self.weigh(here, phase, &at, rows);
+                    gather(rows, &at);
                 }
-                for (x, value) in out.iter_mut().enumerate() {
-                    *value = here[x] + rows.top[x] / rows.bottom[x].max(f32::MIN_POSITIVE);
-                }
-            });
+            }
+            for (x, value) in out.iter_mut().enumerate() {
+                *value = here[x] + rows.top[x] / rows.bottom[x].max(f32::MIN_POSITIVE);
+            }
+        });
     }
 
     fn start(&self, y: usize, rows: &mut Rows) {
-        let width = self.width;
-        let Rows {
-            maps,
-            along,
-            down,
-            sharpness,
-            weight,
-            offset,
-            top,
-            bottom,
-        } = rows;
+        let width = self.scene.width;
+        let Rows { maps, along, down, sharpness, weight, offset, top, bottom } = rows;
         for row in [&mut *along, down, sharpness, weight, offset, top, bottom] {
             row.clear();
             row.resize(width, 0.0);
         }
-        let slow = [
-            &self.slopes.along,
-            &self.slopes.down,
-            &self.slopes.down,
-            &self.slopes.down,
-        ];
-        let [a, d, ..] = maps.sample(self.grid, y, slow, width);
+        let [a, d] = maps.sample(self.scene, y, [&self.slopes.along, &self.slopes.down]);
         along.copy_from_slice(a);
         down.copy_from_slice(d);
         for (sharp, &m) in sharpness.iter_mut().zip(&self.modulation[y * width..]) {
@@ -201,11 +147,7 @@ impl<'a> Window<'a> {
             let turns = (there[x] - here[x] - along[x] * at.dx - down[x] * at.dy) * (1.0 / TAU);
             let d = (turns - round(turns)) * TAU;
             let fits = (1.0 - d * d * sharpness[x]).max(0.0);
-            weight[x] = if lit[x] > 0.0 {
-                spatial * fits * fits
-            } else {
-                0.0
-            };
+            weight[x] = if lit[x] > 0.0 { spatial * fits * fits } else { 0.0 };
             offset[x] = d;
         }
     }

@@ -60,30 +60,14 @@ pub(crate) fn row_shift(layout: DmdLayout, row: usize) -> f64 {
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
 #[must_use]
-pub fn pattern(
-    code: &FringeCode,
-    channel: Channel,
-    height: usize,
-    layout: DmdLayout,
-) -> Array2<f32> {
+pub fn pattern(code: &FringeCode, channel: Channel, height: usize, layout: DmdLayout) -> Array2<f32> {
     let level = |row: usize, column: usize| {
-        let phase = phase_at(
-            code,
-            channel.phase_index(),
-            mirror_column(layout, row, column),
-        );
+        let phase = phase_at(code, channel.phase_index(), mirror_column(layout, row, column));
         (0.5 + 0.5 * (phase + channel.shift_rad()).cos()) as f32
     };
-    let kinds: Vec<Vec<f32>> = (0..2)
-        .map(|row| {
-            (0..code.projector_width)
-                .map(|column| level(row, column))
-                .collect()
-        })
-        .collect();
-    Array2::from_shape_fn((height, code.projector_width), |(row, column)| {
-        kinds[row % 2][column]
-    })
+    let kinds: Vec<Vec<f32>> =
+        (0..2).map(|row| (0..code.projector_width).map(|column| level(row, column)).collect()).collect();
+    Array2::from_shape_fn((height, code.projector_width), |(row, column)| kinds[row % 2][column])
 }
 
 #[cfg(test)]

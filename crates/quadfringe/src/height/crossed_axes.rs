@@ -49,24 +49,14 @@ impl CrossedAxes {
     /// # Errors
     /// [`Error::Value`] when a length is not finite and positive.
     pub fn new(distance_mm: f64, baseline_mm: f64, period_mm: f64) -> Result<Self> {
-        let lengths = [
-            ("distance_mm", distance_mm),
-            ("baseline_mm", baseline_mm),
-            ("period_mm", period_mm),
-        ];
+        let lengths = [("distance_mm", distance_mm), ("baseline_mm", baseline_mm), ("period_mm", period_mm)];
         for (name, length) in lengths {
             if !(length.is_finite() && length > 0.0) {
                 return Err(Error::value(name, "a positive length in mm", length));
             }
         }
         let (sin, cos) = baseline_mm.atan2(distance_mm).sin_cos();
-        Ok(Self {
-            distance_mm,
-            baseline_mm,
-            period_mm,
-            cos,
-            sin,
-        })
+        Ok(Self { distance_mm, baseline_mm, period_mm, cos, sin })
     }
 
     /// Angle between the two axes in rad: `atan(d / L0)`.

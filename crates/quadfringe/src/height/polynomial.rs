@@ -45,35 +45,25 @@ impl PolynomialHeight {
         check_planes(reference_rad, planes, degree)?;
         let (rows, columns) = reference_rad.dim();
         let mut coefficients = Array3::from_elem((rows, columns, degree + 1), f64::NAN);
-        coefficients
-            .axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(row, mut line)| {
-                for column in 0..columns {
-                    let origin = f64::from(reference_rad[[row, column]]);
-                    let samples: Vec<_> = planes
-                        .iter()
-                        .map(|(height, map)| (f64::from(map[[row, column]]) - origin, *height))
-                        .filter(|(difference, _)| difference.is_finite())
-                        .collect();
-                    if let Some(fitted) = fit_pixel(&samples, degree) {
-                        line.row_mut(column)
-                            .iter_mut()
-                            .zip(fitted)
-                            .for_each(|(c, f)| *c = f);
-                    }
+        coefficients.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+            for column in 0..columns {
+                let origin = f64::from(reference_rad[[row, column]]);
+                let samples: Vec<_> = planes
+                    .iter()
+                    .map(|(height, map)| (f64::from(map[[row, column]]) - origin, *height))
+                    .filter(|(difference, _)| difference.is_finite())
+                    .collect();
+                if let Some(fitted) = fit_pixel(&samples, degree) {
+                    line.row_mut(column).iter_mut().zip(fitted).for_each(|(c, f)| *c = f);
                 }
-            });
+            }
+        });
         if coefficients.iter().all(|c| c.is_nan()) {
             let expected = "phases that differ from plane to plane on at least one pixel";
             let actual = "no pixel with a solution";
             return Err(Error::value("calibration planes", expected, actual));
         }
-        Ok(Self {
-            reference_rad: reference_rad.to_owned(),
-            coefficients,
-        })
+        Ok(Self { reference_rad: reference_rad.to_owned(), coefficients })
     }
 
     /// The coefficients `a_n`, `(rows, columns, degree + 1)` in mm / rad^n, NaN where a pixel has none.
@@ -88,26 +78,18 @@ impl PolynomialHeight {
     /// [`Error::Shape`] when the map has another size than the calibration.
     pub fn height_from_phase(&self, phase_rad: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
         if phase_rad.dim() != self.reference_rad.dim() {
-            return Err(Error::shape(
-                "phase map",
-                self.reference_rad.shape(),
-                phase_rad.shape(),
-            ));
+            return Err(Error::shape("phase map", self.reference_rad.shape(), phase_rad.shape()));
         }
         let mut height = Array2::zeros(phase_rad.dim());
-        height
-            .axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(row, mut line)| {
-                for (column, out) in line.iter_mut().enumerate() {
-                    let at = [row, column];
-                    let difference = f64::from(phase_rad[at]) - f64::from(self.reference_rad[at]);
-                    let terms = self.coefficients.index_axis(Axis(0), row);
-                    let terms = terms.index_axis(Axis(0), column);
-                    *out = terms.iter().rev().fold(0.0, |sum, a| sum * difference + a) as f32;
-                }
-            });
+        height.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+            for (column, out) in line.iter_mut().enumerate() {
+                let at = [row, column];
+                let difference = f64::from(phase_rad[at]) - f64::from(self.reference_rad[at]);
+                let terms = self.coefficients.index_axis(Axis(0), row);
+                let terms = terms.index_axis(Axis(0), column);
+                *out = terms.iter().rev().fold(0.0, |sum, a| sum * difference + a) as f32;
+            }
+        });
         Ok(height)
     }
 }
@@ -123,11 +105,7 @@ fn check_planes(
     }
     for (index, (height, map)) in planes.iter().enumerate() {
         if !height.is_finite() {
-            return Err(Error::value(
-                "height of a plane (mm)",
-                "a finite number",
-                height,
-            ));
+            return Err(Error::value("height of a plane (mm)", "a finite number", height));
         }
         if map.dim() != reference_rad.dim() {
             let what = format!("phase map of plane {index}");
@@ -138,10 +116,7 @@ fn check_planes(
     heights.sort_by(f64::total_cmp);
     heights.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     if heights.len() <= degree {
-        let expected = format!(
-            "at least {} different heights for degree {degree}",
-            degree + 1
-        );
+        let expected = format!("at least {} different heights for degree {degree}", degree + 1);
         return Err(Error::value("calibration planes", expected, heights.len()));
     }
     Ok(())
@@ -150,28 +125,17 @@ fn check_planes(
 /// Least squares by modified Gram-Schmidt on the phase scaled to [-1, 1]; `None` when the phases do not determine it.
 fn fit_pixel(samples: &[(f64, f64)], degree: usize) -> Option<[f64; DEGREE_MAX + 1]> {
     let terms = degree + 1;
-    let scale = samples
-        .iter()
-        .fold(0f64, |s, (difference, _)| s.max(difference.abs()));
+    let scale = samples.iter().fold(0f64, |s, (difference, _)| s.max(difference.abs()));
     if samples.len() < terms || scale < 1e-9 {
         return None;
     }
-    let mut basis: Vec<Vec<f64>> = (0..terms)
-        .map(|n| {
-            samples
-                .iter()
-                .map(|(d, _)| (d / scale).powi(n as i32))
-                .collect()
-        })
-        .collect();
+    let mut basis: Vec<Vec<f64>> =
+        (0..terms).map(|n| samples.iter().map(|(d, _)| (d / scale).powi(n as i32)).collect()).collect();
     let mut rest: Vec<f64> = samples.iter().map(|(_, height)| *height).collect();
     let mut upper = [[0.0; DEGREE_MAX + 1]; DEGREE_MAX + 1];
     let mut weights = [0.0; DEGREE_MAX + 1];
     for i in 0..terms {
-        let before = samples
-            .iter()
-            .map(|(d, _)| (d / scale).powi(2 * i as i32))
-            .sum::<f64>();
+        let before = samples.iter().map(|(d, _)| (d / scale).powi(2 * i as i32)).sum::<f64>();
         let length = inner(&basis[i], &basis[i]).sqrt();
         if length < 1e-7 * before.sqrt() {
             return None;
@@ -190,10 +154,7 @@ fn fit_pixel(samples: &[(f64, f64)], degree: usize) -> Option<[f64; DEGREE_MAX +
 /// Takes from `vector` its part along the unit vector `unit`, and returns the length of that part.
 fn remove_component(unit: &[f64], vector: &mut [f64]) -> f64 {
     let part = inner(unit, vector);
-    vector
-        .iter_mut()
-        .zip(unit)
-        .for_each(|(v, u)| *v -= part * u);
+    vector.iter_mut().zip(unit).for_each(|(v, u)| *v -= part * u);
     part
 }
 
@@ -225,10 +186,7 @@ mod tests {
 
     fn planes(heights: &[f64]) -> Vec<(f64, Array2<f32>)> {
         let phase = |h: f64| (0.3 * h + 1e-3 * h * h) as f32;
-        heights
-            .iter()
-            .map(|h| (*h, Array2::from_elem((3, 4), phase(*h))))
-            .collect()
+        heights.iter().map(|h| (*h, Array2::from_elem((3, 4), phase(*h)))).collect()
     }
 
     fn fitted(planes: &[(f64, Array2<f32>)], degree: usize) -> Result<PolynomialHeight> {
@@ -252,9 +210,7 @@ mod tests {
         assert!(fitted(&planes(&[0.0, 0.0, 10.0]), 2).is_err());
         assert!(fitted(&planes(&[0.0, 5.0, 10.0]), 0).is_err());
         assert!(fitted(&planes(&[0.0, f64::NAN]), 1).is_err());
-        let flat: Vec<_> = (0..3)
-            .map(|i| (f64::from(i), Array2::zeros((3, 4))))
-            .collect();
+        let flat: Vec<_> = (0..3).map(|i| (f64::from(i), Array2::zeros((3, 4)))).collect();
         assert!(fitted(&flat, 1).is_err());
         let wrong = vec![(0.0, Array2::zeros((3, 4))), (1.0, Array2::zeros((4, 4)))];
         assert!(matches!(fitted(&wrong, 1), Err(Error::Shape { .. })));
@@ -265,14 +221,8 @@ mod tests {
         let mut planes = planes(&[0.0, 10.0, 20.0]);
         planes[1].1[[1, 1]] = f32::NAN;
         let height = fitted(&planes, 2).expect("other pixels have data");
-        let map = height
-            .height_from_phase(planes[2].1.view())
-            .expect("same size");
+        let map = height.height_from_phase(planes[2].1.view()).expect("same size");
         assert!(map[[1, 1]].is_nan() && map[[0, 0]].is_finite());
-        assert!(
-            height
-                .height_from_phase(Array2::zeros((2, 2)).view())
-                .is_err()
-        );
+        assert!(height.height_from_phase(Array2::zeros((2, 2)).view()).is_err());
     }
 }

@@ -53,25 +53,18 @@ impl Triangulator {
     /// when the projector does not stand beside the camera across its columns, so that columns carry no depth.
     pub fn new(camera: &Device, projector: &Device) -> Result<Self> {
         let offset = (0..3).fold(0f64, |worst, i| {
-            let turn = (0..3).fold(0f64, |w, j| {
-                w.max((camera.rotation[i][j] - f64::from(u8::from(i == j))).abs())
-            });
+            let turn =
+                (0..3).fold(0f64, |w, j| w.max((camera.rotation[i][j] - f64::from(u8::from(i == j))).abs()));
             worst.max(turn).max(camera.translation_mm[i].abs())
         });
         if offset > 1e-9 {
             let expected = "the identity; express the projector's pose in the camera frame";
-            let actual = format!(
-                "rotation {:?}, translation {:?} mm",
-                camera.rotation, camera.translation_mm
-            );
+            let actual =
+                format!("rotation {:?}, translation {:?} mm", camera.rotation, camera.translation_mm);
             return Err(Error::value("pose of the camera", expected, actual));
         }
         let directions = camera.is_distorted().then(|| directions_of(camera));
-        Ok(Self {
-            camera: camera.clone(),
-            directions,
-            projector: ColumnSheets::new(projector)?,
-        })
+        Ok(Self { camera: camera.clone(), directions, projector: ColumnSheets::new(projector)? })
     }
 
     /// Size of the column maps (rows, columns): that of the camera.
@@ -89,11 +82,7 @@ impl Triangulator {
         let (height, width) = self.shape();
         assert!(row < height, "row {row} of an image of {height} rows");
         assert_eq!(columns_px.len(), width, "columns_px must hold one row");
-        assert_eq!(
-            out.len(),
-            3 * width,
-            "out must hold three values for each column"
-        );
+        assert_eq!(out.len(), 3 * width, "out must hold three values for each column");
         let chunks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
         for (index, (columns, xyz)) in chunks.enumerate() {
             let mut x = [0.0; CHUNK];
@@ -111,27 +100,17 @@ impl Triangulator {
     pub fn xyz_mm(&self, columns_px: ArrayView2<'_, f32>) -> Result<Array3<f32>> {
         let (height, width) = self.shape();
         if columns_px.dim() != (height, width) {
-            return Err(Error::shape(
-                "column map",
-                &[height, width],
-                columns_px.shape(),
-            ));
+            return Err(Error::shape("column map", &[height, width], columns_px.shape()));
         }
         let columns_px = columns_px.as_standard_layout();
         let mut xyz = Array3::zeros((height, width, 3));
-        xyz.axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .zip(columns_px.axis_iter(Axis(0)))
-            .enumerate()
-            .for_each(|(row, (mut out, columns))| {
-                let out = out
-                    .as_slice_mut()
-                    .expect("rows of a new array are contiguous");
-                let columns = columns
-                    .to_slice()
-                    .expect("rows in standard layout are contiguous");
+        xyz.axis_iter_mut(Axis(0)).into_par_iter().zip(columns_px.axis_iter(Axis(0))).enumerate().for_each(
+            |(row, (mut out, columns))| {
+                let out = out.as_slice_mut().expect("rows of a new array are contiguous");
+                let columns = columns.to_slice().expect("rows in standard layout are contiguous");
                 self.xyz_row(row, columns, out);
-            });
+            },
+        );
         Ok(xyz)
     }
 
@@ -160,17 +139,11 @@ impl Triangulator {
 
 fn directions_of(camera: &Device) -> Array2<[f32; 2]> {
     let mut table = Array2::from_elem((camera.height, camera.width), [f32::NAN; 2]);
-    table
-        .axis_iter_mut(Axis(0))
-        .into_par_iter()
-        .enumerate()
-        .for_each(|(row, mut line)| {
-            for (column, entry) in line.iter_mut().enumerate() {
-                *entry = camera
-                    .undistort([column as f64, row as f64])
-                    .map(|v| v as f32);
-            }
-        });
+    table.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+        for (column, entry) in line.iter_mut().enumerate() {
+            *entry = camera.undistort([column as f64, row as f64]).map(|v| v as f32);
+        }
+    });
     table
 }
 
@@ -188,8 +161,7 @@ struct ColumnSheets {
 impl ColumnSheets {
     fn new(projector: &Device) -> Result<Self> {
         let a = projector.translation_mm;
-        let middle =
-            (0.5 * (projector.width as f64 - 1.0) - projector.centre_px[0]) / projector.focal_px[0];
+        let middle = (0.5 * (projector.width as f64 - 1.0) - projector.centre_px[0]) / projector.focal_px[0];
         let across = (a[0] - middle * a[2]).abs() / middle.hypot(1.0);
         let length = (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt();
         if across <= 1e-3 * length || length <= 1e-6 {
@@ -224,16 +196,9 @@ impl ColumnSheets {
             let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
             let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
             let t = (k[i] * a2 - a0) / (b0 - k[i] * b2);
-            depth[i] = if t > 0.0 && t < f64::INFINITY {
-                t
-            } else {
-                f64::NAN
-            };
+            depth[i] = if t > 0.0 && t < f64::INFINITY { t } else { f64::NAN };
         }
-        for (point, (t, (x, y))) in xyz
-            .chunks_exact_mut(3)
-            .zip(depth.iter().zip(x.iter().zip(y)))
-        {
+        for (point, (t, (x, y))) in xyz.chunks_exact_mut(3).zip(depth.iter().zip(x.iter().zip(y))) {
             point[0] = (t * x) as f32;
             point[1] = (t * y) as f32;
             point[2] = *t as f32;
@@ -257,8 +222,7 @@ impl ColumnSheets {
             let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
             let growth = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
             let value = k * radial + 2.0 * p1 * k * m + p2 * (r2 + 2.0 * k * k);
-            let slope =
-                radial + k * growth * along + 2.0 * p1 * (m + k * s) + p2 * (2.0 * along + 4.0 * k);
+            let slope = radial + k * growth * along + 2.0 * p1 * (m + k * s) + p2 * (2.0 * along + 4.0 * k);
             k -= (value - measured) / slope;
         }
         k

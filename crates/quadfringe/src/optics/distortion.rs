@@ -98,10 +98,6 @@ fn newton_step(k: &[f64; 5], [x, y]: [f64; 2], miss: [f64; 2]) -> Option<[f64; 2
     let xy = slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y;
     let yy = radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x;
     let determinant = xx * yy - xy * xy;
-    (determinant.abs() > 1e-12).then(|| {
-        [
-            (yy * miss[0] - xy * miss[1]) / determinant,
-            (xx * miss[1] - xy * miss[0]) / determinant,
-        ]
-    })
+    (determinant.abs() > 1e-12)
+        .then(|| [(yy * miss[0] - xy * miss[1]) / determinant, (xx * miss[1] - xy * miss[0]) / determinant])
 }

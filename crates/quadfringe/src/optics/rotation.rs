@@ -29,8 +29,8 @@ pub fn rotation_from_vector(vector_rad: [f64; 3]) -> [[f64; 3]; 3] {
 
 /// Refuses what is not a proper rotation.
 pub(super) fn check(r: &[[f64; 3]; 3]) -> Result<()> {
-    let orthonormal = (0..3)
-        .all(|i| (0..3).all(|j| (dot(r[i], r[j]) - f64::from(u8::from(i == j))).abs() <= 1e-6));
+    let orthonormal =
+        (0..3).all(|i| (0..3).all(|j| (dot(r[i], r[j]) - f64::from(u8::from(i == j))).abs() <= 1e-6));
     let determinant = r[0][0] * (r[1][1] * r[2][2] - r[1][2] * r[2][1])
         - r[0][1] * (r[1][0] * r[2][2] - r[1][2] * r[2][0])
         + r[0][2] * (r[1][0] * r[2][1] - r[1][1] * r[2][0]);

@@ -31,11 +31,8 @@ pub struct Hit {
 }
 
 impl Hit {
-    const NOTHING: Self = Self {
-        xyz_mm: [f64::NAN; 3],
-        lit_from_px: [[f64::NAN; 2]; 2],
-        facing: [f64::NAN; 2],
-    };
+    const NOTHING: Self =
+        Self { xyz_mm: [f64::NAN; 3], lit_from_px: [[f64::NAN; 2]; 2], facing: [f64::NAN; 2] };
 
     /// Whether the pixel sees a surface.
     #[must_use]
@@ -81,36 +78,30 @@ impl Bench {
             let device = self.projector(beam);
             (device, device.centre_mm())
         });
-        hits.axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(row, mut line)| {
-                for (column, hit) in line.iter_mut().enumerate() {
-                    let ray = self.camera.ray([column as f64, row as f64]);
-                    let Some(t) = surface.hit(&ray, [0.0, f64::INFINITY]) else {
+        hits.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+            for (column, hit) in line.iter_mut().enumerate() {
+                let ray = self.camera.ray([column as f64, row as f64]);
+                let Some(t) = surface.hit(&ray, [0.0, f64::INFINITY]) else {
+                    continue;
+                };
+                let point = ray.at(t);
+                let normal = surface.normal(point);
+                hit.xyz_mm = point;
+                for (index, (device, centre)) in projectors.iter().enumerate() {
+                    if index == 1 && coaxial {
+                        hit.lit_from_px[1] = hit.lit_from_px[0];
+                        hit.facing[1] = hit.facing[0];
                         continue;
-                    };
-                    let point = ray.at(t);
-                    let normal = surface.normal(point);
-                    hit.xyz_mm = point;
-                    for (index, (device, centre)) in projectors.iter().enumerate() {
-                        if index == 1 && coaxial {
-                            hit.lit_from_px[1] = hit.lit_from_px[0];
-                            hit.facing[1] = hit.facing[0];
-                            continue;
-                        }
-                        let (facing, lit_from) = light_at(surface, device, *centre, point, normal);
-                        hit.facing[index] = facing;
-                        hit.lit_from_px[index] = lit_from.unwrap_or([f64::NAN; 2]);
                     }
+                    let (facing, lit_from) = light_at(surface, device, *centre, point, normal);
+                    hit.facing[index] = facing;
+                    hit.lit_from_px[index] = lit_from.unwrap_or([f64::NAN; 2]);
                 }
-            });
+            }
+        });
         // Four pixels' footprint per pixel: a wall steeper than 76 degrees.
         let step_per_depth = 4.0 / self.camera.focal_px[0].min(self.camera.focal_px[1]);
-        Cast {
-            hits,
-            step_per_depth,
-        }
+        Cast { hits, step_per_depth }
     }
 }
 
@@ -124,14 +115,9 @@ fn light_at(
 ) -> (f64, Option<[f64; 2]>) {
     let away: [f64; 3] = std::array::from_fn(|i| point[i] - centre[i]);
     let distance = dot(away, away).sqrt();
-    let ray = Ray {
-        origin_mm: centre,
-        direction: away.map(|c| c / distance),
-    };
+    let ray = Ray { origin_mm: centre, direction: away.map(|c| c / distance) };
     let facing = -dot(normal, ray.direction);
-    let pixel = projector
-        .project(point)
-        .filter(|pixel| facing > 0.0 && projector.contains(*pixel));
+    let pixel = projector.project(point).filter(|pixel| facing > 0.0 && projector.contains(*pixel));
     let lit = pixel.filter(|_| surface.hit(&ray, [0.0, distance - SHADOW_GAP_MM]).is_none());
     (facing, lit)
 }

@@ -16,26 +16,22 @@ pub(super) fn expose(plane: &mut Array2<f32>, channel: usize, options: &RenderOp
     let offset = options.camera_offset[channel] as f32;
     let power = (1.0 / options.camera_exponent[channel]) as f32;
     let noise = options.noise as f32;
-    plane
-        .axis_iter_mut(Axis(0))
-        .into_par_iter()
-        .enumerate()
-        .for_each(|(row, mut line)| {
-            let mut random = generator(options.seed, channel, row);
-            for value in &mut line {
-                let mut light = *value;
-                if noise > 0.0 {
-                    let draw: f32 = StandardNormal.sample(&mut random);
-                    light += noise * draw;
-                }
-                let mut captured = light;
-                if power != 1.0 {
-                    captured = light.max(0.0).powf(power);
-                }
-                captured = ((captured + offset) * full_scale).clamp(0.0, full_scale);
-                *value = if rounds { captured.round() } else { captured };
+    plane.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+        let mut random = generator(options.seed, channel, row);
+        for value in &mut line {
+            let mut light = *value;
+            if noise > 0.0 {
+                let draw: f32 = StandardNormal.sample(&mut random);
+                light += noise * draw;
             }
-        });
+            let mut captured = light;
+            if power != 1.0 {
+                captured = light.max(0.0).powf(power);
+            }
+            captured = ((captured + offset) * full_scale).clamp(0.0, full_scale);
+            *value = if rounds { captured.round() } else { captured };
+        }
+    });
 }
 
 fn generator(seed: u64, channel: usize, row: usize) -> Pcg64Mcg {

@@ -53,19 +53,13 @@ impl Light<'_> {
     /// Vertical fringes.
     #[must_use]
     pub const fn fringes(number: f64, shift_rad: f64) -> Self {
-        Self::Fringes {
-            number,
-            shift_rad,
-            axis: Axis::Columns,
-        }
+        Self::Fringes { number, shift_rad, axis: Axis::Columns }
     }
 
     /// The four channels of a shot: R, G, B, IR.
     #[must_use]
     pub fn shot(code: &FringeCode) -> [Self; 4] {
-        Channel::ALL.map(|channel| {
-            Self::fringes(code.numbers()[channel.phase_index()], channel.shift_rad())
-        })
+        Channel::ALL.map(|channel| Self::fringes(code.numbers()[channel.phase_index()], channel.shift_rad()))
     }
 
     /// The same fringes in all four channels: one step of an N-step capture.
@@ -77,18 +71,12 @@ impl Light<'_> {
     pub(super) fn check(&self, projector: &Device) -> Result<()> {
         match self {
             Self::Image(image) if image.dim() != (projector.height, projector.width) => {
-                Err(Error::shape(
-                    "pattern image",
-                    &[projector.height, projector.width],
-                    image.shape(),
-                ))
+                Err(Error::shape("pattern image", &[projector.height, projector.width], image.shape()))
             }
             Self::Uniform(level) if !(0.0..=1.0).contains(level) => {
                 Err(Error::value("uniform light", "0 to 1", level))
             }
-            Self::Fringes {
-                number, shift_rad, ..
-            } if !(number.is_finite() && shift_rad.is_finite()) => {
+            Self::Fringes { number, shift_rad, .. } if !(number.is_finite() && shift_rad.is_finite()) => {
                 let actual = format!("number {number}, shift {shift_rad} rad");
                 Err(Error::value("fringes", "a finite number and shift", actual))
             }
@@ -100,11 +88,7 @@ impl Light<'_> {
     pub(super) fn level(&self, projector: &Device, layout: DmdLayout, at: [f64; 2]) -> f64 {
         match self {
             Self::Uniform(level) => *level,
-            Self::Fringes {
-                number,
-                shift_rad,
-                axis,
-            } => {
+            Self::Fringes { number, shift_rad, axis } => {
                 let cycles = match axis {
                     Axis::Columns => at[0] / projector.width as f64,
                     Axis::Rows => at[1] / projector.height as f64,
@@ -149,10 +133,7 @@ mod tests {
             for i in 0..500 {
                 let at = [1.0 + 1.8 * f64::from(i), 0.036 * f64::from(i)];
                 let level = |light: &Light<'_>| light.level(&device, layout, at);
-                assert!(
-                    (level(&image) - level(&fringes)).abs() < 5e-3,
-                    "{layout:?} {at:?}"
-                );
+                assert!((level(&image) - level(&fringes)).abs() < 5e-3, "{layout:?} {at:?}");
             }
         }
     }

@@ -25,26 +25,16 @@ pub(super) fn sample_and_interpolate(colours: &mut [Array2<f32>], order: BayerOr
         *raw = colours[order.colour(row, column)][[row, column]];
     });
     for (colour, plane) in colours.iter_mut().enumerate() {
-        plane
-            .axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(row, mut line)| {
-                for (column, out) in line.iter_mut().enumerate() {
-                    *out = interpolated(&raw, order, colour, row, column);
-                }
-            });
+        plane.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+            for (column, out) in line.iter_mut().enumerate() {
+                *out = interpolated(&raw, order, colour, row, column);
+            }
+        });
     }
 }
 
 /// The pixel itself, or the mean of the neighbours of that colour, those across a corner at half weight.
-fn interpolated(
-    raw: &Array2<f32>,
-    order: BayerOrder,
-    colour: usize,
-    row: usize,
-    column: usize,
-) -> f32 {
+fn interpolated(raw: &Array2<f32>, order: BayerOrder, colour: usize, row: usize, column: usize) -> f32 {
     if order.colour(row, column) == colour {
         return raw[[row, column]];
     }
@@ -68,15 +58,9 @@ mod tests {
 
     #[test]
     fn a_linear_image_comes_back_in_every_order() {
-        for order in [
-            BayerOrder::Rggb,
-            BayerOrder::Bggr,
-            BayerOrder::Grbg,
-            BayerOrder::Gbrg,
-        ] {
-            let ramp = |scale: f32| {
-                Array2::from_shape_fn((9, 10), |(r, c)| scale * (r as f32 + 2.0 * c as f32))
-            };
+        for order in [BayerOrder::Rggb, BayerOrder::Bggr, BayerOrder::Grbg, BayerOrder::Gbrg] {
+            let ramp =
+                |scale: f32| Array2::from_shape_fn((9, 10), |(r, c)| scale * (r as f32 + 2.0 * c as f32));
             let mut colours = [ramp(1.0), ramp(2.0), ramp(-1.0)];
             let expected = colours.clone();
             sample_and_interpolate(&mut colours, order);

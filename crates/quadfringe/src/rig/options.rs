@@ -187,12 +187,8 @@ pub struct RenderOptions {
     pub seed: u64,
 }
 
-const NO_CROSSTALK: [[f64; 4]; 4] = [
-    [1.0, 0.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0, 0.0],
-    [0.0, 0.0, 1.0, 0.0],
-    [0.0, 0.0, 0.0, 1.0],
-];
+const NO_CROSSTALK: [[f64; 4]; 4] =
+    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 impl Default for RenderOptions {
     /// Fringes fill 5 to 95 % of the range of the camera.
@@ -232,11 +228,7 @@ impl RenderOptions {
         for (name, values, above_zero) in groups {
             for value in values {
                 if !non_negative(value) || (above_zero && value == 0.0) {
-                    let expected = if above_zero {
-                        "positive numbers"
-                    } else {
-                        "numbers of at least 0"
-                    };
+                    let expected = if above_zero { "positive numbers" } else { "numbers of at least 0" };
                     return Err(Error::value(name, expected, value));
                 }
             }

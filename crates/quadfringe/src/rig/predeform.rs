@@ -27,27 +27,19 @@ impl Bench {
     /// ```
     pub fn predeform(&self, light: &Light<'_>, plane_z_mm: f64) -> Result<Array2<f32>> {
         if !(plane_z_mm.is_finite() && plane_z_mm > 0.0) {
-            return Err(Error::value(
-                "plane_z_mm",
-                "a positive depth in mm",
-                plane_z_mm,
-            ));
+            return Err(Error::value("plane_z_mm", "a positive depth in mm", plane_z_mm));
         }
         light.check(&self.visible)?;
         let mut image = Array2::zeros((self.infrared.height, self.infrared.width));
-        image
-            .axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(row, mut line)| {
-                for (column, level) in line.iter_mut().enumerate() {
-                    let mirror = [mirror_column(self.layout, row, column), row as f64];
-                    let Some(seen) = self.visible_from_infrared(mirror, plane_z_mm) else {
-                        continue;
-                    };
-                    *level = light.level(&self.visible, self.layout, seen) as f32;
-                }
-            });
+        image.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+            for (column, level) in line.iter_mut().enumerate() {
+                let mirror = [mirror_column(self.layout, row, column), row as f64];
+                let Some(seen) = self.visible_from_infrared(mirror, plane_z_mm) else {
+                    continue;
+                };
+                *level = light.level(&self.visible, self.layout, seen) as f32;
+            }
+        });
         Ok(image)
     }
 

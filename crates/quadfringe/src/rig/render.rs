@@ -67,12 +67,7 @@ impl Bench {
     /// assert_eq!(planes[0][[3, 4]], 242);
     /// # Ok::<(), quadfringe::error::Error>(())
     /// ```
-    pub fn render(
-        &self,
-        cast: &Cast,
-        lights: &[Light<'_>; 4],
-        options: &RenderOptions,
-    ) -> Result<Planes> {
+    pub fn render(&self, cast: &Cast, lights: &[Light<'_>; 4], options: &RenderOptions) -> Result<Planes> {
         self.render_moving([cast; 3], lights, options)
     }
 
@@ -112,9 +107,7 @@ impl Bench {
             mosaic::sample_and_interpolate(&mut planes[..3], order);
             let rounds = options.bit_depth.full_scale() > 1.0;
             if rounds {
-                planes[..3]
-                    .iter_mut()
-                    .for_each(|plane| plane.par_mapv_inplace(f32::round));
+                planes[..3].iter_mut().for_each(|plane| plane.par_mapv_inplace(f32::round));
             }
         }
         Ok(Planes::from_counts(planes, options.bit_depth.full_scale()))
@@ -131,11 +124,7 @@ impl Bench {
         let mut planes = [(); 4].map(|()| Array2::zeros(shape));
         let [red, green, blue, infrared] = &mut planes;
         let moving = casts.iter().any(|cast| !std::ptr::eq(*cast, casts[0]));
-        let painter = Painter {
-            bench: self,
-            lights,
-            options,
-        };
+        let painter = Painter { bench: self, lights, options };
         red.axis_iter_mut(Axis(0))
             .into_par_iter()
             .zip(green.axis_iter_mut(Axis(0)))
@@ -172,15 +161,9 @@ impl Painter<'_, '_> {
             light[channel.index()] = self.reflected(channel, pixel, hit);
         }
         let infrared = |hit: &Hit| self.reflected(Channel::Ir, pixel, hit);
-        light[3] = if moving {
-            hits.into_iter().map(infrared).sum::<f64>() / 3.0
-        } else {
-            infrared(hits[0])
-        };
+        light[3] = if moving { hits.into_iter().map(infrared).sum::<f64>() / 3.0 } else { infrared(hits[0]) };
         std::array::from_fn(|c| {
-            let mixed = (0..4)
-                .map(|p| self.options.crosstalk[c][p] * light[p])
-                .sum::<f64>();
+            let mixed = (0..4).map(|p| self.options.crosstalk[c][p] * light[p]).sum::<f64>();
             (self.options.gain[c] * mixed) as f32
         })
     }
@@ -196,16 +179,8 @@ impl Painter<'_, '_> {
             let projector = self.bench.projector(beam);
             let level = self.lights[index].level(projector, self.bench.layout, at);
             let exponent = self.options.projector_exponent[index];
-            let sent = if exponent == 1.0 {
-                level
-            } else {
-                level.max(0.0).powf(exponent)
-            };
-            light += if self.options.shading {
-                sent * hit.facing[beam.index()]
-            } else {
-                sent
-            };
+            let sent = if exponent == 1.0 { level } else { level.max(0.0).powf(exponent) };
+            light += if self.options.shading { sent * hit.facing[beam.index()] } else { sent };
         }
         light * f64::from(self.options.albedo.at(pixel, hit.xyz_mm)[index])
     }

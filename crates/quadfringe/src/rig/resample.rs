@@ -26,39 +26,32 @@ fn gaussian(sigma_px: f64) -> Vec<f32> {
 fn blur_rows(image: ArrayView2<'_, f32>, kernel: &[f32]) -> Array2<f32> {
     let reach = kernel.len() - 1;
     let mut blurred = Array2::zeros(image.dim());
-    blurred
-        .axis_iter_mut(Axis(0))
-        .into_par_iter()
-        .zip(image.axis_iter(Axis(0)))
-        .for_each(|(mut out, line)| {
+    blurred.axis_iter_mut(Axis(0)).into_par_iter().zip(image.axis_iter(Axis(0))).for_each(
+        |(mut out, line)| {
             let width = line.len();
-            let padded: Vec<f32> = (0..width + 2 * reach)
-                .map(|i| line[i.saturating_sub(reach).min(width - 1)])
-                .collect();
+            let padded: Vec<f32> =
+                (0..width + 2 * reach).map(|i| line[i.saturating_sub(reach).min(width - 1)]).collect();
             for (column, out) in out.iter_mut().enumerate() {
                 let at = column + reach;
                 *out = (1..=reach).fold(kernel[0] * padded[at], |sum, i| {
                     sum + kernel[i] * (padded[at - i] + padded[at + i])
                 });
             }
-        });
+        },
+    );
     blurred
 }
 
 fn blur_columns(image: ArrayView2<'_, f32>, kernel: &[f32]) -> Array2<f32> {
     let height = image.nrows();
     let mut blurred = Array2::zeros(image.dim());
-    blurred
-        .axis_iter_mut(Axis(0))
-        .into_par_iter()
-        .enumerate()
-        .for_each(|(row, mut out)| {
-            out.scaled_add(kernel[0], &image.row(row));
-            for (i, weight) in kernel.iter().enumerate().skip(1) {
-                out.scaled_add(*weight, &image.row(row.saturating_sub(i)));
-                out.scaled_add(*weight, &image.row((row + i).min(height - 1)));
-            }
-        });
+    blurred.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut out)| {
+        out.scaled_add(kernel[0], &image.row(row));
+        for (i, weight) in kernel.iter().enumerate().skip(1) {
+            out.scaled_add(*weight, &image.row(row.saturating_sub(i)));
+            out.scaled_add(*weight, &image.row((row + i).min(height - 1)));
+        }
+    });
     blurred
 }
 
@@ -68,33 +61,22 @@ pub(super) fn inverse(affine: [[f64; 3]; 2]) -> Result<[[f64; 3]; 2]> {
     let determinant = a * d - b * c;
     if !(determinant.is_finite() && determinant.abs() > 1e-6 && tx.is_finite() && ty.is_finite()) {
         let expected = "the two rows of an affine map with an inverse";
-        return Err(Error::value(
-            "infrared_from_visible",
-            expected,
-            format!("{affine:?}"),
-        ));
+        return Err(Error::value("infrared_from_visible", expected, format!("{affine:?}")));
     }
     let [ia, ib, ic, id] = [d, -b, -c, a].map(|v| v / determinant);
-    Ok([
-        [ia, ib, -(ia * tx + ib * ty)],
-        [ic, id, -(ic * tx + id * ty)],
-    ])
+    Ok([[ia, ib, -(ia * tx + ib * ty)], [ic, id, -(ic * tx + id * ty)]])
 }
 
 /// Image as seen through an affine map of its pixels: `out(x, y) = image(from_output (x, y, 1))`, by cubic interpolation,
 /// dark outside.
 pub(super) fn warp(image: &Array2<f32>, from_output: [[f64; 3]; 2]) -> Array2<f32> {
     let mut warped = Array2::zeros(image.dim());
-    warped
-        .axis_iter_mut(Axis(0))
-        .into_par_iter()
-        .enumerate()
-        .for_each(|(row, mut out)| {
-            for (column, out) in out.iter_mut().enumerate() {
-                let [x, y] = from_output.map(|r| r[0] * column as f64 + r[1] * row as f64 + r[2]);
-                *out = cubic(image, x, y);
-            }
-        });
+    warped.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut out)| {
+        for (column, out) in out.iter_mut().enumerate() {
+            let [x, y] = from_output.map(|r| r[0] * column as f64 + r[1] * row as f64 + r[2]);
+            *out = cubic(image, x, y);
+        }
+    });
     warped
 }
 
@@ -107,9 +89,8 @@ fn cubic(image: &Array2<f32>, x: f64, y: f64) -> f32 {
     let (left, top) = (x.floor(), y.floor());
     let weights_x = catmull_rom((x - left) as f32);
     let weights_y = catmull_rom((y - top) as f32);
-    let place = |first: f64, k: usize, n: usize| {
-        (first as i64 + k as i64 - 1).clamp(0, n as i64 - 1) as usize
-    };
+    let place =
+        |first: f64, k: usize, n: usize| (first as i64 + k as i64 - 1).clamp(0, n as i64 - 1) as usize;
     let mut sum = 0.0;
     for (j, wy) in weights_y.iter().enumerate() {
         let row = place(top, j, rows);

@@ -48,23 +48,20 @@ impl Cast {
     /// Absolute phase in rad of the first fringe number, 0 at column 0 of the visible projector; NaN where dark.
     #[must_use]
     pub fn phase_rad(&self, code: &FringeCode) -> Array2<f32> {
-        self.hits
-            .map(|hit| phase_at(code, 0, hit.lit_from_px[0][0]) as f32)
+        self.hits.map(|hit| phase_at(code, 0, hit.lit_from_px[0][0]) as f32)
     }
 
     /// Fringe order of the first fringe number: the whole periods in the absolute phase; NaN where dark.
     #[must_use]
     pub fn order(&self, code: &FringeCode) -> Array2<f32> {
         let period = code.period_px(0);
-        self.hits
-            .map(|hit| (hit.lit_from_px[0][0] / period).floor() as f32)
+        self.hits.map(|hit| (hit.lit_from_px[0][0] / period).floor() as f32)
     }
 
     /// Where a surface is seen that at least one projector does not light.
     #[must_use]
     pub fn shadow(&self) -> Array2<bool> {
-        self.hits
-            .map(|hit| hit.is_surface() && Beam::ALL.iter().any(|beam| !hit.is_lit(*beam)))
+        self.hits.map(|hit| hit.is_surface() && Beam::ALL.iter().any(|beam| !hit.is_lit(*beam)))
     }
 
     /// Distance in pixels to the nearest edge: a step in depth, a border of shadow, or a border of the surface. Pixels on
@@ -75,19 +72,12 @@ impl Cast {
         let (rows, columns) = self.shape();
         let mut squared = Array2::from_elem((rows, columns), f32::INFINITY);
         for (mut line, marks) in squared.columns_mut().into_iter().zip(edges.columns()) {
-            let marks: Vec<f32> = marks
-                .iter()
-                .map(|edge| if *edge { 0.0 } else { f32::INFINITY })
-                .collect();
-            line.iter_mut()
-                .zip(squared_distance(&marks))
-                .for_each(|(out, d)| *out = d);
+            let marks: Vec<f32> = marks.iter().map(|edge| if *edge { 0.0 } else { f32::INFINITY }).collect();
+            line.iter_mut().zip(squared_distance(&marks)).for_each(|(out, d)| *out = d);
         }
         for mut line in squared.rows_mut() {
             let before = line.to_vec();
-            line.iter_mut()
-                .zip(squared_distance(&before))
-                .for_each(|(out, d)| *out = d.sqrt());
+            line.iter_mut().zip(squared_distance(&before)).for_each(|(out, d)| *out = d.sqrt());
         }
         squared
     }
@@ -124,11 +114,7 @@ impl Cast {
 /// (Felzenszwalb and Huttenlocher, 2012).
 fn squared_distance(values: &[f32]) -> Vec<f32> {
     let mut hull: Vec<(usize, f32)> = Vec::new();
-    for (q, value) in values
-        .iter()
-        .enumerate()
-        .filter(|(_, value)| value.is_finite())
-    {
+    for (q, value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
         let height = |at: usize, value: f32| value + (at * at) as f32;
         let mut from = f32::NEG_INFINITY;
         while let Some((last, start)) = hull.last().copied() {

@@ -51,12 +51,7 @@ pub(super) struct Capsule {
 impl Capsule {
     pub(super) fn new(start: [f64; 3], end: [f64; 3], radius: f64) -> Self {
         let along = std::array::from_fn(|i| end[i] - start[i]);
-        Self {
-            start,
-            along,
-            scale: 1.0 / dot(along, along),
-            radius,
-        }
+        Self { start, along, scale: 1.0 / dot(along, along), radius }
     }
 
     /// Signed distance.

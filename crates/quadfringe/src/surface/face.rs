@@ -74,12 +74,10 @@ impl Surface for Face {
     fn value(&self, p_mm: [f64; 3]) -> f64 {
         let [x, y, z]: [f64; 3] = std::array::from_fn(|i| p_mm[i] - self.centre_mm[i]);
         let side = [x.hypot(CREASE_MM), y, z];
-        PARTS
-            .iter()
-            .fold(HEAD.value([x, y, z]), |face, (part, blend)| match blend {
-                Blend::Add(rounding) => join(face, part.value(side), *rounding),
-                Blend::Carve(rounding) => carve(face, part.value(side), *rounding),
-            })
+        PARTS.iter().fold(HEAD.value([x, y, z]), |face, (part, blend)| match blend {
+            Blend::Add(rounding) => join(face, part.value(side), *rounding),
+            Blend::Carve(rounding) => carve(face, part.value(side), *rounding),
+        })
     }
 
     fn bounds_mm(&self) -> [[f64; 3]; 2] {

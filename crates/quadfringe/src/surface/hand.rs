@@ -48,11 +48,7 @@ impl Hand {
         let nearer = 12.0 * (TAU * time_s / 4.0).sin();
         let mut capsules = Vec::new();
         let mut add = |start: [f64; 3], end: [f64; 3], radius: f64| {
-            capsules.push(Capsule::new(
-                placed(start, wave, nearer),
-                placed(end, wave, nearer),
-                radius,
-            ));
+            capsules.push(Capsule::new(placed(start, wave, nearer), placed(end, wave, nearer), radius));
         };
         for ([x, y], length, spread, radius) in FINGERS {
             add([0.45 * x, -6.0, 0.0], [x, y, 0.0], radius + 3.5);
@@ -81,10 +77,7 @@ impl Hand {
             std::array::from_fn(|axis| extreme(axis, 0, f64::min) - ROUNDING_MM),
             std::array::from_fn(|axis| extreme(axis, 1, f64::max) + ROUNDING_MM),
         ];
-        Self {
-            capsules,
-            bounds_mm,
-        }
+        Self { capsules, bounds_mm }
     }
 }
 
@@ -98,11 +91,7 @@ fn placed([x, y, z]: [f64; 3], wave_rad: f64, nearer_mm: f64) -> [f64; 3] {
 /// End of a joint that leans sideways by `spread` and towards the camera by `bend`.
 fn step([x, y, z]: [f64; 3], length_mm: f64, spread_rad: f64, bend_rad: f64) -> [f64; 3] {
     let flat = length_mm * bend_rad.cos();
-    [
-        x + flat * spread_rad.sin(),
-        y - flat * spread_rad.cos(),
-        z - length_mm * bend_rad.sin(),
-    ]
+    [x + flat * spread_rad.sin(), y - flat * spread_rad.cos(), z - length_mm * bend_rad.sin()]
 }
 
 impl Surface for Hand {

@@ -10,11 +10,7 @@ const CLOSED_MM: f64 = 1e-10;
 const REFINEMENTS_MAX: usize = 100;
 
 /// Distance at which the value stops being positive, within the range and the bounds of the surface.
-pub(super) fn first_crossing<S: Surface + ?Sized>(
-    surface: &S,
-    ray: &Ray,
-    range_mm: [f64; 2],
-) -> Option<f64> {
+pub(super) fn first_crossing<S: Surface + ?Sized>(surface: &S, ray: &Ray, range_mm: [f64; 2]) -> Option<f64> {
     let [mut t, end] = clip(ray, surface.bounds_mm(), range_mm)?;
     let rate = surface.rate_limit(ray.direction);
     let mut value = surface.value(ray.at(t));

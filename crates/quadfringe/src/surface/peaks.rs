@@ -33,11 +33,7 @@ impl Peaks {
     pub fn new(z_mm: f64, scale_mm: f64) -> Result<Self> {
         if !(z_mm.is_finite() && scale_mm.is_finite() && scale_mm > 0.0) {
             let actual = format!("z {z_mm} mm, scale {scale_mm} mm");
-            return Err(Error::value(
-                "peaks",
-                "a finite depth and a positive scale",
-                actual,
-            ));
+            return Err(Error::value("peaks", "a finite depth and a positive scale", actual));
         }
         Ok(Self { z_mm, scale_mm })
     }
@@ -46,10 +42,7 @@ impl Peaks {
 impl Default for Peaks {
     /// 40 mm from peak to valley, on the reference plane of the ready scenes.
     fn default() -> Self {
-        Self {
-            z_mm: REFERENCE_Z_MM,
-            scale_mm: 2.729_016,
-        }
+        Self { z_mm: REFERENCE_Z_MM, scale_mm: 2.729_016 }
     }
 }
 

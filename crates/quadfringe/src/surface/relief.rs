@@ -79,15 +79,7 @@ impl HeightMap {
             ],
         ];
         let slope = steepest(&heights_mm, pitch_mm, interpolation);
-        Ok(Self {
-            heights_mm,
-            origin_mm,
-            pitch_mm,
-            z_mm,
-            interpolation,
-            slope,
-            bounds_mm,
-        })
+        Ok(Self { heights_mm, origin_mm, pitch_mm, z_mm, interpolation, slope, bounds_mm })
     }
 
     fn height(&self, x_mm: f64, y_mm: f64) -> f64 {
@@ -97,10 +89,7 @@ impl HeightMap {
         match self.interpolation {
             Interpolation::Bilinear => {
                 let line = |r: usize| {
-                    let [a, b] = [
-                        self.heights_mm[[r, column]],
-                        self.heights_mm[[r, column + 1]],
-                    ];
+                    let [a, b] = [self.heights_mm[[r, column]], self.heights_mm[[r, column + 1]]];
                     a + u * (b - a)
                 };
                 line(row) + v * (line(row + 1) - line(row))
@@ -109,10 +98,7 @@ impl HeightMap {
                 let at = |base: usize, k: usize, n: usize| (base + k).saturating_sub(1).min(n - 1);
                 let lines = std::array::from_fn(|i| {
                     let r = at(row, i, rows);
-                    catmull_rom(
-                        std::array::from_fn(|j| self.heights_mm[[r, at(column, j, columns)]]),
-                        u,
-                    )
+                    catmull_rom(std::array::from_fn(|j| self.heights_mm[[r, at(column, j, columns)]]), u)
                 });
                 catmull_rom(lines, v)
             }
@@ -120,20 +106,11 @@ impl HeightMap {
     }
 }
 
-fn check_grid(
-    heights_mm: &Array2<f64>,
-    origin_mm: [f64; 2],
-    pitch_mm: [f64; 2],
-    z_mm: f64,
-) -> Result<()> {
+fn check_grid(heights_mm: &Array2<f64>, origin_mm: [f64; 2], pitch_mm: [f64; 2], z_mm: f64) -> Result<()> {
     let (rows, columns) = heights_mm.dim();
     if rows < 2 || columns < 2 {
         let actual = format!("{rows} x {columns}");
-        return Err(Error::value(
-            "height map (rows x columns)",
-            "at least 2 x 2 samples",
-            actual,
-        ));
+        return Err(Error::value("height map (rows x columns)", "at least 2 x 2 samples", actual));
     }
     if let Some(bad) = heights_mm.iter().find(|h| !h.is_finite()) {
         return Err(Error::value("height map", "finite heights in mm", bad));
@@ -141,11 +118,7 @@ fn check_grid(
     let placed = origin_mm.iter().chain(&pitch_mm).all(|v| v.is_finite()) && z_mm.is_finite();
     if !placed || pitch_mm.iter().any(|p| *p <= 0.0) {
         let actual = format!("origin {origin_mm:?} mm, pitch {pitch_mm:?} mm, z {z_mm} mm");
-        return Err(Error::value(
-            "height map",
-            "a finite place and a positive pitch",
-            actual,
-        ));
+        return Err(Error::value("height map", "a finite place and a positive pitch", actual));
     }
     Ok(())
 }
@@ -208,14 +181,10 @@ mod tests {
     fn both_interpolations_keep_the_samples_and_the_stated_slope() {
         let grid = Array2::from_shape_fn((12, 15), |(r, c)| ((r * 7 + c * 13) % 11) as f64 * 0.8);
         for kind in [Interpolation::Bilinear, Interpolation::Bicubic] {
-            let map = HeightMap::new(grid.clone(), [-10.0, 5.0], [1.5, 2.0], 800.0, kind)
-                .expect("valid map");
+            let map = HeightMap::new(grid.clone(), [-10.0, 5.0], [1.5, 2.0], 800.0, kind).expect("valid map");
             assert!((map.height(-10.0 + 1.5 * 4.0, 5.0 + 2.0 * 3.0) - grid[[3, 4]]).abs() < 1e-12);
             for i in 0..5000 {
-                let (x, y) = (
-                    -10.0 + 0.0042 * f64::from(i),
-                    5.0 + 0.0043 * f64::from((i * 37) % 5000),
-                );
+                let (x, y) = (-10.0 + 0.0042 * f64::from(i), 5.0 + 0.0043 * f64::from((i * 37) % 5000));
                 let rise = map.height(x + 6e-5, y + 8e-5) - map.height(x, y);
                 assert!(rise.abs() / 1e-4 <= map.slope * (1.0 + 1e-6));
                 let z = 800.0 - map.height(x, y);
@@ -235,18 +204,9 @@ mod tests {
 
     #[test]
     fn a_ray_past_the_grid_meets_nothing() {
-        let map = HeightMap::new(
-            Array2::zeros((3, 3)),
-            [0.0; 2],
-            [1.0; 2],
-            800.0,
-            Interpolation::Bilinear,
-        )
-        .expect("valid map");
-        let ray = |x: f64| Ray {
-            origin_mm: [x, 1.0, 0.0],
-            direction: [0.0, 0.0, 1.0],
-        };
+        let map = HeightMap::new(Array2::zeros((3, 3)), [0.0; 2], [1.0; 2], 800.0, Interpolation::Bilinear)
+            .expect("valid map");
+        let ray = |x: f64| Ray { origin_mm: [x, 1.0, 0.0], direction: [0.0, 0.0, 1.0] };
         assert_eq!(map.hit(&ray(5.0), [0.0, 1e4]), None);
         assert_eq!(map.hit(&ray(1.0), [0.0, 1e4]), Some(800.0));
     }

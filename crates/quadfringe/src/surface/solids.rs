@@ -27,11 +27,7 @@ impl Plane {
         let normal = unit(normal);
         if !point_mm.iter().chain(&normal).all(|c| c.is_finite()) {
             let actual = format!("point {point_mm:?} mm, normal {normal:?}");
-            return Err(Error::value(
-                "plane",
-                "a finite point and a normal other than zero",
-                actual,
-            ));
+            return Err(Error::value("plane", "a finite point and a normal other than zero", actual));
         }
         Ok(Self { point_mm, normal })
     }
@@ -39,19 +35,13 @@ impl Plane {
     /// Plane at constant depth, facing the camera.
     #[must_use]
     pub const fn at_z(z_mm: f64) -> Self {
-        Self {
-            point_mm: [0.0, 0.0, z_mm],
-            normal: [0.0, 0.0, -1.0],
-        }
+        Self { point_mm: [0.0, 0.0, z_mm], normal: [0.0, 0.0, -1.0] }
     }
 }
 
 impl Surface for Plane {
     fn value(&self, p_mm: [f64; 3]) -> f64 {
-        dot(
-            self.normal,
-            std::array::from_fn(|i| p_mm[i] - self.point_mm[i]),
-        )
+        dot(self.normal, std::array::from_fn(|i| p_mm[i] - self.point_mm[i]))
     }
 
     fn bounds_mm(&self) -> [[f64; 3]; 2] {
@@ -95,16 +85,9 @@ impl Sphere {
         let finite = centre_mm.iter().all(|c| c.is_finite()) && radius_mm.is_finite();
         if !finite || radius_mm <= 0.0 {
             let actual = format!("centre {centre_mm:?} mm, radius {radius_mm} mm");
-            return Err(Error::value(
-                "sphere",
-                "a finite centre and a positive radius",
-                actual,
-            ));
+            return Err(Error::value("sphere", "a finite centre and a positive radius", actual));
         }
-        Ok(Self {
-            centre_mm,
-            radius_mm,
-        })
+        Ok(Self { centre_mm, radius_mm })
     }
 
     fn offset_from(&self, p_mm: [f64; 3]) -> [f64; 3] {
@@ -119,10 +102,7 @@ impl Surface for Sphere {
     }
 
     fn bounds_mm(&self) -> [[f64; 3]; 2] {
-        [
-            self.centre_mm.map(|c| c - self.radius_mm),
-            self.centre_mm.map(|c| c + self.radius_mm),
-        ]
+        [self.centre_mm.map(|c| c - self.radius_mm), self.centre_mm.map(|c| c + self.radius_mm)]
     }
 
     fn hit(&self, ray: &Ray, [from, to]: [f64; 2]) -> Option<f64> {
@@ -163,11 +143,7 @@ impl Cuboid {
         let finite = low_mm.iter().chain(&high_mm).all(|c| c.is_finite());
         if !finite || (0..3).any(|i| low_mm[i] >= high_mm[i]) {
             let actual = format!("{low_mm:?} to {high_mm:?} mm");
-            return Err(Error::value(
-                "cuboid",
-                "a low corner below the high one on every axis",
-                actual,
-            ));
+            return Err(Error::value("cuboid", "a low corner below the high one on every axis", actual));
         }
         Ok(Self { low_mm, high_mm })
     }
@@ -196,9 +172,7 @@ impl Surface for Cuboid {
 
     fn normal(&self, p_mm: [f64; 3]) -> [f64; 3] {
         let beyond = self.beyond(p_mm);
-        let axis = (0..3)
-            .max_by(|a, b| beyond[*a].total_cmp(&beyond[*b]))
-            .unwrap_or(2);
+        let axis = (0..3).max_by(|a, b| beyond[*a].total_cmp(&beyond[*b])).unwrap_or(2);
         let mut normal = [0.0; 3];
         let middle = 0.5 * (self.low_mm[axis] + self.high_mm[axis]);
         normal[axis] = if p_mm[axis] < middle { -1.0 } else { 1.0 };
@@ -209,10 +183,8 @@ impl Surface for Cuboid {
 /// Blocks of the steps: edges along x, then height above the reference plane, for the upper and the lower row.
 const STEP_EDGES_X_MM: [f64; 7] = [-126.0, -84.0, -42.0, 0.0, 42.0, 84.0, 126.0];
 const STEP_ROWS_Y_MM: [[f64; 2]; 2] = [[-88.0, -4.0], [-4.0, 80.0]];
-const STEP_HEIGHTS_MM: [[f64; 6]; 2] = [
-    [5.0, 15.0, 30.0, 50.0, 20.0, 10.0],
-    [20.0, 10.0, 40.0, 25.0, 45.0, 15.0],
-];
+const STEP_HEIGHTS_MM: [[f64; 6]; 2] =
+    [[5.0, 15.0, 30.0, 50.0, 20.0, 10.0], [20.0, 10.0, 40.0, 25.0, 45.0, 15.0]];
 
 /// The ready scene of twelve blocks on the reference plane.
 pub(super) fn steps() -> Union {

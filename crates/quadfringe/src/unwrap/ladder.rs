@@ -58,18 +58,13 @@ impl Ladder {
     #[must_use]
     #[inline]
     pub fn order(&self, phases: [f32; 3]) -> Ordered {
-        let found = if self.climbs {
-            self.climb(phases)
-        } else {
-            self.search(phases)
-        };
+        let found = if self.climbs { self.climb(phases) } else { self.search(phases) };
         let turns = found.phase_rad / TAU;
         // Column 0 and the end of the field look alike; the field starts half a column before 0.
         match self.cycle {
-            Some(cycle) if turns * self.columns_per_turn >= self.width - 0.5 => Ordered {
-                phase_rad: found.phase_rad - cycle * TAU,
-                ..found
-            },
+            Some(cycle) if turns * self.columns_per_turn >= self.width - 0.5 => {
+                Ordered { phase_rad: found.phase_rad - cycle * TAU, ..found }
+            }
             _ => found,
         }
     }
@@ -81,18 +76,12 @@ impl Ladder {
         let start = wrap_positive((first - second) * coarse.signum()) * coarse.signum();
         let (beat, low) = nearest(first - third, start * (middle / coarse));
         let (phase, high) = nearest(first, beat * (n1 / middle));
-        Ordered {
-            phase_rad: phase,
-            margin: low.min(high),
-        }
+        Ordered { phase_rad: phase, margin: low.min(high) }
     }
 
     fn search(&self, [first, second, third]: [f32; 3]) -> Ordered {
         let start = wrap_positive(first);
-        let ratios = [
-            self.numbers[1] / self.numbers[0],
-            self.numbers[2] / self.numbers[0],
-        ];
+        let ratios = [self.numbers[1] / self.numbers[0], self.numbers[2] / self.numbers[0]];
         let cost = |order: usize| {
             let phase = start + TAU * order as f32;
             let miss = |ratio: f32, seen: f32| 1.0 - (phase * ratio - seen).cos();
@@ -109,11 +98,7 @@ impl Ladder {
         }
         Ordered {
             phase_rad: start + TAU * best as f32,
-            margin: if next > 0.0 {
-                1.0 - (least / next).sqrt()
-            } else {
-                0.0
-            },
+            margin: if next > 0.0 { 1.0 - (least / next).sqrt() } else { 0.0 },
         }
     }
 }
@@ -146,15 +131,9 @@ fn nearest(wrapped: f32, guess: f32) -> (f32, f32) {
 /// assert!(margin[[0, 500]] > 0.9);
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
-pub fn unwrap(
-    code: &FringeCode,
-    wrapped: [ArrayView2<'_, f32>; 3],
-) -> Result<(Array2<f32>, Array2<f32>)> {
+pub fn unwrap(code: &FringeCode, wrapped: [ArrayView2<'_, f32>; 3]) -> Result<(Array2<f32>, Array2<f32>)> {
     let [first, second, third] = &wrapped;
-    for (map, name) in [
-        (second, "second wrapped phase"),
-        (third, "third wrapped phase"),
-    ] {
+    for (map, name) in [(second, "second wrapped phase"), (third, "third wrapped phase")] {
         if map.dim() != first.dim() {
             return Err(Error::shape(name, first.shape(), map.shape()));
         }
@@ -162,17 +141,14 @@ pub fn unwrap(
     let ladder = Ladder::new(code);
     let mut phase = Array2::from_elem(first.raw_dim(), f32::NAN);
     let mut margin = Array2::from_elem(first.raw_dim(), f32::NAN);
-    Zip::from(&mut phase)
-        .and(&mut margin)
-        .and(first)
-        .and(second)
-        .and(third)
-        .par_for_each(|p, m, &a, &b, &c| {
+    Zip::from(&mut phase).and(&mut margin).and(first).and(second).and(third).par_for_each(
+        |p, m, &a, &b, &c| {
             if (a + b + c).is_finite() {
                 let found = ladder.order([a, b, c]);
                 (*p, *m) = (found.phase_rad, found.margin);
             }
-        });
+        },
+    );
     Ok((phase, margin))
 }
 
@@ -202,12 +178,8 @@ mod tests {
                 if column >= code.projector_width() as f64 - 0.5 {
                     continue;
                 }
-                let found =
-                    ladder.order(phases(&code, column)).phase_rad / TAU * ladder.columns_per_turn;
-                assert!(
-                    (f64::from(found) - column).abs() < 0.01,
-                    "{code:?} {column} {found}"
-                );
+                let found = ladder.order(phases(&code, column)).phase_rad / TAU * ladder.columns_per_turn;
+                assert!((f64::from(found) - column).abs() < 0.01, "{code:?} {column} {found}");
             }
         }
     }

@@ -75,8 +75,7 @@ impl Support {
         let per_column = n[0] / code.projector_width() as f64;
         let end = n[0] + 0.5 * per_column;
         let predict = |ratio: f64| {
-            let turn =
-                |label: usize| (ratio * (label as f64 - 1.0) * 65536.0).round() as i64 as u16;
+            let turn = |label: usize| (ratio * (label as f64 - 1.0) * 65536.0).round() as i64 as u16;
             (0..labels).map(turn).collect()
         };
         Self {
@@ -107,40 +106,35 @@ impl Support {
     }
 
     fn sweep_rows(&self, evidence: &[Evidence], columns: usize, sums: &mut Array3<u16>) {
-        sums.axis_iter_mut(Axis(0))
-            .into_par_iter()
-            .zip(evidence.par_chunks(columns))
-            .for_each_init(
-                || Path::new(self.labels),
-                |path, (mut row, nodes)| {
-                    path.restart();
-                    for x in 0..columns {
-                        path.advance(
-                            self,
-                            &nodes[x],
-                            &mut row.row_mut(x).into_slice().expect("labels are contiguous")[..],
-                            true,
-                        );
-                    }
-                    path.restart();
-                    for x in (0..columns).rev() {
-                        path.advance(
-                            self,
-                            &nodes[x],
-                            row.row_mut(x).into_slice().expect("labels are contiguous"),
-                            false,
-                        );
-                    }
-                },
-            );
+        sums.axis_iter_mut(Axis(0)).into_par_iter().zip(evidence.par_chunks(columns)).for_each_init(
+            || Path::new(self.labels),
+            |path, (mut row, nodes)| {
+                path.restart();
+                for x in 0..columns {
+                    path.advance(
+                        self,
+                        &nodes[x],
+                        &mut row.row_mut(x).into_slice().expect("labels are contiguous")[..],
+                        true,
+                    );
+                }
+                path.restart();
+                for x in (0..columns).rev() {
+                    path.advance(
+                        self,
+                        &nodes[x],
+                        row.row_mut(x).into_slice().expect("labels are contiguous"),
+                        false,
+                    );
+                }
+            },
+        );
     }
 
     fn sweep_columns(&self, evidence: &[Evidence], columns: usize, sums: &mut Array3<u16>) {
         let rows = evidence.len() / columns;
-        sums.axis_chunks_iter_mut(Axis(1), BLOCK)
-            .into_par_iter()
-            .enumerate()
-            .for_each(|(block, mut part)| {
+        sums.axis_chunks_iter_mut(Axis(1), BLOCK).into_par_iter().enumerate().for_each(
+            |(block, mut part)| {
                 let width = part.len_of(Axis(1));
                 let mut paths: Vec<Path> = (0..width).map(|_| Path::new(self.labels)).collect();
                 let mut visit = |y: usize, paths: &mut [Path]| {
@@ -154,16 +148,11 @@ impl Support {
                 (0..rows).for_each(|y| visit(y, &mut paths));
                 paths.iter_mut().for_each(Path::restart);
                 (0..rows).rev().for_each(|y| visit(y, &mut paths));
-            });
+            },
+        );
     }
 
-    fn read_out(
-        &self,
-        evidence: &[Evidence],
-        columns: usize,
-        sums: &Array3<u16>,
-        maps: &mut SupportMaps,
-    ) {
+    fn read_out(&self, evidence: &[Evidence], columns: usize, sums: &Array3<u16>, maps: &mut SupportMaps) {
         maps.order.resize(evidence.len(), 0);
         maps.margin.resize(evidence.len(), 0.0);
         maps.misfit.resize(evidence.len(), 0.0);
@@ -196,12 +185,8 @@ impl Support {
             return;
         }
         let phase = f64::from(node.phase);
-        let start = self
-            .ratios
-            .map(|ratio| (ratio * phase).round() as i64 as u16);
-        let predictions = out
-            .iter_mut()
-            .zip(self.offsets[0].iter().zip(&self.offsets[1]));
+        let start = self.ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
+        let predictions = out.iter_mut().zip(self.offsets[0].iter().zip(&self.offsets[1]));
         let [g, ir] = [0, 1].map(|i| node.beats[i].wrapping_sub(start[i]));
         let beats = |p: u16, q: u16| ((beat_miss(g, p) + beat_miss(ir, q)) >> 4).min(CUT);
         match node.cosines {
@@ -229,9 +214,7 @@ impl Support {
 /// Squared distance of two beats, 127 for 45 degrees or more.
 #[inline]
 fn beat_miss(seen: u16, predicted: u16) -> i16 {
-    let error = (seen.wrapping_sub(predicted) as i16 >> 6)
-        .unsigned_abs()
-        .min(127) as i16;
+    let error = (seen.wrapping_sub(predicted) as i16 >> 6).unsigned_abs().min(127) as i16;
     error * error
 }
 
@@ -327,13 +310,9 @@ impl Path {
         self.phase = node.phase;
         let values = &self.current[PAD..PAD + n];
         if first {
-            sums.iter_mut()
-                .zip(values)
-                .for_each(|(s, &v)| *s = v as u16);
+            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = v as u16);
         } else {
-            sums.iter_mut()
-                .zip(values)
-                .for_each(|(s, &v)| *s = s.saturating_add(v as u16));
+            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = s.saturating_add(v as u16));
         }
         std::mem::swap(&mut self.previous, &mut self.current);
     }

@@ -64,14 +64,9 @@ impl Samples {
         sums.into_iter().map(mean).collect()
     }
 
-    fn per_block(
-        &self,
-        response: &Response,
-        sums: impl Fn(&Array2<f32>) -> Vec<f64> + Sync,
-    ) -> Vec<f64> {
-        let table: Vec<f32> = (0..=LEVEL_MAX as usize)
-            .map(|level| response.linear(level as f32 / LEVEL_MAX))
-            .collect();
+    fn per_block(&self, response: &Response, sums: impl Fn(&Array2<f32>) -> Vec<f64> + Sync) -> Vec<f64> {
+        let table: Vec<f32> =
+            (0..=LEVEL_MAX as usize).map(|level| response.linear(level as f32 / LEVEL_MAX)).collect();
         let scored = |block: &Block| sums(&block.errors_rad(&table, &self.partner));
         let parts: Vec<Vec<f64>> = self.blocks.par_iter().map(scored).collect();
         let add = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(b).map(|(x, y)| x + y).collect();
@@ -83,8 +78,7 @@ impl Block {
     fn new(traces: &[Trace<'_>]) -> Self {
         let level = |value: f32| (value * LEVEL_MAX).round() as u16;
         let shape = (traces[0].steps.len(), traces.len());
-        let unit =
-            |t: &Trace<'_>, part: usize| t.harmonic[part] / t.harmonic[0].hypot(t.harmonic[1]);
+        let unit = |t: &Trace<'_>, part: usize| t.harmonic[part] / t.harmonic[0].hypot(t.harmonic[1]);
         Self {
             levels: Array2::from_shape_fn(shape, |(s, p)| level(traces[p].steps[s])),
             cos: traces.iter().map(|t| unit(t, 0)).collect(),
@@ -107,15 +101,11 @@ impl Block {
             }
             let (sin, cos) = (TAU * s as f64 / steps as f64).sin_cos();
             let (sin, cos) = (sin as f32, cos as f32);
-            Zip::from(&mut row)
-                .and(light.row(s))
-                .and(&self.cos)
-                .and(&self.sin)
-                .for_each(|e, &d, &c, &s| {
-                    // (d - i e) exp(-i Phi) exp(-2 pi i s / N), with e the partner
-                    let (re, im) = (d * c - *e * s, -*e * c - d * s);
-                    *e = atan2(im * cos - re * sin, re * cos + im * sin);
-                });
+            Zip::from(&mut row).and(light.row(s)).and(&self.cos).and(&self.sin).for_each(|e, &d, &c, &s| {
+                // (d - i e) exp(-i Phi) exp(-2 pi i s / N), with e the partner
+                let (re, im) = (d * c - *e * s, -*e * c - d * s);
+                *e = atan2(im * cos - re * sin, re * cos + im * sin);
+            });
         }
         errors
     }
@@ -144,11 +134,7 @@ fn quarter_period_later(steps: usize) -> Array2<f32> {
     Array2::from_shape_fn((steps, steps), |(s, t)| {
         let x = s as f64 + n / 4.0 - t as f64;
         let weight = (1.0 + (1..=steps / 2).map(|k| wave(k, x)).sum::<f64>()) / n;
-        if weight.abs() < 1e-9 {
-            0.0
-        } else {
-            weight as f32
-        }
+        if weight.abs() < 1e-9 { 0.0 } else { weight as f32 }
     })
 }
 
@@ -170,10 +156,7 @@ mod tests {
             let traces: Vec<_> = phases
                 .iter()
                 .zip(&values)
-                .map(|(&p, v)| Trace {
-                    steps: v.view(),
-                    harmonic: [p.cos() as f32, p.sin() as f32],
-                })
+                .map(|(&p, v)| Trace { steps: v.view(), harmonic: [p.cos() as f32, p.sin() as f32] })
                 .collect();
             let samples = Samples::new(&traces);
             let rms = samples.rms_rad(&Response::default());

@@ -45,10 +45,7 @@ pub(super) fn select<'a>(stacks: &'a [ArrayView3<'a, f32>]) -> Result<Vec<Trace<
         .zip(&marks)
         .flat_map(|(stack, marks)| marks.indexed_iter().map(move |at| (stack, at)))
         .filter_map(|(stack, ((y, x), mark))| match mark {
-            Mark::Usable(harmonic) => Some(Trace {
-                steps: stack.slice(s![.., y, x]),
-                harmonic: *harmonic,
-            }),
+            Mark::Usable(harmonic) => Some(Trace { steps: stack.slice(s![.., y, x]), harmonic: *harmonic }),
             _ => None,
         })
         .collect();
@@ -119,27 +116,15 @@ fn check_enough(marks: &[Array2<Mark>], usable: usize) -> Result<()> {
         return Ok(());
     }
     let reasons = [
-        (
-            count(|m| matches!(m, Mark::Saturated)),
-            "saturated or beside it (shorten the exposure)",
-        ),
-        (
-            count(|m| matches!(m, Mark::Dark)),
-            "too dark (lengthen the exposure)",
-        ),
+        (count(|m| matches!(m, Mark::Saturated)), "saturated or beside it (shorten the exposure)"),
+        (count(|m| matches!(m, Mark::Dark)), "too dark (lengthen the exposure)"),
         (
             count(|m| matches!(m, Mark::Flat)),
             "lit but without fringes (check that the projector shows them, in focus, and dim the room)",
         ),
-        (
-            disordered,
-            "not sinusoidal over the steps (check the order of the images)",
-        ),
+        (disordered, "not sinusoidal over the steps (check the order of the images)"),
     ];
-    let listed = reasons
-        .iter()
-        .filter(|(n, _)| *n > 0)
-        .map(|(n, why)| format!("{n} {why}"));
+    let listed = reasons.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{n} {why}"));
     let found = format!("{usable}; {}", listed.collect::<Vec<_>>().join(", "));
     let expected = format!(
         "at least {PIXELS_MIN} pixels with a fringe amplitude above {MODULATION_MIN} of full scale and no step above {BRIGHT_MAX:.2}"

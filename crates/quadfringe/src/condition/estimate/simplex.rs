@@ -17,11 +17,7 @@ pub(super) fn minimise<const D: usize>(
     descend(first.0, step, &cost)
 }
 
-fn descend<const D: usize>(
-    start: [f64; D],
-    step: [f64; D],
-    cost: &impl Fn([f64; D]) -> f64,
-) -> Corner<D> {
+fn descend<const D: usize>(start: [f64; D], step: [f64; D], cost: &impl Fn([f64; D]) -> f64) -> Corner<D> {
     let corner = |point: [f64; D]| (point, cost(point));
     let mut simplex = vec![corner(start)];
     for axis in 0..D {
@@ -56,19 +52,11 @@ fn replacement<const D: usize>(
     let worst = simplex[D];
     let centre: [f64; D] =
         std::array::from_fn(|i| simplex[..D].iter().map(|c| c.0[i]).sum::<f64>() / D as f64);
-    let at = |t: f64| {
-        corner(std::array::from_fn(|i| {
-            centre[i] + t * (worst.0[i] - centre[i])
-        }))
-    };
+    let at = |t: f64| corner(std::array::from_fn(|i| centre[i] + t * (worst.0[i] - centre[i])));
     let reflected = at(-1.0);
     if reflected.1 < simplex[0].1 {
         let expanded = at(-2.0);
-        return Some(if expanded.1 < reflected.1 {
-            expanded
-        } else {
-            reflected
-        });
+        return Some(if expanded.1 < reflected.1 { expanded } else { reflected });
     }
     if reflected.1 < simplex[D - 1].1 {
         return Some(reflected);
@@ -79,8 +67,7 @@ fn replacement<const D: usize>(
 
 fn size<const D: usize>(simplex: &[Corner<D>], step: &[f64; D]) -> f64 {
     let best = simplex[0].0;
-    let reach =
-        |c: &Corner<D>| (0..D).fold(0.0f64, |m, i| m.max(((c.0[i] - best[i]) / step[i]).abs()));
+    let reach = |c: &Corner<D>| (0..D).fold(0.0f64, |m, i| m.max(((c.0[i] - best[i]) / step[i]).abs()));
     simplex[1..].iter().map(reach).fold(0.0, f64::max)
 }
 
@@ -92,10 +79,7 @@ mod tests {
     fn a_curved_valley_is_followed_to_its_end() {
         let banana = |[x, y]: [f64; 2]| (1.0 - x).powi(2) + 100.0 * (y - x * x).powi(2);
         let ([x, y], cost) = minimise([-1.2, 1.0], [0.1, 0.1], banana);
-        assert!(
-            (x - 1.0).abs() < 1e-2 && (y - 1.0).abs() < 2e-2 && cost < 1e-4,
-            "{x} {y} {cost}"
-        );
+        assert!((x - 1.0).abs() < 1e-2 && (y - 1.0).abs() < 2e-2 && cost < 1e-4, "{x} {y} {cost}");
     }
 
     #[test]

@@ -30,11 +30,7 @@ fn gamma_is_found_for_any_number_of_steps() {
     for steps in [5, 6, 7, 8, 10, 12, 13, 16] {
         let found = estimate(&capture(steps, 0.0, |v| v.powf(2.2)));
         // Rounding flattens the dark stripes, whose valleys are half a grey value high.
-        let Response {
-            offset,
-            exponent,
-            knee,
-        } = found.response;
+        let Response { offset, exponent, knee } = found.response;
         assert!((exponent - 1.0 / 2.2).abs() < 0.035, "{steps} {found:?}");
         assert!(offset < 0.01 && knee == 0.0, "{steps} {found:?}");
         assert!(found.two_step_rms_before_rad > 0.15, "{steps} {found:?}");
@@ -54,35 +50,19 @@ fn linear_and_opposite_curves_are_found() {
 #[test]
 fn noise_and_ambient_light_are_survived() {
     let noisy = estimate(&capture(12, 0.01, |v| v.powf(2.2)));
-    assert!(
-        (noisy.response.exponent * 2.2 - 1.0).abs() < 0.2,
-        "{noisy:?}"
-    );
+    assert!((noisy.response.exponent * 2.2 - 1.0).abs() < 0.2, "{noisy:?}");
     let ambient = estimate(&capture(12, 0.004, |v| 0.03 + 0.95 * v.powf(2.2)));
-    assert!(
-        (ambient.response.exponent * 2.2 - 1.0).abs() < 0.3,
-        "{ambient:?}"
-    );
+    assert!((ambient.response.exponent * 2.2 - 1.0).abs() < 0.3, "{ambient:?}");
     let hard = estimate(&capture(12, 0.03, |v| v.powf(2.2)));
-    assert!(
-        hard.two_step_rms_after_rad < hard.two_step_rms_before_rad,
-        "{hard:?}"
-    );
+    assert!(hard.two_step_rms_after_rad < hard.two_step_rms_before_rad, "{hard:?}");
     for found in [noisy, ambient] {
-        assert!(
-            found.two_step_rms_after_rad < 0.6 * found.two_step_rms_before_rad,
-            "{found:?}"
-        );
+        assert!(found.two_step_rms_after_rad < 0.6 * found.two_step_rms_before_rad, "{found:?}");
     }
 }
 
 #[test]
 fn a_knee_is_found_and_undone() {
-    let truth = Response {
-        offset: 0.0,
-        exponent: 0.5,
-        knee: 0.6,
-    };
+    let truth = Response { offset: 0.0, exponent: 0.5, knee: 0.6 };
     let captured = |linear: f64| {
         let (mut low, mut high) = (0.0f32, 1.0f32);
         for _ in 0..30 {
@@ -96,10 +76,7 @@ fn a_knee_is_found_and_undone() {
     stack.mapv_inplace(|v| captured(f64::from(v) * 1.1) as f32);
     let found = estimate(&stack);
     assert!((found.response.knee - truth.knee).abs() < 0.1, "{found:?}");
-    assert!(
-        (found.response.exponent - truth.exponent).abs() < 0.05,
-        "{found:?}"
-    );
+    assert!((found.response.exponent - truth.exponent).abs() < 0.05, "{found:?}");
 }
 
 #[test]
@@ -115,10 +92,7 @@ fn stacks_are_pooled() {
 fn the_number_of_threads_changes_nothing() {
     let stack = capture(12, 0.01, |v| v.powf(2.2));
     let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .unwrap();
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| estimate(&stack))
     };
     assert_eq!(on(1), on(3));
@@ -132,12 +106,7 @@ fn unusable_stacks_are_named() {
     assert!(message(&good.mapv(|v| 0.4 + 0.01 * v)).contains("without fringes"));
     assert!(message(&good.mapv(|v| v * 255.0)).contains("divide 8 bit by 255"));
     assert!(message(&good.slice(s![..4, .., ..]).to_owned()).contains("at least 5"));
-    assert!(
-        estimate_response(&[])
-            .unwrap_err()
-            .to_string()
-            .contains("none")
-    );
+    assert!(estimate_response(&[]).unwrap_err().to_string().contains("none"));
     let small = good.slice(s![.., .., ..40]);
     let error = estimate_response(&[good.view(), small]).unwrap_err();
     assert!(error.to_string().contains("stack 1"), "{error}");
@@ -157,9 +126,6 @@ fn images_out_of_order_are_noticed() {
         [7, 2, 9, 0, 11, 4, 1, 10, 3, 8, 5, 6],
     ] {
         let text = message(&good.select(ndarray::Axis(0), &order));
-        assert!(
-            text.contains("order of their phase steps"),
-            "{order:?} {text}"
-        );
+        assert!(text.contains("order of their phase steps"), "{order:?} {text}");
     }
 }

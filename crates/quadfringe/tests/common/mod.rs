@@ -1,0 +1,120 @@
+//! A shot on the virtual bench and its decoding, scored against the truth.
+
+use quadfringe::height::Triangulator;
+use quadfringe::rig::{Bench, BitDepth, Cast, Light, Planes, RenderOptions};
+use quadfringe::surface::scene;
+use quadfringe::{Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot};
+use std::f32::consts::PI;
+
+/// The reference bench with a camera of fewer pixels over the same field.
+pub fn bench(shrink: usize) -> Bench {
+    let whole = Bench::reference();
+    let (width, height) = (whole.camera.width / shrink, whole.camera.height / shrink);
+    let focal = whole.camera.focal_px.map(|f| f / shrink as f64);
+    let centre = [width, height].map(|n| 0.5 * (n as f64 - 1.0));
+    let camera = Device::pinhole(width, height, focal, centre).expect("valid camera");
+    Bench { camera, ..whole }
+}
+
+/// Without noise and nearly without rounding.
+pub fn clean() -> RenderOptions {
+    RenderOptions { bit_depth: BitDepth::Sixteen, ..RenderOptions::default() }
+}
+
+/// As hard as the published test: Gaussian noise of 3 % of full scale, then 8 bit.
+pub fn noisy(seed: u64) -> RenderOptions {
+    RenderOptions { noise: 0.03, seed, ..RenderOptions::default() }
+}
+
+pub fn code() -> FringeCode {
+    FringeCode::optimum(36, 912).expect("valid code")
+}
+
+pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> {
+    match planes {
+        Planes::U8(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
+        Planes::U16(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
+        Planes::F32(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
+    }
+}
+
+/// Render a cast scene and decode it to millimetres.
+pub fn there_and_back(
+    bench: &Bench,
+    cast: &Cast,
+    code: &FringeCode,
+    render: &RenderOptions,
+    method: Method,
+) -> Decoded {
+    let work = || -> std::result::Result<Decoded, Error> {
+        let planes = bench.render(cast, &Light::shot(code), render)?;
+        let (rows, columns) = planes.shape();
+        let options = Options { method, ..Options::default() };
+        let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
+        let mut decoder = Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), options)?
+            .triangulate_with(triangulator)?;
+        decode_planes(&mut decoder, &planes)
+    };
+    work().expect("a valid scene")
+}
+
+pub fn cast_scene(bench: &Bench, name: &str) -> Cast {
+    bench.cast(scene(name, 0.0).expect("known scene").as_ref())
+}
+
+/// What a decoded shot is worth.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Score {
+    /// Lit pixels.
+    pub lit: usize,
+    /// Pixels returned, lit or not.
+    pub returned: usize,
+    /// Of these, pixels with another order than the truth, or without any light.
+    pub wrong: usize,
+    /// Of these, pixels in shadow.
+    pub in_shadow: usize,
+    /// Over right pixels away from edges.
+    pub phase_rms_rad: f64,
+    /// Over right pixels away from edges.
+    pub depth_rms_mm: f64,
+    /// How many those are.
+    pub smooth: usize,
+}
+
+impl Score {
+    pub fn wrong_share(&self) -> f64 {
+        self.wrong as f64 / self.returned.max(1) as f64
+    }
+
+    pub fn returned_share(&self) -> f64 {
+        self.returned as f64 / self.lit.max(1) as f64
+    }
+}
+
+/// Judge a decoded shot; smooth parts are more than `far_px` away from any edge.
+pub fn score(decoded: &Decoded, cast: &Cast, code: &FringeCode, far_px: f32) -> Score {
+    let (truth, edge) = (cast.phase_rad(code), cast.edge_distance_px());
+    let (depth, shadow) = (cast.depth_mm(), cast.shadow());
+    let xyz = decoded.xyz_mm.as_ref().expect("calibrated");
+    let mut score = Score::default();
+    let (mut phase_sum, mut depth_sum) = (0.0, 0.0);
+    for (at, &phase) in decoded.phase_rad.indexed_iter() {
+        score.lit += usize::from(truth[at].is_finite());
+        if !phase.is_finite() {
+            continue;
+        }
+        score.returned += 1;
+        score.in_shadow += usize::from(shadow[at]);
+        let error = phase - truth[at];
+        if error.is_nan() || error.abs() >= PI {
+            score.wrong += 1;
+        } else if edge[at] > far_px {
+            score.smooth += 1;
+            phase_sum += f64::from(error).powi(2);
+            depth_sum += f64::from(xyz[[at.0, at.1, 2]] - depth[at]).powi(2);
+        }
+    }
+    let root = |sum: f64| (sum / score.smooth.max(1) as f64).sqrt();
+    (score.phase_rms_rad, score.depth_rms_mm) = (root(phase_sum), root(depth_sum));
+    score
+}
