@@ -78,7 +78,7 @@ impl Best {
 
         // 3. Fringe orders: by beats from windows, then with what every pixel sees itself (S4).
         self.nodes.by_beats(&scene, fit.beats(), &self.modulation, &mut self.phase);
-        let fringes = self.joint.fringes(&scene, &self.maps.albedo, &self.phase);
+        let fringes = self.joint.fringes(&scene, &self.maps.albedo, &self.phase, |_| true);
         self.nodes.by_cosines(&scene, &fringes, &mut self.phase);
 
         // 4. All four channels measure the same column.
@@ -89,7 +89,7 @@ impl Best {
             phase: &self.phase,
             modulation: &self.modulation,
             misfit: &self.joint.misfit,
-            noise,
+            window: &window,
             nodes: &self.nodes,
             quality_min: options.quality_min,
         };

@@ -3,11 +3,9 @@
 use super::islands::{mark_seams, remove_islands, remove_slivers};
 use super::nodes::Nodes;
 use crate::demod::scene::{RowMaps, Scene};
+use crate::demod::window::Window;
 use rayon::prelude::*;
 
-/// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
-const NOISE_MAX: f32 = 1.5;
-const MISFIT_MAX: f32 = 0.2;
 /// Greatest square of a pixel's own misfit, in units of what its neighbours may have on average.
 const OWN_MISFIT_MAX: f32 = 3.0;
 /// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
@@ -21,7 +19,7 @@ pub(super) struct Findings<'a> {
     pub modulation: &'a [f32],
     /// Mean square misfit of the four channels.
     pub misfit: &'a [f32],
-    pub noise: f32,
+    pub window: &'a Window<'a>,
     pub nodes: &'a Nodes,
     pub quality_min: f32,
 }
@@ -85,8 +83,7 @@ impl Findings<'_> {
         agrees.clear();
         agrees.extend((0..width).map(|x| {
             let sum = sums[x.saturating_sub(1)] + sums[x] + sums[(x + 1).min(width - 1)];
-            let modulation = self.modulation[y * width + x];
-            let most = (NOISE_MAX * self.noise).powi(2) + (MISFIT_MAX * modulation).powi(2);
+            let most = self.window.tolerance(y * width + x);
             sum <= 9.0 * most && self.misfit[y * width + x] <= OWN_MISFIT_MAX * most
         }));
     }

@@ -57,8 +57,9 @@ impl Joint {
         for map in [&mut self.numerator, &mut self.denominator, &mut self.next, &mut self.misfit] {
             map.resize(phase.len(), 0.0);
         }
+        self.misfit.fill(0.0);
         for _ in 0..ROUNDS {
-            let channels = self.fringes(scene, albedo, phase);
+            let channels = self.fringes(scene, albedo, phase, |at| self.misfit[at] <= window.tolerance(at));
             self.update_albedo(scene, &channels, albedo, phase);
             self.linearise(scene, &channels, albedo, phase);
             window.step(phase, &self.numerator, &self.denominator, &mut self.next);
@@ -67,11 +68,20 @@ impl Joint {
     }
 
     /// Background and modulation of every channel, intensities divided by the albedo and weighted by its square, as
-    /// additive noise asks for.
-    pub fn fringes(&self, scene: &Scene<'_>, albedo: &[f32], phase: &[f32]) -> [Fringes; 4] {
+    /// additive noise asks for; pixels that are not `sound` take no part.
+    pub fn fringes(
+        &self,
+        scene: &Scene<'_>,
+        albedo: &[f32],
+        phase: &[f32],
+        sound: impl Fn(usize) -> bool + Sync,
+    ) -> [Fringes; 4] {
         let sums = scene.window_sums::<SUMS>(WINDOW, |light, at| {
             let rho = albedo[at];
             let mut sums = [0.0; SUMS];
+            if !sound(at) {
+                return sums;
+            }
             sums[0] = rho * rho;
             for c in 0..4 {
                 let (_, e) = self.carrier(c, phase[at]);
@@ -142,7 +152,9 @@ impl Joint {
                 row.start(width);
                 let at = y * width..(y + 1) * width;
                 let (phase, albedo) = (&phase[at.clone()], &albedo[at]);
-                [&mut *numerator, &mut *denominator, &mut *misfit].map(|map| map.fill(0.0));
+                for map in [&mut *numerator, &mut *denominator, &mut *misfit] {
+                    map.fill(0.0);
+                }
                 for (c, light) in scene.rows(y).into_iter().enumerate() {
                     row.model(self, scene, &channels[c], c, y, phase);
                     for x in 0..width {

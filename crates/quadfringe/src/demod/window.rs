@@ -14,6 +14,9 @@ const WIDTH: f32 = 0.08;
 const REACH_SIGMAS: f32 = 7.0;
 /// The same for a capture without noise.
 const REACH_RAD: f32 = 0.06;
+/// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
+const NOISE_MAX: f32 = 1.5;
+const MISFIT_MAX: f32 = 0.2;
 /// One pixel in so many is asked for the noise.
 const NOISE_STRIDE: usize = 7;
 
@@ -61,6 +64,11 @@ impl<'a> Window<'a> {
     pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
         let sigma = (WIDTH * scene.period_px as f32).clamp(0.8, 4.0);
         Self { scene, slopes, modulation, radius: (2.0 * sigma).ceil() as isize, sigma, noise }
+    }
+
+    /// Greatest mean square misfit of the four channels that the noise and an imperfect model of a pixel explain.
+    pub fn tolerance(&self, at: usize) -> f32 {
+        (NOISE_MAX * self.noise).powi(2) + (MISFIT_MAX * self.modulation[at]).powi(2)
     }
 
     /// The phase, smoothed.

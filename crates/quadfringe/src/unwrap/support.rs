@@ -5,8 +5,11 @@
 //! (Hirschmueller, IEEE TPAMI 30, 328 (2008)), with one change: where the wrapped phase jumps by a turn the order
 //! changes for free, and only a change of the surface costs.
 
+mod path;
+
 use crate::FringeCode;
 use ndarray::{Array3, ArrayViewMut2, Axis};
+use path::Path;
 use rayon::prelude::*;
 
 /// Misfit (sum of squared beat errors over 2) beyond which evidence says nothing more: 0.1, both beats 0.3 rad off.
@@ -17,8 +20,6 @@ const JUMP: i16 = 30 * CUT;
 const STEP: i16 = JUMP / 2;
 /// Labels are padded to whole vectors.
 const LANES: usize = 16;
-/// Room beside the labels, so that shifted reads stay inside.
-const PAD: usize = 8;
 /// A label outside the field.
 const NEVER: i16 = 16000;
 /// Columns that one task sweeps vertically.
@@ -240,80 +241,4 @@ fn least(sums: &[u16]) -> (usize, u16) {
         }
     }
     (best, second - first)
-}
-
-/// Aggregated costs of the last node of one path.
-struct Path {
-    previous: Vec<i16>,
-    current: Vec<i16>,
-    own: Vec<i16>,
-    least: i16,
-    phase: u16,
-    labels: usize,
-}
-
-impl Path {
-    fn new(labels: usize) -> Self {
-        let mut path = Self {
-            previous: vec![NEVER; labels + 2 * PAD],
-            current: vec![NEVER; labels + 2 * PAD],
-            own: vec![0; labels],
-            least: 0,
-            phase: 0,
-            labels,
-        };
-        path.restart();
-        path
-    }
-
-    fn restart(&mut self) {
-        self.least = 0;
-        self.previous[PAD..PAD + self.labels].fill(0);
-    }
-
-    /// One node further; its aggregated costs replace or join `sums`.
-    #[inline]
-    fn advance(&mut self, support: &Support, node: &Evidence, sums: &mut [u16], first: bool) {
-        if !node.lit {
-            self.restart();
-            if first {
-                sums.fill(0);
-            }
-            return;
-        }
-        support.costs(node, &mut self.own);
-        let step = i32::from(node.phase) - i32::from(self.phase);
-        // A wrapped phase that jumps up by more than half a turn has come from the order above.
-        let shift = if step > 32768 {
-            1
-        } else if step < -32768 {
-            -1isize
-        } else {
-            0
-        };
-        let at = (PAD as isize + shift) as usize;
-        let n = self.labels;
-        let same = &self.previous[at..at + n];
-        let below = &self.previous[at - 1..at - 1 + n];
-        let above = &self.previous[at + 1..at + 1 + n];
-        let limit = self.least.saturating_add(JUMP);
-        let mut least = i16::MAX;
-        let target = &mut self.current[PAD..PAD + n];
-        for k in 0..n {
-            let neighbour = below[k].min(above[k]).saturating_add(STEP);
-            let best = same[k].min(neighbour).min(limit);
-            let value = self.own[k].saturating_add(best - self.least);
-            target[k] = value;
-            least = least.min(value);
-        }
-        self.least = least;
-        self.phase = node.phase;
-        let values = &self.current[PAD..PAD + n];
-        if first {
-            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = v as u16);
-        } else {
-            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = s.saturating_add(v as u16));
-        }
-        std::mem::swap(&mut self.previous, &mut self.current);
-    }
 }

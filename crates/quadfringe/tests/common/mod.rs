@@ -1,10 +1,24 @@
 //! A shot on the virtual bench and its decoding, scored against the truth.
 
+#![allow(dead_code)] // each test uses its part
+
+use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, BitDepth, Cast, Light, Planes, RenderOptions};
 use quadfringe::surface::scene;
 use quadfringe::{Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot};
 use std::f32::consts::PI;
+
+/// So many random cases, the same in every run.
+pub fn cases(count: u32) -> ProptestConfig {
+    ProptestConfig {
+        cases: count,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(20_260_101),
+        max_shrink_iters: 64,
+        ..ProptestConfig::default()
+    }
+}
 
 /// The reference bench with a camera of fewer pixels over the same field.
 pub fn bench(shrink: usize) -> Bench {

@@ -1,0 +1,166 @@
+//! Bad input is an error that says what was expected, what came and what to do; bad light is no data.
+
+mod common;
+
+use common::{bench, cast_scene, code, decode_planes, noisy};
+use ndarray::{Array2, Array3};
+use quadfringe::rig::{Light, Planes};
+use quadfringe::{
+    Conditioner, Decoded, Decoder, Device, FringeCode, Method, Options, Response, Shot, condition, demod,
+    unwrap,
+};
+
+type Four = [Array2<u8>; 4];
+
+fn message<T>(result: quadfringe::Result<T>) -> String {
+    match result {
+        Ok(_) => panic!("this must be refused"),
+        Err(error) => error.to_string(),
+    }
+}
+
+fn assert_says<T>(result: quadfringe::Result<T>, parts: &[&str]) {
+    let text = message(result);
+    for part in parts {
+        assert!(text.contains(part), "{part:?} is not in {text:?}");
+    }
+}
+
+fn decoder(method: Method) -> Decoder {
+    let options = Options { method, ..Options::default() };
+    Decoder::new(code(), [384, 512], &Conditioner::default(), options).expect("valid plan")
+}
+
+fn shot_of_steps() -> Four {
+    let bench = bench(2);
+    let cast = cast_scene(&bench, "steps");
+    let planes = bench.render(&cast, &Light::shot(&code()), &noisy(2));
+    match planes.expect("valid scene") {
+        Planes::U8(planes) => planes,
+        other => panic!("expected 8 bit, got {other:?}"),
+    }
+}
+
+fn returned(decoded: &Decoded) -> f64 {
+    let count = decoded.phase_rad.iter().filter(|p| p.is_finite()).count();
+    count as f64 / decoded.phase_rad.len() as f64
+}
+
+fn decode(method: Method, images: Four) -> Decoded {
+    decode_planes(&mut decoder(method), &Planes::U8(images)).expect("a valid shot")
+}
+
+#[test]
+fn sizes_are_named() {
+    let image = |rows, columns| Array2::<u8>::zeros((rows, columns));
+    let (whole, odd) = (image(384, 512), image(384, 511));
+    let mixed = Shot::new([whole.view(), odd.view(), whole.view(), whole.view()]);
+    assert_says(mixed, &["G image", "[384, 512]", "[384, 511]"]);
+    let small = Shot::new([odd.view(), odd.view(), odd.view(), odd.view()]).expect("one size");
+    let result = decoder(Method::Best).decode(&small);
+    assert_says(result, &["shot", "[384, 512]", "[384, 511]"]);
+    let empty = image(0, 8);
+    let none = Shot::new([empty.view(), empty.view(), empty.view(), empty.view()]);
+    assert_says(none, &["[0, 8]"]);
+    let conditioner = Conditioner::default();
+    let tiny = Decoder::new(code(), [8, 8], &conditioner, Options::default());
+    assert_says(tiny, &["[16, 16]", "[8, 8]"]);
+}
+
+#[test]
+fn values_that_are_not_finite_are_counted() {
+    let good = Array2::<f32>::zeros((20, 30));
+    let mut bad = good.clone();
+    (bad[[3, 4]], bad[[7, 1]]) = (f32::NAN, f32::INFINITY);
+    let shot = Shot::new([good.view(), good.view(), bad.view(), good.view()]);
+    assert_says(shot, &["B image", "2 values", "row 3, column 4"]);
+}
+
+#[test]
+fn codes_that_cannot_number_the_field_name_two_columns() {
+    for numbers in [[16.0, 8.0, 4.0], [30.0, 30.0, 30.0], [36.0, 18.0, 9.0]] {
+        let parts = ["cannot number", "912 columns", "look alike", "36, 35, 30"];
+        assert_says(FringeCode::new(numbers, 912), &parts);
+    }
+    assert_says(FringeCode::new([f64::NAN, 35.0, 30.0], 912), &["fringe number"]);
+    assert_says(FringeCode::new([-36.0, 35.0, 30.0], 912), &["-36"]);
+    assert_says(FringeCode::new([500.0, 35.0, 30.0], 912), &["500"]);
+    assert_says(FringeCode::optimum(35, 912), &["35"]);
+}
+
+#[test]
+fn plans_out_of_range_are_refused() {
+    let plan = |conditioner: Conditioner, options| Decoder::new(code(), [64, 64], &conditioner, options);
+    let settings = |options| plan(Conditioner::default(), options);
+    let plain = Options::default();
+    let modulation_min = f32::NAN;
+    assert_says(settings(Options { modulation_min, ..plain.clone() }), &["modulation_min", "NaN"]);
+    assert_says(settings(Options { quality_min: 1.0, ..plain.clone() }), &["quality_min"]);
+    assert_says(settings(Options { period_px: Some(1.0), ..plain.clone() }), &["period_px"]);
+    let response = [Response { exponent: -1.0, ..Response::default() }; 4];
+    let light = Conditioner { response, ..Conditioner::default() };
+    assert_says(plan(light, plain), &["exponent", "-1"]);
+}
+
+#[test]
+fn stages_refuse_maps_that_do_not_fit() {
+    let (a, b) = (Array2::<f32>::zeros((4, 8)), Array2::<f32>::zeros((4, 9)));
+    assert!(demod::two_step(a.view(), b.view()).is_err());
+    assert!(unwrap::unwrap(&code(), [a.view(), a.view(), b.view()]).is_err());
+    assert!(demod::n_step(Array3::<f32>::zeros((2, 4, 8)).view()).is_err());
+    let black = Array3::<f32>::zeros((12, 32, 32));
+    assert!(condition::estimate_response(&[black.view()]).is_err());
+    assert!(Device::pinhole(0, 8, [10.0; 2], [4.0; 2]).is_err());
+}
+
+#[test]
+fn a_blind_channel_is_no_data() {
+    for channel in 0..4 {
+        for level in [0, 255] {
+            let mut images = shot_of_steps();
+            images[channel].fill(level);
+            let found = returned(&decode(Method::Best, images));
+            assert!(found < 0.01, "channel {channel} at {level}: {found}");
+        }
+    }
+}
+
+#[test]
+fn four_equal_images_are_no_data() {
+    let [red, ..] = shot_of_steps();
+    let images = [red.clone(), red.clone(), red.clone(), red];
+    let found = returned(&decode(Method::Best, images));
+    assert!(found < 0.01, "{found}");
+}
+
+#[test]
+fn exchanged_channels_leave_little_or_no_trust() {
+    let median = |decoded: &Decoded| {
+        let quality = decoded.quality.iter().copied();
+        let mut known: Vec<f32> = quality.filter(|q| q.is_finite()).collect();
+        known.sort_by(f32::total_cmp);
+        known.get(known.len() / 2).copied().unwrap_or(0.0)
+    };
+    let sound = decode(Method::Best, shot_of_steps());
+    assert!(returned(&sound) > 0.8, "{}", returned(&sound));
+    for (first, second) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
+        let mut images = shot_of_steps();
+        images.swap(first, second);
+        let decoded = decode(Method::Best, images);
+        let (trust, least) = (median(&decoded), median(&sound));
+        println!("{first}{second}: median quality {trust}, sound {least}, returned {}", returned(&decoded));
+        assert!(trust < 0.6 * least, "{first} for {second}: {trust} {least}");
+    }
+}
+
+#[test]
+fn saturated_parts_are_no_data_and_the_rest_stays() {
+    let mut images = shot_of_steps();
+    for image in &mut images {
+        image.slice_mut(ndarray::s![100..200, 100..300]).fill(255);
+    }
+    let decoded = decode(Method::Best, images);
+    let inside = decoded.phase_rad.slice(ndarray::s![100..200, 100..300]);
+    assert!(inside.iter().all(|p| p.is_nan()));
+    assert!(returned(&decoded) > 0.7, "{}", returned(&decoded));
+}
