@@ -21,6 +21,7 @@ __all__ = [
     "check_code",
     "estimate_response",
     "fourier",
+    "linear_light",
     "n_step",
     "optimum",
     "pattern",
@@ -176,6 +177,23 @@ def pattern(
     channel: str, fringe_numbers: _Vector3, width: int, height: int, *, layout: str = "regular"
 ) -> NDArray[np.float32]:
     """Give the ideal image of channel R, G, B or IR, (height, width), linear light from 0 to 1."""
+
+def linear_light(
+    red: NDArray[Any],
+    green: NDArray[Any],
+    blue: NDArray[Any],
+    ir: NDArray[Any],
+    *,
+    full_scale: float | None = None,
+    dark: Sequence[float] | None = None,
+    response: Sequence[_Vector3] | None = None,
+    crosstalk: Sequence[Sequence[float]] | None = None,
+    ir_registration: Sequence[Sequence[float]] | None = None,
+) -> dict[str, NDArray[np.float32]]:
+    """Give red, green, blue, ir as linear light, fractions of full scale; NaN where the infrared chip sees nothing.
+
+    Images and errors as those of `Decoder.decode`.
+    """
 
 def background(image: NDArray[np.float32], period_px: float, *, kind: str | None = None) -> NDArray[np.float32]:
     """Give the background of every row; `kind` is mean_envelope (as published) or moving_mean."""

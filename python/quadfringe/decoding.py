@@ -7,7 +7,7 @@ from typing import Any
 
 from quadfringe import _core
 from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response
-from quadfringe.data import Calibration, Shape, Shot
+from quadfringe.data import Calibration, Shape, Shot, conditioning
 from quadfringe.errors import InputError
 from quadfringe.verdict import judge
 
@@ -82,7 +82,7 @@ class ShotDecoder:
             plan.fringes.numbers,
             plan.projector_width_px,
             full_scale=like.full_scale_value,
-            **_conditioning(plan),
+            **conditioning(plan.calibration, plan.response),
             **_geometry(plan.calibration),
             **plan.settings.model_dump(exclude_none=True),
         )
@@ -120,18 +120,6 @@ def _check_sizes(shot: Shot, plan: Plan) -> None:
             f"the calibration's projector has {projector.width_px} columns, "
             f"the fringes are said to cover {plan.projector_width_px}; the two must agree"
         )
-
-
-def _conditioning(plan: Plan) -> dict[str, Any]:
-    calibration = plan.calibration
-    response = plan.response or (calibration.response if calibration else None)
-    known = {
-        "response": response.rows() if response else None,
-        "dark": calibration.dark if calibration else None,
-        "crosstalk": calibration.crosstalk if calibration else None,
-        "ir_registration": calibration.ir_registration if calibration else None,
-    }
-    return {name: value for name, value in known.items() if value is not None}
 
 
 def _geometry(calibration: Calibration | None) -> dict[str, Any]:

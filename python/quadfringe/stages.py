@@ -13,8 +13,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe import _core
 from quadfringe._core import background, carrier, fourier, n_step, two_step, unwrap
-from quadfringe.data import Shot
+from quadfringe.config import Response
+from quadfringe.data import Calibration, Shot, conditioning
 from quadfringe.errors import DecodeError
 
 __all__ = ["background", "carrier", "fourier", "linear_light", "n_step", "two_step", "unwrap", "wrapped_phases"]
@@ -22,10 +24,16 @@ __all__ = ["background", "carrier", "fourier", "linear_light", "n_step", "two_st
 Map = NDArray[np.float32]
 
 
-def linear_light(shot: Shot) -> dict[str, Map]:
-    """Give the channels as fractions of full scale, (H, W) float32; the response is taken as linear."""
-    full = shot.full_scale_value
-    return {name: (image / full).astype(np.float32) for name, image in shot.channels.items()}
+def linear_light(
+    shot: Shot, calibration: Calibration | None = None, response: Response | None = None
+) -> dict[str, Map]:
+    """Give the channels as linear light, fractions of full scale, (H, W) float32 (step 1 of the chain, S1).
+
+    Dark level, response, crosstalk and registration are those of the `calibration`; `response` stands in for its
+    own. Without either, intensities are taken as linear. NaN where the infrared chip does not see the point.
+    """
+    known = conditioning(calibration, response)
+    return _core.linear_light(shot.red, shot.green, shot.blue, shot.ir, full_scale=shot.full_scale_value, **known)
 
 
 def wrapped_phases(shot: Shot, fringe_numbers: tuple[float, float, float]) -> tuple[Map, Map, Map]:

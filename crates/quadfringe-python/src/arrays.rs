@@ -7,6 +7,9 @@ use numpy::{
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
+/// The images of a shot, in the kernel's order.
+pub const CHANNELS: [&str; 4] = ["red", "green", "blue", "ir"];
+
 /// Every error of the kernel is a value that cannot be used.
 pub fn value_error(error: quadfringe::Error) -> PyErr {
     PyValueError::new_err(error.to_string())

@@ -1,6 +1,6 @@
 //! `Decoder`: one call from four images to a shape.
 
-use crate::arrays::{Images, value_error};
+use crate::arrays::{CHANNELS, Images, value_error};
 use crate::device::{Device, unknown};
 use ndarray::ArrayView2;
 use numpy::{IntoPyArray, PyReadonlyArray2};
@@ -54,13 +54,7 @@ impl Decoder {
             quality_min: quality_min.unwrap_or(plain.quality_min),
             period_px: period_px.or(plain.period_px),
         };
-        let ideal = Conditioner::default();
-        let conditioner = Conditioner {
-            dark: dark.unwrap_or(ideal.dark),
-            response: response.map_or(ideal.response, |four| four.map(response_of)),
-            crosstalk: crosstalk.unwrap_or(ideal.crosstalk),
-            ir_registration: ir_registration.unwrap_or(ideal.ir_registration),
-        };
+        let conditioner = conditioner_of(dark, response, crosstalk, ir_registration);
         let kernel = py.detach(|| {
             let decoder = quadfringe::Decoder::new(code, shape, &conditioner, options)?;
             match (&camera, &projector) {
@@ -86,8 +80,7 @@ impl Decoder {
         blue: &Bound<'py, PyAny>,
         ir: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let names = ["red", "green", "blue", "ir"];
-        let decoded = match Images::borrow(names, [red, green, blue, ir])? {
+        let decoded = match Images::borrow(CHANNELS, [red, green, blue, ir])? {
             Images::U8(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
             Images::U16(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
             Images::F32(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
@@ -128,6 +121,22 @@ fn maps_by_name(py: Python<'_>, decoded: Decoded) -> PyResult<Bound<'_, PyDict>>
         named.set_item("xyz_mm", xyz_mm.into_pyarray(py))?;
     }
     Ok(named)
+}
+
+/// What is known about the intensities; what is absent is ideal.
+pub fn conditioner_of(
+    dark: Option<[f32; 4]>,
+    response: Option<[(f32, f32, f32); 4]>,
+    crosstalk: Option<[[f64; 4]; 4]>,
+    ir_registration: Option<[[f64; 3]; 2]>,
+) -> Conditioner {
+    let ideal = Conditioner::default();
+    Conditioner {
+        dark: dark.unwrap_or(ideal.dark),
+        response: response.map_or(ideal.response, |four| four.map(response_of)),
+        crosstalk: crosstalk.unwrap_or(ideal.crosstalk),
+        ir_registration: ir_registration.unwrap_or(ideal.ir_registration),
+    }
 }
 
 fn response_of((offset, exponent, knee): (f32, f32, f32)) -> Response {

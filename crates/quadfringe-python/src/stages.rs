@@ -1,17 +1,67 @@
 //! The stages one by one, for those who teach or debug; all on (H, W) float32.
 
-use crate::arrays::{expected, value_error};
+use crate::arrays::{CHANNELS, Images, expected, value_error};
+use crate::decoder::conditioner_of;
 use crate::device::unknown;
+use ndarray::{Array2, ArrayView2};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use quadfringe::FringeCode;
+use quadfringe::condition::Sample;
 use quadfringe::demod::{self, Background, Band};
+use quadfringe::{Conditioner, FringeCode, Shot};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
 
 fn map<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2<'py, f32>> {
     expected::<f32, 2>(name, object)
+}
+
+/// The four channels as linear light, by name.
+#[pyfunction]
+#[pyo3(signature = (red, green, blue, ir, *, full_scale = None, dark = None, response = None, crosstalk = None,
+    ir_registration = None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+pub fn linear_light<'py>(
+    py: Python<'py>,
+    red: &Bound<'py, PyAny>,
+    green: &Bound<'py, PyAny>,
+    blue: &Bound<'py, PyAny>,
+    ir: &Bound<'py, PyAny>,
+    full_scale: Option<f32>,
+    dark: Option<[f32; 4]>,
+    response: Option<[(f32, f32, f32); 4]>,
+    crosstalk: Option<[[f64; 4]; 4]>,
+    ir_registration: Option<[[f64; 3]; 2]>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let conditioner = conditioner_of(dark, response, crosstalk, ir_registration);
+    let conditioner = &conditioner;
+    let planes = match Images::borrow(CHANNELS, [red, green, blue, ir])? {
+        Images::U8(four) => linearise(py, four.each_ref().map(|i| i.as_array()), full_scale, conditioner),
+        Images::U16(four) => linearise(py, four.each_ref().map(|i| i.as_array()), full_scale, conditioner),
+        Images::F32(four) => linearise(py, four.each_ref().map(|i| i.as_array()), full_scale, conditioner),
+    }?;
+    let named = PyDict::new(py);
+    for (name, plane) in CHANNELS.into_iter().zip(planes) {
+        named.set_item(name, plane.into_pyarray(py))?;
+    }
+    Ok(named)
+}
+
+fn linearise<T: Sample>(
+    py: Python<'_>,
+    planes: [ArrayView2<'_, T>; 4],
+    full_scale: Option<f32>,
+    conditioner: &Conditioner,
+) -> PyResult<[Array2<f32>; 4]> {
+    let work = || {
+        let mut shot = Shot::new(planes)?;
+        if let Some(full_scale) = full_scale {
+            shot = shot.with_full_scale(full_scale)?;
+        }
+        quadfringe::condition::linearise(&shot, conditioner)
+    };
+    py.detach(work).map_err(value_error)
 }
 
 /// Background of every row.

@@ -14,7 +14,7 @@ pub use response::Response;
 pub use sample::Sample;
 
 use crate::{Channel, Error, Result};
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2};
 
 /// Four images of one exposure in the order R, G, B, IR, all `(rows, columns)` of one type; views may be strided.
 #[derive(Debug, Clone)]
@@ -157,6 +157,30 @@ impl Conditioner {
     }
 }
 
+/// The four images as linear light, a fraction of full scale; NaN where the infrared chip does not see the point.
+///
+/// # Errors
+/// As [`Conditioner::check`].
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::{Conditioner, Shot, condition::linearise};
+/// let image = Array2::<u8>::from_elem((2, 3), 51);
+/// let [red, ..] = linearise(&Shot::new([image.view(), image.view(), image.view(), image.view()])?, &Conditioner::default())?;
+/// assert!((red[[1, 2]] - 0.2).abs() < 1e-6);
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
+pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
+    let mut plan = conditioner.plan()?;
+    plan.prepare::<T>(shot.full_scale());
+    let mut planes = [(); 4].map(|()| Array2::zeros(shot.shape()));
+    for y in 0..shot.shape()[0] {
+        let mut rows = planes.each_mut().map(|plane| plane.row_mut(y).into_slice().expect("a fresh row"));
+        plan.row(shot, y, &mut rows);
+    }
+    Ok(planes)
+}
+
 /// Gauss-Jordan with row pivoting; `None` when singular or badly conditioned.
 fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     let mut a = [[0.0; 8]; 4];
@@ -186,7 +210,6 @@ fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use ndarray::Array2;
 
     fn planes<T: Sample>(image: &Array2<T>) -> [ArrayView2<'_, T>; 4] {
         [image.view(), image.view(), image.view(), image.view()]

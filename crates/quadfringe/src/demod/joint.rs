@@ -219,3 +219,40 @@ impl Row {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::grid::Grid;
+    use super::super::window::Slopes;
+    use super::*;
+    use std::f32::consts::TAU;
+
+    #[test]
+    fn a_rippled_phase_and_an_unknown_texture_are_put_right() {
+        let (width, height, period) = (256, 64, 25.0f32);
+        let joint = Joint::new([36.0, 35.0, 30.0]);
+        let truth: Vec<f32> = (0..width * height).map(|i| 40.0 + TAU * (i % width) as f32 / period).collect();
+        let texture =
+            |i: usize| 0.7 + 0.2 * ((i / width) as f32 * 0.3).sin() * ((i % width) as f32 * 0.2).cos();
+        let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
+            let seen = |i: usize| texture(i) * (0.5 + 0.4 * joint.carrier(c, truth[i]).1);
+            (0..width * height).map(seen).collect()
+        });
+        let (grid, usable) = (Grid::new(height, width, 3), vec![true; width * height]);
+        let light = planes.each_ref().map(Vec::as_slice);
+        let scene = Scene { light, usable: &usable, width, grid: &grid, period_px: f64::from(period) };
+        let slopes = Slopes { along: vec![TAU / period; grid.cells()], down: vec![0.0; grid.cells()] };
+        let modulation = vec![0.3; width * height];
+        let window = Window::new(&scene, &slopes, &modulation, 0.003);
+        let rms = |phase: &[f32]| {
+            let square = phase.iter().zip(&truth).map(|(p, t)| (p - t).powi(2)).sum::<f32>();
+            (square / phase.len() as f32).sqrt()
+        };
+        let mut phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
+        let (mut albedo, before, mut joint) = (vec![1.0; width * height], rms(&phase), joint);
+        joint.run(&scene, &window, &mut albedo, &mut phase);
+        assert!(rms(&phase) < 0.2 * before, "{} after {before}", rms(&phase));
+        let mean = joint.misfit.iter().sum::<f32>() / phase.len() as f32;
+        assert!(mean < 1e-4, "{mean}");
+    }
+}

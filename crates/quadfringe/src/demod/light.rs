@@ -74,3 +74,46 @@ fn noise(scene: &Scene<'_>) -> f32 {
     let (_, median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
     *median / (0.6745 * 6.0)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::grid::Grid;
+    use super::*;
+    use std::f32::consts::{FRAC_PI_2, TAU};
+
+    #[test]
+    fn a_shadow_is_told_from_dark_fringes_whatever_the_ambient_light() {
+        let (width, height) = (200, 80);
+        let in_shadow = |x: usize, y: usize| (60..90).contains(&x) && (20..60).contains(&y);
+        for ambient in [0.0, 0.1, 0.3] {
+            let plane = |number: f32, shift: f32| -> Vec<f32> {
+                (0..width * height)
+                    .map(|i| (i % width, i / width))
+                    .map(|(x, y)| {
+                        let fringe = 0.25 + 0.25 * (TAU * number * x as f32 / 912.0 + shift).cos();
+                        ambient + if in_shadow(x, y) { 0.0 } else { fringe }
+                    })
+                    .collect()
+            };
+            let planes = [plane(36.0, 0.0), plane(35.0, 0.0), plane(36.0, FRAC_PI_2), plane(30.0, 0.0)];
+            let grid = Grid::new(height, width, 3);
+            let usable = vec![true; width * height];
+            let light = planes.each_ref().map(Vec::as_slice);
+            let scene = Scene { light, usable: &usable, width, grid: &grid, period_px: 25.3 };
+            let mut lit = vec![false; width * height];
+            find_light(&scene, 0.04, &mut lit);
+            for (i, lit) in lit.iter().enumerate() {
+                let (x, y) = (i % width, i / width);
+                if in_shadow(x, y) {
+                    assert!(!lit, "shadow at {x} {y}, ambient {ambient}");
+                } else if !in_shadow(x + 3, y)
+                    && !in_shadow(x.saturating_sub(3), y)
+                    && !in_shadow(x, y + 3)
+                    && !in_shadow(x, y.saturating_sub(3))
+                {
+                    assert!(*lit || (57..93).contains(&x), "light at {x} {y}, ambient {ambient}");
+                }
+            }
+        }
+    }
+}

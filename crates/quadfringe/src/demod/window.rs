@@ -178,3 +178,37 @@ pub(crate) fn noise(phase: &[f32], modulation: &[f32], width: usize) -> f32 {
     let (_, median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
     *median / (0.6745 * 6f32.sqrt())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::grid::Grid;
+    use super::*;
+
+    #[test]
+    fn noise_goes_edges_and_slopes_stay() {
+        let (width, height, slope) = (120, 60, 0.25f32);
+        let truth = |x: usize| slope * x as f32 + if x >= 60 { 1.3 } else { 0.0 };
+        let mut state = 1u32;
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let wrapped: Vec<f32> =
+            (0..width * height).map(|i| wrap(truth(i % width) + 0.02 * uniform())).collect();
+        let (grid, usable) = (Grid::new(height, width, 3), vec![true; width * height]);
+        let planes = [(); 4].map(|()| vec![0.5; width * height]);
+        let light = planes.each_ref().map(Vec::as_slice);
+        let scene = Scene { light, usable: &usable, width, grid: &grid, period_px: 25.0 };
+        let slopes = Slopes { along: vec![slope; grid.cells()], down: vec![0.0; grid.cells()] };
+        let modulation = vec![0.4; width * height];
+        let spread = noise(&wrapped, &modulation, width);
+        let mut out = vec![0.0; width * height];
+        Window::new(&scene, &slopes, &modulation, spread).smooth(&wrapped, &mut out);
+        let error = |i: usize| wrap(out[i] - truth(i % width)).abs();
+        let worst = (0..width * height).map(error).fold(0.0, f32::max);
+        assert!(worst < 0.02, "{worst}");
+        let rms =
+            ((0..width * height).map(|i| error(i).powi(2)).sum::<f32>() / (width * height) as f32).sqrt();
+        assert!(rms < 0.004, "{rms}");
+    }
+}

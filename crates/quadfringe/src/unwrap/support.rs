@@ -242,3 +242,105 @@ fn least(sums: &[u16]) -> (usize, u16) {
     }
     (best, second - first)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COLUMNS: usize = 96;
+    const ROWS: usize = 64;
+
+    /// Nodes of a surface at projector column `column(x, y)`, with the beats of a perfect shot.
+    fn nodes(code: &FringeCode, column: impl Fn(usize, usize) -> f64) -> Vec<Evidence> {
+        let turns =
+            |n: f64, u: f64| ((n * u / code.projector_width() as f64) * 65536.0).round() as i64 as u16;
+        let [n1, n2, n3] = code.numbers();
+        (0..ROWS * COLUMNS)
+            .map(|i| {
+                let u = column(i % COLUMNS, i / COLUMNS);
+                let beats = [turns(n2 - n1, u), turns(n3 - n1, u)];
+                Evidence { phase: turns(n1, u), beats, cosines: None, lit: true }
+            })
+            .collect()
+    }
+
+    fn orders(code: &FringeCode, evidence: &[Evidence]) -> SupportMaps {
+        let mut maps = SupportMaps::default();
+        Support::new(code).choose(evidence, COLUMNS, &mut Array3::zeros((0, 0, 0)), &mut maps);
+        maps
+    }
+
+    fn right(code: &FringeCode, column: f64, order: i16) -> bool {
+        order == (column / code.period_px(0)).floor() as i16
+    }
+
+    #[test]
+    fn every_order_of_a_field_and_of_a_step_is_right() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let step =
+            |x: usize, y: usize| if x < 50 { 9.3 * x as f64 + y as f64 } else { 300.2 + 5.1 * x as f64 };
+        let maps = orders(&code, &nodes(&code, step));
+        for i in 0..ROWS * COLUMNS {
+            assert!(right(&code, step(i % COLUMNS, i / COLUMNS), maps.order[i]), "{i}");
+            assert!(maps.margin[i] > 0.0 && maps.misfit[i] < 0.05);
+        }
+    }
+
+    #[test]
+    fn a_band_of_wrong_evidence_is_outvoted_and_says_so() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let column = |x: usize, _: usize| 400.0 + 1.7 * x as f64;
+        let mut evidence = nodes(&code, column);
+        for y in 20..30 {
+            for x in 40..46 {
+                let beats = &mut evidence[y * COLUMNS + x].beats;
+                *beats = beats.map(|b| b.wrapping_add(12000));
+            }
+        }
+        let maps = orders(&code, &evidence);
+        for i in 0..ROWS * COLUMNS {
+            assert!(right(&code, column(i % COLUMNS, 0), maps.order[i]), "{i}");
+        }
+        assert!(maps.misfit[25 * COLUMNS + 43] > 0.9);
+    }
+
+    #[test]
+    fn the_dark_carries_no_support() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let column = |x: usize, _: usize| 101.37 + 4.0 * x as f64;
+        let mut evidence = nodes(&code, column);
+        for (i, node) in evidence.iter_mut().enumerate() {
+            node.lit = !(40..44).contains(&(i % COLUMNS));
+            if i % COLUMNS >= 44 {
+                // Beyond the dark lies another surface, ten orders on, with beats of its own.
+                let shift =
+                    |beat: u16, n: f64| beat.wrapping_add((10.0 * n / 36.0 * 65536.0).round() as i64 as u16);
+                node.beats = [shift(node.beats[0], -1.0), shift(node.beats[1], -6.0)];
+            }
+        }
+        let maps = orders(&code, &evidence);
+        for i in 0..ROWS * COLUMNS {
+            let there =
+                column(i % COLUMNS, 0) + if i % COLUMNS >= 44 { 10.0 * code.period_px(0) } else { 0.0 };
+            assert!(!evidence[i].lit || right(&code, there, maps.order[i]), "{i}");
+            assert!(evidence[i].lit || maps.margin[i] == 0.0);
+        }
+    }
+
+    #[test]
+    fn cosines_tell_orders_that_beats_leave_open() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let column = |x: usize, y: usize| 200.37 + 2.9 * x as f64 + 0.31 * y as f64;
+        let mut evidence = nodes(&code, column);
+        for (i, node) in evidence.iter_mut().enumerate() {
+            let u = column(i % COLUMNS, i / COLUMNS);
+            let seen = |n: f64| ((std::f64::consts::TAU * n * u / 912.0).cos() * 128.0) as i16;
+            node.beats = node.beats.map(|b| b.wrapping_add(30000));
+            node.cosines = Some([seen(35.0), seen(30.0)]);
+        }
+        let maps = orders(&code, &evidence);
+        let wrong =
+            (0..ROWS * COLUMNS).filter(|&i| !right(&code, column(i % COLUMNS, i / COLUMNS), maps.order[i]));
+        assert_eq!(wrong.count(), 0);
+    }
+}

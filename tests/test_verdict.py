@@ -1,0 +1,108 @@
+"""Shots that cannot be trusted are refused with their likely cause; sound ones pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+
+import quadfringe as qf
+from quadfringe.errors import DecodeError
+
+METHODS = ("best", "published")
+NAMES = ("red", "green", "blue", "ir")
+Images = dict[str, np.ndarray[Any, Any]]
+
+
+@pytest.fixture(scope="module")
+def sound(small_bench: Any) -> qf.Shot:
+    return qf.read_shot({name: small_bench / f"{name}.png" for name in NAMES})
+
+
+def plan(method: str) -> qf.Plan:
+    return qf.Plan(912, settings=qf.DecodeConfig.model_validate({"method": method}))
+
+
+def changed(shot: qf.Shot, change: Callable[[Images], Images]) -> qf.Shot:
+    images = change({name: image.copy() for name, image in shot.channels.items()})
+    return qf.Shot(*(images[name] for name in NAMES), shot.full_scale)
+
+
+def reason(shot: qf.Shot, method: str) -> str:
+    with pytest.raises(DecodeError) as caught:
+        qf.decode(shot, plan(method))
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_sound_shot_passes(sound: qf.Shot, method: str) -> None:
+    shape = qf.decode(sound, plan(method))
+    assert np.nanmedian(shape.quality) > 0.6
+    assert shape.returned.mean() > 0.8
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("pair", list(combinations(NAMES, 2)))
+def test_exchanged_channels_are_named(sound: qf.Shot, pair: tuple[str, str], method: str) -> None:
+    first, second = pair
+    swapped = changed(sound, lambda i: {**i, first: i[second], second: i[first]})
+    assert f"{first} and {second} seem to be swapped" in reason(swapped, method)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("channel", NAMES)
+@pytest.mark.parametrize(("level", "word"), [(0, "black"), (255, "saturated")])
+def test_a_blind_channel_is_named(sound: qf.Shot, channel: str, level: int, word: str, method: str) -> None:
+    blind = changed(sound, lambda i: {**i, channel: np.full_like(i[channel], level)})
+    assert f"channel {channel} is {word}" in reason(blind, method)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("level", [0, 255])
+def test_no_light_and_too_much_are_told(sound: qf.Shot, level: int, method: str) -> None:
+    flat = changed(sound, lambda i: {name: np.full_like(image, level) for name, image in i.items()})
+    told = reason(flat, method)
+    assert all(f"channel {name} is" in told for name in NAMES)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_fringes_of_another_kind_are_suspected(sound: qf.Shot, method: str) -> None:
+    same = changed(sound, lambda i: dict.fromkeys(NAMES, i["red"]))
+    noise = np.random.default_rng(4)
+    random = changed(sound, lambda i: {n: noise.integers(20, 230, m.shape, np.uint8) for n, m in i.items()})
+    grey = changed(sound, lambda i: {name: np.full_like(image, 128) for name, image in i.items()})
+    for shot in (same, random, grey):
+        assert "no shape" in reason(shot, method)
+
+
+def test_one_image_given_twice_is_refused(sound: qf.Shot) -> None:
+    twice = changed(sound, lambda i: {**i, "blue": i["red"]})
+    assert "every channel is given once" in reason(twice, "best")
+
+
+def test_other_fringe_numbers_are_suspected(sound: qf.Shot) -> None:
+    with pytest.raises(DecodeError, match="fringe numbers"):
+        qf.decode(sound, qf.Plan(912, fringes=qf.Fringes(numbers=(49.0, 48.0, 42.0))))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_later_shots_of_a_decoder_are_judged_too(sound: qf.Shot, method: str) -> None:
+    decoder = qf.ShotDecoder(sound, plan(method))
+    decoder.decode(sound)
+    swapped = changed(sound, lambda i: {**i, "green": i["ir"], "ir": i["green"]})
+    with pytest.raises(DecodeError, match="may be swapped"):
+        decoder.decode(swapped)
+
+
+def test_a_patch_of_glare_is_no_data_and_the_rest_stays(sound: qf.Shot) -> None:
+    def glare(images: Images) -> Images:
+        for image in images.values():
+            image[100:200, 100:300] = 255
+        return images
+
+    shape = qf.decode(changed(sound, glare), plan("best"))
+    assert not shape.returned[100:200, 100:300].any()
+    assert shape.returned.mean() > 0.7
