@@ -23,8 +23,8 @@ rust: $(STAMPS)/tools
 	cargo fmt --all --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets -- -D warnings
 	cargo test
-	for example in $$(find crates/quadfringe/examples -name '*.rs' -printf '%f\n' 2>/dev/null); do \
-		cargo run --release --quiet --package quadfringe --example "$${example%.rs}"; done
+	for example in crates/quadfringe/examples/*.rs; do \
+		cargo run --release --quiet --package quadfringe --example "$$(basename "$$example" .rs)"; done
 	RUSTDOCFLAGS="-D warnings" cargo doc --package quadfringe --no-deps --quiet
 
 python: $(STAMPS)/built stubs
@@ -42,6 +42,7 @@ figures: $(STAMPS)/built
 	$(BIN)/python docs/make_figures.py
 
 bench: $(STAMPS)/built
+	$(BIN)/python benches/bench_decode.py
 	$(BIN)/python benches/first_frame.py
 
 format: $(STAMPS)/tools

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import quadfringe as qf
-from quadfringe import _core
+from quadfringe import _core, stages
 from quadfringe.config import DecodeConfig
 
 CODE = ((36.0, 35.0, 30.0), 912)
@@ -65,6 +65,28 @@ def test_any_number_of_threads_gives_the_same_bits(small_bench: Any, method: str
     for other in shapes[1:]:
         for name, values in shapes[0].maps.items():
             np.testing.assert_array_equal(values, other.maps[name], err_msg=name)
+
+
+def test_linear_light_undoes_what_the_calibration_knows(images: Four) -> None:
+    red, green, blue, ir = images
+    leak = np.eye(4)
+    leak[0, 1] = 0.1
+    seen = [0.05 + np.sqrt(red + 0.1 * green), 0.05 + np.sqrt(green), 0.05 + np.sqrt(blue), 0.05 + np.sqrt(ir)]
+    found = _core.linear_light(
+        *[image.astype(np.float32) for image in seen],
+        dark=[0.05] * 4,
+        response=[(0.0, 2.0, 0.0)] * 4,
+        crosstalk=leak.tolist(),
+    )
+    assert list(found) == ["red", "green", "blue", "ir"]
+    for name, image in zip(found, images, strict=True):
+        np.testing.assert_allclose(found[name], image, atol=1e-5)
+
+
+def test_linear_light_is_a_fraction_of_full_scale(images: Four) -> None:
+    shot = qf.Shot(*eight_bit(images))
+    for name, light in stages.linear_light(shot).items():
+        np.testing.assert_allclose(light, shot.channels[name] / 255, atol=1e-6)
 
 
 def test_the_bench_gives_the_same_bits_again() -> None:

@@ -16,7 +16,7 @@ from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
 from quadfringe.images import full_scale
 
-__all__ = ["Calibration", "ResponseCalibration", "Shape", "Shot", "Truth"]
+__all__ = ["Calibration", "ResponseCalibration", "Shape", "Shot", "Truth", "conditioning"]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
@@ -62,6 +62,18 @@ class Calibration(Stored):
     response: Response | None = None
     crosstalk: Matrix4 | None = None
     ir_registration: Affine | None = None
+
+
+def conditioning(calibration: Calibration | None, response: Response | None) -> dict[str, Any]:
+    """Give what is known about the intensities as the kernel's keywords; `response` stands in for the calibration's."""
+    response = response or (calibration.response if calibration else None)
+    known = {
+        "response": response.rows() if response else None,
+        "dark": calibration.dark if calibration else None,
+        "crosstalk": calibration.crosstalk if calibration else None,
+        "ir_registration": calibration.ir_registration if calibration else None,
+    }
+    return {name: value for name, value in known.items() if value is not None}
 
 
 @dataclass(frozen=True)

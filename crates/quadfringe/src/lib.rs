@@ -77,3 +77,8 @@ pub use decode::{Decoded, Decoder, Method, Options};
 pub use error::{Error, Result};
 pub use fringe::{Channel, DmdLayout, FringeCode};
 pub use optics::Device;
+
+/// The Rust of the README is run too.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

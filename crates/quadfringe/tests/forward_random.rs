@@ -1,5 +1,7 @@
 //! The virtual bench and triangulation over random rigs and surfaces.
 
+mod common;
+
 use ndarray::Array2;
 use proptest::prelude::*;
 use quadfringe::fringe::DmdLayout;
@@ -68,7 +70,7 @@ fn any_surface() -> impl Strategy<Value = Box<dyn Surface>> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
+    #![proptest_config(common::cases(64))]
 
     #[test]
     fn project_undoes_ray(device in any_device(1024, 768), x in 0.0..1023.0f64, y in 0.0..767.0f64, t in 100.0..2000.0f64) {

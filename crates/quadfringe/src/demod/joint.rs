@@ -5,7 +5,7 @@
 //! window), albedo (per pixel) and one Gauss-Newton step of the phase (in the small window that follows the surface).
 
 use super::scene::{RowMaps, Scene, smooth_albedo};
-use super::window::Window;
+use super::window::{Reach, Window};
 use crate::Channel;
 use crate::angle::sin_cos;
 use rayon::prelude::*;
@@ -58,11 +58,12 @@ impl Joint {
             map.resize(phase.len(), 0.0);
         }
         self.misfit.fill(0.0);
-        for _ in 0..ROUNDS {
+        for round in 1..=ROUNDS {
             let channels = self.fringes(scene, albedo, phase, |at| self.misfit[at] <= window.tolerance(at));
             self.update_albedo(scene, &channels, albedo, phase);
-            self.linearise(scene, &channels, albedo, phase);
-            window.step(phase, &self.numerator, &self.denominator, &mut self.next);
+            self.linearise(scene, window, &channels, albedo, phase);
+            let reach = if round < ROUNDS { Reach::Near } else { Reach::Full };
+            window.step(phase, &self.numerator, &self.denominator, reach, &mut self.next);
             std::mem::swap(phase, &mut self.next);
         }
     }
@@ -139,7 +140,14 @@ impl Joint {
     }
 
     /// Gauss-Newton terms of every pixel with the albedo eliminated, and how far the channels are from their model.
-    fn linearise(&mut self, scene: &Scene<'_>, channels: &[Fringes; 4], albedo: &[f32], phase: &[f32]) {
+    fn linearise(
+        &mut self,
+        scene: &Scene<'_>,
+        window: &Window<'_>,
+        channels: &[Fringes; 4],
+        albedo: &[f32],
+        phase: &[f32],
+    ) {
         let width = scene.width;
         let mut maps = [&mut self.numerator, &mut self.denominator, &mut self.misfit].map(std::mem::take);
         let [numerator, denominator, misfit] = &mut maps;
@@ -171,6 +179,9 @@ impl Joint {
                 for x in 0..width {
                     let shared = row.top[x] * row.top[x] / row.bottom[x].max(1e-9);
                     denominator[x] = (denominator[x] - shared).max(0.1 * denominator[x]);
+                    if !window.is_lit(y * width + x) {
+                        (numerator[x], denominator[x]) = (0.0, 0.0);
+                    }
                 }
             });
         [self.numerator, self.denominator, self.misfit] = maps;

@@ -5,8 +5,10 @@
 
 use super::scene::{RowMaps, Scene};
 use crate::angle::{round, wrap};
+use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
+use std::ops::Range;
 
 /// Width (sigma) of the window in fringe periods.
 const WIDTH: f32 = 0.08;
@@ -44,19 +46,17 @@ struct Rows {
     along: Vec<f32>,
     down: Vec<f32>,
     sharpness: Vec<f32>,
-    weight: Vec<f32>,
-    offset: Vec<f32>,
     top: Vec<f32>,
     bottom: Vec<f32>,
 }
 
-/// One neighbour of a row: its offset, the columns that have it, and its index less the column (wrapping).
-struct Neighbour {
-    dx: f32,
-    dy: f32,
-    from: usize,
-    to: usize,
-    start: usize,
+/// How far a window reaches.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Reach {
+    /// Two pixels: enough on the way to a solution.
+    Near,
+    /// Two sigma: as far as there is anything to gain.
+    Full,
 }
 
 impl<'a> Window<'a> {
@@ -71,50 +71,46 @@ impl<'a> Window<'a> {
         (NOISE_MAX * self.noise).powi(2) + (MISFIT_MAX * self.modulation[at]).powi(2)
     }
 
+    /// Whether a pixel has light to measure by.
+    pub fn is_lit(&self, at: usize) -> bool {
+        self.modulation[at] > 0.0
+    }
+
     /// The phase, smoothed.
     pub fn smooth(&self, phase: &[f32], out: &mut [f32]) {
-        self.run(phase, out, |rows, at| {
-            let Rows { weight, offset, top, bottom, .. } = rows;
-            for x in at.from..at.to {
-                top[x] += weight[x] * offset[x];
-                bottom[x] += weight[x];
-            }
-        });
+        let weights: Vec<f32> = self.modulation.iter().map(|m| f32::from(u8::from(*m > 0.0))).collect();
+        let nothing = vec![0.0; phase.len()];
+        self.step(phase, &nothing, &weights, Reach::Full, out);
     }
 
-    /// The phase plus the ratio of two maps, each summed over the window: a Gauss-Newton step that neighbours share.
-    pub fn step(&self, phase: &[f32], numerator: &[f32], denominator: &[f32], out: &mut [f32]) {
-        self.run(phase, out, |rows, at| {
-            let Rows { weight, offset, top, bottom, .. } = rows;
-            let (numerator, denominator) = (&numerator[at.start..], &denominator[at.start..]);
-            let n = at.to - at.from;
-            let sums = top[at.from..at.to].iter_mut().zip(&mut bottom[at.from..at.to]);
-            let terms = numerator[..n].iter().zip(&denominator[..n]);
-            let seen = weight[at.from..at.to].iter().zip(&offset[at.from..at.to]);
-            for (((top, bottom), (w, d)), (num, den)) in sums.zip(seen).zip(terms) {
-                *top += w * (num + den * d);
-                *bottom += w * den;
-            }
-        });
-    }
-
-    fn run(&self, phase: &[f32], out: &mut [f32], gather: impl Fn(&mut Rows, &Neighbour) + Sync) {
+    /// Every pixel's Gauss-Newton step `numerator / denominator` added to its phase, and the sum averaged over the
+    /// window with the denominators as weights; they must be 0 in the dark.
+    pub fn step(&self, phase: &[f32], numerator: &[f32], denominator: &[f32], reach: Reach, out: &mut [f32]) {
         let width = self.scene.width;
         let height = phase.len() / width;
+        let radius = if reach == Reach::Near { 2 } else { self.radius };
         out.par_chunks_mut(width).enumerate().for_each_init(Rows::default, |rows, (y, out)| {
             self.start(y, rows);
             let here = &phase[y * width..][..width];
-            for dy in -self.radius..=self.radius {
+            for dy in -radius..=radius {
                 let Some(row) = y.checked_add_signed(dy).filter(|&r| r < height) else {
                     continue;
                 };
-                for dx in -self.radius..=self.radius {
+                for dx in -radius..=radius {
                     let from = dx.min(0).unsigned_abs().min(width);
                     let to = (width as isize - dx.max(0)).max(from as isize) as usize;
                     let start = (row * width + from).wrapping_add_signed(dx);
-                    let at = Neighbour { dx: dx as f32, dy: dy as f32, from, to, start };
-                    self.weigh(here, phase, &at, rows);
-                    gather(rows, &at);
+                    let there = start..start + (to - from);
+                    let (dx, dy) = (dx as f32, dy as f32);
+                    let neighbour = Neighbour {
+                        dx,
+                        dy,
+                        weight: (-0.5 * (dx * dx + dy * dy) / (self.sigma * self.sigma)).exp(),
+                        phase: &phase[there.clone()],
+                        numerator: &numerator[there.clone()],
+                        denominator: &denominator[there],
+                    };
+                    rows.add(&here[from..to], &neighbour, from..to);
                 }
             }
             for (x, value) in out.iter_mut().enumerate() {
@@ -125,8 +121,8 @@ impl<'a> Window<'a> {
 
     fn start(&self, y: usize, rows: &mut Rows) {
         let width = self.scene.width;
-        let Rows { maps, along, down, sharpness, weight, offset, top, bottom } = rows;
-        for row in [&mut *along, down, sharpness, weight, offset, top, bottom] {
+        let Rows { maps, along, down, sharpness, top, bottom } = rows;
+        for row in [&mut *along, down, sharpness, top, bottom] {
             row.clear();
             row.resize(width, 0.0);
         }
@@ -138,26 +134,47 @@ impl<'a> Window<'a> {
             *sharp = 1.0 / (reach * reach);
         }
     }
+}
 
-    /// Weight of one neighbour for every pixel of a row, and its phase less what the slope explains.
-    #[inline]
-    fn weigh(&self, here: &[f32], phase: &[f32], at: &Neighbour, rows: &mut Rows) {
-        let spatial = (-0.5 * (at.dx * at.dx + at.dy * at.dy) / (self.sigma * self.sigma)).exp();
-        let (from, to, n) = (at.from, at.to, at.to - at.from);
-        let there = &phase[at.start..at.start + n];
-        let lit = &self.modulation[at.start..at.start + n];
-        let here = &here[from..to];
-        let (along, down) = (&rows.along[from..to], &rows.down[from..to]);
-        let sharpness = &rows.sharpness[from..to];
-        let weight = &mut rows.weight[from..to];
-        let offset = &mut rows.offset[from..to];
-        for x in 0..n {
-            let turns = (there[x] - here[x] - along[x] * at.dx - down[x] * at.dy) * (1.0 / TAU);
-            let d = (turns - round(turns)) * TAU;
-            let fits = (1.0 - d * d * sharpness[x]).max(0.0);
-            weight[x] = if lit[x] > 0.0 { spatial * fits * fits } else { 0.0 };
-            offset[x] = d;
-        }
+/// One neighbour of a stretch of a row.
+struct Neighbour<'a> {
+    dx: f32,
+    dy: f32,
+    /// Weight for its distance.
+    weight: f32,
+    phase: &'a [f32],
+    numerator: &'a [f32],
+    denominator: &'a [f32],
+}
+
+impl Rows {
+    fn add(&mut self, here: &[f32], there: &Neighbour<'_>, at: Range<usize>) {
+        let plane = [&self.along[at.clone()], &self.down[at.clone()], &self.sharpness[at.clone()]];
+        add_neighbour(here, there, plane, &mut self.top[at.clone()], &mut self.bottom[at]);
+    }
+}
+
+/// Adds one neighbour to the sums of every pixel of a stretch, as far as it fits the plane through the pixel.
+#[multiversion(targets("x86_64+avx2"))]
+fn add_neighbour<'a>(
+    here: &[f32],
+    there: &Neighbour<'a>,
+    [along, down, sharpness]: [&[f32]; 3],
+    top: &mut [f32],
+    bottom: &mut [f32],
+) {
+    let n = here.len();
+    let (phase, numerator, denominator) = (&there.phase[..n], &there.numerator[..n], &there.denominator[..n]);
+    let (along, down, sharpness) = (&along[..n], &down[..n], &sharpness[..n]);
+    let (top, bottom) = (&mut top[..n], &mut bottom[..n]);
+    for x in 0..n {
+        let turns = (phase[x] - here[x] - along[x] * there.dx - down[x] * there.dy) * (1.0 / TAU);
+        let d = (turns - round(turns)) * TAU;
+        let miss = 1.0 - d * d * sharpness[x];
+        let fits = if miss > 0.0 { miss } else { 0.0 };
+        let weight = there.weight * fits * fits;
+        top[x] += weight * (numerator[x] + denominator[x] * d);
+        bottom[x] += weight * denominator[x];
     }
 }
 

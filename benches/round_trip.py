@@ -1,0 +1,74 @@
+"""decode(simulate(h)) without noise, and the identity of the virtual bench, as figures.
+
+    python benches/round_trip.py [--json FILE]
+
+Shots of the reference bench, 1024 x 768, 16 bit. Phase errors are over pixels more than a fringe away from edges,
+wrong orders over everything that is returned. Identity: camera and projector are the same device before a plane at
+800 mm; the captured image must be the projected one.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from bench_decode import scene_from
+
+import quadfringe as qf
+from quadfringe import _core
+
+import scoring  # isort: skip  (bench_decode makes it known)
+
+SURFACES = ("plane", "peaks", "steps", "sphere")
+FRINGE_PX = 28
+FOCAL_PX = 12.0 / 4.65e-3  # the camera of the published bench: 12 mm lens, 4.65 um pixels
+
+
+def round_trip(surface: str) -> dict[str, float]:
+    config = qf.SystemConfig(scene=qf.SceneConfig(surface=surface, bit_depth=16))
+    with qf.open(config) as scanner:
+        shot = scanner.grab()
+        shape = scanner.decode(shot)
+    scene = scene_from(shot, config)
+    lit = np.isfinite(scene.phase_rad)
+    whole = scoring.score(scene, shape.phase_rad, mask=lit)
+    smooth = scoring.score(scene, shape.phase_rad, mask=scoring.inside(scene.scored, FRINGE_PX))
+    assert whole.in_shadow_pixels is not None
+    return {
+        f"{surface}_phase_rms_rad": smooth.right_phase_rms_rad,
+        f"{surface}_wrong_pixels": whole.wrong_pixels + int(np.count_nonzero(shape.returned & ~lit)),
+        f"{surface}_in_shadow_pixels": whole.in_shadow_pixels,
+        f"{surface}_returned_percent": whole.returned_percent,
+    }
+
+
+def identity() -> float:
+    """Give the greatest difference between captured and projected images, as a share of full scale."""
+    device = _core.Device(1024, 768, (FOCAL_PX, FOCAL_PX), (511.5, 383.5))
+    bench = _core.Bench(camera=device, visible=device, infrared=device)
+    numbers, ideal = (36.0, 35.0, 30.0), {"albedo": (1.0,) * 4, "ambient": (0.0,) * 4}
+    captured = bench.render(bench.cast("plane"), numbers, bit_depth=16, **ideal)
+    names = zip(("red", "green", "blue", "ir"), ("R", "G", "B", "IR"), strict=True)
+    return max(
+        float(np.abs(captured[name] / 65535 - _core.pattern(channel, numbers, 1024, 768)).max())
+        for name, channel in names
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    options = parser.parse_args()
+    figures = {"identity_max_difference": identity()}
+    for surface in SURFACES:
+        figures |= round_trip(surface)
+    for name, value in figures.items():
+        print(f"{name:32}{value:12.5g}")
+    if options.json:
+        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()
