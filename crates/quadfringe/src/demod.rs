@@ -15,8 +15,9 @@ pub(crate) mod window;
 
 pub use background::{Background, background};
 pub(crate) use background::{Scratch as BackgroundScratch, background_row};
+pub(crate) use carrier::LineSpectrum;
 pub use carrier::{Carrier, carrier};
 pub use fourier::{Band, fourier};
-pub(crate) use fourier::{RowFilter, RowScratch};
+pub(crate) use fourier::{Half, RowFilter, RowScratch};
 pub use n_step::{NStep, n_step};
 pub use two_step::two_step;

@@ -1,6 +1,11 @@
 //! Background of a fringe image, row by row (system, section 3, step 2).
 
+mod envelope;
+mod moving_mean;
+
 use crate::{Error, Result};
+use envelope::mean_envelope;
+use moving_mean::{Sums, moving_mean};
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 
@@ -56,13 +61,12 @@ pub(crate) fn check_period(period_px: f64, columns: usize) -> Result<()> {
 /// Working memory of [`background_row`].
 #[derive(Debug, Default, Clone)]
 pub(crate) struct Scratch {
-    sums: Vec<f64>,
-    smooth: Vec<f32>,
-    middle: Vec<f32>,
-    extrema: Vec<(usize, bool)>,
+    sums: Sums,
+    envelope: envelope::Scratch,
 }
 
 /// Background of one row into `out`.
+#[inline(always)]
 pub(crate) fn background_row(
     row: &[f32],
     kind: Background,
@@ -70,92 +74,10 @@ pub(crate) fn background_row(
     scratch: &mut Scratch,
     out: &mut [f32],
 ) {
-    match kind {
-        Background::MovingMean => moving_mean(row, period_px, &mut scratch.sums, out),
-        Background::MeanEnvelope => mean_envelope(row, period_px, scratch, out),
-    }
-}
-
-/// Mean over `width` (not rounded to whole pixels), narrowing to what there is at the ends of the row, in whole
-/// periods' stead: a window that leaves the row is moved back inside.
-fn moving_mean(row: &[f32], width: f32, sums: &mut Vec<f64>, out: &mut [f32]) {
-    sums.clear();
-    sums.push(0.0);
-    let mut sum = 0.0;
-    sums.extend(row.iter().map(|&v| {
-        sum += f64::from(v);
-        sum
-    }));
-    let half = f64::from(width) / 2.0;
-    let last = row.len() as f64;
-    let integral = |at: f64| {
-        let i = (at as usize).min(row.len() - 1);
-        sums[i] + (at - i as f64) * f64::from(row[i])
-    };
-    for (x, value) in out.iter_mut().enumerate() {
-        let middle = (x as f64 + 0.5).clamp(half.min(last / 2.0), (last - half).max(last / 2.0));
-        let (from, to) = ((middle - half).max(0.0), (middle + half).min(last));
-        *value = ((integral(to) - integral(from)) / (to - from)) as f32;
-    }
-}
-
-/// Half the sum of the straight-line envelopes through maxima and minima. A row is split where it crosses its moving
-/// mean; each side of a crossing holds one extremum, found on the slightly smoothed row so that noise adds none.
-fn mean_envelope(row: &[f32], period_px: f32, scratch: &mut Scratch, out: &mut [f32]) {
-    let n = row.len();
-    scratch.smooth.resize(n, 0.0);
-    scratch.middle.resize(n, 0.0);
-    moving_mean(row, period_px / 5.0, &mut scratch.sums, &mut scratch.smooth);
-    moving_mean(row, period_px, &mut scratch.sums, &mut scratch.middle);
-    find_extrema(&scratch.smooth, &scratch.middle, (period_px / 5.0) as usize, &mut scratch.extrema);
-    out.fill(0.0);
-    for upper in [true, false] {
-        let mut knots = scratch.extrema.iter().filter(|e| e.1 == upper).map(|e| e.0).peekable();
-        if knots.peek().is_none() {
-            out.iter_mut().zip(&scratch.middle).for_each(|(o, m)| *o += 0.5 * m);
-            continue;
-        }
-        add_envelope(&scratch.smooth, knots, out);
-    }
-}
-
-/// Place and kind (true for a maximum) of one extremum a half wave; half waves shorter than `shortest` are noise.
-fn find_extrema(smooth: &[f32], middle: &[f32], shortest: usize, extrema: &mut Vec<(usize, bool)>) {
-    extrema.clear();
-    let above = |x: usize| smooth[x] > middle[x];
-    let mut start = 0;
-    for x in 1..=smooth.len() {
-        if x < smooth.len() && above(x) == above(start) {
-            continue;
-        }
-        let upper = above(start);
-        let better = |a: &usize, b: &usize| {
-            let order = smooth[*a].total_cmp(&smooth[*b]);
-            if upper { order } else { order.reverse() }
-        };
-        // A half wave cut by the end of the row has no extremum of its own.
-        let whole = start > 0 && x < smooth.len();
-        if whole && x - start > shortest {
-            extrema.extend((start..x).max_by(better).map(|at| (at, upper)));
-        }
-        start = x;
-    }
-}
-
-/// Add half of the polyline through the knots, level beyond the first and the last.
-fn add_envelope(smooth: &[f32], knots: impl Iterator<Item = usize>, out: &mut [f32]) {
-    let mut previous: Option<usize> = None;
-    for knot in knots {
-        let from = previous.unwrap_or(0);
-        let (left, right) = (smooth[previous.unwrap_or(knot)], smooth[knot]);
-        let step = 1.0 / (knot - from).max(1) as f32;
-        for x in from..knot {
-            out[x] += 0.5 * (left + (right - left) * (x - from) as f32 * step);
-        }
-        previous = Some(knot);
-    }
-    if let Some(from) = previous {
-        out[from..].iter_mut().for_each(|o| *o += 0.5 * smooth[from]);
+    let Scratch { sums, envelope } = scratch;
+    let drawn = kind == Background::MeanEnvelope && mean_envelope(row, period_px, sums, envelope, out);
+    if !drawn {
+        moving_mean(row, period_px, sums, out);
     }
 }
 

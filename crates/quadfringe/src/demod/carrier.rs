@@ -1,7 +1,9 @@
 //! The fringe period that the camera sees, estimated from the shot itself.
 
-use super::fourier::RowFilter;
-use ndarray::ArrayView2;
+use ndarray::{ArrayView1, ArrayView2};
+use realfft::{RealFftPlanner, RealToComplex};
+use rustfft::num_complex::Complex32;
+use std::sync::Arc;
 
 /// Lines that are looked at in each direction: enough to average out objects, few enough to cost nothing.
 const LINES: usize = 48;
@@ -47,21 +49,59 @@ fn line_period(image: ArrayView2<'_, f32>) -> f64 {
     if length < 4 * FEWEST {
         return f64::INFINITY;
     }
-    let filter = RowFilter::new(length);
-    let mut scratch = filter.scratch();
-    let mut power = vec![0.0f32; length / 2 + 1];
-    let window: Vec<f32> = (0..length)
-        .map(|x| (std::f32::consts::PI * (x as f32 + 0.5) / length as f32).sin().powi(2))
-        .collect();
+    let mut spectrum = LineSpectrum::new(length);
     for line in (0..lines).step_by(lines.div_ceil(LINES)) {
-        let row = image.row(line);
-        let mean = row.sum() / length as f32;
-        for ((value, &sample), weight) in scratch.input.iter_mut().zip(row).zip(&window) {
-            *value = if sample.is_finite() { (sample - mean) * weight } else { 0.0 };
-        }
-        filter.add_power(&mut scratch, &mut power);
+        spectrum.add(image.row(line));
     }
-    strongest(&power).map_or(f64::INFINITY, |cycles| length as f64 / cycles)
+    spectrum.take_period_px()
+}
+
+/// Mean power spectrum of lines of one length, planned once.
+pub(crate) struct LineSpectrum {
+    forward: Arc<dyn RealToComplex<f32>>,
+    window: Vec<f32>,
+    input: Vec<f32>,
+    spectrum: Vec<Complex32>,
+    work: Vec<Complex32>,
+    power: Vec<f32>,
+}
+
+impl LineSpectrum {
+    pub fn new(length: usize) -> Self {
+        let forward = RealFftPlanner::new().plan_fft_forward(length);
+        let bell = |x: usize| (std::f32::consts::PI * (x as f32 + 0.5) / length as f32).sin();
+        Self {
+            window: (0..length).map(|x| bell(x).powi(2)).collect(),
+            input: forward.make_input_vec(),
+            spectrum: forward.make_output_vec(),
+            work: forward.make_scratch_vec(),
+            power: vec![0.0; length / 2 + 1],
+            forward,
+        }
+    }
+
+    /// Take one more line into account; NaN counts as the mean.
+    pub fn add(&mut self, line: ArrayView1<'_, f32>) {
+        let seen = line.iter().filter(|v| v.is_finite());
+        let mean = seen.clone().sum::<f32>() / seen.count().max(1) as f32;
+        for ((value, &sample), weight) in self.input.iter_mut().zip(line).zip(&self.window) {
+            let inside = sample.is_finite();
+            *value = if inside { (sample - mean) * weight } else { 0.0 };
+        }
+        self.forward
+            .process_with_scratch(&mut self.input, &mut self.spectrum, &mut self.work)
+            .expect("buffers were made by this plan");
+        for (p, s) in self.power.iter_mut().zip(&self.spectrum) {
+            *p += s.norm_sqr();
+        }
+    }
+
+    /// Period of the strongest line of the spectrum, infinite where none stands out; forgets all lines.
+    pub fn take_period_px(&mut self) -> f64 {
+        let cycles = strongest(&self.power);
+        self.power.fill(0.0);
+        cycles.map_or(f64::INFINITY, |cycles| self.window.len() as f64 / cycles)
+    }
 }
 
 /// Centre of the strongest line in cycles, when it holds a fair share of all power above the lowest frequencies.

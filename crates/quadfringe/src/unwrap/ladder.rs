@@ -1,9 +1,13 @@
 //! Fringe orders point by point.
 
-use crate::angle::{round, wrap_positive};
+use crate::angle::{round, sin_cos, wrap_positive};
 use crate::{Error, FringeCode, Result};
-use ndarray::{Array2, ArrayView2, Zip};
+use ndarray::{Array2, ArrayView2, Axis};
+use rayon::prelude::*;
 use std::f32::consts::TAU;
+
+/// Pixels that are searched together.
+const BLOCK: usize = 64;
 
 /// Orders of one pixel at a time: the beat of the first two fringe numbers has at most one fringe over the field; it
 /// orders the beat of the first and the third, which orders the first (S4). A triple without such a beat is
@@ -56,57 +60,86 @@ impl Ladder {
     /// # Ok::<(), quadfringe::Error>(())
     /// ```
     #[must_use]
-    #[inline]
     pub fn order(&self, phases: [f32; 3]) -> Ordered {
-        let found = if self.climbs { self.climb(phases) } else { self.search(phases) };
-        let turns = found.phase_rad / TAU;
+        let [first, second, third] = phases.map(|p| [p]);
+        let (mut phase_rad, mut margin) = ([0.0], [0.0]);
+        self.order_row([&first, &second, &third], &mut phase_rad, &mut margin);
+        Ordered { phase_rad: phase_rad[0], margin: margin[0] }
+    }
+
+    /// Order a row of pixels: absolute phase and margin as in [`Ordered`]; NaN in, NaN out.
+    #[inline(always)]
+    pub(crate) fn order_row(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
+        if self.climbs {
+            self.climb(wrapped, phase, margin);
+        } else {
+            self.search(wrapped, phase, margin);
+        }
+        let Some(cycle) = self.cycle else { return };
         // Column 0 and the end of the field look alike; the field starts half a column before 0.
-        match self.cycle {
-            Some(cycle) if turns * self.columns_per_turn >= self.width - 0.5 => {
-                Ordered { phase_rad: found.phase_rad - cycle * TAU, ..found }
-            }
-            _ => found,
+        let end = (self.width - 0.5) / self.columns_per_turn * TAU;
+        for phase in phase {
+            let below = *phase - cycle * TAU;
+            *phase = if *phase >= end { below } else { *phase };
         }
     }
 
-    #[inline]
-    fn climb(&self, [first, second, third]: [f32; 3]) -> Ordered {
+    #[inline(always)]
+    fn climb(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
         let [n1, n2, n3] = self.numbers;
         let (coarse, middle) = (n1 - n2, n1 - n3);
-        let start = wrap_positive((first - second) * coarse.signum()) * coarse.signum();
-        let (beat, low) = nearest(first - third, start * (middle / coarse));
-        let (phase, high) = nearest(first, beat * (n1 / middle));
-        Ordered { phase_rad: phase, margin: low.min(high) }
+        let sign = coarse.signum();
+        let (to_middle, to_first) = (middle / coarse, n1 / middle);
+        let out = phase.iter_mut().zip(margin);
+        let seen = wrapped[0].iter().zip(wrapped[1]).zip(wrapped[2]);
+        for (((first, second), third), (phase, margin)) in seen.zip(out) {
+            let start = wrap_positive((first - second) * sign) * sign;
+            let (beat, low) = nearest(first - third, start * to_middle);
+            let (found, high) = nearest(*first, beat * to_first);
+            *phase = found;
+            *margin = if low < high { low } else { high };
+        }
     }
 
-    fn search(&self, [first, second, third]: [f32; 3]) -> Ordered {
-        let start = wrap_positive(first);
-        let ratios = [self.numbers[1] / self.numbers[0], self.numbers[2] / self.numbers[0]];
-        let cost = |order: usize| {
-            let phase = start + TAU * order as f32;
-            let miss = |ratio: f32, seen: f32| 1.0 - (phase * ratio - seen).cos();
-            miss(ratios[0], second) + miss(ratios[1], third)
-        };
-        let (mut best, mut least, mut next) = (0, f32::INFINITY, f32::INFINITY);
+    fn search(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
+        let [first, second, third] = wrapped.map(|row| row.chunks(BLOCK));
+        let out = phase.chunks_mut(BLOCK).zip(margin.chunks_mut(BLOCK));
+        for (((first, second), third), (phase, margin)) in first.zip(second).zip(third).zip(out) {
+            self.search_block([first, second, third], phase, margin);
+        }
+    }
+
+    /// Every order in turn for a block of pixels: the one with the least squared miss of the other two phasors, and how
+    /// far behind the next one is.
+    fn search_block(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
+        let [first, second, third] = wrapped;
+        let ratios = [1, 2].map(|i| self.numbers[i] / self.numbers[0]);
+        let (mut least, mut next) = ([f32::INFINITY; BLOCK], [f32::INFINITY; BLOCK]);
         for order in 0..self.orders {
-            let c = cost(order);
-            if c < least {
-                (best, next, least) = (order, least, c);
-            } else {
-                next = next.min(c);
+            for i in 0..first.len() {
+                let guess = wrap_positive(first[i]) + TAU * order as f32;
+                let miss = |ratio: f32, seen: f32| 1.0 - sin_cos(guess * ratio - seen).1;
+                let cost = miss(ratios[0], second[i]) + miss(ratios[1], third[i]);
+                let better = cost < least[i];
+                let behind = if better { least[i] } else { cost };
+                next[i] = if behind < next[i] { behind } else { next[i] };
+                least[i] = if better { cost } else { least[i] };
+                phase[i] = if better { guess } else { phase[i] };
             }
         }
-        Ordered {
-            phase_rad: start + TAU * best as f32,
-            margin: if next > 0.0 { 1.0 - (least / next).sqrt() } else { 0.0 },
+        for i in 0..first.len() {
+            let known = least[i].is_finite() && next[i] > 0.0;
+            margin[i] = if known { 1.0 - (least[i].max(0.0) / next[i]).sqrt() } else { 0.0 };
+            let seen = (first[i] + second[i] + third[i]).is_finite();
+            (phase[i], margin[i]) = if seen { (phase[i], margin[i]) } else { (f32::NAN, f32::NAN) };
         }
     }
 }
 
 /// The angle nearest to `guess` that differs from `wrapped` by whole turns, and how far the choice was from a toss-up.
-#[inline]
+#[inline(always)]
 fn nearest(wrapped: f32, guess: f32) -> (f32, f32) {
-    let turns = (guess - wrapped) / TAU;
+    let turns = (guess - wrapped) * (1.0 / TAU);
     let whole = round(turns);
     (wrapped + TAU * whole, 1.0 - 2.0 * (turns - whole).abs())
 }
@@ -140,15 +173,15 @@ pub fn unwrap(code: &FringeCode, wrapped: [ArrayView2<'_, f32>; 3]) -> Result<(A
     }
     let ladder = Ladder::new(code);
     let mut phase = Array2::from_elem(first.raw_dim(), f32::NAN);
-    let mut margin = Array2::from_elem(first.raw_dim(), f32::NAN);
-    Zip::from(&mut phase).and(&mut margin).and(first).and(second).and(third).par_for_each(
-        |p, m, &a, &b, &c| {
-            if (a + b + c).is_finite() {
-                let found = ladder.order([a, b, c]);
-                (*p, *m) = (found.phase_rad, found.margin);
-            }
-        },
-    );
+    let mut margin = phase.clone();
+    let wrapped = wrapped.map(|map| map.as_standard_layout().into_owned());
+    let rows = (phase.axis_iter_mut(Axis(0)).into_par_iter()).zip(margin.axis_iter_mut(Axis(0)));
+    rows.enumerate().for_each(|(y, (mut phase, mut margin))| {
+        let contiguous = "rows in standard layout are contiguous";
+        let [a, b, c] = wrapped.each_ref().map(|map| map.row(y).to_slice().expect(contiguous));
+        let phase = phase.as_slice_mut().expect(contiguous);
+        ladder.order_row([a, b, c], phase, margin.as_slice_mut().expect(contiguous));
+    });
     Ok((phase, margin))
 }
 

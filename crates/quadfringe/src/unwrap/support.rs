@@ -8,6 +8,7 @@
 mod path;
 
 use crate::FringeCode;
+use multiversion::multiversion;
 use ndarray::{Array3, ArrayViewMut2, Axis};
 use path::Path;
 use rayon::prelude::*;
@@ -187,18 +188,14 @@ impl Support {
         }
         let phase = f64::from(node.phase);
         let start = self.ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
-        let predictions = out.iter_mut().zip(self.offsets[0].iter().zip(&self.offsets[1]));
-        let [g, ir] = [0, 1].map(|i| node.beats[i].wrapping_sub(start[i]));
-        let beats = |p: u16, q: u16| ((beat_miss(g, p) + beat_miss(ir, q)) >> 4).min(CUT);
+        let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(start[i]));
+        let [second, third] = &self.offsets;
         match node.cosines {
-            None => predictions.for_each(|(cost, (&p, &q))| *cost = beats(p, q)),
+            None => beat_costs(beats, second, third, out),
             Some(seen) => {
-                let [second, third] = start.map(|s| s.wrapping_add(node.phase));
-                predictions.for_each(|(cost, (&p, &q))| {
-                    let miss = cosine_miss(seen[0], second.wrapping_add(p))
-                        + cosine_miss(seen[1], third.wrapping_add(q));
-                    *cost = (beats(p, q) + (miss >> 3).min(CUT)) >> 1;
-                });
+                beat_costs(beats, second, third, out);
+                let phases = start.map(|s| s.wrapping_add(node.phase));
+                join_cosine_costs(phases, seen, second, third, out);
             }
         }
         let turn = phase / 65536.0;
@@ -212,8 +209,26 @@ impl Support {
     }
 }
 
+/// Cost of every label by two beats, given what they are above those of order 0.
+#[multiversion(targets("x86_64+avx2"))]
+fn beat_costs(seen: [u16; 2], second: &[u16], third: &[u16], out: &mut [i16]) {
+    for (cost, (&p, &q)) in out.iter_mut().zip(second.iter().zip(third)) {
+        *cost = ((beat_miss(seen[0], p) + beat_miss(seen[1], q)) >> 4).min(CUT);
+    }
+}
+
+/// The mean of that and the cost by two cosines, given the phases of order 0.
+#[multiversion(targets("x86_64+avx2"))]
+fn join_cosine_costs(phases: [u16; 2], seen: [i16; 2], second: &[u16], third: &[u16], out: &mut [i16]) {
+    for (cost, (&p, &q)) in out.iter_mut().zip(second.iter().zip(third)) {
+        let miss =
+            cosine_miss(seen[0], phases[0].wrapping_add(p)) + cosine_miss(seen[1], phases[1].wrapping_add(q));
+        *cost = (*cost + (miss >> 3).min(CUT)) >> 1;
+    }
+}
+
 /// Squared distance of two beats, 127 for 45 degrees or more.
-#[inline]
+#[inline(always)]
 fn beat_miss(seen: u16, predicted: u16) -> i16 {
     let error = (seen.wrapping_sub(predicted) as i16 >> 6).unsigned_abs().min(127) as i16;
     error * error
@@ -221,7 +236,7 @@ fn beat_miss(seen: u16, predicted: u16) -> i16 {
 
 /// Squared distance of a cosine from that of a predicted phase, 128 for 1. The parabola through zeros and peaks is
 /// within 0.06 of the cosine, less than noise and albedo leave.
-#[inline]
+#[inline(always)]
 fn cosine_miss(seen: i16, predicted: u16) -> i16 {
     let from_zero = (16384 - i32::from((predicted as i16).unsigned_abs())) >> 7;
     let y = from_zero as i16;

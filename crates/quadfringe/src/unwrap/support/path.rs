@@ -1,5 +1,7 @@
 //! One sweep of semi-global matching.
 
+use multiversion::multiversion;
+
 use super::{Evidence, JUMP, NEVER, STEP, Support};
 
 /// Room beside the labels, so that shifted reads stay inside.
@@ -12,6 +14,8 @@ pub(super) struct Path {
     own: Vec<i16>,
     least: i16,
     phase: u16,
+    /// Nothing before it counts.
+    fresh: bool,
     labels: usize,
 }
 
@@ -23,6 +27,7 @@ impl Path {
             own: vec![0; labels],
             least: 0,
             phase: 0,
+            fresh: true,
             labels,
         };
         path.restart();
@@ -31,6 +36,7 @@ impl Path {
 
     pub fn restart(&mut self) {
         self.least = 0;
+        self.fresh = true;
         self.previous[PAD..PAD + self.labels].fill(0);
     }
 
@@ -45,38 +51,40 @@ impl Path {
             return;
         }
         support.costs(node, &mut self.own);
-        let step = i32::from(node.phase) - i32::from(self.phase);
         // A wrapped phase that jumps up by more than half a turn has come from the order above.
-        let shift = if step > 32768 {
-            1
-        } else if step < -32768 {
-            -1isize
-        } else {
-            0
+        let shift = match i32::from(node.phase) - i32::from(self.phase) {
+            _ if self.fresh => 0,
+            32769.. => 1,
+            ..-32768 => -1isize,
+            _ => 0,
         };
         let at = (PAD as isize + shift) as usize;
         let n = self.labels;
-        let same = &self.previous[at..at + n];
-        let below = &self.previous[at - 1..at - 1 + n];
-        let above = &self.previous[at + 1..at + 1 + n];
-        let limit = self.least.saturating_add(JUMP);
-        let mut least = i16::MAX;
+        let before = [at - 1, at, at + 1].map(|from| &self.previous[from..from + n]);
         let target = &mut self.current[PAD..PAD + n];
-        for k in 0..n {
-            let neighbour = below[k].min(above[k]).saturating_add(STEP);
-            let best = same[k].min(neighbour).min(limit);
-            let value = self.own[k].saturating_add(best - self.least);
-            target[k] = value;
-            least = least.min(value);
-        }
-        self.least = least;
-        self.phase = node.phase;
-        let values = &self.current[PAD..PAD + n];
+        let least = aggregate(before, &self.own, self.least, target);
         if first {
-            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = v as u16);
-        } else {
-            sums.iter_mut().zip(values).for_each(|(s, &v)| *s = s.saturating_add(v as u16));
+            sums.fill(0);
         }
+        sums.iter_mut().zip(&*target).for_each(|(s, &v)| *s = s.saturating_add(v as u16));
+        (self.least, self.phase, self.fresh) = (least, node.phase, false);
         std::mem::swap(&mut self.previous, &mut self.current);
     }
+}
+
+/// Own costs plus the cheapest way from the node before (its costs one label below, at, and one above); the least.
+#[multiversion(targets("x86_64+avx2"))]
+fn aggregate(before: [&[i16]; 3], own: &[i16], least_before: i16, target: &mut [i16]) -> i16 {
+    let n = target.len();
+    let [below, same, above] = before.map(|costs| &costs[..n]);
+    let own = &own[..n];
+    let limit = least_before.saturating_add(JUMP);
+    let mut least = i16::MAX;
+    for k in 0..n {
+        let neighbour = below[k].min(above[k]).saturating_add(STEP);
+        let best = same[k].min(neighbour).min(limit);
+        target[k] = own[k].saturating_add(best - least_before);
+        least = least.min(target[k]);
+    }
+    least
 }
