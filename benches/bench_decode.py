@@ -87,9 +87,9 @@ def timed(contenders: dict[str, Contender], repeats: int) -> dict[str, float]:
     return {name: float(np.median(values)) for name, values in spent.items()}
 
 
-def scene_from(shot: qf.Shot, config: qf.SystemConfig) -> scoring.Scene:
+def scene_from(shot: qf.Shot, config: qf.SystemConfig, width: int) -> scoring.Scene:
     assert shot.truth is not None
-    numbers, width = config.fringes.numbers, config.projector.width_px
+    numbers = config.fringes.numbers
     return scoring.Scene(
         name=config.scene.surface,
         red=shot.red,
@@ -125,7 +125,7 @@ def main() -> None:
                 shot, config, calibration, method=method, threads=threads
             )
     times = timed(contenders, options.repeats)
-    scene = scene_from(shot, config)
+    scene = scene_from(shot, config, calibration.projector.width_px)
 
     figures: dict[str, float] = {}
     print(f"{options.surface}, {shot.red.shape[1]} x {shot.red.shape[0]}, {shot.red.dtype}")

@@ -31,7 +31,7 @@ def round_trip(surface: str) -> dict[str, float]:
     with qf.open(config) as scanner:
         shot = scanner.grab()
         shape = scanner.decode(shot)
-    scene = scene_from(shot, config)
+    scene = scene_from(shot, config, scanner.calibration.projector.width_px)
     lit = np.isfinite(scene.phase_rad)
     whole = scoring.score(scene, shape.phase_rad, mask=lit)
     smooth = scoring.score(scene, shape.phase_rad, mask=scoring.inside(scene.scored, FRINGE_PX))

@@ -1,9 +1,7 @@
 //! NumPy arrays as the kernel sees them: borrowed, never copied; a wrong dtype is named in our own words.
 
 use numpy::ndarray::{Dim, Dimension, Ix};
-use numpy::{
-    Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods,
-};
+use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
@@ -25,9 +23,7 @@ where
     let Ok(array) = object.cast::<PyArray<T, Dim<[Ix; N]>>>() else {
         return Ok(None);
     };
-    let borrowed = array
-        .try_readonly()
-        .map_err(|error| PyValueError::new_err(error.to_string()))?;
+    let borrowed = array.try_readonly().map_err(|error| PyValueError::new_err(error.to_string()))?;
     Ok(Some(borrowed))
 }
 
@@ -88,7 +84,5 @@ fn all<'py, T: Element, const COUNT: usize>(
     for (name, object) in names.into_iter().zip(objects) {
         found.push(expected::<T, 2>(name, object)?);
     }
-    Ok(found
-        .try_into()
-        .unwrap_or_else(|_| unreachable!("one array for each name")))
+    Ok(found.try_into().unwrap_or_else(|_| unreachable!("one array for each name")))
 }

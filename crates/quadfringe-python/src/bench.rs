@@ -118,9 +118,7 @@ impl Bench {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let options = render_options(options)?;
-        let planes = py
-            .detach(|| self.0.render(&cast.0, lights, &options))
-            .map_err(value_error)?;
+        let planes = py.detach(|| self.0.render(&cast.0, lights, &options)).map_err(value_error)?;
         let images = match planes {
             Planes::U8(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
             Planes::U16(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
@@ -147,8 +145,7 @@ impl Cast {
 
     /// Column of the visible projector that lights each pixel, (H, W) float32.
     fn column_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        py.detach(|| self.0.column_px(Beam::Visible))
-            .into_pyarray(py)
+        py.detach(|| self.0.column_px(Beam::Visible)).into_pyarray(py)
     }
 
     /// Where a surface is seen that a projector does not light, (H, W) bool.
@@ -182,22 +179,15 @@ fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> 
             "camera_offset" => options.camera_offset = value.extract()?,
             "camera_exponent" => options.camera_exponent = value.extract()?,
             "bayer" => options.bayer = Some(bayer_named(value.extract()?)?),
-            "bit_depth" => {
-                options.bit_depth = BitDepth::from_bits(value.extract()?).map_err(value_error)?
-            }
+            "bit_depth" => options.bit_depth = BitDepth::from_bits(value.extract()?).map_err(value_error)?,
             "seed" => options.seed = value.extract()?,
             _ => {
-                return Err(PyTypeError::new_err(format!(
-                    "render: no option is called {name:?}"
-                )));
+                return Err(PyTypeError::new_err(format!("render: no option is called {name:?}")));
             }
         }
     }
     if let (Some(side_mm), Albedo::Uniform(albedo)) = (patch_mm, &options.albedo) {
-        options.albedo = Albedo::Patches {
-            side_mm,
-            albedo: *albedo,
-        };
+        options.albedo = Albedo::Patches { side_mm, albedo: *albedo };
     }
     Ok(options)
 }

@@ -97,10 +97,7 @@ impl Decoder {
                 shot = shot.with_full_scale(full_scale)?;
             }
             // A panic in an earlier shot leaves nothing behind that the next one does not write again.
-            self.kernel
-                .lock()
-                .unwrap_or_else(PoisonError::into_inner)
-                .decode(&shot)
+            self.kernel.lock().unwrap_or_else(PoisonError::into_inner).decode(&shot)
         };
         let decoded = py.detach(|| match &self.pool {
             Some(pool) => pool.install(work),
@@ -140,11 +137,7 @@ pub fn conditioner_of(
 }
 
 fn response_of((offset, exponent, knee): (f32, f32, f32)) -> Response {
-    Response {
-        offset,
-        exponent,
-        knee,
-    }
+    Response { offset, exponent, knee }
 }
 
 fn method_named(name: &str) -> PyResult<Method> {
@@ -157,7 +150,5 @@ fn method_named(name: &str) -> PyResult<Method> {
 
 fn pool_of(threads: usize) -> PyResult<ThreadPool> {
     let built = ThreadPoolBuilder::new().num_threads(threads).build();
-    built.map_err(|error| {
-        PyValueError::new_err(format!("threads: {threads} cannot be started: {error}"))
-    })
+    built.map_err(|error| PyValueError::new_err(format!("threads: {threads} cannot be started: {error}")))
 }

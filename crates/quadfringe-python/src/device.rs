@@ -26,17 +26,9 @@ impl Device {
         rotation: [[f64; 3]; 3],
         translation_mm: [f64; 3],
     ) -> PyResult<Self> {
-        optics::Device::new(
-            width,
-            height,
-            focal_px,
-            centre_px,
-            distortion,
-            rotation,
-            translation_mm,
-        )
-        .map(Self)
-        .map_err(value_error)
+        optics::Device::new(width, height, focal_px, centre_px, distortion, rotation, translation_mm)
+            .map(Self)
+            .map_err(value_error)
     }
 
     #[getter]
@@ -86,10 +78,7 @@ impl Device {
     }
 
     fn __repr__(&self) -> String {
-        format!(
-            "Device({} x {}, focal_px={:?})",
-            self.0.width, self.0.height, self.0.focal_px
-        )
+        format!("Device({} x {}, focal_px={:?})", self.0.width, self.0.height, self.0.focal_px)
     }
 }
 
@@ -125,9 +114,7 @@ pub fn pattern<'py>(
 }
 
 fn channel_named(name: &str) -> PyResult<Channel> {
-    let found = Channel::ALL
-        .into_iter()
-        .find(|channel| channel.name() == name);
+    let found = Channel::ALL.into_iter().find(|channel| channel.name() == name);
     found.ok_or_else(|| unknown("channel", name, "R, G, B or IR"))
 }
 

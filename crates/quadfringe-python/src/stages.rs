@@ -75,9 +75,7 @@ pub fn background<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let (view, kind) = (image.as_array(), background_named(kind)?);
-    let found = py
-        .detach(|| demod::background(view, kind, period_px))
-        .map_err(value_error)?;
+    let found = py.detach(|| demod::background(view, kind, period_px)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -99,9 +97,7 @@ pub fn two_step<'py>(
 ) -> PyResult<Map<'py>> {
     let (red, blue) = (map("red", red)?, map("blue", blue)?);
     let views = (red.as_array(), blue.as_array());
-    let found = py
-        .detach(|| demod::two_step(views.0, views.1))
-        .map_err(value_error)?;
+    let found = py.detach(|| demod::two_step(views.0, views.1)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -117,9 +113,7 @@ pub fn fourier<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let (view, band, kind) = (image.as_array(), band_named(band)?, background_named(kind)?);
-    let found = py
-        .detach(|| demod::fourier(view, band, kind, period_px))
-        .map_err(value_error)?;
+    let found = py.detach(|| demod::fourier(view, band, kind, period_px)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -134,24 +128,15 @@ pub fn unwrap<'py>(
     projector_width: usize,
 ) -> PyResult<(Map<'py>, Map<'py>)> {
     let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
-    let maps = [
-        map("first", first)?,
-        map("second", second)?,
-        map("third", third)?,
-    ];
+    let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
     let views = maps.each_ref().map(PyReadonlyArray2::as_array);
-    let found = py
-        .detach(|| quadfringe::unwrap::unwrap(&code, views))
-        .map_err(value_error)?;
+    let found = py.detach(|| quadfringe::unwrap::unwrap(&code, views)).map_err(value_error)?;
     Ok((found.0.into_pyarray(py), found.1.into_pyarray(py)))
 }
 
 /// Wrapped phase, background and modulation from a stack of equal steps over one period, (steps, H, W).
 #[pyfunction]
-pub fn n_step<'py>(
-    py: Python<'py>,
-    stack: &Bound<'py, PyAny>,
-) -> PyResult<(Map<'py>, Map<'py>, Map<'py>)> {
+pub fn n_step<'py>(py: Python<'py>, stack: &Bound<'py, PyAny>) -> PyResult<(Map<'py>, Map<'py>, Map<'py>)> {
     let stack = expected::<f32, 3>("stack", stack)?;
     let view = stack.as_array();
     let found = py.detach(|| demod::n_step(view)).map_err(value_error)?;
@@ -166,15 +151,10 @@ pub fn estimate_response<'py>(
     py: Python<'py>,
     stacks: Vec<Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let stacks: PyResult<Vec<_>> = stacks
-        .iter()
-        .map(|stack| expected::<f32, 3>("stack", stack))
-        .collect();
+    let stacks: PyResult<Vec<_>> = stacks.iter().map(|stack| expected::<f32, 3>("stack", stack)).collect();
     let stacks = stacks?;
     let views: Vec<_> = stacks.iter().map(PyReadonlyArray3::as_array).collect();
-    let found = py
-        .detach(|| quadfringe::condition::estimate_response(&views))
-        .map_err(value_error)?;
+    let found = py.detach(|| quadfringe::condition::estimate_response(&views)).map_err(value_error)?;
     let named = PyDict::new(py);
     named.set_item("offset", found.response.offset)?;
     named.set_item("exponent", found.response.exponent)?;

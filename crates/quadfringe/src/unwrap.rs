@@ -1,6 +1,6 @@
 //! Three wrapped phases -> absolute phase.
 //!
-//! [`Ladder`] is the published way, point by point (optimum three-frequency selection, system (S4)). [`Support`]
+//! [`Ladder`] is the published way, point by point (optimum three-frequency selection, system (S4)). `Support`
 //! chooses the fringe order by likelihood over all three phases, with the neighbours' help.
 
 mod ladder;

@@ -50,6 +50,16 @@ impl Plan {
         self.response[c].linear(fraction - self.dark[c])
     }
 
+    fn values<T: Sample>(&self, c: usize, row: &[T], full_scale: f32, out: &mut [f32]) {
+        let table = &self.tables[c][..T::LEVELS];
+        for (value, &raw) in out.iter_mut().zip(row) {
+            *value = match raw.level() {
+                Some(level) => table[level],
+                None => self.linear(c, raw.intensity() / full_scale),
+            };
+        }
+    }
+
     fn value<T: Sample>(&self, c: usize, raw: T, full_scale: f32) -> f32 {
         match raw.level() {
             Some(level) => self.tables[c][level],
@@ -65,8 +75,10 @@ impl Plan {
                 continue;
             }
             let row = shot.planes[c].row(y);
-            for (value, &raw) in target.iter_mut().zip(row) {
-                *value = self.value(c, raw, shot.full_scale);
+            match row.as_slice() {
+                // Contiguous rows need no look at strides, pixel by pixel.
+                Some(row) => self.values(c, row, shot.full_scale, target),
+                None => self.values(c, &row.to_vec(), shot.full_scale, target),
             }
         }
         if let Some(map) = &self.registration {

@@ -1,5 +1,6 @@
 //! What comes out of a shot.
 
+use crate::angle::floor;
 use crate::height::Triangulator;
 use crate::{Error, FringeCode, Result};
 use ndarray::{Array2, Array3};
@@ -24,17 +25,17 @@ pub struct Decoded {
 }
 
 impl Decoded {
-    /// Empty maps for images of `shape`.
+    /// Maps for a decoder to fill, for images of `shape`.
     #[must_use]
     pub fn new(shape: [usize; 2], calibrated: bool) -> Self {
-        let map = || Array2::from_elem(shape, f32::NAN);
+        let map = || Array2::zeros(shape);
         Self {
             phase_rad: map(),
             column_px: map(),
             order: map(),
             modulation: map(),
             quality: map(),
-            xyz_mm: calibrated.then(|| Array3::from_elem([shape[0], shape[1], 3], f32::NAN)),
+            xyz_mm: calibrated.then(|| Array3::zeros([shape[0], shape[1], 3])),
         }
     }
 
@@ -86,7 +87,7 @@ impl Decoded {
                         *phase = f32::NAN;
                     }
                     *column = *phase * per_rad;
-                    *order = (*phase * (1.0 / TAU)).floor();
+                    *order = floor(*phase / TAU);
                 }
             });
         if let (Some(triangulator), Some(xyz)) = (triangulator, &mut self.xyz_mm) {

@@ -11,6 +11,8 @@ const LINES: usize = 48;
 const FEWEST: usize = 4;
 /// Share of the power that a carrier must hold to be believed.
 const SHARE: f32 = 0.2;
+/// Least power of a carrier, as a share of that of the mean level: rounding of a flat line leaves less than 1e-12.
+const FAINTEST: f32 = 1e-8;
 
 /// Fringe period in camera pixels along rows and columns; infinite where no carrier stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,6 +66,7 @@ pub(crate) struct LineSpectrum {
     spectrum: Vec<Complex32>,
     work: Vec<Complex32>,
     power: Vec<f32>,
+    level: f32,
 }
 
 impl LineSpectrum {
@@ -76,6 +79,7 @@ impl LineSpectrum {
             spectrum: forward.make_output_vec(),
             work: forward.make_scratch_vec(),
             power: vec![0.0; length / 2 + 1],
+            level: 0.0,
             forward,
         }
     }
@@ -88,6 +92,7 @@ impl LineSpectrum {
             let inside = sample.is_finite();
             *value = if inside { (sample - mean) * weight } else { 0.0 };
         }
+        self.level += (mean * line.len() as f32).powi(2);
         self.forward
             .process_with_scratch(&mut self.input, &mut self.spectrum, &mut self.work)
             .expect("buffers were made by this plan");
@@ -98,18 +103,19 @@ impl LineSpectrum {
 
     /// Period of the strongest line of the spectrum, infinite where none stands out; forgets all lines.
     pub fn take_period_px(&mut self) -> f64 {
-        let cycles = strongest(&self.power);
+        let cycles = strongest(&self.power, FAINTEST * self.level);
         self.power.fill(0.0);
+        self.level = 0.0;
         cycles.map_or(f64::INFINITY, |cycles| self.window.len() as f64 / cycles)
     }
 }
 
 /// Centre of the strongest line in cycles, when it holds a fair share of all power above the lowest frequencies.
-fn strongest(power: &[f32]) -> Option<f64> {
+fn strongest(power: &[f32], least: f32) -> Option<f64> {
     let total: f32 = power[FEWEST..].iter().sum();
     let peak = (FEWEST..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
     let around = peak.saturating_sub(3).max(FEWEST)..(peak + 4).min(power.len());
     let near: f32 = power[around.clone()].iter().sum();
     let moment: f32 = around.map(|bin| bin as f32 * power[bin]).sum();
-    (near > SHARE * total).then(|| f64::from(moment / near))
+    (near > least && near > SHARE * total).then(|| f64::from(moment / near))
 }

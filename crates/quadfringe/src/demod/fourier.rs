@@ -55,8 +55,7 @@ fn soft(t: f32) -> f32 {
 /// let image = Array2::from_shape_fn((1, 256), |(_, x)| 0.5 + 0.4 * (step * x as f32).cos());
 /// let phase = fourier(image.view(), Band::Improved, Background::MovingMean, 16.0)?;
 /// assert!((phase[[0, 132]] - step * 4.0).abs() < 0.01);
-/// # Ok::<(), Error>(())
-/// # use quadfringe::Error;
+/// # Ok::<(), quadfringe::Error>(())
 /// ```
 pub fn fourier(
     image: ArrayView2<'_, f32>,

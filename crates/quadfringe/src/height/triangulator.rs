@@ -10,6 +10,7 @@
 //! coordinate is a polynomial in `k` alone. It is solved for `k` by three Newton steps from the measured value: exact to
 //! rounding at every depth, without a table and without a depth range to stay in.
 
+use multiversion::multiversion;
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 use rayon::prelude::*;
 
@@ -189,15 +190,9 @@ impl ColumnSheets {
                 *k = self.ideal_coordinate(distortion, *k, *x, *y);
             }
         }
-        let [r0, _, r2] = &self.rotation;
-        let [a0, _, a2] = self.centre;
         let mut depth = [0.0; CHUNK];
-        for i in 0..CHUNK {
-            let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
-            let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
-            let t = (k[i] * a2 - a0) / (b0 - k[i] * b2);
-            depth[i] = if t > 0.0 && t < f64::INFINITY { t } else { f64::NAN };
-        }
+        let [r0, _, r2] = self.rotation;
+        depths([r0, r2], [self.centre[0], self.centre[2]], &k, x, y, &mut depth);
         for (point, (t, (x, y))) in xyz.chunks_exact_mut(3).zip(depth.iter().zip(x.iter().zip(y))) {
             point[0] = (t * x) as f32;
             point[1] = (t * y) as f32;
@@ -226,5 +221,23 @@ impl ColumnSheets {
             k -= (value - measured) / slope;
         }
         k
+    }
+}
+
+/// Depth along each ray `(x, y, 1)` of the sheet with ideal column `k`; NaN behind the camera.
+#[multiversion(targets("x86_64+avx2"))]
+fn depths(
+    [r0, r2]: [[f64; 3]; 2],
+    [a0, a2]: [f64; 2],
+    k: &[f64; CHUNK],
+    x: &[f64; CHUNK],
+    y: &[f64; CHUNK],
+    depth: &mut [f64; CHUNK],
+) {
+    for i in 0..CHUNK {
+        let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
+        let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
+        let t = (k[i] * a2 - a0) / (b0 - k[i] * b2);
+        depth[i] = if t > 0.0 && t < f64::INFINITY { t } else { f64::NAN };
     }
 }
