@@ -89,13 +89,21 @@ impl Plan {
         }
     }
 
-    /// Which pixels of a row are saturated in no channel.
-    pub fn unsaturated_row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [bool]) {
+    /// Which pixels of a row are saturated in no channel, and which are glare: saturated in R and in B, which on a lit
+    /// surface, a quarter period apart, are never both at the crest of their fringes.
+    pub fn saturation_row<T: Sample>(
+        &self,
+        shot: &Shot<'_, T>,
+        y: usize,
+        unsaturated: &mut [bool],
+        glare: &mut [bool],
+    ) {
         let limit = CLIPPED * shot.full_scale;
-        out.fill(true);
-        for plane in &shot.planes {
-            let row = plane.row(y);
-            out.iter_mut().zip(row).for_each(|(o, v)| *o &= v.intensity() < limit);
+        let rows = shot.planes.each_ref().map(|plane| plane.row(y));
+        for x in 0..unsaturated.len() {
+            let [red, green, blue, infrared] = rows.each_ref().map(|row| row[x].intensity() >= limit);
+            unsaturated[x] = !(red || green || blue || infrared);
+            glare[x] = red && blue;
         }
     }
 

@@ -23,6 +23,7 @@ pub(super) struct Best {
     shape: [usize; 2],
     light: [Vec<f32>; 4],
     unsaturated: Vec<bool>,
+    glare: Vec<bool>,
     lit: Vec<bool>,
     usable: Vec<bool>,
     maps: PixelMaps,
@@ -42,6 +43,7 @@ impl Best {
             shape,
             light: [plane(), plane(), plane(), plane()],
             unsaturated: vec![false; pixels],
+            glare: vec![false; pixels],
             lit: vec![false; pixels],
             usable: vec![false; pixels],
             maps: PixelMaps::default(),
@@ -63,6 +65,8 @@ impl Best {
         let everywhere =
             Scene { light, usable: &self.unsaturated, width: self.shape[1], grid: &grid, period_px };
         find_light(&everywhere, 2.0 * options.modulation_min, &mut self.lit);
+        let lit = self.lit.par_iter_mut().zip(&self.glare);
+        lit.for_each(|(lit, glare)| *lit &= !glare);
         let both = self.unsaturated.par_iter().zip(&self.lit);
         self.usable.par_iter_mut().zip(both).for_each(|(usable, (a, b))| *usable = *a && *b);
         let scene = Scene { usable: &self.usable, ..everywhere };
@@ -100,10 +104,10 @@ impl Best {
     fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
         let width = self.shape[1];
         let [red, green, blue, infrared] = self.light.each_mut().map(|plane| plane.par_chunks_mut(width));
-        let unsaturated = self.unsaturated.par_chunks_mut(width);
-        let rows = red.zip(green).zip(blue.zip(infrared)).zip(unsaturated).enumerate();
-        rows.for_each(|(y, (((red, green), (blue, infrared)), unsaturated))| {
-            plan.unsaturated_row(shot, y, unsaturated);
+        let saturation = self.unsaturated.par_chunks_mut(width).zip(self.glare.par_chunks_mut(width));
+        let rows = red.zip(green).zip(blue.zip(infrared)).zip(saturation).enumerate();
+        rows.for_each(|(y, (((red, green), (blue, infrared)), (unsaturated, glare)))| {
+            plan.saturation_row(shot, y, unsaturated, glare);
             let mut rows = [red, green, blue, infrared];
             plan.row(shot, y, &mut rows);
             // A pixel that the infrared chip does not see takes no part in any fit.

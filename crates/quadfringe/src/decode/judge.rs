@@ -36,9 +36,6 @@ pub(super) struct Judge {
     parents: Vec<u32>,
 }
 
-/// Pixels of the 3 x 3 around, unsaturated and lit, that make a pixel's own order; an edge of glare leaves 6.
-const SEEN_MIN: usize = 4;
-
 impl Judge {
     pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>) {
         let width = scene.width;
@@ -85,13 +82,7 @@ impl Findings<'_> {
         sums.extend((0..width).map(|x| rows.iter().map(|row| self.misfit[row + x]).sum::<f32>()));
         agrees.clear();
         agrees.extend((0..width).map(|x| {
-            let near = [x.saturating_sub(1), x, (x + 1).min(width - 1)];
-            let seen =
-                rows.iter().flat_map(|row| near.map(|x| scene.usable[row + x])).filter(|seen| *seen).count();
-            if seen < SEEN_MIN {
-                return false;
-            }
-            let sum: f32 = near.iter().map(|x| sums[*x]).sum();
+            let sum = sums[x.saturating_sub(1)] + sums[x] + sums[(x + 1).min(width - 1)];
             let most = self.window.tolerance(y * width + x);
             sum <= 9.0 * most && self.misfit[y * width + x] <= OWN_MISFIT_MAX * most
         }));

@@ -178,7 +178,7 @@ impl Joint {
                 // What a change of albedo would explain as well says nothing about the phase.
                 for x in 0..width {
                     let shared = row.top[x] * row.top[x] / row.bottom[x].max(1e-9);
-                    denominator[x] = (denominator[x] - shared).max(0.1 * denominator[x]);
+                    denominator[x] = (denominator[x] - shared).max(0.25 * denominator[x]);
                     if !window.is_lit(y * width + x) {
                         (numerator[x], denominator[x]) = (0.0, 0.0);
                     }
@@ -252,7 +252,7 @@ mod tests {
         let (grid, usable) = (Grid::new(height, width, 3), vec![true; width * height]);
         let light = planes.each_ref().map(Vec::as_slice);
         let scene = Scene { light, usable: &usable, width, grid: &grid, period_px: f64::from(period) };
-        let slopes = Slopes { along: vec![TAU / period; grid.cells()], down: vec![0.0; grid.cells()] };
+        let slopes = Slopes { along: vec![TAU / period; width * height], down: vec![0.0; width * height] };
         let modulation = vec![0.3; width * height];
         let window = Window::new(&scene, &slopes, &modulation, 0.003);
         let rms = |phase: &[f32]| {

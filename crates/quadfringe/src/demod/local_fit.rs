@@ -17,6 +17,8 @@ const WINDOW: f32 = 0.3;
 const FIRST_WINDOW: f32 = 0.5;
 /// Ridge of the normal equations relative to the weight in the window.
 const RIDGE: f32 = 1e-3;
+/// Width (sigma) in cells over which slopes are averaged.
+const SLOPE_CELLS: f32 = 2.0;
 /// Sums of one cell: w, wc, ws, wcc, wcs, then w I, w I c, w I s of four channels.
 const SUMS: usize = 17;
 /// Least contrast (modulation over background) of light that comes from the projector.
@@ -195,7 +197,7 @@ impl PixelMaps {
         out.par_iter_mut().zip(phasors).for_each(|(phase, (&c, &s))| *phase = atan2(s, c));
     }
 
-    /// Slopes of the phase on the cells; `modulation` is 0 where there is no light.
+    /// Slopes of the phase; `modulation` is 0 where there is no light.
     pub fn slopes(&self, scene: &Scene<'_>, modulation: &[f32]) -> Slopes {
         let width = scene.width;
         let mut sums = scene.sums::<4>(|_, at| {
@@ -210,12 +212,12 @@ impl PixelMaps {
             let [d, e] = step(at + width < modulation.len(), at + width);
             [a, b, d, e]
         });
-        scene.grid.smooth_all(&mut sums, 1.0);
-        let angle = |real: &[f32], imaginary: &[f32]| {
-            let pairs = real.iter().zip(imaginary);
-            pairs.map(|(&re, &im)| atan2(im, re)).collect()
+        scene.grid.smooth_all(&mut sums, SLOPE_CELLS);
+        let slope = |re: &Vec<f32>, im: &Vec<f32>| {
+            let cells = re.iter().zip(im).map(|(re, im)| atan2(*im, *re)).collect();
+            scene.spread_out(&cells)
         };
-        Slopes { along: angle(&sums[0], &sums[1]), down: angle(&sums[2], &sums[3]) }
+        Slopes { along: slope(&sums[0], &sums[1]), down: slope(&sums[2], &sums[3]) }
     }
 }
 

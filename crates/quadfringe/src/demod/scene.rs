@@ -67,6 +67,17 @@ impl<'a> Scene<'a> {
     }
 }
 
+impl Scene<'_> {
+    /// A map given on the cells, at every pixel.
+    pub fn spread_out(&self, cells: &Vec<f32>) -> Vec<f32> {
+        let mut map = vec![0.0; self.pixels()];
+        map.par_chunks_mut(self.width).enumerate().for_each_init(RowMaps::default, |row_maps, (y, out)| {
+            out.copy_from_slice(row_maps.sample(self, y, [cells])[0])
+        });
+        map
+    }
+}
+
 /// Slow maps interpolated along one row.
 #[derive(Debug, Default)]
 pub(crate) struct RowMaps {

@@ -3,12 +3,11 @@
 //! Neighbours count as far as their phase fits the plane through the pixel within the noise (a plane-compensated
 //! bilateral window, Tukey's biweight); phases are compared modulo a turn, so they may be wrapped or absolute.
 
-use super::scene::{RowMaps, Scene};
+use super::scene::Scene;
 use crate::angle::{round, wrap};
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
-use std::ops::Range;
 
 /// Width (sigma) of the window in fringe periods.
 const WIDTH: f32 = 0.08;
@@ -22,7 +21,7 @@ const MISFIT_MAX: f32 = 0.2;
 /// One pixel in so many is asked for the noise.
 const NOISE_STRIDE: usize = 7;
 
-/// Slopes of the phase on the cells, in rad per pixel.
+/// Slopes of the phase at every pixel, in rad per pixel.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Slopes {
     pub along: Vec<f32>,
@@ -42,9 +41,6 @@ pub(crate) struct Window<'a> {
 /// Rows that one output row needs.
 #[derive(Default)]
 struct Rows {
-    maps: RowMaps,
-    along: Vec<f32>,
-    down: Vec<f32>,
     sharpness: Vec<f32>,
     top: Vec<f32>,
     bottom: Vec<f32>,
@@ -91,7 +87,8 @@ impl<'a> Window<'a> {
         let radius = if reach == Reach::Near { 2 } else { self.radius };
         out.par_chunks_mut(width).enumerate().for_each_init(Rows::default, |rows, (y, out)| {
             self.start(y, rows);
-            let here = &phase[y * width..][..width];
+            let [here, along, down] =
+                [phase, &self.slopes.along, &self.slopes.down].map(|map| &map[y * width..][..width]);
             for dy in -radius..=radius {
                 let Some(row) = y.checked_add_signed(dy).filter(|&r| r < height) else {
                     continue;
@@ -107,10 +104,14 @@ impl<'a> Window<'a> {
                         dy,
                         weight: (-0.5 * (dx * dx + dy * dy) / (self.sigma * self.sigma)).exp(),
                         phase: &phase[there.clone()],
+                        along: &self.slopes.along[there.clone()],
+                        down: &self.slopes.down[there.clone()],
                         numerator: &numerator[there.clone()],
                         denominator: &denominator[there],
                     };
-                    rows.add(&here[from..to], &neighbour, from..to);
+                    let own = [here, along, down, &rows.sharpness].map(|row| &row[from..to]);
+                    let sums = [&mut rows.top[from..to], &mut rows.bottom[from..to]];
+                    add_neighbour(own, &neighbour, sums);
                 }
             }
             for (x, value) in out.iter_mut().enumerate() {
@@ -121,15 +122,11 @@ impl<'a> Window<'a> {
 
     fn start(&self, y: usize, rows: &mut Rows) {
         let width = self.scene.width;
-        let Rows { maps, along, down, sharpness, top, bottom } = rows;
-        for row in [&mut *along, down, sharpness, top, bottom] {
+        for row in [&mut rows.sharpness, &mut rows.top, &mut rows.bottom] {
             row.clear();
             row.resize(width, 0.0);
         }
-        let [a, d] = maps.sample(self.scene, y, [&self.slopes.along, &self.slopes.down]);
-        along.copy_from_slice(a);
-        down.copy_from_slice(d);
-        for (sharp, &m) in sharpness.iter_mut().zip(&self.modulation[y * width..]) {
+        for (sharp, &m) in rows.sharpness.iter_mut().zip(&self.modulation[y * width..]) {
             let reach = (REACH_SIGMAS * self.noise / m.max(1e-6)).clamp(REACH_RAD, TAU);
             *sharp = 1.0 / (reach * reach);
         }
@@ -143,32 +140,29 @@ struct Neighbour<'a> {
     /// Weight for its distance.
     weight: f32,
     phase: &'a [f32],
+    along: &'a [f32],
+    down: &'a [f32],
     numerator: &'a [f32],
     denominator: &'a [f32],
 }
 
-impl Rows {
-    fn add(&mut self, here: &[f32], there: &Neighbour<'_>, at: Range<usize>) {
-        let plane = [&self.along[at.clone()], &self.down[at.clone()], &self.sharpness[at.clone()]];
-        add_neighbour(here, there, plane, &mut self.top[at.clone()], &mut self.bottom[at]);
-    }
-}
-
-/// Adds one neighbour to the sums of every pixel of a stretch, as far as it fits the plane through the pixel.
+/// Adds one neighbour to two sums of every pixel of a stretch, as far as it fits: the phase between two pixels is the
+/// mean of their slopes times their distance, which is exact for a surface of constant curvature.
 #[multiversion(targets("x86_64+avx2"))]
 fn add_neighbour<'a>(
-    here: &[f32],
+    [here, along, down, sharpness]: [&[f32]; 4],
     there: &Neighbour<'a>,
-    [along, down, sharpness]: [&[f32]; 3],
-    top: &mut [f32],
-    bottom: &mut [f32],
+    [top, bottom]: [&mut [f32]; 2],
 ) {
     let n = here.len();
     let (phase, numerator, denominator) = (&there.phase[..n], &there.numerator[..n], &there.denominator[..n]);
+    let (other_along, other_down) = (&there.along[..n], &there.down[..n]);
     let (along, down, sharpness) = (&along[..n], &down[..n], &sharpness[..n]);
     let (top, bottom) = (&mut top[..n], &mut bottom[..n]);
+    let (dx, dy) = (0.5 * there.dx, 0.5 * there.dy);
     for x in 0..n {
-        let turns = (phase[x] - here[x] - along[x] * there.dx - down[x] * there.dy) * (1.0 / TAU);
+        let way = (along[x] + other_along[x]) * dx + (down[x] + other_down[x]) * dy;
+        let turns = (phase[x] - here[x] - way) * (1.0 / TAU);
         let d = (turns - round(turns)) * TAU;
         let miss = 1.0 - d * d * sharpness[x];
         let fits = if miss > 0.0 { miss } else { 0.0 };
@@ -216,7 +210,7 @@ mod tests {
         let planes = [(); 4].map(|()| vec![0.5; width * height]);
         let light = planes.each_ref().map(Vec::as_slice);
         let scene = Scene { light, usable: &usable, width, grid: &grid, period_px: 25.0 };
-        let slopes = Slopes { along: vec![slope; grid.cells()], down: vec![0.0; grid.cells()] };
+        let slopes = Slopes { along: vec![slope; width * height], down: vec![0.0; width * height] };
         let modulation = vec![0.4; width * height];
         let spread = noise(&wrapped, &modulation, width);
         let mut out = vec![0.0; width * height];
