@@ -10,6 +10,7 @@ import pytest
 import tifffile
 import trimesh
 
+import quadfringe as qf
 from quadfringe.config import ChannelResponse, DeviceModel, Response
 from quadfringe.data import Calibration, ResponseCalibration, Shape
 from quadfringe.errors import ConfigError, InputError
@@ -123,3 +124,12 @@ def test_a_bad_calibration_file_is_explained(tmp_path: Path, text: str, reason: 
     with pytest.raises(ConfigError, match=r"r\.json") as caught:
         ResponseCalibration.load(path)
     assert reason in str(caught.value)
+
+
+def test_a_result_carries_the_settings_in_force() -> None:
+    with qf.open() as scanner:
+        shape = scanner.measure()
+    settings = shape.config["decode"]
+    assert settings["method"] == "best"
+    assert 0 < settings["quality_min"] < 1
+    assert settings["period_px"] is None

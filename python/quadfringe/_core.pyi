@@ -158,6 +158,9 @@ class Decoder:
         camera: Device | None = None,
         projector: Device | None = None,
     ) -> Decoder: ...
+    def settings(self) -> dict[str, str | float | None]:
+        """Give method, modulation_min, quality_min and period_px (None: from every shot), defaults included."""
+
     def decode(
         self, red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], ir: NDArray[Any]
     ) -> dict[str, NDArray[np.float32]]:

@@ -28,13 +28,12 @@ class Plan:
     settings: DecodeConfig = DecodeConfig()
 
     def described(self) -> dict[str, Any]:
-        """Everything that decides the result, as plain data for a saved file."""
+        """Describe what is decoded, as plain data for a saved file; the decoder adds the settings in force."""
         response = self.response.model_dump(include=set(Response.model_fields)) if self.response else None
         return {
             "projector_width_px": self.projector_width_px,
             "fringes": self.fringes.model_dump(mode="json"),
             "response": response,
-            "decode": self.settings.model_dump(mode="json", exclude_none=True),
         }
 
 
@@ -74,7 +73,6 @@ class ShotDecoder:
 
     def __init__(self, like: Shot, plan: Plan) -> None:
         self.plan = plan
-        self._described = plan.described()
         self._channels_known = False
         _check_sizes(like, plan)
         self._core = _core.Decoder(
@@ -86,6 +84,7 @@ class ShotDecoder:
             **_geometry(plan.calibration),
             **plan.settings.model_dump(exclude_none=True),
         )
+        self._described = plan.described() | {"decode": self._core.settings()}
 
     def decode(self, shot: Shot) -> Shape:
         """Give the shape; raises `DecodeError` when the orders cannot be trusted, naming the likely cause."""

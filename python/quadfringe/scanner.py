@@ -41,7 +41,8 @@ class Scanner:
         if self._decoder is None:
             self._decoder = ShotDecoder(shot, self._plan())
         shape = self._decoder.decode(shot)
-        return shape.with_settings(self.config.model_dump(mode="json", exclude_none=True), self.calibration)
+        resolved = self.config.model_dump(mode="json", exclude_none=True) | {"decode": shape.config["decode"]}
+        return shape.with_settings(resolved, self.calibration)
 
     def measure(self) -> Shape:
         """Project, grab, decode: one exposure in, one metric shape out."""

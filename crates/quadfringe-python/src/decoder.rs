@@ -71,6 +71,18 @@ impl Decoder {
         })
     }
 
+    /// The settings in force, the kernel's defaults included.
+    fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let kernel = self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
+        let options = kernel.options();
+        let named = PyDict::new(py);
+        named.set_item("method", name_of(options.method))?;
+        named.set_item("modulation_min", options.modulation_min)?;
+        named.set_item("quality_min", options.quality_min)?;
+        named.set_item("period_px", options.period_px)?;
+        Ok(named)
+    }
+
     /// Maps by name, float32.
     fn decode<'py>(
         &self,
@@ -138,6 +150,13 @@ pub fn conditioner_of(
 
 fn response_of((offset, exponent, knee): (f32, f32, f32)) -> Response {
     Response { offset, exponent, knee }
+}
+
+fn name_of(method: Method) -> &'static str {
+    match method {
+        Method::Published => "published",
+        Method::Best => "best",
+    }
 }
 
 fn method_named(name: &str) -> PyResult<Method> {
