@@ -9,9 +9,8 @@
 //! ```
 
 mod best;
-mod islands;
 mod judge;
-mod nodes;
+mod orders;
 mod output;
 mod published;
 

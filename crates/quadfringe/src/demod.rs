@@ -1,14 +1,16 @@
 //! Planes -> wrapped phase: background, two-step (TPS), Fourier (FTP), N-step, and the local fit of all channels.
 
 mod background;
+pub(crate) mod backgrounds;
 mod carrier;
 mod fourier;
-pub(crate) mod grid;
+pub(crate) mod cells;
 pub(crate) mod joint;
 pub(crate) mod light;
 pub(crate) mod local_fit;
 mod n_step;
 pub(crate) mod scene;
+pub(crate) mod slopes;
 
 mod two_step;
 pub(crate) mod window;

@@ -51,6 +51,7 @@
 pub mod error;
 
 mod angle;
+mod slots;
 
 pub mod fringe;
 

@@ -7,4 +7,4 @@ mod ladder;
 mod support;
 
 pub use ladder::{Ladder, Ordered, unwrap};
-pub(crate) use support::{Evidence, Support, SupportMaps};
+pub(crate) use support::{Evidence, Seen, Support};

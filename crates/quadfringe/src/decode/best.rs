@@ -1,57 +1,65 @@
 //! The best chain: local fit, orders with support, joint fit, and a judgement of every pixel.
 
-use super::judge::{Findings, Judge};
-use super::nodes::Nodes;
+use super::judge::{Findings, Judge, MISFIT_MAX};
+use super::orders::{Orders, Wrapped};
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
+use crate::demod::backgrounds::Backgrounds;
 use crate::demod::carrier;
-use crate::demod::grid::Grid;
+use crate::demod::cells::Grid;
 use crate::demod::joint::Joint;
-use crate::demod::light::find_light;
+use crate::demod::light::LightFinder;
 use crate::demod::local_fit::{LocalFit, PixelMaps};
 use crate::demod::scene::Scene;
+use crate::demod::slopes::Slopes;
 use crate::demod::window::{Window, noise};
-use crate::unwrap::Support;
 use crate::{FringeCode, Shot};
-use ndarray::ArrayView2;
+use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
-/// Cells in a fringe period.
-const CELLS: f64 = 8.0;
+/// Cells in a fringe period, at least.
+const CELLS: f64 = 4.5;
 
 pub(super) struct Best {
     shape: [usize; 2],
+    ratios: [f32; 3],
     light: [Vec<f32>; 4],
-    unsaturated: Vec<bool>,
-    glare: Vec<bool>,
-    lit: Vec<bool>,
-    usable: Vec<bool>,
-    maps: PixelMaps,
+    lit: Vec<f32>,
+    usable: Vec<f32>,
     modulation: Vec<f32>,
+    albedo: Vec<f32>,
     wrapped: Vec<f32>,
     phase: Vec<f32>,
-    nodes: Nodes,
+    finder: LightFinder,
+    fit: LocalFit,
+    slopes: Slopes,
+    orders: Orders,
+    backgrounds: Backgrounds,
     joint: Joint,
     judge: Judge,
 }
 
 impl Best {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
-        let pixels = shape[0] * shape[1];
+        let pixels = Grid::new(shape, 1.0).pixels();
         let plane = || vec![0.0; pixels];
+        let numbers = code.numbers();
         Self {
             shape,
+            ratios: numbers.map(|n| (n / numbers[0]) as f32),
             light: [plane(), plane(), plane(), plane()],
-            unsaturated: vec![false; pixels],
-            glare: vec![false; pixels],
-            lit: vec![false; pixels],
-            usable: vec![false; pixels],
-            maps: PixelMaps::default(),
+            lit: plane(),
+            usable: plane(),
             modulation: plane(),
+            albedo: plane(),
             wrapped: plane(),
             phase: plane(),
-            nodes: Nodes::new(Support::new(code)),
-            joint: Joint::new(code.numbers()),
+            finder: LightFinder::default(),
+            fit: LocalFit::default(),
+            slopes: Slopes::default(),
+            orders: Orders::new(code),
+            backgrounds: Backgrounds::new(),
+            joint: Joint::default(),
             judge: Judge::default(),
         }
     }
@@ -61,70 +69,93 @@ impl Best {
         self.condition(plan, shot);
         let light = self.light.each_ref().map(Vec::as_slice);
         let period_px = options.period_px.unwrap_or_else(|| period_px(light[0], self.shape));
-        let grid = Grid::new(self.shape[0], self.shape[1], ((period_px / CELLS) as usize).clamp(1, 16));
-        let everywhere =
-            Scene { light, usable: &self.unsaturated, width: self.shape[1], grid: &grid, period_px };
-        find_light(&everywhere, 2.0 * options.modulation_min, &mut self.lit);
-        let lit = self.lit.par_iter_mut().zip(&self.glare);
-        lit.for_each(|(lit, glare)| *lit &= !glare);
-        let both = self.unsaturated.par_iter().zip(&self.lit);
-        self.usable.par_iter_mut().zip(both).for_each(|(usable, (a, b))| *usable = *a && *b);
-        let scene = Scene { usable: &self.usable, ..everywhere };
+        let grid = Grid::new(self.shape, period_px / CELLS);
+        self.finder.find(&grid, light, period_px, 2.0 * options.modulation_min, &mut self.modulation);
+        let found = self.modulation.par_chunks(grid.stride);
+        let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
+        masks.zip(found).for_each(|((lit, usable), found)| {
+            for ((lit, usable), found) in lit.iter_mut().zip(usable).zip(found) {
+                *lit *= found;
+                *usable *= *lit;
+            }
+        });
+        let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
 
         // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
-        let fit = LocalFit::new(&scene, &mut self.maps);
-        fit.modulation(&scene, &self.maps, &self.lit, options.modulation_min, &mut self.modulation);
-        self.maps.phase(&mut self.wrapped);
-        let noise = noise(&self.wrapped, &self.modulation, scene.width);
-        let slopes = self.maps.slopes(&scene, &self.modulation);
-        let window = Window::new(&scene, &slopes, &self.modulation, noise);
-        window.smooth(&self.wrapped, &mut self.phase);
+        let maps = PixelMaps {
+            phase: &mut self.wrapped,
+            modulation: &mut self.modulation,
+            albedo: &mut self.albedo,
+        };
+        self.fit.run(&scene, &self.lit, options.modulation_min, maps);
+        let noise = noise(&scene, &self.wrapped, &self.modulation);
+        self.slopes.measure(&scene, &self.wrapped, &self.modulation);
 
-        // 3. Fringe orders: by beats from windows, then with what every pixel sees itself (S4).
-        self.nodes.by_beats(&scene, fit.beats(), &self.modulation, &mut self.phase);
-        let fringes = self.joint.fringes(&scene, &self.maps.albedo, &self.phase, |_| true);
-        self.nodes.by_cosines(&scene, &fringes, &mut self.phase);
+        // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
+        let known = Wrapped {
+            phase: &self.wrapped,
+            modulation: &self.modulation,
+            albedo: &self.albedo,
+            fit: &self.fit,
+            slopes: &self.slopes,
+        };
+        self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
-        self.joint.run(&scene, &window, &mut self.maps.albedo, &mut self.phase);
+        let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
+        self.backgrounds.start(&scene, &self.fit);
+        for window in [window.near(), window] {
+            self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, MISFIT_MAX);
+            self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
+        }
 
         // 5. What is not sure is no data.
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
             misfit: &self.joint.misfit,
-            window: &window,
-            nodes: &self.nodes,
+            noise,
+            orders: &self.orders,
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
-        self.write(out);
+        self.write(&grid, out);
     }
 
+    /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
     fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
-        let width = self.shape[1];
-        let [red, green, blue, infrared] = self.light.each_mut().map(|plane| plane.par_chunks_mut(width));
-        let saturation = self.unsaturated.par_chunks_mut(width).zip(self.glare.par_chunks_mut(width));
+        let [_, width] = self.shape;
+        let stride = width.next_multiple_of(crate::demod::cells::LANES);
+        let [red, green, blue, infrared] = self.light.each_mut().map(|plane| plane.par_chunks_mut(stride));
+        let saturation = self.usable.par_chunks_mut(stride).zip(self.lit.par_chunks_mut(stride));
         let rows = red.zip(green).zip(blue.zip(infrared)).zip(saturation).enumerate();
-        rows.for_each(|(y, (((red, green), (blue, infrared)), (unsaturated, glare)))| {
-            plan.saturation_row(shot, y, unsaturated, glare);
-            let mut rows = [red, green, blue, infrared];
-            plan.row(shot, y, &mut rows);
-            // A pixel that the infrared chip does not see takes no part in any fit.
-            for (x, unsaturated) in unsaturated.iter_mut().enumerate() {
-                if !rows[3][x].is_finite() {
-                    *unsaturated = false;
-                    rows.iter_mut().for_each(|row| row[x] = 0.0);
+        rows.for_each_init(
+            || (vec![false; width], vec![false; width]),
+            |(unsaturated, glare), (y, (((red, green), (blue, infrared)), (usable, lit)))| {
+                plan.saturation_row(shot, y, unsaturated, glare);
+                let mut rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
+                plan.row(shot, y, &mut rows);
+                for x in 0..width {
+                    // A pixel that the infrared chip does not see takes no part in any fit.
+                    let seen = rows[3][x].is_finite();
+                    if !seen {
+                        rows.iter_mut().for_each(|row| row[x] = 0.0);
+                    }
+                    usable[x] = f32::from(u8::from(seen && unsaturated[x]));
+                    lit[x] = f32::from(u8::from(!glare[x]));
                 }
-            }
-        });
+            },
+        );
     }
 
-    fn write(&self, out: &mut Decoded) {
-        let width = self.shape[1];
+    fn write(&self, grid: &Grid, out: &mut Decoded) {
         out.rows().enumerate().for_each(|(y, [phase, modulation, quality])| {
-            let at = y * width..(y + 1) * width;
-            phase.copy_from_slice(&self.judge.phase[at.clone()]);
+            let at = y * grid.stride..y * grid.stride + grid.width;
+            for ((out, sure), own) in
+                phase.iter_mut().zip(&self.judge.sure[at.clone()]).zip(&self.phase[at.clone()])
+            {
+                *out = if *sure != 0 { *own } else { f32::NAN };
+            }
             modulation.copy_from_slice(&self.modulation[at.clone()]);
             quality.copy_from_slice(&self.judge.quality[at]);
         });
@@ -133,8 +164,9 @@ impl Best {
 
 /// Fringe period across the fringes, from the red image; a sixteenth of the image when nothing stands out.
 fn period_px(red: &[f32], [height, width]: [usize; 2]) -> f64 {
-    let red = ArrayView2::from_shape((height, width), red).expect("a plane is whole");
-    let found = carrier(red).period_px();
+    let stride = red.len() / height;
+    let red = ArrayView2::from_shape((height, stride), red).expect("a plane is whole");
+    let found = carrier(red.slice(s![.., ..width])).period_px();
     let shorter = width.min(height) as f64;
     if found.is_finite() { found.clamp(4.0, shorter.max(8.0)) } else { width as f64 / 16.0 }
 }

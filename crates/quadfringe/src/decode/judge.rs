@@ -1,90 +1,152 @@
 //! Which pixels can be trusted: a hole is better than a lie.
 
-use super::islands::{mark_seams, remove_islands, remove_slivers};
-use super::nodes::Nodes;
-use crate::demod::scene::{RowMaps, Scene};
-use crate::demod::window::Window;
-use rayon::prelude::*;
+mod islands;
+mod seams;
 
+use super::orders::Orders;
+use crate::demod::cells::{CellMaps, CellWork, RowMaps};
+use crate::demod::scene::{Scene, around};
+use crate::slots::Slots;
+use islands::Islands;
+use multiversion::multiversion;
+use rayon::prelude::*;
+use seams::mark_seams;
+
+/// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
+const NOISE_MAX: f32 = 1.5;
+pub(super) const MISFIT_MAX: f32 = 0.2;
 /// Greatest square of a pixel's own misfit, in units of what its neighbours may have on average.
 const OWN_MISFIT_MAX: f32 = 3.0;
 /// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
 const NEIGHBOURS_MIN: u8 = 10;
 /// Least side of a region that is a surface, in fringe periods.
 const ISLAND_SIDE: f64 = 0.25;
+/// Width (sigma) in fringe periods of the surroundings that back an order.
+const BACKING: f32 = 1.0;
 
 /// What there is to judge by.
 pub(super) struct Findings<'a> {
+    /// Absolute phase in rad.
     pub phase: &'a [f32],
+    /// 0 where there is no light.
     pub modulation: &'a [f32],
     /// Mean square misfit of the four channels.
     pub misfit: &'a [f32],
-    pub window: &'a Window<'a>,
-    pub nodes: &'a Nodes,
+    /// Standard deviation of the intensities.
+    pub noise: f32,
+    pub orders: &'a Orders,
     pub quality_min: f32,
 }
 
 /// The verdict on every pixel.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Default)]
 pub(super) struct Judge {
-    /// Absolute phase of what can be trusted, NaN elsewhere.
-    pub phase: Vec<f32>,
+    /// 1 for what can be trusted, 0 elsewhere.
+    pub sure: Vec<u8>,
     /// Quality of the order of what is lit, NaN elsewhere.
     pub quality: Vec<f32>,
-    seams: Vec<bool>,
-    counts: Vec<u8>,
-    parents: Vec<u32>,
+    seams: Vec<u8>,
+    spare: Vec<u8>,
+    backing: CellMaps,
+    sums: CellMaps,
+    islands: Islands,
+    slots: Slots<(Rows, CellWork)>,
+}
+
+/// Rows of one task.
+#[derive(Debug, Default)]
+struct Rows {
+    maps: RowMaps,
+    sums: Vec<f32>,
+    margin: Vec<f32>,
 }
 
 impl Judge {
     pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>) {
-        let width = scene.width;
-        mark_seams(findings.phase, |i| findings.modulation[i] > 0.0, width, &mut self.seams);
-        let backing = findings.nodes.backing(scene);
-        self.phase.resize(scene.pixels(), 0.0);
-        self.quality.resize(scene.pixels(), 0.0);
-        let seams = &self.seams;
-        self.phase.par_chunks_mut(width).zip(self.quality.par_chunks_mut(width)).enumerate().for_each_init(
-            Scratch::default,
-            |scratch, (y, (phase, quality))| {
-                findings.agrees(scene, y, scratch);
-                let [backing] = scratch.maps.sample(scene, y, [&backing]);
-                for x in 0..width {
-                    let at = y * width + x;
-                    let margin = findings.nodes.margin(y, x).filter(|_| findings.modulation[at] > 0.0);
-                    quality[x] = margin.map_or(f32::NAN, |margin| margin * backing[x]);
-                    let sure = quality[x] >= findings.quality_min && scratch.agrees[x] && !seams[at];
-                    phase[x] = if sure { findings.phase[at] } else { f32::NAN };
+        let grid = scene.grid;
+        mark_seams(grid, findings.phase, findings.modulation, &mut self.spare, &mut self.seams);
+        self.back(scene, findings.orders);
+        self.quality.resize(grid.pixels(), 0.0);
+        self.spare.resize(grid.pixels(), 0);
+        let Self { quality, spare, seams, backing, slots, .. } = self;
+        let rows = quality.par_chunks_mut(grid.stride).zip(spare.par_chunks_mut(grid.stride)).enumerate();
+        rows.for_each_init(|| slots.take(), |slot, (y, (quality, sure))| {
+            let Rows { maps, sums, margin } = &mut slot.0;
+            let [backing] = maps.sample(grid, backing, 1, y);
+            margin.clear();
+            for (lead, _, lit) in findings.orders.verdict(scene, y / grid.step) {
+                margin.extend(std::iter::repeat_n(if lit { lead } else { 0.0 }, grid.step));
+            }
+            let near = around(y, grid.height).map(|row| scene.row(findings.misfit, row));
+            let known = [scene.row(findings.modulation, y), margin, backing];
+            let limits = [findings.noise, findings.quality_min];
+            verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, sure);
+        });
+        seams::remove_slivers(grid, NEIGHBOURS_MIN, &self.spare, &mut self.sure);
+        let least = (ISLAND_SIDE * scene.period_px).powi(2) as usize;
+        self.islands.remove(grid, findings.phase, least, &mut self.sure);
+    }
+
+    /// Share of the surroundings whose own light speaks for the order chosen there.
+    fn back(&mut self, scene: &Scene<'_>, orders: &Orders) {
+        let grid = scene.grid;
+        let mut agree = std::mem::take(&mut self.backing);
+        agree.fill::<2>(grid, |row, [weight, agree]| {
+            for ((weight, agree), (_, misfit, lit)) in
+                weight.iter_mut().zip(agree).zip(orders.verdict(scene, row))
+            {
+                (*weight, *agree) = if lit { (1.0, 1.0 - misfit) } else { (0.0, 0.0) };
+            }
+        });
+        self.backing = CellMaps::new(2);
+        grid.smooth::<2, Rows>(
+            scene.cells(BACKING),
+            &self.slots,
+            &mut self.sums,
+            &mut self.backing,
+            |row, k| Some(agree.line(row, k)),
+            |_, [weight, agree], out| {
+                let columns = weight.len();
+                for i in 0..columns {
+                    out[columns + i] = ((agree[i] + 1e-6) / (weight[i] + 1e-6)).clamp(0.0, 1.0);
                 }
             },
         );
-        remove_slivers(&mut self.phase, width, NEIGHBOURS_MIN, &mut self.counts);
-        let least = (ISLAND_SIDE * scene.period_px).powi(2) as usize;
-        remove_islands(&mut self.phase, width, least, &mut self.parents);
     }
 }
 
-#[derive(Default)]
-struct Scratch {
-    maps: RowMaps,
-    sums: Vec<f32>,
-    agrees: Vec<bool>,
-}
-
-impl Findings<'_> {
-    /// Pixels of a row whose four channels, with their neighbours', agree with the model of the chosen order; a wrong
-    /// order has G and IR wrong.
-    fn agrees(&self, scene: &Scene<'_>, y: usize, scratch: &mut Scratch) {
-        let width = scene.width;
-        let rows = [y.saturating_sub(1), y, (y + 1).min(scene.height() - 1)].map(|row| row * width);
-        let Scratch { sums, agrees, .. } = scratch;
-        sums.clear();
-        sums.extend((0..width).map(|x| rows.iter().map(|row| self.misfit[row + x]).sum::<f32>()));
-        agrees.clear();
-        agrees.extend((0..width).map(|x| {
-            let sum = sums[x.saturating_sub(1)] + sums[x] + sums[(x + 1).min(width - 1)];
-            let most = self.window.tolerance(y * width + x);
-            sum <= 9.0 * most && self.misfit[y * width + x] <= OWN_MISFIT_MAX * most
-        }));
+/// Quality of the pixels of a row, and which of them agree, with their neighbours, with the model of the chosen order; a
+/// wrong order has G and IR wrong.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+#[expect(clippy::too_many_arguments, reason = "one row of everything")]
+fn verdict(
+    misfit: [&[f32]; 3],
+    [modulation, margin, backing]: [&[f32]; 3],
+    seams: &[u8],
+    width: usize,
+    [noise, quality_min]: [f32; 2],
+    sums: &mut Vec<f32>,
+    quality: &mut [f32],
+    sure: &mut [u8],
+) {
+    sums.resize(width + 2, 0.0);
+    let [above, own, below] = misfit.map(|row| &row[..width]);
+    let middle = &mut sums[1..=width];
+    for x in 0..width {
+        middle[x] = above[x] + own[x] + below[x];
+    }
+    (sums[0], sums[width + 1]) = (sums[1], sums[width]);
+    let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
+    let (modulation, margin, backing) = (&modulation[..width], &margin[..width], &backing[..width]);
+    let (seams, quality, sure) = (&seams[..width], &mut quality[..width], &mut sure[..width]);
+    let floor = (NOISE_MAX * noise) * (NOISE_MAX * noise);
+    for x in 0..width {
+        let lit = modulation[x] > 0.0;
+        let own_quality = margin[x] * backing[x];
+        let share = MISFIT_MAX * modulation[x];
+        let most = floor + share * share;
+        let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
+        quality[x] = if lit { own_quality } else { f32::NAN };
+        sure[x] = u8::from(lit & agrees & (own_quality >= quality_min) & (seams[x] == 0));
     }
 }

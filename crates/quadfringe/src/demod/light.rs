@@ -4,7 +4,10 @@
 //! they stand at least 0.15 of their range above it. In a shadow all four channels lie at the bottom. Bottom and range
 //! are taken from the surroundings of each pixel, so that neither the ambient light nor the albedo has to be known.
 
-use super::scene::{RowMaps, Scene, neighbourhoods};
+use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, lanes_mut, take};
+use super::scene::around;
+use crate::slots::Slots;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Half width of the surroundings in fringe periods: a whole fringe with something to spare.
@@ -14,57 +17,210 @@ const LEAST: f32 = 0.02;
 /// One pixel in so many is asked for the noise.
 const NOISE_STRIDE: usize = 11;
 
-/// Writes true for every pixel that is lit. `range_min` is the least range of fringes, in linear light.
-pub(crate) fn find_light(scene: &Scene<'_>, range_min: f32, lit: &mut [bool]) {
-    let surroundings = surroundings(scene);
-    let (width, noise) = (scene.width, noise(scene));
-    let mut heights = vec![0.0f32; lit.len()];
-    heights.par_chunks_mut(width).enumerate().for_each_init(RowMaps::default, |row_maps, (y, out)| {
-        for (light, [bottom, top]) in scene.rows(y).into_iter().zip(&surroundings) {
-            let [low, high] = row_maps.sample(scene, y, [bottom, top]);
-            for x in 0..width {
-                let range = (high[x] - low[x]).max(range_min);
-                let height = light[x] - low[x];
-                out[x] += (height * height - noise * noise) / (range * range);
-            }
-        }
-    });
-    let sum = |[a, b, c]: [f32; 3]| a + b + c;
-    let least = |[a, b, c]: [f32; 3]| a.min(b).min(c);
-    let mut means = vec![0.0f32; lit.len()];
-    neighbourhoods(&heights, width, &mut means, sum, sum);
-    // The mean reaches one pixel into a shadow: the least of the means does not.
-    neighbourhoods(&means, width, &mut heights, least, least);
-    lit.iter_mut().zip(&heights).for_each(|(lit, height)| *lit = *height > 9.0 * LEAST);
+/// Working maps of the search for light.
+#[derive(Debug, Default)]
+pub(crate) struct LightFinder {
+    means: CellMaps,
+    extremes: CellMaps,
+    smoothed: CellMaps,
+    heights: Vec<f32>,
+    sums: CellMaps,
+    slots: Slots<(Rows, CellWork)>,
 }
 
-/// Least and greatest light of each channel around every cell.
-fn surroundings(scene: &Scene<'_>) -> Vec<[Vec<f32>; 2]> {
-    let grid = scene.grid;
-    let sums = scene.sums::<5>(|[r, g, b, ir], _| [1.0, r, g, b, ir]);
-    let reach = scene.cells(SURROUNDINGS).ceil();
-    sums[1..]
-        .par_iter()
-        .map(|light| {
-            let mean: Vec<f32> = light.iter().zip(&sums[0]).map(|(s, n)| s / n).collect();
-            [f32::min as fn(f32, f32) -> f32, f32::max].map(|pick| {
-                let mut map = grid.extreme(&mean, reach as usize, pick);
-                grid.average(&mut map, reach / 2.0);
-                map
-            })
-        })
-        .collect()
+/// Rows of one task.
+#[derive(Debug, Default)]
+struct Rows {
+    maps: RowMaps,
+    sums: Vec<f32>,
+    means: [Vec<f32>; 3],
+}
+
+impl LightFinder {
+    /// Writes 1 for every pixel that is lit, 0 elsewhere. `range_min` is the least range of fringes, in linear light.
+    pub fn find(
+        &mut self,
+        grid: &Grid,
+        light: [&[f32]; 4],
+        period_px: f64,
+        range_min: f32,
+        lit: &mut [f32],
+    ) {
+        let reach = (SURROUNDINGS * period_px as f32 / grid.step as f32).ceil();
+        self.surroundings(grid, light, reach, range_min);
+        let (stride, noise) = (grid.stride, noise(light[0], grid));
+        self.heights.resize(grid.pixels(), 0.0);
+        let (smoothed, slots) = (&self.smoothed, &self.slots);
+        self.heights.par_chunks_mut(stride).enumerate().for_each_init(
+            || slots.take(),
+            |slot, (y, out)| {
+                let maps = slot.0.maps.sample::<8>(grid, smoothed, 0, y);
+                heights(maps, light.map(|plane| &plane[y * stride..][..stride]), noise * noise, out);
+            },
+        );
+        let heights = &self.heights;
+        lit.par_chunks_mut(stride).enumerate().for_each_init(|| slots.take(), |slot, (y, lit)| {
+            // The mean reaches one pixel into a shadow: the least of the means does not.
+            let Rows { sums, means, .. } = &mut slot.0;
+            for (mean, centre) in means.iter_mut().zip(around(y, grid.height)) {
+                let near = around(centre, grid.height).map(|row| &heights[row * stride..][..stride]);
+                mean_of_nine(near, grid.width, sums, mean);
+            }
+            least_of_nine(means.each_ref().map(Vec::as_slice), grid.width, 9.0 * LEAST, sums, lit);
+        });
+    }
+
+    /// Bottom of the light of each channel around every cell, and the inverse square of its range.
+    fn surroundings(&mut self, grid: &Grid, light: [&[f32]; 4], reach: f32, range_min: f32) {
+        let inside: Vec<f32> = (0..grid.stride).map(|x| f32::from(u8::from(x < grid.width))).collect();
+        self.means = CellMaps::new(4);
+        grid.window_sums::<5, Rows>(
+            (0.0, usize::MAX),
+            &self.slots,
+            &mut self.sums,
+            &mut self.means,
+            |_, y, sums| {
+                let rows = light.map(|plane| &plane[y * grid.stride..][..grid.stride]);
+                add_light(&inside, rows, sums);
+            },
+            |_, [count, sums @ ..], out| {
+                for (sums, out) in sums.iter().zip(out.chunks_exact_mut(grid.columns)) {
+                    let mut last = 0.0;
+                    for ((mean, sum), n) in out.iter_mut().zip(*sums).zip(count) {
+                        // Padding repeats the last cell.
+                        last = if *n > 0.0 { sum / n } else { last };
+                        *mean = last;
+                    }
+                }
+            },
+        );
+        let (means, reach_cells) = (&self.means, reach as usize);
+        self.extremes.fill::<8>(grid, |row, out| {
+            let near = row.saturating_sub(reach_cells)..(row + reach_cells + 1).min(grid.rows);
+            for (k, out) in out.into_iter().enumerate() {
+                let mut column = means.line(row, k / 2).to_vec();
+                let pick = if k % 2 == 0 { lower } else { upper };
+                near.clone().for_each(|other| pick(means.line(other, k / 2), &mut column));
+                out.copy_from_slice(&column);
+                for shift in 1..=reach_cells.min(grid.columns - 1) {
+                    let n = grid.columns - shift;
+                    pick(&column[shift..], &mut out[..n]);
+                    pick(&column[..n], &mut out[shift..]);
+                }
+            }
+        });
+        self.smoothed = CellMaps::new(8);
+        let Self { slots, extremes, sums, smoothed, .. } = self;
+        average(grid, reach / 2.0, range_min, slots, extremes, sums, smoothed);
+    }
+}
+
+fn average(
+    grid: &Grid,
+    sigma: f32,
+    range_min: f32,
+    slots: &Slots<(Rows, CellWork)>,
+    extremes: &CellMaps,
+    sums: &mut CellMaps,
+    out: &mut CellMaps,
+) {
+    grid.smooth::<9, Rows>(
+        sigma,
+        slots,
+        sums,
+        out,
+        |row, k| if k == 0 { None } else { Some(extremes.line(row, k - 1)) },
+        |_, [weight, maps @ ..], out| {
+            let mut lines = out.chunks_exact_mut(grid.columns);
+            for pair in maps.chunks_exact(2) {
+                let (low, range) = (lines.next().expect("two lines"), lines.next().expect("two lines"));
+                for i in 0..grid.columns {
+                    low[i] = pair[0][i] / weight[i];
+                    range[i] = (pair[1][i] / weight[i] - low[i]).max(range_min).powi(-2);
+                }
+            }
+        },
+    );
+}
+
+fn lower(from: &[f32], to: &mut [f32]) {
+    to.iter_mut().zip(from).for_each(|(t, &f)| *t = if f < *t { f } else { *t });
+}
+
+fn upper(from: &[f32], to: &mut [f32]) {
+    to.iter_mut().zip(from).for_each(|(t, &f)| *t = if f > *t { f } else { *t });
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_light(inside: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
+    let [r, g, b, ir] = light.map(lanes);
+    let rows = [lanes(inside), r, g, b, ir];
+    for (i, sums) in sums.iter_mut().enumerate() {
+        add(sums, &take(&rows, i));
+    }
+}
+
+/// Sum of squared heights above the bottom in units of the range, noise taken off.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn heights(maps: [&[f32]; 8], light: [&[f32]; 4], noise: f32, out: &mut [f32]) {
+    let (maps, light) = (maps.map(lanes), light.map(lanes));
+    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
+        let (maps, light) = (take(&maps, i), take(&light, i));
+        let mut sum = [0.0; LANES];
+        for c in 0..4 {
+            for x in 0..LANES {
+                let height = light[c][x] - maps[2 * c][x];
+                sum[x] += (height * height - noise) * maps[2 * c + 1][x];
+            }
+        }
+        *out = sum;
+    }
+}
+
+/// Sum over a pixel and its eight neighbours; borders repeat.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn mean_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut Vec<f32>) {
+    spare.resize(width + 2, 0.0);
+    out.resize(width, 0.0);
+    let [a, b, c] = rows.map(|row| &row[..width]);
+    let middle = &mut spare[1..=width];
+    for x in 0..width {
+        middle[x] = a[x] + b[x] + c[x];
+    }
+    (spare[0], spare[width + 1]) = (spare[1], spare[width]);
+    let [left, middle, right] = [0, 1, 2].map(|k| &spare[k..k + width]);
+    for (x, out) in out[..width].iter_mut().enumerate() {
+        *out = left[x] + middle[x] + right[x];
+    }
+}
+
+/// 1 where the least of nine sums is above `limit`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn least_of_nine(rows: [&[f32]; 3], width: usize, limit: f32, spare: &mut Vec<f32>, out: &mut [f32]) {
+    let least = |a: f32, b: f32| if a < b { a } else { b };
+    spare.resize(width + 2, 0.0);
+    let [a, b, c] = rows.map(|row| &row[..width]);
+    let middle = &mut spare[1..=width];
+    for x in 0..width {
+        middle[x] = least(least(a[x], b[x]), c[x]);
+    }
+    (spare[0], spare[width + 1]) = (spare[1], spare[width]);
+    let [left, middle, right] = [0, 1, 2].map(|k| &spare[k..k + width]);
+    for (x, out) in out[..width].iter_mut().enumerate() {
+        *out = if least(least(left[x], middle[x]), right[x]) > limit { 1.0 } else { 0.0 };
+    }
 }
 
 /// Standard deviation of the noise of the red plane, from a mask that is blind to anything that varies along rows
 /// alone or along columns alone (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)).
-fn noise(scene: &Scene<'_>) -> f32 {
-    let (red, width) = (scene.light[0], scene.width);
-    let mut seen: Vec<f32> = (width + 1..red.len().saturating_sub(width + 1))
+fn noise(red: &[f32], grid: &Grid) -> f32 {
+    let stride = grid.stride;
+    let mut seen: Vec<f32> = (stride + 1..red.len().saturating_sub(stride + 1))
         .step_by(NOISE_STRIDE)
+        .filter(|i| i % stride + 1 < grid.width)
         .map(|i| {
             let bend = |at: usize| red[at - 1] - 2.0 * red[at] + red[at + 1];
-            (bend(i - width) - 2.0 * bend(i) + bend(i + width)).abs()
+            (bend(i - stride) - 2.0 * bend(i) + bend(i + stride)).abs()
         })
         .collect();
     if seen.is_empty() {
@@ -77,18 +233,17 @@ fn noise(scene: &Scene<'_>) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::grid::Grid;
     use super::*;
     use std::f32::consts::{FRAC_PI_2, TAU};
 
     #[test]
     fn a_shadow_is_told_from_dark_fringes_whatever_the_ambient_light() {
-        let (width, height) = (200, 80);
+        let grid = Grid::new([80, 208], 4.0);
         let in_shadow = |x: usize, y: usize| (60..90).contains(&x) && (20..60).contains(&y);
         for ambient in [0.0, 0.1, 0.3] {
             let plane = |number: f32, shift: f32| -> Vec<f32> {
-                (0..width * height)
-                    .map(|i| (i % width, i / width))
+                (0..grid.pixels())
+                    .map(|i| (i % grid.stride, i / grid.stride))
                     .map(|(x, y)| {
                         let fringe = 0.25 + 0.25 * (TAU * number * x as f32 / 912.0 + shift).cos();
                         ambient + if in_shadow(x, y) { 0.0 } else { fringe }
@@ -96,22 +251,14 @@ mod tests {
                     .collect()
             };
             let planes = [plane(36.0, 0.0), plane(35.0, 0.0), plane(36.0, FRAC_PI_2), plane(30.0, 0.0)];
-            let grid = Grid::new(height, width, 3);
-            let usable = vec![true; width * height];
-            let light = planes.each_ref().map(Vec::as_slice);
-            let scene = Scene { light, usable: &usable, width, grid: &grid, period_px: 25.3 };
-            let mut lit = vec![false; width * height];
-            find_light(&scene, 0.04, &mut lit);
+            let mut lit = vec![0.0; grid.pixels()];
+            LightFinder::default().find(&grid, planes.each_ref().map(Vec::as_slice), 25.3, 0.04, &mut lit);
             for (i, lit) in lit.iter().enumerate() {
-                let (x, y) = (i % width, i / width);
+                let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {
-                    assert!(!lit, "shadow at {x} {y}, ambient {ambient}");
-                } else if !in_shadow(x + 3, y)
-                    && !in_shadow(x.saturating_sub(3), y)
-                    && !in_shadow(x, y + 3)
-                    && !in_shadow(x, y.saturating_sub(3))
-                {
-                    assert!(*lit || (57..93).contains(&x), "light at {x} {y}, ambient {ambient}");
+                    assert_eq!(*lit, 0.0, "shadow at {x} {y}, ambient {ambient}");
+                } else if !(57..93).contains(&x) || !(17..63).contains(&y) {
+                    assert_eq!(*lit, 1.0, "light at {x} {y}, ambient {ambient}");
                 }
             }
         }

@@ -1,0 +1,156 @@
+//! Islands too small to be trusted.
+
+use crate::demod::cells::Grid;
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// Connected regions by their runs along rows.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Islands {
+    rows: Vec<Vec<Run>>,
+    parents: Vec<u32>,
+    sizes: Vec<u32>,
+}
+
+/// Pixels side by side on one surface.
+#[derive(Debug, Clone, Copy)]
+struct Run {
+    from: u32,
+    to: u32,
+    /// Number of the run in the image.
+    number: u32,
+}
+
+impl Islands {
+    /// Takes from `sure` every connected region of fewer than `least` pixels; neighbours whose `phase` (rad) is half a
+    /// turn or more apart are not connected.
+    pub fn remove(&mut self, grid: &Grid, phase: &[f32], least: usize, sure: &mut [u8]) {
+        let stride = grid.stride;
+        self.rows.resize_with(grid.height, Vec::new);
+        let source = sure.par_chunks(stride).zip(phase.par_chunks(stride));
+        self.rows.par_iter_mut().zip(source).for_each(|(runs, (sure, phase))| {
+            find_runs(&sure[..grid.width], phase, runs);
+        });
+        self.number();
+        for y in 1..grid.height {
+            let (above, below) = (&self.rows[y - 1], &self.rows[y]);
+            let lines = [y - 1, y].map(|row| &phase[row * stride..][..stride]);
+            connect(above, below, lines, &mut self.parents);
+        }
+        self.sizes.clear();
+        self.sizes.resize(self.parents.len(), 0);
+        for run in self.rows.iter().flatten() {
+            let root = root(&mut self.parents, run.number);
+            self.sizes[root as usize] += run.to - run.from;
+        }
+        for (runs, sure) in self.rows.iter().zip(sure.chunks_mut(stride)) {
+            for run in runs {
+                let root = root(&mut self.parents, run.number);
+                if (self.sizes[root as usize] as usize) < least {
+                    sure[run.from as usize..run.to as usize].fill(0);
+                }
+            }
+        }
+    }
+
+    fn number(&mut self) {
+        let mut count = 0;
+        for run in self.rows.iter_mut().flatten() {
+            run.number = count;
+            count += 1;
+        }
+        self.parents.clear();
+        self.parents.extend(0..count);
+    }
+}
+
+fn find_runs(sure: &[u8], phase: &[f32], runs: &mut Vec<Run>) {
+    runs.clear();
+    let mut open = None;
+    for (x, &on) in sure.iter().enumerate() {
+        if let Some(from) = open.filter(|_| on == 0 || !joined(phase[x - 1], phase[x])) {
+            runs.push(Run { from, to: x as u32, number: 0 });
+            open = None;
+        }
+        if on != 0 && open.is_none() {
+            open = Some(x as u32);
+        }
+    }
+    if let Some(from) = open {
+        runs.push(Run { from, to: sure.len() as u32, number: 0 });
+    }
+}
+
+/// Unites runs of two rows that touch on one surface.
+fn connect(above: &[Run], below: &[Run], [upper, lower]: [&[f32]; 2], parents: &mut [u32]) {
+    let (mut i, mut k) = (0, 0);
+    while i < above.len() && k < below.len() {
+        let (a, b) = (above[i], below[k]);
+        let mut common = a.from.max(b.from) as usize..a.to.min(b.to) as usize;
+        if common.any(|x| joined(upper[x], lower[x])) {
+            unite(parents, a.number, b.number);
+        }
+        if a.to < b.to {
+            i += 1;
+        } else {
+            k += 1;
+        }
+    }
+}
+
+/// Neighbours on one surface.
+fn joined(a: f32, b: f32) -> bool {
+    (a - b).abs() < PI
+}
+
+fn root(parents: &mut [u32], mut i: u32) -> u32 {
+    while parents[i as usize] != i {
+        let next = parents[i as usize];
+        parents[i as usize] = parents[next as usize];
+        i = next;
+    }
+    i
+}
+
+fn unite(parents: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (root(parents, a), root(parents, b));
+    parents[a.max(b) as usize] = a.min(b);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn islands_go_and_surfaces_stay() {
+        let grid = Grid::new([20, 32], 4.0);
+        let place = |x: usize, y: usize| y * grid.stride + x;
+        let mut phase = vec![10.0f32; grid.pixels()];
+        phase[place(5, 5)] = 20.0;
+        for y in 0..20 {
+            (15..20).for_each(|x| phase[place(x, y)] = 30.0);
+        }
+        let mut sure = vec![1u8; grid.pixels()];
+        Islands::default().remove(&grid, &phase, 10, &mut sure);
+        assert_eq!((sure[place(5, 5)], sure[place(2, 3)], sure[place(17, 2)]), (0, 1, 1));
+        Islands::default().remove(&grid, &phase, 101, &mut sure);
+        assert_eq!((sure[place(2, 3)], sure[place(17, 2)], sure[place(25, 2)]), (1, 0, 1));
+    }
+
+    #[test]
+    fn a_spiral_is_one_island() {
+        let grid = Grid::new([16, 16], 4.0);
+        let mut sure = vec![0u8; grid.pixels()];
+        // Two columns joined at the bottom only.
+        for y in 0..16 {
+            sure[y * 16 + 3] = 1;
+            sure[y * 16 + 6] = 1;
+        }
+        (3..=6).for_each(|x| sure[15 * 16 + x] = 1);
+        let before = sure.clone();
+        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], 34, &mut sure);
+        assert_eq!(sure, before);
+        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], 35, &mut sure);
+        assert!(sure.iter().all(|&v| v == 0));
+    }
+}

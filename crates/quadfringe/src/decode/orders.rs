@@ -1,0 +1,333 @@
+//! The orders of a scene: a node on every cell, and the pixels beside edges one by one.
+
+use crate::angle::{atan2, round, sin_cos, wrap, wrap_positive};
+use crate::demod::cells::{LANES, Lanes, RowMaps, add, lanes, take};
+use crate::demod::local_fit::LocalFit;
+use crate::demod::scene::Scene;
+use crate::demod::slopes::Slopes;
+use crate::unwrap::{Evidence, Seen, Support};
+use crate::slots::Slots;
+use crate::{Channel, FringeCode};
+use multiversion::multiversion;
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+
+/// Rows of pixels that speak for a node.
+const SAMPLED_ROWS: usize = 4;
+/// Squared misfit of a pixel's cosines beyond which a candidate order is simply wrong there.
+const MISS_MAX: f32 = 1.0;
+/// Sums over the pixels of a node: pixels, then s^2, s cos f, s sin f, cos 2f, sin 2f of G and of IR.
+const SUMS: usize = 11;
+
+/// Evidence and orders of one shot.
+pub(super) struct Orders {
+    support: Support,
+    /// Wrapped phase of every node.
+    phase: Vec<f32>,
+    /// Fringe numbers of G and IR over that of R and B.
+    ratios: [f32; 2],
+    slots: Slots<Rows>,
+    blocks: Slots<Block>,
+}
+
+/// What the pixels know before orders are chosen.
+#[derive(Clone, Copy)]
+pub(super) struct Wrapped<'a> {
+    /// Wrapped phase of R and B.
+    pub phase: &'a [f32],
+    /// 0 where there is no light.
+    pub modulation: &'a [f32],
+    pub albedo: &'a [f32],
+    pub fit: &'a LocalFit,
+    pub slopes: &'a Slopes,
+}
+
+/// Rows of one task.
+#[derive(Debug, Default)]
+struct Rows {
+    maps: [RowMaps; 4],
+    node: Vec<f32>,
+    sums: Vec<[Lanes; SUMS]>,
+    cells: [Vec<f32>; SUMS],
+}
+
+impl Orders {
+    pub fn new(code: &FringeCode) -> Self {
+        let n = code.numbers();
+        let ratios = [Channel::G, Channel::Ir].map(|c| (n[c.phase_index()] / n[0]) as f32);
+        Self { support: Support::new(code), phase: Vec::new(), ratios, slots: Slots::default(), blocks: Slots::default() }
+    }
+
+    /// Choose the orders of a wrapped phase; `absolute` receives it with them.
+    pub fn choose(&mut self, scene: &Scene<'_>, known: &Wrapped<'_>, absolute: &mut [f32]) {
+        let grid = scene.grid;
+        self.phase.resize(grid.rows * grid.columns, 0.0);
+        self.phase
+            .par_chunks_mut(grid.columns)
+            .enumerate()
+            .for_each(|(row, phase)| node_phases(scene, known, row, phase));
+        let (phase, ratios, slots) = (&self.phase, self.ratios, &self.slots);
+        self.support.choose([grid.rows, grid.columns], |row, out| {
+            let mut rows = slots.take();
+            let nodes = &phase[row * grid.columns..][..grid.columns];
+            gather(scene, known, ratios, row, nodes, &mut rows);
+            let beats = known.fit.beats(row);
+            out.extend((0..grid.columns).map(|x| evidence(nodes[x], beats.map(|beat| beat[x]), &rows.cells, x)));
+        });
+        let this = &*self;
+        absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
+            || self.blocks.take(),
+            |block, (row, absolute)| {
+                for column in 0..grid.columns {
+                    this.write(scene, known, [row, column], block, absolute);
+                }
+            },
+        );
+    }
+
+    /// Lead of the order chosen at every node of a row, and the misfit of what its own pixels see, both in [0, 1].
+    pub fn verdict(&self, scene: &Scene<'_>, row: usize) -> impl Iterator<Item = (f32, f32, bool)> {
+        let at = row * scene.grid.columns..(row + 1) * scene.grid.columns;
+        let known = self.support.margin[at.clone()].iter().zip(&self.support.misfit[at.clone()]);
+        known.zip(&self.support.nodes[at]).map(|((margin, misfit), node)| (margin.min(1.0), *misfit, node.lit))
+    }
+
+    fn absolute(&self, at: usize) -> f32 {
+        self.phase[at] + TAU * f32::from(self.support.order[at])
+    }
+
+    /// Absolute phase of the pixels of one cell.
+    #[inline(never)]
+    fn write(
+        &self,
+        scene: &Scene<'_>,
+        known: &Wrapped<'_>,
+        [row, column]: [usize; 2],
+        block: &mut Block,
+        absolute: &mut [f32],
+    ) {
+        let grid = scene.grid;
+        let node = row * grid.columns + column;
+        let (phase, whole) = (self.phase[node], self.absolute(node));
+        let candidates = self.candidates(scene, known.slopes, [row, column]);
+        let first = row * grid.step * grid.stride + column * grid.step;
+        if candidates.count > 1 {
+            block.decide(self, scene, known, [row, column], &candidates);
+        }
+        for (dy, line) in absolute.chunks_exact_mut(grid.stride).enumerate() {
+            let wrapped = &known.phase[first + dy * grid.stride..][..grid.step];
+            let line = &mut line[column * grid.step..][..grid.step];
+            for (x, (out, &own)) in line.iter_mut().zip(wrapped).enumerate() {
+                let turns = if candidates.count > 1 { block.turns[dy * grid.step + x] } else { 0.0 };
+                *out = whole + wrap(own - phase) + TAU * turns;
+            }
+        }
+    }
+
+    /// Orders that a cell and its eight neighbours propose for the pixels of the cell, in turns beside its own.
+    fn candidates(&self, scene: &Scene<'_>, slopes: &Slopes, [row, column]: [usize; 2]) -> Candidates {
+        let grid = scene.grid;
+        let node = row * grid.columns + column;
+        let mut found = Candidates { turns: [0.0; 9], count: 1 };
+        let lines = row.saturating_sub(1)..=(row + 1).min(grid.rows - 1);
+        let own = self.absolute(node);
+        // Where all orders agree and no phase turns over there is nothing to ask.
+        for other_row in lines {
+            for other_column in column.saturating_sub(1)..=(column + 1).min(grid.columns - 1) {
+                let other = other_row * grid.columns + other_column;
+                if other == node || !self.support.nodes[other].lit {
+                    continue;
+                }
+                let gap = own - self.absolute(other);
+                if gap.abs() < 2.0 {
+                    continue;
+                }
+                let [along, down] = slopes.at(other_row, other_column);
+                let step = grid.step as f32;
+                let way = step
+                    * (along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32));
+                // What the neighbour expects here, as turns beside what this node has.
+                let turns = -round((gap - way) / TAU);
+                if !found.turns[..found.count].contains(&turns) {
+                    found.turns[found.count] = turns;
+                    found.count += 1;
+                }
+            }
+        }
+        found
+    }
+}
+
+/// Turns beside the order of the own node; the first is 0.
+struct Candidates {
+    turns: [f32; 9],
+    count: usize,
+}
+
+/// Decisions for the pixels of one cell.
+#[derive(Debug, Default)]
+struct Block {
+    misses: Vec<[f32; 9]>,
+    turns: Vec<f32>,
+}
+
+impl Block {
+    /// Give every pixel the candidate that explains what it and its neighbours see in G and IR best.
+    fn decide(
+        &mut self,
+        orders: &Orders,
+        scene: &Scene<'_>,
+        known: &Wrapped<'_>,
+        [row, column]: [usize; 2],
+        candidates: &Candidates,
+    ) {
+        let grid = scene.grid;
+        let (step, side) = (grid.step, grid.step + 2);
+        let node = row * grid.columns + column;
+        let (phase, whole) = (orders.phase[node], orders.absolute(node));
+        let [_, green, _, infrared] = known.fit.cell(row, column);
+        let fringes = [green, infrared];
+        self.misses.clear();
+        for i in 0..side * side {
+            let y = (row * step + i / side).saturating_sub(1).min(grid.height - 1);
+            let x = (column * step + i % side).saturating_sub(1).min(grid.width - 1);
+            let at = y * grid.stride + x;
+            let mut misses = [0.0; 9];
+            if known.modulation[at] > 0.0 {
+                let own = whole + wrap(known.phase[at] - phase);
+                for (c, ratio) in orders.ratios.iter().enumerate() {
+                    let [a, b] = fringes[c];
+                    let light = scene.light[[1, 3][c]][at];
+                    let seen = cosine(light, known.albedo[at], a, b);
+                    for (miss, turns) in misses.iter_mut().zip(&candidates.turns[..candidates.count]) {
+                        let (_, predicted) = sin_cos(ratio * (own + TAU * turns));
+                        *miss += (seen - predicted).powi(2).min(MISS_MAX);
+                    }
+                }
+            }
+            self.misses.push(misses);
+        }
+        self.turns.clear();
+        for i in 0..step * step {
+            let (y, x) = (i / step, i % step);
+            let sum = |k: usize| -> f32 {
+                (0..9).map(|n| self.misses[(y + n / 3) * side + x + n % 3][k]).sum()
+            };
+            let best = (0..candidates.count).map(|k| (k, sum(k))).reduce(|a, b| if b.1 < a.1 { b } else { a });
+            self.turns.push(best.map_or(0.0, |(k, _)| candidates.turns[k]));
+        }
+    }
+}
+
+/// What a pixel sees of a cosine, cut where noise or glare has taken over.
+#[inline(always)]
+fn cosine(light: f32, albedo: f32, a: f32, b: f32) -> f32 {
+    let scale = albedo * b;
+    let seen = (light - albedo * a) / if scale > 1e-6 { scale } else { 1e-6 };
+    let seen = if seen < 2.0 { seen } else { 2.0 };
+    if seen > -2.0 { seen } else { -2.0 }
+}
+
+/// Wrapped phase of the nodes of one row: that of the lit pixel nearest to the middle of each cell.
+#[inline(never)]
+fn node_phases(scene: &Scene<'_>, known: &Wrapped<'_>, row: usize, out: &mut [f32]) {
+    let grid = scene.grid;
+    let half = grid.step / 2;
+    for (column, out) in out.iter_mut().enumerate() {
+        let (cy, cx) = (row * grid.step + half, column * grid.step + half);
+        let middle = cy.min(grid.height - 1) * grid.stride + cx;
+        *out = wrap_positive(known.phase[middle]);
+        if known.modulation[middle] > 0.0 {
+            continue;
+        }
+        let mut nearest = usize::MAX;
+        for y in row * grid.step..((row + 1) * grid.step).min(grid.height) {
+            for x in column * grid.step..(column + 1) * grid.step {
+                let far = y.abs_diff(cy).pow(2) + x.abs_diff(cx).pow(2);
+                if far < nearest && known.modulation[y * grid.stride + x] > 0.0 {
+                    (nearest, *out) = (far, wrap_positive(known.phase[y * grid.stride + x]));
+                }
+            }
+        }
+    }
+}
+
+/// Sums over the pixels of a row of nodes, into `rows.cells`; the last is the share of lit pixels.
+#[inline(never)]
+fn gather(
+    scene: &Scene<'_>,
+    known: &Wrapped<'_>,
+    ratios: [f32; 2],
+    row: usize,
+    nodes: &[f32],
+    rows: &mut Rows,
+) {
+    let grid = scene.grid;
+    let Rows { maps, node, sums, cells } = rows;
+    node.clear();
+    nodes.iter().for_each(|&phase| node.extend(std::iter::repeat_n(phase, grid.step)));
+    sums.clear();
+    sums.resize(grid.stride / LANES, [[0.0; LANES]; SUMS]);
+    for y in grid.samples(row, SAMPLED_ROWS) {
+        let fringes = known.fit.fringes(scene, y, maps);
+        let [_, green, _, infrared] = scene.rows(y);
+        let pixels = [known.phase, known.modulation, known.albedo, scene.usable].map(|plane| scene.row(plane, y));
+        add_seen(node, pixels, [green, infrared], fringes, ratios, sums);
+    }
+    for (k, line) in cells.iter_mut().enumerate() {
+        line.resize(grid.columns, 0.0);
+        grid.fold(k, sums, line);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_seen(
+    node: &[f32],
+    pixels: [&[f32]; 4],
+    light: [&[f32]; 2],
+    fringes: [&[f32]; 4],
+    ratios: [f32; 2],
+    sums: &mut [[Lanes; SUMS]],
+) {
+    let (node, pixels) = (lanes(node), pixels.map(lanes));
+    let (light, fringes) = (light.map(lanes), fringes.map(lanes));
+    for (i, sums) in sums.iter_mut().enumerate() {
+        let (node, [phase, modulation, albedo, usable]) = (node[i], take(&pixels, i));
+        let (light, fringes) = (take(&light, i), take(&fringes, i));
+        let mut terms = [[0.0; LANES]; SUMS];
+        for x in 0..LANES {
+            let lit = modulation[x] > 0.0;
+            let weight = if lit { usable[x] } else { 0.0 };
+            // Light counts a hundredth of a pixel, so that a node of saturated pixels is lit and knows nothing.
+            terms[0][x] = if lit { weight + LIT } else { 0.0 };
+            let own = node[x] + wrap(phase[x] - node[x]);
+            for c in 0..2 {
+                let s = cosine(light[c][x], albedo[x], fringes[2 * c][x], fringes[2 * c + 1][x]);
+                let (sine, cos) = sin_cos(ratios[c] * own);
+                let values = [s * s, s * cos, s * sine, cos * cos - sine * sine, 2.0 * sine * cos];
+                for k in 0..5 {
+                    terms[1 + 5 * c + k][x] = weight * values[k];
+                }
+            }
+        }
+        add(sums, &terms);
+    }
+}
+
+/// What a lit pixel counts at least.
+const LIT: f32 = 1.0 / 1024.0;
+
+fn evidence(phase: f32, [g_p, g_q, ir_p, ir_q]: [f32; 4], cells: &[Vec<f32>; SUMS], x: usize) -> Evidence {
+    let seen = |from: usize| Seen {
+        square: cells[from][x],
+        first: [cells[from + 1][x], cells[from + 2][x]],
+        second: [cells[from + 3][x], cells[from + 4][x]],
+    };
+    Evidence {
+        phase: Evidence::turns(phase),
+        beats: [Evidence::turns(-atan2(g_q, g_p)), Evidence::turns(-atan2(ir_q, ir_p))],
+        seen: [seen(1), seen(6)],
+        pixels: cells[0][x].floor(),
+        lit: cells[0][x] > 0.0,
+    }
+}

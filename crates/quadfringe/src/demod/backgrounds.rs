@@ -1,0 +1,314 @@
+//! Background and modulation of every channel, once the absolute phase is known.
+//!
+//! `I_c = rho (a_c + b_c cos(N_c / N_1 Phi + delta_c))`: phase and albedo belong to the pixel, backgrounds `a` and
+//! modulations `b` to a window of about a fringe. What an error of the pixel's phase or albedo would change to first order
+//! is projected out of its four intensities (variable projection; Golub and Pereyra, SIAM J. Numer. Anal. 10, 413 (1973)),
+//! so that neither noise of the phase nor texture reaches `a` and `b`, and one round does what alternating takes many for.
+
+use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, take};
+use super::local_fit::LocalFit;
+use super::scene::Scene;
+use crate::angle::sin_cos;
+use crate::slots::Slots;
+use multiversion::multiversion;
+
+/// Width (sigma) of the window in fringe periods: the albedo takes what is faster.
+const WINDOW: f32 = 1.0;
+/// Sides of the cells in fringe periods.
+const CELL: f64 = 0.7;
+/// Rows of pixels that stand for a row of cells.
+const SAMPLED_ROWS: usize = 4;
+/// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
+const RIDGE: f32 = 1e-2;
+/// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
+const MATRIX: usize = 36;
+/// The same with the right hand side.
+const SUMS: usize = MATRIX + 8;
+
+/// Backgrounds and modulations on cells of their own.
+#[derive(Debug)]
+pub(crate) struct Backgrounds {
+    grid: Grid,
+    maps: CellMaps,
+    next: CellMaps,
+    sums: CellMaps,
+    slots: Slots<(RowMaps, CellWork)>,
+}
+
+impl Backgrounds {
+    pub fn new() -> Self {
+        Self {
+            grid: Grid::new([1, 1], 1.0),
+            maps: CellMaps::new(8),
+            next: CellMaps::new(8),
+            sums: CellMaps::default(),
+            slots: Slots::default(),
+        }
+    }
+
+    /// Start from what is known without orders.
+    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit) {
+        let fine = scene.grid;
+        self.grid = Grid::new([fine.height, fine.width], (CELL * scene.period_px).max(fine.step as f64));
+        let times = self.grid.step / fine.step;
+        self.maps.fill::<8>(&self.grid, |row, mut lines| {
+            for column in 0..lines[0].len() {
+                let inside = |at: usize, count: usize| (at * times + times / 2).min(count - 1);
+                let channels = fit.cell(inside(row, fine.rows), inside(column, fine.columns));
+                for (line, value) in lines.iter_mut().zip(channels.as_flattened()) {
+                    line[column] = *value;
+                }
+            }
+        });
+    }
+
+    /// Backgrounds and modulations at row `y`: a, b of R, of G, of B, of IR.
+    pub fn sample<'a>(&self, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 8] {
+        maps.sample(&self.grid, &self.maps, 0, y)
+    }
+
+    /// Fit them to an absolute phase in rad. Pixels that are further from any such model than `misfit_max` times their
+    /// modulation (root mean square) take no part.
+    pub fn fit(
+        &mut self,
+        scene: &Scene<'_>,
+        ratios: [f32; 3],
+        phase: &[f32],
+        modulation: &[f32],
+        misfit_max: f32,
+    ) {
+        let Self { grid, maps, next, sums, slots } = self;
+        let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
+        grid.window_sums::<SUMS, RowMaps>(
+            (sigma, SAMPLED_ROWS),
+            slots,
+            sums,
+            next,
+            |rows, y, sums| {
+                let model = rows.sample::<8>(grid, maps, 0, y);
+                let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
+                add_projected(model, pixels, scene.rows(y), ratios, 4.0 * misfit_max * misfit_max, sums);
+            },
+            |row, sums, out| {
+                let before: [&[f32]; 8] = std::array::from_fn(|k| maps.line(row, k));
+                improve(sums, before, out);
+            },
+        );
+        std::mem::swap(maps, next);
+    }
+}
+
+/// Cosines of the four channels and the derivative of each by the phase of the first.
+#[inline(always)]
+pub(crate) fn carriers(phase: f32, [_, second, third]: [f32; 3]) -> ([f32; 4], [f32; 4]) {
+    let (s, c) = sin_cos(phase);
+    let (s_g, c_g) = sin_cos(second * phase);
+    let (s_ir, c_ir) = sin_cos(third * phase);
+    ([c, c_g, -s, c_ir], [-s, -second * s_g, -c, -third * s_ir])
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_projected(
+    model: [&[f32]; 8],
+    pixels: [&[f32]; 3],
+    light: [&[f32]; 4],
+    ratios: [f32; 3],
+    misfit_max: f32,
+    sums: &mut [[Lanes; SUMS]],
+) {
+    let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
+    for (i, sums) in sums.iter_mut().enumerate() {
+        let (model, light) = (take(&model, i), take(&light, i));
+        let [phase, modulation, usable] = take(&pixels, i);
+        let mut terms = [[0.0; LANES]; SUMS];
+        for x in 0..LANES {
+            let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
+            let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
+            let pixel = [phase[x], modulation[x], usable[x]];
+            let own = project(model, pixel, seen, ratios, misfit_max);
+            for k in 0..SUMS {
+                terms[k][x] = own[k];
+            }
+        }
+        add(sums, &terms);
+    }
+}
+
+/// Terms of one pixel.
+#[inline(always)]
+fn project(
+    model: [f32; 8],
+    [phase, modulation, usable]: [f32; 3],
+    seen: [f32; 4],
+    ratios: [f32; 3],
+    misfit_max: f32,
+) -> [f32; SUMS] {
+    let (cosines, derivatives) = carriers(phase, ratios);
+    let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
+    let (mut mm, mut md, mut dd, mut ms) = (1e-9f32, 0.0f32, 1e-9f32, 0.0f32);
+    for c in 0..4 {
+        let (a, b) = (model[2 * c], model[2 * c + 1]);
+        (m[c], d[c]) = (a + b * cosines[c], b * derivatives[c]);
+        mm += m[c] * m[c];
+        md += m[c] * d[c];
+        dd += d[c] * d[c];
+        ms += m[c] * seen[c];
+    }
+    // Projector onto what neither m (albedo) nor d (phase) can explain.
+    let determinant = mm * dd - md * md;
+    let inverse = 1.0 / if determinant > 1e-12 { determinant } else { 1e-12 };
+    let mut projector = [[0.0f32; 4]; 4];
+    let mut rest = [0.0f32; 4];
+    let mut misfit = 0.0f32;
+    for c in 0..4 {
+        let (along_m, along_d) = (dd * m[c] - md * d[c], mm * d[c] - md * m[c]);
+        for k in 0..4 {
+            let own = if c == k { 1.0 } else { 0.0 };
+            projector[c][k] = own - (along_m * m[k] + along_d * d[k]) * inverse;
+            rest[c] += projector[c][k] * seen[k];
+        }
+        misfit += rest[c] * seen[c];
+    }
+    let sound = (modulation > 0.0) & (misfit <= misfit_max * modulation * modulation);
+    let weight = if sound { usable } else { 0.0 };
+    let albedo = ms / mm;
+    let (first, square) = (weight * albedo, weight * albedo * albedo);
+    let mut terms = [0.0f32; SUMS];
+    let mut at = 0;
+    for c in 0..4 {
+        for k in c..4 {
+            let p = square * projector[c][k];
+            let q = p * cosines[c];
+            terms[at] = p;
+            terms[at + 1] = p * cosines[k];
+            // Columns a_c and b_c meet a_k and b_k; below the diagonal nothing is kept.
+            if k > c {
+                terms[at + 2] = q;
+                terms[at + 3] = q * cosines[k];
+                at += 4;
+            } else {
+                terms[at + 2] = q * cosines[k];
+                at += 3;
+            }
+        }
+        terms[MATRIX + 2 * c] = first * rest[c];
+        terms[MATRIX + 2 * c + 1] = first * rest[c] * cosines[c];
+    }
+    terms
+}
+
+/// Normal equations of a row of cells, solved for the change of the eight unknowns.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn improve(sums: [&[f32]; SUMS], before: [&[f32]; 8], out: &mut [f32]) {
+    let columns = before[0].len();
+    for first in (0..columns).step_by(LANES) {
+        let count = LANES.min(columns - first);
+        let part = |row: &[f32]| {
+            let mut lanes = [0.0; LANES];
+            lanes[..count].copy_from_slice(&row[first..first + count]);
+            lanes
+        };
+        let mut system = System::new(sums.map(part), before.map(part));
+        system.solve();
+        for (k, values) in system.unknowns.iter().enumerate() {
+            out[k * columns + first..][..count].copy_from_slice(&values[..count]);
+        }
+    }
+}
+
+/// Systems of [`LANES`] cells, side by side.
+struct System {
+    matrix: [[Lanes; 8]; 8],
+    right: [Lanes; 8],
+    unknowns: [Lanes; 8],
+}
+
+impl System {
+    #[inline(always)]
+    fn new(sums: [Lanes; SUMS], before: [Lanes; 8]) -> Self {
+        let mut matrix = [[[0.0; LANES]; 8]; 8];
+        let mut at = 0;
+        for c in 0..4 {
+            for k in c..4 {
+                let (u, v) = (2 * c, 2 * k);
+                matrix[u][v] = sums[at];
+                matrix[u][v + 1] = sums[at + 1];
+                if k > c {
+                    matrix[u + 1][v] = sums[at + 2];
+                    matrix[u + 1][v + 1] = sums[at + 3];
+                    at += 4;
+                } else {
+                    matrix[u + 1][v + 1] = sums[at + 2];
+                    at += 3;
+                }
+            }
+        }
+        let mut right: [Lanes; 8] = std::array::from_fn(|r| sums[MATRIX + r]);
+        let mut floor = [1e-9; LANES];
+        for r in 0..8 {
+            for c in 0..8 {
+                if c < r {
+                    matrix[r][c] = matrix[c][r];
+                }
+                for x in 0..LANES {
+                    right[r][x] -= matrix[r][c][x] * before[c][x];
+                }
+            }
+            for x in 0..LANES {
+                floor[x] += matrix[r][r][x] * (RIDGE / 8.0);
+            }
+        }
+        for r in 0..8 {
+            for x in 0..LANES {
+                matrix[r][r][x] += RIDGE * matrix[r][r][x] + floor[x];
+            }
+        }
+        Self { matrix, right, unknowns: before }
+    }
+
+    /// Adds the solution to the unknowns (Cholesky).
+    #[inline(always)]
+    fn solve(&mut self) {
+        let Self { matrix, right, unknowns } = self;
+        for k in 0..8 {
+            let mut inverse = [0.0; LANES];
+            for x in 0..LANES {
+                let pivot = matrix[k][k][x];
+                inverse[x] = 1.0 / (if pivot > 1e-12 { pivot } else { 1e-12 }).sqrt();
+            }
+            for r in k..8 {
+                for x in 0..LANES {
+                    matrix[r][k][x] *= inverse[x];
+                }
+            }
+            for r in k + 1..8 {
+                for c in k + 1..=r {
+                    for x in 0..LANES {
+                        matrix[r][c][x] -= matrix[r][k][x] * matrix[c][k][x];
+                    }
+                }
+            }
+        }
+        for k in 0..8 {
+            for x in 0..LANES {
+                right[k][x] /= matrix[k][k][x];
+            }
+            for r in k + 1..8 {
+                for x in 0..LANES {
+                    right[r][x] -= matrix[r][k][x] * right[k][x];
+                }
+            }
+        }
+        for k in (0..8).rev() {
+            for x in 0..LANES {
+                right[k][x] /= matrix[k][k][x];
+                unknowns[k][x] += right[k][x];
+            }
+            for r in 0..k {
+                for x in 0..LANES {
+                    right[r][x] -= matrix[k][r][x] * right[k][x];
+                }
+            }
+        }
+    }
+}
