@@ -27,7 +27,6 @@ pub(super) struct Best {
     lit: Vec<f32>,
     usable: Vec<f32>,
     modulation: Vec<f32>,
-    albedo: Vec<f32>,
     wrapped: Vec<f32>,
     phase: Vec<f32>,
     finder: LightFinder,
@@ -51,7 +50,6 @@ impl Best {
             lit: plane(),
             usable: plane(),
             modulation: plane(),
-            albedo: plane(),
             wrapped: plane(),
             phase: plane(),
             finder: LightFinder::default(),
@@ -85,7 +83,6 @@ impl Best {
         let maps = PixelMaps {
             phase: &mut self.wrapped,
             modulation: &mut self.modulation,
-            albedo: &mut self.albedo,
         };
         self.fit.run(&scene, &self.lit, options.modulation_min, maps);
         let noise = noise(&scene, &self.wrapped, &self.modulation);
@@ -95,15 +92,18 @@ impl Best {
         let known = Wrapped {
             phase: &self.wrapped,
             modulation: &self.modulation,
-            albedo: &self.albedo,
             fit: &self.fit,
+            backgrounds: None,
             slopes: &self.slopes,
         };
+        self.orders.choose(&scene, &known, &mut self.phase);
+        self.backgrounds.start(&scene, &self.fit);
+        self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, MISFIT_MAX);
+        let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
         let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
-        self.backgrounds.start(&scene, &self.fit);
         for window in [window.near(), window] {
             self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, MISFIT_MAX);
             self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);

@@ -10,13 +10,13 @@ use crate::slots::Slots;
 use islands::Islands;
 use multiversion::multiversion;
 use rayon::prelude::*;
-use seams::mark_seams;
+use seams::Tears;
 
 /// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
 const NOISE_MAX: f32 = 1.5;
-pub(super) const MISFIT_MAX: f32 = 0.2;
+pub(super) const MISFIT_MAX: f32 = 0.28;
 /// Greatest square of a pixel's own misfit, in units of what its neighbours may have on average.
-const OWN_MISFIT_MAX: f32 = 3.0;
+const OWN_MISFIT_MAX: f32 = 4.0;
 /// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
 const NEIGHBOURS_MIN: u8 = 10;
 /// Least side of a region that is a surface, in fringe periods.
@@ -45,6 +45,7 @@ pub(super) struct Judge {
     pub sure: Vec<u8>,
     /// Quality of the order of what is lit, NaN elsewhere.
     pub quality: Vec<f32>,
+    tears: Tears,
     seams: Vec<u8>,
     spare: Vec<u8>,
     backing: CellMaps,
@@ -64,7 +65,7 @@ struct Rows {
 impl Judge {
     pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>) {
         let grid = scene.grid;
-        mark_seams(grid, findings.phase, findings.modulation, &mut self.spare, &mut self.seams);
+        self.tears.mark(grid, findings.phase, findings.modulation, &mut self.seams);
         self.back(scene, findings.orders);
         self.quality.resize(grid.pixels(), 0.0);
         self.spare.resize(grid.pixels(), 0);
@@ -147,6 +148,7 @@ fn verdict(
         let most = floor + share * share;
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
         quality[x] = if lit { own_quality } else { f32::NAN };
-        sure[x] = u8::from(lit & agrees & (own_quality >= quality_min) & (seams[x] == 0));
+        let dbg = std::env::var("DBG").ok().and_then(|v| v.parse::<u32>().ok()).unwrap_or(7);
+        sure[x] = u8::from(lit & (dbg & 2 == 0 || agrees) & (dbg & 1 == 0 || own_quality >= quality_min) & (dbg & 4 == 0 || seams[x] == 0));
     }
 }

@@ -1,6 +1,7 @@
 //! The orders of a scene: a node on every cell, and the pixels beside edges one by one.
 
 use crate::angle::{atan2, round, sin_cos, wrap, wrap_positive};
+use crate::demod::backgrounds::Backgrounds;
 use crate::demod::cells::{LANES, Lanes, RowMaps, add, lanes, take};
 use crate::demod::local_fit::LocalFit;
 use crate::demod::scene::Scene;
@@ -12,10 +13,14 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
+/// A change of the surface costs as much as contradictions over so many fringe periods.
+const JUMP_PERIODS: f64 = 1.25;
 /// Rows of pixels that speak for a node.
 const SAMPLED_ROWS: usize = 4;
 /// Squared misfit of a pixel's cosines beyond which a candidate order is simply wrong there.
 const MISS_MAX: f32 = 1.0;
+/// The own order and those of eight neighbours.
+const CANDIDATES: usize = 9;
 /// Sums over the pixels of a node: pixels, then s^2, s cos f, s sin f, cos 2f, sin 2f of G and of IR.
 const SUMS: usize = 11;
 
@@ -37,15 +42,34 @@ pub(super) struct Wrapped<'a> {
     pub phase: &'a [f32],
     /// 0 where there is no light.
     pub modulation: &'a [f32],
-    pub albedo: &'a [f32],
     pub fit: &'a LocalFit,
+    /// Where backgrounds and modulations come from; before the first choice of orders, from the fit.
+    pub backgrounds: Option<&'a Backgrounds>,
     pub slopes: &'a Slopes,
+}
+
+impl Wrapped<'_> {
+    /// Background and modulation of R, G, B, IR at row `y`.
+    fn fringes<'b>(&self, scene: &Scene<'_>, y: usize, maps: &'b mut [RowMaps; 2]) -> [&'b [f32]; 8] {
+        match self.backgrounds {
+            None => self.fit.fringes(scene, y, maps),
+            Some(backgrounds) => backgrounds.sample(y, &mut maps[0]),
+        }
+    }
+
+    /// The same at the middle of a cell.
+    fn cell(&self, scene: &Scene<'_>, row: usize, column: usize) -> [[f32; 2]; 4] {
+        match self.backgrounds {
+            None => self.fit.cell(row, column),
+            Some(backgrounds) => backgrounds.cell(scene, row, column),
+        }
+    }
 }
 
 /// Rows of one task.
 #[derive(Debug, Default)]
 struct Rows {
-    maps: [RowMaps; 4],
+    maps: [RowMaps; 2],
     node: Vec<f32>,
     sums: Vec<[Lanes; SUMS]>,
     cells: [Vec<f32>; SUMS],
@@ -67,7 +91,8 @@ impl Orders {
             .enumerate()
             .for_each(|(row, phase)| node_phases(scene, known, row, phase));
         let (phase, ratios, slots) = (&self.phase, self.ratios, &self.slots);
-        self.support.choose([grid.rows, grid.columns], |row, out| {
+        let jump_nodes = JUMP_PERIODS * scene.period_px / grid.step as f64;
+        self.support.choose([grid.rows, grid.columns], jump_nodes, |row, out| {
             let mut rows = slots.take();
             let nodes = &phase[row * grid.columns..][..grid.columns];
             gather(scene, known, ratios, row, nodes, &mut rows);
@@ -128,7 +153,7 @@ impl Orders {
     fn candidates(&self, scene: &Scene<'_>, slopes: &Slopes, [row, column]: [usize; 2]) -> Candidates {
         let grid = scene.grid;
         let node = row * grid.columns + column;
-        let mut found = Candidates { turns: [0.0; 9], count: 1 };
+        let mut found = Candidates { turns: [0.0; CANDIDATES], count: 1 };
         let lines = row.saturating_sub(1)..=(row + 1).min(grid.rows - 1);
         let own = self.absolute(node);
         // Where all orders agree and no phase turns over there is nothing to ask.
@@ -148,10 +173,7 @@ impl Orders {
                     * (along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32));
                 // What the neighbour expects here, as turns beside what this node has.
                 let turns = -round((gap - way) / TAU);
-                if !found.turns[..found.count].contains(&turns) {
-                    found.turns[found.count] = turns;
-                    found.count += 1;
-                }
+                found.add(turns);
             }
         }
         found
@@ -160,14 +182,23 @@ impl Orders {
 
 /// Turns beside the order of the own node; the first is 0.
 struct Candidates {
-    turns: [f32; 9],
+    turns: [f32; CANDIDATES],
     count: usize,
+}
+
+impl Candidates {
+    fn add(&mut self, turns: f32) {
+        if !self.turns[..self.count].contains(&turns) {
+            self.turns[self.count] = turns;
+            self.count += 1;
+        }
+    }
 }
 
 /// Decisions for the pixels of one cell.
 #[derive(Debug, Default)]
 struct Block {
-    misses: Vec<[f32; 9]>,
+    misses: Vec<[f32; CANDIDATES]>,
     turns: Vec<f32>,
 }
 
@@ -185,20 +216,19 @@ impl Block {
         let (step, side) = (grid.step, grid.step + 2);
         let node = row * grid.columns + column;
         let (phase, whole) = (orders.phase[node], orders.absolute(node));
-        let [_, green, _, infrared] = known.fit.cell(row, column);
-        let fringes = [green, infrared];
+        let fringes = known.cell(scene, row, column);
         self.misses.clear();
         for i in 0..side * side {
             let y = (row * step + i / side).saturating_sub(1).min(grid.height - 1);
             let x = (column * step + i % side).saturating_sub(1).min(grid.width - 1);
             let at = y * grid.stride + x;
-            let mut misses = [0.0; 9];
+            let mut misses = [0.0; CANDIDATES];
             if known.modulation[at] > 0.0 {
                 let own = whole + wrap(known.phase[at] - phase);
-                for (c, ratio) in orders.ratios.iter().enumerate() {
-                    let [a, b] = fringes[c];
-                    let light = scene.light[[1, 3][c]][at];
-                    let seen = cosine(light, known.albedo[at], a, b);
+                let light = scene.light.map(|plane| plane[at]);
+                let albedo = albedo(known.phase[at], [light[0], light[2]], [fringes[0], fringes[2]]);
+                for (c, ratio) in [1, 3].into_iter().zip(orders.ratios) {
+                    let seen = cosine(light[c], albedo, fringes[c]);
                     for (miss, turns) in misses.iter_mut().zip(&candidates.turns[..candidates.count]) {
                         let (_, predicted) = sin_cos(ratio * (own + TAU * turns));
                         *miss += (seen - predicted).powi(2).min(MISS_MAX);
@@ -221,11 +251,20 @@ impl Block {
 
 /// What a pixel sees of a cosine, cut where noise or glare has taken over.
 #[inline(always)]
-fn cosine(light: f32, albedo: f32, a: f32, b: f32) -> f32 {
+fn cosine(light: f32, albedo: f32, [a, b]: [f32; 2]) -> f32 {
     let scale = albedo * b;
     let seen = (light - albedo * a) / if scale > 1e-6 { scale } else { 1e-6 };
     let seen = if seen < 2.0 { seen } else { 2.0 };
     if seen > -2.0 { seen } else { -2.0 }
+}
+
+/// Albedo by what R and B see of a phase: they are never both dark.
+#[inline(always)]
+fn albedo(phase: f32, [red, blue]: [f32; 2], [[a_r, b_r], [a_b, b_b]]: [[f32; 2]; 2]) -> f32 {
+    let (s, c) = sin_cos(phase);
+    let (r, b) = (a_r + b_r * c, a_b - b_b * s);
+    let norm = r * r + b * b;
+    (red * r + blue * b) / if norm > 1e-6 { norm } else { 1e-6 }
 }
 
 /// Wrapped phase of the nodes of one row: that of the lit pixel nearest to the middle of each cell.
@@ -269,10 +308,9 @@ fn gather(
     sums.clear();
     sums.resize(grid.stride / LANES, [[0.0; LANES]; SUMS]);
     for y in grid.samples(row, SAMPLED_ROWS) {
-        let fringes = known.fit.fringes(scene, y, maps);
-        let [_, green, _, infrared] = scene.rows(y);
-        let pixels = [known.phase, known.modulation, known.albedo, scene.usable].map(|plane| scene.row(plane, y));
-        add_seen(node, pixels, [green, infrared], fringes, ratios, sums);
+        let fringes = known.fringes(scene, y, maps);
+        let pixels = [known.phase, known.modulation, scene.usable].map(|plane| scene.row(plane, y));
+        add_seen(node, pixels, scene.rows(y), fringes, ratios, sums);
     }
     for (k, line) in cells.iter_mut().enumerate() {
         line.resize(grid.columns, 0.0);
@@ -283,16 +321,16 @@ fn gather(
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_seen(
     node: &[f32],
-    pixels: [&[f32]; 4],
-    light: [&[f32]; 2],
-    fringes: [&[f32]; 4],
+    pixels: [&[f32]; 3],
+    light: [&[f32]; 4],
+    fringes: [&[f32]; 8],
     ratios: [f32; 2],
     sums: &mut [[Lanes; SUMS]],
 ) {
     let (node, pixels) = (lanes(node), pixels.map(lanes));
     let (light, fringes) = (light.map(lanes), fringes.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
-        let (node, [phase, modulation, albedo, usable]) = (node[i], take(&pixels, i));
+        let (node, [phase, modulation, usable]) = (node[i], take(&pixels, i));
         let (light, fringes) = (take(&light, i), take(&fringes, i));
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
@@ -301,8 +339,10 @@ fn add_seen(
             // Light counts a hundredth of a pixel, so that a node of saturated pixels is lit and knows nothing.
             terms[0][x] = if lit { weight + LIT } else { 0.0 };
             let own = node[x] + wrap(phase[x] - node[x]);
+            let fringe = |c: usize| [fringes[2 * c][x], fringes[2 * c + 1][x]];
+            let albedo = albedo(phase[x], [light[0][x], light[2][x]], [fringe(0), fringe(2)]);
             for c in 0..2 {
-                let s = cosine(light[c][x], albedo[x], fringes[2 * c][x], fringes[2 * c + 1][x]);
+                let s = cosine(light[2 * c + 1][x], albedo, fringe(2 * c + 1));
                 let (sine, cos) = sin_cos(ratios[c] * own);
                 let values = [s * s, s * cos, s * sine, cos * cos - sine * sine, 2.0 * sine * cos];
                 for k in 0..5 {

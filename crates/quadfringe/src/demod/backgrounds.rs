@@ -67,6 +67,12 @@ impl Backgrounds {
         maps.sample(&self.grid, &self.maps, 0, y)
     }
 
+    /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.
+    pub fn cell(&self, scene: &Scene<'_>, row: usize, column: usize) -> [[f32; 2]; 4] {
+        let times = self.grid.step / scene.grid.step;
+        [0, 2, 4, 6].map(|c| [c, c + 1].map(|k| self.maps.line(row / times, k)[column / times]))
+    }
+
     /// Fit them to an absolute phase in rad. Pixels that are further from any such model than `misfit_max` times their
     /// modulation (root mean square) take no part.
     pub fn fit(

@@ -51,12 +51,11 @@ pub(crate) struct LocalFit {
     slots: Slots<(Rows, CellWork)>,
 }
 
-/// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, modulation of R and B in linear light (0 where
-/// nothing can be measured), and albedo relative to the surroundings.
+/// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, and their modulation in linear light (0 where
+/// nothing can be measured).
 pub(crate) struct PixelMaps<'a> {
     pub phase: &'a mut [f32],
     pub modulation: &'a mut [f32],
-    pub albedo: &'a mut [f32],
 }
 
 impl Default for LocalFit {
@@ -73,6 +72,7 @@ struct Rows {
     sin: Vec<f32>,
     albedo: [Vec<f32>; 3],
     smooth: Vec<f32>,
+    albedo_smooth: Vec<f32>,
 }
 
 impl LocalFit {
@@ -84,14 +84,12 @@ impl LocalFit {
         self.phase(scene, lit, least, out);
     }
 
-    /// Backgrounds and modulations of G and IR at row `y`: a, b, a, b; for a beat `p - i q` see [`Self::beats`].
-    pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut [RowMaps; 4]) -> [&'a [f32]; 4] {
-        let numbers = [map::A_G, map::B_G, map::A_IR, map::B_IR];
-        let mut numbers = numbers.into_iter();
-        maps.each_mut().map(|maps| {
-            let [row] = maps.sample(scene.grid, &self.maps, numbers.next().expect("four maps"), y);
-            row
-        })
+    /// Backgrounds and modulations at row `y`: a, b of R, of G, of B, of IR.
+    pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut [RowMaps; 2]) -> [&'a [f32]; 8] {
+        let [first, second] = maps;
+        let [a_r, b_r, a_b, b_b] = first.sample(scene.grid, &self.maps, map::TWO_STEP, y);
+        let [a_g, _, _, a_ir, _, _, b_g, b_ir] = second.sample(scene.grid, &self.maps, map::A_G, y);
+        [a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir]
     }
 
     /// Background and modulation of all channels in one cell.
@@ -153,8 +151,7 @@ impl LocalFit {
         let out = out
             .phase
             .par_chunks_mut(grid.stride)
-            .zip(out.modulation.par_chunks_mut(grid.stride))
-            .zip(out.albedo.par_chunks_mut(grid.stride));
+            .zip(out.modulation.par_chunks_mut(grid.stride));
         let block = grid.step.max(4);
         // Blocks of rows: of each the albedo is computed once, but for the two rows beside a block.
         let out = out.chunks(block).enumerate();
@@ -167,16 +164,18 @@ impl LocalFit {
             let [above, _, _] = around(first, grid.height);
             self.albedo_row(scene, above, 0, rows);
             self.albedo_row(scene, first, 1, rows);
-            for (i, ((phase, modulation), albedo)) in out.into_iter().enumerate() {
+            for (i, (phase, modulation)) in out.into_iter().enumerate() {
                 let y = first + i;
                 self.albedo_row(scene, around(y, grid.height)[2], (i + 2) % 3, rows);
-                let Rows { maps, cos, sin, albedo: ring, smooth, .. } = rows;
+                let Rows { maps, cos, sin, albedo: ring, smooth, albedo_smooth } = rows;
+                albedo_smooth.resize(grid.stride, 0.0);
                 let near = [0, 1, 2].map(|k| ring[(i + k) % 3].as_slice());
-                binomial(near, grid.width, smooth, albedo);
+                binomial(near, grid.width, smooth, albedo_smooth);
                 let two = maps.sample::<4>(grid, &self.maps, map::TWO_STEP, y);
-                two_step(two, Some(albedo), scene.rows(y), cos, sin);
+                two_step(two, Some(albedo_smooth), scene.rows(y), cos, sin);
                 let strengths = maps.sample::<2>(grid, &self.maps, map::WEAKEST, y);
-                finish_row([cos, sin], strengths, scene.row(lit, y), least, [phase, modulation, albedo]);
+                let known = [cos.as_slice(), sin, scene.row(lit, y), albedo_smooth];
+                finish_row(known, strengths, least, [phase, modulation]);
             }
         });
     }
@@ -357,13 +356,12 @@ pub(crate) fn binomial(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, ou
 /// Phase, and modulation where there is enough of it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn finish_row(
-    phasor: [&[f32]; 2],
+    known: [&[f32]; 4],
     strengths: [&[f32]; 2],
-    lit: &[f32],
     least: f32,
-    [phase, modulation, albedo]: [&mut [f32]; 3],
+    [phase, modulation]: [&mut [f32]; 2],
 ) {
-    let rows = [phasor[0], phasor[1], strengths[0], strengths[1], lit, albedo].map(lanes);
+    let rows = [known[0], known[1], strengths[0], strengths[1], known[2], known[3]].map(lanes);
     let mut out = [lanes_mut(phase), lanes_mut(modulation)];
     for i in 0..out[0].len() {
         let [cos, sin, weakest, mean, lit, albedo] = take(&rows, i);

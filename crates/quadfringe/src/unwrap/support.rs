@@ -18,10 +18,6 @@ use sweep::{Path, across, sweep_back, sweep_on};
 
 /// Misfit beyond which evidence says nothing more: both beats 0.3 rad off, or cosines 0.3 off (root mean square).
 const CUT: i16 = 333;
-/// Cost of any change of the surface, in units of [`CUT`].
-const JUMP: i16 = 30 * CUT;
-/// Cost of a change by one order.
-const STEP: i16 = JUMP / 2;
 /// Labels are padded to whole vectors.
 const LANES: usize = 16;
 /// A label outside the field.
@@ -68,13 +64,16 @@ impl Support {
         }
     }
 
-    /// Choose the orders of `rows` x `columns` nodes; `evidence` writes what is known of a row of them.
+    /// Choose the orders of `rows` x `columns` nodes; `evidence` writes what is known of a row of them. Any change of the
+    /// surface costs as much as `jump_nodes` nodes in a row that contradict; a change by one order costs half of that.
     pub fn choose(
         &mut self,
         [rows, columns]: [usize; 2],
+        jump_nodes: f64,
         evidence: impl Fn(usize, &mut Vec<Evidence>) + Sync,
     ) {
         let (nodes, labels) = (rows * columns, self.labels.count());
+        let jump = (jump_nodes.clamp(1.0, 30.0) * f64::from(CUT)) as i16;
         self.columns = columns;
         self.nodes.resize(nodes, Node::default());
         self.costs.resize(nodes * labels, 0);
@@ -83,7 +82,7 @@ impl Support {
         let rows = rows.zip(self.nodes.par_chunks_mut(columns)).enumerate();
         let table = &self.labels;
         rows.for_each_init(
-            || (Path::new(labels), Vec::new()),
+            || (Path::new(labels, jump), Vec::new()),
             |(path, known), (row, ((costs, sums), nodes))| {
                 known.clear();
                 evidence(row, known);
@@ -97,11 +96,11 @@ impl Support {
                 sweep_back(path, nodes, costs, sums);
             },
         );
-        self.sweep_columns(labels);
-        self.read_out(labels);
+        self.sweep_columns(labels, jump);
+        self.read_out(labels, jump);
     }
 
-    fn sweep_columns(&mut self, labels: usize) {
+    fn sweep_columns(&mut self, labels: usize, jump: i16) {
         let Self { nodes, costs, sums, columns, .. } = self;
         let (columns, rows) = (*columns, nodes.len() / *columns);
         let mut blocks: Vec<Vec<&mut [u16]>> = Vec::new();
@@ -115,7 +114,7 @@ impl Support {
         blocks.into_par_iter().enumerate().for_each(|(block, mut part)| {
             let first = block * BLOCK;
             let width = BLOCK.min(columns - first);
-            let mut paths: Vec<Path> = (0..width).map(|_| Path::new(labels)).collect();
+            let mut paths: Vec<Path> = (0..width).map(|_| Path::new(labels, jump)).collect();
             let mut visit = |row: usize, paths: &mut [Path]| {
                 let at = row * columns + first;
                 let costs = &costs[at * labels..][..width * labels];
@@ -127,7 +126,7 @@ impl Support {
         });
     }
 
-    fn read_out(&mut self, labels: usize) {
+    fn read_out(&mut self, labels: usize, jump: i16) {
         let columns = self.columns;
         self.order.resize(self.nodes.len(), 0);
         self.margin.resize(self.nodes.len(), 0.0);
@@ -140,7 +139,7 @@ impl Support {
             for (x, (sums, costs)) in nodes.enumerate() {
                 let (best, lead) = least(sums);
                 order[x] = best as i16 - 1;
-                margin[x] = f32::from(lead) / f32::from(JUMP);
+                margin[x] = f32::from(lead) / f32::from(jump);
                 misfit[x] = f32::from(costs[best]) / f32::from(CUT);
             }
         });

@@ -1,35 +1,56 @@
 //! Doubtful pixels by their nearest neighbours: seams of the absolute phase, and slivers.
 
+use crate::angle::wrap;
 use crate::demod::cells::Grid;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Marks every lit pixel whose absolute phase (rad) differs by half a turn or more from that of a lit neighbour - there
-/// one of the two has the wrong order, or sees two surfaces at once - and the pixels around it.
-pub(super) fn mark_seams(
-    grid: &Grid,
-    phase: &[f32],
-    modulation: &[f32],
-    torn: &mut Vec<u8>,
-    seams: &mut Vec<u8>,
-) {
-    let stride = grid.stride;
-    torn.resize(grid.pixels(), 0);
-    seams.resize(grid.pixels(), 0);
-    torn.par_chunks_mut(stride).enumerate().for_each(|(y, torn)| {
-        torn.fill(0);
-        let here = [&phase[y * stride..][..grid.width], &modulation[y * stride..][..grid.width]];
-        tear_along(here, torn);
-        for other in [y.checked_sub(1), (y + 1 < grid.height).then_some(y + 1)].into_iter().flatten() {
-            tear_down(here, [&phase[other * stride..], &modulation[other * stride..]], torn);
-        }
-    });
-    let torn = &*torn;
-    seams.par_chunks_mut(stride).enumerate().for_each_init(Vec::new, |sums, (y, seams)| {
-        let near = y.saturating_sub(1)..(y + 2).min(grid.height);
-        count_near(torn, stride, grid.width, (near, 1), sums, seams);
-    });
+/// Wrapped phases nearer than this are the same to R and B.
+const BLIND_RAD: f32 = 0.3;
+/// Pixels beside such a seam that may lie on its other side.
+const BLIND_REACH: usize = 2;
+
+/// Tears of the phase: whether a pixel is torn from a neighbour, and whether R and B could not see it.
+#[derive(Debug, Default)]
+pub(super) struct Tears {
+    torn: Vec<u8>,
+    blind: Vec<u8>,
+}
+
+impl Tears {
+    /// Marks in `seams` every lit pixel whose absolute phase (rad) differs by half a turn or more from that of a lit
+    /// neighbour - there one of the two has the wrong order, or sees two surfaces at once - and the pixels around it.
+    /// Where the two wrapped phases agree only G and IR know on which side a pixel lies, and those are blurred: there
+    /// more pixels around are marked.
+    pub fn mark(&mut self, grid: &Grid, phase: &[f32], modulation: &[f32], seams: &mut Vec<u8>) {
+        let stride = grid.stride;
+        self.torn.resize(grid.pixels(), 0);
+        self.blind.resize(grid.pixels(), 0);
+        seams.resize(grid.pixels(), 0);
+        let rows = self.torn.par_chunks_mut(stride).zip(self.blind.par_chunks_mut(stride)).enumerate();
+        rows.for_each(|(y, (torn, blind))| {
+            torn.fill(0);
+            blind.fill(0);
+            let row = |y: usize| [phase, modulation].map(|plane| &plane[y * stride..][..grid.width]);
+            let here = row(y);
+            let n = grid.width - 1;
+            let [left, right] = [here.map(|map| &map[..n]), here.map(|map| &map[1..])];
+            tear(left, right, [&mut torn[..n], &mut blind[..n]]);
+            tear(left, right, [&mut torn[1..=n], &mut blind[1..=n]]);
+            for other in [y.checked_sub(1), (y + 1 < grid.height).then_some(y + 1)].into_iter().flatten() {
+                tear(here, row(other), [&mut torn[..=n], &mut blind[..=n]]);
+            }
+        });
+        let (torn, blind) = (&self.torn, &self.blind);
+        let work = || (Vec::new(), vec![0; stride]);
+        seams.par_chunks_mut(stride).enumerate().for_each_init(work, |(sums, wide), (y, seams)| {
+            let near = |reach: usize| y.saturating_sub(reach)..(y + reach + 1).min(grid.height);
+            count_near(torn, stride, grid.width, (near(1), 1), sums, seams);
+            count_near(blind, stride, grid.width, (near(BLIND_REACH), BLIND_REACH), sums, wide);
+            seams.iter_mut().zip(wide).for_each(|(seam, wide)| *seam |= *wide);
+        });
+    }
 }
 
 /// Keeps of `pixels` those with at least `least` like them, themselves included, among the 5 x 5 around; what the border
@@ -49,27 +70,16 @@ pub(super) fn remove_slivers(grid: &Grid, least: u8, pixels: &[u8], out: &mut Ve
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn tear_along([phase, modulation]: [&[f32]; 2], torn: &mut [u8]) {
-    let n = phase.len() - 1;
-    let (left, right) = (&phase[..n], &phase[1..]);
-    let (left_lit, right_lit) = (&modulation[..n], &modulation[1..=n]);
+fn tear(here: [&[f32]; 2], there: [&[f32]; 2], out: [&mut [u8]; 2]) {
+    let n = here[0].len();
+    let ([phase, lit], [other, other_lit], [torn, blind]) = (here, there, out);
+    let (lit, other, other_lit) = (&lit[..n], &other[..n], &other_lit[..n]);
+    let (torn, blind) = (&mut torn[..n], &mut blind[..n]);
     for x in 0..n {
-        let apart = (left[x] - right[x]).abs() >= PI;
-        torn[x] |= u8::from(apart & (left_lit[x] > 0.0) & (right_lit[x] > 0.0));
-    }
-    for x in 0..n {
-        let apart = (left[x] - right[x]).abs() >= PI;
-        torn[x + 1] |= u8::from(apart & (left_lit[x] > 0.0) & (right_lit[x] > 0.0));
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn tear_down([phase, modulation]: [&[f32]; 2], [other, other_lit]: [&[f32]; 2], torn: &mut [u8]) {
-    let n = phase.len();
-    let (other, other_lit, modulation, torn) = (&other[..n], &other_lit[..n], &modulation[..n], &mut torn[..n]);
-    for x in 0..n {
-        let apart = (phase[x] - other[x]).abs() >= PI;
-        torn[x] |= u8::from(apart & (modulation[x] > 0.0) & (other_lit[x] > 0.0));
+        let gap = phase[x] - other[x];
+        let apart = (gap.abs() >= PI) & (lit[x] > 0.0) & (other_lit[x] > 0.0);
+        torn[x] |= u8::from(apart);
+        blind[x] |= u8::from(apart & (wrap(gap).abs() < BLIND_RAD));
     }
 }
 
@@ -103,13 +113,13 @@ mod tests {
     #[test]
     fn seams_are_marked_on_both_sides() {
         let grid = Grid::new([20, 32], 4.0);
-        let phase: Vec<f32> = (0..grid.pixels()).map(|i| if i % 32 < 15 { 10.0 } else { 30.0 }).collect();
+        let phase: Vec<f32> = (0..grid.pixels()).map(|i| if i % 32 < 15 { 10.0 } else { 32.0 }).collect();
         let mut seams = Vec::new();
-        mark_seams(&grid, &phase, &vec![1.0; grid.pixels()], &mut Vec::new(), &mut seams);
+        Tears::default().mark(&grid, &phase, &vec![1.0; grid.pixels()], &mut seams);
         let row: Vec<usize> = (0..32).filter(|x| seams[7 * 32 + x] > 0).collect();
         assert_eq!(row, [13, 14, 15, 16]);
         let lit: Vec<f32> = (0..grid.pixels()).map(|i| if i % 32 < 15 { 1.0 } else { 0.0 }).collect();
-        mark_seams(&grid, &phase, &lit, &mut Vec::new(), &mut seams);
+        Tears::default().mark(&grid, &phase, &lit, &mut seams);
         assert!(seams.iter().all(|&s| s == 0), "the dark has no seams");
     }
 

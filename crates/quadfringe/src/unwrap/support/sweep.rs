@@ -1,6 +1,6 @@
 //! Sweeps of semi-global matching.
 
-use super::{JUMP, LANES, NEVER, Node, STEP};
+use super::{LANES, NEVER, Node};
 use multiversion::multiversion;
 
 /// Room beside the labels, so that shifted reads stay inside.
@@ -15,10 +15,13 @@ pub(super) struct Path {
     /// Nothing before it counts.
     fresh: bool,
     labels: usize,
+    /// Cost of any change of the surface, and of one by a single order.
+    jump: i16,
+    step: i16,
 }
 
 impl Path {
-    pub fn new(labels: usize) -> Self {
+    pub fn new(labels: usize, jump: i16) -> Self {
         let mut path = Self {
             previous: vec![NEVER; labels + 2 * PAD],
             current: vec![NEVER; labels + 2 * PAD],
@@ -26,6 +29,8 @@ impl Path {
             phase: 0,
             fresh: true,
             labels,
+            jump,
+            step: jump / 2,
         };
         path.restart();
         path
@@ -63,12 +68,12 @@ impl Path {
         let target = &mut self.current[PAD..].as_chunks_mut::<LANES>().0[..blocks];
         let [below, same, above] =
             [at - 1, at, at + 1].map(|from| &self.previous[from..].as_chunks::<LANES>().0[..blocks]);
-        let limit = self.least.saturating_add(JUMP);
+        let limit = self.least.saturating_add(self.jump);
         let mut least = [i16::MAX; LANES];
         for b in 0..blocks {
             for k in 0..LANES {
                 let (low, high) = (below[b][k], above[b][k]);
-                let neighbour = (if low < high { low } else { high }).saturating_add(STEP);
+                let neighbour = (if low < high { low } else { high }).saturating_add(self.step);
                 let best = if same[b][k] < neighbour { same[b][k] } else { neighbour };
                 let best = if best < limit { best } else { limit };
                 let sum = own[b][k].saturating_add(best - self.least);
