@@ -100,9 +100,9 @@ def peers(found: Record) -> str:
     return "\n".join(
         [
             "## Peers\n",
-            "`python benches/peers.py`: peaks, 1024 x 768, 8 bit, 3 % noise, all in turns in one run. They do not all do "
-            "the same job; the head of the script says who does what. The floor is that of the same number of threads: "
-            "the bytes and the row transforms alone.\n",
+            "`python benches/peers.py`: peaks, 1024 x 768, 8 bit, 3 % noise, all in turns in one run. They do not all "
+            "do the same job; the head of the script says who does what. The floor is that of the same number of "
+            "threads: the bytes and the row transforms alone.\n",
             columns(found["peers"], heads),
         ]
     )
@@ -116,7 +116,8 @@ def accuracy(found: Record) -> str:
     return "\n".join(
         [
             "## Accuracy\n",
-            "`python benches/accuracy.py`: its head says what each name means, benches/efficiency.py what efficiency is.\n",
+            "`python benches/accuracy.py`: its head says what each name means, benches/efficiency.py what the "
+            "efficiency is.\n",
             table(("figure", *METHODS), lines) + missing,
         ]
     )
