@@ -5,7 +5,8 @@
 Scene: peaks on the virtual bench, 1024 x 768, 8 bit, 3 % noise. All take turns, and in every turn a run off the clock
 goes before the one on it. Not all do the same job, and the table says what each needs and gives:
 
-- quadfringe and the published chain in plain NumPy: one shot of four images to absolute phase and X, Y, Z.
+- quadfringe and the published chain in plain NumPy: one shot of four images to absolute phase and X, Y, Z; quadfringe
+  through Python, with new maps and a verdict on every shot.
 - floor, and kernel: the compiled bench `floor` (crates/quadfringe/benches/floor.rs) on the same shot: the bytes and the
   row transforms without a decoder, and both methods into maps made before, without Python.
 - OpenCV structured_light: wrapped phase alone, from one image (FTP) or three (PSP). Its sign and constant offset are

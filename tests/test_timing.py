@@ -83,6 +83,12 @@ def test_a_shot_that_cannot_be_decoded_is_told() -> None:
         timing.time_decoding((16, 16), ["published"], [1], repeats=3, surface="plane")
 
 
+def test_a_surface_that_nobody_knows_is_named() -> None:
+    result = CliRunner().invoke(app, ["bench", "--surface", "unicorn"])
+    assert result.exit_code == 2
+    assert "unicorn" in result.stderr
+
+
 def test_resident_memory_follows_what_is_held() -> None:
     code = (
         "import numpy as np; from quadfringe.machine import resident_bytes as r\n"
