@@ -87,3 +87,8 @@ def test_tables_are_written_from_records() -> None:
     text = results.accuracy({"figures": {"published_peaks_rms_rad": 0.06, "best_peaks_rms_rad": 0.009}})
     assert "| peaks_rms_rad | 0.06 | 0.009 |" in text
     assert "no test data" in text
+
+
+def test_a_script_without_figures_stops_the_results() -> None:
+    with pytest.raises(SystemExit, match="no figures, exit status 2"):
+        results.measured(str(ROOT / "benches" / "peers.py"), "--skip", "nobody")
