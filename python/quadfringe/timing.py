@@ -111,10 +111,8 @@ def time_decoding(
     Raises `DecodeError` when a shot of this size cannot be decoded.
     """
     cases = [Case(*size, method, count) for method in methods for count in threads]
-    with _shot_folder(size, surface) as folder, ExitStack() as stack:
-        workers = [stack.enter_context(_Worker(folder, case)) for case in cases]
-        turns: list[list[dict[str, float]]] = [[worker.ask("time") for worker in workers] for _ in range(repeats + 1)]
-    return [_timing(case, [turn[i] for turn in turns[1:]]) for i, case in enumerate(cases)]
+    with _shot_folder(size, surface) as folder:
+        return _time_in_turns(folder, cases, repeats)
 
 
 def scaling(methods: Sequence[str], threads: int, *, repeats: int, surface: str) -> Iterator[Timing]:
@@ -124,8 +122,9 @@ def scaling(methods: Sequence[str], threads: int, *, repeats: int, surface: str)
     """
     for size in SCALING_SIZES:
         fewer = max(REPEATS_MIN, min(repeats, round(repeats * 1e6 / (size[0] * size[1]))))
-        for method in methods:  # one after the other: two decoders of 16 million pixels need some GB
-            yield from time_decoding(size, [method], [threads], repeats=fewer, surface=surface)
+        with _shot_folder(size, surface) as folder:
+            for method in methods:  # one after the other: two decoders of 16 million pixels need some GB
+                yield from _time_in_turns(folder, [Case(*size, method, threads)], fewer)
 
 
 def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, surface: str) -> list[Memory]:
@@ -138,6 +137,14 @@ def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, surfa
             with _Worker(folder, case, **GIVE_BACK) as worker:
                 found.append(Memory(case, **worker.ask("weigh")))
     return found
+
+
+def _time_in_turns(folder: Path, cases: Sequence[Case], repeats: int) -> list[Timing]:
+    """Time the cases on the shot of a folder; the first turn of all is not counted."""
+    with ExitStack() as stack:
+        workers = [stack.enter_context(_Worker(folder, case)) for case in cases]
+        turns: list[list[dict[str, float]]] = [[worker.ask("time") for worker in workers] for _ in range(repeats + 1)]
+    return [_timing(case, [turn[i] for turn in turns[1:]]) for i, case in enumerate(cases)]
 
 
 def _timing(case: Case, turns: list[dict[str, float]]) -> Timing:
