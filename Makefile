@@ -41,7 +41,7 @@ stubs: $(STAMPS)/built
 figures: $(STAMPS)/built
 	$(BIN)/python docs/make_figures.py
 
-# Times, memory, peers and accuracy into benches/RESULTS.md; some 15 minutes on an idle machine of two cores.
+# Times, memory, peers and accuracy into benches/RESULTS.md; let the machine do nothing else meanwhile.
 bench: $(STAMPS)/peers
 	$(BIN)/python benches/results.py
 
