@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
 
-.PHONY: demo test figures rust python stubs format bench clean
+.PHONY: demo test figures rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
@@ -41,9 +41,17 @@ stubs: $(STAMPS)/built
 figures: $(STAMPS)/built
 	$(BIN)/python docs/make_figures.py
 
-bench: $(STAMPS)/built
-	$(BIN)/python benches/bench_decode.py
-	$(BIN)/python benches/first_frame.py
+# Times, memory, peers and accuracy into benches/RESULTS.md; let the machine do nothing else meanwhile.
+bench: $(STAMPS)/peers
+	$(BIN)/python benches/results.py
+
+peers: $(STAMPS)/peers
+
+# Fringes asks for another OpenCV wheel than ours, and two of them in one environment overwrite each other.
+$(STAMPS)/peers: $(STAMPS)/built benches/requirements.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
+	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps "Fringes>=2.1,<3"
+	touch $@
 
 format: $(STAMPS)/tools
 	cargo fmt --all

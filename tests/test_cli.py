@@ -49,7 +49,7 @@ def test_the_script_and_the_module_are_the_same_command() -> None:
     plain = {**os.environ, "NO_COLOR": "1", "COLUMNS": "100"}
     for command in ([str(script)], [sys.executable, "-m", "quadfringe"]):
         done = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True, env=plain)
-        for name in ("demo", "pattern", "simulate", "decode", "measure", "info", "calibrate", "reproduce"):
+        for name in ("demo", "pattern", "simulate", "decode", "measure", "info", "calibrate", "reproduce", "bench"):
             assert name in done.stdout
 
 
@@ -67,6 +67,12 @@ def test_version() -> None:
         ["decode", "--fringes", "36", "35", "--projector-width", "912", "--out", "x.npz"],
         ["decode", "--fringes", "36", "35", "many", "--projector-width", "912", "--out", "x.npz"],
         ["reproduce", "everything"],
+        ["bench", "--no-such-option"],
+        ["bench", "--size", "1024"],
+        ["bench", "--size", "8x8"],
+        ["bench", "--threads", "0"],
+        ["bench", "--repeats", "1"],
+        ["bench", "--method", "fastest"],
         ["calibrate", "response", "--steps", "2", "a.png", "--out", "r.json"],
     ],
 )

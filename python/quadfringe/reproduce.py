@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +22,7 @@ from quadfringe.report import Panel, draw_panels
 from quadfringe.stages import carrier, fourier, linear_light
 from quadfringe.truth import rms
 
-__all__ = ["REPRODUCTIONS", "peaks"]
+__all__ = ["REPRODUCTIONS", "WIDTH_PX", "inside", "peaks", "peaks_shot"]
 
 Map = NDArray[np.float32]
 
@@ -42,7 +43,7 @@ def peaks(out: Path) -> tuple[dict[str, float], Path]:
     Writes `out`/peaks.png. Figures are RMS in rad of the 36-fringe phase, over the field without a border of one
     fringe period, and along row 760.
     """
-    shot, truth_rad = _peaks_shot()
+    shot, truth_rad = peaks_shot()
     light = linear_light(shot)
     period_px, _ = carrier(light["red"])
     shape = decode(shot, Plan(projector_width_px=WIDTH_PX, fringes=Fringes()))
@@ -51,19 +52,23 @@ def peaks(out: Path) -> tuple[dict[str, float], Path]:
         "improved_ftp": _turnless(fourier(light["red"], period_px, band="improved") - truth_rad),
         "proposed": shape.phase_rad - truth_rad,
     }
-    errors = {name: _inside(miss, period_px) for name, miss in misses.items()}
+    errors = {name: inside(miss, period_px) for name, miss in misses.items()}
     figures = {f"{name}_rms_rad": rms(error) for name, error in errors.items()}
     figures |= {f"{name}_rms_rad_row{ROW}": rms(error[ROW]) for name, error in errors.items()}
     _draw(out / "peaks.png", shot, truth_rad, errors, figures)
     return figures, out / "peaks.png"
 
 
-def _peaks_shot() -> tuple[Shot, Map]:
-    """Give the shot, and the exact absolute phase of 36 fringes, (H, W) rad."""
+def peaks_shot(**light: Any) -> tuple[Shot, Map]:
+    """Give the shot, and the exact absolute phase of 36 fringes, (H, W) rad.
+
+    `light` replaces settings of the published shot, by the names of `SceneConfig`: a white surface in the dark,
+    noise of 3 %, 8 bit.
+    """
     bench = _core.Bench(camera=core_device(_camera()), visible=core_device(_projector()))
     cast = bench.cast_peaks(z_mm=DEPTH_MM, scale_mm=PEAKS_SCALE_MM)
-    ideal = {"albedo": (1.0,) * 4, "ambient": (0.0,) * 4}
-    images = bench.render(cast, Fringes().numbers, noise=NOISE, seed=SEED, bit_depth=8, **ideal)
+    published = {"albedo": (1.0,) * 4, "ambient": (0.0,) * 4, "noise": NOISE, "seed": SEED, "bit_depth": 8}
+    images = bench.render(cast, Fringes().numbers, **(published | light))
     phase_rad = 2 * np.pi * Fringes().numbers[0] / WIDTH_PX * cast.column_px().astype(np.float64)
     shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
     return shot, phase_rad.astype(np.float32)
@@ -94,8 +99,8 @@ def _turnless(error: Map) -> Map:
     return (error - 2 * np.pi * turns).astype(np.float32)
 
 
-def _inside(error: Map, period_px: float) -> Map:
-    """Blank a border of one fringe period."""
+def inside(error: Map, period_px: float) -> Map:
+    """Blank a border of one fringe period with NaN, (H, W)."""
     border = math.ceil(period_px)
     blank = np.full_like(error, np.nan)
     inner = np.s_[border:-border, border:-border]

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import typer
 
 from quadfringe.files import atomic, figures_text
 
-__all__ = ["Fringes3", "JsonOption", "complain", "say", "steps", "table", "write_figures"]
+__all__ = ["Fringes3", "JsonOption", "complain", "rows", "say", "steps", "table", "write_figures", "write_record"]
 
 Item = TypeVar("Item")
 
@@ -42,14 +42,21 @@ def _stdout_is_taken(json: Path | None) -> bool:
 
 def table(title: str, figures: Mapping[str, float], json: Path | None = None) -> None:
     """Print figures as a table; on stderr when stdout carries JSON."""
+    rows(title, ("figure", "value"), figures.items(), json)
+
+
+def rows(
+    title: str, head: Sequence[str], lines: Iterable[Sequence[str | int | float]], json: Path | None = None
+) -> None:
+    """Print lines of words and numbers under a head; the first column to the left; on stderr as in `say`."""
     from rich.console import Console
     from rich.table import Table
 
     drawn = Table()
-    drawn.add_column("figure")
-    drawn.add_column("value", justify="right")
-    for name, value in figures.items():
-        drawn.add_row(name, f"{value:.4g}")
+    for column, name in enumerate(head):
+        drawn.add_column(name, justify="right" if column else "left")
+    for line in lines:
+        drawn.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in line))
     console = Console(stderr=_stdout_is_taken(json))
     console.print(title, highlight=False, soft_wrap=True)
     console.print(drawn)
@@ -57,13 +64,24 @@ def table(title: str, figures: Mapping[str, float], json: Path | None = None) ->
 
 def write_figures(figures: Mapping[str, float], json: Path | None) -> None:
     """Write {"figures": {...}} to the file, or to stdout for "-"."""
+    _write(figures_text(figures), json)
+
+
+def write_record(record: Mapping[str, Any], json: Path | None) -> None:
+    """Write plain data to the file, or to stdout for "-"."""
+    from json import dumps
+
+    _write(dumps(record, indent=2, allow_nan=False) + "\n", json)
+
+
+def _write(text: str, json: Path | None) -> None:
     if json is None:
         return
     if _stdout_is_taken(json):
-        sys.stdout.write(figures_text(figures))
+        sys.stdout.write(text)
         return
     with atomic(json) as temporary:
-        temporary.write_text(figures_text(figures))
+        temporary.write_text(text)
 
 
 @contextmanager

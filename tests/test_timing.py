@@ -1,0 +1,105 @@
+"""`quadfringe bench`: what it measures is what it says, and scripts can read it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from quadfringe import machine, timing
+from quadfringe.cli import app
+from quadfringe.errors import DecodeError
+
+SIZE = (320, 240)
+CASE_KEYS = {"width_px", "height_px", "method", "threads"}
+TIMING_KEYS = CASE_KEYS | {
+    "repeats",
+    "median_ms",
+    "minimum_ms",
+    "verdict_ms",
+    "busy_cores",
+    "returned_percent",
+    "shots_per_s",
+    "ns_per_pixel",
+}
+
+
+@pytest.fixture(scope="module")
+def measured() -> dict[str, Any]:
+    """The JSON of one small run, from standard output."""
+    options = ["--size", "320x240", "--method", "published", "--threads", "1", "--threads", "2", "--repeats", "3"]
+    result = CliRunner().invoke(app, ["bench", *options, "--json", "-"])
+    assert result.exit_code == 0, result.output
+    record: dict[str, Any] = json.loads(result.stdout)
+    return record
+
+
+def test_the_record_has_its_keys(measured: dict[str, Any]) -> None:
+    assert set(measured) == {"schema_version", "machine", "surface", "noise", "timings", "memory", "scaling", "figures"}
+    assert set(measured["machine"]) == {"cpu", "cores", "os", "python", "quadfringe", "commit"}
+    assert measured["scaling"] == []
+    assert [(t["method"], t["threads"], t["repeats"]) for t in measured["timings"]] == [
+        ("published", 1, 3),
+        ("published", 2, 3),
+    ]
+    for found in measured["timings"]:
+        assert set(found) == TIMING_KEYS
+    assert list(measured["figures"].values()) == [t["median_ms"] for t in measured["timings"]]
+    assert all(name.startswith("published_320x240_") for name in measured["figures"])
+
+
+def test_times_are_consistent(measured: dict[str, Any]) -> None:
+    for found in measured["timings"]:
+        assert 0 < found["verdict_ms"] < found["median_ms"]
+        assert 0 < found["minimum_ms"] <= found["median_ms"]
+        assert found["shots_per_s"] == pytest.approx(1e3 / found["median_ms"])
+        assert found["ns_per_pixel"] == pytest.approx(1e6 * found["median_ms"] / (320 * 240))
+        assert found["returned_percent"] > 80
+
+
+def test_a_process_keeps_to_its_threads(measured: dict[str, Any]) -> None:
+    for found in measured["timings"]:
+        assert found["busy_cores"] <= found["threads"] + 0.1
+
+
+@pytest.mark.skipif(machine.resident_bytes() is None, reason="this system does not tell what is resident")
+def test_a_decoder_weighs_less_than_its_results_and_some_maps() -> None:
+    published, best = timing.memory(SIZE, timing.METHODS, 1, surface="plane")
+    map_mb = 4 * SIZE[0] * SIZE[1] / 2**20
+    for found in (published, best):
+        assert found.while_decoding_mb > 8 * map_mb  # the results alone are eight maps
+        assert -map_mb < found.held_mb < 100 * map_mb
+    assert set(published.record()) == CASE_KEYS | {"held_mb", "while_decoding_mb"}
+
+
+def test_a_shot_that_cannot_be_decoded_is_told() -> None:
+    with pytest.raises(DecodeError, match="published at 16 x 16 pixels: "):
+        timing.time_decoding((16, 16), ["published"], [1], repeats=3, surface="plane")
+
+
+def test_a_surface_that_nobody_knows_is_named() -> None:
+    result = CliRunner().invoke(app, ["bench", "--surface", "unicorn"])
+    assert result.exit_code == 2
+    assert "unicorn" in result.stderr
+
+
+def test_resident_memory_follows_what_is_held() -> None:
+    code = (
+        "import numpy as np; from quadfringe.machine import resident_bytes as r\n"
+        "before = r(); held = np.ones(2**25, np.uint8); assert before is None or 2**24 < r() - before < 2**26"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_the_machine_is_described(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = machine.described()
+    assert found["cpu"]
+    assert 1 <= machine.usable_cores() <= (os.cpu_count() or 1)
+    monkeypatch.setenv("PATH", str(tmp_path))  # no git here
+    assert machine.described() == found | {"commit": None}
