@@ -6,8 +6,13 @@ use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, BitDepth, Cast, Light, Planes, RenderOptions};
 use quadfringe::surface::scene;
-use quadfringe::{Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot};
+use quadfringe::{
+    BayerPattern, Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot,
+};
 use std::f32::consts::PI;
+
+/// The pattern of the mosaics that are tested.
+pub const BAYER: BayerPattern = BayerPattern::Grbg;
 
 /// So many random cases, the same in every run.
 pub fn cases(count: u32) -> ProptestConfig {
@@ -44,8 +49,12 @@ pub fn code() -> FringeCode {
     FringeCode::optimum(36, 912).expect("valid code")
 }
 
+/// Decode what the bench rendered; a mosaic is taken as `BAYER`.
 pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> {
     match planes {
+        Planes::BayerU8([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
+        Planes::BayerU16([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
+        Planes::BayerF32([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
         Planes::U8(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
         Planes::U16(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
         Planes::F32(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
