@@ -193,6 +193,18 @@ mod tests {
     }
 
     #[test]
+    fn what_the_infrared_chip_does_not_see_spreads_to_no_other_channel() {
+        let image = Array2::from_elem((3, 5), 0.5f32);
+        let mut crosstalk = Conditioner::default().crosstalk;
+        (crosstalk[0][1], crosstalk[3][0]) = (0.1, 0.2);
+        let ir_registration = [[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
+        let conditioner = Conditioner { crosstalk, ir_registration, ..Conditioner::default() };
+        let light = linearise(&Shot::new(planes(&image)).unwrap(), &conditioner).unwrap();
+        assert!((light[0][[1, 4]] - 0.45).abs() < 1e-6 && (light[2][[1, 4]] - 0.5).abs() < 1e-6);
+        assert!(light[3][[1, 4]].is_nan() && (light[3][[1, 3]] - 0.41).abs() < 1e-6);
+    }
+
+    #[test]
     fn bad_conditioning_is_named() {
         let singular = Conditioner { crosstalk: [[1.0; 4]; 4], ..Conditioner::default() };
         assert!(singular.check().unwrap_err().to_string().contains("invertible"));

@@ -99,11 +99,16 @@ impl Plan {
     }
 }
 
+/// Crosstalk undone. Where the infrared chip sees nothing, the others are freed from one another alone: no data must not
+/// spread to them, as filters along rows would carry it on.
 fn unmix_row(unmix: &[[f32; 4]; 4], rows: &mut [&mut [f32]; 4]) {
     for x in 0..rows[0].len() {
-        let seen = [rows[0][x], rows[1][x], rows[2][x], rows[3][x]];
+        let mut seen = [rows[0][x], rows[1][x], rows[2][x], rows[3][x]];
+        let blind = seen[3].is_nan();
+        seen[3] = if blind { 0.0 } else { seen[3] };
         for (row, weights) in rows.iter_mut().zip(unmix) {
             row[x] = weights.iter().zip(seen).map(|(w, s)| w * s).sum();
         }
+        rows[3][x] = if blind { f32::NAN } else { rows[3][x] };
     }
 }

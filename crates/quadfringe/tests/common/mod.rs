@@ -69,12 +69,24 @@ pub fn there_and_back(
     render: &RenderOptions,
     method: Method,
 ) -> Decoded {
+    there_and_back_by(bench, cast, code, render, method, &Conditioner::default())
+}
+
+/// The same with what a calibration knows of the intensities.
+pub fn there_and_back_by(
+    bench: &Bench,
+    cast: &Cast,
+    code: &FringeCode,
+    render: &RenderOptions,
+    method: Method,
+    conditioner: &Conditioner,
+) -> Decoded {
     let work = || -> std::result::Result<Decoded, Error> {
         let planes = bench.render(cast, &Light::shot(code), render)?;
         let (rows, columns) = planes.shape();
         let options = Options { method, ..Options::default() };
         let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-        let mut decoder = Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), options)?
+        let mut decoder = Decoder::new(code.clone(), [rows, columns], conditioner, options)?
             .triangulate_with(triangulator)?;
         decode_planes(&mut decoder, &planes)
     };
@@ -107,6 +119,11 @@ pub struct Score {
 impl Score {
     pub fn wrong_share(&self) -> f64 {
         self.wrong as f64 / self.returned.max(1) as f64
+    }
+
+    /// Returned pixels that are lit, and have another order than the truth.
+    pub fn wrong_orders(&self) -> usize {
+        self.wrong - self.in_shadow
     }
 
     pub fn returned_share(&self) -> f64 {
