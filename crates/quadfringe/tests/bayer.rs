@@ -5,7 +5,8 @@ mod common;
 use common::{BAYER, Score, bench, cast_scene, clean, code, noisy, score, there_and_back, there_and_back_by};
 use ndarray::Array2;
 use quadfringe::rig::{Bench, BitDepth, Cast, Demosaic, RenderOptions};
-use quadfringe::{Conditioner, Error, Method, Response, Shot};
+use quadfringe::{Conditioner, Decoded, Error, Method, Response, Shot};
+use std::f32::consts::PI;
 
 /// One fringe of the reference bench in camera pixels.
 const FRINGE_PX: f32 = 28.0;
@@ -14,6 +15,20 @@ const MISALIGNED: [[f64; 3]; 2] = [[1.002, -0.0044, 0.37], [0.0044, 1.002, -1.62
 
 fn mosaic(plain: &RenderOptions) -> RenderOptions {
     RenderOptions { bayer: Some(BAYER), ..plain.clone() }
+}
+
+/// Phase RMS (rad) over right pixels a fringe away from edges and from the rim of the image, where the infrared chip sees
+/// another part of the scene than the visible one.
+fn inner_phase_rms_rad(decoded: &Decoded, cast: &Cast) -> f64 {
+    let (truth, edge) = (cast.phase_rad(&code()), cast.edge_distance_px());
+    let (rows, columns) = truth.dim();
+    let rim = FRINGE_PX as usize;
+    let inside = |y: usize, x: usize| (rim..rows - rim).contains(&y) && (rim..columns - rim).contains(&x);
+    let errors = decoded.phase_rad.indexed_iter().map(|(at, phase)| (at, phase - truth[at]));
+    let counted = errors.filter(|&((y, x), e)| e.abs() < PI && edge[[y, x]] > FRINGE_PX && inside(y, x));
+    let (sum, count) = counted.fold((0.0, 0), |(sum, n), (_, e)| (sum + f64::from(e * e), n + 1));
+    assert!(count > rows * columns / 4, "{count}");
+    (sum / count as f64).sqrt()
 }
 
 fn found(bench: &Bench, cast: &Cast, render: &RenderOptions, method: Method) -> Score {
@@ -91,13 +106,14 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         ir_registration: MISALIGNED,
     };
     for method in [Method::Published, Method::Best] {
-        let plain = found(&bench, &cast, &mosaic(&clean()), method);
-        let decoded = there_and_back_by(&bench, &cast, &code(), &flawed, method, &conditioner);
-        let undone = score(&decoded, &cast, &code(), FRINGE_PX);
-        println!("{method:?}\n{plain:?}\n{undone:?}");
-        assert!(undone.phase_rms_rad < 1.2 * plain.phase_rms_rad, "{undone:?}");
-        assert!(undone.wrong_share() < 5e-5, "{undone:?}");
-        assert!(undone.returned_share() > 0.98, "{undone:?}");
+        let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), method);
+        let undone = there_and_back_by(&bench, &cast, &code(), &flawed, method, &conditioner);
+        let rms = [&plain, &undone].map(|decoded| inner_phase_rms_rad(decoded, &cast));
+        let judged = score(&undone, &cast, &code(), FRINGE_PX);
+        println!("{method:?} {rms:?} {judged:?}");
+        assert!(rms[1] < 1.1 * rms[0], "{rms:?}");
+        assert!(judged.wrong_share() < 5e-5, "{judged:?}");
+        assert!(judged.returned_share() > 0.98, "{judged:?}");
     }
 }
 
@@ -115,17 +131,18 @@ fn registration_costs_neither_phase_nor_orders() {
     ];
     for (name, render, method) in cases {
         let cast = cast_scene(&bench, name);
-        let aligned = found(&bench, &cast, &render, method);
-        let decoded = there_and_back_by(&bench, &cast, &code(), &moved(render), method, &conditioner);
-        let registered = score(&decoded, &cast, &code(), FRINGE_PX);
-        println!("{name} {method:?}\n{aligned:?}\n{registered:?}");
-        assert!(registered.phase_rms_rad < 1.1 * aligned.phase_rms_rad, "{registered:?}");
+        let aligned = there_and_back(&bench, &cast, &code(), &render, method);
+        let registered = there_and_back_by(&bench, &cast, &code(), &moved(render), method, &conditioner);
+        let rms = [&aligned, &registered].map(|decoded| inner_phase_rms_rad(decoded, &cast));
+        let [aligned, registered] = [aligned, registered].map(|d| score(&d, &cast, &code(), FRINGE_PX));
+        println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
+        assert!(rms[1] < 1.1 * rms[0], "{rms:?}");
         // The published filter runs along whole rows, and errs beside what the infrared chip does not see.
         assert!(
             registered.wrong_orders() <= aligned.wrong_orders() + registered.lit / 20_000,
             "{registered:?}"
         );
-        assert!(registered.returned_share() > aligned.returned_share() - 0.01, "{registered:?}");
+        assert!(registered.returned_share() > aligned.returned_share() - 0.02, "{registered:?}");
     }
 }
 
