@@ -94,6 +94,26 @@ CAPTURES = (
         )
     ),
 )
+BAYER = (
+    *(
+        row
+        for period in (20, 10)
+        for row in (
+            (f"fringes_{period}_px_mosaic_phase_rms_rad", f"raw mosaic, fringes of {period} px: phase RMS, rad", ""),
+            (f"fringes_{period}_px_opencv_phase_rms_rad", "the same mosaic interpolated by OpenCV, rad", ""),
+        )
+    ),
+    ("noise_left_mosaic", "raw mosaic: share of white noise left in red", ""),
+    ("noise_left_opencv", "the same mosaic interpolated by OpenCV", ""),
+    ("peaks_noise_0_percent_published_full_phase_rms_rad", "peaks, published method, all colours: phase RMS, rad", ""),
+    ("peaks_noise_0_percent_published_mosaic_phase_rms_rad", "the same from a raw mosaic, rad", ""),
+    ("peaks_noise_0_percent_published_bilinear_phase_rms_rad", "the same from bilinear planes, rad", ""),
+    ("face_noise_3_percent_best_full_phase_rms_rad", "face, 3 % noise, all colours: phase RMS, rad", ""),
+    ("face_noise_3_percent_best_mosaic_phase_rms_rad", "the same from a raw mosaic, rad", ""),
+    ("face_noise_3_percent_best_bilinear_phase_rms_rad", "the same from bilinear planes, rad", ""),
+    ("steps_noise_3_percent_best_mosaic_wrong_pixels", "steps, 3 % noise, raw mosaic: wrong orders, lit pixels", ""),
+    ("steps_noise_3_percent_best_mosaic_returned_percent", "the same: lit pixels returned, %", ""),
+)
 SPEED = (
     ("numpy_float64_ms", "published chain in plain NumPy, float64, 1024 x 768, u8 to X, Y, Z, ms", ""),
     ("numpy_float32_ms", "the same in float32, ms", ""),
@@ -104,6 +124,7 @@ SPEED = (
 )
 SOURCES = (
     Source(("benches/round_trip.py",), ROUND_TRIP),
+    Source(("benches/bayer.py",), BAYER),
     Source(("quadfringe", "demo"), DEMO),
     Source(("quadfringe", "reproduce", "peaks"), PEAKS),
     Source(("benches/captures_report.py",), CAPTURES, needs_data=True),

@@ -15,25 +15,26 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from quadfringe._core import Decoder, Device, __version__, check_code, optimum, pattern
     from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response, SceneConfig, SystemConfig
-    from quadfringe.data import Calibration, ResponseCalibration, Shape, Shot, Truth
+    from quadfringe.data import BayerShot, Calibration, ResponseCalibration, Shape, Shot, Truth
     from quadfringe.decoding import Plan, ShotDecoder, decode
     from quadfringe.errors import ConfigError, DecodeError, InputError, MissingExtraError
     from quadfringe.scanner import Scanner
     from quadfringe.scanner import open_system as open  # noqa: A004 - read as quadfringe.open
-    from quadfringe.shots import read_shot
+    from quadfringe.shots import read_bayer_shot, read_shot
 
 _HOME = {
     "_core": ("Decoder", "Device", "__version__", "check_code", "optimum", "pattern"),
     "config": ("DecodeConfig", "DeviceModel", "Fringes", "Response", "SceneConfig", "SystemConfig"),
-    "data": ("Calibration", "ResponseCalibration", "Shape", "Shot", "Truth"),
+    "data": ("BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth"),
     "decoding": ("Plan", "ShotDecoder", "decode"),
     "errors": ("ConfigError", "DecodeError", "InputError", "MissingExtraError"),
     "scanner": ("Scanner", "open_system"),
-    "shots": ("read_shot",),
+    "shots": ("read_bayer_shot", "read_shot"),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 
 __all__ = [
+    "BayerShot",
     "Calibration",
     "ConfigError",
     "DecodeConfig",
@@ -60,6 +61,7 @@ __all__ = [
     "open",
     "optimum",
     "pattern",
+    "read_bayer_shot",
     "read_shot",
 ]
 

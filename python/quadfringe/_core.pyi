@@ -22,6 +22,7 @@ __all__ = [
     "estimate_response",
     "fourier",
     "linear_light",
+    "linear_light_bayer",
     "n_step",
     "optimum",
     "pattern",
@@ -105,7 +106,7 @@ class Bench:
         """Send one ray through each pixel of a relief over the plane z, (rows, columns) float64 mm."""
 
     def render(self, cast: Cast, fringe_numbers: _Vector3, **options: Any) -> dict[str, NDArray[Any]]:
-        """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`.
+        """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
         Options are those of `quadfringe.SceneConfig`; an option that is not known is a TypeError.
         """
@@ -113,7 +114,7 @@ class Bench:
     def render_step(
         self, cast: Cast, fringe_number: float, shift_rad: float, **options: Any
     ) -> dict[str, NDArray[Any]]:
-        """Give the four images with the same fringes in each: one step of an N-step capture."""
+        """Give the images with the same fringes in each channel: one step of an N-step capture."""
 
 @final
 class Cast:
@@ -170,6 +171,12 @@ class Decoder:
         copied. Raises TypeError for another type, ValueError for another size or values that are not finite.
         """
 
+    def decode_bayer(self, raw: NDArray[Any], bayer: str, ir: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
+        """Give the same maps from the raw mosaic of a Bayer chip (rggb, grbg, gbrg or bggr) and an infrared image.
+
+        Images and errors as those of `decode`; ValueError for another pattern.
+        """
+
 def optimum(n: int, projector_width: int) -> _Vector3:
     """Give the fringe numbers N, N - 1, N - sqrt(N); ValueError unless N is a perfect square that fits."""
 
@@ -196,6 +203,22 @@ def linear_light(
     """Give red, green, blue, ir as linear light, fractions of full scale; NaN where the infrared chip sees nothing.
 
     Images and errors as those of `Decoder.decode`.
+    """
+
+def linear_light_bayer(
+    raw: NDArray[Any],
+    bayer: str,
+    ir: NDArray[Any],
+    *,
+    full_scale: float | None = None,
+    dark: Sequence[float] | None = None,
+    response: Sequence[_Vector3] | None = None,
+    crosstalk: Sequence[Sequence[float]] | None = None,
+    ir_registration: Sequence[Sequence[float]] | None = None,
+) -> dict[str, NDArray[np.float32]]:
+    """Give the same of a raw mosaic: each colour at every pixel, interpolated from its own samples.
+
+    Images and errors as those of `Decoder.decode_bayer`.
     """
 
 def background(image: NDArray[np.float32], period_px: float, *, kind: str | None = None) -> NDArray[np.float32]:

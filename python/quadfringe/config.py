@@ -21,6 +21,7 @@ from quadfringe.errors import ConfigError
 from quadfringe.files import read_bytes
 
 __all__ = [
+    "BayerPattern",
     "ChannelResponse",
     "DecodeConfig",
     "DeviceModel",
@@ -44,6 +45,7 @@ Row4 = tuple[Finite, Finite, Finite, Finite]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]
 PerChannel = Annotated[Row4, BeforeValidator(lambda v: (v,) * 4 if isinstance(v, (int, float)) else v)]
 Affine = tuple[Triple, Triple]
+BayerPattern = Literal["rggb", "grbg", "gbrg", "bggr"]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
@@ -112,7 +114,8 @@ class SceneConfig(Model):
     """What stands on the virtual bench, and what the bench adds to the light (shares of full scale).
 
     A setting for each channel (R, G, B, IR) may be one number for all four. What is absent is ideal, or takes
-    the kernel's default.
+    the kernel's default. With `bayer` the visible chip sees one colour at each pixel and delivers a raw mosaic;
+    with `demosaic` too, the camera makes three planes of it, as most cameras do.
     """
 
     surface: str = "face"
@@ -130,7 +133,8 @@ class SceneConfig(Model):
     noise: NotNegative | None = None
     camera_offset: PerChannel | None = None
     camera_exponent: PerChannel | None = None
-    bayer: Literal["rggb", "bggr", "grbg", "gbrg"] | None = None
+    bayer: BayerPattern | None = None
+    demosaic: Literal["bilinear"] | None = None
     bit_depth: Literal[8, 10, 12, 16] = 8
     seed: Annotated[int, Field(ge=0)] | None = None
 

@@ -1,4 +1,4 @@
-"""The records that flow and are saved: `Shot` in, `Calibration` beside it, `Shape` out."""
+"""The records that flow and are saved: `Shot` or `BayerShot` in, `Calibration` beside it, `Shape` out."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.config import Affine, DeviceModel, Matrix4, Model, Response, Row4, checked
+from quadfringe.config import Affine, BayerPattern, DeviceModel, Matrix4, Model, Response, Row4, checked
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
 from quadfringe.images import full_scale
 
-__all__ = ["Calibration", "ResponseCalibration", "Shape", "Shot", "Truth", "conditioning"]
+__all__ = ["AnyShot", "BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth", "conditioning"]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
@@ -111,9 +111,63 @@ class Shot:
         return {"red": self.red, "green": self.green, "blue": self.blue, "ir": self.ir}
 
     @property
+    def images(self) -> dict[str, NDArray[Any]]:
+        """Give what was captured, by name: the four channels."""
+        return self.channels
+
+    @property
     def full_scale_value(self) -> float:
         """The intensity of a full pixel: as given, else 255, 65535 or 1.0 by dtype."""
         return float(full_scale(self.red)) if self.full_scale is None else self.full_scale
+
+
+@dataclass(frozen=True)
+class BayerShot:
+    """One exposure of a Bayer chip and an infrared one: the raw mosaic and the infrared image, (H, W) of one dtype.
+
+    `bayer` names the colours of the first two pixels of the first row and of the second. Nothing is interpolated
+    here: decoding does that, after dark level and response. Raises `InputError` for a pattern that does not exist,
+    and for images that are not (H, W) of one size.
+    """
+
+    raw: NDArray[Any]
+    bayer: BayerPattern
+    ir: NDArray[Any]
+    full_scale: float | None = None
+    truth: Truth | None = field(default=None, repr=False)
+
+    def __post_init__(self) -> None:
+        if self.bayer not in get_args(BayerPattern):
+            known = ", ".join(get_args(BayerPattern))
+            raise InputError(f"bayer: expected one of {known}, got {self.bayer!r}")
+        if self.raw.ndim != 2 or self.ir.shape != self.raw.shape:
+            raise InputError(
+                f"expected a raw mosaic and an infrared image (H, W) of one size, got shapes {self.raw.shape} "
+                f"and {self.ir.shape}; a colour image is no mosaic any more: give its planes as a `Shot`"
+            )
+
+    @property
+    def images(self) -> dict[str, NDArray[Any]]:
+        """Give what was captured, by name: `raw` and `ir`."""
+        return {"raw": self.raw, "ir": self.ir}
+
+    @property
+    def channels(self) -> dict[str, NDArray[Any]]:
+        """Give the samples of each channel by name, to look at: colours have a quarter of the pixels.
+
+        They lie at different places, half of the green ones are left out, and nothing may be decoded from them.
+        """
+        row, column = divmod(self.bayer.index("r"), 2)
+        red, green = self.raw[row::2, column::2], self.raw[row::2, 1 - column :: 2]
+        return {"red": red, "green": green, "blue": self.raw[1 - row :: 2, 1 - column :: 2], "ir": self.ir}
+
+    @property
+    def full_scale_value(self) -> float:
+        """The intensity of a full pixel: as given, else 255, 65535 or 1.0 by dtype."""
+        return float(full_scale(self.raw)) if self.full_scale is None else self.full_scale
+
+
+AnyShot = Shot | BayerShot
 
 
 @dataclass(frozen=True)

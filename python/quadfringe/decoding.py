@@ -7,7 +7,7 @@ from typing import Any
 
 from quadfringe import _core
 from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response
-from quadfringe.data import Calibration, Shape, Shot, conditioning
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, conditioning
 from quadfringe.errors import InputError
 from quadfringe.verdict import judge
 
@@ -71,12 +71,12 @@ class ShotDecoder:
     calibration for another size.
     """
 
-    def __init__(self, like: Shot, plan: Plan) -> None:
+    def __init__(self, like: AnyShot, plan: Plan) -> None:
         self.plan = plan
         self._channels_known = False
         _check_sizes(like, plan)
         self._core = _core.Decoder(
-            like.red.shape,
+            next(iter(like.images.values())).shape,
             plan.fringes.numbers,
             plan.projector_width_px,
             full_scale=like.full_scale_value,
@@ -86,33 +86,37 @@ class ShotDecoder:
         )
         self._described = plan.described() | {"decode": self._core.settings()}
 
-    def decode(self, shot: Shot) -> Shape:
+    def decode(self, shot: AnyShot) -> Shape:
         """Give the shape; raises `DecodeError` when the orders cannot be trusted, naming the likely cause."""
         shape = self._shape(shot)
         judge(shape, shot, None if self._channels_known else self._shape)
         self._channels_known = True
         return shape
 
-    def _shape(self, shot: Shot) -> Shape:
-        maps = self._core.decode(shot.red, shot.green, shot.blue, shot.ir)
+    def _shape(self, shot: AnyShot) -> Shape:
+        if isinstance(shot, BayerShot):
+            maps = self._core.decode_bayer(shot.raw, shot.bayer, shot.ir)
+        else:
+            maps = self._core.decode(shot.red, shot.green, shot.blue, shot.ir)
         return Shape(**maps, config=self._described, calibration=self.plan.calibration)
 
 
-def decode(shot: Shot, plan: Plan) -> Shape:
+def decode(shot: AnyShot, plan: Plan) -> Shape:
     """Decode one shot: plan, decode, judge. For many shots make one `ShotDecoder`."""
     return ShotDecoder(shot, plan).decode(shot)
 
 
-def _check_sizes(shot: Shot, plan: Plan) -> None:
-    if shot.red.ndim != 2:
-        raise InputError(f"red: expected one grey image (H, W), got an array of shape {shot.red.shape}")
+def _check_sizes(shot: AnyShot, plan: Plan) -> None:
+    name, image = next(iter(shot.images.items()))
+    if image.ndim != 2:
+        raise InputError(f"{name}: expected one grey image (H, W), got an array of shape {image.shape}")
     if plan.calibration is None:
         return
     camera, projector = plan.calibration.camera, plan.calibration.projector
-    if shot.red.shape != (camera.height_px, camera.width_px):
+    if image.shape != (camera.height_px, camera.width_px):
         raise InputError(
             f"the calibration is for images of {camera.width_px} x {camera.height_px} pixels, "
-            f"the shot has {shot.red.shape[1]} x {shot.red.shape[0]}; calibrate at the size in use"
+            f"the shot has {image.shape[1]} x {image.shape[0]}; calibrate at the size in use"
         )
     if projector.width_px != plan.projector_width_px:
         raise InputError(

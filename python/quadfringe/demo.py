@@ -7,7 +7,7 @@ from pathlib import Path
 from time import perf_counter
 
 from quadfringe.config import SceneConfig, SystemConfig
-from quadfringe.data import Shape, Shot
+from quadfringe.data import AnyShot, Shape
 from quadfringe.report import write_report
 from quadfringe.scanner import Scanner, open_system
 from quadfringe.stages import wrapped_phases
@@ -48,7 +48,7 @@ def run_scene(surface: str, out: Path) -> SceneResult:
     return SceneResult(figures, decode_ms)
 
 
-def _timed_decode(scanner: Scanner, shot: Shot) -> tuple[Shape, float]:
+def _timed_decode(scanner: Scanner, shot: AnyShot) -> tuple[Shape, float]:
     times_ms = []
     for _ in range(REPEATS):
         start = perf_counter()

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.data import Shape, Shot
+from quadfringe.data import AnyShot, Shape
 from quadfringe.errors import require
 from quadfringe.files import atomic
 from quadfringe.truth import Comparison
@@ -70,7 +70,7 @@ def _draw(figure: Any, axes: Any, panel: Panel) -> None:
         bar.ax.tick_params(labelsize=7)
 
 
-def fringe_panels(shot: Shot) -> list[Panel]:
+def fringe_panels(shot: AnyShot) -> list[Panel]:
     """Give the four channels as they were captured."""
     full = (0.0, shot.full_scale_value)
     return [Panel(f"captured {name}", image, "", "gray", full) for name, image in shot.channels.items()]
@@ -79,7 +79,7 @@ def fringe_panels(shot: Shot) -> list[Panel]:
 def write_report(
     path: Path,
     title: str,
-    shot: Shot,
+    shot: AnyShot,
     shape: Shape,
     wrapped: Sequence[NDArray[np.float32]],
     found: Comparison,

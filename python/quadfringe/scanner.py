@@ -13,7 +13,7 @@ from pathlib import Path
 from types import TracebackType
 
 from quadfringe.config import SystemConfig, load_system
-from quadfringe.data import Calibration, Shape, Shot
+from quadfringe.data import AnyShot, Calibration, Shape
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.devices import Camera, Projector
 from quadfringe.devices.virtual import VirtualBench, VirtualCamera, VirtualProjector
@@ -31,12 +31,12 @@ class Scanner:
         self._camera = camera
         self._decoder: ShotDecoder | None = None
 
-    def grab(self) -> Shot:
+    def grab(self) -> AnyShot:
         """Project the fringes and take one shot of them."""
         self._projector.show(self.config.fringes)
         return self._camera.grab()
 
-    def decode(self, shot: Shot) -> Shape:
+    def decode(self, shot: AnyShot) -> Shape:
         """Give the shape of a shot of this system; raises `DecodeError` when none can be trusted."""
         if self._decoder is None:
             self._decoder = ShotDecoder(shot, self._plan())

@@ -1,4 +1,4 @@
-"""Shots to image files and back: four grey files, or one colour file and one infrared."""
+"""Shots to image files and back: four grey files, or an infrared one and one of all colours, plain or raw mosaic."""
 
 from __future__ import annotations
 
@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.data import Shot
+from quadfringe.config import BayerPattern
+from quadfringe.data import AnyShot, BayerShot, Shot
 from quadfringe.errors import InputError
 from quadfringe.images import full_scale, read_grey, read_rgb, write_image
 
-__all__ = ["read_shot", "write_shot"]
+__all__ = ["read_bayer_shot", "read_shot", "write_shot"]
 
 COLOURS = ("red", "green", "blue")
 
@@ -30,7 +31,23 @@ def read_shot(files: Mapping[str, Path | None], bits: int | None = None) -> Shot
     full_scales = {name: _full_scale(image, bits, given.get(name)) for name, image in images.items()}
     if len({image.dtype for image in images.values()}) == 1:
         return _shot(images, full_scales["ir"])
-    return _shot({n: (image / full_scales[n]).astype(np.float32) for n, image in images.items()}, 1.0)
+    return _shot(_fractions(images, full_scales), 1.0)
+
+
+def read_bayer_shot(raw: Path, bayer: BayerPattern, ir: Path, bits: int | None = None) -> BayerShot:
+    """Read a raw mosaic of the pattern `bayer` (rggb, grbg, gbrg or bggr) and an infrared image.
+
+    `bits` and files of different depth are as for `read_shot`. Raises `InputError` that names the file at fault.
+    """
+    images = {"raw": read_grey(raw), "ir": read_grey(ir)}
+    full_scales = {name: _full_scale(images[name], bits, path) for name, path in (("raw", raw), ("ir", ir))}
+    if images["raw"].dtype != images["ir"].dtype:
+        images, full_scales = _fractions(images, full_scales), {"ir": 1.0}
+    return BayerShot(images["raw"], bayer, images["ir"], full_scales["ir"])
+
+
+def _fractions(images: Mapping[str, NDArray[Any]], full_scales: Mapping[str, float]) -> dict[str, NDArray[np.float32]]:
+    return {name: (image / full_scales[name]).astype(np.float32) for name, image in images.items()}
 
 
 def _shot(images: Mapping[str, NDArray[Any]], full_scale: float) -> Shot:
@@ -65,9 +82,9 @@ def _full_scale(image: NDArray[Any], bits: int | None, path: Path | None) -> flo
     return float(full)
 
 
-def write_shot(folder: Path, shot: Shot) -> dict[str, Path]:
-    """Write the four channels of a shot as red.png, green.png, blue.png, ir.png; returns the paths."""
-    paths = {name: folder / f"{name}.png" for name in shot.channels}
-    for name, image in shot.channels.items():
+def write_shot(folder: Path, shot: AnyShot) -> dict[str, Path]:
+    """Write red.png, green.png, blue.png, ir.png of a shot, or raw.png and ir.png of a mosaic; returns the paths."""
+    paths = {name: folder / f"{name}.png" for name in shot.images}
+    for name, image in shot.images.items():
         write_image(paths[name], image)
     return paths

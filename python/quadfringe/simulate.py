@@ -24,7 +24,7 @@ def bench_config(system: Path | None, **scene: Any) -> SystemConfig:
 
 
 def write_simulation(folder: Path, config: SystemConfig) -> list[Path]:
-    """Write red.png, green.png, blue.png, ir.png, calibration.json and truth.npz; returns their paths."""
+    """Write the images as `write_shot` does, calibration.json and truth.npz; returns their paths."""
     with open_system(config) as scanner:
         shot = scanner.grab()
     paths = list(write_shot(folder_for(folder), shot).values())

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from quadfringe import _core
 from quadfringe._core import background, carrier, fourier, n_step, two_step, unwrap
 from quadfringe.config import Response
-from quadfringe.data import Calibration, Shot, conditioning
+from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.errors import DecodeError
 
 __all__ = ["background", "carrier", "fourier", "linear_light", "n_step", "two_step", "unwrap", "wrapped_phases"]
@@ -25,18 +25,21 @@ Map = NDArray[np.float32]
 
 
 def linear_light(
-    shot: Shot, calibration: Calibration | None = None, response: Response | None = None
+    shot: AnyShot, calibration: Calibration | None = None, response: Response | None = None
 ) -> dict[str, Map]:
     """Give the channels as linear light, fractions of full scale, (H, W) float32 (step 1 of the chain, S1).
 
     Dark level, response, crosstalk and registration are those of the `calibration`; `response` stands in for its
-    own. Without either, intensities are taken as linear. NaN where the infrared chip does not see the point.
+    own. Without either, intensities are taken as linear. NaN where the infrared chip does not see the point. The
+    colours of a raw mosaic are interpolated at every pixel, from samples made linear.
     """
     known = conditioning(calibration, response)
+    if isinstance(shot, BayerShot):
+        return _core.linear_light_bayer(shot.raw, shot.bayer, shot.ir, full_scale=shot.full_scale_value, **known)
     return _core.linear_light(shot.red, shot.green, shot.blue, shot.ir, full_scale=shot.full_scale_value, **known)
 
 
-def wrapped_phases(shot: Shot, fringe_numbers: tuple[float, float, float]) -> tuple[Map, Map, Map]:
+def wrapped_phases(shot: AnyShot, fringe_numbers: tuple[float, float, float]) -> tuple[Map, Map, Map]:
     """Give the wrapped phases in rad, (H, W): red and blue by two steps (S2), green and infrared by Fourier (S3).
 
     Raises `DecodeError` when no fringes cross the rows.

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import combinations
+from typing import get_args
 
 import numpy as np
 
-from quadfringe.data import Shape, Shot
+from quadfringe.config import BayerPattern
+from quadfringe.data import AnyShot, BayerShot, Shape, Shot
 from quadfringe.errors import DecodeError
 
 __all__ = ["judge"]
@@ -21,13 +24,14 @@ RETURNED_MIN = 0.05  # share of lit pixels that must come back
 COLLAPSED, DOUBTFUL = 0.35, 0.6
 CLEARLY_BETTER = 1.2  # ratio of margins that tells channels are exchanged
 
-Decode = Callable[[Shot], Shape]
+Decode = Callable[[AnyShot], Shape]
 
 
-def judge(shape: Shape, shot: Shot, again: Decode | None) -> None:
+def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
     """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
 
-    `again` decodes the shot with two channels exchanged, to find out which; None leaves that question out.
+    `again` decodes the shot with two channels exchanged, or as another Bayer pattern, to find out which; None leaves
+    that question out.
     """
     margin, lit, returned = _margin(shape)
     enough = lit > 0 and returned >= RETURNED_MIN * lit
@@ -58,7 +62,7 @@ def _margin(shape: Shape) -> tuple[float, int, int]:
     return float(np.median(lit)) if lit.size else 0.0, lit.size, int(returned)
 
 
-def _blind_channels(shot: Shot) -> list[str]:
+def _blind_channels(shot: AnyShot) -> list[str]:
     """Name the channels that are black or saturated over nearly the whole frame."""
     full, found = shot.full_scale_value, []
     for name, image in shot.channels.items():
@@ -70,15 +74,23 @@ def _blind_channels(shot: Shot) -> list[str]:
     return found
 
 
-def _refuse_exchanged(shot: Shot, margin: float, again: Decode) -> None:
-    """Raise when exchanging two channels makes the orders clearly surer."""
-    found = {pair: _margin(again(_exchanged(shot, *pair)))[0] for pair in combinations(shot.channels, 2)}
-    best = max(found, key=lambda pair: found[pair])
+def _refuse_exchanged(shot: AnyShot, margin: float, again: Decode) -> None:
+    """Raise when taking the channels for others makes the orders clearly surer."""
+    found = {words: _margin(again(other))[0] for words, other in _suspects(shot).items()}
+    best = max(found, key=lambda words: found[words])
     if found[best] > max(COLLAPSED, CLEARLY_BETTER * margin):
         raise DecodeError(
-            f"no shape: {best[0]} and {best[1]} seem to be swapped: the median order margin is {margin:.2f} "
-            f"as given and {found[best]:.2f} with the two exchanged"
+            f"no shape: {best}: the median order margin is {margin:.2f} as given and {found[best]:.2f} if so"
         )
+
+
+def _suspects(shot: AnyShot) -> dict[str, AnyShot]:
+    """Give what the shot may be instead, by what is then to say."""
+    if isinstance(shot, BayerShot):
+        others = (name for name in get_args(BayerPattern) if name != shot.bayer)
+        return {f"the Bayer pattern seems to be {o}, not {shot.bayer}": replace(shot, bayer=o) for o in others}
+    pairs = combinations(shot.channels, 2)
+    return {f"{a} and {b} seem to be swapped": _exchanged(shot, a, b) for a, b in pairs}
 
 
 def _exchanged(shot: Shot, first: str, second: str) -> Shot:

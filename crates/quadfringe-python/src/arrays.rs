@@ -1,12 +1,15 @@
 //! NumPy arrays as the kernel sees them: borrowed, never copied; a wrong dtype is named in our own words.
 
-use numpy::ndarray::{Dim, Dimension, Ix};
+use numpy::ndarray::{ArrayView2, Dim, Dimension, Ix};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 
 /// The images of a shot, in the kernel's order.
 pub const CHANNELS: [&str; 4] = ["red", "green", "blue", "ir"];
+
+/// The images of a shot of a Bayer chip.
+pub const BAYER_IMAGES: [&str; 2] = ["raw", "ir"];
 
 /// Every error of the kernel is a value that cannot be used.
 pub fn value_error(error: quadfringe::Error) -> PyErr {
@@ -74,6 +77,13 @@ impl<'py, const COUNT: usize> Images<'py, COUNT> {
             Err(wrong_array(names[0], kinds, objects[0]))
         }
     }
+}
+
+/// What the kernel reads of borrowed images.
+pub fn views<'a, T: Element, const COUNT: usize>(
+    images: &'a [PyReadonlyArray<'_, T, Dim<[Ix; 2]>>; COUNT],
+) -> [ArrayView2<'a, T>; COUNT] {
+    images.each_ref().map(|image| image.as_array())
 }
 
 fn all<'py, T: Element, const COUNT: usize>(

@@ -1,13 +1,15 @@
 //! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` knows the truth.
 
-use crate::arrays::{expected, value_error};
+use crate::arrays::{BAYER_IMAGES, CHANNELS, expected, value_error};
 use crate::device::{Device, layout_named, unknown};
-use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
+use ndarray::Array2;
+use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use quadfringe::BayerPattern;
 use quadfringe::fringe::FringeCode;
-use quadfringe::rig::{self, Albedo, BayerOrder, Beam, BitDepth, Light, Planes, RenderOptions};
+use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, RenderOptions};
 use quadfringe::surface::{HeightMap, Interpolation, Peaks, Surface, scene};
 
 /// Camera and two projectors before a surface.
@@ -78,7 +80,7 @@ impl Bench {
         Ok(self.cast_surface(py, &surface.map_err(value_error)?))
     }
 
-    /// The four images of a shot, by channel name.
+    /// The images of a shot by name: four channels, or the raw mosaic and infrared of a Bayer chip.
     #[pyo3(signature = (cast, fringe_numbers, **options))]
     fn render<'py>(
         &self,
@@ -91,7 +93,7 @@ impl Bench {
         self.render_lights(py, cast, &Light::shot(&code), options)
     }
 
-    /// The four images with the same fringes in all channels: one step of an N-step capture.
+    /// The images with the same fringes in all channels: one step of an N-step capture.
     #[pyo3(signature = (cast, fringe_number, shift_rad, **options))]
     fn render_step<'py>(
         &self,
@@ -119,17 +121,27 @@ impl Bench {
     ) -> PyResult<Bound<'py, PyDict>> {
         let options = render_options(options)?;
         let planes = py.detach(|| self.0.render(&cast.0, lights, &options)).map_err(value_error)?;
-        let images = match planes {
-            Planes::U8(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
-            Planes::U16(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
-            Planes::F32(planes) => planes.map(|plane| plane.into_pyarray(py).into_any()),
-        };
-        let named = PyDict::new(py);
-        for (name, image) in ["red", "green", "blue", "ir"].into_iter().zip(images) {
-            named.set_item(name, image)?;
+        match planes {
+            Planes::U8(planes) => named(py, CHANNELS, planes),
+            Planes::U16(planes) => named(py, CHANNELS, planes),
+            Planes::F32(planes) => named(py, CHANNELS, planes),
+            Planes::BayerU8(images) => named(py, BAYER_IMAGES, images),
+            Planes::BayerU16(images) => named(py, BAYER_IMAGES, images),
+            Planes::BayerF32(images) => named(py, BAYER_IMAGES, images),
         }
-        Ok(named)
     }
+}
+
+fn named<'py, T: Element, const COUNT: usize>(
+    py: Python<'py>,
+    names: [&str; COUNT],
+    images: [Array2<T>; COUNT],
+) -> PyResult<Bound<'py, PyDict>> {
+    let named = PyDict::new(py);
+    for (name, image) in names.into_iter().zip(images) {
+        named.set_item(name, image.into_pyarray(py))?;
+    }
+    Ok(named)
 }
 
 /// What the bench sees of a scene, and where each pixel is lit from.
@@ -178,7 +190,10 @@ fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> 
             "noise" => options.noise = value.extract()?,
             "camera_offset" => options.camera_offset = value.extract()?,
             "camera_exponent" => options.camera_exponent = value.extract()?,
-            "bayer" => options.bayer = Some(bayer_named(value.extract()?)?),
+            "bayer" => {
+                options.bayer = Some(BayerPattern::from_name(value.extract()?).map_err(value_error)?);
+            }
+            "demosaic" => options.demosaic = Some(demosaic_named(value.extract()?)?),
             "bit_depth" => options.bit_depth = BitDepth::from_bits(value.extract()?).map_err(value_error)?,
             "seed" => options.seed = value.extract()?,
             _ => {
@@ -192,12 +207,9 @@ fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> 
     Ok(options)
 }
 
-fn bayer_named(name: &str) -> PyResult<BayerOrder> {
+fn demosaic_named(name: &str) -> PyResult<Demosaic> {
     match name {
-        "rggb" => Ok(BayerOrder::Rggb),
-        "bggr" => Ok(BayerOrder::Bggr),
-        "grbg" => Ok(BayerOrder::Grbg),
-        "gbrg" => Ok(BayerOrder::Gbrg),
-        _ => Err(unknown("bayer", name, "rggb, bggr, grbg or gbrg")),
+        "bilinear" => Ok(Demosaic::Bilinear),
+        _ => Err(unknown("demosaic", name, "bilinear")),
     }
 }

@@ -1,15 +1,14 @@
 //! `Decoder`: one call from four images to a shape.
 
-use crate::arrays::{CHANNELS, Images, value_error};
+use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, value_error, views};
 use crate::device::{Device, unknown};
-use ndarray::ArrayView2;
-use numpy::{IntoPyArray, PyReadonlyArray2};
+use numpy::IntoPyArray;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::Sample;
 use quadfringe::height::Triangulator;
-use quadfringe::{Conditioner, Decoded, FringeCode, Method, Options, Response, Shot};
+use quadfringe::{BayerPattern, Conditioner, Decoded, FringeCode, Method, Options, Response, Shot};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Mutex, PoisonError};
 
@@ -92,22 +91,41 @@ impl Decoder {
         blue: &Bound<'py, PyAny>,
         ir: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let decoded = match Images::borrow(CHANNELS, [red, green, blue, ir])? {
-            Images::U8(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
-            Images::U16(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
-            Images::F32(four) => self.run(py, four.each_ref().map(PyReadonlyArray2::as_array)),
+        let decoded = match &Images::borrow(CHANNELS, [red, green, blue, ir])? {
+            Images::U8(four) => self.run(py, views(four), Shot::new),
+            Images::U16(four) => self.run(py, views(four), Shot::new),
+            Images::F32(four) => self.run(py, views(four), Shot::new),
+        }?;
+        maps_by_name(py, decoded)
+    }
+
+    /// The same from the raw mosaic of a Bayer chip and an infrared image.
+    fn decode_bayer<'py>(
+        &self,
+        py: Python<'py>,
+        raw: &Bound<'py, PyAny>,
+        bayer: &str,
+        ir: &Bound<'py, PyAny>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
+        let decoded = match &Images::borrow(BAYER_IMAGES, [raw, ir])? {
+            Images::U8(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
+            Images::U16(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
+            Images::F32(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
         }?;
         maps_by_name(py, decoded)
     }
 }
 
 impl Decoder {
-    fn run<T: Sample>(&self, py: Python<'_>, planes: [ArrayView2<'_, T>; 4]) -> PyResult<Decoded> {
+    fn run<'a, T: Sample, I: Send>(
+        &self,
+        py: Python<'_>,
+        images: I,
+        shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
+    ) -> PyResult<Decoded> {
         let work = || {
-            let mut shot = Shot::new(planes)?;
-            if let Some(full_scale) = self.full_scale {
-                shot = shot.with_full_scale(full_scale)?;
-            }
+            let shot = scaled(shot(images)?, self.full_scale)?;
             // A panic in an earlier shot leaves nothing behind that the next one does not write again.
             self.kernel.lock().unwrap_or_else(PoisonError::into_inner).decode(&shot)
         };
@@ -116,6 +134,14 @@ impl Decoder {
             None => work(),
         });
         decoded.map_err(value_error)
+    }
+}
+
+/// The shot with its white, where that is not the greatest value of the type.
+pub fn scaled<T: Sample>(shot: Shot<'_, T>, full_scale: Option<f32>) -> quadfringe::Result<Shot<'_, T>> {
+    match full_scale {
+        Some(full_scale) => shot.with_full_scale(full_scale),
+        None => Ok(shot),
     }
 }
 

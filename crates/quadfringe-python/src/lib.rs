@@ -19,6 +19,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
     module.add_function(wrap_pyfunction!(device::pattern, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::linear_light_bayer, module)?)?;
     module.add_function(wrap_pyfunction!(stages::background, module)?)?;
     module.add_function(wrap_pyfunction!(stages::carrier, module)?)?;
     module.add_function(wrap_pyfunction!(stages::two_step, module)?)?;

@@ -1,15 +1,15 @@
 //! The stages one by one, for those who teach or debug; all on (H, W) float32.
 
-use crate::arrays::{CHANNELS, Images, expected, value_error};
-use crate::decoder::conditioner_of;
+use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, expected, value_error, views};
+use crate::decoder::{conditioner_of, scaled};
 use crate::device::unknown;
-use ndarray::{Array2, ArrayView2};
+use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::Sample;
 use quadfringe::demod::{self, Background, Band};
-use quadfringe::{Conditioner, FringeCode, Shot};
+use quadfringe::{BayerPattern, Conditioner, FringeCode, Shot};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
 
@@ -34,34 +34,57 @@ pub fn linear_light<'py>(
     crosstalk: Option<[[f64; 4]; 4]>,
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let conditioner = conditioner_of(dark, response, crosstalk, ir_registration);
-    let conditioner = &conditioner;
-    let planes = match Images::borrow(CHANNELS, [red, green, blue, ir])? {
-        Images::U8(four) => linearise(py, four.each_ref().map(|i| i.as_array()), full_scale, conditioner),
-        Images::U16(four) => linearise(py, four.each_ref().map(|i| i.as_array()), full_scale, conditioner),
-        Images::F32(four) => linearise(py, four.each_ref().map(|i| i.as_array()), full_scale, conditioner),
+    let known = (full_scale, conditioner_of(dark, response, crosstalk, ir_registration));
+    let planes = match &Images::borrow(CHANNELS, [red, green, blue, ir])? {
+        Images::U8(four) => linearise(py, views(four), Shot::new, &known),
+        Images::U16(four) => linearise(py, views(four), Shot::new, &known),
+        Images::F32(four) => linearise(py, views(four), Shot::new, &known),
     }?;
+    light_by_name(py, planes)
+}
+
+/// The four channels at every pixel as linear light, by name, from a raw mosaic and an infrared image.
+#[pyfunction]
+#[pyo3(signature = (raw, bayer, ir, *, full_scale = None, dark = None, response = None, crosstalk = None,
+    ir_registration = None))]
+#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+pub fn linear_light_bayer<'py>(
+    py: Python<'py>,
+    raw: &Bound<'py, PyAny>,
+    bayer: &str,
+    ir: &Bound<'py, PyAny>,
+    full_scale: Option<f32>,
+    dark: Option<[f32; 4]>,
+    response: Option<[(f32, f32, f32); 4]>,
+    crosstalk: Option<[[f64; 4]; 4]>,
+    ir_registration: Option<[[f64; 3]; 2]>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
+    let known = (full_scale, conditioner_of(dark, response, crosstalk, ir_registration));
+    let planes = match &Images::borrow(BAYER_IMAGES, [raw, ir])? {
+        Images::U8(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
+        Images::U16(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
+        Images::F32(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
+    }?;
+    light_by_name(py, planes)
+}
+
+fn linearise<'a, T: Sample, I: Send>(
+    py: Python<'_>,
+    images: I,
+    shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
+    (full_scale, conditioner): &(Option<f32>, Conditioner),
+) -> PyResult<[Array2<f32>; 4]> {
+    let work = || quadfringe::condition::linearise(&scaled(shot(images)?, *full_scale)?, conditioner);
+    py.detach(work).map_err(value_error)
+}
+
+fn light_by_name(py: Python<'_>, planes: [Array2<f32>; 4]) -> PyResult<Bound<'_, PyDict>> {
     let named = PyDict::new(py);
     for (name, plane) in CHANNELS.into_iter().zip(planes) {
         named.set_item(name, plane.into_pyarray(py))?;
     }
     Ok(named)
-}
-
-fn linearise<T: Sample>(
-    py: Python<'_>,
-    planes: [ArrayView2<'_, T>; 4],
-    full_scale: Option<f32>,
-    conditioner: &Conditioner,
-) -> PyResult<[Array2<f32>; 4]> {
-    let work = || {
-        let mut shot = Shot::new(planes)?;
-        if let Some(full_scale) = full_scale {
-            shot = shot.with_full_scale(full_scale)?;
-        }
-        quadfringe::condition::linearise(&shot, conditioner)
-    };
-    py.detach(work).map_err(value_error)
 }
 
 /// Background of every row.

@@ -12,7 +12,9 @@ use quadfringe::condition::linearise;
 use quadfringe::demod::{self, Background, Band};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
-use quadfringe::{Conditioner, Decoder, FringeCode, Method, Options, Result, Shot, surface, unwrap};
+use quadfringe::{
+    BayerPattern, Conditioner, Decoder, FringeCode, Method, Options, Result, Shot, surface, unwrap,
+};
 use std::hint::black_box;
 
 /// Fringe period of the reference bench in camera pixels.
@@ -76,6 +78,16 @@ fn stages(c: &mut Criterion) {
     let mut group = c.benchmark_group("stage");
     group.sample_size(30);
     group.bench_function("conditioning", |b| b.iter(lights));
+    let raw = Shot::bayer(scene.planes[1].view(), BayerPattern::Rggb, scene.planes[3].view());
+    let raw = raw.expect("two images of one size");
+    let of_mosaic = || linearise(black_box(&raw), &Conditioner::default());
+    group.bench_function("conditioning of a mosaic", |b| b.iter(of_mosaic));
+    let turned = Conditioner {
+        ir_registration: [[1.002, -0.0044, 0.37], [0.0044, 1.002, -1.62]],
+        ..Conditioner::default()
+    };
+    let registered = || linearise(black_box(&shot), &turned);
+    group.bench_function("conditioning with registration", |b| b.iter(registered));
     group.bench_function("carrier", |b| b.iter(|| demod::carrier(black_box(red.view()))));
     for (name, kind) in [("mean envelope", Background::MeanEnvelope), ("moving mean", Background::MovingMean)]
     {

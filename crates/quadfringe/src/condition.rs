@@ -1,87 +1,26 @@
 //! Raw shot -> linear planes: dark level, response, crosstalk, registration (step 1 of the recipe, system (S1)).
 //!
-//! A [`Conditioner`] is what a calibration knows about the four channels; a [`Shot`] is four borrowed images of one
-//! instant. Conditioning turns intensities into fractions of full scale that are linear in the projected light.
+//! A [`Conditioner`] is what a calibration knows about the four channels; a [`Shot`] borrows the images of one instant:
+//! four planes, or the raw mosaic of a Bayer chip and an infrared image. Conditioning turns intensities into fractions of
+//! full scale that are linear in the projected light, all four at every pixel.
 
 mod estimate;
+mod linear;
+mod mosaic;
 mod plan;
+mod registered;
 mod response;
 mod sample;
+mod shot;
 
 pub use estimate::{ResponseEstimate, estimate_response};
 pub(crate) use plan::Plan;
 pub use response::Response;
 pub use sample::Sample;
+pub use shot::Shot;
 
 use crate::{Channel, Error, Result};
-use ndarray::{Array2, ArrayView2};
-
-/// Four images of one exposure in the order R, G, B, IR, all `(rows, columns)` of one type; views may be strided.
-#[derive(Debug, Clone)]
-pub struct Shot<'a, T> {
-    planes: [ArrayView2<'a, T>; 4],
-    full_scale: f32,
-}
-
-impl<'a, T: Sample> Shot<'a, T> {
-    /// A shot whose white is the greatest value of the type (255, 65535; 1.0 for `f32`).
-    ///
-    /// # Errors
-    /// [`Error::Shape`] when the four images differ in size or are empty; [`Error::NotFinite`] for NaN or infinity.
-    ///
-    /// ```
-    /// use ndarray::Array2;
-    /// use quadfringe::Shot;
-    /// let image = Array2::<u8>::zeros((4, 8));
-    /// let shot = Shot::new([image.view(), image.view(), image.view(), image.view()])?;
-    /// assert_eq!(shot.shape(), [4, 8]);
-    /// # Ok::<(), quadfringe::Error>(())
-    /// ```
-    pub fn new(planes: [ArrayView2<'a, T>; 4]) -> Result<Self> {
-        let shape = planes[0].shape().to_vec();
-        if shape.contains(&0) {
-            return Err(Error::shape("red image", &[1, 1], &shape));
-        }
-        for (plane, channel) in planes.iter().zip(Channel::ALL) {
-            if plane.shape() != shape {
-                let what = format!("{} image", channel.name());
-                return Err(Error::shape(what, &shape, plane.shape()));
-            }
-            T::check_finite(plane, channel.name())?;
-        }
-        Ok(Self { planes, full_scale: T::FULL_SCALE })
-    }
-
-    /// The value that stands for full scale, for example 4095 for 12 bit data in 16 bit words.
-    ///
-    /// # Errors
-    /// [`Error::Value`] unless positive and finite.
-    pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
-        if !(full_scale.is_finite() && full_scale > 0.0) {
-            return Err(Error::value("full_scale", "a positive intensity", full_scale));
-        }
-        self.full_scale = full_scale;
-        Ok(self)
-    }
-
-    /// Rows and columns.
-    #[must_use]
-    pub fn shape(&self) -> [usize; 2] {
-        [self.planes[0].nrows(), self.planes[0].ncols()]
-    }
-
-    /// The image of one channel.
-    #[must_use]
-    pub fn plane(&self, channel: Channel) -> ArrayView2<'a, T> {
-        self.planes[channel.index()]
-    }
-
-    /// The intensity that stands for full scale.
-    #[must_use]
-    pub fn full_scale(&self) -> f32 {
-        self.full_scale
-    }
-}
+use ndarray::Array2;
 
 /// What a calibration knows about the intensities of the four channels.
 ///
@@ -157,7 +96,7 @@ impl Conditioner {
     }
 }
 
-/// The four images as linear light, a fraction of full scale; NaN where the infrared chip does not see the point.
+/// The four channels as linear light at every pixel, a fraction of full scale; NaN where the infrared chip does not see the point.
 ///
 /// # Errors
 /// As [`Conditioner::check`].
@@ -172,7 +111,7 @@ impl Conditioner {
 /// ```
 pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
     let mut plan = conditioner.plan()?;
-    plan.prepare::<T>(shot.full_scale());
+    plan.prepare(shot);
     let mut planes = [(); 4].map(|()| Array2::zeros(shot.shape()));
     for y in 0..shot.shape()[0] {
         let mut rows = planes.each_mut().map(|plane| plane.row_mut(y).into_slice().expect("a fresh row"));
@@ -210,6 +149,7 @@ fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use ndarray::ArrayView2;
 
     fn planes<T: Sample>(image: &Array2<T>) -> [ArrayView2<'_, T>; 4] {
         [image.view(), image.view(), image.view(), image.view()]
@@ -228,7 +168,7 @@ mod tests {
             .collect();
         let shot = Shot::new(std::array::from_fn(|c| seen[c].view())).unwrap();
         let mut plan = conditioner.plan().unwrap();
-        plan.prepare::<f32>(shot.full_scale());
+        plan.prepare(&shot);
         let mut out = [[0.0f32; 3]; 4];
         let [r, g, b, ir] = &mut out;
         plan.row(&shot, 0, &mut [r, g, b, ir]);
@@ -243,12 +183,25 @@ mod tests {
         let conditioner =
             Conditioner { ir_registration: [[1.0, 0.0, 0.5], [0.0, 1.0, 0.0]], ..Conditioner::default() };
         let shot = Shot::new(planes(&image)).unwrap();
-        let plan = conditioner.plan().unwrap();
+        let mut plan = conditioner.plan().unwrap();
+        plan.prepare(&shot);
         let mut out = [[0.0f32; 4]; 4];
         let [r, g, b, ir] = &mut out;
         plan.row(&shot, 0, &mut [r, g, b, ir]);
         assert!((out[3][1] - 0.15).abs() < 1e-6);
         assert!(out[3][3].is_nan());
+    }
+
+    #[test]
+    fn what_the_infrared_chip_does_not_see_spreads_to_no_other_channel() {
+        let image = Array2::from_elem((3, 5), 0.5f32);
+        let mut crosstalk = Conditioner::default().crosstalk;
+        (crosstalk[0][1], crosstalk[3][0]) = (0.1, 0.2);
+        let ir_registration = [[1.0, 0.0, 1.0], [0.0, 1.0, 0.0]];
+        let conditioner = Conditioner { crosstalk, ir_registration, ..Conditioner::default() };
+        let light = linearise(&Shot::new(planes(&image)).unwrap(), &conditioner).unwrap();
+        assert!((light[0][[1, 4]] - 0.45).abs() < 1e-6 && (light[2][[1, 4]] - 0.5).abs() < 1e-6);
+        assert!(light[3][[1, 4]].is_nan() && (light[3][[1, 3]] - 0.41).abs() < 1e-6);
     }
 
     #[test]

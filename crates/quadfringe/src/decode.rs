@@ -1,7 +1,7 @@
-//! THE RECIPE: four images of one exposure -> absolute phase -> millimetres, steps in order.
+//! THE RECIPE: the images of one exposure -> absolute phase -> millimetres, steps in order.
 //!
 //! ```text
-//! condition   dark, response, crosstalk, registration                                  (S1)
+//! condition   dark, response, Bayer mosaic, crosstalk, registration                    (S1)
 //! demodulate  R and B by two-step phase shifting                                       (S2)
 //!             G and IR against them: local fit (best) or Fourier filter (published)    (S3)
 //! unwrap      orders with support (best) or the ladder, point by point (published)     (S4)
@@ -163,7 +163,7 @@ impl Decoder {
             return Err(Error::shape("shot", &self.shape, &shot.shape()));
         }
         out.check(self.shape, self.triangulator.is_some())?;
-        self.plan.prepare::<T>(shot.full_scale());
+        self.plan.prepare(shot);
         match &mut self.engine {
             Engine::Published(engine) => engine.run(&self.plan, shot, &self.options, out),
             Engine::Best(engine) => engine.run(&self.plan, shot, &self.options, out),

@@ -15,7 +15,7 @@
 //! |---|---|
 //! | [`error`] | what can be wrong with an input |
 //! | [`fringe`] | what is projected: numbers, shifts, channels, ideal images |
-//! | [`optics`] | the pinhole device, of which a projector is an inverse one |
+//! | [`optics`] | the pinhole device, of which a projector is an inverse one, and the Bayer chip |
 //! | [`surface`] | forward: what is measured, as implicit surfaces |
 //! | [`rig`] | forward: the virtual bench, from a surface to a shot |
 //! | [`condition`] | inverse: raw shot to linear light |
@@ -77,7 +77,7 @@ pub use condition::{Conditioner, Response, Shot};
 pub use decode::{Decoded, Decoder, Method, Options};
 pub use error::{Error, Result};
 pub use fringe::{Channel, DmdLayout, FringeCode};
-pub use optics::Device;
+pub use optics::{BayerPattern, Device};
 
 /// The Rust of the README is run too.
 #[cfg(doctest)]

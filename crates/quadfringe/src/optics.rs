@@ -5,9 +5,11 @@
 
 use crate::error::{Error, Result};
 
+mod bayer;
 mod distortion;
 mod rotation;
 
+pub use bayer::BayerPattern;
 pub use rotation::rotation_from_vector;
 
 /// Half-line in the camera frame.

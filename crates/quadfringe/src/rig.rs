@@ -16,7 +16,7 @@ mod truth;
 
 pub use cast::{Cast, Hit};
 pub use light::{Axis, Light};
-pub use options::{Albedo, BayerOrder, BitDepth, RenderOptions};
+pub use options::{Albedo, BitDepth, Demosaic, RenderOptions};
 pub use render::Planes;
 
 use crate::error::Result;

@@ -21,12 +21,13 @@ const FORWARD: [&str; 2] = ["surface", "rig"];
 const INVERSE: [&str; 5] = ["condition", "demod", "unwrap", "height", "decode"];
 
 /// Where the names at the root of the crate come from.
-const ROOT_NAMES: [(&str, &str); 12] = [
+const ROOT_NAMES: [(&str, &str); 13] = [
     ("Error", "error"),
     ("Result", "error"),
     ("Channel", "fringe"),
     ("DmdLayout", "fringe"),
     ("FringeCode", "fringe"),
+    ("BayerPattern", "optics"),
     ("Device", "optics"),
     ("Conditioner", "condition"),
     ("Response", "condition"),

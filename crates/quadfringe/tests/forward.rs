@@ -2,8 +2,8 @@
 
 use ndarray::{Array2, Array3};
 use quadfringe::fringe::{Channel, DmdLayout, FringeCode, pattern};
-use quadfringe::optics::Device;
-use quadfringe::rig::{Albedo, BayerOrder, Beam, Bench, BitDepth, Light, Planes, RenderOptions};
+use quadfringe::optics::{BayerPattern, Device};
+use quadfringe::rig::{Albedo, Beam, Bench, BitDepth, Light, Planes, RenderOptions};
 use quadfringe::surface::{Plane, scene};
 
 fn small(bench: Bench, shrink: usize) -> Bench {
@@ -67,7 +67,7 @@ fn rows_do_not_depend_on_the_number_of_threads() {
     let options = RenderOptions {
         noise: 0.03,
         blur_px: 0.8,
-        bayer: Some(BayerOrder::Rggb),
+        bayer: Some(BayerPattern::Rggb),
         seed: 11,
         ..RenderOptions::default()
     };

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli.output import Fringes3, say
+from quadfringe.cli.output import Bayer, Fringes3, say
 
 __all__ = ["measure", "pattern", "simulate"]
 
@@ -43,11 +43,12 @@ def simulate(
     surface: Annotated[str | None, typer.Option(help="What stands on the bench, in place of the file's.")] = None,
     noise: Annotated[float | None, typer.Option(min=0, help="Noise, fraction of full scale.")] = None,
     seed: Annotated[int | None, typer.Option(min=0, help="Seed of the noise.")] = None,
+    bayer: Annotated[Bayer | None, typer.Option(help="A Bayer chip: raw.png in place of three images.")] = None,
 ) -> None:
-    """Render one shot of the virtual bench: four images, calibration.json, truth.npz."""
+    """Render one shot of the virtual bench: its images, calibration.json, truth.npz."""
     from quadfringe.simulate import bench_config, write_simulation
 
-    config = bench_config(system, surface=surface, noise=noise, seed=seed)
+    config = bench_config(system, surface=surface, noise=noise, seed=seed, bayer=None if bayer is None else bayer.value)
     for path in write_simulation(out, config):
         say(str(path))
 

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import Fringes3, JsonOption, say, write_figures
+from quadfringe.cli.output import Bayer, Fringes3, JsonOption, say, write_figures
+
+if TYPE_CHECKING:
+    from quadfringe.config import BayerPattern
 
 __all__ = ["Bits", "Method", "decode"]
 
@@ -40,20 +44,22 @@ def decode(
     blue: ImageOption = None,
     ir: ImageOption = None,
     rgb: Annotated[Path | None, typer.Option(metavar="FILE", help="One colour image for all three.")] = None,
+    raw: Annotated[Path | None, typer.Option(metavar="FILE", help="Raw mosaic for all three, with --bayer.")] = None,
+    bayer: Annotated[Bayer | None, typer.Option(help="Colours of the first 2 x 2 pixels of --raw.")] = None,
     response: Annotated[Path | None, typer.Option(metavar="FILE", help="Response of the channels, JSON.")] = None,
     calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Calibration, JSON.")] = None,
     method: Annotated[Method | None, typer.Option(help="How to demodulate and unwrap.")] = None,
     bits: Annotated[Bits | None, typer.Option(help="Bits in use in 16-bit files.")] = None,
     json: JsonOption = None,
 ) -> None:
-    """Decode the four images of one shot to absolute phase, and to millimetres when calibrated."""
+    """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
     from quadfringe.config import DecodeConfig, Fringes
-    from quadfringe.data import SUFFIXES, Calibration, ResponseCalibration
+    from quadfringe.data import SUFFIXES, AnyShot, Calibration, ResponseCalibration
     from quadfringe.decoding import Plan
     from quadfringe.decoding import decode as decode_shot
     from quadfringe.errors import InputError
     from quadfringe.files import require_suffix
-    from quadfringe.shots import read_shot
+    from quadfringe.shots import read_bayer_shot, read_shot
 
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without it write .npz")
@@ -64,9 +70,29 @@ def decode(
         response=None if response is None else ResponseCalibration.load(response),
         settings=DecodeConfig(method=None if method is None else method.value),
     )
+    bits_in_use = None if bits is None else int(bits)
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}
-    shape = decode_shot(read_shot(files, None if bits is None else int(bits)), plan)
+    if raw is None and bayer is None:
+        shot: AnyShot = read_shot(files, bits_in_use)
+    else:
+        shot = read_bayer_shot(*_mosaic(raw, bayer, files), bits_in_use)
+    shape = decode_shot(shot, plan)
     shape.save(out)
     percent = 100.0 * float(shape.returned.mean())
     say(f"{out}: {percent:.1f} % of {shape.phase_rad.size} pixels returned", json)
     write_figures({"returned_percent": percent}, json)
+
+
+def _mosaic(raw: Path | None, bayer: Bayer | None, files: Mapping[str, Path | None]) -> tuple[Path, BayerPattern, Path]:
+    """Give the mosaic, its pattern and the infrared image; raise when one is missing or there is too much."""
+    from quadfringe.errors import InputError
+
+    ir = files["ir"]
+    missing = [
+        option for option, value in (("--raw FILE", raw), ("--bayer NAME", bayer), ("--ir FILE", ir)) if not value
+    ]
+    if raw is None or bayer is None or ir is None:
+        raise InputError(f"a raw mosaic needs --raw, --bayer and --ir: add {' and '.join(missing)}")
+    if more := [name for name, path in files.items() if path is not None and name != "ir"]:
+        raise InputError(f"--raw already holds red, green and blue; leave out --{' --'.join(more)}")
+    return raw, bayer.value, ir

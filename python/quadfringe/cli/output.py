@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from enum import StrEnum
 from pathlib import Path
 from typing import Annotated, Any, TypeVar
 
@@ -12,7 +13,18 @@ import typer
 
 from quadfringe.files import atomic, figures_text
 
-__all__ = ["Fringes3", "JsonOption", "complain", "rows", "say", "steps", "table", "write_figures", "write_record"]
+__all__ = [
+    "Bayer",
+    "Fringes3",
+    "JsonOption",
+    "complain",
+    "rows",
+    "say",
+    "steps",
+    "table",
+    "write_figures",
+    "write_record",
+]
 
 Item = TypeVar("Item")
 
@@ -24,6 +36,15 @@ Fringes3 = Annotated[
     tuple[float, float, float],
     typer.Option("--fringes", metavar="N N N", help="Fringe numbers: red and blue, green, infrared."),
 ]
+
+
+class Bayer(StrEnum):
+    """Colours of the first two pixels of the first row and of the second row of a chip."""
+
+    rggb = "rggb"
+    grbg = "grbg"
+    gbrg = "gbrg"
+    bggr = "bggr"
 
 
 def complain(message: str) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from quadfringe.config import Fringes
-from quadfringe.data import Shot
+from quadfringe.data import AnyShot
 
 __all__ = ["Camera", "Projector"]
 
@@ -21,9 +21,9 @@ class Projector(Protocol):
 
 
 class Camera(Protocol):
-    """Takes four channels in one exposure."""
+    """Takes four channels in one exposure: as four images, or as a raw mosaic and an infrared image."""
 
-    def grab(self) -> Shot:
+    def grab(self) -> AnyShot:
         """Expose once and return the shot."""
 
     def close(self) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 
 from quadfringe import _core
 from quadfringe.config import ChannelResponse, Fringes, Response, SceneConfig, SystemConfig
-from quadfringe.data import Calibration, Shot, Truth
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth
 from quadfringe.decoding import core_device, device_model
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.export import read_npy
@@ -51,7 +51,7 @@ class VirtualBench:
             ir_registration=scene.infrared_from_visible,
         )
 
-    def expose(self) -> Shot:
+    def expose(self) -> AnyShot:
         """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected."""
         if self.projected is None:
             raise DecodeError("the projector shows nothing: call show(fringes) before grab()")
@@ -59,7 +59,10 @@ class VirtualBench:
             self._cast = self._look()
         images = self._bench.render(self._cast, self.projected.numbers, **_light(self._scene))
         full_scale = float(2**self._scene.bit_depth - 1)
-        return Shot(**images, full_scale=full_scale, truth=self._truth(self._cast))
+        truth = self._truth(self._cast)
+        if "raw" in images and self._scene.bayer is not None:
+            return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
+        return Shot(**images, full_scale=full_scale, truth=truth)
 
     def _look(self) -> _core.Cast:
         relief = self._scene.height_map
@@ -106,7 +109,7 @@ class VirtualCamera:
     def __init__(self, bench: VirtualBench) -> None:
         self._bench = bench
 
-    def grab(self) -> Shot:
+    def grab(self) -> AnyShot:
         """Render one shot of the bench."""
         return self._bench.expose()
 

@@ -3,6 +3,7 @@
 use ndarray::Array3;
 
 use crate::error::{Error, Result};
+use crate::optics::BayerPattern;
 
 /// Share of light that the surface gives back in each channel.
 ///
@@ -129,23 +130,19 @@ impl BitDepth {
     }
 }
 
-/// Colour of the first two pixels of the first two rows of a Bayer chip.
+/// How a camera makes three planes of its mosaic.
 ///
 /// ```
-/// use quadfringe::rig::{BayerOrder, RenderOptions};
-/// let options = RenderOptions { bayer: Some(BayerOrder::Rggb), ..RenderOptions::default() };
-/// assert!(options.bayer.is_some());
+/// use quadfringe::BayerPattern;
+/// use quadfringe::rig::{Demosaic, RenderOptions};
+/// let (bayer, demosaic) = (Some(BayerPattern::Rggb), Some(Demosaic::Bilinear));
+/// let plain_camera = RenderOptions { bayer, demosaic, ..RenderOptions::default() };
+/// assert_ne!(plain_camera, RenderOptions { demosaic: None, ..plain_camera.clone() });
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum BayerOrder {
-    /// Red first.
-    Rggb,
-    /// Blue first.
-    Bggr,
-    /// Green, then red.
-    Grbg,
-    /// Green, then blue.
-    Gbrg,
+pub enum Demosaic {
+    /// The mean of the nearest samples of each colour, as in most cameras and libraries.
+    Bilinear,
 }
 
 /// How a scene is rendered. The default is a clean 8-bit camera before a white surface under a little room light.
@@ -179,8 +176,10 @@ pub struct RenderOptions {
     pub camera_offset: [f64; 4],
     /// Response of the camera: captured = offset + linear ^ (1 / exponent).
     pub camera_exponent: [f64; 4],
-    /// The visible chip sees one colour per pixel; the others are interpolated. `None`: all colours at every pixel.
-    pub bayer: Option<BayerOrder>,
+    /// The visible chip sees one colour per pixel and delivers a raw mosaic. `None`: all colours at every pixel.
+    pub bayer: Option<BayerPattern>,
+    /// The camera makes three planes of the mosaic. `None`: it delivers the mosaic.
+    pub demosaic: Option<Demosaic>,
     /// Rounding of the camera.
     pub bit_depth: BitDepth,
     /// Seed of the noise: the same seed gives the same images for any number of threads.
@@ -206,6 +205,7 @@ impl Default for RenderOptions {
             camera_offset: [0.0; 4],
             camera_exponent: [1.0; 4],
             bayer: None,
+            demosaic: None,
             bit_depth: BitDepth::Eight,
             seed: 0,
         }
@@ -232,6 +232,9 @@ impl RenderOptions {
                     return Err(Error::value(name, expected, value));
                 }
             }
+        }
+        if self.demosaic.is_some() && self.bayer.is_none() {
+            return Err(Error::value("demosaic", "a Bayer pattern to interpolate", "none"));
         }
         if let Some(affine) = self.infrared_from_visible {
             super::resample::inverse(affine)?;

@@ -7,7 +7,7 @@ use super::{Beam, Bench, Cast, Hit, Light, RenderOptions, expose, mosaic, resamp
 use crate::error::{Error, Result};
 use crate::fringe::Channel;
 
-/// The four images of a shot in the order R, G, B, IR, each `(rows, columns)`.
+/// The images of a shot, each `(rows, columns)`: four in the order R, G, B, IR, or the raw mosaic of a Bayer chip and IR.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -17,12 +17,18 @@ use crate::fringe::Channel;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Planes {
-    /// 8 bit, full scale 255.
+    /// Four of 8 bit, full scale 255.
     U8([Array2<u8>; 4]),
-    /// 10, 12 or 16 bit, full scale 1023, 4095 or 65535.
+    /// Four of 10, 12 or 16 bit, full scale 1023, 4095 or 65535.
     U16([Array2<u16>; 4]),
-    /// Not rounded, full scale 1.
+    /// Four, not rounded, full scale 1.
     F32([Array2<f32>; 4]),
+    /// Mosaic and IR of 8 bit, full scale 255.
+    BayerU8([Array2<u8>; 2]),
+    /// Mosaic and IR of 10, 12 or 16 bit, full scale 1023, 4095 or 65535.
+    BayerU16([Array2<u16>; 2]),
+    /// Mosaic and IR, not rounded, full scale 1.
+    BayerF32([Array2<f32>; 2]),
 }
 
 impl Planes {
@@ -33,16 +39,42 @@ impl Planes {
             Self::U8(planes) => planes[0].dim(),
             Self::U16(planes) => planes[0].dim(),
             Self::F32(planes) => planes[0].dim(),
+            Self::BayerU8(images) => images[0].dim(),
+            Self::BayerU16(images) => images[0].dim(),
+            Self::BayerF32(images) => images[0].dim(),
         }
     }
 
     fn from_counts(planes: [Array2<f32>; 4], full_scale: f32) -> Self {
-        if full_scale <= 1.0 {
-            Self::F32(planes)
-        } else if full_scale <= 255.0 {
-            Self::U8(planes.map(|plane| plane.mapv(|count| count as u8)))
-        } else {
-            Self::U16(planes.map(|plane| plane.mapv(|count| count as u16)))
+        match Depth::of(full_scale) {
+            Depth::Byte => Self::U8(planes.map(|plane| plane.mapv(|count| count as u8))),
+            Depth::Word => Self::U16(planes.map(|plane| plane.mapv(|count| count as u16))),
+            Depth::Float => Self::F32(planes),
+        }
+    }
+
+    fn bayer_from_counts(images: [Array2<f32>; 2], full_scale: f32) -> Self {
+        match Depth::of(full_scale) {
+            Depth::Byte => Self::BayerU8(images.map(|image| image.mapv(|count| count as u8))),
+            Depth::Word => Self::BayerU16(images.map(|image| image.mapv(|count| count as u16))),
+            Depth::Float => Self::BayerF32(images),
+        }
+    }
+}
+
+/// Type of a stored intensity.
+enum Depth {
+    Byte,
+    Word,
+    Float,
+}
+
+impl Depth {
+    fn of(full_scale: f32) -> Self {
+        match full_scale {
+            ..=1.0 => Self::Float,
+            ..=255.0 => Self::Byte,
+            _ => Self::Word,
         }
     }
 }
@@ -103,14 +135,19 @@ impl Bench {
         for (channel, plane) in planes.iter_mut().enumerate() {
             expose::expose(plane, channel, options);
         }
-        if let Some(order) = options.bayer {
-            mosaic::sample_and_interpolate(&mut planes[..3], order);
-            let rounds = options.bit_depth.full_scale() > 1.0;
-            if rounds {
-                planes[..3].iter_mut().for_each(|plane| plane.par_mapv_inplace(f32::round));
-            }
+        let full_scale = options.bit_depth.full_scale();
+        let Some(pattern) = options.bayer else {
+            return Ok(Planes::from_counts(planes, full_scale));
+        };
+        let raw = mosaic::sample(&planes[..3], pattern);
+        let [.., infrared] = planes;
+        if options.demosaic.is_none() {
+            return Ok(Planes::bayer_from_counts([raw, infrared], full_scale));
         }
-        Ok(Planes::from_counts(planes, options.bit_depth.full_scale()))
+        let rounds = full_scale > 1.0;
+        let [red, green, blue] = mosaic::bilinear(&raw, pattern)
+            .map(|plane| if rounds { plane.mapv_into(f32::round) } else { plane });
+        Ok(Planes::from_counts([red, green, blue, infrared], full_scale))
     }
 
     /// Linear light of the four captured channels, 1 = full scale.

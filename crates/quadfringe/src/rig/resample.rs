@@ -67,8 +67,8 @@ pub(super) fn inverse(affine: [[f64; 3]; 2]) -> Result<[[f64; 3]; 2]> {
     Ok([[ia, ib, -(ia * tx + ib * ty)], [ic, id, -(ic * tx + id * ty)]])
 }
 
-/// Image as seen through an affine map of its pixels: `out(x, y) = image(from_output (x, y, 1))`, by cubic interpolation,
-/// dark outside.
+/// Image as seen through an affine map of its pixels: `out(x, y) = image(from_output (x, y, 1))`, by cubic interpolation;
+/// the border is continued.
 pub(super) fn warp(image: &Array2<f32>, from_output: [[f64; 3]; 2]) -> Array2<f32> {
     let mut warped = Array2::zeros(image.dim());
     warped.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut out)| {
@@ -82,10 +82,7 @@ pub(super) fn warp(image: &Array2<f32>, from_output: [[f64; 3]; 2]) -> Array2<f3
 
 fn cubic(image: &Array2<f32>, x: f64, y: f64) -> f32 {
     let (rows, columns) = image.dim();
-    let inside = |p: f64, n: usize| p >= -0.5 && p < n as f64 - 0.5;
-    if !inside(x, columns) || !inside(y, rows) {
-        return 0.0;
-    }
+    let (x, y) = (x.clamp(-1.0, columns as f64), y.clamp(-1.0, rows as f64));
     let (left, top) = (x.floor(), y.floor());
     let weights_x = catmull_rom((x - left) as f32);
     let weights_y = catmull_rom((y - top) as f32);

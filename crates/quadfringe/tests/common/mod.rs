@@ -6,8 +6,13 @@ use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, BitDepth, Cast, Light, Planes, RenderOptions};
 use quadfringe::surface::scene;
-use quadfringe::{Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot};
+use quadfringe::{
+    BayerPattern, Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot,
+};
 use std::f32::consts::PI;
+
+/// The pattern of the mosaics that are tested.
+pub const BAYER: BayerPattern = BayerPattern::Grbg;
 
 /// So many random cases, the same in every run.
 pub fn cases(count: u32) -> ProptestConfig {
@@ -44,8 +49,12 @@ pub fn code() -> FringeCode {
     FringeCode::optimum(36, 912).expect("valid code")
 }
 
+/// Decode what the bench rendered; a mosaic is taken as `BAYER`.
 pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> {
     match planes {
+        Planes::BayerU8([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
+        Planes::BayerU16([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
+        Planes::BayerF32([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
         Planes::U8(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
         Planes::U16(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
         Planes::F32(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
@@ -60,12 +69,24 @@ pub fn there_and_back(
     render: &RenderOptions,
     method: Method,
 ) -> Decoded {
+    there_and_back_by(bench, cast, code, render, method, &Conditioner::default())
+}
+
+/// The same with what a calibration knows of the intensities.
+pub fn there_and_back_by(
+    bench: &Bench,
+    cast: &Cast,
+    code: &FringeCode,
+    render: &RenderOptions,
+    method: Method,
+    conditioner: &Conditioner,
+) -> Decoded {
     let work = || -> std::result::Result<Decoded, Error> {
         let planes = bench.render(cast, &Light::shot(code), render)?;
         let (rows, columns) = planes.shape();
         let options = Options { method, ..Options::default() };
         let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-        let mut decoder = Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), options)?
+        let mut decoder = Decoder::new(code.clone(), [rows, columns], conditioner, options)?
             .triangulate_with(triangulator)?;
         decode_planes(&mut decoder, &planes)
     };
@@ -98,6 +119,11 @@ pub struct Score {
 impl Score {
     pub fn wrong_share(&self) -> f64 {
         self.wrong as f64 / self.returned.max(1) as f64
+    }
+
+    /// Returned pixels that are lit, and have another order than the truth.
+    pub fn wrong_orders(&self) -> usize {
+        self.wrong - self.in_shadow
     }
 
     pub fn returned_share(&self) -> f64 {

@@ -1,0 +1,98 @@
+//! Raw numbers to linear light, channel by channel, by look-up where the type allows it.
+
+use super::{Conditioner, Response, Sample};
+use std::borrow::Cow;
+
+use ndarray::ArrayView2;
+
+/// Dark level and response of the four channels, ready for one type of sample and one full scale.
+#[derive(Debug, Clone)]
+pub(super) struct Linear {
+    dark: [f32; 4],
+    response: [Response; 4],
+    full_scale: f32,
+    tables: [Vec<f32>; 4],
+    tables_for: Option<(usize, f32)>,
+}
+
+impl Linear {
+    pub fn new(conditioner: &Conditioner) -> Self {
+        Self {
+            dark: conditioner.dark,
+            response: conditioner.response,
+            full_scale: 1.0,
+            tables: std::array::from_fn(|_| Vec::new()),
+            tables_for: None,
+        }
+    }
+
+    /// Fill the look-up tables when the type or the full scale has changed since the last shot.
+    pub fn prepare<T: Sample>(&mut self, full_scale: f32) {
+        if self.tables_for == Some((T::LEVELS, full_scale)) {
+            return;
+        }
+        self.full_scale = full_scale;
+        for c in 0..4 {
+            let linear = |level: usize| self.linear(c, level as f32 / full_scale);
+            self.tables[c] = (0..T::LEVELS).map(linear).collect();
+        }
+        self.tables_for = Some((T::LEVELS, full_scale));
+    }
+
+    fn linear(&self, c: usize, fraction: f32) -> f32 {
+        self.response[c].linear(fraction - self.dark[c])
+    }
+
+    /// A row of channel `c`.
+    #[inline]
+    pub fn row<T: Sample>(&self, c: usize, row: &[T], out: &mut [f32]) {
+        let table = &self.tables[c][..T::LEVELS];
+        for (value, &raw) in out.iter_mut().zip(row) {
+            *value = self.value(c, table, raw);
+        }
+    }
+
+    /// A row of two channels that take turns: the even columns and the odd ones.
+    #[inline]
+    pub fn row_of_two<T: Sample>(&self, [a, b]: [usize; 2], row: &[T], [even, odd]: [&mut [f32]; 2]) {
+        let tables = [a, b].map(|c| &self.tables[c][..T::LEVELS]);
+        let pairs = row.chunks_exact(2);
+        if let [last] = pairs.remainder() {
+            even[row.len() / 2] = self.value(a, tables[0], *last);
+        }
+        for ((even, odd), pair) in even.iter_mut().zip(odd).zip(pairs) {
+            *even = self.value(a, tables[0], pair[0]);
+            *odd = self.value(b, tables[1], pair[1]);
+        }
+    }
+
+    #[inline]
+    fn value<T: Sample>(&self, c: usize, table: &[f32], raw: T) -> f32 {
+        match raw.level() {
+            Some(level) => table[level],
+            None => self.linear(c, raw.intensity() / self.full_scale),
+        }
+    }
+}
+
+/// Row `y`, contiguous, so that no loop has to look at strides pixel by pixel.
+#[inline]
+pub(super) fn row_of<'r, T: Sample>(plane: &'r ArrayView2<'_, T>, y: usize) -> Cow<'r, [T]> {
+    let row = plane.row(y);
+    match row.to_slice() {
+        Some(row) => Cow::Borrowed(row),
+        None => Cow::Owned(row.to_vec()),
+    }
+}
+
+/// Continue the `count` samples after the first `margin` on both sides: mirrored at the end sample in place and in value,
+/// which keeps a slope. As many samples are written before as after.
+pub(super) fn extend(line: &mut [f32], margin: usize, count: usize) {
+    let (first, last) = (margin, margin + count - 1);
+    for i in 1..=margin {
+        line[first - i] = 2.0 * line[first] - line[(first + i).min(last)];
+    }
+    for i in 1..=margin {
+        line[last + i] = 2.0 * line[last] - line[last.saturating_sub(i).max(first)];
+    }
+}

@@ -1,0 +1,135 @@
+//! The images of one exposure, borrowed: four planes, or the raw mosaic of a Bayer chip and an infrared image.
+
+use super::Sample;
+use crate::{BayerPattern, Channel, Error, Result};
+use ndarray::ArrayView2;
+
+/// The images of one exposure, all `(rows, columns)` of one type; views may be strided.
+#[derive(Debug, Clone)]
+pub struct Shot<'a, T> {
+    pub(super) images: Images<'a, T>,
+    full_scale: f32,
+}
+
+/// What the chips delivered.
+#[derive(Debug, Clone)]
+pub(super) enum Images<'a, T> {
+    /// R, G, B, IR.
+    Planes([ArrayView2<'a, T>; 4]),
+    /// One colour at each pixel, and IR.
+    Bayer { raw: ArrayView2<'a, T>, pattern: BayerPattern, infrared: ArrayView2<'a, T> },
+}
+
+impl<'a, T: Sample> Shot<'a, T> {
+    /// A shot of four images in the order R, G, B, IR, whose white is the greatest value of the type (255, 65535; 1.0
+    /// for `f32`).
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the four images differ in size or are empty; [`Error::NotFinite`] for NaN or infinity.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use quadfringe::Shot;
+    /// let image = Array2::<u8>::zeros((4, 8));
+    /// let shot = Shot::new([image.view(), image.view(), image.view(), image.view()])?;
+    /// assert_eq!(shot.shape(), [4, 8]);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    pub fn new(planes: [ArrayView2<'a, T>; 4]) -> Result<Self> {
+        let shape = planes[0].shape().to_vec();
+        if shape.contains(&0) {
+            return Err(Error::shape("red image", &[1, 1], &shape));
+        }
+        for (plane, channel) in planes.iter().zip(Channel::ALL) {
+            if plane.shape() != shape {
+                let what = format!("{} image", channel.name());
+                return Err(Error::shape(what, &shape, plane.shape()));
+            }
+            T::check_finite(plane, channel.name())?;
+        }
+        Ok(Self { images: Images::Planes(planes), full_scale: T::FULL_SCALE })
+    }
+
+    /// A shot of a camera with two chips: the raw mosaic of the visible one, as it was read out, and the infrared image.
+    /// White is the greatest value of the type.
+    ///
+    /// The colours that a pixel does not see are interpolated after dark level and response, from samples of the same
+    /// colour alone, at the place of the pixel: the phase that is decoded there belongs there.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the two images differ in size or the mosaic is smaller than 2 x 2; [`Error::NotFinite`] for
+    /// NaN or infinity.
+    ///
+    /// ```
+    /// use ndarray::Array2;
+    /// use quadfringe::{BayerPattern, Conditioner, Shot, condition::linearise};
+    /// // A red wall, and no infrared light.
+    /// let raw = Array2::from_shape_fn((6, 8), |(y, x)| if y % 2 == 0 && x % 2 == 0 { 204u8 } else { 0 });
+    /// let infrared = Array2::zeros((6, 8));
+    /// let shot = Shot::bayer(raw.view(), BayerPattern::Rggb, infrared.view())?;
+    /// let [red, green, ..] = linearise(&shot, &Conditioner::default())?;
+    /// assert!((red[[3, 3]] - 0.8).abs() < 1e-6 && green[[3, 3]] == 0.0);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    pub fn bayer(raw: ArrayView2<'a, T>, pattern: BayerPattern, infrared: ArrayView2<'a, T>) -> Result<Self> {
+        if raw.nrows() < 2 || raw.ncols() < 2 {
+            return Err(Error::shape("raw mosaic", &[2, 2], raw.shape()));
+        }
+        if infrared.shape() != raw.shape() {
+            return Err(Error::shape("IR image", raw.shape(), infrared.shape()));
+        }
+        T::check_finite(&raw, "raw mosaic")?;
+        T::check_finite(&infrared, Channel::Ir.name())?;
+        Ok(Self { images: Images::Bayer { raw, pattern, infrared }, full_scale: T::FULL_SCALE })
+    }
+
+    /// The value that stands for full scale, for example 4095 for 12 bit data in 16 bit words.
+    ///
+    /// # Errors
+    /// [`Error::Value`] unless positive and finite.
+    pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
+        if !(full_scale.is_finite() && full_scale > 0.0) {
+            return Err(Error::value("full_scale", "a positive intensity", full_scale));
+        }
+        self.full_scale = full_scale;
+        Ok(self)
+    }
+
+    /// Rows and columns.
+    #[must_use]
+    pub fn shape(&self) -> [usize; 2] {
+        let (rows, columns) = self.infrared().dim();
+        [rows, columns]
+    }
+
+    /// The image of one channel; `None` for R, G and B of a mosaic.
+    #[must_use]
+    pub fn plane(&self, channel: Channel) -> Option<ArrayView2<'a, T>> {
+        match (&self.images, channel) {
+            (Images::Planes(planes), _) => Some(planes[channel.index()]),
+            (Images::Bayer { infrared, .. }, Channel::Ir) => Some(*infrared),
+            (Images::Bayer { .. }, _) => None,
+        }
+    }
+
+    /// The raw mosaic and its pattern; `None` for a shot of four planes.
+    #[must_use]
+    pub fn mosaic(&self) -> Option<(ArrayView2<'a, T>, BayerPattern)> {
+        match &self.images {
+            Images::Planes(_) => None,
+            Images::Bayer { raw, pattern, .. } => Some((*raw, *pattern)),
+        }
+    }
+
+    /// The intensity that stands for full scale.
+    #[must_use]
+    pub fn full_scale(&self) -> f32 {
+        self.full_scale
+    }
+
+    pub(super) fn infrared(&self) -> &ArrayView2<'a, T> {
+        match &self.images {
+            Images::Planes([.., infrared]) | Images::Bayer { infrared, .. } => infrared,
+        }
+    }
+}
