@@ -21,6 +21,7 @@ use crate::condition::{Plan, Sample};
 use crate::height::Triangulator;
 use crate::{Conditioner, Error, FringeCode, Result, Shot};
 use best::Best;
+use output::Finish;
 use published::Published;
 
 /// Which way a shot is decoded.
@@ -165,11 +166,11 @@ impl Decoder {
         }
         out.check(self.shape, self.triangulator.is_some())?;
         self.plan.prepare::<T>(shot.full_scale());
+        let finish = Finish { code: &self.code, triangulator: self.triangulator.as_ref() };
         match &mut self.engine {
-            Engine::Published(engine) => engine.run(&self.plan, shot, &self.options, out),
-            Engine::Best(engine) => engine.run(&self.plan, shot, &self.options, out),
+            Engine::Published(engine) => engine.run(&self.plan, shot, &self.options, &finish, out),
+            Engine::Best(engine) => engine.run(&self.plan, shot, &self.options, &finish, out),
         }
-        out.finish(&self.code, self.triangulator.as_ref());
         Ok(())
     }
 }

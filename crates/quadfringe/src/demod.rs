@@ -1,5 +1,6 @@
 //! Planes -> wrapped phase: background, two-step (TPS), Fourier (FTP), N-step, and the local fit of all channels.
 
+mod aligned;
 mod background;
 mod carrier;
 mod fourier;
@@ -13,6 +14,7 @@ pub(crate) mod scene;
 mod two_step;
 pub(crate) mod window;
 
+pub(crate) use aligned::Aligned;
 pub use background::{Background, background};
 pub(crate) use background::{Scratch as BackgroundScratch, background_row};
 pub(crate) use carrier::LineSpectrum;

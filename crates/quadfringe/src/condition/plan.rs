@@ -40,7 +40,7 @@ impl Plan {
             return;
         }
         for c in 0..4 {
-            let linear = |level: usize| self.linear(c, level as f32 / full_scale);
+            let linear = |level: usize| self.linear(c, level as f32 * (1.0 / full_scale));
             self.tables[c] = (0..T::LEVELS).map(linear).collect();
         }
         self.tables_for = Some((T::LEVELS, full_scale));
@@ -50,12 +50,19 @@ impl Plan {
         self.response[c].linear(fraction - self.dark[c])
     }
 
+    #[inline(always)]
     fn values<T: Sample>(&self, c: usize, row: &[T], full_scale: f32, out: &mut [f32]) {
-        let table = &self.tables[c][..T::LEVELS];
-        for (value, &raw) in out.iter_mut().zip(row) {
+        let (table, scale) = (&self.tables[c][..T::LEVELS], 1.0 / full_scale);
+        let pixels = out.iter_mut().zip(row);
+        if self.response[c] == Response::default() {
+            // Arithmetic runs on vectors, which a table does not.
+            let dark = self.dark[c];
+            return pixels.for_each(|(value, raw)| *value = raw.intensity() * scale - dark);
+        }
+        for (value, &raw) in pixels {
             *value = match raw.level() {
                 Some(level) => table[level],
-                None => self.linear(c, raw.intensity() / full_scale),
+                None => self.linear(c, raw.intensity() * scale),
             };
         }
     }
@@ -63,12 +70,12 @@ impl Plan {
     fn value<T: Sample>(&self, c: usize, raw: T, full_scale: f32) -> f32 {
         match raw.level() {
             Some(level) => self.tables[c][level],
-            None => self.linear(c, raw.intensity() / full_scale),
+            None => self.linear(c, raw.intensity() * (1.0 / full_scale)),
         }
     }
 
     /// One row of the shot as four rows of linear light.
-    #[inline]
+    #[inline(always)]
     pub fn row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [&mut [f32]; 4]) {
         for (c, target) in out.iter_mut().enumerate() {
             if c == 3 && self.registration.is_some() {

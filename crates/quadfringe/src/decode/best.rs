@@ -2,6 +2,7 @@
 
 use super::judge::{Findings, Judge};
 use super::nodes::Nodes;
+use super::output::Finish;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::carrier;
@@ -56,7 +57,14 @@ impl Best {
         }
     }
 
-    pub fn run<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>, options: &Options, out: &mut Decoded) {
+    pub fn run<T: Sample>(
+        &mut self,
+        plan: &Plan,
+        shot: &Shot<'_, T>,
+        options: &Options,
+        finish: &Finish<'_>,
+        out: &mut Decoded,
+    ) {
         // 1. Linear light (S1), and where it comes from the projector.
         self.condition(plan, shot);
         let light = self.light.each_ref().map(Vec::as_slice);
@@ -98,7 +106,7 @@ impl Best {
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
-        self.write(out);
+        self.write(finish, out);
     }
 
     fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
@@ -120,13 +128,14 @@ impl Best {
         });
     }
 
-    fn write(&self, out: &mut Decoded) {
+    fn write(&self, finish: &Finish<'_>, out: &mut Decoded) {
         let width = self.shape[1];
-        out.rows().enumerate().for_each(|(y, [phase, modulation, quality])| {
+        out.rows().enumerate().for_each(|(y, mut row)| {
             let at = y * width..(y + 1) * width;
-            phase.copy_from_slice(&self.judge.phase[at.clone()]);
-            modulation.copy_from_slice(&self.modulation[at.clone()]);
-            quality.copy_from_slice(&self.judge.quality[at]);
+            row.phase.copy_from_slice(&self.judge.phase[at.clone()]);
+            row.modulation.copy_from_slice(&self.modulation[at.clone()]);
+            row.quality.copy_from_slice(&self.judge.quality[at]);
+            finish.row(y, &mut row);
         });
     }
 }
