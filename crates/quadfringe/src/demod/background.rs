@@ -77,10 +77,10 @@ pub(crate) fn background_row<'a>(
     scratch: &'a mut Scratch,
 ) -> &'a [f32] {
     let Scratch { sums, envelope, mean } = scratch;
-    if kind == Background::MeanEnvelope {
-        if let Some(drawn) = mean_envelope(row, period_px, sums, envelope) {
-            return drawn;
-        }
+    if kind == Background::MeanEnvelope
+        && let Some(drawn) = mean_envelope(row, period_px, sums, envelope)
+    {
+        return drawn;
     }
     mean.resize(row.len());
     moving_mean(row, period_px, sums, mean);

@@ -126,10 +126,10 @@ impl Knots {
             if last_upper != Some(upper) {
                 self.at_px.push(at_px);
                 self.value.push(value);
-            } else if let (Some(last_px), Some(last)) = (self.at_px.last_mut(), self.value.last_mut()) {
-                if (value > *last) == upper {
-                    (*last_px, *last) = (at_px, value);
-                }
+            } else if let (Some(last_px), Some(last)) = (self.at_px.last_mut(), self.value.last_mut())
+                && (value > *last) == upper
+            {
+                (*last_px, *last) = (at_px, value);
             }
             last_upper = Some(upper);
         }
