@@ -117,7 +117,7 @@ impl Finish<'_> {
 }
 
 /// No light comes from beside the projector's image, of which a column on each side is noise.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2"))]
 fn columns_and_orders(per_rad: f32, end: f32, phase: &mut [f32], column: &mut [f32], order: &mut [f32]) {
     for ((phase, column), order) in phase.iter_mut().zip(column).zip(order) {
         let found = *phase * per_rad;

@@ -77,14 +77,15 @@ pub(crate) fn background_row<'a>(
     scratch: &'a mut Scratch,
 ) -> &'a [f32] {
     let Scratch { sums, envelope, mean } = scratch;
-    if kind == Background::MeanEnvelope
-        && let Some(drawn) = mean_envelope(row, period_px, sums, envelope)
-    {
-        return drawn;
-    }
-    mean.resize(row.len());
-    moving_mean(row, period_px, sums, mean);
-    mean
+    let drawn = match kind {
+        Background::MeanEnvelope => mean_envelope(row, period_px, sums, envelope),
+        Background::MovingMean => None,
+    };
+    drawn.unwrap_or_else(|| {
+        mean.resize(row.len());
+        moving_mean(row, period_px, sums, mean);
+        mean
+    })
 }
 
 #[cfg(test)]

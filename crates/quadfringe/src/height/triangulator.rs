@@ -132,7 +132,7 @@ impl Triangulator {
 }
 
 /// A row of points, a block of pixels at a time.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2"))]
 fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut [f32]) {
     let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
     for (index, (columns, xyz)) in blocks.enumerate() {

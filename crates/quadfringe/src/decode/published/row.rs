@@ -46,7 +46,7 @@ pub(super) struct Rows {
 
 /// Row `y` of a shot from bytes to phase, modulation and quality. Without fused multiplication: every number comes out
 /// the same for vectors of any width.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+#[multiversion(targets("x86_64+avx2"))]
 pub(super) fn decode_row<T: Sample>(
     rows: &mut Rows,
     plan: &RowPlan<'_>,

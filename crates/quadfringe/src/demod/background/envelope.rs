@@ -122,15 +122,16 @@ impl Knots {
         let mut last_upper = None;
         for (wave, upper) in waves.whole().filter(|(wave, _)| wave.len() > shortest) {
             let (at, value) = top(smooth, waves.extremum(smooth, wave, upper), upper);
-            let at_px = (at + 0.5) * step - 0.5;
-            if last_upper != Some(upper) {
-                self.at_px.push(at_px);
-                self.value.push(value);
-            } else if let (Some(last_px), Some(last)) = (self.at_px.last_mut(), self.value.last_mut())
-                && (value > *last) == upper
-            {
-                (*last_px, *last) = (at_px, value);
+            if last_upper == Some(upper) {
+                if (value > self.value[self.value.len() - 1]) != upper {
+                    continue;
+                }
+                // A half wave between them was noise: of two extrema on one side the further one counts.
+                self.at_px.pop();
+                self.value.pop();
             }
+            self.at_px.push((at + 0.5) * step - 0.5);
+            self.value.push(value);
             last_upper = Some(upper);
         }
     }
