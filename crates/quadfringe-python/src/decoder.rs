@@ -2,7 +2,8 @@
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, value_error, views};
 use crate::device::{Device, unknown};
-use numpy::IntoPyArray;
+use crate::memory::Memory;
+use ndarray::{Ix2, Ix3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -10,7 +11,7 @@ use quadfringe::condition::Sample;
 use quadfringe::height::Triangulator;
 use quadfringe::{BayerPattern, Conditioner, Decoded, FringeCode, Method, Options, Response, Shot};
 use rayon::{ThreadPool, ThreadPoolBuilder};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Decodes shots of one size; planned and checked when made.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -18,6 +19,9 @@ pub struct Decoder {
     kernel: Mutex<quadfringe::Decoder>,
     pool: Option<ThreadPool>,
     full_scale: Option<f32>,
+    shape: [usize; 2],
+    calibrated: bool,
+    memory: Arc<Memory>,
 }
 
 #[pymethods]
@@ -67,6 +71,9 @@ impl Decoder {
             kernel: Mutex::new(kernel.map_err(value_error)?),
             pool: threads.map(pool_of).transpose()?,
             full_scale,
+            shape,
+            calibrated: camera.is_some() && projector.is_some(),
+            memory: Arc::default(),
         })
     }
 
@@ -96,7 +103,7 @@ impl Decoder {
             Images::U16(four) => self.run(py, views(four), Shot::new),
             Images::F32(four) => self.run(py, views(four), Shot::new),
         }?;
-        maps_by_name(py, decoded)
+        self.maps_by_name(py, decoded)
     }
 
     /// The same from the raw mosaic of a Bayer chip and an infrared image.
@@ -113,7 +120,7 @@ impl Decoder {
             Images::U16(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
             Images::F32(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
         }?;
-        maps_by_name(py, decoded)
+        self.maps_by_name(py, decoded)
     }
 }
 
@@ -126,14 +133,43 @@ impl Decoder {
     ) -> PyResult<Decoded> {
         let work = || {
             let shot = scaled(shot(images)?, self.full_scale)?;
+            let mut maps = self.maps();
             // A panic in an earlier shot leaves nothing behind that the next one does not write again.
-            self.kernel.lock().unwrap_or_else(PoisonError::into_inner).decode(&shot)
+            let mut kernel = self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
+            kernel.decode_into(&shot, &mut maps).map(|()| maps)
         };
         let decoded = py.detach(|| match &self.pool {
             Some(pool) => pool.install(work),
             None => work(),
         });
         decoded.map_err(value_error)
+    }
+
+    /// Maps for the kernel to fill.
+    fn maps(&self) -> Decoded {
+        let [rows, columns] = self.shape;
+        let map = || self.memory.take(Ix2(rows, columns));
+        Decoded {
+            phase_rad: map(),
+            column_px: map(),
+            order: map(),
+            modulation: map(),
+            quality: map(),
+            xyz_mm: self.calibrated.then(|| self.memory.take(Ix3(rows, columns, 3))),
+        }
+    }
+
+    fn maps_by_name<'py>(&self, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
+        let named = PyDict::new(py);
+        named.set_item("phase_rad", self.memory.lend(py, decoded.phase_rad)?)?;
+        named.set_item("column_px", self.memory.lend(py, decoded.column_px)?)?;
+        named.set_item("order", self.memory.lend(py, decoded.order)?)?;
+        named.set_item("modulation", self.memory.lend(py, decoded.modulation)?)?;
+        named.set_item("quality", self.memory.lend(py, decoded.quality)?)?;
+        if let Some(xyz_mm) = decoded.xyz_mm {
+            named.set_item("xyz_mm", self.memory.lend(py, xyz_mm)?)?;
+        }
+        Ok(named)
     }
 }
 
@@ -143,19 +179,6 @@ pub fn scaled<T: Sample>(shot: Shot<'_, T>, full_scale: Option<f32>) -> quadfrin
         Some(full_scale) => shot.with_full_scale(full_scale),
         None => Ok(shot),
     }
-}
-
-fn maps_by_name(py: Python<'_>, decoded: Decoded) -> PyResult<Bound<'_, PyDict>> {
-    let named = PyDict::new(py);
-    named.set_item("phase_rad", decoded.phase_rad.into_pyarray(py))?;
-    named.set_item("column_px", decoded.column_px.into_pyarray(py))?;
-    named.set_item("order", decoded.order.into_pyarray(py))?;
-    named.set_item("modulation", decoded.modulation.into_pyarray(py))?;
-    named.set_item("quality", decoded.quality.into_pyarray(py))?;
-    if let Some(xyz_mm) = decoded.xyz_mm {
-        named.set_item("xyz_mm", xyz_mm.into_pyarray(py))?;
-    }
-    Ok(named)
 }
 
 /// What is known about the intensities; what is absent is ideal.

@@ -4,6 +4,7 @@ mod arrays;
 mod bench;
 mod decoder;
 mod device;
+mod memory;
 mod stages;
 
 use pyo3::prelude::*;

@@ -1,8 +1,10 @@
 //! Times of the whole of both methods and of each stage, on one shot of the virtual bench: 1024 x 768, 8 bit, 3 % noise.
+//! Beside them the floor: what no Fourier decoder does without. The ratios to it are taken in turns and printed at the
+//! end, so that they hold on a busy machine too.
 //!
 //! ```text
 //! cargo bench -p quadfringe                      everything
-//! cargo bench -p quadfringe -- shot              whole shots only
+//! cargo bench -p quadfringe -- shot              whole shots and ratios only
 //! RAYON_NUM_THREADS=1 cargo bench -p quadfringe  one thread
 //! ```
 
@@ -13,9 +15,14 @@ use quadfringe::demod::{self, Background, Band};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
 use quadfringe::{
-    BayerPattern, Conditioner, Decoder, FringeCode, Method, Options, Result, Shot, surface, unwrap,
+    BayerPattern, Conditioner, Decoded, Decoder, FringeCode, Method, Options, Result, Shot, surface, unwrap,
 };
+use rayon::ThreadPoolBuilder;
+use rayon::prelude::*;
+use realfft::{ComplexToReal, RealFftPlanner, RealToComplex};
 use std::hint::black_box;
+use std::sync::Arc;
+use std::time::Instant;
 
 /// Fringe period of the reference bench in camera pixels.
 const PERIOD_PX: f64 = 25.6;
@@ -54,6 +61,109 @@ impl Scene {
         let decoder = Decoder::new(self.code.clone(), self.shape(), &Conditioner::default(), options)?;
         decoder.triangulate_with(self.triangulator()?)
     }
+}
+
+/// What no Fourier decoder does without: every row of two channels forward and back through the transform, every byte of
+/// a shot read and every byte of its maps written once.
+struct Floor {
+    forward: Arc<dyn RealToComplex<f32>>,
+    inverse: Arc<dyn ComplexToReal<f32>>,
+}
+
+impl Floor {
+    fn new(width: usize) -> Self {
+        let mut planner = RealFftPlanner::new();
+        Self { forward: planner.plan_fft_forward(width), inverse: planner.plan_fft_inverse(width) }
+    }
+
+    fn run(&self, planes: &[Array2<u8>; 4], out: &mut Decoded) {
+        let width = planes[0].ncols();
+        let maps = [&mut out.phase_rad, &mut out.column_px, &mut out.order, &mut out.modulation];
+        let [green, infrared, red, blue] = maps.map(|map| rows_of(map.as_slice_mut(), width));
+        let quality = rows_of(out.quality.as_slice_mut(), width);
+        let xyz = rows_of(out.xyz_mm.as_mut().and_then(|xyz| xyz.as_slice_mut()), 3 * width);
+        let rows = green.zip(infrared).zip(red.zip(blue)).zip(quality.zip(xyz)).enumerate().with_min_len(8);
+        rows.for_each_init(
+            || (self.forward.make_input_vec(), self.forward.make_output_vec(), self.scratch()),
+            |(row, spectrum, scratch), (y, (((green, infrared), (red, blue)), (quality, xyz)))| {
+                let seen = planes.each_ref().map(|plane| plane.row(y).to_slice().expect("whole rows"));
+                for (raw, out) in [(seen[1], &mut *green), (seen[3], &mut *infrared)] {
+                    copy(raw, row);
+                    self.forward.process_with_scratch(row, spectrum, scratch).expect("planned lengths");
+                    self.inverse.process_with_scratch(spectrum, row, scratch).expect("planned lengths");
+                    out.copy_from_slice(row);
+                }
+                copy(seen[0], red);
+                copy(seen[2], blue);
+                quality.copy_from_slice(red);
+                xyz.chunks_exact_mut(width)
+                    .zip([green, infrared, blue])
+                    .for_each(|(x, y)| x.copy_from_slice(y));
+            },
+        );
+    }
+
+    fn scratch(&self) -> Vec<realfft::num_complex::Complex32> {
+        let length = self.forward.get_scratch_len().max(self.inverse.get_scratch_len());
+        vec![Default::default(); length]
+    }
+}
+
+fn rows_of(map: Option<&mut [f32]>, width: usize) -> rayon::slice::ChunksExactMut<'_, f32> {
+    map.expect("maps in standard layout").par_chunks_exact_mut(width)
+}
+
+fn copy(raw: &[u8], out: &mut [f32]) {
+    raw.iter().zip(out).for_each(|(raw, out)| *out = f32::from(*raw));
+}
+
+fn floor(c: &mut Criterion) {
+    let scene = Scene::new().expect("the reference bench renders");
+    let (floor, mut out) = (Floor::new(scene.shape()[1]), Decoded::new(scene.shape(), true));
+    let mut group = c.benchmark_group("floor");
+    group.sample_size(30);
+    group
+        .bench_function("transforms and bytes", |b| b.iter(|| floor.run(black_box(&scene.planes), &mut out)));
+    group.finish();
+}
+
+/// Each method against the floor and against itself on one thread: the least of many turns.
+fn ratios(_: &mut Criterion) {
+    const TURNS: usize = 40;
+    let scene = Scene::new().expect("the reference bench renders");
+    let shot = scene.shot().expect("four images of one size");
+    let floor = Floor::new(scene.shape()[1]);
+    let mut out = Decoded::new(scene.shape(), true);
+    let pools = [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
+    for method in [Method::Published, Method::Best] {
+        let mut decoder = scene.decoder(method).expect("the reference bench is calibrated");
+        let mut least = [[f64::INFINITY; 2]; 2];
+        for _ in 0..TURNS {
+            for (pool, least) in pools.iter().zip(&mut least) {
+                let decoded = pool.install(|| decoder.decode_into(&shot, &mut out));
+                decoded.expect("a shot of the decoder's size");
+                least[0] = least[0].min(milliseconds(|| {
+                    pool.install(|| decoder.decode_into(&shot, &mut out)).expect("as before");
+                }));
+                pool.install(|| floor.run(&scene.planes, &mut out));
+                least[1] = least[1].min(milliseconds(|| pool.install(|| floor.run(&scene.planes, &mut out))));
+            }
+        }
+        let [[one, floor_one], [two, floor_two]] = least;
+        println!(
+            "{method:?}: {one:.2} ms on one thread, {:.2} times the floor; {two:.2} ms on two, {:.2} times the floor; \
+             one to two threads {:.2} times",
+            one / floor_one,
+            two / floor_two,
+            one / two
+        );
+    }
+}
+
+fn milliseconds(work: impl FnOnce()) -> f64 {
+    let start = Instant::now();
+    work();
+    1e3 * start.elapsed().as_secs_f64()
 }
 
 /// From bytes to phase, order, quality and X, Y, Z, into maps made before.
@@ -105,5 +215,5 @@ fn stages(c: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, whole_shots, stages);
+criterion_group!(benches, whole_shots, floor, stages, ratios);
 criterion_main!(benches);

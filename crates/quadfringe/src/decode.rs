@@ -20,6 +20,7 @@ use crate::condition::{Plan, Sample};
 use crate::height::Triangulator;
 use crate::{Conditioner, Error, FringeCode, Result, Shot};
 use best::Best;
+use output::Finish;
 use published::Published;
 
 /// Which way a shot is decoded.
@@ -164,11 +165,11 @@ impl Decoder {
         }
         out.check(self.shape, self.triangulator.is_some())?;
         self.plan.prepare(shot);
+        let finish = Finish { code: &self.code, triangulator: self.triangulator.as_ref() };
         match &mut self.engine {
-            Engine::Published(engine) => engine.run(&self.plan, shot, &self.options, out),
-            Engine::Best(engine) => engine.run(&self.plan, shot, &self.options, out),
+            Engine::Published(engine) => engine.run(&self.plan, shot, &self.options, &finish, out),
+            Engine::Best(engine) => engine.run(&self.plan, shot, &self.options, &finish, out),
         }
-        out.finish(&self.code, self.triangulator.as_ref());
         Ok(())
     }
 }

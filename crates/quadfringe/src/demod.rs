@@ -1,5 +1,6 @@
 //! Planes -> wrapped phase: background, two-step (TPS), Fourier (FTP), N-step, and the local fit of all channels.
 
+mod aligned;
 mod background;
 pub(crate) mod backgrounds;
 mod carrier;
@@ -15,6 +16,7 @@ pub(crate) mod slopes;
 mod two_step;
 pub(crate) mod window;
 
+pub(crate) use aligned::Aligned;
 pub use background::{Background, background};
 pub(crate) use background::{Scratch as BackgroundScratch, background_row};
 pub(crate) use carrier::LineSpectrum;

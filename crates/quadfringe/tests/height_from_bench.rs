@@ -83,6 +83,47 @@ fn triangulation_is_exact_over_depth_with_both_distortions() {
     assert!(worst > 0.0 && worst < 1e-3, "{worst} mm");
 }
 
+/// Depth in mm at which the projector sees the ray of a camera pixel in `column`, by secants in double precision.
+fn depth_mm(bench: &Bench, pixel: [f64; 2], column: f32) -> f64 {
+    let ray = bench.camera.ray(pixel);
+    let miss = |z_mm: f64| bench.visible.project(ray.at(z_mm)).expect("in front")[0] - f64::from(column);
+    let (mut before, mut now) = (790.0, 810.0);
+    for _ in 0..20 {
+        let slope = (miss(now) - miss(before)) / (now - before);
+        if slope == 0.0 || !slope.is_finite() {
+            break;
+        }
+        (before, now) = (now, now - miss(now) / slope);
+    }
+    now
+}
+
+#[test]
+fn single_precision_stays_within_a_micrometre_of_double() {
+    let plain = Bench::reference();
+    let mut bent = Bench::reference();
+    bent.camera = bent.camera.with_distortion([-0.25, 0.1, 1e-3, -2e-3, 0.02]).expect("valid");
+    bent.visible = bent.visible.with_distortion([-0.2, 0.1, 2e-3, 1e-3, -0.03]).expect("valid");
+    for bench in [plain, bent] {
+        let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("beside the camera");
+        let (height, width) = triangulator.shape();
+        let mut xyz = vec![0.0; 3 * width];
+        let mut worst_mm = 0f64;
+        for (row, z_mm) in (0..height).step_by(64).zip((650..=950).step_by(25)) {
+            let pixel = |x: usize| [x as f64, row as f64];
+            let column = |x: usize| bench.visible.project(bench.camera.ray(pixel(x)).at(f64::from(z_mm)));
+            let columns: Vec<f32> = (0..width).map(|x| column(x).expect("in front")[0] as f32).collect();
+            triangulator.xyz_row(row, &columns, &mut xyz);
+            for (x, found) in xyz.chunks_exact(3).enumerate().step_by(7) {
+                let expected = bench.camera.ray(pixel(x)).at(depth_mm(&bench, pixel(x), columns[x]));
+                let miss = (0..3).map(|i| (f64::from(found[i]) - expected[i]).abs());
+                worst_mm = miss.fold(worst_mm, f64::max);
+            }
+        }
+        assert!(worst_mm > 0.0 && worst_mm < 1e-3, "{worst_mm} mm");
+    }
+}
+
 #[test]
 fn triangulation_refuses_pairs_without_depth() {
     let bench = crossed_axes_bench(800.0, 230.0);

@@ -33,7 +33,7 @@ impl Linear {
         }
         self.full_scale = full_scale;
         for c in 0..4 {
-            let linear = |level: usize| self.linear(c, level as f32 / full_scale);
+            let linear = |level: usize| self.linear(c, level as f32 * (1.0 / full_scale));
             self.tables[c] = (0..T::LEVELS).map(linear).collect();
         }
         self.tables_for = Some((T::LEVELS, full_scale));
@@ -44,10 +44,16 @@ impl Linear {
     }
 
     /// A row of channel `c`.
-    #[inline]
+    #[inline(always)]
     pub fn row<T: Sample>(&self, c: usize, row: &[T], out: &mut [f32]) {
-        let table = &self.tables[c][..T::LEVELS];
-        for (value, &raw) in out.iter_mut().zip(row) {
+        let (table, scale) = (&self.tables[c][..T::LEVELS], 1.0 / self.full_scale);
+        let pixels = out.iter_mut().zip(row);
+        if self.response[c] == Response::default() {
+            // Arithmetic runs on vectors, which a table does not.
+            let dark = self.dark[c];
+            return pixels.for_each(|(value, raw)| *value = raw.intensity() * scale - dark);
+        }
+        for (value, &raw) in pixels {
             *value = self.value(c, table, raw);
         }
     }
@@ -70,7 +76,7 @@ impl Linear {
     fn value<T: Sample>(&self, c: usize, table: &[f32], raw: T) -> f32 {
         match raw.level() {
             Some(level) => table[level],
-            None => self.linear(c, raw.intensity() / self.full_scale),
+            None => self.linear(c, raw.intensity() * (1.0 / self.full_scale)),
         }
     }
 }

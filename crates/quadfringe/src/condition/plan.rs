@@ -46,7 +46,7 @@ impl Plan {
     }
 
     /// One row of the shot as four rows of linear light.
-    #[inline]
+    #[inline(always)]
     pub fn row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [&mut [f32]; 4]) {
         let [red, green, blue, infrared] = out;
         match &shot.images {

@@ -2,6 +2,7 @@
 
 use super::judge::{Findings, Judge, MISFIT_MAX};
 use super::orders::{Orders, Wrapped};
+use super::output::Finish;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::backgrounds::Backgrounds;
@@ -62,7 +63,14 @@ impl Best {
         }
     }
 
-    pub fn run<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>, options: &Options, out: &mut Decoded) {
+    pub fn run<T: Sample>(
+        &mut self,
+        plan: &Plan,
+        shot: &Shot<'_, T>,
+        options: &Options,
+        finish: &Finish<'_>,
+        out: &mut Decoded,
+    ) {
         // 1. Linear light (S1), and where it comes from the projector.
         self.condition(plan, shot);
         let light = self.light.each_ref().map(Vec::as_slice);
@@ -119,7 +127,7 @@ impl Best {
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
-        self.write(&grid, out);
+        self.write(&grid, finish, out);
     }
 
     /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
@@ -148,16 +156,16 @@ impl Best {
         );
     }
 
-    fn write(&self, grid: &Grid, out: &mut Decoded) {
-        out.rows().enumerate().for_each(|(y, [phase, modulation, quality])| {
+    fn write(&self, grid: &Grid, finish: &Finish<'_>, out: &mut Decoded) {
+        out.rows().enumerate().for_each(|(y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
-            for ((out, sure), own) in
-                phase.iter_mut().zip(&self.judge.sure[at.clone()]).zip(&self.phase[at.clone()])
-            {
+            let known = self.judge.sure[at.clone()].iter().zip(&self.phase[at.clone()]);
+            for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
                 *out = if *sure != 0 { *own } else { f32::NAN };
             }
-            modulation.copy_from_slice(&self.modulation[at.clone()]);
-            quality.copy_from_slice(&self.judge.quality[at]);
+            row.modulation.copy_from_slice(&self.modulation[at.clone()]);
+            row.quality.copy_from_slice(&self.judge.quality[at]);
+            finish.row(y, &mut row);
         });
     }
 }

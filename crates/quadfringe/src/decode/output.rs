@@ -3,6 +3,7 @@
 use crate::angle::floor;
 use crate::height::Triangulator;
 use crate::{Error, FringeCode, Result};
+use multiversion::multiversion;
 use ndarray::{Array2, Array3};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -55,48 +56,74 @@ impl Decoded {
         }
     }
 
-    /// Rows of phase, modulation and quality, for an engine to fill.
-    pub(super) fn rows(&mut self) -> impl IndexedParallelIterator<Item = [&mut [f32]; 3]> {
+    /// All maps row by row, for an engine to fill.
+    pub(super) fn rows(&mut self) -> impl IndexedParallelIterator<Item = OutputRow<'_>> {
         let width = self.phase_rad.ncols();
-        let phase = self.phase_rad.as_slice_mut().expect("checked layout");
-        let modulation = self.modulation.as_slice_mut().expect("checked layout");
-        let quality = self.quality.as_slice_mut().expect("checked layout");
-        phase
-            .par_chunks_mut(width)
-            .zip(modulation.par_chunks_mut(width))
-            .zip(quality.par_chunks_mut(width))
-            .map(|((p, m), q)| [p, m, q])
+        let maps = [
+            &mut self.phase_rad,
+            &mut self.column_px,
+            &mut self.order,
+            &mut self.modulation,
+            &mut self.quality,
+        ];
+        let mut maps = maps.map(|map| map.as_slice_mut().expect("checked layout").chunks_exact_mut(width));
+        let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("checked layout"));
+        let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
+        let mut next = || {
+            let [phase, column, order, modulation, quality] = maps.each_mut().map(Iterator::next);
+            Some(OutputRow {
+                phase: phase?,
+                column: column?,
+                order: order?,
+                modulation: modulation?,
+                quality: quality?,
+                xyz: xyz.as_mut().and_then(Iterator::next),
+            })
+        };
+        let rows: Vec<_> = std::iter::from_fn(&mut next).collect();
+        rows.into_par_iter().with_min_len(ROWS_AT_ONCE)
     }
+}
 
-    /// Columns, orders and points from the phase.
-    pub(super) fn finish(&mut self, code: &FringeCode, triangulator: Option<&Triangulator>) {
-        let width = self.phase_rad.ncols();
-        let per_rad = code.period_px(0) as f32 / TAU;
-        let field = -1.5..code.projector_width() as f32 + 0.5;
-        let phase = self.phase_rad.as_slice_mut().expect("checked layout");
-        let column = self.column_px.as_slice_mut().expect("checked layout");
-        let order = self.order.as_slice_mut().expect("checked layout");
-        column
-            .par_chunks_mut(width)
-            .zip(order.par_chunks_mut(width))
-            .zip(phase.par_chunks_mut(width))
-            .for_each(|((column, order), phase)| {
-                for ((column, order), phase) in column.iter_mut().zip(order).zip(phase) {
-                    // No light comes from beside the projector's image; a column on each side is noise.
-                    if !field.contains(&(*phase * per_rad)) {
-                        *phase = f32::NAN;
-                    }
-                    *column = *phase * per_rad;
-                    *order = floor(*phase / TAU);
-                }
-            });
-        if let (Some(triangulator), Some(xyz)) = (triangulator, &mut self.xyz_mm) {
-            let column = self.column_px.as_slice().expect("checked layout");
-            let xyz = xyz.as_slice_mut().expect("checked layout");
-            xyz.par_chunks_mut(3 * width)
-                .zip(column.par_chunks(width))
-                .enumerate()
-                .for_each(|(row, (xyz, column))| triangulator.xyz_row(row, column, xyz));
+/// Fewest rows that a thread takes at once.
+const ROWS_AT_ONCE: usize = 8;
+
+/// One row of every map.
+pub(super) struct OutputRow<'a> {
+    pub phase: &'a mut [f32],
+    pub column: &'a mut [f32],
+    pub order: &'a mut [f32],
+    pub modulation: &'a mut [f32],
+    pub quality: &'a mut [f32],
+    pub xyz: Option<&'a mut [f32]>,
+}
+
+/// The last step of either method, row by row: columns, orders and points from the phase.
+pub(super) struct Finish<'a> {
+    pub code: &'a FringeCode,
+    pub triangulator: Option<&'a Triangulator>,
+}
+
+impl Finish<'_> {
+    /// Row `y`, of which phase, modulation and quality are known.
+    pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
+        let per_rad = self.code.period_px(0) as f32 / TAU;
+        let end = self.code.projector_width() as f32 + 0.5;
+        columns_and_orders(per_rad, end, row.phase, row.column, row.order);
+        if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
+            triangulator.xyz_row(y, row.column, xyz);
         }
+    }
+}
+
+/// No light comes from beside the projector's image, of which a column on each side is noise.
+#[multiversion(targets("x86_64+avx2"))]
+fn columns_and_orders(per_rad: f32, end: f32, phase: &mut [f32], column: &mut [f32], order: &mut [f32]) {
+    for ((phase, column), order) in phase.iter_mut().zip(column).zip(order) {
+        let found = *phase * per_rad;
+        let inside = (found >= -1.5) & (found < end);
+        *phase = if inside { *phase } else { f32::NAN };
+        *column = if inside { found } else { f32::NAN };
+        *order = floor(*phase / TAU);
     }
 }

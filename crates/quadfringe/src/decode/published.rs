@@ -2,6 +2,7 @@
 
 mod row;
 
+use super::output::Finish;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::{Band, LineSpectrum, RowFilter};
@@ -9,7 +10,7 @@ use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
 use ndarray::ArrayView1;
 use rayon::prelude::*;
-use row::{RowPlan, Rows};
+use row::{RowPlan, Rows, decode_row};
 
 /// Rows of the red image that are looked at for the carrier.
 const CARRIER_ROWS: usize = 16;
@@ -33,13 +34,21 @@ impl Published {
         }
     }
 
-    pub fn run<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>, options: &Options, out: &mut Decoded) {
+    pub fn run<T: Sample>(
+        &mut self,
+        plan: &Plan,
+        shot: &Shot<'_, T>,
+        options: &Options,
+        finish: &Finish<'_>,
+        out: &mut Decoded,
+    ) {
         let period = match options.period_px {
             Some(period) => period,
             None => self.period_px(plan, shot),
         };
         let periods_px = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
         let row_plan = RowPlan {
+            conditioning: plan,
             ladder: &self.ladder,
             filter: &self.filter,
             periods_px,
@@ -49,9 +58,9 @@ impl Published {
         };
         out.rows().enumerate().for_each_init(
             || Rows::new(&self.filter, self.shape[1]),
-            |rows, (y, out)| {
-                plan.row(shot, y, &mut rows.light_mut());
-                rows.decode(&row_plan, out);
+            |rows, (y, mut out)| {
+                decode_row(rows, &row_plan, shot, y, &mut out);
+                finish.row(y, &mut out);
             },
         );
     }

@@ -2,7 +2,9 @@
 
 mod envelope;
 mod moving_mean;
+mod waves;
 
+use super::Aligned;
 use crate::{Error, Result};
 use envelope::mean_envelope;
 use moving_mean::{Sums, moving_mean};
@@ -44,7 +46,7 @@ pub fn background(image: ArrayView2<'_, f32>, kind: Background, period_px: f64) 
         |scratch, (mut target, row)| {
             let row = row.to_vec();
             let target = target.as_slice_mut().expect("a fresh array is contiguous");
-            background_row(&row, kind, period_px as f32, scratch, target);
+            target.copy_from_slice(background_row(&row, kind, period_px as f32, scratch));
         },
     );
     Ok(out)
@@ -59,26 +61,31 @@ pub(crate) fn check_period(period_px: f64, columns: usize) -> Result<()> {
 }
 
 /// Working memory of [`background_row`].
-#[derive(Debug, Default, Clone)]
+#[derive(Debug, Default)]
 pub(crate) struct Scratch {
     sums: Sums,
     envelope: envelope::Scratch,
+    mean: Aligned<f32>,
 }
 
-/// Background of one row into `out`.
+/// Background of one row.
 #[inline(always)]
-pub(crate) fn background_row(
+pub(crate) fn background_row<'a>(
     row: &[f32],
     kind: Background,
     period_px: f32,
-    scratch: &mut Scratch,
-    out: &mut [f32],
-) {
-    let Scratch { sums, envelope } = scratch;
-    let drawn = kind == Background::MeanEnvelope && mean_envelope(row, period_px, sums, envelope, out);
-    if !drawn {
-        moving_mean(row, period_px, sums, out);
-    }
+    scratch: &'a mut Scratch,
+) -> &'a [f32] {
+    let Scratch { sums, envelope, mean } = scratch;
+    let drawn = match kind {
+        Background::MeanEnvelope => mean_envelope(row, period_px, sums, envelope),
+        Background::MovingMean => None,
+    };
+    drawn.unwrap_or_else(|| {
+        mean.resize(row.len());
+        moving_mean(row, period_px, sums, mean);
+        mean
+    })
 }
 
 #[cfg(test)]

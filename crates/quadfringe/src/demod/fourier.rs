@@ -2,6 +2,7 @@
 
 mod extend;
 
+use super::Aligned;
 use super::background::{Background, background, check_period};
 use crate::angle::atan2;
 use crate::{Error, Result};
@@ -120,10 +121,14 @@ pub(crate) enum Half {
 
 /// Working memory of one thread.
 pub(crate) struct RowScratch {
-    tails: [Vec<f32>; 2],
-    spectrum: Vec<Complex32>,
-    output: Vec<Complex32>,
-    work: Vec<Complex32>,
+    tails: [Aligned<f32>; 2],
+    extend: extend::Scratch,
+    spectrum: Aligned<Complex32>,
+    /// Weighted positive frequencies; zero from `bins` on.
+    positive: Aligned<Complex32>,
+    bins: usize,
+    output: Aligned<Complex32>,
+    work: Aligned<Complex32>,
 }
 
 impl RowFilter {
@@ -153,29 +158,31 @@ impl RowFilter {
     }
 
     pub fn scratch(&self) -> RowScratch {
-        let zeros = |n| vec![Complex32::ZERO; n];
         let length = self.forward.len();
-        let work = (self.forward.get_inplace_scratch_len()).max(self.inverse.get_inplace_scratch_len());
+        let work = (self.forward.get_inplace_scratch_len()).max(self.inverse.get_immutable_scratch_len());
         RowScratch {
-            tails: [vec![0.0; self.fade.len()], vec![0.0; self.fade.len()]],
-            spectrum: zeros(length),
-            output: zeros(length),
-            work: zeros(work),
+            tails: [Aligned::new(self.fade.len()), Aligned::new(self.fade.len())],
+            extend: extend::Scratch::default(),
+            spectrum: Aligned::new(length),
+            positive: Aligned::new(length),
+            bins: 0,
+            output: Aligned::new(length),
+            work: Aligned::new(work),
         }
     }
 
     /// Spectrum of two rows of fringes without background.
     #[inline(always)]
     pub fn transform(&self, rows: [&[f32]; 2], periods_px: [f32; 2], scratch: &mut RowScratch) {
-        let RowScratch { tails, spectrum, work, .. } = scratch;
+        let RowScratch { tails, extend: edges, spectrum, work, .. } = scratch;
         for ((row, period), tail) in rows.iter().zip(periods_px).zip(tails.iter_mut()) {
-            extend(row, period, &self.fade, tail);
+            extend(row, period, &self.fade, edges, tail);
         }
         let (inside, beyond) = spectrum.split_at_mut(self.columns);
         for ((z, re), im) in inside.iter_mut().zip(rows[0]).zip(rows[1]) {
             *z = Complex32::new(*re, *im);
         }
-        for ((z, re), im) in beyond.iter_mut().zip(&tails[0]).zip(&tails[1]) {
+        for ((z, re), im) in beyond.iter_mut().zip(&*tails[0]).zip(&*tails[1]) {
             *z = Complex32::new(*re, *im);
         }
         self.forward.process_with_scratch(spectrum, work);
@@ -184,11 +191,11 @@ impl RowFilter {
     /// Analytic signal of one of the rows last transformed: its positive frequencies, weighted.
     #[inline(always)]
     pub fn analytic<'a>(&self, half: Half, weights: &[f32], scratch: &'a mut RowScratch) -> &'a [Complex32] {
-        let RowScratch { spectrum, output, work, .. } = scratch;
+        let RowScratch { spectrum, positive, bins, output, work, .. } = scratch;
         let mirrored = spectrum.iter().rev();
         // The zero frequency is background.
-        let bins = output.iter_mut().zip(&*spectrum).zip(weights).skip(1).zip(mirrored);
-        for (((out, &up), &w), down) in bins {
+        let weighted = positive.iter_mut().zip(spectrum.iter()).zip(weights).skip(1).zip(mirrored);
+        for (((out, &up), &w), down) in weighted {
             *out = match half {
                 Half::Real => (up + down.conj()) * w,
                 Half::Imaginary => {
@@ -197,9 +204,9 @@ impl RowFilter {
                 }
             };
         }
-        output[0] = Complex32::ZERO;
-        output[weights.len()..].fill(Complex32::ZERO);
-        self.inverse.process_with_scratch(output, work);
+        positive[weights.len()..(*bins).max(weights.len())].fill(Complex32::ZERO);
+        *bins = weights.len();
+        self.inverse.process_immutable_with_scratch(positive, output, work);
         &output[..self.columns]
     }
 }

@@ -84,13 +84,7 @@ impl Triangulator {
         assert!(row < height, "row {row} of an image of {height} rows");
         assert_eq!(columns_px.len(), width, "columns_px must hold one row");
         assert_eq!(out.len(), 3 * width, "out must hold three values for each column");
-        let chunks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
-        for (index, (columns, xyz)) in chunks.enumerate() {
-            let mut x = [0.0; CHUNK];
-            let mut y = [0.0; CHUNK];
-            self.fill_directions(row, index * CHUNK, columns.len(), &mut x, &mut y);
-            self.projector.intersect(columns, &x, &y, xyz);
-        }
+        points(self, row, columns_px, out);
     }
 
     /// Points of a whole column map `(height, width)`, float32 `(height, width, 3)` in mm, NaN for no data; rows in
@@ -115,26 +109,35 @@ impl Triangulator {
         Ok(xyz)
     }
 
-    fn fill_directions(
-        &self,
-        row: usize,
-        first: usize,
-        count: usize,
-        x: &mut [f64; CHUNK],
-        y: &mut [f64; CHUNK],
-    ) {
+    /// Normalised `x, y` of the pixels of a row from `first` on.
+    #[inline(always)]
+    fn directions(&self, row: usize, first: usize, count: usize) -> [[f32; CHUNK]; 2] {
+        let (mut x, mut y) = ([0.0; CHUNK], [0.0; CHUNK]);
         if let Some(table) = &self.directions {
-            for i in 0..count {
-                [x[i], y[i]] = table[[row, first + i]].map(f64::from);
+            let table = table.row(row).to_slice().expect("the table is in standard layout");
+            for ((x, y), entry) in x.iter_mut().zip(&mut y).zip(&table[first..first + count]) {
+                [*x, *y] = *entry;
             }
-            return;
+            return [x, y];
         }
         let [fx, fy] = self.camera.focal_px;
         let [cx, cy] = self.camera.centre_px;
+        let (from, step) = (((first as f64 - cx) / fx) as f32, (1.0 / fx) as f32);
         for (i, x) in x.iter_mut().enumerate() {
-            *x = ((first + i) as f64 - cx) / fx;
+            *x = from + i as f32 * step;
         }
-        y.fill((row as f64 - cy) / fy);
+        y.fill(((row as f64 - cy) / fy) as f32);
+        [x, y]
+    }
+}
+
+/// A row of points, a block of pixels at a time.
+#[multiversion(targets("x86_64+avx2"))]
+fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut [f32]) {
+    let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
+    for (index, (columns, xyz)) in blocks.enumerate() {
+        let directions = triangulator.directions(row, index * CHUNK, columns.len());
+        triangulator.projector.intersect(columns, &directions, xyz);
     }
 }
 
@@ -151,12 +154,12 @@ fn directions_of(camera: &Device) -> Array2<[f32; 2]> {
 /// The sheets of light of a projector's columns, as the camera meets them.
 #[derive(Debug, Clone)]
 struct ColumnSheets {
-    rotation: [[f64; 3]; 3],
+    rotation: [[f32; 3]; 3],
     /// Camera centre in projector coordinates, mm.
-    centre: [f64; 3],
-    focal_px: f64,
-    centre_px: f64,
-    distortion: Option<[f64; 5]>,
+    centre: [f32; 3],
+    focal_px: f32,
+    centre_px: f32,
+    distortion: Option<[f32; 5]>,
 }
 
 impl ColumnSheets {
@@ -171,37 +174,41 @@ impl ColumnSheets {
             return Err(Error::value("pose of the projector", expected, actual));
         }
         Ok(Self {
-            rotation: projector.rotation,
-            centre: a,
-            focal_px: projector.focal_px[0],
-            centre_px: projector.centre_px[0],
-            distortion: projector.is_distorted().then_some(projector.distortion),
+            rotation: projector.rotation.map(|row| row.map(|v| v as f32)),
+            centre: a.map(|v| v as f32),
+            focal_px: projector.focal_px[0] as f32,
+            centre_px: projector.centre_px[0] as f32,
+            distortion: projector.is_distorted().then(|| projector.distortion.map(|v| v as f32)),
         })
     }
 
-    /// Points where rays `(x, y, 1)` meet the sheets of `columns`, written as X, Y, Z.
-    fn intersect(&self, columns: &[f32], x: &[f64; CHUNK], y: &[f64; CHUNK], xyz: &mut [f32]) {
-        let mut k = [f64::NAN; CHUNK];
+    /// Points where rays `(x, y, 1)` meet the sheets of `columns`, written as X, Y, Z; NaN behind the camera.
+    #[inline(always)]
+    fn intersect(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], xyz: &mut [f32]) {
+        let mut k = [f32::NAN; CHUNK];
+        let scale = 1.0 / self.focal_px;
         for (k, u) in k.iter_mut().zip(columns) {
-            *k = (f64::from(*u) - self.centre_px) / self.focal_px;
+            *k = (u - self.centre_px) * scale;
         }
         if let Some(distortion) = &self.distortion {
             for (k, (x, y)) in k.iter_mut().zip(x.iter().zip(y)) {
                 *k = self.ideal_coordinate(distortion, *k, *x, *y);
             }
         }
+        let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
         let mut depth = [0.0; CHUNK];
-        let [r0, _, r2] = self.rotation;
-        depths([r0, r2], [self.centre[0], self.centre[2]], &k, x, y, &mut depth);
-        for (point, (t, (x, y))) in xyz.chunks_exact_mut(3).zip(depth.iter().zip(x.iter().zip(y))) {
-            point[0] = (t * x) as f32;
-            point[1] = (t * y) as f32;
-            point[2] = *t as f32;
+        for i in 0..CHUNK {
+            let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
+            let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
+            let t = (k[i] * a2 - a0) / (b0 - k[i] * b2);
+            depth[i] = if (t > 0.0) & (t < f32::INFINITY) { t } else { f32::NAN };
         }
+        write_points(&depth, x, y, xyz);
     }
 
     /// Ideal normalised column where the projector's image of the ray `(x, y, 1)` has the distorted column `measured`.
-    fn ideal_coordinate(&self, distortion: &[f64; 5], measured: f64, x: f64, y: f64) -> f64 {
+    #[inline(always)]
+    fn ideal_coordinate(&self, distortion: &[f32; 5], measured: f32, x: f32, y: f32) -> f32 {
         let [k1, k2, p1, p2, k3] = *distortion;
         let b = self.rotation.map(|r| r[0] * x + r[1] * y + r[2]);
         let a = self.centre;
@@ -224,20 +231,21 @@ impl ColumnSheets {
     }
 }
 
-/// Depth along each ray `(x, y, 1)` of the sheet with ideal column `k`; NaN behind the camera.
-#[multiversion(targets("x86_64+avx2"))]
-fn depths(
-    [r0, r2]: [[f64; 3]; 2],
-    [a0, a2]: [f64; 2],
-    k: &[f64; CHUNK],
-    x: &[f64; CHUNK],
-    y: &[f64; CHUNK],
-    depth: &mut [f64; CHUNK],
-) {
-    for i in 0..CHUNK {
-        let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
-        let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
-        let t = (k[i] * a2 - a0) / (b0 - k[i] * b2);
-        depth[i] = if t > 0.0 && t < f64::INFINITY { t } else { f64::NAN };
+/// `t x, t y, t` pixel by pixel, in blocks that vectors can shuffle.
+#[inline(always)]
+fn write_points(depth: &[f32; CHUNK], x: &[f32; CHUNK], y: &[f32; CHUNK], xyz: &mut [f32]) {
+    const BLOCK: usize = 8;
+    for (block, points) in xyz.chunks_mut(3 * BLOCK).enumerate() {
+        let mut shuffled = [0.0; 3 * BLOCK];
+        for i in 0..BLOCK {
+            let at = BLOCK * block + i;
+            shuffled[3 * i] = depth[at] * x[at];
+            shuffled[3 * i + 1] = depth[at] * y[at];
+            shuffled[3 * i + 2] = depth[at];
+        }
+        match points.first_chunk_mut() {
+            Some(whole) => *whole = shuffled,
+            None => points.copy_from_slice(&shuffled[..points.len()]),
+        }
     }
 }

@@ -1,59 +1,75 @@
 //! Half the sum of the envelopes through the fringe maxima and the fringe minima.
 
 use super::moving_mean::{Sums, moving_mean};
+use super::waves::Waves;
+use crate::demod::Aligned;
 
 /// Fewest samples a fringe is looked at with: an extremum lies between them on a parabola.
 const SAMPLES_PER_FRINGE: f32 = 8.0;
 /// Share of a fringe that is averaged over so that noise adds no extrema, and that a half wave must exceed.
 const SMOOTH: f32 = 0.2;
 
+/// Pixels drawn at once: mostly all from one extremum to the next.
+const BLOCK: usize = 16;
+
 /// Working memory of [`mean_envelope`].
-#[derive(Debug, Default, Clone)]
+#[derive(Debug, Default)]
 pub(super) struct Scratch {
-    coarse: Vec<f32>,
-    smooth: Vec<f32>,
-    middle: Vec<f32>,
-    crossings: Vec<u32>,
-    knots: Vec<Knot>,
+    coarse: Aligned<f32>,
+    smooth: Aligned<f32>,
+    middle: Aligned<f32>,
+    waves: Waves,
+    knots: Knots,
     levels: Vec<f32>,
+    lines: Vec<Line>,
+    drawn: Aligned<f32>,
 }
 
-/// An extremum; maxima and minima alternate.
-#[derive(Debug, Clone, Copy)]
-struct Knot {
-    at_px: f32,
-    value: f32,
-    upper: bool,
+/// Extrema of a row; maxima and minima alternate.
+#[derive(Debug, Default)]
+struct Knots {
+    at_px: Vec<f32>,
+    value: Vec<f32>,
 }
 
-/// Background of `row` into `out`; false when the row has no fringes to draw envelopes through.
+/// `level + i slope` over the pixels before `end`, from the end of the line before on.
+#[derive(Debug, Default, Clone, Copy)]
+struct Line {
+    level: f32,
+    slope: f32,
+    end: u32,
+}
+
+/// Background of `row`; none when the row has no fringes to draw envelopes through.
 ///
 /// A row is split where it crosses its moving mean; each side of a crossing holds one extremum. They are looked for on
 /// sums of 1, 2, 4, ... pixels, as many as leave a fringe `SAMPLES_PER_FRINGE` samples.
 #[inline(always)]
-pub(super) fn mean_envelope(
+pub(super) fn mean_envelope<'a>(
     row: &[f32],
     period_px: f32,
     sums: &mut Sums,
-    scratch: &mut Scratch,
-    out: &mut [f32],
-) -> bool {
+    scratch: &'a mut Scratch,
+) -> Option<&'a [f32]> {
     let step = coarseness(period_px);
-    coarsen(row, step, &mut scratch.coarse);
     let period = period_px / step as f32;
-    for buffer in [&mut scratch.smooth, &mut scratch.middle] {
-        buffer.resize(scratch.coarse.len(), 0.0);
+    let Scratch { coarse, smooth, middle, waves, knots, levels, lines, drawn } = scratch;
+    coarsen(row, step, coarse, smooth);
+    let count = coarse.len();
+    for buffer in [&mut *smooth, &mut *middle] {
+        buffer.resize(Waves::padded(count));
     }
-    moving_mean(&scratch.coarse, SMOOTH * period, sums, &mut scratch.smooth);
-    moving_mean(&scratch.coarse, period, sums, &mut scratch.middle);
-    find_crossings(&scratch.smooth, &scratch.middle, &mut scratch.crossings);
-    find_knots(scratch, (SMOOTH * period) as usize, step as f32);
-    if scratch.knots.len() < 2 {
-        return false;
+    moving_mean(coarse, SMOOTH * period, sums, &mut smooth[..count]);
+    moving_mean(coarse, period, sums, &mut middle[..count]);
+    waves.find(smooth, middle, count);
+    knots.find(waves, smooth, (SMOOTH * period) as usize, step as f32);
+    if knots.at_px.len() < 2 {
+        return None;
     }
-    find_levels(&scratch.knots, &mut scratch.levels);
-    draw(&scratch.knots, &scratch.levels, out);
-    true
+    find_levels(knots, levels);
+    find_lines(knots, levels, lines);
+    draw(lines, levels, row.len(), drawn);
+    Some(&drawn[..row.len()])
 }
 
 fn coarseness(period_px: f32) -> usize {
@@ -66,124 +82,115 @@ fn coarseness(period_px: f32) -> usize {
 
 /// Means of `step` (a power of two) pixels.
 #[inline(always)]
-fn coarsen(row: &[f32], step: usize, out: &mut Vec<f32>) {
-    out.clear();
-    match step {
-        1 => out.extend_from_slice(row),
-        2 => out.extend(row.chunks_exact(2).map(|v| 0.5 * (v[0] + v[1]))),
-        4 => out.extend(row.chunks_exact(4).map(|v| 0.25 * (v[0] + v[1] + v[2] + v[3]))),
-        _ => out.extend(row.chunks_exact(step).map(|v| v.iter().sum::<f32>() / step as f32)),
+fn coarsen(row: &[f32], step: usize, out: &mut Aligned<f32>, spare: &mut Aligned<f32>) {
+    out.resize(row.len() / step.min(2));
+    if step == 1 {
+        out.copy_from_slice(row);
+        return;
+    }
+    pair_means(row, out);
+    for _ in 1..step.ilog2() {
+        spare.resize(out.len() / 2);
+        pair_means(out, spare);
+        std::mem::swap(out, spare);
     }
 }
 
-/// First samples of the half waves but the first. The place is written every time and kept where there is a crossing:
-/// crossings come too irregularly for a processor to guess.
+/// Means of two samples. Vectors add neighbours in blocks of eight; a plain loop over pairs shuffles every number.
 #[inline(always)]
-fn find_crossings(smooth: &[f32], middle: &[f32], crossings: &mut Vec<u32>) {
-    crossings.resize(smooth.len(), 0);
-    let mut count = 0;
-    let mut before = smooth[0] > middle[0];
-    for (i, (s, m)) in smooth.iter().zip(middle).enumerate() {
-        let above = s > m;
-        crossings[count] = i as u32;
-        count += usize::from(above != before);
-        before = above;
+fn pair_means(row: &[f32], out: &mut [f32]) {
+    const PAIRS: usize = 8;
+    let blocks = row.chunks_exact(2 * PAIRS);
+    let rest = blocks.remainder().chunks_exact(2);
+    let (whole, last) = out.split_at_mut(row.len() / (2 * PAIRS) * PAIRS);
+    for (to, from) in whole.chunks_exact_mut(PAIRS).zip(blocks) {
+        let means: [f32; PAIRS] = std::array::from_fn(|i| 0.5 * (from[2 * i] + from[2 * i + 1]));
+        to.copy_from_slice(&means);
     }
-    crossings.truncate(count);
+    for (to, from) in last.iter_mut().zip(rest) {
+        *to = 0.5 * (from[0] + from[1]);
+    }
 }
 
-/// One extremum for each half wave longer than `shortest`; shorter ones are noise within their neighbours. A half wave
-/// cut by the end of the row has no extremum of its own.
-#[inline(always)]
-fn find_knots(scratch: &mut Scratch, shortest: usize, step: f32) {
-    let Scratch { smooth, middle, crossings, knots, .. } = scratch;
-    knots.clear();
-    for pair in crossings.windows(2) {
-        let (from, to) = (pair[0] as usize, pair[1] as usize);
-        if to - from <= shortest {
-            continue;
-        }
-        let upper = smooth[from] > middle[from];
-        let knot = extremum(smooth, from, to, upper, step);
-        match knots.last_mut() {
-            Some(last) if last.upper == upper => {
-                if (knot.value > last.value) == upper {
-                    *last = knot;
+impl Knots {
+    /// One extremum for each half wave longer than `shortest`; shorter ones are noise within their neighbours. A half
+    /// wave cut by the end of the row has no extremum of its own.
+    #[inline(always)]
+    fn find(&mut self, waves: &Waves, smooth: &[f32], shortest: usize, step: f32) {
+        self.at_px.clear();
+        self.value.clear();
+        let mut last_upper = None;
+        for (wave, upper) in waves.whole().filter(|(wave, _)| wave.len() > shortest) {
+            let (at, value) = top(smooth, waves.extremum(smooth, wave, upper), upper);
+            if last_upper == Some(upper) {
+                if (value > self.value[self.value.len() - 1]) != upper {
+                    continue;
                 }
+                // A half wave between them was noise: of two extrema on one side the further one counts.
+                self.at_px.pop();
+                self.value.pop();
             }
-            _ => knots.push(knot),
+            self.at_px.push((at + 0.5) * step - 0.5);
+            self.value.push(value);
+            last_upper = Some(upper);
         }
     }
 }
 
-/// The greatest (`upper`) or least sample of a half wave, and the top of the parabola through it and its neighbours.
+/// Place and value of the top of the parabola through the greatest (`upper`) or least sample and its neighbours.
 #[inline(always)]
-fn extremum(smooth: &[f32], from: usize, to: usize, upper: bool, step: f32) -> Knot {
-    let sign = if upper { 1.0 } else { -1.0 };
-    let (mut best, mut most) = (from, sign * smooth[from]);
-    for (i, value) in smooth[from..to].iter().enumerate() {
-        let value = sign * value;
-        let better = value > most;
-        best = if better { from + i } else { best };
-        most = if better { value } else { most };
-    }
+fn top(smooth: &[f32], at: usize, upper: bool) -> (f32, f32) {
     // A half wave between two crossings touches neither end of the row.
-    let (left, top, right) = (smooth[best - 1], smooth[best], smooth[best + 1]);
+    let [left, top, right] = smooth[at - 1..=at + 1] else { unreachable!("three samples") };
     let curvature = left - 2.0 * top + right;
-    let bent = curvature * sign < 0.0;
+    let bent = if upper { curvature < 0.0 } else { curvature > 0.0 };
     let shift = if bent { (0.5 * (left - right) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
-    Knot {
-        at_px: (best as f32 + 0.5 + shift) * step - 0.5,
-        value: top - 0.25 * (left - right) * shift,
-        upper,
-    }
+    (at as f32 + shift, top - 0.25 * (left - right) * shift)
 }
 
 /// The background at each knot: half its own envelope and half the other, which is straight between the neighbours.
 #[inline(always)]
-fn find_levels(knots: &[Knot], levels: &mut Vec<f32>) {
-    let end = |own: Knot, other: Knot| 0.5 * (own.value + other.value);
-    levels.clear();
-    levels.push(end(knots[0], knots[1]));
-    levels.extend(knots.windows(3).map(|k| {
-        let along = (k[1].at_px - k[0].at_px) / (k[2].at_px - k[0].at_px);
-        0.5 * (k[1].value + k[0].value + (k[2].value - k[0].value) * along)
-    }));
-    let last = knots.len() - 1;
-    levels.push(end(knots[last], knots[last - 1]));
+fn find_levels(Knots { at_px, value }: &Knots, levels: &mut Vec<f32>) {
+    let last = value.len() - 1;
+    levels.resize(value.len(), 0.0);
+    levels[0] = 0.5 * (value[0] + value[1]);
+    levels[last] = 0.5 * (value[last] + value[last - 1]);
+    let places = at_px.iter().zip(&at_px[1..]).zip(&at_px[2..]);
+    let values = value.iter().zip(&value[1..]).zip(&value[2..]);
+    for ((level, ((x0, x1), x2)), ((v0, v1), v2)) in levels[1..].iter_mut().zip(places).zip(values) {
+        let along = (x1 - x0) / (x2 - x0);
+        *level = 0.5 * (v1 + v0 + (v2 - v0) * along);
+    }
 }
 
-/// Straight lines through the levels at the knots, level beyond the first and the last.
+/// Straight lines through the levels at the knots.
 #[inline(always)]
-fn draw(knots: &[Knot], levels: &[f32], out: &mut [f32]) {
-    let n = out.len();
-    let mut start = (knots[0].at_px as usize + 1).min(n);
-    out[..start].fill(levels[0]);
-    for (k, l) in knots.windows(2).zip(levels.windows(2)) {
-        let end = (k[1].at_px as usize + 1).min(n);
-        let slope = (l[1] - l[0]) / (k[1].at_px - k[0].at_px);
-        let first = l[0] + slope * (start as f32 - k[0].at_px);
-        ramp(first, slope, end - start, &mut out[start..]);
+fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>) {
+    lines.resize(levels.len(), Line::default());
+    // Up to the first knot the background is level.
+    lines[0] = Line { level: levels[0], slope: 0.0, end: at_px[0] as u32 + 1 };
+    let ends = at_px.iter().zip(&at_px[1..]).zip(levels.iter().zip(&levels[1..]));
+    for (line, ((&x0, &x1), (l0, l1))) in lines[1..].iter_mut().zip(ends) {
+        let slope = (l1 - l0) / (x1 - x0);
+        let first = x0 as u32 + 1;
+        *line = Line { level: l0 + slope * (first as f32 - x0), slope, end: x1 as u32 + 1 };
+    }
+}
+
+/// Lines one after the other in whole blocks, of which the next line overwrites what is too much; level beyond the last.
+#[inline(always)]
+fn draw(lines: &[Line], levels: &[f32], count: usize, out: &mut Aligned<f32>) {
+    out.resize(count + BLOCK);
+    let mut start = 0;
+    for line in lines {
+        let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * line.slope);
+        let end = (line.end as usize).min(count);
+        let mut level = line.level;
+        for from in (start..end).step_by(BLOCK) {
+            out[from..from + BLOCK].copy_from_slice(&steps.map(|step| level + step));
+            level += BLOCK as f32 * line.slope;
+        }
         start = end;
     }
     out[start..].fill(levels[levels.len() - 1]);
-}
-
-/// `first + i slope` over `count` pixels, in whole blocks: the next line overwrites what is too much.
-#[inline(always)]
-fn ramp(first: f32, slope: f32, count: usize, out: &mut [f32]) {
-    const BLOCK: usize = 8;
-    let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * slope);
-    let stop = out.len().min(count.next_multiple_of(BLOCK));
-    let mut at = first;
-    let mut blocks = out[..stop].chunks_exact_mut(BLOCK);
-    for block in &mut blocks {
-        for (value, step) in block.iter_mut().zip(steps) {
-            *value = at + step;
-        }
-        at += BLOCK as f32 * slope;
-    }
-    for (value, step) in blocks.into_remainder().iter_mut().zip(steps) {
-        *value = at + step;
-    }
 }

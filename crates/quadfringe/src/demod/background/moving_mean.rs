@@ -1,11 +1,13 @@
 //! Mean over a window whose width need not be whole.
 
+use crate::demod::Aligned;
+
 /// Working memory of [`moving_mean`].
-#[derive(Debug, Default, Clone)]
+#[derive(Debug, Default)]
 pub(super) struct Sums {
-    now: Vec<f32>,
-    next: Vec<f32>,
-    window: Vec<f32>,
+    now: Aligned<f32>,
+    next: Aligned<f32>,
+    window: Aligned<f32>,
 }
 
 /// Mean over `width` samples around each; a window that would leave the row is moved back inside.
@@ -30,9 +32,8 @@ pub(super) fn moving_mean(row: &[f32], width: f32, sums: &mut Sums, out: &mut [f
         out[begin..end].fill(last);
         return;
     }
-    window_sums(row, 2 * side + 1, sums);
+    let whole = &window_sums(row, 2 * side + 1, sums)[begin - side..];
     let (left, right) = (&row[begin - side - 1..], &row[begin + side + 1..]);
-    let whole = &sums.window[begin - side..];
     let middle = &mut out[begin..end];
     for (((value, sum), l), r) in middle.iter_mut().zip(whole).zip(left).zip(right) {
         *value = (sum + part * (l + r)) * scale;
@@ -53,30 +54,41 @@ fn end_mean<'a>(row: impl Iterator<Item = &'a f32>, width: f32) -> f32 {
     sum / width
 }
 
-/// `sums.window[x]` = sum of `count` (odd) samples from x on.
+/// Sums of `count` (odd) samples from each place on.
 #[inline(always)]
-fn window_sums(row: &[f32], count: usize, sums: &mut Sums) {
-    let Sums { now, next, window } = sums;
-    let n = row.len();
-    for buffer in [&mut *now, &mut *next, &mut *window] {
-        buffer.resize(n, 0.0);
+fn window_sums<'a>(row: &'a [f32], count: usize, sums: &'a mut Sums) -> &'a [f32] {
+    if count == 1 {
+        return row;
     }
-    now.copy_from_slice(row);
-    window.copy_from_slice(row);
-    let mut done = 1;
-    let mut span = 1;
-    while 2 * span <= count {
-        for ((to, a), b) in next.iter_mut().zip(&*now).zip(&now[span..]) {
-            *to = a + b;
-        }
-        std::mem::swap(now, next);
-        span *= 2;
+    let Sums { now, next, window } = sums;
+    for buffer in [&mut *now, &mut *next, &mut *window] {
+        buffer.resize(row.len());
+    }
+    add_shifted(row, row, 1, now);
+    let (mut span, mut done) = (2, 1);
+    loop {
         if count & span != 0 {
-            for (to, more) in window.iter_mut().zip(&now[done..]) {
-                *to += more;
+            if done == 1 {
+                add_shifted(row, now, 1, window);
+            } else {
+                window.iter_mut().zip(&now[done..]).for_each(|(to, more)| *to += more);
             }
             done += span;
         }
+        if done == count {
+            return window;
+        }
+        add_shifted(now, now, span, next);
+        std::mem::swap(now, next);
+        span *= 2;
+    }
+}
+
+/// `out[x] = a[x] + b[x + shift]`, as far as there is such a sample.
+#[inline(always)]
+fn add_shifted(a: &[f32], b: &[f32], shift: usize, out: &mut [f32]) {
+    for ((to, a), b) in out.iter_mut().zip(a).zip(&b[shift..]) {
+        *to = a + b;
     }
 }
 

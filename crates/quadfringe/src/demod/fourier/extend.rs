@@ -6,33 +6,59 @@
 /// Fringes are even about an extremum. The row is mirrored at the extremum nearest to its end, so value, slope and
 /// phase go on; mirrored at the end itself, the phase would jump.
 #[inline(always)]
-pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], tail: &mut [f32]) {
+pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], scratch: &mut Scratch, tail: &mut [f32]) {
     let n = row.len();
     let quarter = ((period_px / 4.0) as usize).clamp(1, n / 8);
-    let after = mirror(quarter, |i| row[n - 1 - i]);
-    let before = mirror(quarter, |i| row[i]);
-    let count = tail.len();
-    for (k, (value, weight)) in tail.iter_mut().zip(fade).enumerate() {
-        let end = row[(n - 2).saturating_sub(after + k)];
-        let begin = row[(before + count - k).min(n - 1)];
-        *value = end + weight * (begin - end);
+    let Scratch { edge, misses } = scratch;
+    edge.resize(6 * quarter + 2, 0.0);
+    reversed(row, edge);
+    let after = mirror(edge, quarter, misses);
+    let before = mirror(&row[..6 * quarter + 2], quarter, misses);
+    reversed(&row[..n - 1 - after], tail);
+    // From the far end of the tail back: what leads up to the beginning of the row.
+    let beyond = tail.len().saturating_sub(n - 1 - before);
+    for (value, weight) in tail[..beyond].iter_mut().zip(fade) {
+        *value += weight * (row[n - 1] - *value);
+    }
+    let near = tail[beyond..].iter_mut().rev().zip(fade[beyond..].iter().rev());
+    for ((value, weight), begin) in near.zip(&row[before + 1..]) {
+        *value += weight * (begin - *value);
     }
 }
 
-/// Twice the distance of an extremum from the end of a row, of which `at(0)` is the last sample; half a fringe is looked
-/// through, from a quarter on.
+/// Working memory of [`extend`].
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    edge: Vec<f32>,
+    misses: Vec<f32>,
+}
+
+/// The end of `source` backwards; its first sample again where it is too short.
 #[inline(always)]
-fn mirror(quarter: usize, at: impl Fn(usize) -> f32) -> usize {
-    let mismatch = |twice: usize| -> f32 {
-        let miss = |i: usize| at(i) - at(twice - i);
-        (0..quarter).map(|i| miss(i) * miss(i)).sum()
-    };
-    let (mut best, mut least) = (2 * quarter, f32::INFINITY);
-    for twice in 2 * quarter..6 * quarter + 2 {
-        let found = mismatch(twice);
-        (best, least) = if found < least { (twice, found) } else { (best, least) };
+fn reversed(source: &[f32], out: &mut [f32]) {
+    let (known, beyond) = out.split_at_mut(source.len().min(out.len()));
+    known.iter_mut().zip(source.iter().rev()).for_each(|(to, from)| *to = *from);
+    beyond.fill(source[0]);
+}
+
+/// Twice the distance of an extremum from the end of a row, of which `edge[0]` is the last sample; half a fringe is
+/// looked through, from a quarter on, every place at once.
+#[inline(always)]
+fn mirror(edge: &[f32], quarter: usize, misses: &mut Vec<f32>) -> usize {
+    misses.clear();
+    misses.resize(4 * quarter + 2, 0.0);
+    for (i, sample) in edge[..quarter].iter().enumerate() {
+        for (miss, image) in misses.iter_mut().zip(&edge[2 * quarter - i..]) {
+            *miss += (sample - image) * (sample - image);
+        }
     }
-    best
+    let (mut best, mut least) = (0, f32::INFINITY);
+    for (place, &miss) in misses.iter().enumerate() {
+        let better = miss < least;
+        best = if better { place } else { best };
+        least = if better { miss } else { least };
+    }
+    2 * quarter + best
 }
 
 #[cfg(test)]
@@ -47,7 +73,7 @@ mod tests {
             let row: Vec<f32> = (0..400).map(|x| at(x as f32)).collect();
             let fade: Vec<f32> = (0..60).map(|k| if k < 30 { 0.0 } else { 1.0 }).collect();
             let mut tail = [0.0; 60];
-            extend(&row, 25.3, &fade, &mut tail);
+            extend(&row, 25.3, &fade, &mut Scratch::default(), &mut tail);
             for k in 0..30 {
                 // An extremum is found to a quarter of a pixel, so the mirrored row is off by half a pixel at most.
                 assert!((tail[k] - at(400.0 + k as f32)).abs() < 0.13, "{start} {k}");

@@ -1,0 +1,63 @@
+//! Memory of the maps that go to Python, used again once Python has dropped them: the system takes longer to find fresh
+//! memory than the kernel takes to fill it.
+
+use ndarray::{Array, ArrayView, Dimension};
+use numpy::PyArray;
+use pyo3::prelude::*;
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// Most maps that wait for a shot: those of two shots.
+const WAITING: usize = 12;
+
+/// Maps that wait for the next shot.
+#[derive(Default)]
+pub struct Memory {
+    waiting: Mutex<Vec<Vec<f32>>>,
+}
+
+impl Memory {
+    /// An array of numbers left over from another shot, or of zeros.
+    pub fn take<D: Dimension>(&self, shape: D) -> Array<f32, D> {
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        let fitting = waiting.iter().position(|values| values.len() == shape.size());
+        match fitting.map(|at| waiting.swap_remove(at)) {
+            Some(values) => Array::from_shape_vec(shape, values).expect("as many values as the shape has"),
+            None => Array::zeros(shape),
+        }
+    }
+
+    /// Lend an array to Python; its memory comes back when the last NumPy array that looks at it is gone.
+    pub fn lend<'py, D: Dimension>(
+        self: &Arc<Self>,
+        py: Python<'py>,
+        array: Array<f32, D>,
+    ) -> PyResult<Bound<'py, PyArray<f32, D>>> {
+        let shape = array.raw_dim();
+        let (values, _) = array.into_raw_vec_and_offset();
+        let loan = Bound::new(py, Loan { values, owner: Arc::clone(self) })?;
+        let view = ArrayView::from_shape(shape, &loan.get().values).expect("as many values as the shape has");
+        // SAFETY: the array keeps the loan alive, which neither moves, changes nor shows its values to anyone else.
+        #[expect(unsafe_code, reason = "the only way to a NumPy array that tells when it is gone")]
+        Ok(unsafe { PyArray::borrow_from_array(&view, loan.clone().into_any()) })
+    }
+
+    fn give_back(&self, values: Vec<f32>) {
+        let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
+        if waiting.len() < WAITING {
+            waiting.push(values);
+        }
+    }
+}
+
+/// Memory lent to Python: the base of a NumPy array.
+#[pyclass(frozen, module = "quadfringe._core")]
+struct Loan {
+    values: Vec<f32>,
+    owner: Arc<Memory>,
+}
+
+impl Drop for Loan {
+    fn drop(&mut self) {
+        self.owner.give_back(std::mem::take(&mut self.values));
+    }
+}

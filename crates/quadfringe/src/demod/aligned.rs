@@ -1,0 +1,70 @@
+//! Working memory that begins with a cache line: a wide vector across two lines is read and written in two goes.
+
+use std::ops::{Deref, DerefMut};
+
+/// Bytes of a cache line, and of the widest vectors.
+const LINE: usize = 64;
+
+/// A row of numbers that keeps its place and its numbers for as long as it need not grow.
+#[derive(Debug, Default)]
+pub(crate) struct Aligned<T> {
+    memory: Vec<T>,
+    start: usize,
+    count: usize,
+}
+
+impl<T: Copy + Default> Aligned<T> {
+    /// So many zeros.
+    pub fn new(count: usize) -> Self {
+        let mut row = Self::default();
+        row.resize(count);
+        row
+    }
+
+    /// Hold so many numbers; zeros when the row has to grow.
+    #[inline(always)]
+    pub fn resize(&mut self, count: usize) {
+        if self.start + count > self.memory.len() {
+            let spare = LINE / size_of::<T>();
+            self.memory = vec![T::default(); count + spare];
+            self.start = self.memory.as_ptr().align_offset(LINE).min(spare);
+        }
+        self.count = count;
+    }
+}
+
+impl<T> Deref for Aligned<T> {
+    type Target = [T];
+
+    #[inline(always)]
+    fn deref(&self) -> &[T] {
+        &self.memory[self.start..self.start + self.count]
+    }
+}
+
+impl<T> DerefMut for Aligned<T> {
+    #[inline(always)]
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.memory[self.start..self.start + self.count]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_begin_with_a_cache_line_and_keep_their_numbers() {
+        for count in [1, 7, 1024] {
+            let mut row = Aligned::<f32>::new(count);
+            assert_eq!(row.as_ptr() as usize % LINE, 0);
+            row.fill(3.0);
+            row.resize(count / 2);
+            row.resize(count);
+            assert_eq!(&*row, vec![3.0; count]);
+            row.resize(2 * count + 100);
+            assert_eq!(row.as_ptr() as usize % LINE, 0);
+            assert_eq!(row.len(), 2 * count + 100);
+        }
+    }
+}
