@@ -44,6 +44,26 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
     assert all(m.dtype == np.float32 and m.shape == (96, 912) for m in maps.values())
 
 
+def test_memory_is_used_again_only_when_nobody_looks_at_it(images: Four) -> None:
+    decode, shot = decoder().decode, eight_bit(images)
+    black = [np.zeros_like(image) for image in shot]
+
+    def place(values: np.ndarray[Any, Any]) -> int:
+        return int(values.__array_interface__["data"][0])
+
+    kept = decode(*shot)["phase_rad"][10:20]
+    expected = kept.copy()
+    places = {place(decode(*black)["phase_rad"]) for _ in range(20)}
+    np.testing.assert_array_equal(kept, expected)
+    assert not any(0 <= place(kept) - start <= 96 * 912 * 4 for start in places)
+    assert len(places) <= 6
+    held = [decode(*shot)["phase_rad"] for _ in range(3)]
+    assert len({place(values) for values in held}) == 3
+    for values in held:
+        values += 1.0
+        np.testing.assert_array_equal(values[10:20], expected + np.float32(1.0))
+
+
 def test_strided_views_are_as_good_as_copies(images: Four) -> None:
     red, green, blue, ir = eight_bit(images)
     colour = np.stack([red, green, blue], axis=2)
