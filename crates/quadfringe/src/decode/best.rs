@@ -94,6 +94,7 @@ impl Best {
         };
         self.fit.run(&scene, &self.lit, options.modulation_min, maps);
         let noise = noise(&scene, &self.wrapped, &self.modulation);
+        let relative_noise = relative(noise, &self.modulation);
         self.slopes.measure(&scene, &self.wrapped, &self.modulation);
 
         // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
@@ -106,14 +107,14 @@ impl Best {
         };
         self.orders.choose(&scene, &known, &mut self.phase);
         self.backgrounds.start(&scene, &self.fit);
-        self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, MISFIT_MAX);
+        self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, (MISFIT_MAX, relative_noise));
         let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
         let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
         for window in [window.near(), window] {
-            self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, MISFIT_MAX);
+            self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, (MISFIT_MAX, relative_noise));
             self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
         }
 
@@ -168,6 +169,13 @@ impl Best {
             finish.row(y, &mut row);
         });
     }
+}
+
+/// Noise over the mean modulation of what is lit.
+fn relative(noise: f32, modulation: &[f32]) -> f32 {
+    let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
+    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));
+    noise * count / f32::max(sum, 1e-6)
 }
 
 /// Fringe period across the fringes, from the red image; a sixteenth of the image when nothing stands out.

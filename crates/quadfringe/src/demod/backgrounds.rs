@@ -13,9 +13,15 @@ use crate::slots::Slots;
 use multiversion::multiversion;
 
 /// Width (sigma) of the window in fringe periods: the albedo takes what is faster.
-const WINDOW: f32 = 1.0;
+const WINDOW: f32 = 0.28;
+/// Width (sigma) over which surroundings of one colour are averaged on top of that.
+const SURROUNDINGS: f32 = 1.0;
+/// Relative difference (root mean square of eight) from the surroundings that is a colour of its own: in units of the
+/// noise over the modulation, and at least.
+const OWN_COLOUR_NOISES: f32 = 0.2;
+const OWN_COLOUR_MIN: f32 = 0.01;
 /// Sides of the cells in fringe periods.
-const CELL: f64 = 0.7;
+const CELL: f64 = 0.35;
 /// Rows of pixels that stand for a row of cells.
 const SAMPLED_ROWS: usize = 4;
 /// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
@@ -74,14 +80,14 @@ impl Backgrounds {
     }
 
     /// Fit them to an absolute phase in rad. Pixels that are further from any such model than `misfit_max` times their
-    /// modulation (root mean square) take no part.
+    /// modulation (root mean square) take no part. `relative_noise` is the noise over the modulation.
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
         ratios: [f32; 3],
         phase: &[f32],
         modulation: &[f32],
-        misfit_max: f32,
+        (misfit_max, relative_noise): (f32, f32),
     ) {
         let Self { grid, maps, next, sums, slots } = self;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
@@ -100,7 +106,35 @@ impl Backgrounds {
                 improve(sums, before, out);
             },
         );
-        std::mem::swap(maps, next);
+        let sigma = SURROUNDINGS * scene.period_px as f32 / grid.step as f32;
+        let threshold = (OWN_COLOUR_NOISES * relative_noise).max(OWN_COLOUR_MIN);
+        let own = &*next;
+        grid.smooth::<8, RowMaps>(
+            sigma,
+            slots,
+            sums,
+            maps,
+            |row, k| Some(own.line(row, k)),
+            |row, wide, out| blend(threshold, std::array::from_fn(|k| own.line(row, k)), wide, out),
+        );
+    }
+}
+
+/// The fit of every cell, drawn to that of its surroundings as far as the two have one colour.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn blend(threshold: f32, own: [&[f32]; 8], wide: [&[f32]; 8], out: &mut [f32]) {
+    let columns = own[0].len();
+    for i in 0..columns {
+        let norm = |maps: &[&[f32]; 8]| (0..8).map(|k| maps[k][i] * maps[k][i]).sum::<f32>().max(1e-12);
+        // Only ratios count: the albedo of the pixels takes a common factor.
+        let scale = (norm(&own) / norm(&wide)).sqrt();
+        let size = norm(&own);
+        let square: f32 = (0..8).map(|k| (own[k][i] - scale * wide[k][i]).powi(2)).sum();
+        let apart = square / (size * threshold * threshold);
+        let weight = (apart - 1.0).clamp(0.0, 1.0);
+        for k in 0..8 {
+            out[k * columns + i] = scale * wide[k][i] + weight * (own[k][i] - scale * wide[k][i]);
+        }
     }
 }
 
