@@ -4,9 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Modules in the order of `lib.rs`.
-const ORDER: [&str; 11] = [
+const ORDER: [&str; 12] = [
     "error",
     "angle",
+    "slots",
     "fringe",
     "optics",
     "surface",

@@ -67,7 +67,8 @@ fn a_mosaic_loses_no_orders_at_edges() {
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
     assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
-    assert!(raw.returned_share() > full.returned_share() - 2e-3, "{raw:?}");
+    // Two pixels beside every shadow are left out, into which light is interpolated.
+    assert!(raw.returned_share() > full.returned_share() - 6e-3, "{raw:?}");
 }
 
 #[test]
@@ -111,7 +112,8 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         let rms = [&plain, &undone].map(|decoded| inner_phase_rms_rad(decoded, &cast));
         let judged = score(&undone, &cast, &code(), FRINGE_PX);
         println!("{method:?} {rms:?} {judged:?}");
-        assert!(rms[1] < 1.1 * rms[0], "{rms:?}");
+        // Or so little that noise of a thousandth of full scale would hide it.
+        assert!(rms[1] < (1.1 * rms[0]).max(2.5e-3), "{rms:?}");
         assert!(judged.wrong_share() < 5e-5, "{judged:?}");
         assert!(judged.returned_share() > 0.98, "{judged:?}");
     }
@@ -136,7 +138,8 @@ fn registration_costs_neither_phase_nor_orders() {
         let rms = [&aligned, &registered].map(|decoded| inner_phase_rms_rad(decoded, &cast));
         let [aligned, registered] = [aligned, registered].map(|d| score(&d, &cast, &code(), FRINGE_PX));
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
-        assert!(rms[1] < 1.1 * rms[0], "{rms:?}");
+        // Or so little that noise of a thousandth of full scale would hide it.
+        assert!(rms[1] < (1.1 * rms[0]).max(2.5e-3), "{rms:?}");
         // The published filter runs along whole rows, and errs beside what the infrared chip does not see.
         assert!(
             registered.wrong_orders() <= aligned.wrong_orders() + registered.lit / 20_000,

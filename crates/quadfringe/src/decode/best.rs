@@ -21,6 +21,9 @@ use rayon::prelude::*;
 /// Cells in a fringe period, at least.
 const CELLS: f64 = 4.5;
 
+/// Pixels that interpolated light reaches into a shadow.
+const MOSAIC_BLUR_PX: usize = 2;
+
 pub(super) struct Best {
     shape: [usize; 2],
     ratios: [f32; 3],
@@ -77,6 +80,10 @@ impl Best {
         let period_px = options.period_px.unwrap_or_else(|| period_px(light[0], self.shape));
         let grid = Grid::new(self.shape, period_px / CELLS);
         self.finder.find(&grid, light, period_px, 2.0 * options.modulation_min, &mut self.modulation);
+        if shot.mosaic().is_some() {
+            // Interpolated between the samples of a mosaic, light reaches into the shadow beside it.
+            (0..MOSAIC_BLUR_PX).for_each(|_| self.finder.shrink(&grid, &mut self.modulation));
+        }
         let found = self.modulation.par_chunks(grid.stride);
         let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
         masks.zip(found).for_each(|((lit, usable), found)| {
@@ -88,10 +95,7 @@ impl Best {
         let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
 
         // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
-        let maps = PixelMaps {
-            phase: &mut self.wrapped,
-            modulation: &mut self.modulation,
-        };
+        let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
         self.fit.run(&scene, &self.lit, options.modulation_min, maps);
         let noise = noise(&scene, &self.wrapped, &self.modulation);
         let relative_noise = relative(noise, &self.modulation);
@@ -107,14 +111,26 @@ impl Best {
         };
         self.orders.choose(&scene, &known, &mut self.phase);
         self.backgrounds.start(&scene, &self.fit);
-        self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, (MISFIT_MAX, relative_noise));
+        self.backgrounds.fit(
+            &scene,
+            self.ratios,
+            &self.phase,
+            &self.modulation,
+            (MISFIT_MAX, relative_noise),
+        );
         let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
         let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
         for window in [window.near(), window] {
-            self.backgrounds.fit(&scene, self.ratios, &self.phase, &self.modulation, (MISFIT_MAX, relative_noise));
+            self.backgrounds.fit(
+                &scene,
+                self.ratios,
+                &self.phase,
+                &self.modulation,
+                (MISFIT_MAX, relative_noise),
+            );
             self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
         }
 

@@ -71,18 +71,21 @@ impl Judge {
         self.spare.resize(grid.pixels(), 0);
         let Self { quality, spare, seams, backing, slots, .. } = self;
         let rows = quality.par_chunks_mut(grid.stride).zip(spare.par_chunks_mut(grid.stride)).enumerate();
-        rows.for_each_init(|| slots.take(), |slot, (y, (quality, sure))| {
-            let Rows { maps, sums, margin } = &mut slot.0;
-            let [backing] = maps.sample(grid, backing, 1, y);
-            margin.clear();
-            for (lead, _, lit) in findings.orders.verdict(scene, y / grid.step) {
-                margin.extend(std::iter::repeat_n(if lit { lead } else { 0.0 }, grid.step));
-            }
-            let near = around(y, grid.height).map(|row| scene.row(findings.misfit, row));
-            let known = [scene.row(findings.modulation, y), margin, backing];
-            let limits = [findings.noise, findings.quality_min];
-            verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, sure);
-        });
+        rows.for_each_init(
+            || slots.take(),
+            |slot, (y, (quality, sure))| {
+                let Rows { maps, sums, margin } = &mut slot.0;
+                let [backing] = maps.sample(grid, backing, 1, y);
+                margin.clear();
+                for (lead, _, lit) in findings.orders.verdict(scene, y / grid.step) {
+                    margin.extend(std::iter::repeat_n(if lit { lead } else { 0.0 }, grid.step));
+                }
+                let near = around(y, grid.height).map(|row| scene.row(findings.misfit, row));
+                let known = [scene.row(findings.modulation, y), margin, backing];
+                let limits = [findings.noise, findings.quality_min];
+                verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, sure);
+            },
+        );
         seams::remove_slivers(grid, NEIGHBOURS_MIN, &self.spare, &mut self.sure);
         let least = (ISLAND_SIDE * scene.period_px).powi(2) as usize;
         self.islands.remove(grid, findings.phase, least, &mut self.sure);
@@ -149,6 +152,10 @@ fn verdict(
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
         quality[x] = if lit { own_quality } else { f32::NAN };
         let dbg = std::env::var("DBG").ok().and_then(|v| v.parse::<u32>().ok()).unwrap_or(7);
-        sure[x] = u8::from(lit & (dbg & 2 == 0 || agrees) & (dbg & 1 == 0 || own_quality >= quality_min) & (dbg & 4 == 0 || seams[x] == 0));
+        sure[x] = u8::from(
+            lit & (dbg & 2 == 0 || agrees)
+                & (dbg & 1 == 0 || own_quality >= quality_min)
+                & (dbg & 4 == 0 || seams[x] == 0),
+        );
     }
 }

@@ -6,8 +6,8 @@ use crate::demod::cells::{LANES, Lanes, RowMaps, add, lanes, take};
 use crate::demod::local_fit::LocalFit;
 use crate::demod::scene::Scene;
 use crate::demod::slopes::Slopes;
-use crate::unwrap::{Evidence, Seen, Support};
 use crate::slots::Slots;
+use crate::unwrap::{Evidence, Seen, Support};
 use crate::{Channel, FringeCode};
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -79,7 +79,13 @@ impl Orders {
     pub fn new(code: &FringeCode) -> Self {
         let n = code.numbers();
         let ratios = [Channel::G, Channel::Ir].map(|c| (n[c.phase_index()] / n[0]) as f32);
-        Self { support: Support::new(code), phase: Vec::new(), ratios, slots: Slots::default(), blocks: Slots::default() }
+        Self {
+            support: Support::new(code),
+            phase: Vec::new(),
+            ratios,
+            slots: Slots::default(),
+            blocks: Slots::default(),
+        }
     }
 
     /// Choose the orders of a wrapped phase; `absolute` receives it with them.
@@ -97,7 +103,9 @@ impl Orders {
             let nodes = &phase[row * grid.columns..][..grid.columns];
             gather(scene, known, ratios, row, nodes, &mut rows);
             let beats = known.fit.beats(row);
-            out.extend((0..grid.columns).map(|x| evidence(nodes[x], beats.map(|beat| beat[x]), &rows.cells, x)));
+            out.extend(
+                (0..grid.columns).map(|x| evidence(nodes[x], beats.map(|beat| beat[x]), &rows.cells, x)),
+            );
         });
         let this = &*self;
         absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
@@ -114,7 +122,9 @@ impl Orders {
     pub fn verdict(&self, scene: &Scene<'_>, row: usize) -> impl Iterator<Item = (f32, f32, bool)> {
         let at = row * scene.grid.columns..(row + 1) * scene.grid.columns;
         let known = self.support.margin[at.clone()].iter().zip(&self.support.misfit[at.clone()]);
-        known.zip(&self.support.nodes[at]).map(|((margin, misfit), node)| (margin.min(1.0), *misfit, node.lit))
+        known
+            .zip(&self.support.nodes[at])
+            .map(|((margin, misfit), node)| (margin.min(1.0), *misfit, node.lit))
     }
 
     fn absolute(&self, at: usize) -> f32 {
@@ -170,7 +180,8 @@ impl Orders {
                 let [along, down] = slopes.at(other_row, other_column);
                 let step = grid.step as f32;
                 let way = step
-                    * (along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32));
+                    * (along * (column as f32 - other_column as f32)
+                        + down * (row as f32 - other_row as f32));
                 // What the neighbour expects here, as turns beside what this node has.
                 let turns = -round((gap - way) / TAU);
                 found.add(turns);
@@ -240,10 +251,10 @@ impl Block {
         self.turns.clear();
         for i in 0..step * step {
             let (y, x) = (i / step, i % step);
-            let sum = |k: usize| -> f32 {
-                (0..9).map(|n| self.misses[(y + n / 3) * side + x + n % 3][k]).sum()
-            };
-            let best = (0..candidates.count).map(|k| (k, sum(k))).reduce(|a, b| if b.1 < a.1 { b } else { a });
+            let sum =
+                |k: usize| -> f32 { (0..9).map(|n| self.misses[(y + n / 3) * side + x + n % 3][k]).sum() };
+            let best =
+                (0..candidates.count).map(|k| (k, sum(k))).reduce(|a, b| if b.1 < a.1 { b } else { a });
             self.turns.push(best.map_or(0.0, |(k, _)| candidates.turns[k]));
         }
     }

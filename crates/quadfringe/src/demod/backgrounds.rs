@@ -352,3 +352,48 @@ impl System {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::TAU;
+
+    #[test]
+    fn backgrounds_are_found_whatever_the_texture_and_an_error_of_the_phase() {
+        let grid = Grid::new([96, 256], 4.0);
+        let ratios = [1.0, 35.0 / 36.0, 30.0 / 36.0];
+        let truth: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
+        let texture = |i: usize| 0.7 + 0.2 * ((i / 256) as f32 * 0.9).sin() * ((i % 256) as f32 * 0.7).cos();
+        let fringes = [[0.5, 0.4], [0.45, 0.38], [0.55, 0.42], [0.4, 0.37]];
+        let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
+            let [a, b] = fringes[c];
+            (0..grid.pixels()).map(|i| texture(i) * (a + b * carriers(truth[i], ratios).0[c])).collect()
+        });
+        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
+        let light = planes.each_ref().map(Vec::as_slice);
+        let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0 };
+        let (mut fit, mut found) = (LocalFit::default(), Backgrounds::new());
+        let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
+        let maps = super::super::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
+        fit.run(&scene, &usable, 0.02, maps);
+        found.start(&scene, &fit);
+        // The phase given is 0.05 rad off, as a two-step phase with wrong backgrounds is.
+        let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
+        for _ in 0..3 {
+            found.fit(&scene, ratios, &phase, &modulation, (0.3, 0.0));
+        }
+        let mut maps = RowMaps::default();
+        let rows = found.sample(48, &mut maps);
+        for x in 40..216 {
+            // Only ratios are defined.
+            let scale = rows[0][x] / fringes[0][0];
+            for c in 0..4 {
+                let (a, b) = (rows[2 * c][x] / scale, rows[2 * c + 1][x] / scale);
+                assert!(
+                    (a - fringes[c][0]).abs() < 0.02 && (b - fringes[c][1]).abs() < 0.02,
+                    "{c} {x} {a} {b}"
+                );
+            }
+        }
+    }
+}

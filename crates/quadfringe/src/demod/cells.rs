@@ -144,17 +144,20 @@ impl Grid {
     ) {
         let kernel = kernel(sigma);
         sums.shape(self, N);
-        sums.data.par_chunks_mut(N * self.columns).enumerate().for_each_init(|| slots.take(), |slot, (row, out)| {
-            let spare = &mut slot.1.spare;
-            spare.resize(self.columns + kernel.len(), 0.0);
-            for (k, target) in out.chunks_exact_mut(self.columns).enumerate() {
-                match line(row, k) {
-                    Some(source) => target.copy_from_slice(source),
-                    None => target.fill(1.0),
+        sums.data.par_chunks_mut(N * self.columns).enumerate().for_each_init(
+            || slots.take(),
+            |slot, (row, out)| {
+                let spare = &mut slot.1.spare;
+                spare.resize(self.columns + kernel.len(), 0.0);
+                for (k, target) in out.chunks_exact_mut(self.columns).enumerate() {
+                    match line(row, k) {
+                        Some(source) => target.copy_from_slice(source),
+                        None => target.fill(1.0),
+                    }
+                    smooth_line(&kernel, target, spare);
                 }
-                smooth_line(&kernel, target, spare);
-            }
-        });
+            },
+        );
         self.sum_down(&kernel, slots, sums, out, finish);
     }
 
@@ -169,17 +172,20 @@ impl Grid {
     ) {
         out.shape(self, out.count);
         let (reach, length) = (kernel.len() / 2, out.count * self.columns);
-        out.data.par_chunks_mut(length).enumerate().for_each_init(|| slots.take(), |slot, (row, out)| {
-            let total = &mut slot.1.total;
-            total.clear();
-            total.resize(N * self.columns, 0.0);
-            for (k, &weight) in kernel.iter().enumerate() {
-                if let Some(other) = (row + k).checked_sub(reach).filter(|&r| r < self.rows) {
-                    add_scaled(weight, sums.row(other), total);
+        out.data.par_chunks_mut(length).enumerate().for_each_init(
+            || slots.take(),
+            |slot, (row, out)| {
+                let total = &mut slot.1.total;
+                total.clear();
+                total.resize(N * self.columns, 0.0);
+                for (k, &weight) in kernel.iter().enumerate() {
+                    if let Some(other) = (row + k).checked_sub(reach).filter(|&r| r < self.rows) {
+                        add_scaled(weight, sums.row(other), total);
+                    }
                 }
-            }
-            finish(row, std::array::from_fn(|k| &total[k * self.columns..][..self.columns]), out);
-        });
+                finish(row, std::array::from_fn(|k| &total[k * self.columns..][..self.columns]), out);
+            },
+        );
     }
 
     /// Term `k` of columns of pixels as one sum per cell.
@@ -201,7 +207,6 @@ impl Grid {
         spread(self.step, mix, out);
     }
 }
-
 
 /// Several maps on the cells, kept row of cells by row of cells.
 #[derive(Debug, Clone, Default)]

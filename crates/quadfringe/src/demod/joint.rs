@@ -22,8 +22,6 @@ pub(crate) struct Joint {
     slots: Slots<Rows>,
     /// Misfit of the four channels: mean square in linear light.
     pub misfit: Vec<f32>,
-    /// One over the variance of the phase for intensities of unit noise.
-    pub information: Vec<f32>,
 }
 
 /// Model and derivative of the four channels for an albedo of 1, and the albedo that fits best, on one row.
@@ -55,41 +53,43 @@ impl Joint {
         let grid = scene.grid;
         self.steps.resize(grid.pixels());
         self.misfit.resize(grid.pixels(), 0.0);
-        self.information.resize(grid.pixels(), 0.0);
-        let Self { steps, misfit, slots, .. } = self;
+        let Self { steps, misfit, slots } = self;
         let before = &*phase;
         let out = steps
             .phase
             .par_chunks_mut(grid.stride)
             .zip(steps.numerator.par_chunks_mut(grid.stride))
-            .zip(steps.denominator.par_chunks_mut(grid.stride).zip(steps.variance.par_chunks_mut(grid.stride)))
+            .zip(steps.denominator.par_chunks_mut(grid.stride))
             .zip(misfit.par_chunks_mut(grid.stride))
             .chunks(BLOCK)
             .enumerate();
-        out.for_each_init(|| slots.take(), |rows, (block, out)| {
-            let rows = &mut **rows;
-            let first = block * BLOCK;
-            let model = |rows: &mut Rows, y: usize, at: usize| {
-                let maps = backgrounds.sample(y, &mut rows.maps);
-                rows.ring[at].fill(maps, scene.row(before, y), scene.rows(y), ratios);
-            };
-            model(rows, around(first, grid.height)[0], 0);
-            model(rows, first, 1);
-            for (i, (((phase, numerator), (denominator, variance)), misfit)) in out.into_iter().enumerate() {
-                let y = first + i;
-                model(rows, around(y, grid.height)[2], (i + 2) % 3);
-                let Rows { ring, albedo, smooth, window: window_rows, .. } = rows;
-                let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[8].as_slice());
-                albedo.resize(grid.stride, 0.0);
-                binomial(near, grid.width, smooth, albedo);
-                let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
-                let lit = [window.modulation(y), scene.row(scene.usable, y)];
-                linearise(model, albedo, scene.rows(y), lit, [numerator, denominator, misfit]);
-                phase.copy_from_slice(scene.row(before, y));
-                window.along(y, window_rows, [phase, numerator, denominator, variance]);
-            }
-        });
-        window.down(&self.steps, &self.slots, |rows| &mut rows.window, phase, &mut self.information);
+        out.for_each_init(
+            || slots.take(),
+            |rows, (block, out)| {
+                let rows = &mut **rows;
+                let first = block * BLOCK;
+                let model = |rows: &mut Rows, y: usize, at: usize| {
+                    let maps = backgrounds.sample(y, &mut rows.maps);
+                    rows.ring[at].fill(maps, scene.row(before, y), scene.rows(y), ratios);
+                };
+                model(rows, around(first, grid.height)[0], 0);
+                model(rows, first, 1);
+                for (i, (((phase, numerator), denominator), misfit)) in out.into_iter().enumerate() {
+                    let y = first + i;
+                    model(rows, around(y, grid.height)[2], (i + 2) % 3);
+                    let Rows { ring, albedo, smooth, window: window_rows, .. } = rows;
+                    let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[8].as_slice());
+                    albedo.resize(grid.stride, 0.0);
+                    binomial(near, grid.width, smooth, albedo);
+                    let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
+                    let lit = [window.modulation(y), scene.row(scene.usable, y)];
+                    linearise(model, albedo, scene.rows(y), lit, [numerator, denominator, misfit]);
+                    phase.copy_from_slice(scene.row(before, y));
+                    window.along(y, window_rows, [phase, numerator, denominator]);
+                }
+            },
+        );
+        window.down(&self.steps, &self.slots, |rows| &mut rows.window, phase);
     }
 }
 
@@ -127,13 +127,7 @@ fn predict(maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3
 
 /// Gauss-Newton terms of every pixel with the albedo eliminated, and how far the channels are from their model.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn linearise(
-    model: [&[f32]; 9],
-    albedo: &[f32],
-    light: [&[f32]; 4],
-    lit: [&[f32]; 2],
-    out: [&mut [f32]; 3],
-) {
+fn linearise(model: [&[f32]; 9], albedo: &[f32], light: [&[f32]; 4], lit: [&[f32]; 2], out: [&mut [f32]; 3]) {
     let (model, albedo, light, lit) = (model.map(lanes), lanes(albedo), light.map(lanes), lit.map(lanes));
     let mut out = out.map(lanes_mut);
     for (i, albedo) in albedo.iter().enumerate() {

@@ -38,14 +38,7 @@ struct Rows {
 
 impl LightFinder {
     /// Writes 1 for every pixel that is lit, 0 elsewhere. `range_min` is the least range of fringes, in linear light.
-    pub fn find(
-        &mut self,
-        grid: &Grid,
-        light: [&[f32]; 4],
-        period_px: f64,
-        range_min: f32,
-        lit: &mut [f32],
-    ) {
+    pub fn find(&mut self, grid: &Grid, light: [&[f32]; 4], period_px: f64, range_min: f32, lit: &mut [f32]) {
         let reach = (SURROUNDINGS * period_px as f32 / grid.step as f32).ceil();
         self.surroundings(grid, light, reach, range_min);
         let (stride, noise) = (grid.stride, noise(light[0], grid));
@@ -59,15 +52,32 @@ impl LightFinder {
             },
         );
         let heights = &self.heights;
-        lit.par_chunks_mut(stride).enumerate().for_each_init(|| slots.take(), |slot, (y, lit)| {
-            // The mean reaches one pixel into a shadow: the least of the means does not.
-            let Rows { sums, means, .. } = &mut slot.0;
-            for (mean, centre) in means.iter_mut().zip(around(y, grid.height)) {
-                let near = around(centre, grid.height).map(|row| &heights[row * stride..][..stride]);
-                mean_of_nine(near, grid.width, sums, mean);
-            }
-            least_of_nine(means.each_ref().map(Vec::as_slice), grid.width, 9.0 * LEAST, sums, lit);
-        });
+        lit.par_chunks_mut(stride).enumerate().for_each_init(
+            || slots.take(),
+            |slot, (y, lit)| {
+                // The mean reaches one pixel into a shadow: the least of the means does not.
+                let Rows { sums, means, .. } = &mut slot.0;
+                for (mean, centre) in means.iter_mut().zip(around(y, grid.height)) {
+                    let near = around(centre, grid.height).map(|row| &heights[row * stride..][..stride]);
+                    mean_of_nine(near, grid.width, sums, mean);
+                }
+                least_of_nine(means.each_ref().map(Vec::as_slice), grid.width, 9.0 * LEAST, sums, lit);
+            },
+        );
+    }
+
+    /// Takes the outermost pixels of what is lit.
+    pub fn shrink(&mut self, grid: &Grid, lit: &mut [f32]) {
+        let Self { heights, slots, .. } = self;
+        heights.copy_from_slice(lit);
+        let stride = grid.stride;
+        lit.par_chunks_mut(stride).enumerate().for_each_init(
+            || slots.take(),
+            |slot, (y, lit)| {
+                let near = around(y, grid.height).map(|row| &heights[row * stride..][..stride]);
+                least_of_nine(near, grid.width, 0.5, &mut slot.0.sums, lit);
+            },
+        );
     }
 
     /// Bottom of the light of each channel around every cell, and the inverse square of its range.

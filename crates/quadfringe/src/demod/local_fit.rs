@@ -60,7 +60,12 @@ pub(crate) struct PixelMaps<'a> {
 
 impl Default for LocalFit {
     fn default() -> Self {
-        Self { start: CellMaps::new(4), maps: CellMaps::new(map::COUNT), sums: CellMaps::default(), slots: Slots::default() }
+        Self {
+            start: CellMaps::new(4),
+            maps: CellMaps::new(map::COUNT),
+            sums: CellMaps::default(),
+            slots: Slots::default(),
+        }
     }
 }
 
@@ -148,36 +153,36 @@ impl LocalFit {
     /// Albedo of every pixel, not sharper than the lens, and the two-step phase with it (S2).
     fn phase(&self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
         let grid = scene.grid;
-        let out = out
-            .phase
-            .par_chunks_mut(grid.stride)
-            .zip(out.modulation.par_chunks_mut(grid.stride));
+        let out = out.phase.par_chunks_mut(grid.stride).zip(out.modulation.par_chunks_mut(grid.stride));
         let block = grid.step.max(4);
         // Blocks of rows: of each the albedo is computed once, but for the two rows beside a block.
         let out = out.chunks(block).enumerate();
-        out.for_each_init(|| self.slots.take(), |slot, (block_row, out)| {
-            let rows = &mut slot.0;
-            let first = block_row * block;
-            for row in &mut rows.albedo {
-                row.resize(grid.stride, 0.0);
-            }
-            let [above, _, _] = around(first, grid.height);
-            self.albedo_row(scene, above, 0, rows);
-            self.albedo_row(scene, first, 1, rows);
-            for (i, (phase, modulation)) in out.into_iter().enumerate() {
-                let y = first + i;
-                self.albedo_row(scene, around(y, grid.height)[2], (i + 2) % 3, rows);
-                let Rows { maps, cos, sin, albedo: ring, smooth, albedo_smooth } = rows;
-                albedo_smooth.resize(grid.stride, 0.0);
-                let near = [0, 1, 2].map(|k| ring[(i + k) % 3].as_slice());
-                binomial(near, grid.width, smooth, albedo_smooth);
-                let two = maps.sample::<4>(grid, &self.maps, map::TWO_STEP, y);
-                two_step(two, Some(albedo_smooth), scene.rows(y), cos, sin);
-                let strengths = maps.sample::<2>(grid, &self.maps, map::WEAKEST, y);
-                let known = [cos.as_slice(), sin, scene.row(lit, y), albedo_smooth];
-                finish_row(known, strengths, least, [phase, modulation]);
-            }
-        });
+        out.for_each_init(
+            || self.slots.take(),
+            |slot, (block_row, out)| {
+                let rows = &mut slot.0;
+                let first = block_row * block;
+                for row in &mut rows.albedo {
+                    row.resize(grid.stride, 0.0);
+                }
+                let [above, _, _] = around(first, grid.height);
+                self.albedo_row(scene, above, 0, rows);
+                self.albedo_row(scene, first, 1, rows);
+                for (i, (phase, modulation)) in out.into_iter().enumerate() {
+                    let y = first + i;
+                    self.albedo_row(scene, around(y, grid.height)[2], (i + 2) % 3, rows);
+                    let Rows { maps, cos, sin, albedo: ring, smooth, albedo_smooth } = rows;
+                    albedo_smooth.resize(grid.stride, 0.0);
+                    let near = [0, 1, 2].map(|k| ring[(i + k) % 3].as_slice());
+                    binomial(near, grid.width, smooth, albedo_smooth);
+                    let two = maps.sample::<4>(grid, &self.maps, map::TWO_STEP, y);
+                    two_step(two, Some(albedo_smooth), scene.rows(y), cos, sin);
+                    let strengths = maps.sample::<2>(grid, &self.maps, map::WEAKEST, y);
+                    let known = [cos.as_slice(), sin, scene.row(lit, y), albedo_smooth];
+                    finish_row(known, strengths, least, [phase, modulation]);
+                }
+            },
+        );
     }
 
     /// Albedo of row `y` into place `at` of the ring: the factor that brings the model of all four channels closest to
@@ -218,13 +223,7 @@ fn add_squares(usable: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
 /// Unit phasor of R and B for backgrounds and modulations `a_r, b_r, a_b, b_b`: (R / rho - a) / b times rho b_r b_b, as
 /// only the direction counts.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn two_step(
-    maps: [&[f32]; 4],
-    albedo: Option<&[f32]>,
-    light: [&[f32]; 4],
-    cos: &mut [f32],
-    sin: &mut [f32],
-) {
+fn two_step(maps: [&[f32]; 4], albedo: Option<&[f32]>, light: [&[f32]; 4], cos: &mut [f32], sin: &mut [f32]) {
     let (maps, light) = (maps.map(lanes), [lanes(light[0]), lanes(light[2])]);
     let mut out = [lanes_mut(cos), lanes_mut(sin)];
     for i in 0..out[0].len() {
@@ -268,7 +267,8 @@ fn add_products(usable: &[f32], phasor: [&[f32]; 2], light: [&[f32]; 4], sums: &
 fn solve_row(sums: [&[f32]; SUMS], out: &mut [f32]) {
     let columns = sums[0].len();
     let mut maps = out.chunks_exact_mut(columns);
-    let mut maps: [&mut [f32]; map::COUNT] = std::array::from_fn(|_| maps.next().expect("a line for each map"));
+    let mut maps: [&mut [f32]; map::COUNT] =
+        std::array::from_fn(|_| maps.next().expect("a line for each map"));
     for i in 0..columns {
         let [w, wc, ws, wcc, wcs] = [0, 1, 2, 3, 4].map(|k| sums[k][i]);
         let half = 0.5 * w;
@@ -355,12 +355,7 @@ pub(crate) fn binomial(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, ou
 
 /// Phase, and modulation where there is enough of it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn finish_row(
-    known: [&[f32]; 4],
-    strengths: [&[f32]; 2],
-    least: f32,
-    [phase, modulation]: [&mut [f32]; 2],
-) {
+fn finish_row(known: [&[f32]; 4], strengths: [&[f32]; 2], least: f32, [phase, modulation]: [&mut [f32]; 2]) {
     let rows = [known[0], known[1], strengths[0], strengths[1], known[2], known[3]].map(lanes);
     let mut out = [lanes_mut(phase), lanes_mut(modulation)];
     for i in 0..out[0].len() {

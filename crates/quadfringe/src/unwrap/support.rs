@@ -78,7 +78,8 @@ impl Support {
         self.nodes.resize(nodes, Node::default());
         self.costs.resize(nodes * labels, 0);
         self.sums.resize(nodes * labels, 0);
-        let rows = self.costs.par_chunks_mut(columns * labels).zip(self.sums.par_chunks_mut(columns * labels));
+        let rows =
+            self.costs.par_chunks_mut(columns * labels).zip(self.sums.par_chunks_mut(columns * labels));
         let rows = rows.zip(self.nodes.par_chunks_mut(columns)).enumerate();
         let table = &self.labels;
         rows.for_each_init(
@@ -86,7 +87,9 @@ impl Support {
             |(path, known), (row, ((costs, sums), nodes))| {
                 known.clear();
                 evidence(row, known);
-                for ((node, known), costs) in nodes.iter_mut().zip(&*known).zip(costs.chunks_exact_mut(labels)) {
+                for ((node, known), costs) in
+                    nodes.iter_mut().zip(&*known).zip(costs.chunks_exact_mut(labels))
+                {
                     *node = known.node();
                     table.costs(known, costs);
                 }
@@ -165,4 +168,103 @@ fn least(sums: &[u16]) -> (usize, u16) {
         }
     }
     (best, second.iter().copied().fold(u16::MAX, u16::min) - first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const COLUMNS: usize = 96;
+    const ROWS: usize = 64;
+
+    /// A node that sees projector column `u`, with the beats of a perfect shot and one pixel of its own.
+    fn node(code: &FringeCode, u: f64) -> Evidence {
+        let [n1, n2, n3] = code.numbers();
+        let turns = |n: f64| ((n * u / code.projector_width() as f64) * 65536.0).round() as i64 as u16;
+        let wrapped = f64::from(turns(n1)) / 65536.0 * TAU;
+        let seen = |n: f64| {
+            let s = (TAU * n * u / code.projector_width() as f64).cos();
+            let f = n / n1 * wrapped;
+            let [square, first, second] =
+                [[s * s, 0.0], [s * f.cos(), s * f.sin()], [(2.0 * f).cos(), (2.0 * f).sin()]];
+            let round = |pair: [f64; 2]| pair.map(|v| v as f32);
+            Seen { square: square[0] as f32, first: round(first), second: round(second) }
+        };
+        Evidence {
+            phase: turns(n1),
+            beats: [turns(n2 - n1), turns(n3 - n1)],
+            seen: [seen(n2), seen(n3)],
+            pixels: 1.0,
+            lit: true,
+        }
+    }
+
+    fn choose(code: &FringeCode, evidence: impl Fn(usize, usize) -> Evidence + Sync) -> Support {
+        let mut support = Support::new(code);
+        let row = |y: usize, out: &mut Vec<Evidence>| out.extend((0..COLUMNS).map(|x| evidence(x, y)));
+        support.choose([ROWS, COLUMNS], 8.0, row);
+        support
+    }
+
+    fn right(code: &FringeCode, column: f64, order: i16) -> bool {
+        order == (column / code.period_px(0)).floor() as i16
+    }
+
+    #[test]
+    fn every_order_of_a_field_and_of_a_step_is_right() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let step =
+            |x: usize, y: usize| if x < 50 { 9.3 * x as f64 + y as f64 } else { 300.2 + 5.1 * x as f64 };
+        let found = choose(&code, |x, y| node(&code, step(x, y)));
+        for i in 0..ROWS * COLUMNS {
+            assert!(right(&code, step(i % COLUMNS, i / COLUMNS), found.order[i]), "{i}");
+            assert!(found.margin[i] > 0.0 && found.misfit[i] < 0.05, "{i}");
+        }
+    }
+
+    #[test]
+    fn a_band_of_wrong_evidence_is_outvoted_and_says_so() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let column = |x: usize| 400.0 + 1.7 * x as f64;
+        let found = choose(&code, |x, y| {
+            let mut node = node(&code, column(x));
+            if (20..30).contains(&y) && (40..46).contains(&x) {
+                node.beats = node.beats.map(|beat| beat.wrapping_add(12000));
+                node.seen = node.seen.map(|seen| Seen { first: seen.first.map(|v| -v), ..seen });
+            }
+            node
+        });
+        for i in 0..ROWS * COLUMNS {
+            assert!(right(&code, column(i % COLUMNS), found.order[i]), "{i}");
+        }
+        assert!(found.misfit[25 * COLUMNS + 43] > 0.6);
+    }
+
+    #[test]
+    fn the_dark_carries_no_support() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        // Beyond the dark lies another surface, ten orders on.
+        let column =
+            |x: usize| 101.37 + 4.0 * x as f64 + if x >= 44 { 10.0 * code.period_px(0) } else { 0.0 };
+        let found = choose(&code, |x, _| Evidence { lit: !(40..44).contains(&x), ..node(&code, column(x)) });
+        for i in 0..ROWS * COLUMNS {
+            let lit = !(40..44).contains(&(i % COLUMNS));
+            assert!(!lit || right(&code, column(i % COLUMNS), found.order[i]), "{i}");
+            assert!(lit || found.margin[i] == 0.0);
+        }
+    }
+
+    #[test]
+    fn own_pixels_tell_orders_that_beats_leave_open() {
+        let code = FringeCode::optimum(36, 912).unwrap();
+        let column = |x: usize, y: usize| 200.37 + 2.9 * x as f64 + 0.31 * y as f64;
+        let found = choose(&code, |x, y| {
+            let node = node(&code, column(x, y));
+            Evidence { beats: node.beats.map(|beat| beat.wrapping_add(30000)), ..node }
+        });
+        let wrong =
+            (0..ROWS * COLUMNS).filter(|&i| !right(&code, column(i % COLUMNS, i / COLUMNS), found.order[i]));
+        assert_eq!(wrong.count(), 0);
+    }
 }

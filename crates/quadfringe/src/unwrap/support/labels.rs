@@ -67,7 +67,8 @@ impl Labels {
         let per_column = n[0] / code.projector_width() as f64;
         let end = n[0] + 0.5 * per_column;
         let labels = || (0..count).map(|label| label as f64 - 1.0);
-        let beats = ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
+        let beats =
+            ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
         let turns = ratios.map(|ratio| {
             let angle = |k: f64| TAU * (ratio * k).rem_euclid(1.0);
             [
