@@ -12,7 +12,7 @@
 //! | [`projector`] | the projector in the verbs of its user |
 //! | [`flash`] | images of 24 bit for TI's program |
 //! | `usb` | real devices (feature `usb`) |
-//! | `window` | HDMI: a window on the output of a projector (feature `window`) |
+//! | `window` | HDMI: a window on the output of a projector (feature `window`, Linux) |
 //! | `emulator` | a DLPC350 in memory (feature `emulator`) |
 //! | `testbed` | the same behind the real libusb (feature `testbed`, Linux) |
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -34,7 +34,7 @@ pub mod emulator;
 pub mod testbed;
 #[cfg(feature = "usb")]
 pub mod usb;
-#[cfg(feature = "window")]
+#[cfg(all(feature = "window", target_os = "linux"))]
 pub mod window;
 
 pub use error::{Error, Result};
