@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, decode, demo, info, reproduce
+from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce
 from quadfringe.cli.output import complain
 from quadfringe.errors import DecodeError, MissingExtraError
 
@@ -69,3 +69,4 @@ app.command("measure")(bench.measure)
 app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(projector.app, name="projector")
