@@ -22,6 +22,7 @@ test: rust python test-usb
 rust: $(STAMPS)/tools
 	cargo fmt --all --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets -- -D warnings
+	cargo clippy --package lightcrafter --all-targets --all-features -- -D warnings
 	cargo test
 	cargo test --package lightcrafter --no-default-features --features emulator
 	for example in crates/quadfringe/examples/*.rs; do \

@@ -1,4 +1,6 @@
-#![doc = include_str!("../README.md")]
+// The example of the README opens real devices.
+#![cfg_attr(feature = "usb", doc = include_str!("../README.md"))]
+#![cfg_attr(not(feature = "usb"), doc = "Driver for the TI LightCrafter 4500, without its USB backend.")]
 //!
 //! # Map
 //! | | |
@@ -15,7 +17,6 @@
 //! | `window` | HDMI: a window on the output of a projector (feature `window`, Linux) |
 //! | `emulator` | a DLPC350 in memory (feature `emulator`) |
 //! | `testbed` | the same behind the real libusb (feature `testbed`, Linux) |
-#![cfg_attr(docsrs, feature(doc_cfg))]
 
 pub mod command;
 pub mod error;

@@ -10,6 +10,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
+use x11rb::connection::Connection;
+use x11rb::protocol::xproto::{ConnectionExt, ImageFormat};
 
 /// The file in which Xvfb keeps its screen, in the format of xwd.
 const SCREEN: &str = "LIGHTCRAFTER_SCREEN";
@@ -20,17 +22,67 @@ struct Server {
     folder: PathBuf,
 }
 
+/// Two outputs of 912 x 1140, side by side, by the dummy driver of Xorg.
+const TWO_OUTPUTS: &str = r#"
+Section "ServerFlags"
+  Option "AutoAddDevices" "false"
+EndSection
+Section "Device"
+  Identifier "dummy"
+  Driver "dummy"
+  VideoRam 65536
+EndSection
+Section "Monitor"
+  Identifier "monitor"
+  HorizSync 5-1000
+  VertRefresh 5-200
+  Modeline "912x1140" 73.0 912 968 1032 1040 1140 1157 1167 1170
+EndSection
+Section "Screen"
+  Identifier "screen"
+  Device "dummy"
+  Monitor "monitor"
+  DefaultDepth 24
+  SubSection "Display"
+    Depth 24
+    Modes "912x1140"
+    Virtual 4096 2400
+  EndSubSection
+EndSection
+"#;
+
 impl Server {
-    /// A screen of this size; the server chooses a free display.
-    fn start(size: &str) -> Self {
+    /// A screen of this size in memory.
+    fn xvfb(size: &str) -> Self {
+        Self::start(size, |folder| format!("Xvfb -screen 0 {size}x24 -fbdir {folder}"))
+    }
+
+    /// Outputs DUMMY0 and DUMMY1; none where Xorg may not be started or has no dummy driver.
+    fn two_outputs() -> Option<Self> {
+        let driver = Path::new("/usr/lib/xorg/modules/drivers/dummy_drv.so");
+        let root = Command::new("id").arg("-u").output().is_ok_and(|id| id.stdout == b"0\n");
+        if !driver.exists() || !root {
+            return None;
+        }
+        let server = Self::start("two", |folder| {
+            fs::write(format!("{folder}/xorg.conf"), TWO_OUTPUTS).unwrap();
+            format!("Xorg -config {folder}/xorg.conf -logfile {folder}/log -noreset -novtswitch -sharevts")
+        });
+        for order in ["--addmode DUMMY1 912x1140", "--output DUMMY1 --mode 912x1140 --right-of DUMMY0"] {
+            let mut xrandr = Command::new("xrandr");
+            let status = xrandr.env("DISPLAY", &server.display).args(order.split(' ')).status();
+            assert!(status.expect("apt-get install x11-xserver-utils").success(), "xrandr {order}");
+        }
+        Some(server)
+    }
+
+    /// Start a server; it chooses a free display.
+    fn start(size: &str, command: impl FnOnce(&str) -> String) -> Self {
         let folder = std::env::temp_dir().join(format!("lightcrafter-xvfb-{}-{size}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let number = folder.join("number");
-        let command = format!(
-            "exec Xvfb -displayfd 3 -screen 0 {size}x24 -fbdir {} 3>{}",
-            folder.display(),
-            number.display()
-        );
+        let server = command(folder.to_str().unwrap());
+        let command = format!("exec {server} -displayfd 3 3>{}", number.display());
         let mut shell = Command::new("sh");
         let child = shell.args(["-c", &command]).stderr(Stdio::null()).spawn().expect("sh");
         let deadline = Instant::now() + Duration::from_secs(20);
@@ -39,7 +91,7 @@ impl Server {
             if text.ends_with('\n') {
                 break format!(":{}", text.trim());
             }
-            assert!(Instant::now() < deadline, "Xvfb did not start: apt-get install xvfb");
+            assert!(Instant::now() < deadline, "no X server: apt-get install xvfb");
             sleep(Duration::from_millis(20));
         };
         Self { child, display, folder }
@@ -64,8 +116,12 @@ impl Drop for Server {
 
 #[test]
 fn under_xvfb() {
-    Server::start("912x1140").run("every_pixel_is_on_the_screen");
-    Server::start("1920x1140").run("another_size_is_refused");
+    Server::xvfb("912x1140").run("every_pixel_is_on_the_screen");
+    Server::xvfb("1920x1140").run("another_size_is_refused");
+    match Server::two_outputs() {
+        Some(server) => server.run("each_of_two_outputs_gets_its_own"),
+        None => eprintln!("two outputs need root and Xorg: apt-get install xserver-xorg-video-dummy"),
+    }
     let mut without = Command::new(std::env::current_exe().unwrap());
     without.args(["--ignored", "--exact", "no_display_is_an_error"]).env_remove("DISPLAY");
     assert!(without.env_remove("WAYLAND_DISPLAY").status().unwrap().success());
@@ -112,6 +168,30 @@ fn every_pixel_is_on_the_screen() {
     assert!(matches!(error, Error::Output { .. }) && error.to_string().contains(&found[0].name), "{error}");
     drop(window);
     assert!(PatternWindow::open(None).is_ok(), "the only fit output, a second time");
+}
+
+/// Red, green, blue of 912 x 1140 pixels of the desktop, from this column on.
+fn desktop_from(column: i16) -> Vec<u8> {
+    let (connection, screen) = x11rb::connect(None).unwrap();
+    let root = connection.setup().roots[screen].root;
+    let image =
+        connection.get_image(ImageFormat::Z_PIXMAP, root, column, 0, 912, 1140, !0).unwrap().reply().unwrap();
+    image.data.chunks(4).flat_map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
+}
+
+#[test]
+#[ignore = "run by under_xvfb"]
+fn each_of_two_outputs_gets_its_own() {
+    let found = outputs().unwrap();
+    let places: Vec<_> = found.iter().map(|output| (output.name.as_str(), output.position_px)).collect();
+    assert_eq!(places, [("DUMMY0", (0, 0)), ("DUMMY1", (912, 0))]);
+    assert!(PatternWindow::open(None).unwrap_err().to_string().contains("several are fit"));
+    let (left, right) = (noise(10), noise(11));
+    // The second output first: a window that ignored its output would stand on the first.
+    let mut windows = ["DUMMY1", "DUMMY0"].map(|name| PatternWindow::open(Some(name)).unwrap());
+    windows[0].show(&right).unwrap();
+    windows[1].show(&left).unwrap();
+    assert!(desktop_from(0) == left && desktop_from(912) == right);
 }
 
 #[test]
