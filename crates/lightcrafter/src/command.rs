@@ -7,23 +7,27 @@ mod bytes;
 mod display;
 mod led;
 mod pattern;
+mod picture;
 mod status;
+mod table;
 mod trigger;
 
 pub use display::{
-    ChannelOrder, ChannelSwap, Curtain, DisplayArea, DisplayMode, FlashImage, FpdLink, Gamma, ImageLoadTime,
-    InputPort, InputSource, LongAxisFlip, MeasureImageLoad, ParallelWidth, PixelFormat, PortClock, Rectangle,
-    ShortAxisFlip, SwapPort, TestPattern, TestPatternColours,
+    ChannelOrder, ChannelSwap, DisplayArea, DisplayMode, FpdLink, Gamma, InputPort, InputSource,
+    LongAxisFlip, ParallelWidth, PixelFormat, PortClock, Rectangle, ShortAxisFlip, SwapPort,
 };
 pub use led::{BlueLedDelay, GreenLedDelay, LedCurrent, LedEnable, LedPolarity, RedLedDelay};
 pub use pattern::{
-    EntryTrigger, ImageTable, InvertData, LutControl, LutEntry, Mailbox, MailboxOffset, PatternSource,
-    PatternTable, RunState, Timing, TriggerMode, Validate, Validation, VariableControl, VariableEntry,
-    VariableOffset,
+    InvertData, LutControl, Mailbox, MailboxOffset, PatternSource, RunState, Timing, TriggerMode, Validate,
+    Validation,
 };
+pub use picture::{Curtain, FlashImage, ImageLoadTime, MeasureImageLoad, TestPattern, TestPatternColours};
 pub use status::{
     DisplayFreeze, DmdPark, FirmwareTag, FlashImageCount, HardwareStatus, MainStatus, PowerMode,
     SoftwareReset, SystemStatus, Version, Versions, VideoSignal,
+};
+pub use table::{
+    EntryTrigger, ImageTable, LutEntry, PatternTable, VariableControl, VariableEntry, VariableOffset,
 };
 pub use trigger::{EdgeDelay, TriggerIn1Delay, TriggerIn2Edge, TriggerOut1, TriggerOut2};
 
@@ -53,7 +57,8 @@ pub trait Writable: Message {
     const ACCESS: Access = Access::Write;
 }
 
-/// Call a macro with every message: `$visit!(Type, read)`, `(Type, write)` or `(Type, both)`.
+/// Call a macro with every message of [`command`](crate::command), whose names must be in scope: `$visit!(Type, read)`,
+/// `(Type, write)` or `(Type, both)`.
 #[macro_export]
 macro_rules! for_each_message {
     ($visit:ident) => {

@@ -113,12 +113,15 @@ pub fn exposure_in_frame_us(count: usize, bit_depth: u8, frame_rate_hz: f64) -> 
     lightcrafter::sequence::exposure_in_frame_us(count, bit_depth, frame_rate_hz).map_err(device_error)
 }
 
+/// Image, number and bit depth of a pattern in flash.
+type Place = (usize, u8, u8);
+
 /// BMP files of 24 bit, and image, number and bit depth of each pattern.
 #[pyfunction]
 pub fn pack_flash<'py>(
     py: Python<'py>,
     patterns: Vec<(Bound<'py, PyAny>, u8)>,
-) -> PyResult<(Vec<Bound<'py, PyBytes>>, Vec<(usize, u8, u8)>)> {
+) -> PyResult<(Vec<Bound<'py, PyBytes>>, Vec<Place>)> {
     let arrays: PyResult<Vec<_>> =
         patterns.iter().map(|(array, _)| expected::<u8, 2>("pattern", array)).collect();
     let arrays = arrays?;

@@ -61,9 +61,12 @@ impl PatternWindow {
     }
 }
 
+/// One output, as the row below names it.
+type Row = (String, u32, u32, Option<f64>, Option<String>);
+
 /// Name, width, height, frame rate in Hz, and why it cannot carry a pattern, of every output that is on.
 #[pyfunction]
-pub fn outputs(py: Python<'_>) -> PyResult<Vec<(String, u32, u32, Option<f64>, Option<String>)>> {
+pub fn outputs(py: Python<'_>) -> PyResult<Vec<Row>> {
     let outputs = py.detach(lightcrafter::window::outputs).map_err(device_error)?;
     let row = |output: lightcrafter::window::Output| {
         let unfit = output.unfit();
