@@ -42,10 +42,10 @@ stubs: $(STAMPS)/built
 	$(BIN)/python -m mypy.stubtest quadfringe._core
 
 # Two projectors in a umockdev testbed: the driver in Rust and through the wheel, over the real libusb, and the window
-# under Xvfb. The crate's other tests run along.
+# under Xvfb.
 test-usb: $(STAMPS)/built
 	scripts/set-up testbed
-	cargo test --package lightcrafter --all-features
+	cargo test --package lightcrafter --all-features --lib --test libusb --test window
 	cargo run --quiet --package lightcrafter --no-default-features --features testbed --bin lightcrafter-testbed -- $(BIN)/pytest tests/usb
 
 # Any bytes to the decoders, the driver and the emulator, on the stable compiler: libFuzzer with LLVM's counters.

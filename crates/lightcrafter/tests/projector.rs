@@ -235,6 +235,13 @@ fn the_lock_is_asked_for_before_pattern_mode() {
     assert!(matches!(bench.projector.show_video(), Err(Error::NotLocked { .. })));
     bench.device().video = true;
     bench.projector.play(&colour_video()).unwrap();
+    // While patterns run the signal reads as not locked; neither video nor other patterns are kept back by that.
+    bench.projector.show_video().unwrap();
+    bench.projector.show_flash_image(0).unwrap();
+    bench.projector.play(&colour_flash()).unwrap();
+    bench.projector.play(&colour_video()).unwrap();
+    assert_eq!(bench.projector.read::<InputSource>().unwrap(), InputSource::HDMI);
+    assert!(bench.projector.status().unwrap().main.running);
 }
 
 #[test]

@@ -13,13 +13,13 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 impl<T: Transport> LightCrafter<T> {
-    /// Show the video input as it is, in linear light. The input must be locked first.
+    /// Show the video input as it is, in linear light; an error when it does not lock.
     pub fn show_video(&mut self) -> Result<()> {
         self.set_power(PowerMode::Normal)?;
-        self.select_input(InputSource::HDMI)?;
-        self.wait_for_lock()?;
         self.enter(DisplayMode::Video)?;
-        self.write(&Gamma::LINEAR)
+        self.select_input(InputSource::HDMI)?;
+        self.write(&Gamma::LINEAR)?;
+        self.wait_for_lock().map(|_| ())
     }
 
     /// Show a picture of the generator, in video mode.
@@ -100,12 +100,13 @@ impl<T: Transport> LightCrafter<T> {
         Err(Error::value(name, format!("below {present}, the number of images there"), last))
     }
 
-    /// Once patterns run the signal reads as not locked, so the lock is asked for before.
+    /// In pattern mode the signal reads as not locked, so the lock is asked for before.
     fn enter_pattern_mode(&mut self, sequence: &Sequence) -> Result<()> {
-        let entered = self.read::<DisplayMode>()? == DisplayMode::PatternSequence;
-        if sequence.from_the_video_input() && !entered {
+        if sequence.from_the_video_input() {
             self.select_input(InputSource::HDMI)?;
-            self.wait_for_lock()?;
+            if self.read::<DisplayMode>()? == DisplayMode::Video {
+                self.wait_for_lock()?;
+            }
         }
         self.enter(DisplayMode::PatternSequence)
     }
@@ -190,8 +191,12 @@ impl<T: Transport> LightCrafter<T> {
             self.enter_pattern_mode(&sequence)?;
             self.send(&sequence)?;
         }
+        self.begin()
+    }
+
+    /// Run, and see that patterns are shown: the board goes to video by itself when HDMI data appear.
+    fn begin(&mut self) -> Result<()> {
         self.run(RunState::Start)?;
-        // The board goes to video by itself when HDMI data appear.
         match self.read::<DisplayMode>()? {
             DisplayMode::PatternSequence => Ok(()),
             other => Err(self.stuck(&DisplayMode::PatternSequence, &other, Duration::ZERO)),
@@ -201,7 +206,7 @@ impl<T: Transport> LightCrafter<T> {
     /// Load and start.
     pub fn play(&mut self, sequence: &Sequence) -> Result<Validation> {
         let verdict = self.load(sequence)?;
-        self.run(RunState::Start)?;
+        self.begin()?;
         Ok(verdict)
     }
 
