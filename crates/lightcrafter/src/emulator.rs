@@ -48,6 +48,7 @@ pub struct Dlpc350 {
     frozen: bool,
     redundant_modes: u32,
     start_pending: bool,
+    silent_left: u32,
     assembler: Assembler,
     faults: VecDeque<Fault>,
     log: VecDeque<Request>,
@@ -73,6 +74,7 @@ impl Dlpc350 {
             frozen: false,
             redundant_modes: 0,
             start_pending: false,
+            silent_left: 0,
             assembler: Assembler::default(),
             faults: VecDeque::new(),
             log: VecDeque::new(),
@@ -143,10 +145,21 @@ impl Dlpc350 {
         let waking = self.quirks.silent_wake && self.asleep();
         let outcome = if fault == Some(Fault::Refuse) { None } else { self.execute(&request) };
         let unheard = waking && request.word == 0x0200 && !self.asleep();
-        if self.frozen || unheard || request.access == Access::WriteUnacknowledged {
+        if self.frozen || self.silent(unheard) || request.access == Access::WriteUnacknowledged {
             return Vec::new();
         }
         answers(&request, outcome, fault)
+    }
+
+    /// Neither waking nor some commands after it are answered.
+    fn silent(&mut self, unheard: bool) -> bool {
+        if unheard {
+            self.silent_left = self.quirks.silent_reads_after_waking;
+            return true;
+        }
+        let silent = self.silent_left > 0;
+        self.silent_left -= u32::from(silent);
+        silent
     }
 
     fn remember(&mut self, request: &Request) {

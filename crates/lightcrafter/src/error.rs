@@ -58,7 +58,7 @@ pub enum Error {
         /// How long was waited.
         waited_ms: u64,
     },
-    /// USB failed at {place} while {doing}: {reason}
+    /// USB failed at {place} while {doing}: {reason}; plug the projector in again, and pass USB (/dev/bus/usb) into a container or virtual machine
     Usb {
         /// Bus and port path.
         place: String,
@@ -85,7 +85,7 @@ pub enum Error {
         /// The number received.
         actual: u8,
     },
-    /// malformed {what}: expected {expected}, got {actual}
+    /// malformed {what}: expected {expected}, got {actual}; try again, and switch the power of the projector off and on when it repeats
     Malformed {
         /// The message at fault.
         what: String,
@@ -127,6 +127,11 @@ pub enum Error {
         actual: String,
         /// How long was waited.
         waited_ms: u64,
+    },
+    /// the projector at {place} went to video by itself, as it does when HDMI data appear; connect and enable the HDMI output first, then load and start the patterns again
+    LeftPatterns {
+        /// Bus and port path.
+        place: String,
     },
     /// output {wanted}: {reason}; outputs: {present}
     Output {

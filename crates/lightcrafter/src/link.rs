@@ -48,7 +48,7 @@ impl<T: Transport> Link<T> {
         if data.is_empty() {
             return Err(self.refused(&doing(Access::Read, M::NAME)));
         }
-        M::decode(&data).map_err(|error| as_reply(error, M::NAME))
+        M::decode(&data).map_err(|error| at(self.transport.place(), error, &doing(Access::Read, M::NAME)))
     }
 
     /// Set a register; never sent twice, because the first may have been heard.
@@ -61,14 +61,15 @@ impl<T: Transport> Link<T> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Request { access, sequence: self.sequence, word, data };
         let doing = doing(access, name);
-        let reply = self.exchange(&request, &doing);
+        let reply =
+            self.exchange(&request, &doing).map_err(|error| at(self.transport.place(), error, &doing));
         self.residue = reply.as_ref().is_err_and(Error::leaves_residue);
         reply
     }
 
     fn exchange(&mut self, request: &Request, doing: &str) -> Result<Vec<u8>> {
         for report in request.to_reports()? {
-            self.transport.send(&report, self.reply_timeout).map_err(|error| at(error, doing))?;
+            self.transport.send(&report, self.reply_timeout)?;
         }
         if request.access == Access::WriteUnacknowledged {
             return Ok(Vec::new());
@@ -79,12 +80,8 @@ impl<T: Transport> Link<T> {
         }
         let echo = request.word.to_le_bytes();
         if reply.read != (request.access == Access::Read) || (!reply.read && reply.data != echo) {
-            let what = format!("reply to {doing}");
-            return Err(Error::malformed(
-                what,
-                format!("one for {:#06x}", request.word),
-                format!("{reply:02x?}"),
-            ));
+            let expected = format!("one for {:#06x}", request.word);
+            return Err(Error::malformed("reply", expected, format!("{reply:02x?}")));
         }
         Ok(reply.data)
     }
@@ -97,17 +94,13 @@ impl<T: Transport> Link<T> {
         loop {
             let remaining = deadline.saturating_duration_since(Instant::now());
             let mut report = [0; REPORT_BYTES];
-            let count = if remaining.is_zero() {
-                0
-            } else {
-                self.transport.receive(&mut report, remaining).map_err(|error| at(error, doing))?
-            };
+            let count =
+                if remaining.is_zero() { 0 } else { self.transport.receive(&mut report, remaining)? };
             if count == 0 {
                 return Err(self.nothing_came(request, doing, stranger));
             }
             if count != REPORT_BYTES {
-                let what = format!("reply to {doing}");
-                return Err(Error::malformed(what, format!("a report of {REPORT_BYTES} bytes"), count));
+                return Err(Error::malformed("reply", format!("a report of {REPORT_BYTES} bytes"), count));
             }
             let Some(message) = assembler.push(&report)? else { continue };
             let reply = Reply::from_message(&message)?;
@@ -149,23 +142,16 @@ fn doing(access: Access, name: &str) -> String {
     format!("{verb} the {name}")
 }
 
-/// A value out of range is the fault of who sent it: of the device, here.
-fn as_reply(error: Error, name: &str) -> Error {
+/// Name the projector and what was asked of it. A value out of range is the fault of who sent it: of the device, here.
+fn at(place: &str, error: Error, doing: &str) -> Error {
+    let doing = doing.to_owned();
     match error {
-        Error::Value { name: field, expected, actual } => {
-            Error::Malformed { what: format!("reply to reading the {name}, {field}"), expected, actual }
+        Error::Timeout { place, waited_ms, .. } => Error::Timeout { place, doing, waited_ms },
+        Error::Usb { place, reason, .. } => Error::Usb { place, doing, reason },
+        Error::Malformed { what: field, expected, actual }
+        | Error::Value { name: field, expected, actual } => {
+            Error::Malformed { what: format!("answer of {place} while {doing} ({field})"), expected, actual }
         }
-        other => other,
-    }
-}
-
-/// Transports do not know what they carry: name it.
-fn at(error: Error, doing: &str) -> Error {
-    match error {
-        Error::Timeout { place, waited_ms, .. } => {
-            Error::Timeout { place, doing: doing.to_owned(), waited_ms }
-        }
-        Error::Usb { place, reason, .. } => Error::Usb { place, doing: doing.to_owned(), reason },
         other => other,
     }
 }

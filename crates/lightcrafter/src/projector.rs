@@ -201,7 +201,24 @@ impl<T: Transport> LightCrafter<T> {
         }
         self.loaded = None;
         sleep(self.waits.wake);
-        self.wait_for(power, self.waits.power)
+        self.wait_for_power(power)
+    }
+
+    /// As [`wait_for`](Self::wait_for), for a controller that may still be silent.
+    fn wait_for_power(&mut self, power: PowerMode) -> Result<()> {
+        let deadline = Instant::now() + self.waits.power;
+        loop {
+            let answer = self.read::<PowerMode>();
+            let late = Instant::now() >= deadline;
+            match answer {
+                Ok(actual) if actual == power => return Ok(()),
+                Ok(actual) if late => return Err(self.stuck(&power, &actual, self.waits.power)),
+                Ok(_) => {}
+                Err(Error::Timeout { .. } | Error::Refused { .. }) if !late => {}
+                Err(error) => return Err(error),
+            }
+            sleep(self.waits.poll);
+        }
     }
 
     /// Start the firmware again. The device leaves the bus, so the projector is used up: open it again after 5 to 10 s.

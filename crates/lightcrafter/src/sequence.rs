@@ -208,12 +208,20 @@ impl Sequence {
 /// The exposure of each pattern, us, when `count` patterns of this bit depth share a frame; an error when they do not fit.
 pub fn exposure_in_frame_us(count: usize, bit_depth: u8, frame_rate_hz: f64) -> Result<u32> {
     let least = depth_limits(bit_depth)?.min_exposure_us;
+    check_frame_rate(frame_rate_hz)?;
     let share = (1e6 / frame_rate_hz / count.max(1) as f64) as u32;
     if share >= least {
         return Ok(share);
     }
     let name = format!("time in us for each of {count} patterns of {bit_depth} bit at {frame_rate_hz} Hz");
     Err(Error::value(name, format!("at least {least}; take fewer bits"), share))
+}
+
+fn check_frame_rate(frame_rate_hz: f64) -> Result<()> {
+    if (1.0..=240.0).contains(&frame_rate_hz) {
+        return Ok(());
+    }
+    Err(Error::value("frame rate in Hz", "1 to 240", frame_rate_hz))
 }
 
 #[cfg(test)]

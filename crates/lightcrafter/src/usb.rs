@@ -21,6 +21,8 @@ const INTERFACE: u8 = 0;
 const OUT: u8 = 0x01;
 const IN: u8 = 0x81;
 const STRINGS_TIMEOUT: Duration = Duration::from_millis(1000);
+/// libusb counts in ms, and takes 0 for "without bound".
+const LEAST_TIMEOUT: Duration = Duration::from_millis(1);
 
 /// Bus and port path: where a cable is plugged in.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -111,7 +113,7 @@ pub fn list() -> Result<Vec<Found>> {
 }
 
 fn devices() -> Result<Vec<(Found, Device<Context>)>> {
-    let failed = |error| from_libusb(error, "this computer", "listing devices");
+    let failed = |error| from_libusb(error, "this computer", "listing its devices");
     let context = Context::new().map_err(failed)?;
     let mut present = Vec::new();
     for device in context.devices().map_err(failed)?.iter() {
@@ -174,6 +176,7 @@ impl UsbTransport {
 impl Transport for UsbTransport {
     fn send(&mut self, report: &Report, timeout: Duration) -> Result<()> {
         let doing = "sending a report";
+        let timeout = timeout.max(LEAST_TIMEOUT);
         match self.handle.write_interrupt(OUT, report, timeout) {
             Ok(count) if count == report.len() => Ok(()),
             Ok(count) => {
@@ -189,9 +192,7 @@ impl Transport for UsbTransport {
     }
 
     fn receive(&mut self, report: &mut Report, timeout: Duration) -> Result<usize> {
-        // libusb takes 0 for "without bound".
-        let timeout = timeout.max(Duration::from_millis(1));
-        match self.handle.read_interrupt(IN, report, timeout) {
+        match self.handle.read_interrupt(IN, report, timeout.max(LEAST_TIMEOUT)) {
             Ok(count) => Ok(count),
             Err(rusb::Error::Timeout) => Ok(0),
             Err(error) => Err(from_libusb(error, &self.place, "receiving a report")),

@@ -12,7 +12,12 @@ use lightcrafter::{Error, LightCrafter, Sequence, Waits, for_each_message};
 use std::thread;
 use std::time::{Duration, Instant};
 
+mod registers;
+
 type Projector = LightCrafter<UsbTransport>;
+
+/// More than a loaded machine needs beyond the waits of the driver.
+const SLACK: Duration = Duration::from_secs(3);
 
 fn at(port: &str) -> Selector {
     Selector::Port(port.parse::<PortPath>().unwrap())
@@ -107,7 +112,7 @@ fn an_unplug_in_the_middle_is_an_error_at_once() {
     let start = Instant::now();
     let error = projector.load(&Sequence::from_flash(0, colour_channels(8), 8333)).unwrap_err();
     assert!(matches!(error, Error::Disconnected { .. }), "{error}");
-    assert!(start.elapsed() < Duration::from_secs(1));
+    assert!(start.elapsed() < Waits::default().reply, "no wait ended by its bound");
     assert!(matches!(projector.versions(), Err(Error::Disconnected { .. })));
     assert!(matches!(LightCrafter::open(&at("1-2")), Err(Error::NotFound { .. })));
     drop(projector);
@@ -134,10 +139,7 @@ fn faults_end_in_their_errors_within_their_time() {
         let error = projector.versions().unwrap_err();
         let took = start.elapsed();
         assert!(expected(&error), "{fault}: {error}");
-        assert!(
-            took >= reply * waits && took < reply * waits + Duration::from_millis(400),
-            "{fault}: {took:?}"
-        );
+        assert!(took >= reply * waits && took < reply * waits + SLACK, "{fault}: {took:?}");
         assert_eq!(projector.firmware_tag().unwrap(), "QF-EMULATOR-1-1", "after {fault}");
     }
     order("1-1", "fault stale 5");
@@ -179,9 +181,12 @@ fn every_command_crosses_libusb() {
         (SoftwareReset, write) => {};
         ($name:ident, write) => {};
     }
+    registers::every_register_returns(&mut projector);
+    order("1-1", "plug");
     // Writing the mode again is what freezes the chip, so the projector rests in pattern mode meanwhile.
     projector.write(&DisplayMode::PatternSequence).unwrap();
-    while projector.read::<DisplayMode>().unwrap() != DisplayMode::PatternSequence {}
+    let arrived = |_| projector.read::<DisplayMode>().unwrap() == DisplayMode::PatternSequence;
+    assert!((0..100).any(arrived), "pattern mode");
     for_each_message!(visit);
     projector.write(&Mailbox::Patterns).unwrap();
     projector.write(&MailboxOffset(0)).unwrap();
@@ -259,9 +264,11 @@ fn hammering_from_two_threads() {
     };
     let threads = [thread::spawn(hammer("1-1", 1)), thread::spawn(hammer("1-2", 2))];
     let mut times: Vec<Duration> = threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect();
-    times.sort();
     assert_eq!(times.len(), 2 * EACH);
-    let (median, last) = (times[EACH], times[2 * EACH - 1]);
-    println!("{} transactions, median {median:?}, slowest {last:?}", 2 * EACH);
-    assert!(median < Duration::from_millis(5), "{median:?}");
+    // Of ten stretches the fastest: other programs may slow some of them down, a wait in the driver slows all.
+    let median = |times: &mut [Duration]| *times.select_nth_unstable(times.len() / 2).1;
+    let fastest = times.chunks(EACH / 5).map(|stretch| median(&mut stretch.to_vec())).min().unwrap();
+    let (all, last) = (median(&mut times), times.iter().max().unwrap());
+    println!("{} transactions, median {all:?} ({fastest:?} at best), slowest {last:?}", 2 * EACH);
+    assert!(fastest < Duration::from_millis(5), "{fastest:?}");
 }

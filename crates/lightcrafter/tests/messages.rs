@@ -3,13 +3,11 @@
 
 use lightcrafter::command::*;
 use lightcrafter::emulator::{Dlpc350, EmulatedTransport, Fault};
-use lightcrafter::for_each_message;
 use lightcrafter::packet::{Access, DATA_BYTES, REPORT_BYTES, Request};
-use lightcrafter::{LightCrafter, Waits};
+use lightcrafter::{LightCrafter, for_each_message};
 use proptest::prelude::*;
 use std::collections::BTreeSet;
 use std::fmt::Debug;
-use std::time::Duration;
 
 /// Decode; when that succeeds, encode and decode again. Returns whether it succeeded.
 fn survives<M: Message + PartialEq + Debug>(data: &[u8]) -> bool {
@@ -128,8 +126,7 @@ fn faults_are_named() {
 
 #[test]
 fn what_the_emulator_answers_the_driver_can_read() {
-    let waits = Waits { reply: Duration::from_millis(50), ..Waits::default() };
-    let mut projector = LightCrafter::new(EmulatedTransport::new(Dlpc350::default())).with_waits(waits);
+    let mut projector = LightCrafter::new(EmulatedTransport::new(Dlpc350::default()));
     projector.write(&Mailbox::Patterns).unwrap();
     macro_rules! visit {
         ($name:ident, write) => {};

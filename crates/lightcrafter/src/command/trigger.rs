@@ -76,7 +76,7 @@ fn invert_byte(byte: u8) -> Result<u8> {
     Ok(in_range("invert byte of a trigger output", byte.into(), 0, 3)? as u8)
 }
 
-/// Trigger output 2: a pulse of 20 us at the start of the pattern sequence.
+/// Trigger output 2: a pulse of fixed length at the start of the pattern sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TriggerOut2 {
     /// The byte with the invert bit, as in [`TriggerOut1`].
@@ -104,7 +104,7 @@ direction!(TriggerOut2, both);
 /// Delay of trigger input 1, in steps of 107.136 ns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct TriggerIn1Delay {
-    /// Steps, 18 bits and one.
+    /// Steps, 19 bits.
     pub steps: u32,
 }
 

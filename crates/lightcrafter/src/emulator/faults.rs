@@ -46,6 +46,8 @@ pub struct Quirks {
     pub ignores_first_start: bool,
     /// Waking from standby is not acknowledged.
     pub silent_wake: bool,
+    /// Commands after waking that are not answered either.
+    pub silent_reads_after_waking: u32,
     /// Reads of the verdict that still say busy.
     pub busy_polls: u32,
     /// Reads after which a new mode or run state shows.
@@ -61,6 +63,7 @@ impl Default for Quirks {
         Self {
             ignores_first_start: true,
             silent_wake: true,
+            silent_reads_after_waking: 0,
             busy_polls: 3,
             lag_polls: 1,
             redundant_modes_to_freeze: 3,

@@ -57,6 +57,8 @@ impl<T: Transport> LightCrafter<T> {
         }
         if mode == DisplayMode::Video {
             self.stop()?;
+            // Delays of the LEDs belong to patterns alone.
+            self.set_led_delays_us([0.0; 3], [0.0; 3])?;
         }
         self.loaded = None;
         self.write(&mode)?;
@@ -147,9 +149,10 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&Mailbox::Close)?;
         let Source::Flash { images, .. } = &sequence.source else { return Ok(()) };
         self.write(&Mailbox::Images)?;
-        // In chunks, because a table holds 64 entries in one message.
-        for (i, chunk) in images.chunks(64).enumerate() {
-            self.write(&VariableOffset(64 * i as u16))?;
+        // In chunks, because a table holds 64 entries in one message; never of two, which the firmware exchanges.
+        let size = if images.len() % 64 == 2 { 63 } else { 64 };
+        for (i, chunk) in images.chunks(size).enumerate() {
+            self.write(&VariableOffset((size * i) as u16))?;
             self.write(&ImageTable(chunk.to_vec()))?;
         }
         self.write(&Mailbox::Close)
@@ -199,7 +202,10 @@ impl<T: Transport> LightCrafter<T> {
         self.run(RunState::Start)?;
         match self.read::<DisplayMode>()? {
             DisplayMode::PatternSequence => Ok(()),
-            other => Err(self.stuck(&DisplayMode::PatternSequence, &other, Duration::ZERO)),
+            DisplayMode::Video => {
+                self.loaded = None;
+                Err(Error::LeftPatterns { place: self.place() })
+            }
         }
     }
 
@@ -218,9 +224,9 @@ impl<T: Transport> LightCrafter<T> {
     /// Stop the patterns, and wait until nothing runs.
     pub fn stop(&mut self) -> Result<()> {
         self.run(RunState::Stop)?;
-        if self.loaded.as_ref().is_some_and(Sequence::from_the_video_input) {
+        if let Some(Sequence { source: Source::Video { frame_rate_hz }, .. }) = &self.loaded {
             // Two frames, as the input is buffered twice.
-            sleep(Duration::from_millis(34));
+            sleep(Duration::from_secs_f64(2.0 / frame_rate_hz));
         }
         Ok(())
     }

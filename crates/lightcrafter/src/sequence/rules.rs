@@ -1,6 +1,6 @@
 //! The rules that a sequence must keep, as far as they can be known without the projector.
 
-use super::{Exposures, MAX_EXPOSURE_US, MIN_GAP_US, Sequence, Source, depth_limits};
+use super::{Exposures, MAX_EXPOSURE_US, MIN_GAP_US, Sequence, Source, check_frame_rate, depth_limits};
 use crate::command::{EntryTrigger, Timing, TriggerMode};
 use crate::error::{Error, Result};
 
@@ -102,9 +102,7 @@ impl Sequence {
     }
 
     fn check_frames(&self, frame_rate_hz: f64) -> Result<()> {
-        if !(1.0..=240.0).contains(&frame_rate_hz) {
-            return Err(Error::value("frame rate in Hz", "1 to 240", frame_rate_hz));
-        }
+        check_frame_rate(frame_rate_hz)?;
         let frame_us = (1e6 / frame_rate_hz) as u64;
         let mut used_us = 0;
         for (i, pattern) in self.patterns.iter().enumerate() {

@@ -38,6 +38,9 @@ fn a_colour_image_fits_into_a_frame_with_7_bits_and_not_with_8() {
     let error = exposure_in_frame_us(3, 8, 60.0).unwrap_err().to_string();
     assert!(error.contains("at least 8333") && error.contains("5555"), "{error}");
     assert_eq!(exposure_in_frame_us(2, 8, 60.0).unwrap(), 8333);
+    for rate_hz in [0.0, -60.0, f64::NAN, 241.0] {
+        assert!(exposure_in_frame_us(3, 7, rate_hz).unwrap_err().to_string().contains("1 to 240"));
+    }
     refused(&Sequence::from_video(colour_channels(7), 60.0, 5600), &["at most 16666", "16800"]);
 }
 

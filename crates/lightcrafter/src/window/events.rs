@@ -53,7 +53,7 @@ fn start() -> std::result::Result<Mutex<EventLoopProxy<Order>>, String> {
     let run = move || {
         let event_loop: EventLoop<Order> = match EventLoop::with_user_event().with_any_thread(true).build() {
             Ok(event_loop) => event_loop,
-            Err(error) => return drop(ready.send(Err(error.to_string()))),
+            Err(error) => return drop(ready.send(Err(reason(error)))),
         };
         let _ = ready.send(Ok(Mutex::new(event_loop.create_proxy())));
         // When the display goes away, so does the thread, and `ask` says so.
@@ -61,7 +61,15 @@ fn start() -> std::result::Result<Mutex<EventLoopProxy<Order>>, String> {
     };
     let thread = thread::Builder::new().name("pattern windows".into()).spawn(run);
     thread.map_err(|error| error.to_string())?;
-    started.recv().map_err(|error| error.to_string())?
+    let silent = |_| format!("the display did not answer within {} s", PATIENCE.as_secs());
+    started.recv_timeout(PATIENCE).map_err(silent)?
+}
+
+/// The words of an error of the window system, without the place in its source that winit puts before them.
+fn reason(error: impl std::fmt::Display) -> String {
+    let text = error.to_string();
+    let words = text.strip_prefix("os error at ").and_then(|rest| rest.split_once(": "));
+    words.map_or(text.as_str(), |(_, words)| words).trim_end_matches('.').to_owned()
 }
 
 /// A window, what it shows, and who waits for it.
@@ -98,7 +106,7 @@ fn output(monitor: &MonitorHandle, wayland: bool) -> Output {
 }
 
 fn no_display(error: impl std::fmt::Display) -> Error {
-    Error::NoDisplay { reason: error.to_string() }
+    Error::NoDisplay { reason: reason(error) }
 }
 
 impl Panes {
