@@ -116,6 +116,7 @@ def test_a_pair_of_projectors_is_told_apart_by_ports() -> None:
         ({"led_drive": [1, 2, 256]}, {}, "projectors.visible.led_drive.2"),
         ({"brightness": 1}, {}, "projectors.visible.brightness: this key is not known"),
         ({"leds": "x"}, {}, "projectors.visible.leds"),
+        ({"light": "external", "led_drive": [1, 1, 1]}, {}, "led_drive needs led_drive_limit"),
     ],
 )
 def test_projectors_at_fault_are_named(visible: dict[str, object], infrared: dict[str, object], reason: str) -> None:

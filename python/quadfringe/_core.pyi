@@ -275,6 +275,9 @@ class LightCrafter:
     One command is in flight at a time, and every wait has a bound: 2 s for a reply, 10 s for a change of state. What
     the caller chose wrongly is a ValueError; what the device did is an OSError: FileNotFoundError when it is absent,
     PermissionError with the udev rule, TimeoutError, ConnectionError when it was unplugged. Opening sends nothing.
+
+    `light` is TI's own light engine ("evm") or another ("external"), whose `drive_limit` must be stated before a drive
+    is set; `current_inverted` says whether its register is 0 at full current, as TI's is.
     """
 
     def __new__(
@@ -284,6 +287,7 @@ class LightCrafter:
         serial: str | None = None,
         light: str = "evm",
         drive_limit: _Bytes3 | None = None,
+        current_inverted: bool | None = None,
         trigger_invert_byte: int | None = None,
     ) -> Self: ...
     @property

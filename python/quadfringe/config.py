@@ -167,8 +167,8 @@ class ProjectorConfig(Model):
 
     `leds` light a grey pattern; a colour pattern has a LED for each colour. Drives are red, green, blue from 0 (off)
     to 255; beyond those of TI's light engine after power-on, or with another one (`light = "external"`), the limit must
-    be stated. An absent drive stays as it is after power-on; an absent exposure is as long as the frame allows, and
-    from flash as short as 8 bit allow.
+    be stated, and `led_current_inverted` set to false where 255 in the register is full current. An absent drive stays
+    as it is after power-on; an absent exposure is as long as the frame allows, and from flash as short as 8 bit allow.
     """
 
     port: Annotated[str, Field(pattern=r"^\d{1,3}-\d{1,3}(\.\d{1,3})*$")]
@@ -178,6 +178,7 @@ class ProjectorConfig(Model):
     leds: Literal["r", "g", "b", "rg", "rb", "gb", "rgb"] = "rgb"
     led_drive: Drive | None = None
     led_drive_limit: Drive | None = None
+    led_current_inverted: bool = True
     exposure_us: Microseconds | None = None
     trigger_invert_byte: Literal[1, 2] = 1
     flip_long_axis: bool = False
@@ -187,6 +188,12 @@ class ProjectorConfig(Model):
     def _one_route(self) -> ProjectorConfig:
         if (self.hdmi is None) == (self.flash is None):
             raise ValueError("expected hdmi or flash, and one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _drive_within_a_limit(self) -> ProjectorConfig:
+        if self.light == "external" and self.led_drive is not None and self.led_drive_limit is None:
+            raise ValueError("led_drive needs led_drive_limit: the safe currents of an external light are not known")
         return self
 
 

@@ -79,7 +79,7 @@ def test_faults_have_their_own_exceptions(order: Order) -> None:
             start = time.monotonic()
             with pytest.raises(kind, match=reason):
                 projector.versions()
-            assert time.monotonic() - start < 5
+            assert time.monotonic() - start < 2 * 2.0 + 5.0  # a read is asked twice
             assert projector.firmware_tag() == "QF-EMULATOR-1-1", fault
         order("1-1", "fault unplug 1")
         with pytest.raises(ConnectionError, match="left the bus"):
@@ -147,6 +147,10 @@ def test_light_triggers_and_geometry() -> None:
         assert projector.status()["frozen"]
     with LightCrafter("1-2", light="external") as projector, pytest.raises(ValueError, match="limit stated"):
         projector.set_led_drive((1, 1, 1))
+    with LightCrafter("1-2", light="external", drive_limit=(9, 9, 9), current_inverted=False) as projector:
+        projector.set_led_drive((1, 2, 3))
+    with LightCrafter("1-2") as projector:
+        assert projector.led_drive() == (254, 253, 252), "the register as TI's board understands it"
     with pytest.raises(ValueError, match="evm or external"):
         LightCrafter("1-2", light="laser")
 
@@ -200,7 +204,8 @@ def test_hammering_from_two_threads() -> None:
     for thread in threads:
         thread.join()
     assert len(times) == 2000
-    assert median(times) < 0.005
+    # Of ten stretches the fastest: other programs may slow some of them down, a wait in the driver slows all.
+    assert min(median(times[i : i + 200]) for i in range(0, 2000, 200)) < 0.005
 
 
 def test_flash_images_are_packed_for_the_program_of_ti() -> None:

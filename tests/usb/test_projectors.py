@@ -162,6 +162,40 @@ def test_the_readme_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         assert result.exit_code == 0, (line, result.output)
 
 
+def test_the_other_projector_is_stopped_when_one_is_gone(order: Order, flash_system: Path) -> None:
+    for stop in ("by command", "as a pair"):
+        config = load_system(flash_system)
+        pair = open_projector(config)
+        assert isinstance(pair, CoaxialPair)
+        pair.show(config.fringes)
+        if stop == "by command":
+            pair.release()
+        order("1-1", "unplug")
+        if stop == "by command":
+            result = run("stop", "--system", flash_system)
+            assert result.exit_code == 1
+            assert "no LightCrafter 4500 at port 1-1" in result.stderr
+        else:
+            with pytest.raises(ConnectionError):
+                pair.stop()
+            pair.release()
+        assert "port 1-2: stopped" in run("status", "--port", "1-2").stdout
+        order("1-1", "plug")
+
+
+def test_a_projector_that_went_to_video_is_shown_again(order: Order, flash_system: Path) -> None:
+    config = load_system(flash_system)
+    assert config.projectors is not None
+    with CoaxialPair(config.projectors) as pair:
+        pair.show(config.fringes)
+        pair.pause()
+        order("1-1", "video appears")
+        with pytest.raises(OSError, match="HDMI data appear"):
+            pair.start()
+        pair.show(config.fringes)
+        assert pair.visible.device.status()["running"]
+
+
 def test_a_device_error_is_a_failed_run(order: Order) -> None:
     order("1-1", "fault silence 2")
     result = run("status", "--port", "1-1")

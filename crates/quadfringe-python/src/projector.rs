@@ -49,13 +49,15 @@ impl LightCrafter {
 #[pymethods]
 impl LightCrafter {
     #[new]
-    #[pyo3(signature = (port = None, *, serial = None, light = "evm", drive_limit = None, trigger_invert_byte = None))]
+    #[pyo3(signature = (port = None, *, serial = None, light = "evm", drive_limit = None, current_inverted = None,
+        trigger_invert_byte = None))]
     fn new(
         py: Python<'_>,
         port: Option<&str>,
         serial: Option<String>,
         light: &str,
         drive_limit: Option<[u8; 3]>,
+        current_inverted: Option<bool>,
         trigger_invert_byte: Option<u8>,
     ) -> PyResult<Self> {
         let selector = match (port, serial) {
@@ -66,6 +68,7 @@ impl LightCrafter {
         };
         let mut profile = names::profile(light)?;
         profile.drive_limit = drive_limit.or(profile.drive_limit);
+        profile.current_inverted = current_inverted.unwrap_or(profile.current_inverted);
         profile.trigger_invert_byte = trigger_invert_byte.unwrap_or(profile.trigger_invert_byte);
         let driver = py.detach(|| Driver::open(&selector)).map_err(device_error)?.with_profile(profile);
         Ok(Self { place: driver.place(), driver: Mutex::new(Some(driver)) })

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -14,7 +14,7 @@ from quadfringe.cli.output import complain, say
 from quadfringe.errors import InputError
 
 if TYPE_CHECKING:
-    from quadfringe.config import SystemConfig
+    from quadfringe.config import ProjectorConfig, SystemConfig
     from quadfringe.devices.lightcrafter import LightCrafter
 
 __all__ = ["app"]
@@ -45,25 +45,42 @@ def _system(file: Path) -> SystemConfig:
 
     config = load_system(file)
     if config.projectors is None:
-        raise InputError(f"{file}: no [projectors] table: its fringes are shown by the virtual bench")
+        raise InputError(
+            f"{file}: no [projectors] table, so that its fringes are shown by the virtual bench (quadfringe simulate); "
+            "add one that names two ports, as the README has it"
+        )
     return config
 
 
-def _chosen(port: str | None) -> LightCrafter:
-    from quadfringe.devices.lightcrafter import LightCrafter
+def _chosen(which: ProjectorConfig | str | None) -> LightCrafter:
+    from quadfringe.devices.lightcrafter import LightCrafter, open_device
 
-    return LightCrafter(port)
+    return LightCrafter(which) if which is None or isinstance(which, str) else open_device(which)
 
 
-def _each(port: str | None, system: Path | None) -> list[str | None]:
-    """Give the ports that are meant."""
+def _meant(port: str | None, system: Path | None) -> Sequence[ProjectorConfig | str | None]:
+    """Give the projectors that are meant: one by its port, the only one, or both of a system."""
     if system is None:
         return [port]
     if port is not None:
         raise InputError("give --port or --system, not both")
     projectors = _system(system).projectors
     assert projectors is not None
-    return [projectors.visible.port, projectors.infrared.port]
+    return [projectors.visible, projectors.infrared]
+
+
+def _each(port: str | None, system: Path | None, act: Callable[[LightCrafter], object]) -> None:
+    """Do it to every projector that is meant, also when one of them fails."""
+    failed = False
+    for one in _meant(port, system):
+        try:
+            with _chosen(one) as device:
+                act(device)
+        except OSError as error:
+            complain(str(error))
+            failed = True
+    if failed:
+        raise typer.Exit(FAILED)
 
 
 @app.command("list")
@@ -84,9 +101,7 @@ def list_projectors() -> None:
 @app.command()
 def status(port: PortOption = None, system: SystemOption = None) -> None:
     """Say what projectors do, and what is wrong with them."""
-    for one in _each(port, system):
-        with _devices(), _chosen(one) as device:
-            _report(device)
+    _each(port, system, _report)
 
 
 def _report(device: LightCrafter) -> list[str]:
@@ -94,7 +109,8 @@ def _report(device: LightCrafter) -> list[str]:
     firmware = device.versions()["application"]
     say(f"port {device.port}: {state['run']}, mode {state['mode']}, power {state['power']}, input {state['input']}")
     say(f"  firmware {firmware} ({device.firmware_tag()}), {device.flash_image_count()} images in flash")
-    say(f"  video: {state['video']}; LED drive (red, green, blue) {' '.join(map(str, device.led_drive()))}")
+    video = state["video"] if state["mode"] == "video" else "not watched in pattern mode"
+    say(f"  video: {video}; LED drive (red, green, blue) {' '.join(map(str, device.led_drive()))}")
     for fault in state["faults"]:
         say(f"  fault: {fault}")
     return state["faults"]
@@ -193,19 +209,23 @@ def _start_from_flash(config: SystemConfig, file: Path) -> None:
 @app.command()
 def pause(port: PortOption = None, system: SystemOption = None) -> None:
     """Hold the current pattern."""
-    for one in _each(port, system):
-        with _devices(), _chosen(one) as device:
-            device.pause()
-            say(f"port {device.port}: paused")
+    _each(port, system, _pause)
+
+
+def _pause(device: LightCrafter) -> None:
+    device.pause()
+    say(f"port {device.port}: paused")
 
 
 @app.command()
 def stop(port: PortOption = None, system: SystemOption = None) -> None:
     """Stop the patterns."""
-    for one in _each(port, system):
-        with _devices(), _chosen(one) as device:
-            device.stop()
-            say(f"port {device.port}: stopped")
+    _each(port, system, _stop)
+
+
+def _stop(device: LightCrafter) -> None:
+    device.stop()
+    say(f"port {device.port}: stopped")
 
 
 @app.command()

@@ -37,6 +37,7 @@ __all__ = [
     "PatternSequence",
     "PatternWindow",
     "lightcrafters",
+    "open_device",
     "outputs",
     "pack_flash",
     "udev_rule",
@@ -57,7 +58,7 @@ class PatternProjector:
         self._window: PatternWindow | None = None
         self._playing = False
         with ExitStack() as opened:
-            self.device = opened.enter_context(_opened(config))
+            self.device = opened.enter_context(open_device(config))
             _set_up(self.device, config)
             if config.hdmi is not None:
                 # HDMI data would take a projector that shows patterns back to video: the window comes first.
@@ -107,8 +108,10 @@ class PatternProjector:
         return [Pattern(number, depth, led) for number, led in enumerate(COLOURS)]
 
     def start(self) -> None:
-        """Go on after a pause or a stop."""
+        """Go on after a pause or a stop; after an error, `show` loads the patterns again."""
+        playing, self._playing = self._playing, False
         self.device.start()
+        self._playing = playing
 
     def pause(self) -> None:
         """Hold the current pattern."""
@@ -173,9 +176,10 @@ class CoaxialPair:
         self.infrared.pause()
 
     def stop(self) -> None:
-        """Show nothing."""
-        self.visible.stop()
-        self.infrared.stop()
+        """Show nothing, also on the other one when one fails."""
+        with ExitStack() as other:
+            other.callback(self.infrared.stop)
+            self.visible.stop()
 
     def release(self) -> None:
         """Release both, which go on showing what is in flash."""
@@ -198,11 +202,13 @@ class CoaxialPair:
         self.close()
 
 
-def _opened(config: ProjectorConfig) -> LightCrafter:
+def open_device(config: ProjectorConfig) -> LightCrafter:
+    """Open the projector of these settings, with its light engine; nothing is sent."""
     return LightCrafter(
         config.port,
         light=config.light,
         drive_limit=config.led_drive_limit,
+        current_inverted=config.led_current_inverted,
         trigger_invert_byte=config.trigger_invert_byte,
     )
 
