@@ -49,7 +49,8 @@ def test_the_script_and_the_module_are_the_same_command() -> None:
     plain = {**os.environ, "NO_COLOR": "1", "COLUMNS": "100"}
     for command in ([str(script)], [sys.executable, "-m", "quadfringe"]):
         done = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True, env=plain)
-        for name in ("demo", "pattern", "simulate", "decode", "measure", "info", "calibrate", "reproduce", "bench"):
+        commands = ("demo", "pattern", "simulate", "decode", "measure", "info", "calibrate", "projector", "reproduce")
+        for name in (*commands, "bench"):
             assert name in done.stdout
 
 

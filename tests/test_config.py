@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from quadfringe.config import (
     load_system,
 )
 from quadfringe.errors import ConfigError, InputError
+from quadfringe.scanner import open_system
 
 
 def write(folder: Path, text: str) -> Path:
@@ -89,3 +91,41 @@ def test_one_number_stands_for_all_channels(tmp_path: Path) -> None:
 def test_channels_that_are_left_out_are_linear() -> None:
     response = Response.model_validate({"red": {"exponent": 0.5}})
     assert response.rows() == [(0.0, 0.5, 0.0), *[(0.0, 1.0, 0.0)] * 3]
+
+
+VISIBLE = {"port": "1-1", "hdmi": {"output": "HDMI-1"}}
+INFRARED = {"port": "1-2", "flash": {"image": 0, "fringes": {}}, "leds": "r"}
+
+
+def test_a_pair_of_projectors_is_told_apart_by_ports() -> None:
+    config = checked(SystemConfig, {"projectors": {"visible": VISIBLE, "infrared": INFRARED}}, "s.toml")
+    assert config.projectors is not None
+    assert (config.projectors.visible.port, config.projectors.infrared.leds) == ("1-1", "r")
+    assert SystemConfig().projectors is None
+
+
+@pytest.mark.parametrize(
+    ("visible", "infrared", "reason"),
+    [
+        ({"port": "left"}, {}, "projectors.visible.port"),
+        ({"hdmi": None}, {}, "expected hdmi or flash, and one of them"),
+        ({"flash": INFRARED["flash"]}, {}, "expected hdmi or flash, and one of them"),
+        ({}, {"port": "1-1"}, "both at port 1-1"),
+        ({}, {"flash": None, "hdmi": {"output": "HDMI-1"}}, "an output for each projector"),
+        ({"hdmi": {}}, {"flash": None, "hdmi": {"output": "HDMI-1"}}, "an output for each projector"),
+        ({"led_drive": [1, 2, 256]}, {}, "projectors.visible.led_drive.2"),
+        ({"brightness": 1}, {}, "projectors.visible.brightness: this key is not known"),
+        ({"leds": "x"}, {}, "projectors.visible.leds"),
+        ({"light": "external", "led_drive": [1, 1, 1]}, {}, "led_drive needs led_drive_limit"),
+    ],
+)
+def test_projectors_at_fault_are_named(visible: dict[str, object], infrared: dict[str, object], reason: str) -> None:
+    pair = {"visible": VISIBLE | visible, "infrared": INFRARED | infrared}
+    with pytest.raises(ConfigError, match=re.escape(reason)):
+        checked(SystemConfig, {"projectors": pair}, "s.toml")
+
+
+def test_a_virtual_camera_is_not_sold_as_a_real_one() -> None:
+    config = checked(SystemConfig, {"projectors": {"visible": VISIBLE, "infrared": INFRARED}}, "s.toml")
+    with pytest.raises(ConfigError, match="the only camera is that of the virtual bench"):
+        open_system(config)

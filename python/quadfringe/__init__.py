@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response, SceneConfig, SystemConfig
     from quadfringe.data import BayerShot, Calibration, ResponseCalibration, Shape, Shot, Truth
     from quadfringe.decoding import Plan, ShotDecoder, decode
+    from quadfringe.devices import open_projector
     from quadfringe.errors import ConfigError, DecodeError, InputError, MissingExtraError
     from quadfringe.scanner import Scanner
     from quadfringe.scanner import open_system as open  # noqa: A004 - read as quadfringe.open
@@ -27,6 +28,7 @@ _HOME = {
     "config": ("DecodeConfig", "DeviceModel", "Fringes", "Response", "SceneConfig", "SystemConfig"),
     "data": ("BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth"),
     "decoding": ("Plan", "ShotDecoder", "decode"),
+    "devices": ("open_projector",),
     "errors": ("ConfigError", "DecodeError", "InputError", "MissingExtraError"),
     "scanner": ("Scanner", "open_system"),
     "shots": ("read_bayer_shot", "read_shot"),
@@ -59,6 +61,7 @@ __all__ = [
     "check_code",
     "decode",
     "open",
+    "open_projector",
     "optimum",
     "pattern",
     "read_bayer_shot",

@@ -5,7 +5,7 @@ wrong type a TypeError; both say what was expected and what came. The GIL is rel
 """
 
 from collections.abc import Sequence
-from typing import Any, Final, final
+from typing import Any, Final, Self, TypedDict, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,18 +15,28 @@ __all__ = [
     "Cast",
     "Decoder",
     "Device",
+    "LightCrafter",
+    "Pattern",
+    "PatternSequence",
+    "PatternWindow",
     "__version__",
     "background",
     "carrier",
     "check_code",
     "estimate_response",
+    "exposure_in_frame_us",
     "fourier",
+    "lightcrafters",
     "linear_light",
     "linear_light_bayer",
     "n_step",
     "optimum",
+    "outputs",
+    "pack_flash",
     "pattern",
+    "power_on_drive",
     "two_step",
+    "udev_rule",
     "unwrap",
 ]
 
@@ -36,6 +46,31 @@ _Vector2 = tuple[float, float]
 _Vector3 = tuple[float, float, float]
 _Vector5 = tuple[float, float, float, float, float]
 _Matrix3 = tuple[_Vector3, _Vector3, _Vector3]
+_Bytes3 = tuple[int, int, int]
+
+class _Status(TypedDict):
+    initialised: bool
+    memory_passed: bool
+    parked: bool
+    running: bool
+    frozen: bool
+    gamma: bool
+    power: str
+    mode: str
+    run: str
+    input: str
+    video_locked: bool
+    video: str
+    faults: list[str]
+
+class _Triggers(TypedDict):
+    out_1_inverted: bool
+    out_1_rising_us: float
+    out_1_falling_us: float
+    out_2_inverted: bool
+    out_2_rising_us: float
+    in_1_delay_us: float
+    in_2_falling: bool
 
 @final
 class Device:
@@ -255,3 +290,213 @@ def estimate_response(stacks: Sequence[NDArray[np.float32]]) -> dict[str, float]
     Each stack is (steps, H, W) in fractions of full scale. ValueError when a stack is out of order, too dark,
     saturated or without fringes.
     """
+
+@final
+class LightCrafter:
+    """A LightCrafter 4500 on USB, named by bus and port path ("1-2"), by serial number, or as the only one.
+
+    One command is in flight at a time, and every wait has a bound: 2 s for a reply, 10 s for a change of state. What
+    the caller chose wrongly is a ValueError; what the device did is an OSError: FileNotFoundError when it is absent,
+    PermissionError with the udev rule, TimeoutError, ConnectionError when it was unplugged. Opening sends nothing.
+
+    `light` is TI's own light engine ("evm") or another ("external"), whose `drive_limit` must be stated before a drive
+    is set; `current_inverted` says whether its register is 0 at full current, as TI's is.
+    """
+
+    def __new__(
+        cls,
+        port: str | None = None,
+        *,
+        serial: str | None = None,
+        light: str = "evm",
+        drive_limit: _Bytes3 | None = None,
+        current_inverted: bool | None = None,
+        trigger_invert_byte: int | None = None,
+    ) -> Self: ...
+    @property
+    def port(self) -> str: ...
+    def close(self) -> None:
+        """Release the device, which goes on showing what it shows; closing twice is allowed."""
+
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *_exception: object) -> None: ...
+    def status(self) -> _Status:
+        """Give everything that the projector says of itself; `faults` names what is wrong."""
+
+    def versions(self) -> dict[str, str]:
+        """Give the versions of application, api, software and sequencer."""
+
+    def firmware_tag(self) -> str:
+        """Give the name of the firmware image."""
+
+    def flash_image_count(self) -> int:
+        """Give the number of images of 24 bit in flash."""
+
+    def check_flash(self, images: int, tag: str | None = None) -> None:
+        """Compare flash with what it should hold; ValueError says what differs."""
+
+    def measure_image_load_ms(self, first: int, count: int) -> float:
+        """Measure how long flash images take to load."""
+
+    def wake(self) -> None:
+        """Leave standby and wait for it."""
+
+    def sleep(self) -> None:
+        """Go to standby and wait for it."""
+
+    def show_video(self) -> None:
+        """Show the video input in linear light; OSError when it is not locked."""
+
+    def show_test_pattern(self, name: str, *, foreground: _Bytes3 = ..., background: _Bytes3 = ...) -> None:
+        """Show a picture of the generator; colours are red, green, blue from 0 to 1023."""
+
+    def show_flash_image(self, image: int) -> None:
+        """Show an image of flash as a still picture, in linear light."""
+
+    def load(self, sequence: PatternSequence) -> list[str]:
+        """Send a sequence and have it judged; returns warnings, OSError names what must not run."""
+
+    def play(self, sequence: PatternSequence) -> list[str]:
+        """Load and start."""
+
+    def start(self) -> None:
+        """Start the loaded sequence, or go on after a pause."""
+
+    def pause(self) -> None:
+        """Hold the current pattern."""
+
+    def stop(self) -> None:
+        """Stop, and wait until nothing runs."""
+
+    def set_timing(self, exposure_us: int, period_us: int | None = None) -> None:
+        """Change exposure and period of the loaded sequence."""
+
+    def led_drive(self) -> _Bytes3:
+        """Give the brightness of red, green, blue: 0 is off, 255 full current."""
+
+    def set_led_drive(self, drive: _Bytes3) -> None:
+        """Set the brightness of red, green, blue; ValueError beyond the limit of the light engine."""
+
+    def set_leds(self, leds: str | None) -> None:
+        """Switch LEDs by hand ("rb"), or leave the choice to the patterns (None)."""
+
+    def set_led_delays_us(self, rising_us: _Vector3, falling_us: _Vector3) -> None:
+        """Delay switching on and off of red, green, blue."""
+
+    def set_triggers(
+        self,
+        *,
+        out_1_inverted: bool = False,
+        out_1_rising_us: float = 0.0,
+        out_1_falling_us: float = 0.0,
+        out_2_inverted: bool = False,
+        out_2_rising_us: float = 0.0,
+        in_1_delay_us: float = 0.0,
+        in_2_falling: bool = False,
+    ) -> None:
+        """Set all triggers; what is not given is reset."""
+
+    def triggers(self) -> _Triggers:
+        """Give the triggers to the nearest step."""
+
+    def flips(self) -> tuple[bool, bool]:
+        """Tell whether the image is mirrored along the long and the short axis."""
+
+    def set_flips(self, long_axis: bool, short_axis: bool) -> None:
+        """Mirror the image; in pattern mode from the next image on."""
+
+    def set_gamma(self, table: int | None) -> None:
+        """Bend video by table 0 or 1; None is linear light."""
+
+    def set_inverted(self, inverted: bool) -> None:
+        """Exchange dark and bright in all patterns."""
+
+    def set_frozen(self, frozen: bool) -> None:
+        """Hold the image that is shown, whatever arrives."""
+
+@final
+class Pattern:
+    """One pattern of a sequence: its number among those of its bit depth, and its LEDs (letters of "rgb").
+
+    Raises ValueError for unknown letters or trigger ("internal", "rising", "falling", "continue").
+    """
+
+    def __new__(
+        cls,
+        number: int,
+        bit_depth: int,
+        leds: str,
+        *,
+        trigger: str = "internal",
+        invert: bool = False,
+        black_after: bool = False,
+        next_image: bool = False,
+        shares_exposure: bool = False,
+    ) -> Self: ...
+
+@final
+class PatternSequence:
+    """What a projector shows, for how long, started by what; ValueError names the rule that is broken.
+
+    `timings_us` has exposure and period for all patterns, or one pair for each. The source is video (`frame_rate_hz`)
+    or flash (`images` in the order of use).
+    """
+
+    def __new__(
+        cls,
+        patterns: Sequence[Pattern],
+        timings_us: Sequence[tuple[int, int]],
+        *,
+        trigger_mode: str,
+        frame_rate_hz: float | None = None,
+        images: Sequence[int] | None = None,
+        load_us: int | None = None,
+        repeat: bool = True,
+    ) -> Self: ...
+    @staticmethod
+    def from_video(patterns: Sequence[Pattern], frame_rate_hz: float, exposure_us: int) -> PatternSequence:
+        """Give a sequence that shows the patterns in every video frame."""
+
+    @staticmethod
+    def from_flash(image: int, patterns: Sequence[Pattern], exposure_us: int) -> PatternSequence:
+        """Give a sequence that shows the patterns of one flash image again and again."""
+
+@final
+class PatternWindow:
+    """A borderless window of 912 x 1140 that covers an output; without a name, the only one of this size.
+
+    Raises ValueError when the output is absent, of another size or scaled; OSError without a display.
+    """
+
+    def __new__(cls, output: str | None = None) -> Self: ...
+    @property
+    def output(self) -> str: ...
+    def show(self, image: NDArray[np.uint8]) -> None:
+        """Show red, green, blue, (1140, 912, 3) uint8, until told otherwise."""
+
+    def close(self) -> None:
+        """Close the window; closing twice is allowed."""
+
+    def __enter__(self) -> Self: ...
+    def __exit__(self, *_exception: object) -> None: ...
+
+def lightcrafters() -> list[tuple[str, int, str | None]]:
+    """Give port, address and serial number (None without permission) of every projector on the bus."""
+
+def udev_rule() -> tuple[str, str]:
+    """Give the file and the line that let every user open a projector on Linux."""
+
+def power_on_drive() -> _Bytes3:
+    """Give the LED drive after power-on, also the limit of TI's own light engine."""
+
+def exposure_in_frame_us(count: int, bit_depth: int, frame_rate_hz: float) -> int:
+    """Give the exposure of each of `count` patterns that share a frame; ValueError when they do not fit."""
+
+def pack_flash(patterns: Sequence[tuple[NDArray[np.uint8], int]]) -> tuple[list[bytes], list[tuple[int, int, int]]]:
+    """Pack patterns, (1140, 912) uint8 with their bit depths, into BMP files of 24 bit for TI's program.
+
+    Returns the files, and image, number and bit depth of each pattern.
+    """
+
+def outputs() -> list[tuple[str, int, int, float | None, str | None]]:
+    """Give name, width, height, frame rate in Hz, and why it cannot carry a pattern, of every output that is on."""

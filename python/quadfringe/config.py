@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
 from quadfringe.errors import ConfigError
 from quadfringe.files import read_bytes
@@ -25,9 +25,13 @@ __all__ = [
     "ChannelResponse",
     "DecodeConfig",
     "DeviceModel",
+    "FlashRoute",
     "Fringes",
+    "HdmiRoute",
     "HeightMapConfig",
     "Model",
+    "ProjectorConfig",
+    "ProjectorsConfig",
     "Response",
     "SceneConfig",
     "SystemConfig",
@@ -139,6 +143,81 @@ class SceneConfig(Model):
     seed: Annotated[int, Field(ge=0)] | None = None
 
 
+Byte = Annotated[int, Field(ge=0, le=255)]
+Drive = tuple[Byte, Byte, Byte]
+Microseconds = Annotated[int, Field(gt=0, le=200_000_000)]
+
+
+class HdmiRoute(Model):
+    """Patterns by HDMI: the output of the computer (as `xrandr` names it) that feeds the projector, at 912 x 1140.
+
+    Without an output, the only one of that size is taken.
+    """
+
+    output: str | None = None
+    frame_rate_hz: Annotated[float, Field(ge=1, le=240)] = 60.0
+
+
+class FlashRoute(Model):
+    """Patterns from flash: the number of the image, and the fringes that are in it."""
+
+    image: Byte
+    fringes: Fringes
+    firmware_tag: str | None = None
+
+
+class ProjectorConfig(Model):
+    """One LightCrafter 4500: where it is plugged in (bus and port path, such as 1-2), and how patterns reach it.
+
+    `leds` light a grey pattern; a colour pattern has a LED for each colour. Drives are red, green, blue from 0 (off)
+    to 255; beyond those of TI's light engine after power-on, or with another one (`light = "external"`), the limit must
+    be stated, and `led_current_inverted` set to false where 255 in the register is full current. An absent drive stays
+    as it is after power-on; an absent exposure is as long as the frame allows, and from flash as short as 8 bit allow.
+    """
+
+    port: Annotated[str, Field(pattern=r"^\d{1,3}-\d{1,3}(\.\d{1,3})*$")]
+    hdmi: HdmiRoute | None = None
+    flash: FlashRoute | None = None
+    light: Literal["evm", "external"] = "evm"
+    leds: Literal["r", "g", "b", "rg", "rb", "gb", "rgb"] = "rgb"
+    led_drive: Drive | None = None
+    led_drive_limit: Drive | None = None
+    led_current_inverted: bool = True
+    exposure_us: Microseconds | None = None
+    trigger_invert_byte: Literal[1, 2] = 1
+    flip_long_axis: bool = False
+    flip_short_axis: bool = False
+
+    @model_validator(mode="after")
+    def _one_route(self) -> ProjectorConfig:
+        if (self.hdmi is None) == (self.flash is None):
+            raise ValueError("expected hdmi or flash, and one of them")
+        return self
+
+    @model_validator(mode="after")
+    def _drive_within_a_limit(self) -> ProjectorConfig:
+        if self.light == "external" and self.led_drive is not None and self.led_drive_limit is None:
+            raise ValueError("led_drive needs led_drive_limit: the safe currents of an external light are not known")
+        return self
+
+
+class ProjectorsConfig(Model):
+    """The coaxial pair: both projectors have one serial number, so they are told apart by their ports."""
+
+    kind: Literal["lightcrafter"] = "lightcrafter"
+    visible: ProjectorConfig
+    infrared: ProjectorConfig
+
+    @model_validator(mode="after")
+    def _two_projectors(self) -> ProjectorsConfig:
+        if self.visible.port == self.infrared.port:
+            raise ValueError(f"visible and infrared are both at port {self.visible.port}")
+        windows = [p.hdmi for p in (self.visible, self.infrared) if p.hdmi is not None]
+        if len(windows) == 2 and (windows[0].output is None or windows[0].output == windows[1].output):
+            raise ValueError("expected an output for each projector, and two of them")
+        return self
+
+
 class DecodeConfig(Model):
     """Settings of the decoder; what is absent takes the kernel's default."""
 
@@ -152,6 +231,7 @@ class SystemConfig(Model):
     """A whole system: devices, fringes, what is measured, how it is decoded.
 
     Devices that are absent are those of the published bench; `infrared` is coaxial with `projector` when absent.
+    Without `projectors` the fringes are shown by the virtual bench.
     """
 
     schema_version: Literal[1] = 1
@@ -160,6 +240,7 @@ class SystemConfig(Model):
     projector: DeviceModel | None = None
     infrared: DeviceModel | None = None
     calibration: Path | None = None
+    projectors: ProjectorsConfig | None = None
     fringes: Fringes = Fringes()
     scene: SceneConfig = SceneConfig()
     decode: DecodeConfig = DecodeConfig()

@@ -17,6 +17,7 @@ from quadfringe.data import AnyShot, Calibration, Shape
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.devices import Camera, Projector
 from quadfringe.devices.virtual import VirtualBench, VirtualCamera, VirtualProjector
+from quadfringe.errors import ConfigError
 
 __all__ = ["Scanner", "open_system"]
 
@@ -76,7 +77,7 @@ class Scanner:
 def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
     """Open the system of a TOML file, of a config, or the virtual bench as it comes.
 
-    Raises `ConfigError` when the file has unknown keys or wrong values.
+    Raises `ConfigError` when the file has unknown keys or wrong values, or names projectors of a real bench.
     """
     if system is None:
         config = SystemConfig()
@@ -84,6 +85,11 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
         config = system
     else:
         config = load_system(Path(system))
+    if config.projectors is not None:
+        raise ConfigError(
+            "projectors: the only camera is that of the virtual bench, which cannot see them; show the fringes with "
+            "quadfringe.devices.open_projector or `quadfringe projector show --system FILE`, and decode the images"
+        )
     bench = VirtualBench(config)
     calibration = bench.calibration() if config.calibration is None else Calibration.load(config.calibration)
     return Scanner(bench.resolved(config), VirtualProjector(bench), VirtualCamera(bench), calibration)

@@ -5,6 +5,7 @@ mod bench;
 mod decoder;
 mod device;
 mod memory;
+mod projector;
 mod stages;
 
 use pyo3::prelude::*;
@@ -16,6 +17,10 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;
     module.add_class::<decoder::Decoder>()?;
+    module.add_class::<projector::LightCrafter>()?;
+    module.add_class::<projector::Pattern>()?;
+    module.add_class::<projector::PatternSequence>()?;
+    module.add_class::<projector::PatternWindow>()?;
     module.add_function(wrap_pyfunction!(device::optimum, module)?)?;
     module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
     module.add_function(wrap_pyfunction!(device::pattern, module)?)?;
@@ -28,5 +33,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::n_step, module)?)?;
     module.add_function(wrap_pyfunction!(stages::unwrap, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
+    module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
+    module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;
+    module.add_function(wrap_pyfunction!(projector::power_on_drive, module)?)?;
+    module.add_function(wrap_pyfunction!(projector::exposure_in_frame_us, module)?)?;
+    module.add_function(wrap_pyfunction!(projector::pack_flash, module)?)?;
+    module.add_function(wrap_pyfunction!(projector::outputs, module)?)?;
     Ok(())
 }

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, decode, demo, info, reproduce, timing
+from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce, timing
 from quadfringe.cli.output import complain
 from quadfringe.errors import DecodeError, MissingExtraError
 
@@ -70,3 +70,4 @@ app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)
 app.add_typer(calibrate.app, name="calibrate")
+app.add_typer(projector.app, name="projector")

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from quadfringe.config import Fringes
+from quadfringe.config import Fringes, SystemConfig
 from quadfringe.data import AnyShot
 
-__all__ = ["Camera", "Projector"]
+__all__ = ["Camera", "Projector", "open_projector"]
 
 
 class Projector(Protocol):
     """Shows the fringes of one shot: a composite colour image and an infrared one, at the same instant."""
 
     def show(self, fringes: Fringes) -> None:
-        """Project these fringes until told otherwise."""
+        """Project these fringes until told otherwise; ValueError when they cannot number the field."""
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
@@ -28,3 +28,17 @@ class Camera(Protocol):
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
+
+
+def open_projector(config: SystemConfig) -> Projector:
+    """Open the projectors of a system: those of its `projectors`, or of a virtual bench when there are none.
+
+    Raises OSError when a device cannot be opened, ValueError when it cannot do what the settings ask.
+    """
+    if config.projectors is None:
+        from quadfringe.devices.virtual import VirtualBench, VirtualProjector
+
+        return VirtualProjector(VirtualBench(config))
+    from quadfringe.devices.lightcrafter import CoaxialPair
+
+    return CoaxialPair(config.projectors)

@@ -51,6 +51,11 @@ class VirtualBench:
             ir_registration=scene.infrared_from_visible,
         )
 
+    def project(self, fringes: Fringes) -> None:
+        """Light the scene with these fringes from now on."""
+        _core.check_code(fringes.numbers, self._bench.visible.width)
+        self.projected = fringes
+
     def expose(self) -> AnyShot:
         """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected."""
         if self.projected is None:
@@ -95,8 +100,8 @@ class VirtualProjector:
         self._bench = bench
 
     def show(self, fringes: Fringes) -> None:
-        """Light the bench with these fringes."""
-        self._bench.projected = fringes
+        """Light the bench with these fringes; ValueError when they cannot number the field."""
+        self._bench.project(fringes)
 
     def close(self) -> None:
         """Switch the light off."""

@@ -1,0 +1,32 @@
+//! Show one colour image from flash, watch a fault, and stop; on an emulated projector, so that it runs anywhere.
+//!
+//! With a real one, `LightCrafter::open(&Selector::Port("1-2".parse()?))` takes the place of the emulator.
+
+use lightcrafter::emulator::{Dlpc350, EmulatedTransport, Fault};
+use lightcrafter::sequence::colour_channels;
+use lightcrafter::{Error, LightCrafter, Sequence};
+
+fn main() -> Result<(), Error> {
+    let transport = EmulatedTransport::new(Dlpc350::default());
+    let device = transport.device();
+    let mut projector = LightCrafter::new(transport);
+
+    println!(
+        "firmware {}, {} images in flash",
+        projector.versions()?.application,
+        projector.flash_image_count()?
+    );
+    let verdict = projector.play(&Sequence::from_flash(0, colour_channels(8), 8333))?;
+    println!("running: {}, warnings: {:?}", projector.status()?.main.running, verdict.warnings());
+
+    // Too short for 8 bit: refused before anything is sent.
+    let error = projector.load(&Sequence::from_flash(0, colour_channels(8), 5000)).unwrap_err();
+    println!("refused: {error}");
+
+    device.lock().expect("no thread panicked").inject(Fault::Unplug, 1);
+    match projector.stop() {
+        Err(error @ Error::Disconnected { .. }) => println!("unplugged: {error}"),
+        other => panic!("expected an unplugged projector, got {other:?}"),
+    }
+    Ok(())
+}

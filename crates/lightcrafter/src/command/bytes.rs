@@ -1,0 +1,161 @@
+//! Bytes in and out of messages, and the three shapes that most registers have.
+
+use crate::error::{Error, Result};
+
+/// Takes fields from the front of a message; bytes that are left over are padding.
+pub struct Bytes<'a> {
+    name: &'static str,
+    data: &'a [u8],
+    rest: &'a [u8],
+}
+
+impl<'a> Bytes<'a> {
+    pub fn new(name: &'static str, data: &'a [u8]) -> Self {
+        Self { name, data, rest: data }
+    }
+
+    fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
+        let Some((head, rest)) = self.rest.split_first_chunk::<N>() else {
+            let needed = self.data.len() - self.rest.len() + N;
+            let (expected, actual) = (format!("at least {needed} bytes"), self.data.len());
+            return Err(Error::malformed(self.name, expected, actual));
+        };
+        self.rest = rest;
+        Ok(*head)
+    }
+
+    pub fn u8(&mut self) -> Result<u8> {
+        Ok(self.take::<1>()?[0])
+    }
+
+    pub fn u16(&mut self) -> Result<u16> {
+        Ok(u16::from_le_bytes(self.take()?))
+    }
+
+    pub fn u24(&mut self) -> Result<u32> {
+        let [low, middle, high] = self.take()?;
+        Ok(u32::from_le_bytes([low, middle, high, 0]))
+    }
+
+    pub fn u32(&mut self) -> Result<u32> {
+        Ok(u32::from_le_bytes(self.take()?))
+    }
+
+    pub fn u16s<const N: usize>(&mut self) -> Result<[u16; N]> {
+        let mut values = [0; N];
+        for value in &mut values {
+            *value = self.u16()?;
+        }
+        Ok(values)
+    }
+}
+
+/// The little-endian bytes of 16-bit fields, one after another.
+pub fn from_u16s(values: &[u16]) -> Vec<u8> {
+    values.iter().flat_map(|value| value.to_le_bytes()).collect()
+}
+
+/// A number of a register; an error that names it when it is outside.
+pub fn in_range(name: &str, value: u32, low: u32, high: u32) -> Result<u32> {
+    if (low..=high).contains(&value) {
+        return Ok(value);
+    }
+    Err(Error::value(name, format!("{low} to {high}"), value))
+}
+
+/// Say in which directions a message goes.
+macro_rules! direction {
+    ($name:ident, read) => {
+        impl crate::command::Readable for $name {}
+    };
+    ($name:ident, write) => {
+        impl crate::command::Writable for $name {}
+    };
+    ($name:ident, both) => {
+        impl crate::command::Readable for $name {}
+        impl crate::command::Writable for $name {}
+    };
+}
+
+/// A register of one byte that chooses among named values.
+macro_rules! choice {
+    ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident,
+     { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name { $($(#[$variant_doc])* $variant = $value),+ }
+
+        impl crate::command::Message for $name {
+            const WORD: u16 = $word;
+            const NAME: &'static str = $title;
+
+            fn encode(&self) -> crate::error::Result<Vec<u8>> {
+                Ok(vec![*self as u8])
+            }
+
+            fn decode(data: &[u8]) -> crate::error::Result<Self> {
+                match crate::command::bytes::Bytes::new($title, data).u8()? {
+                    $($value => Ok(Self::$variant),)+
+                    other => {
+                        let known = [$(concat!(stringify!($value), " ", stringify!($variant))),+].join(", ");
+                        Err(crate::error::Error::malformed($title, known, other))
+                    }
+                }
+            }
+        }
+
+        direction!($name, $direction);
+    };
+}
+
+/// A register of one byte whose bits have names; the others are zero.
+macro_rules! bits {
+    ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident,
+     { $($(#[$field_doc:meta])* $field:ident = $bit:literal),+ $(,)? }) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        pub struct $name { $($(#[$field_doc])* pub $field: bool),+ }
+
+        impl crate::command::Message for $name {
+            const WORD: u16 = $word;
+            const NAME: &'static str = $title;
+
+            fn encode(&self) -> crate::error::Result<Vec<u8>> {
+                Ok(vec![$(u8::from(self.$field) << $bit)|+])
+            }
+
+            fn decode(data: &[u8]) -> crate::error::Result<Self> {
+                let byte = crate::command::bytes::Bytes::new($title, data).u8()?;
+                Ok(Self { $($field: byte & (1 << $bit) != 0),+ })
+            }
+        }
+
+        direction!($name, $direction);
+    };
+}
+
+/// A register of one byte that is on or off.
+macro_rules! switch {
+    ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        pub struct $name(pub bool);
+
+        impl crate::command::Message for $name {
+            const WORD: u16 = $word;
+            const NAME: &'static str = $title;
+
+            fn encode(&self) -> crate::error::Result<Vec<u8>> {
+                Ok(vec![u8::from(self.0)])
+            }
+
+            fn decode(data: &[u8]) -> crate::error::Result<Self> {
+                Ok(Self(crate::command::bytes::Bytes::new($title, data).u8()? & 1 != 0))
+            }
+        }
+
+        direction!($name, $direction);
+    };
+}
+
+pub(crate) use {bits, choice, direction, switch};

@@ -1,0 +1,222 @@
+//! The tables of pattern mode: patterns, images, patterns with an exposure each.
+
+use super::Message;
+use super::bytes::{Bytes, direction, in_range};
+use super::pattern::Timing;
+use crate::error::Result;
+
+/// What starts an entry of the pattern table.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum EntryTrigger {
+    /// The internal clock.
+    Internal = 0,
+    /// The rising edge of an external signal; the first pattern of a video frame too.
+    Rising = 1,
+    /// The falling edge of an external signal.
+    Falling = 2,
+    /// The end of the entry before.
+    Continue = 3,
+}
+
+/// One pattern: bit planes, light, and what happens around it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LutEntry {
+    /// What starts it.
+    pub trigger: EntryTrigger,
+    /// Number of the pattern among those of its bit depth, 0 to 63.
+    pub number: u8,
+    /// Bits per pixel, 1 to 8.
+    pub bit_depth: u8,
+    /// LEDs: bit 0 red, bit 1 green, bit 2 blue.
+    pub leds: u8,
+    /// Dark for bright.
+    pub invert: bool,
+    /// Black after the pattern, which takes 230 us.
+    pub black_after: bool,
+    /// Take the next image before this pattern.
+    pub next_image: bool,
+    /// Trigger output 1 stays high, the exposure is shared with the entry before.
+    pub shares_exposure: bool,
+}
+
+impl LutEntry {
+    /// Give the 24 bits of the entry.
+    fn to_word(self) -> Result<u32> {
+        let number = in_range("pattern number", self.number.into(), 0, 63)?;
+        let depth = in_range("bit depth", self.bit_depth.into(), 1, 8)?;
+        let leds = in_range("LED selection", self.leds.into(), 0, 7)?;
+        let flags =
+            [(self.invert, 16), (self.black_after, 17), (self.next_image, 18), (self.shares_exposure, 19)];
+        let flags = flags.iter().fold(0, |word, (set, bit)| word | u32::from(*set) << bit);
+        Ok(self.trigger as u32 | number << 2 | depth << 8 | leds << 12 | flags)
+    }
+
+    fn from_word(word: u32) -> Result<Self> {
+        let trigger = match word & 3 {
+            0 => EntryTrigger::Internal,
+            1 => EntryTrigger::Rising,
+            2 => EntryTrigger::Falling,
+            _ => EntryTrigger::Continue,
+        };
+        let entry = Self {
+            trigger,
+            number: (word >> 2 & 63) as u8,
+            bit_depth: (word >> 8 & 15) as u8,
+            leds: (word >> 12 & 7) as u8,
+            invert: word & 1 << 16 != 0,
+            black_after: word & 1 << 17 != 0,
+            next_image: word & 1 << 18 != 0,
+            shares_exposure: word & 1 << 19 != 0,
+        };
+        entry.to_word()?;
+        Ok(entry)
+    }
+}
+
+/// Entries for the open mailbox [`Mailbox::Patterns`](super::Mailbox::Patterns), at most 128.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct PatternTable(pub Vec<LutEntry>);
+
+impl Message for PatternTable {
+    const WORD: u16 = 0x1A34;
+    const NAME: &'static str = "pattern table";
+
+    fn encode(&self) -> Result<Vec<u8>> {
+        in_range("pattern entries", self.0.len() as u32, 1, 128)?;
+        let words: Result<Vec<u32>> = self.0.iter().map(|entry| entry.to_word()).collect();
+        Ok(words?.iter().flat_map(|word| word.to_le_bytes().into_iter().take(3)).collect())
+    }
+
+    fn decode(data: &[u8]) -> Result<Self> {
+        let mut bytes = Bytes::new(Self::NAME, data);
+        let entries: Result<Vec<_>> =
+            (0..data.len() / 3).map(|_| bytes.u24().and_then(LutEntry::from_word)).collect();
+        let table = Self(entries?);
+        table.encode()?;
+        Ok(table)
+    }
+}
+
+direction!(PatternTable, both);
+
+/// Flash images for the open mailbox [`Mailbox::Images`](super::Mailbox::Images), at most 64. A table of two is exchanged on the wire, a
+/// special case of the firmware.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct ImageTable(pub Vec<u8>);
+
+impl ImageTable {
+    fn exchanged(mut images: Vec<u8>) -> Vec<u8> {
+        if images.len() == 2 {
+            images.swap(0, 1);
+        }
+        images
+    }
+}
+
+impl Message for ImageTable {
+    const WORD: u16 = 0x1A34;
+    const NAME: &'static str = "image table";
+
+    fn encode(&self) -> Result<Vec<u8>> {
+        in_range("image entries", self.0.len() as u32, 1, 64)?;
+        Ok(Self::exchanged(self.0.clone()))
+    }
+
+    fn decode(data: &[u8]) -> Result<Self> {
+        let table = Self(Self::exchanged(data.to_vec()));
+        table.encode()?;
+        Ok(table)
+    }
+}
+
+direction!(ImageTable, both);
+
+/// The entry at which [`VariableEntry`] goes, 0 to 1823; to be sent before each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct VariableOffset(pub u16);
+
+impl Message for VariableOffset {
+    const WORD: u16 = 0x1A3F;
+    const NAME: &'static str = "offset in the variable table";
+
+    fn encode(&self) -> Result<Vec<u8>> {
+        in_range(Self::NAME, self.0.into(), 0, 1823)?;
+        Ok(self.0.to_le_bytes().to_vec())
+    }
+
+    fn decode(data: &[u8]) -> Result<Self> {
+        let offset = Self(Bytes::new(Self::NAME, data).u16()?);
+        offset.encode()?;
+        Ok(offset)
+    }
+}
+
+direction!(VariableOffset, write);
+
+/// A pattern with its own exposure; firmware 3.0 or newer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VariableEntry {
+    /// The pattern.
+    pub entry: LutEntry,
+    /// Its exposure and period.
+    pub timing: Timing,
+}
+
+impl Message for VariableEntry {
+    const WORD: u16 = 0x1A3E;
+    const NAME: &'static str = "entry of the variable table";
+
+    fn encode(&self) -> Result<Vec<u8>> {
+        Ok([self.entry.to_word()?.to_le_bytes().to_vec(), self.timing.encode()?].concat())
+    }
+
+    fn decode(data: &[u8]) -> Result<Self> {
+        let mut bytes = Bytes::new(Self::NAME, data);
+        let entry = LutEntry::from_word(bytes.u32()?)?;
+        Ok(Self { entry, timing: Timing { exposure_us: bytes.u32()?, period_us: bytes.u32()? } })
+    }
+}
+
+direction!(VariableEntry, write);
+
+/// How much of the variable table is used.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct VariableControl {
+    /// Entries of the table, 1 to 1824.
+    pub entries: u16,
+    /// Patterns to show, 1 to 1824.
+    pub patterns: u16,
+    /// Entries of the image table, 1 to 256.
+    pub images: u16,
+    /// Again and again, or once.
+    pub repeat: bool,
+}
+
+impl Message for VariableControl {
+    const WORD: u16 = 0x1A40;
+    const NAME: &'static str = "control of the variable table";
+
+    fn encode(&self) -> Result<Vec<u8>> {
+        let entries = in_range("variable entries", self.entries.into(), 1, 1824)? as u16;
+        let patterns = in_range("patterns to show", self.patterns.into(), 1, 1824)? as u16;
+        let images = in_range("image entries", self.images.into(), 1, 256)?;
+        let mut data = [(entries - 1).to_le_bytes(), (patterns - 1).to_le_bytes()].concat();
+        data.extend([(images - 1) as u8, u8::from(self.repeat)]);
+        Ok(data)
+    }
+
+    fn decode(data: &[u8]) -> Result<Self> {
+        let mut bytes = Bytes::new(Self::NAME, data);
+        let (entries, patterns, images, repeat) = (bytes.u16()?, bytes.u16()?, bytes.u8()?, bytes.u8()?);
+        let control = Self {
+            entries: entries.saturating_add(1),
+            patterns: patterns.saturating_add(1),
+            images: u16::from(images) + 1,
+            repeat: repeat & 1 != 0,
+        };
+        control.encode()?;
+        Ok(control)
+    }
+}
+
+direction!(VariableControl, both);

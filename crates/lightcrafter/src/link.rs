@@ -1,0 +1,157 @@
+//! One transaction at a time: number it, send it, wait for the reply with that number, within a bound.
+
+use crate::command::{Readable, Writable};
+use crate::error::{Error, Result};
+use crate::packet::{Access, Assembler, REPORT_BYTES, Reply, Request};
+use crate::transport::Transport;
+use std::time::{Duration, Instant};
+
+/// Reports that are discarded at most before a command, after one went wrong.
+const DRAIN_REPORTS: usize = 16;
+const DRAIN_WAIT: Duration = Duration::from_millis(20);
+
+/// A transport, and what is needed to tell a reply from an old one.
+#[derive(Debug)]
+pub struct Link<T> {
+    transport: T,
+    reply_timeout: Duration,
+    sequence: u8,
+    residue: bool,
+}
+
+impl<T: Transport> Link<T> {
+    /// Old replies may wait in a device whose last owner did not fetch them: the first command drains them.
+    pub fn new(transport: T, reply_timeout: Duration) -> Self {
+        Self { transport, reply_timeout, sequence: 0, residue: true }
+    }
+
+    pub fn place(&self) -> String {
+        self.transport.place().to_owned()
+    }
+
+    pub fn set_reply_timeout(&mut self, timeout: Duration) {
+        self.reply_timeout = timeout;
+    }
+
+    pub fn into_transport(self) -> T {
+        self.transport
+    }
+
+    /// Ask for a register; asked once more when nothing, or nothing readable, came.
+    pub fn read<M: Readable>(&mut self) -> Result<M> {
+        let first = self.transact(Access::Read, M::WORD, M::NAME, Vec::new());
+        let data = match first {
+            Err(error) if error.leaves_residue() => self.transact(Access::Read, M::WORD, M::NAME, Vec::new()),
+            other => other,
+        }?;
+        // An empty answer is the other way in which the firmware refuses.
+        if data.is_empty() {
+            return Err(self.refused(&doing(Access::Read, M::NAME)));
+        }
+        M::decode(&data).map_err(|error| at(self.transport.place(), error, &doing(Access::Read, M::NAME)))
+    }
+
+    /// Set a register; never sent twice, because the first may have been heard.
+    pub fn write<M: Writable>(&mut self, message: &M) -> Result<()> {
+        self.transact(M::ACCESS, M::WORD, M::NAME, message.encode()?).map(|_| ())
+    }
+
+    fn transact(&mut self, access: Access, word: u16, name: &str, data: Vec<u8>) -> Result<Vec<u8>> {
+        self.drain()?;
+        self.sequence = self.sequence.wrapping_add(1);
+        let request = Request { access, sequence: self.sequence, word, data };
+        let doing = doing(access, name);
+        let reply =
+            self.exchange(&request, &doing).map_err(|error| at(self.transport.place(), error, &doing));
+        self.residue = reply.as_ref().is_err_and(Error::leaves_residue);
+        reply
+    }
+
+    fn exchange(&mut self, request: &Request, doing: &str) -> Result<Vec<u8>> {
+        for report in request.to_reports()? {
+            self.transport.send(&report, self.reply_timeout)?;
+        }
+        if request.access == Access::WriteUnacknowledged {
+            return Ok(Vec::new());
+        }
+        let reply = self.reply(request, doing)?;
+        if reply.refused {
+            return Err(self.refused(doing));
+        }
+        let echo = request.word.to_le_bytes();
+        if reply.read != (request.access == Access::Read) || (!reply.read && reply.data != echo) {
+            let expected = format!("one for {:#06x}", request.word);
+            return Err(Error::malformed("reply", expected, format!("{reply:02x?}")));
+        }
+        Ok(reply.data)
+    }
+
+    /// The reply with the number of the request; others are left-overs and discarded.
+    fn reply(&mut self, request: &Request, doing: &str) -> Result<Reply> {
+        let deadline = Instant::now() + self.reply_timeout;
+        let mut assembler = Assembler::default();
+        let mut stranger = None;
+        loop {
+            let remaining = deadline.saturating_duration_since(Instant::now());
+            let mut report = [0; REPORT_BYTES];
+            let count =
+                if remaining.is_zero() { 0 } else { self.transport.receive(&mut report, remaining)? };
+            if count == 0 {
+                return Err(self.nothing_came(request, doing, stranger));
+            }
+            if count != REPORT_BYTES {
+                return Err(Error::malformed("reply", format!("a report of {REPORT_BYTES} bytes"), count));
+            }
+            let Some(message) = assembler.push(&report)? else { continue };
+            let reply = Reply::from_message(&message)?;
+            if reply.sequence == request.sequence {
+                return Ok(reply);
+            }
+            stranger = Some(reply.sequence);
+        }
+    }
+
+    fn nothing_came(&self, request: &Request, doing: &str, stranger: Option<u8>) -> Error {
+        let (place, doing) = (self.place(), doing.to_owned());
+        match stranger {
+            Some(actual) => Error::Sequence { place, doing, expected: request.sequence, actual },
+            None => Error::Timeout { place, doing, waited_ms: self.reply_timeout.as_millis() as u64 },
+        }
+    }
+
+    fn refused(&self, doing: &str) -> Error {
+        Error::Refused { place: self.place(), doing: doing.to_owned() }
+    }
+
+    /// Fetch what an earlier command left behind.
+    fn drain(&mut self) -> Result<()> {
+        let mut report = [0; REPORT_BYTES];
+        for _ in 0..DRAIN_REPORTS {
+            if !self.residue {
+                break;
+            }
+            self.residue = self.transport.receive(&mut report, DRAIN_WAIT)? > 0;
+        }
+        self.residue = false;
+        Ok(())
+    }
+}
+
+fn doing(access: Access, name: &str) -> String {
+    let verb = if access == Access::Read { "reading" } else { "setting" };
+    format!("{verb} the {name}")
+}
+
+/// Name the projector and what was asked of it. A value out of range is the fault of who sent it: of the device, here.
+fn at(place: &str, error: Error, doing: &str) -> Error {
+    let doing = doing.to_owned();
+    match error {
+        Error::Timeout { place, waited_ms, .. } => Error::Timeout { place, doing, waited_ms },
+        Error::Usb { place, reason, .. } => Error::Usb { place, doing, reason },
+        Error::Malformed { what: field, expected, actual }
+        | Error::Value { name: field, expected, actual } => {
+            Error::Malformed { what: format!("answer of {place} while {doing} ({field})"), expected, actual }
+        }
+        other => other,
+    }
+}

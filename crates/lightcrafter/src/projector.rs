@@ -1,0 +1,272 @@
+//! A LightCrafter 4500 in the verbs of its user.
+
+mod configure;
+mod play;
+
+pub use configure::{TriggerOut, Triggers};
+
+use crate::command::{
+    DisplayMode, FirmwareTag, FlashImageCount, HardwareStatus, InputSource, MainStatus, PowerMode, Readable,
+    RunState, SoftwareReset, SystemStatus, Versions, VideoSignal, Writable,
+};
+use crate::error::{Error, Result};
+use crate::link::Link;
+use crate::profile::Profile;
+use crate::sequence::Sequence;
+use crate::transport::Transport;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+/// Every wait has a bound; these are the documented ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Waits {
+    /// For a reply. A read that got none is asked once more.
+    pub reply: Duration,
+    /// Between two looks at a state that is about to change.
+    pub poll: Duration,
+    /// For a mode, the run state or a verdict to come true.
+    pub change: Duration,
+    /// Between asking for a verdict and the first look.
+    pub verdict: Duration,
+    /// Between waking and the first look, during which the controller may not answer.
+    pub wake: Duration,
+    /// For the controller to be awake, or asleep.
+    pub power: Duration,
+    /// For the video input to lock.
+    pub lock: Duration,
+}
+
+impl Default for Waits {
+    fn default() -> Self {
+        let ms = Duration::from_millis;
+        Self {
+            reply: ms(2000),
+            poll: ms(100),
+            change: ms(10_000),
+            verdict: ms(100),
+            wake: ms(2000),
+            power: ms(10_000),
+            lock: ms(5000),
+        }
+    }
+}
+
+/// Everything that a projector says of itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Status {
+    /// The hardware.
+    pub hardware: HardwareStatus,
+    /// The self-test.
+    pub system: SystemStatus,
+    /// The display.
+    pub main: MainStatus,
+    /// Awake or asleep.
+    pub power: PowerMode,
+    /// Video or patterns.
+    pub mode: DisplayMode,
+    /// Whether patterns run.
+    pub run: RunState,
+    /// The input of the video mode.
+    pub input: InputSource,
+    /// The video signal; not locked while patterns run, which is no fault.
+    pub signal: VideoSignal,
+}
+
+impl Status {
+    /// What is wrong, in words; empty when all is well.
+    pub fn faults(&self) -> Vec<&'static str> {
+        let HardwareStatus { initialised, reset_overlap, forced_swap, sequencer_abort, sequencer_error } =
+            self.hardware;
+        let faults = [
+            (!initialised, "the controller did not initialise: switch its power off and on"),
+            (!self.system.memory_passed, "the internal memory failed its test: switch the power off and on"),
+            (reset_overlap, "two operations of the mirrors overlapped"),
+            (forced_swap, "a buffer was swapped by force: patterns come faster than images load"),
+            (sequencer_abort, "the sequencer gave up: load the sequence again"),
+            (sequencer_error, "the sequencer found an error: load the sequence again"),
+        ];
+        faults.iter().filter(|(set, _)| *set).map(|(_, name)| *name).collect()
+    }
+}
+
+/// One projector. It takes `&mut self` for every transaction, so that one is in flight; nothing is global, and any
+/// number of projectors work at the same time from as many threads.
+#[derive(Debug)]
+pub struct LightCrafter<T> {
+    link: Link<T>,
+    profile: Profile,
+    waits: Waits,
+    loaded: Option<Sequence>,
+}
+
+impl<T: Transport> LightCrafter<T> {
+    /// A projector at the end of a transport, with TI's light engine and the documented waits. Nothing is sent.
+    pub fn new(transport: T) -> Self {
+        let waits = Waits::default();
+        Self { link: Link::new(transport, waits.reply), profile: Profile::EVM, waits, loaded: None }
+    }
+
+    /// With another light engine.
+    pub fn with_profile(mut self, profile: Profile) -> Self {
+        self.profile = profile;
+        self
+    }
+
+    /// With other waits.
+    pub fn with_waits(mut self, waits: Waits) -> Self {
+        self.link.set_reply_timeout(waits.reply);
+        self.waits = waits;
+        self
+    }
+
+    /// Bus and port path.
+    pub fn place(&self) -> String {
+        self.link.place()
+    }
+
+    /// The light engine.
+    pub fn profile(&self) -> Profile {
+        self.profile
+    }
+
+    /// Give the transport back; the projector goes on showing what it shows.
+    pub fn into_transport(self) -> T {
+        self.link.into_transport()
+    }
+
+    /// Read any register: the door to what has no verb.
+    pub fn read<M: Readable>(&mut self) -> Result<M> {
+        self.link.read()
+    }
+
+    /// Write any register: the door to what has no verb.
+    pub fn write<M: Writable>(&mut self, message: &M) -> Result<()> {
+        self.link.write(message)
+    }
+
+    /// Everything that the projector says of itself.
+    pub fn status(&mut self) -> Result<Status> {
+        Ok(Status {
+            hardware: self.read()?,
+            system: self.read()?,
+            main: self.read()?,
+            power: self.read()?,
+            mode: self.read()?,
+            run: self.read()?,
+            input: self.read()?,
+            signal: self.read()?,
+        })
+    }
+
+    /// Versions of the firmware and its parts.
+    pub fn versions(&mut self) -> Result<Versions> {
+        self.read()
+    }
+
+    /// The name that the maker of the firmware image gave it.
+    pub fn firmware_tag(&mut self) -> Result<String> {
+        self.read().map(|FirmwareTag(tag)| tag)
+    }
+
+    /// How many images of 24 bit are in flash.
+    pub fn flash_image_count(&mut self) -> Result<u8> {
+        self.read().map(|FlashImageCount(count)| count)
+    }
+
+    /// Compare flash with what it should hold; an error that says what differs.
+    pub fn check_flash(&mut self, images: u8, tag: Option<&str>) -> Result<()> {
+        let present = self.flash_image_count()?;
+        if present < images {
+            let name = format!("images in the flash of the projector at {}", self.place());
+            let expected = format!("at least {images}; write them with TI's program");
+            return Err(Error::value(name, expected, present));
+        }
+        let Some(wanted) = tag else { return Ok(()) };
+        let found = self.firmware_tag()?;
+        if found == wanted {
+            return Ok(());
+        }
+        let name = format!("firmware tag of the projector at {}", self.place());
+        Err(Error::value(name, format!("{wanted:?}"), format!("{found:?}")))
+    }
+
+    /// Wake the projector, or send it to sleep, and wait until it is. Waking may go without acknowledgement.
+    pub fn set_power(&mut self, power: PowerMode) -> Result<()> {
+        if self.read::<PowerMode>()? == power {
+            return Ok(());
+        }
+        match self.write(&power) {
+            Err(Error::Timeout { .. } | Error::Refused { .. }) if power == PowerMode::Normal => {}
+            other => other?,
+        }
+        self.loaded = None;
+        sleep(self.waits.wake);
+        self.wait_for_power(power)
+    }
+
+    /// As [`wait_for`](Self::wait_for), for a controller that may still be silent.
+    fn wait_for_power(&mut self, power: PowerMode) -> Result<()> {
+        let deadline = Instant::now() + self.waits.power;
+        loop {
+            let answer = self.read::<PowerMode>();
+            let late = Instant::now() >= deadline;
+            match answer {
+                Ok(actual) if actual == power => return Ok(()),
+                Ok(actual) if late => return Err(self.stuck(&power, &actual, self.waits.power)),
+                Ok(_) => {}
+                Err(Error::Timeout { .. } | Error::Refused { .. }) if !late => {}
+                Err(error) => return Err(error),
+            }
+            sleep(self.waits.poll);
+        }
+    }
+
+    /// Start the firmware again. The device leaves the bus, so the projector is used up: open it again after 5 to 10 s.
+    pub fn reset(mut self) -> Result<()> {
+        self.write(&SoftwareReset)
+    }
+
+    /// The video signal as the projector sees it.
+    pub fn video_signal(&mut self) -> Result<VideoSignal> {
+        self.read()
+    }
+
+    /// Wait until the video input is locked; an error with what is seen instead.
+    pub fn wait_for_lock(&mut self) -> Result<VideoSignal> {
+        let deadline = Instant::now() + self.waits.lock;
+        loop {
+            let signal = self.video_signal()?;
+            if signal.locked() {
+                return Ok(signal);
+            }
+            if Instant::now() >= deadline {
+                return Err(Error::NotLocked { place: self.place(), signal: signal.to_string() });
+            }
+            sleep(self.waits.poll);
+        }
+    }
+
+    /// Look at a register until it has this value.
+    fn wait_for<M>(&mut self, wanted: M, bound: Duration) -> Result<()>
+    where
+        M: Readable + PartialEq + std::fmt::Debug,
+    {
+        let deadline = Instant::now() + bound;
+        loop {
+            let actual = self.read::<M>()?;
+            if actual == wanted {
+                return Ok(());
+            }
+            if Instant::now() >= deadline {
+                return Err(self.stuck(&wanted, &actual, bound));
+            }
+            sleep(self.waits.poll);
+        }
+    }
+
+    fn stuck(&self, asked: &dyn std::fmt::Debug, actual: &dyn std::fmt::Debug, bound: Duration) -> Error {
+        let waited_ms = bound.as_millis() as u64;
+        let (asked, actual) = (format!("{asked:?}"), format!("{actual:?}"));
+        Error::Stuck { place: self.place(), asked, actual, waited_ms }
+    }
+}

@@ -1,0 +1,91 @@
+//! The emulator behind the real libusb: a umockdev testbed with projectors in chosen ports (Linux).
+//!
+//! umockdev's preload library shows a program `/sys` and `/dev` of our making, and sends each ioctl on a device node to a
+//! socket, on which this module answers as usbfs does. libusb and everything above it run unmodified. Programs find the
+//! control socket of the testbed through the environment variable [`CONTROL`] and inject faults with [`Control`].
+//!
+//! The protocol between the preload library and the socket is internal to umockdev: it is known for 0.17, and
+//! [`Testbed::command`] refuses another version by name.
+
+mod control;
+mod descriptors;
+mod node;
+mod usbfs;
+
+pub use control::Control;
+
+use crate::emulator::Dlpc350;
+use node::Node;
+use std::io;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::{Arc, Mutex};
+
+/// The environment variable with the path of the control socket.
+pub const CONTROL: &str = "LIGHTCRAFTER_TESTBED";
+const PRELOAD: &str = "libumockdev-preload.so.0";
+const KNOWN_VERSION: &str = "0.17.";
+
+/// Projectors on a bus of our own; removed when dropped.
+#[derive(Debug)]
+pub struct Testbed {
+    root: PathBuf,
+    nodes: Vec<Arc<Node>>,
+}
+
+impl Testbed {
+    /// Bus 1 with one projector in each of these ports, all with the same serial number.
+    pub fn new(ports: &[u8]) -> io::Result<Self> {
+        let root = std::env::temp_dir().join(format!("lightcrafter-testbed-{}", std::process::id()));
+        let _ = std::fs::remove_dir_all(&root);
+        std::fs::create_dir_all(root.join("sys/bus/usb/devices"))?;
+        std::fs::create_dir_all(root.join("sys/class"))?;
+        symlink("../bus/usb", root.join("sys/class/usb_device"))?;
+        let mut nodes = Vec::new();
+        for (i, port) in ports.iter().enumerate() {
+            let model = Dlpc350::new(&format!("QF-EMULATOR-1-{port}"), 3);
+            nodes.push(Node::start(&root, 1, 5 + i as u8, *port, Mutex::new(model))?);
+        }
+        control::listen(&root.join("control"), nodes.clone())?;
+        Ok(Self { root, nodes })
+    }
+
+    /// The folder with `/sys` and `/dev` as the program sees them.
+    pub fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// A command that will run in the testbed; an error when umockdev is absent or of an unknown version.
+    pub fn command(&self, program: &str) -> io::Result<Command> {
+        check_umockdev()?;
+        let mut command = Command::new(program);
+        command.env("UMOCKDEV_DIR", &self.root).env("LD_PRELOAD", PRELOAD);
+        command.env(CONTROL, self.root.join("control"));
+        Ok(command)
+    }
+
+    /// How many requests each projector got.
+    pub fn transactions(&self) -> Vec<(String, u64)> {
+        self.nodes.iter().map(|node| (node.place.clone(), node.model().transactions())).collect()
+    }
+}
+
+impl Drop for Testbed {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.root);
+    }
+}
+
+fn check_umockdev() -> io::Result<()> {
+    let output = Command::new("umockdev-run").arg("--version").output().map_err(|error| {
+        io::Error::new(error.kind(), "umockdev is not installed: apt-get install umockdev")
+    })?;
+    let version = String::from_utf8_lossy(&output.stdout).trim().to_owned();
+    if version.starts_with(KNOWN_VERSION) {
+        return Ok(());
+    }
+    let message =
+        format!("umockdev {version} has another ioctl protocol than {KNOWN_VERSION}x: install that one");
+    Err(io::Error::new(io::ErrorKind::Unsupported, message))
+}

@@ -1,0 +1,145 @@
+//! One device in the testbed: its folder in `/sys`, its node in `/dev`, and who holds its interfaces.
+
+use super::descriptors::{DEVICE, configuration};
+use super::usbfs;
+use crate::emulator::Dlpc350;
+use std::collections::VecDeque;
+use std::fs;
+use std::io;
+use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::net::UnixListener;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread;
+
+/// A file that nobody may open for writing, root neither: what a node without permission looks like.
+const FORBIDDEN: &str = "/sys/kernel/uevent_seqnum";
+/// umockdev takes a file with the sticky bit for a device node.
+const DEVICE_MODE: u32 = 0o1666;
+
+/// Who has an interface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Holder {
+    /// Nobody.
+    Free,
+    /// The HID driver of the kernel.
+    Kernel,
+    /// A program, through this connection.
+    Program(u64),
+}
+
+/// State that all connections to a device share.
+#[derive(Debug)]
+pub struct Shared {
+    pub holders: [Holder; 2],
+    /// Reports on their way to whoever reads next.
+    pub incoming: VecDeque<Vec<u8>>,
+}
+
+#[derive(Debug)]
+pub struct Node {
+    pub place: String,
+    model: Mutex<Dlpc350>,
+    shared: Mutex<Shared>,
+    link: PathBuf,
+    target: PathBuf,
+    device: PathBuf,
+}
+
+impl Node {
+    /// Write the files and answer on the socket until the process ends.
+    pub fn start(
+        root: &Path,
+        bus: u8,
+        address: u8,
+        port: u8,
+        model: Mutex<Dlpc350>,
+    ) -> io::Result<Arc<Self>> {
+        let place = format!("{bus}-{port}");
+        let parent = format!("devices/pci0000:00/0000:00:14.0/usb{bus}/{place}");
+        let device = format!("dev/bus/usb/{bus:03}/{address:03}");
+        let node = Arc::new(Self {
+            link: root.join(format!("sys/bus/usb/devices/{place}")),
+            target: PathBuf::from(format!("../../../{parent}")),
+            device: root.join(&device),
+            place,
+            model,
+            shared: Mutex::new(Shared { holders: [Holder::Kernel; 2], incoming: VecDeque::new() }),
+        });
+        write_sysfs(&root.join("sys").join(parent), bus, address)?;
+        fs::create_dir_all(node.device.parent().unwrap_or(root))?;
+        node.allow()?;
+        node.reflect()?;
+        let socket = root.join("ioctl").join(device);
+        fs::create_dir_all(socket.parent().unwrap_or(root))?;
+        node.clone().listen(&UnixListener::bind(&socket)?, &socket)?;
+        Ok(node)
+    }
+
+    fn listen(self: Arc<Self>, listener: &UnixListener, socket: &Path) -> io::Result<()> {
+        fs::set_permissions(socket, fs::Permissions::from_mode(0o777))?;
+        let listener = listener.try_clone()?;
+        thread::spawn(move || {
+            for (number, stream) in listener.incoming().flatten().enumerate() {
+                let node = Arc::clone(&self);
+                thread::spawn(move || usbfs::serve(&node, number as u64, stream));
+            }
+        });
+        Ok(())
+    }
+
+    pub fn model(&self) -> MutexGuard<'_, Dlpc350> {
+        self.model.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub fn shared(&self) -> MutexGuard<'_, Shared> {
+        self.shared.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Show the device on the bus, or take it off, as the model has it.
+    pub fn reflect(&self) -> io::Result<()> {
+        let plugged = self.model().plugged();
+        match (plugged, self.link.is_symlink()) {
+            (true, false) => symlink(&self.target, &self.link),
+            (false, true) => fs::remove_file(&self.link),
+            _ => Ok(()),
+        }
+    }
+
+    /// A node that every user may open.
+    pub fn allow(&self) -> io::Result<()> {
+        let _ = fs::remove_file(&self.device);
+        fs::write(&self.device, [DEVICE.to_vec(), configuration()].concat())?;
+        fs::set_permissions(&self.device, fs::Permissions::from_mode(DEVICE_MODE))
+    }
+
+    /// A node that nobody may open.
+    pub fn deny(&self) -> io::Result<()> {
+        fs::remove_file(&self.device)?;
+        symlink(FORBIDDEN, &self.device)
+    }
+}
+
+fn write_sysfs(folder: &Path, bus: u8, address: u8) -> io::Result<()> {
+    fs::create_dir_all(folder)?;
+    let (bus, address) = (bus.to_string(), address.to_string());
+    let attributes = [
+        ("busnum", bus.as_str()),
+        ("devnum", &address),
+        ("speed", "12"),
+        ("bConfigurationValue", "1"),
+        ("idVendor", "0451"),
+        ("idProduct", "6401"),
+        ("serial", "LCR2"),
+    ];
+    for (name, value) in attributes {
+        fs::write(folder.join(name), format!("{value}\n"))?;
+    }
+    fs::write(folder.join("descriptors"), [DEVICE.to_vec(), configuration()].concat())?;
+    let name = format!("bus/usb/{bus:0>3}/{address:0>3}");
+    let properties = format!(
+        "DEVTYPE=usb_device\nBUSNUM={bus:0>3}\nDEVNUM={address:0>3}\nDEVNAME={name}\nPRODUCT=451/6401/0\n"
+    );
+    fs::write(folder.join("uevent"), properties)?;
+    symlink("../../../../../bus/usb", folder.join("subsystem"))
+}

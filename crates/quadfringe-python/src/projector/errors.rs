@@ -1,0 +1,22 @@
+//! Each error of the driver as the Python exception that a caller would look for.
+
+use lightcrafter::Error;
+use pyo3::exceptions::{
+    PyConnectionError, PyFileNotFoundError, PyOSError, PyPermissionError, PyTimeoutError, PyValueError,
+};
+use pyo3::prelude::*;
+
+/// ValueError for what the caller chose, OSError and its kinds for what the device did.
+pub fn device_error(error: Error) -> PyErr {
+    let message = error.to_string();
+    match error {
+        Error::Value { .. } | Error::Ambiguous { .. } | Error::Output { .. } => {
+            PyValueError::new_err(message)
+        }
+        Error::NotFound { .. } => PyFileNotFoundError::new_err(message),
+        Error::AccessDenied { .. } => PyPermissionError::new_err(message),
+        Error::Timeout { .. } | Error::Stuck { .. } => PyTimeoutError::new_err(message),
+        Error::Disconnected { .. } => PyConnectionError::new_err(message),
+        _ => PyOSError::new_err(message),
+    }
+}

@@ -1,0 +1,276 @@
+"""`quadfringe projector`: the LightCrafter 4500s of a bench."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from quadfringe.cli.output import complain, say
+from quadfringe.errors import InputError
+
+if TYPE_CHECKING:
+    from quadfringe.config import ProjectorConfig, SystemConfig
+    from quadfringe.devices.lightcrafter import LightCrafter
+
+__all__ = ["app"]
+
+app = typer.Typer(name="projector", help="The LightCrafter 4500s of a bench.", no_args_is_help=True)
+
+FAILED = 1
+PortOption = Annotated[
+    str | None, typer.Option("--port", metavar="BUS-PORT", help="Which projector, such as 1-2; else the only one.")
+]
+SystemOption = Annotated[
+    Path | None, typer.Option("--system", metavar="FILE", help="A system file with a [projectors] table.")
+]
+
+
+@contextmanager
+def _devices() -> Iterator[None]:
+    """Let what a device did end the run with status 1; what the caller chose wrongly ends with 2, as everywhere."""
+    try:
+        yield
+    except OSError as error:
+        complain(str(error))
+        raise typer.Exit(FAILED) from error
+
+
+def _system(file: Path) -> SystemConfig:
+    from quadfringe.config import load_system
+
+    config = load_system(file)
+    if config.projectors is None:
+        raise InputError(
+            f"{file}: no [projectors] table, so that its fringes are shown by the virtual bench (quadfringe simulate); "
+            "add one that names two ports, as the README has it"
+        )
+    return config
+
+
+def _chosen(which: ProjectorConfig | str | None) -> LightCrafter:
+    from quadfringe.devices.lightcrafter import LightCrafter, open_device
+
+    return LightCrafter(which) if which is None or isinstance(which, str) else open_device(which)
+
+
+def _meant(port: str | None, system: Path | None) -> Sequence[ProjectorConfig | str | None]:
+    """Give the projectors that are meant: one by its port, the only one, or both of a system."""
+    if system is None:
+        return [port]
+    if port is not None:
+        raise InputError("give --port or --system, not both")
+    projectors = _system(system).projectors
+    assert projectors is not None
+    return [projectors.visible, projectors.infrared]
+
+
+def _each(port: str | None, system: Path | None, act: Callable[[LightCrafter], object]) -> None:
+    """Do it to every projector that is meant, also when one of them fails."""
+    failed = False
+    for one in _meant(port, system):
+        try:
+            with _chosen(one) as device:
+                act(device)
+        except OSError as error:
+            complain(str(error))
+            failed = True
+    if failed:
+        raise typer.Exit(FAILED)
+
+
+@app.command("list")
+def list_projectors() -> None:
+    """List projectors by their ports; all of them may have the same serial number."""
+    from quadfringe.devices.lightcrafter import lightcrafters
+
+    with _devices():
+        found = lightcrafters()
+    for port, address, serial in found:
+        name = "no permission: run quadfringe projector doctor" if serial is None else f"serial number {serial}"
+        say(f"port {port}  address {address}  {name}")
+    if not found:
+        complain("no LightCrafter 4500 is connected; check the power and the USB cable")
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+def status(port: PortOption = None, system: SystemOption = None) -> None:
+    """Say what projectors do, and what is wrong with them."""
+    _each(port, system, _report)
+
+
+def _report(device: LightCrafter) -> list[str]:
+    state = device.status()
+    firmware = device.versions()["application"]
+    say(f"port {device.port}: {state['run']}, mode {state['mode']}, power {state['power']}, input {state['input']}")
+    say(f"  firmware {firmware} ({device.firmware_tag()}), {device.flash_image_count()} images in flash")
+    video = state["video"] if state["mode"] == "video" else "not watched in pattern mode"
+    say(f"  video: {video}; LED drive (red, green, blue) {' '.join(map(str, device.led_drive()))}")
+    for fault in state["faults"]:
+        say(f"  fault: {fault}")
+    return state["faults"]
+
+
+@app.command()
+def show(
+    system: SystemOption = None,
+    port: PortOption = None,
+    flash_image: Annotated[
+        int | None, typer.Option("--flash-image", metavar="N", help="Show this image of flash and return.")
+    ] = None,
+    test_pattern: Annotated[
+        str | None, typer.Option("--test-pattern", metavar="NAME", help="Show a picture of the generator and return.")
+    ] = None,
+    seconds: Annotated[
+        float | None, typer.Option("--seconds", min=0.0, help="Show the fringes this long; else until Ctrl-C.")
+    ] = None,
+) -> None:
+    """Show the fringes of a system on its pair of projectors, or a still picture on one projector."""
+    if sum(choice is not None for choice in (system, flash_image, test_pattern)) != 1:
+        raise InputError("give one of --system, --flash-image and --test-pattern")
+    if system is not None and port is not None:
+        raise InputError("--port goes with --flash-image and --test-pattern; --system names both ports")
+    if system is None and seconds is not None:
+        raise InputError("--seconds goes with --system; a still picture stays")
+    with _devices():
+        if system is not None:
+            _show_fringes(_system(system), seconds)
+        else:
+            _show_still(port, flash_image, test_pattern)
+
+
+def _show_fringes(config: SystemConfig, seconds: float | None) -> None:
+    from quadfringe.devices import open_projector
+
+    projector = open_projector(config)
+    try:
+        projector.show(config.fringes)
+        say("showing; Ctrl-C ends it" if seconds is None else f"showing for {seconds:g} s")
+        _rest(seconds)
+    finally:
+        projector.close()
+
+
+def _rest(seconds: float | None) -> None:
+    if seconds is not None:
+        time.sleep(seconds)
+        return
+    try:
+        while True:
+            time.sleep(3600)
+    except KeyboardInterrupt:
+        say("stopped")
+
+
+def _show_still(port: str | None, flash_image: int | None, test_pattern: str | None) -> None:
+    with _chosen(port) as device:
+        if flash_image is not None:
+            device.show_flash_image(flash_image)
+        elif test_pattern is not None:
+            device.show_test_pattern(test_pattern)
+        say(f"port {device.port}: shown")
+
+
+@app.command()
+def start(port: PortOption = None, system: SystemOption = None) -> None:
+    """Go on after a pause; with a system whose patterns are in flash, load and start them, and leave them running."""
+    if system is None:
+        with _devices(), _chosen(port) as device:
+            device.start()
+            say(f"port {device.port}: running")
+        return
+    if port is not None:
+        raise InputError("give --port or --system, not both")
+    with _devices():
+        _start_from_flash(_system(system), system)
+
+
+def _start_from_flash(config: SystemConfig, file: Path) -> None:
+    from quadfringe.devices.lightcrafter import CoaxialPair
+
+    assert config.projectors is not None
+    if any(one.hdmi is not None for one in (config.projectors.visible, config.projectors.infrared)):
+        raise InputError(f"{file}: HDMI needs a window that stays: use quadfringe projector show --system {file}")
+    pair = CoaxialPair(config.projectors)
+    try:
+        pair.show(config.fringes)
+    except BaseException:
+        pair.close()
+        raise
+    pair.release()
+    say("running on both projectors")
+
+
+@app.command()
+def pause(port: PortOption = None, system: SystemOption = None) -> None:
+    """Hold the current pattern."""
+    _each(port, system, _pause)
+
+
+def _pause(device: LightCrafter) -> None:
+    device.pause()
+    say(f"port {device.port}: paused")
+
+
+@app.command()
+def stop(port: PortOption = None, system: SystemOption = None) -> None:
+    """Stop the patterns."""
+    _each(port, system, _stop)
+
+
+def _stop(device: LightCrafter) -> None:
+    device.stop()
+    say(f"port {device.port}: stopped")
+
+
+@app.command()
+def doctor() -> None:
+    """Open every projector and look at every output; say what is wrong and how to mend it."""
+    from quadfringe.devices.lightcrafter import lightcrafters
+
+    with _devices():
+        found = lightcrafters()
+    problems = 0 if found else 1
+    if not found:
+        complain("no LightCrafter 4500 is connected; check the power and the USB cable")
+    for port, _, _ in found:
+        problems += _examine(port)
+    _examine_outputs()
+    if problems:
+        raise typer.Exit(FAILED)
+    say("all projectors answer")
+
+
+def _examine(port: str) -> int:
+    """Give the number of problems of one projector, each said with its cure."""
+    from quadfringe.devices.lightcrafter import udev_rule
+
+    try:
+        with _chosen(port) as device:
+            return len(_report(device))
+    except PermissionError as error:
+        complain(str(error))
+        file, rule = udev_rule()
+        say(f"# {file}\n{rule}")
+    except OSError as error:
+        complain(str(error))
+    return 1
+
+
+def _examine_outputs() -> None:
+    """Tell which outputs can carry patterns; none is needed when they are in flash."""
+    from quadfringe.devices.lightcrafter import outputs
+
+    try:
+        rows = outputs()
+    except OSError as error:
+        say(f"outputs: {error}")
+        return
+    for name, width, height, rate_hz, unfit in rows:
+        rate = "" if rate_hz is None else f" at {rate_hz:.2f} Hz"
+        say(f"output {name}: {width} x {height}{rate}, {'fit for patterns' if unfit is None else unfit}")
