@@ -19,9 +19,11 @@ STRIDE = 4  # pixels that are looked at, along rows and columns: enough for quan
 DARK = 0.02  # a channel whose brightest pixels stay below this fraction of full scale is black
 NEARLY_NONE = 5e-4  # share of pixels that may differ in a black or saturated channel
 RETURNED_MIN = 0.05  # share of lit pixels that must come back
-# Median order margin of the lit pixels. Sound shots leave above 0.8, and the published way 0.4 when the response is
-# not corrected; channels exchanged leave at most 0.34 (best) and 0.49 (published); strangers 0.3 to the ladder.
-COLLAPSED, DOUBTFUL = 0.35, 0.6
+# Median order margin of the lit pixels. Sound shots leave above 0.75, and the published way 0.4 when the response is
+# not corrected; channels exchanged leave at most 0.44 (best) and 0.49 (published); other fringe numbers 0.5 to the
+# best way and 0.3 to the ladder.
+COLLAPSED = {"best": 0.55, "published": 0.35}
+DOUBTFUL = 0.6
 CLEARLY_BETTER = 1.2  # ratio of margins that tells channels are exchanged
 
 Decode = Callable[[AnyShot], Shape]
@@ -34,6 +36,7 @@ def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
     that question out.
     """
     margin, lit, returned = _margin(shape)
+    collapsed = COLLAPSED[shape.config["decode"]["method"]]
     enough = lit > 0 and returned >= RETURNED_MIN * lit
     if enough and margin >= DOUBTFUL:
         return
@@ -45,8 +48,8 @@ def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
             "and that every channel is given once"
         )
     if again is not None:
-        _refuse_exchanged(shot, margin, again)
-    if not enough or margin < COLLAPSED:
+        _refuse_exchanged(shot, margin, max(collapsed, CLEARLY_BETTER * margin), again)
+    if not enough or margin < collapsed:
         raise DecodeError(
             f"no shape: the order margin has collapsed: below {margin:.2f} of 1 for half of the lit "
             "pixels; the channels may be swapped (red, green, blue, ir), or the fringe numbers, the projector "
@@ -74,11 +77,11 @@ def _blind_channels(shot: AnyShot) -> list[str]:
     return found
 
 
-def _refuse_exchanged(shot: AnyShot, margin: float, again: Decode) -> None:
-    """Raise when taking the channels for others makes the orders clearly surer."""
+def _refuse_exchanged(shot: AnyShot, margin: float, least: float, again: Decode) -> None:
+    """Raise when taking the channels for others brings the margin above `least`."""
     found = {words: _margin(again(other))[0] for words, other in _suspects(shot).items()}
     best = max(found, key=lambda words: found[words])
-    if found[best] > max(COLLAPSED, CLEARLY_BETTER * margin):
+    if found[best] > least:
         raise DecodeError(
             f"no shape: {best}: the median order margin is {margin:.2f} as given and {found[best]:.2f} if so"
         )

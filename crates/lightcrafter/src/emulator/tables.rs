@@ -87,7 +87,7 @@ impl Tables {
     pub fn write(&mut self, registers: &Registers, data: &[u8]) -> Option<()> {
         let offset = usize::from(registers.byte(0x1A32));
         match registers.byte(0x1A33) {
-            PATTERN_BOX if data.len() % 3 == 0 => {
+            PATTERN_BOX if data.len().is_multiple_of(3) => {
                 self.patterns.get_mut(3 * offset..3 * offset + data.len())?.copy_from_slice(data);
                 self.written = true;
             }

@@ -23,14 +23,10 @@ impl Sequence {
         if count == 0 || count > most {
             return Err(Error::value("patterns of a sequence", format!("1 to {most}"), count));
         }
-        if let Exposures::Each(timings) = &self.exposures {
-            if timings.len() != count {
-                return Err(Error::value(
-                    "exposures of a sequence",
-                    format!("{count}, one each"),
-                    timings.len(),
-                ));
-            }
+        if let Exposures::Each(timings) = &self.exposures
+            && timings.len() != count
+        {
+            return Err(Error::value("exposures of a sequence", format!("{count}, one each"), timings.len()));
         }
         Ok(())
     }
