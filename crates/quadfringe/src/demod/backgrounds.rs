@@ -25,7 +25,7 @@ const CELL: f64 = 0.35;
 /// Rows of pixels that stand for a row of cells.
 const SAMPLED_ROWS: usize = 4;
 /// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
-const RIDGE: f32 = 1e-2;
+const RIDGE: f32 = 5e-2;
 /// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
 const MATRIX: usize = 36;
 /// The same with the right hand side.
@@ -52,12 +52,13 @@ impl Backgrounds {
         }
     }
 
-    /// Start from what is known without orders.
+    /// Start from what is known without orders, averaged over the surroundings: where the phase hardly changes in a window
+    /// the fit has nothing better to go by.
     pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit) {
         let fine = scene.grid;
         self.grid = Grid::new([fine.height, fine.width], (CELL * scene.period_px).max(fine.step as f64));
         let times = self.grid.step / fine.step;
-        self.maps.fill::<8>(&self.grid, |row, mut lines| {
+        self.next.fill::<8>(&self.grid, |row, mut lines| {
             for column in 0..lines[0].len() {
                 let inside = |at: usize, count: usize| (at * times + times / 2).min(count - 1);
                 let channels = fit.cell(inside(row, fine.rows), inside(column, fine.columns));
@@ -66,6 +67,7 @@ impl Backgrounds {
                 }
             }
         });
+        self.draw_together(scene, f32::INFINITY);
     }
 
     /// Backgrounds and modulations at row `y`: a, b of R, of G, of B, of IR.
@@ -106,8 +108,13 @@ impl Backgrounds {
                 improve(sums, before, out);
             },
         );
+        self.draw_together(scene, (OWN_COLOUR_NOISES * relative_noise).max(OWN_COLOUR_MIN));
+    }
+
+    /// Every cell drawn to its surroundings as far as the two are not further apart than `threshold`.
+    fn draw_together(&mut self, scene: &Scene<'_>, threshold: f32) {
+        let Self { grid, maps, next, sums, slots } = self;
         let sigma = SURROUNDINGS * scene.period_px as f32 / grid.step as f32;
-        let threshold = (OWN_COLOUR_NOISES * relative_noise).max(OWN_COLOUR_MIN);
         let own = &*next;
         grid.smooth::<8, RowMaps>(
             sigma,
