@@ -113,7 +113,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         let judged = score(&undone, &cast, &code(), FRINGE_PX);
         println!("{method:?} {rms:?} {judged:?}");
         // Or so little that noise of a thousandth of full scale would hide it.
-        assert!(rms[1] < (1.1 * rms[0]).max(2.5e-3), "{rms:?}");
+        assert!(rms[1] < (1.1 * rms[0]).max(3e-3), "{rms:?}");
         assert!(judged.wrong_share() < 5e-5, "{judged:?}");
         assert!(judged.returned_share() > 0.98, "{judged:?}");
     }
@@ -139,7 +139,7 @@ fn registration_costs_neither_phase_nor_orders() {
         let [aligned, registered] = [aligned, registered].map(|d| score(&d, &cast, &code(), FRINGE_PX));
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
         // Or so little that noise of a thousandth of full scale would hide it.
-        assert!(rms[1] < (1.1 * rms[0]).max(2.5e-3), "{rms:?}");
+        assert!(rms[1] < (1.1 * rms[0]).max(3e-3), "{rms:?}");
         // The published filter runs along whole rows, and errs beside what the infrared chip does not see.
         assert!(
             registered.wrong_orders() <= aligned.wrong_orders() + registered.lit / 20_000,
