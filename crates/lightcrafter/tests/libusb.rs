@@ -265,10 +265,8 @@ fn hammering_from_two_threads() {
     let threads = [thread::spawn(hammer("1-1", 1)), thread::spawn(hammer("1-2", 2))];
     let mut times: Vec<Duration> = threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect();
     assert_eq!(times.len(), 2 * EACH);
-    // Of ten stretches the fastest: other programs may slow some of them down, a wait in the driver slows all.
-    let median = |times: &mut [Duration]| *times.select_nth_unstable(times.len() / 2).1;
-    let fastest = times.chunks(EACH / 5).map(|stretch| median(&mut stretch.to_vec())).min().unwrap();
-    let (all, last) = (median(&mut times), times.iter().max().unwrap());
-    println!("{} transactions, median {all:?} ({fastest:?} at best), slowest {last:?}", 2 * EACH);
-    assert!(fastest < Duration::from_millis(5), "{fastest:?}");
+    let median = *times.select_nth_unstable(EACH).1;
+    let last = times.iter().max().unwrap();
+    println!("{} transactions, median {median:?}, slowest {last:?}", 2 * EACH);
+    assert!(median < Duration::from_millis(5), "{median:?}");
 }
