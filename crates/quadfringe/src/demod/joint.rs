@@ -34,6 +34,7 @@ struct ModelRow {
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
+    losses: RowMaps,
     ring: [ModelRow; 3],
     albedo: Vec<f32>,
     smooth: Vec<f32>,
@@ -69,8 +70,9 @@ impl Joint {
                 let rows = &mut **rows;
                 let first = block * BLOCK;
                 let model = |rows: &mut Rows, y: usize, at: usize| {
-                    let maps = backgrounds.sample(y, &mut rows.maps);
-                    rows.ring[at].fill(maps, scene.row(before, y), scene.rows(y), ratios);
+                    let maps = backgrounds.sample(scene, y, &mut rows.maps);
+                    let loss = window.loss(y, &mut rows.losses);
+                    rows.ring[at].fill(maps, [scene.row(before, y), loss], scene.rows(y), ratios);
                 };
                 model(rows, around(first, grid.height)[0], 0);
                 model(rows, first, 1);
@@ -94,20 +96,27 @@ impl Joint {
 }
 
 impl ModelRow {
-    fn fill(&mut self, maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3]) {
-        self.rows.iter_mut().for_each(|row| row.resize(phase.len(), 0.0));
-        predict(maps, phase, light, ratios, self.rows.each_mut().map(Vec::as_mut_slice));
+    fn fill(&mut self, maps: [&[f32]; 8], pixels: [&[f32]; 2], light: [&[f32]; 4], ratios: [f32; 3]) {
+        self.rows.iter_mut().for_each(|row| row.resize(pixels[0].len(), 0.0));
+        predict(maps, pixels, light, ratios, self.rows.each_mut().map(Vec::as_mut_slice));
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn predict(maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3], out: [&mut [f32]; 9]) {
-    let (maps, phase, light, mut out) = (maps.map(lanes), lanes(phase), light.map(lanes), out.map(lanes_mut));
-    for (i, phase) in phase.iter().enumerate() {
-        let (maps, light) = (take(&maps, i), take(&light, i));
+fn predict(
+    maps: [&[f32]; 8],
+    pixels: [&[f32]; 2],
+    light: [&[f32]; 4],
+    ratios: [f32; 3],
+    out: [&mut [f32]; 9],
+) {
+    let (maps, pixels, light) = (maps.map(lanes), pixels.map(lanes), light.map(lanes));
+    let mut out = out.map(lanes_mut);
+    for i in 0..pixels[0].len() {
+        let (maps, [phase, loss], light) = (take(&maps, i), take(&pixels, i), take(&light, i));
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios);
+            let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
             for c in 0..4 {
                 let (a, b) = (maps[2 * c][x], maps[2 * c + 1][x]);
