@@ -121,7 +121,7 @@ impl Best {
         self.expander.run(scenes, guide, self.ratios, &self.full.lit, out);
     }
 
-    /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
+    /// Planes of linear light; `lit` is 0 for glare and for what one chip does not see, `usable` for pixels that are saturated.
     fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
         let ([_, width], stride) = (self.shape, self.stride);
         let Level { light, lit, usable } = &mut self.full;
@@ -141,7 +141,7 @@ impl Best {
                         rows.iter_mut().for_each(|row| row[x] = 0.0);
                     }
                     usable[x] = f32::from(u8::from(seen && unsaturated[x]));
-                    lit[x] = f32::from(u8::from(!glare[x]));
+                    lit[x] = f32::from(u8::from(seen && !glare[x]));
                 }
             },
         );
@@ -154,7 +154,7 @@ impl Best {
             for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
                 *out = if *sure != 0 { *own } else { f32::NAN };
             }
-            row.modulation.copy_from_slice(&self.modulation[at.clone()]);
+            row.modulation.copy_from_slice(&self.guide.joint.modulation[at.clone()]);
             row.quality.copy_from_slice(&self.judge.quality[at]);
             finish.row(y, &mut row);
         });

@@ -5,9 +5,10 @@
 
 use super::guide::Guide;
 use crate::demod::backgrounds::carriers;
-use crate::demod::cells::{LANES, blend, lanes, spread};
+use crate::demod::cells::{LANES, Lanes, blend, lanes, spread};
 use crate::demod::scene::{Scene, around};
 use crate::slots::Slots;
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Surfaces nearer than this, in rad, are one.
@@ -20,6 +21,7 @@ const STEP_MAX: f32 = 1.0;
 const NEAR: usize = 9;
 /// Greatest factor between the two images.
 pub(super) const FACTOR_MAX: usize = 4;
+const VECTORS: usize = ((FACTOR_MAX + 2) * (FACTOR_MAX + 2)).div_ceil(LANES);
 
 /// Working rows of the tasks.
 #[derive(Debug, Default)]
@@ -30,7 +32,14 @@ pub(super) struct Expander {
 #[derive(Debug, Default)]
 struct Rows {
     mix: Vec<f32>,
-    misses: Vec<[f32; NEAR]>,
+    around: Around,
+}
+
+/// What the surfaces leave unexplained at the pixels of a block and around it, and their steps to them.
+#[derive(Debug, Default)]
+struct Around {
+    misses: [[Lanes; NEAR]; VECTORS],
+    steps: [[Lanes; NEAR]; VECTORS],
 }
 
 /// One of the surfaces that meet at a pixel of the coarse image: phase at its middle and slopes, per fine pixel.
@@ -112,31 +121,33 @@ impl Beside<'_> {
         let torn = lanes(torn).iter().enumerate().filter(|(_, torn)| torn.iter().any(|&t| t > 0.0));
         for (i, torn) in torn {
             let columns = (i * LANES..((i + 1) * LANES).min(width)).filter(|x| torn[x % LANES] > 0.0);
-            columns.for_each(|column| self.block(column, &mut rows.misses, phase, modulation));
+            columns.for_each(|column| self.block(column, &mut rows.around, phase, modulation));
         }
     }
 
     /// The fine pixels of one coarse pixel.
-    fn block(&self, column: usize, misses: &mut Vec<[f32; NEAR]>, phase: &mut [f32], modulation: &mut [f32]) {
+    fn block(&self, column: usize, around: &mut Around, phase: &mut [f32], modulation: &mut [f32]) {
         let (factor, stride) = (self.factor, self.scenes[1].grid.stride);
         let mut found = [Surface::default(); NEAR];
         let count = self.surfaces(column, &mut found);
         let surfaces = &found[..count];
-        let fringes = self.fringes(column);
         if count > 1 {
-            self.ask(column, fringes, surfaces, misses);
+            self.ask(column, surfaces, around);
         }
         for i in 0..factor * factor {
             let (y, x) = (i / factor, i % factor);
             let at = y * stride + column * factor + x;
-            let start = |surface: &Surface| (surface.at([x as f32, y as f32]), surface.modulation);
+            if at >= phase.len() {
+                break; // below the last row of the image
+            }
             (phase[at], modulation[at]) = match surfaces {
                 [] => (0.0, 0.0),
-                [only] => start(only),
+                [only] => (only.at([x as f32, y as f32]), only.modulation),
                 _ => {
-                    let (start, modulation) = start(&surfaces[least(misses, [x, y], factor + 2, count)]);
-                    let light = self.light(column * factor + x, self.row * factor + y);
-                    (start + self.explain(light, fringes, start, modulation).1, modulation)
+                    let best = around.least([x, y], factor + 2, count);
+                    let own = (y + 1) * (factor + 2) + x + 1;
+                    let step = around.steps[own / LANES][best][own % LANES];
+                    (surfaces[best].at([x as f32, y as f32]) + step, surfaces[best].modulation)
                 }
             };
         }
@@ -147,13 +158,6 @@ impl Beside<'_> {
         let coarse = self.scenes[0];
         let [row, column] = [self.row, column].map(|v| v / coarse.grid.step);
         self.guide.backgrounds.cell(coarse, row, column)
-    }
-
-    /// Intensities of a fine pixel.
-    fn light(&self, x: usize, y: usize) -> [f32; 4] {
-        let fine = self.scenes[1];
-        let at = y.min(fine.grid.height - 1) * fine.grid.stride + x;
-        fine.light.map(|plane| plane[at])
     }
 
     /// Surfaces of the pixel and its neighbours, those that differ; their number.
@@ -186,40 +190,72 @@ impl Beside<'_> {
     }
 
     /// What every surface leaves unexplained at the pixels of a block and around it.
-    fn ask(
-        &self,
-        column: usize,
-        fringes: [[f32; 2]; 4],
-        surfaces: &[Surface],
-        misses: &mut Vec<[f32; NEAR]>,
-    ) {
-        let (grid, factor) = (self.scenes[1].grid, self.factor);
-        let side = factor + 2;
+    fn ask(&self, column: usize, surfaces: &[Surface], around: &mut Around) {
+        let (fine, factor) = (self.scenes[1], self.factor);
+        let (grid, side) = (fine.grid, factor + 2);
         let first = [column * factor, self.row * factor];
-        misses.clear();
-        for i in 0..side * side {
-            let x = (first[0] + i % side).saturating_sub(1).min(grid.width - 1);
-            let y = (first[1] + i / side).saturating_sub(1).min(grid.height - 1);
-            let mut own = [0.0; NEAR];
-            if self.lit[y * grid.stride + x] > 0.0 {
-                let (light, place) =
-                    (self.light(x, y), [x as f32 - first[0] as f32, y as f32 - first[1] as f32]);
-                for (miss, surface) in own.iter_mut().zip(surfaces) {
-                    *miss = self.explain(light, fringes, surface.at(place), surface.modulation).0;
-                }
+        let fringes = self.fringes(column);
+        for vector in 0..(side * side).div_ceil(LANES) {
+            let (mut light, mut lit, mut places) = ([[0.0; LANES]; 4], [0.0; LANES], [[0.0; LANES]; 2]);
+            for k in 0..LANES.min(side * side - vector * LANES) {
+                let i = vector * LANES + k;
+                let x = (first[0] + i % side).saturating_sub(1).min(grid.width - 1);
+                let y = (first[1] + i / side).saturating_sub(1).min(grid.height - 1);
+                let at = y * grid.stride + x;
+                lit[k] = self.lit[at];
+                light.iter_mut().zip(fine.light).for_each(|(light, plane)| light[k] = plane[at]);
+                (places[0][k], places[1][k]) = (x as f32 - first[0] as f32, y as f32 - first[1] as f32);
             }
-            misses.push(own);
+            for (k, surface) in surfaces.iter().enumerate() {
+                let mut phases = [0.0; LANES];
+                for x in 0..LANES {
+                    phases[x] = surface.at([places[0][x], places[1][x]]);
+                }
+                let known = [&phases, &lit];
+                let found = [&mut around.misses[vector][k], &mut around.steps[vector][k]];
+                explain(&light, known, &fringes, self.ratios, surface.modulation, found);
+            }
         }
     }
+}
 
-    /// What neither albedo nor a small change of the phase explains of four intensities, and that change.
-    fn explain(&self, light: [f32; 4], fringes: [[f32; 2]; 4], phase: f32, modulation: f32) -> (f32, f32) {
-        let (cosines, derivatives) = carriers(phase, self.ratios, 0.0);
+impl Around {
+    /// The surface with the least misfit over the pixel (x, y) of a block and its neighbours.
+    fn least(&self, [x, y]: [usize; 2], side: usize, count: usize) -> usize {
+        let miss = |n: usize, k: usize| {
+            let at = (y + n / 3) * side + x + n % 3;
+            self.misses[at / LANES][k][at % LANES]
+        };
+        let sum = |k: usize| -> f32 { (0..NEAR).map(|n| miss(n, k)).sum() };
+        let (mut best, mut least) = (0, sum(0));
+        for k in 1..count {
+            let own = sum(k);
+            if own < least {
+                (best, least) = (k, own);
+            }
+        }
+        best
+    }
+}
+
+/// What neither albedo nor a small change of the phase explains of the intensities of lit pixels, and that change.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn explain(
+    light: &[Lanes; 4],
+    [phases, lit]: [&Lanes; 2],
+    fringes: &[[f32; 2]; 4],
+    ratios: [f32; 3],
+    modulation: f32,
+    [misses, steps]: [&mut Lanes; 2],
+) {
+    let most = MISS_MAX * modulation * modulation;
+    for x in 0..LANES {
+        let (cosines, derivatives) = carriers(phases[x], ratios, 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {
             let [a, b] = fringes[c];
-            let (m, d, s) = (a + b * cosines[c], b * derivatives[c], light[c]);
+            let (m, d, s) = (a + b * cosines[c], b * derivatives[c], light[c][x]);
             mm += m * m;
             md += m * d;
             dd += d * d;
@@ -227,24 +263,16 @@ impl Beside<'_> {
             ds += d * s;
             ss += s * s;
         }
-        let determinant = (mm * dd - md * md).max(1e-12);
-        let albedo = (dd * ms - md * ds) / determinant;
-        let change = (mm * ds - md * ms) / determinant;
-        let rest = (ss - albedo * ms - change * ds).max(0.0);
-        let step = if albedo > 1e-4 { (change / albedo).clamp(-STEP_MAX, STEP_MAX) } else { 0.0 };
-        (rest.min(MISS_MAX * modulation * modulation), step)
+        let determinant = mm * dd - md * md;
+        let inverse = 1.0 / if determinant > 1e-12 { determinant } else { 1e-12 };
+        let (albedo, change) = ((dd * ms - md * ds) * inverse, (mm * ds - md * ms) * inverse);
+        let rest = ss - albedo * ms - change * ds;
+        let rest = if rest > 0.0 { rest } else { 0.0 };
+        let rest = if rest < most { rest } else { most };
+        let step = change / if albedo > 1e-4 { albedo } else { 1e-4 };
+        let step = if step < STEP_MAX { step } else { STEP_MAX };
+        let on = lit[x] > 0.0;
+        misses[x] = if on { rest } else { 0.0 };
+        steps[x] = if on { if step > -STEP_MAX { step } else { -STEP_MAX } } else { 0.0 };
     }
-}
-
-/// The surface with the least sum over the pixel (x, y) of a block and its neighbours.
-fn least(misses: &[[f32; NEAR]], [x, y]: [usize; 2], side: usize, count: usize) -> usize {
-    let sum = |k: usize| -> f32 { (0..NEAR).map(|n| misses[(y + n / 3) * side + x + n % 3][k]).sum() };
-    let (mut best, mut miss) = (0, sum(0));
-    for k in 1..count {
-        let own = sum(k);
-        if own < miss {
-            (best, miss) = (k, own);
-        }
-    }
-    best
 }

@@ -110,3 +110,41 @@ fn fold<const F: usize>(rows: &[&[f32]], out: &mut [f32], join: impl Fn(f32, f32
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shrunk_image_has_means_of_light_and_the_least_of_masks_at_odd_borders_too() {
+        let (height, width) = (5, 7);
+        for factor in [2, 4] {
+            let fine_grid = Grid::with_stride([height, width], LANES * factor, 4.0);
+            let grid = fine_grid.shrunk(factor);
+            assert_eq!((grid.stride, grid.step, grid.rows), (LANES, 4 / factor, fine_grid.rows));
+            let (mut fine, mut out) = (Level::default(), Level::default());
+            fine.resize(fine_grid.pixels());
+            for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+                let at = y * fine_grid.stride + x;
+                fine.light.iter_mut().for_each(|plane| plane[at] = (10 * y + x) as f32);
+                fine.usable[at] = 1.0;
+                fine.lit[at] = f32::from(u8::from((y, x) != (1, 2)));
+            }
+            out.shrink(&fine, [&grid, &fine_grid], factor);
+            for (row, column) in (0..grid.height).flat_map(|y| (0..grid.width).map(move |x| (y, x))) {
+                let ys = (0..factor).map(|i| (row * factor + i).min(height - 1));
+                let xs = column * factor..((column + 1) * factor).min(width);
+                let pixels: Vec<_> = ys.flat_map(|y| xs.clone().map(move |x| (y, x))).collect();
+                let mean = pixels.iter().map(|(y, x)| (10 * y + x) as f32).sum::<f32>() / pixels.len() as f32;
+                let at = row * grid.stride + column;
+                assert!(
+                    (out.light[2][at] - mean).abs() < 1e-4,
+                    "{row} {column}: {} {mean}",
+                    out.light[2][at]
+                );
+                let dark = pixels.contains(&(1, 2));
+                assert_eq!(out.lit[at] == 0.0, dark || (column + 1) * factor > width, "{row} {column}");
+            }
+        }
+    }
+}
