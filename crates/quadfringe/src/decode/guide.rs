@@ -5,7 +5,7 @@ use super::judge::MISFIT_MAX;
 use super::orders::{Orders, Wrapped};
 use super::{Level, Options};
 use crate::FringeCode;
-use crate::demod::backgrounds::Backgrounds;
+use crate::demod::backgrounds::{Backgrounds, ROUGH_ROWS, ROWS};
 use crate::demod::cells::Grid;
 use crate::demod::joint::Joint;
 use crate::demod::light::LightFinder;
@@ -98,17 +98,31 @@ impl Guide {
         self.orders.choose(&scene, &known, &mut self.phase);
         self.backgrounds.start(&scene, &self.fit, &self.slopes, ratios);
         let limits = (MISFIT_MAX, relative_noise);
-        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.modulation], &self.slopes, limits);
+        self.backgrounds.fit(
+            &scene,
+            ratios,
+            [&self.phase, &self.modulation],
+            &self.slopes,
+            limits,
+            ROUGH_ROWS,
+        );
         let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
-        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.modulation], &self.slopes, limits);
+        self.backgrounds.fit(
+            &scene,
+            ratios,
+            [&self.phase, &self.modulation],
+            &self.slopes,
+            limits,
+            ROUGH_ROWS,
+        );
         let window = Window::new(&scene, &self.slopes, &self.modulation, self.noise).near();
         self.joint.step(&scene, &self.backgrounds, &window, ratios, &mut self.phase);
         self.find_tears(grid);
         for _ in 0..LAST_FITS {
-            self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits);
+            self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);
         }
     }
 

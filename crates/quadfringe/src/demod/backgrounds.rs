@@ -23,8 +23,9 @@ const OWN_COLOUR_NOISES: f32 = 0.2;
 const OWN_COLOUR_MIN: f32 = 0.01;
 /// Sides of the cells in fringe periods.
 const CELL: f64 = 0.35;
-/// Rows of pixels that stand for a row of cells.
-const SAMPLED_ROWS: usize = 4;
+/// Rows of pixels that stand for a row of cells: in the last fits, and on the way there.
+pub(crate) const ROWS: usize = 4;
+pub(crate) const ROUGH_ROWS: usize = 2;
 /// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
 const RIDGE: f32 = 5e-2;
 /// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
@@ -88,7 +89,7 @@ impl Backgrounds {
         [0, 2, 4, 6].map(|c| [c, c + 1].map(|k| self.maps.line(row / times, k)[column / times]))
     }
 
-    /// Fit them to an absolute phase in rad. Pixels that are further from any such model than `misfit_max` times their
+    /// Fit them to an absolute phase in rad by `most` rows of pixels for a row of cells. Pixels that are further from any such model than `misfit_max` times their
     /// modulation (root mean square) take no part. `relative_noise` is the noise over the modulation.
     pub fn fit(
         &mut self,
@@ -97,11 +98,12 @@ impl Backgrounds {
         [phase, modulation]: [&[f32]; 2],
         slopes: &Slopes,
         (misfit_max, relative_noise): (f32, f32),
+        most: usize,
     ) {
         let Self { grid, maps, next, sums, slots } = self;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
         grid.window_sums::<SUMS, [RowMaps; 2]>(
-            (sigma, SAMPLED_ROWS),
+            (sigma, most),
             slots,
             sums,
             next,
@@ -399,7 +401,7 @@ mod tests {
         // The phase given is 0.05 rad off, as a two-step phase with wrong backgrounds is.
         let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
         for _ in 0..3 {
-            found.fit(&scene, ratios, [&phase, &modulation], &slopes, (0.3, 0.0));
+            found.fit(&scene, ratios, [&phase, &modulation], &slopes, (0.3, 0.0), ROWS);
         }
         let mut maps = RowMaps::default();
         let rows = found.sample(&scene, 48, &mut maps);
