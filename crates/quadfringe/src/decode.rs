@@ -13,6 +13,7 @@ mod judge;
 mod orders;
 mod output;
 mod published;
+mod uncertainty;
 
 pub use output::Decoded;
 
@@ -45,11 +46,21 @@ pub struct Options {
     pub quality_min: f32,
     /// Fringe period in camera pixels; `None` estimates it from every shot.
     pub period_px: Option<f64>,
+    /// Instants at which R, G, B and IR are seen (the middle of each exposure), in us from the instant that the result is to
+    /// stand for; `None` when all see the same. A projector that shows its colours one after another needs them when the
+    /// surface moves. [`Method::Best`] alone can do this.
+    pub channel_instants_us: Option<[f32; 4]>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { method: Method::default(), modulation_min: 0.02, quality_min: 0.15, period_px: None }
+        Self {
+            method: Method::default(),
+            modulation_min: 0.02,
+            quality_min: 0.15,
+            period_px: None,
+            channel_instants_us: None,
+        }
     }
 }
 
@@ -59,6 +70,15 @@ impl Options {
         for (name, value) in fractions {
             if !(0.0..1.0).contains(&value) {
                 return Err(Error::value(name, "a fraction in [0, 1)", value));
+            }
+        }
+        if let Some(instants) = self.channel_instants_us {
+            if let Some(odd) = instants.into_iter().find(|t| !t.is_finite()) {
+                return Err(Error::value("channel_instants_us", "finite times", odd));
+            }
+            if self.method == Method::Published {
+                let expected = "none with the published method, which cannot undo motion; take the best one";
+                return Err(Error::value("channel_instants_us", expected, format!("{instants:?}")));
             }
         }
         match self.period_px {

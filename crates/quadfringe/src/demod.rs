@@ -9,6 +9,7 @@ mod fourier;
 pub(crate) mod joint;
 pub(crate) mod light;
 pub(crate) mod local_fit;
+pub(crate) mod motion;
 mod n_step;
 pub(crate) mod scene;
 pub(crate) mod slopes;

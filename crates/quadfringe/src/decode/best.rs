@@ -3,6 +3,7 @@
 use super::judge::{Findings, Judge, MISFIT_MAX};
 use super::orders::{Orders, Wrapped};
 use super::output::Finish;
+use super::uncertainty::{Odds, PhaseNoise};
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::backgrounds::Backgrounds;
@@ -11,6 +12,7 @@ use crate::demod::cells::Grid;
 use crate::demod::joint::Joint;
 use crate::demod::light::LightFinder;
 use crate::demod::local_fit::{LocalFit, PixelMaps};
+use crate::demod::motion::Motion;
 use crate::demod::scene::Scene;
 use crate::demod::slopes::Slopes;
 use crate::demod::window::{Window, noise};
@@ -23,6 +25,9 @@ const CELLS: f64 = 4.5;
 
 /// Pixels that interpolated light reaches into a shadow.
 const MOSAIC_BLUR_PX: usize = 2;
+
+/// Times that the light of a moving surface is brought to one instant and decoded again.
+const MOTION_ROUNDS: usize = 2;
 
 pub(super) struct Best {
     shape: [usize; 2],
@@ -39,6 +44,9 @@ pub(super) struct Best {
     orders: Orders,
     backgrounds: Backgrounds,
     joint: Joint,
+    motion: Motion,
+    /// Light as it was seen, when it has to be brought to one instant.
+    seen: [Vec<f32>; 4],
     judge: Judge,
 }
 
@@ -62,6 +70,8 @@ impl Best {
             orders: Orders::new(code),
             backgrounds: Backgrounds::new(),
             joint: Joint::default(),
+            motion: Motion::default(),
+            seen: Default::default(),
             judge: Judge::default(),
         }
     }
@@ -92,38 +102,32 @@ impl Best {
                 *usable *= *lit;
             }
         });
-        let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
+        let motion = options.channel_instants_us.map(|instants| (self.ratios, instants.map(|t| 1e-6 * t)));
+        if motion.is_some() {
+            self.seen = self.light.clone();
+        }
+        let mut rounds = if motion.is_some() { MOTION_ROUNDS } else { 0 };
+        let (noise, share) = loop {
+            let light = self.light.each_ref().map(Vec::as_slice);
+            let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
 
-        // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
-        let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
-        self.fit.run(&scene, &self.lit, options.modulation_min, maps);
-        let noise = noise(&scene, &self.wrapped, &self.modulation);
-        let relative_noise = relative(noise, &self.modulation);
-        self.slopes.measure(&scene, &self.wrapped, &self.modulation);
+            // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
+            let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
+            self.fit.run(&scene, &self.lit, options.modulation_min, maps);
+            let noise = noise(&scene, &self.wrapped, &self.modulation);
+            let relative_noise = relative(noise, &self.modulation);
+            self.slopes.measure(&scene, &self.wrapped, &self.modulation);
 
-        // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
-        let known = Wrapped {
-            phase: &self.wrapped,
-            modulation: &self.modulation,
-            fit: &self.fit,
-            backgrounds: None,
-            slopes: &self.slopes,
-        };
-        self.orders.choose(&scene, &known, &mut self.phase);
-        self.backgrounds.start(&scene, &self.fit);
-        self.backgrounds.fit(
-            &scene,
-            self.ratios,
-            &self.phase,
-            &self.modulation,
-            (MISFIT_MAX, relative_noise),
-        );
-        let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
-        self.orders.choose(&scene, &known, &mut self.phase);
-
-        // 4. All four channels measure the same column.
-        let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
-        for window in [window.near(), window] {
+            // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
+            let known = Wrapped {
+                phase: &self.wrapped,
+                modulation: &self.modulation,
+                fit: &self.fit,
+                backgrounds: None,
+                slopes: &self.slopes,
+            };
+            self.orders.choose(&scene, &known, &mut self.phase);
+            self.backgrounds.start(&scene, &self.fit);
             self.backgrounds.fit(
                 &scene,
                 self.ratios,
@@ -131,10 +135,38 @@ impl Best {
                 &self.modulation,
                 (MISFIT_MAX, relative_noise),
             );
-            self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
-        }
+            let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
+            self.orders.choose(&scene, &known, &mut self.phase);
+
+            // 4. All four channels measure the same column.
+            let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
+            for window in [window.near(), window] {
+                self.backgrounds.fit(
+                    &scene,
+                    self.ratios,
+                    &self.phase,
+                    &self.modulation,
+                    (MISFIT_MAX, relative_noise),
+                );
+                self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
+            }
+
+            // What moves is brought to one instant and decoded again.
+            let Some(motion) = motion.filter(|_| rounds > 0) else { break (noise, window.share()) };
+            if rounds == MOTION_ROUNDS {
+                self.motion.rest(&scene);
+            }
+            rounds -= 1;
+            self.motion.measure(&scene, motion, &self.backgrounds, &self.phase, &self.modulation);
+            let light = self.seen.each_ref().map(Vec::as_slice);
+            let seen = Scene { light, usable: &self.usable, grid: &grid, period_px };
+            let light = self.light.each_mut().map(Vec::as_mut_slice);
+            self.motion.settle(&seen, motion, &self.backgrounds, &self.phase, light);
+        };
 
         // 5. What is not sure is no data.
+        let light = self.light.each_ref().map(Vec::as_slice);
+        let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
@@ -144,7 +176,11 @@ impl Best {
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
-        self.write(&grid, finish, out);
+
+        // 6. How sure the rest is: needs the noise, the window and what it added up, leads and misfits of the orders.
+        let noise = PhaseNoise::new(noise, share);
+        let odds = self.orders.odds(&scene);
+        self.write(&scene, (&noise, &odds), finish, out);
     }
 
     /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
@@ -173,7 +209,14 @@ impl Best {
         );
     }
 
-    fn write(&self, grid: &Grid, finish: &Finish<'_>, out: &mut Decoded) {
+    fn write(
+        &self,
+        scene: &Scene<'_>,
+        (noise, odds): (&PhaseNoise, &Odds),
+        finish: &Finish<'_>,
+        out: &mut Decoded,
+    ) {
+        let grid = scene.grid;
         out.rows().enumerate().for_each(|(y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
             let known = self.judge.sure[at.clone()].iter().zip(&self.phase[at.clone()]);
@@ -181,7 +224,13 @@ impl Best {
                 *out = if *sure != 0 { *own } else { f32::NAN };
             }
             row.modulation.copy_from_slice(&self.modulation[at.clone()]);
-            row.quality.copy_from_slice(&self.judge.quality[at]);
+            row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
+            noise.row(&self.joint.information[at], row.sigma);
+            for (wrong, (lead, _, _)) in
+                row.wrong.chunks_mut(grid.step).zip(self.orders.verdict(scene, y / grid.step))
+            {
+                wrong.fill(odds.another(lead));
+            }
             finish.row(y, &mut row);
         });
     }

@@ -22,6 +22,9 @@ pub(crate) struct Joint {
     slots: Slots<Rows>,
     /// Misfit of the four channels: mean square in linear light.
     pub misfit: Vec<f32>,
+    /// What the window of the last round knows of the phase of every pixel: sum of weighted squared derivatives, 1/rad^2 in
+    /// units of linear light. The uncertainty is made of it.
+    pub information: Vec<f32>,
 }
 
 /// Model and derivative of the four channels for an albedo of 1, and the albedo that fits best, on one row.
@@ -53,7 +56,8 @@ impl Joint {
         let grid = scene.grid;
         self.steps.resize(grid.pixels());
         self.misfit.resize(grid.pixels(), 0.0);
-        let Self { steps, misfit, slots } = self;
+        self.information.resize(grid.pixels(), 0.0);
+        let Self { steps, misfit, information, slots } = self;
         let before = &*phase;
         let out = steps
             .phase
@@ -89,7 +93,7 @@ impl Joint {
                 }
             },
         );
-        window.down(&self.steps, &self.slots, |rows| &mut rows.window, phase);
+        window.down(steps, slots, |rows| &mut rows.window, phase, information);
     }
 }
 
