@@ -1,5 +1,6 @@
 //! Planes -> wrapped phase: background, two-step (TPS), Fourier (FTP), N-step, and the local fit of all channels.
 
+pub(crate) mod agreement;
 mod aligned;
 mod background;
 pub(crate) mod backgrounds;

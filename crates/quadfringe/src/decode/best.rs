@@ -3,12 +3,13 @@
 use super::judge::{Findings, Judge, MISFIT_MAX};
 use super::orders::{Orders, Wrapped};
 use super::output::Finish;
-use super::uncertainty::{Odds, PhaseNoise};
+use super::uncertainty::PhaseNoise;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
+use crate::demod::agreement::Agreement;
 use crate::demod::backgrounds::Backgrounds;
 use crate::demod::carrier;
-use crate::demod::cells::Grid;
+use crate::demod::cells::{Grid, RowMaps};
 use crate::demod::joint::Joint;
 use crate::demod::light::LightFinder;
 use crate::demod::local_fit::{LocalFit, PixelMaps};
@@ -27,7 +28,7 @@ const CELLS: f64 = 4.5;
 const MOSAIC_BLUR_PX: usize = 2;
 
 /// Times that the light of a moving surface is brought to one instant and decoded again.
-const MOTION_ROUNDS: usize = 2;
+const MOTION_ROUNDS: usize = 3;
 
 pub(super) struct Best {
     shape: [usize; 2],
@@ -44,6 +45,9 @@ pub(super) struct Best {
     orders: Orders,
     backgrounds: Backgrounds,
     joint: Joint,
+    agreement: Agreement,
+    /// Probability that the order of a node is another one.
+    another: Vec<f32>,
     motion: Motion,
     /// Light as it was seen, when it has to be brought to one instant.
     seen: [Vec<f32>; 4],
@@ -70,6 +74,8 @@ impl Best {
             orders: Orders::new(code),
             backgrounds: Backgrounds::new(),
             joint: Joint::default(),
+            agreement: Agreement::default(),
+            another: Vec::new(),
             motion: Motion::default(),
             seen: Default::default(),
             judge: Judge::default(),
@@ -176,11 +182,17 @@ impl Best {
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
+        if let Some((_, instants)) = motion {
+            self.motion.rule_out(&scene, instants, &mut self.judge.sure);
+        }
 
-        // 6. How sure the rest is: needs the noise, the window and what it added up, leads and misfits of the orders.
+        // 6. How sure the rest is. Needed: the noise, the share of squared weights in the window and the information it has
+        // added up, backgrounds and final phase, leads and misfits of the orders.
+        let known = (self.ratios, noise);
+        self.agreement.measure(&scene, known, &self.backgrounds, &self.phase, &self.modulation);
         let noise = PhaseNoise::new(noise, share);
-        let odds = self.orders.odds(&scene);
-        self.write(&scene, (&noise, &odds), finish, out);
+        self.orders.another(&scene, &mut self.another);
+        self.write(&scene, &noise, finish, out);
     }
 
     /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
@@ -209,15 +221,9 @@ impl Best {
         );
     }
 
-    fn write(
-        &self,
-        scene: &Scene<'_>,
-        (noise, odds): (&PhaseNoise, &Odds),
-        finish: &Finish<'_>,
-        out: &mut Decoded,
-    ) {
+    fn write(&self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
         let grid = scene.grid;
-        out.rows().enumerate().for_each(|(y, mut row)| {
+        out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
             let known = self.judge.sure[at.clone()].iter().zip(&self.phase[at.clone()]);
             for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
@@ -225,12 +231,10 @@ impl Best {
             }
             row.modulation.copy_from_slice(&self.modulation[at.clone()]);
             row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
-            noise.row(&self.joint.information[at], row.sigma);
-            for (wrong, (lead, _, _)) in
-                row.wrong.chunks_mut(grid.step).zip(self.orders.verdict(scene, y / grid.step))
-            {
-                wrong.fill(odds.another(lead));
-            }
+            let disagreement = self.agreement.row(scene, y, maps);
+            noise.row(&self.joint.information[at], disagreement, row.sigma);
+            let nodes = &self.another[y / grid.step * grid.columns..];
+            row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);
         });
     }

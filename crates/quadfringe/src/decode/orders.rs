@@ -1,6 +1,6 @@
 //! The orders of a scene: a node on every cell, and the pixels beside edges one by one.
 
-use super::uncertainty::Odds;
+use super::uncertainty::CostOdds;
 use crate::angle::{atan2, round, sin_cos, wrap, wrap_positive};
 use crate::demod::backgrounds::Backgrounds;
 use crate::demod::cells::{LANES, Lanes, RowMaps, add, lanes, take};
@@ -127,12 +127,18 @@ impl Orders {
             .map(|((margin, misfit), node)| (margin.min(1.0), *misfit, node.lit))
     }
 
-    /// How the leads of [`Self::verdict`] are to be taken: evidence comes from the window of the local fit, which is so many
-    /// nodes wide as an equal weight for each would make it.
-    pub fn odds(&self, scene: &Scene<'_>) -> Odds {
-        let lit = (0..scene.grid.rows).flat_map(|row| self.verdict(scene, row)).filter(|(_, _, lit)| *lit);
+    /// Probability for every node that its order is another one. Evidence comes from the window of the local fit, which is so
+    /// many nodes wide as an equal weight for each would make it.
+    pub fn another(&self, scene: &Scene<'_>, out: &mut Vec<f32>) {
+        let grid = scene.grid;
+        let lit = (0..grid.rows).flat_map(|row| self.verdict(scene, row)).filter(|(_, _, lit)| *lit);
         let together = scene.cells(2.0 * PI.sqrt() * LocalFit::WINDOW);
-        Odds::of_costs(lit.map(|(_, misfit, _)| misfit), jump_nodes(scene) as f32, together)
+        let odds = CostOdds::new(lit.map(|(_, misfit, _)| misfit), jump_nodes(scene) as f32, together);
+        out.resize(grid.rows * grid.columns, 0.0);
+        out.par_chunks_mut(grid.columns).enumerate().for_each(|(row, out)| {
+            let nodes = out.iter_mut().zip(self.verdict(scene, row));
+            nodes.for_each(|(out, (lead, misfit, _))| *out = odds.another(lead, misfit));
+        });
     }
 
     fn absolute(&self, at: usize) -> f32 {

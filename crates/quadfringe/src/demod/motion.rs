@@ -8,7 +8,7 @@
 //! brought to the instant 0 by what its model says that motion has changed.
 
 use super::backgrounds::{Backgrounds, carriers};
-use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, add, lanes, lanes_mut, put, take};
+use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, lanes_mut, put, take};
 use super::scene::Scene;
 use crate::angle::sin_cos;
 use crate::slots::Slots;
@@ -20,6 +20,12 @@ const WINDOW: f32 = 0.5;
 /// Rows of pixels that stand for a row of cells.
 const SAMPLED_ROWS: usize = 4;
 
+/// Greatest share of the way that a step is taken to leave.
+const SLOWEST: f64 = 0.8;
+
+/// Greatest turn of B against R, rad; a quarter of a fringe is 1.57.
+const TURN_MAX: f32 = 1.1;
+
 /// Instants of the four channels, in any unit of time; 0 is the instant that everything is brought to.
 pub(crate) type Instants = [f32; 4];
 
@@ -29,6 +35,9 @@ pub(crate) struct Motion {
     /// Phase of the first fringe number per unit of time.
     velocity: CellMaps,
     change: CellMaps,
+    /// Steps taken, and what the next one is multiplied by.
+    steps: usize,
+    gain: f32,
     sums: CellMaps,
     slots: Slots<([RowMaps; 2], CellWork)>,
 }
@@ -38,6 +47,8 @@ impl Default for Motion {
         Self {
             velocity: CellMaps::default(),
             change: CellMaps::new(1),
+            steps: 0,
+            gain: 1.0,
             sums: CellMaps::default(),
             slots: Slots::default(),
         }
@@ -48,6 +59,7 @@ impl Motion {
     /// Forget the last shot.
     pub fn rest(&mut self, scene: &Scene<'_>) {
         self.velocity.fill::<1>(scene.grid, |_, [line]| line.fill(0.0));
+        (self.steps, self.gain) = (0, 1.0);
     }
 
     /// Add to the velocity what light that was settled by it still shows; `phase` is absolute, `modulation` 0 where there is no
@@ -76,11 +88,30 @@ impl Motion {
                 found.for_each(|(out, (seen, known))| *out = seen / known.max(1e-9));
             },
         );
-        let (before, change) = (std::mem::take(&mut self.velocity), &self.change);
+        self.speed_up(grid);
+        let (before, change, gain) = (std::mem::take(&mut self.velocity), &self.change, self.gain);
         self.velocity.fill::<1>(grid, |row, [line]| {
             let both = before.line(row, 0).iter().zip(change.line(row, 0));
-            line.iter_mut().zip(both).for_each(|(out, (before, change))| *out = before + change);
+            line.iter_mut().zip(both).for_each(|(out, (before, change))| *out = before + gain * change);
         });
+    }
+
+    /// Backgrounds and phase were fitted as if nothing moved, and have taken up a part of what motion does to the light. So a
+    /// step finds the same share of what is left every time, and the second one tells which: the rest of the way is a geometric
+    /// series.
+    fn speed_up(&mut self, grid: &Grid) {
+        self.steps += 1;
+        if self.steps != 2 {
+            return;
+        }
+        let (mut both, mut first) = (0.0, f64::MIN_POSITIVE);
+        for row in 0..grid.rows {
+            for (before, change) in self.velocity.line(row, 0).iter().zip(self.change.line(row, 0)) {
+                both += f64::from(before * change);
+                first += f64::from(before * before);
+            }
+        }
+        self.gain = (1.0 / (1.0 - (both / first).clamp(0.0, SLOWEST))) as f32;
     }
 
     /// Bring the light of a scene, as it was seen, to the instant 0.
@@ -107,10 +138,18 @@ impl Motion {
         );
     }
 
-    /// Velocity along row `y`, in rad per unit of time.
-    pub fn row<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
-        let [row] = maps.sample(scene.grid, &self.velocity, 0, y);
-        row
+    /// Takes from `sure` what moves too fast: where R and B have turned against each other by nearly a quarter of a fringe
+    /// they show the same, and nothing tells how fast it was.
+    pub fn rule_out(&self, scene: &Scene<'_>, [red, _, blue, _]: Instants, sure: &mut [u8]) {
+        let grid = scene.grid;
+        let most = TURN_MAX / (blue - red).abs().max(f32::MIN_POSITIVE);
+        sure.par_chunks_mut(grid.stride).enumerate().for_each_init(
+            || self.slots.take(),
+            |slot, (y, sure)| {
+                let [velocity] = slot.0[0].sample(grid, &self.velocity, 0, y);
+                sure.iter_mut().zip(velocity).for_each(|(sure, v)| *sure &= u8::from(v.abs() <= most));
+            },
+        );
     }
 }
 
