@@ -72,9 +72,7 @@ def decode(
         fringes=Fringes(numbers=fringes),
         calibration=None if calibration is None else Calibration.load(calibration),
         response=None if response is None else ResponseCalibration.load(response),
-        settings=DecodeConfig(
-            method=None if method is None else method.value, channel_instants_us=channel_instants_us
-        ),
+        settings=DecodeConfig(method=None if method is None else method.value, channel_instants_us=channel_instants_us),
     )
     bits_in_use = None if bits is None else int(bits)
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}
