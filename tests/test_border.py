@@ -17,7 +17,7 @@ CHANNELS = ("R", "G", "B", "IR")
 Four = list[np.ndarray[Any, Any]]
 
 
-SURENESS = ("uncertainty_rad", "wrong_order_probability")
+SURENESS = ("wrong_order_probability", "uncertainty_rad")
 
 
 @pytest.fixture(scope="module")
@@ -45,6 +45,13 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
     assert np.isfinite(error).mean() > 0.98
     assert np.nanmedian(error) < 0.1
     assert all(m.dtype == np.float32 and m.shape == (96, 912) for m in maps.values())
+
+
+def test_instants_of_the_channels_are_kept_and_checked() -> None:
+    instants = (-5556.0, 0.0, 5556.0, 0.0)
+    assert decoder(channel_instants_us=instants).settings()["channel_instants_us"] == list(instants)
+    with pytest.raises(ValueError, match="channel_instants_us: expected none with the published method"):
+        decoder(channel_instants_us=instants, method="published")
 
 
 def test_memory_is_used_again_only_when_nobody_looks_at_it(images: Four) -> None:

@@ -53,7 +53,7 @@ def test_command_line_decodes_a_capture(scene: scoring.Scene, response_file: Pat
     quadfringe("decode", *words, "--response", response_file, "--out", out)
     with np.load(out) as maps:
         assert_bars(scoring.score(scene, maps["phase_rad"]))
-        for name in (*MAPS, "uncertainty_rad", "wrong_order_probability"):
+        for name in (*MAPS, "wrong_order_probability", "uncertainty_rad"):
             assert maps[name].shape == scene.red.shape
             assert maps[name].dtype == np.float32
         returned = np.isfinite(maps["phase_rad"])

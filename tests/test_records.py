@@ -34,9 +34,9 @@ CALIBRATION = Calibration(
 @pytest.fixture
 def shape() -> Shape:
     rng = np.random.default_rng(7)
-    maps = rng.random((8, 6, 8), np.float32)
+    maps = rng.random((7, 6, 8), np.float32)
     maps[:, 2, 3] = np.nan
-    names = ("uncertainty_rad", "wrong_order_probability", "uncertainty_mm")
+    names = ("wrong_order_probability", "uncertainty_mm")
     sureness = dict(zip(names, maps[5:], strict=True))
     xyz = rng.random((6, 8, 3), np.float32) * 800
     xyz[2, 3] = np.nan
@@ -72,9 +72,9 @@ def test_figures_say_what_came_back_and_how_sure_it_is(shape: Shape) -> None:
     assert figures["returned_percent"] == pytest.approx(100 * 47 / 48)
     assert figures["uncertainty_median_mm"] == pytest.approx(np.nanmedian(shape.uncertainty_mm))
     assert figures["expected_wrong_orders"] == pytest.approx(np.nansum(shape.wrong_order_probability))
-    without = replace(shape, uncertainty_mm=None, xyz_mm=None).figures()
-    assert "uncertainty_median_rad" in without
-    assert "uncertainty_median_mm" not in without
+    phase_only = replace(shape, uncertainty_mm=None, uncertainty_rad=shape.uncertainty_mm, xyz_mm=None).figures()
+    assert "uncertainty_median_rad" in phase_only
+    assert "uncertainty_median_mm" not in phase_only
 
 
 @pytest.mark.parametrize("name", ["depth.tif", "depth.tiff"])

@@ -203,8 +203,8 @@ class Decoder:
     ) -> dict[str, NDArray[np.float32]]:
         """Give maps (H, W) by name.
 
-        phase_rad, column_px, order, modulation, quality, uncertainty_rad, wrong_order_probability; when devices are
-        known also uncertainty_mm (of the depth) and xyz_mm (H, W, 3).
+        phase_rad, column_px, order, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
+        when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3).
 
         The images are (H, W) uint8, uint16 or float32, all of one type; strided views are welcome, nothing is
         copied. Raises TypeError for another type, ValueError for another size or values that are not finite.

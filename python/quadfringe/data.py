@@ -20,7 +20,7 @@ __all__ = ["AnyShot", "BayerShot", "Calibration", "ResponseCalibration", "Shape"
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
-MORE_MAPS = ("uncertainty_rad", "wrong_order_probability", "uncertainty_mm", "xyz_mm")
+MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm")
 SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
 
@@ -176,9 +176,9 @@ AnyShot = Shot | BayerShot
 class Shape:
     """A decoded shot: maps (H, W) float32, points (H, W, 3) mm when calibrated; NaN where there is no data.
 
-    `uncertainty_mm` is one standard deviation of the depth, `uncertainty_rad` of the phase, both for the order that was
-    chosen; `wrong_order_probability` is that of another order. `config` and `calibration` are the settings that made it
-    and travel with it into an NPZ file.
+    `uncertainty_mm` is one standard deviation of the depth (`uncertainty_rad` of the phase when not calibrated) for the
+    order that was chosen, `wrong_order_probability` that of another order. `config` and `calibration` are the settings
+    that made it and travel with it into an NPZ file.
     """
 
     phase_rad: Map
@@ -187,15 +187,15 @@ class Shape:
     modulation: Map
     quality: Map
     xyz_mm: Map | None = None
-    uncertainty_rad: Map | None = None
     wrong_order_probability: Map | None = None
+    uncertainty_rad: Map | None = None
     uncertainty_mm: Map | None = None
     config: Mapping[str, Any] = field(default_factory=dict, repr=False)
     calibration: Calibration | None = field(default=None, repr=False)
 
     @property
     def maps(self) -> dict[str, Map]:
-        """Every map by name; `uncertainty_mm` and `xyz_mm` only when calibrated."""
+        """Every map by name; `uncertainty_mm` in place of `uncertainty_rad`, and `xyz_mm`, when calibrated."""
         maps = {name: getattr(self, name) for name in (*MAPS, *MORE_MAPS)}
         return {name: values for name, values in maps.items() if values is not None}
 
@@ -222,11 +222,13 @@ class Shape:
         """
         returned = self.returned
         found = {"returned_percent": 100.0 * float(returned.mean())}
-        if self.uncertainty_rad is None or self.wrong_order_probability is None or not returned.any():
+        if not returned.any():
             return found
-        unit, sigma = ("rad", self.uncertainty_rad) if self.uncertainty_mm is None else ("mm", self.uncertainty_mm)
-        found[f"uncertainty_median_{unit}"] = float(np.nanmedian(sigma))
-        found["expected_wrong_orders"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
+        for name, sigma in (("rad", self.uncertainty_rad), ("mm", self.uncertainty_mm)):
+            if sigma is not None:
+                found[f"uncertainty_median_{name}"] = float(np.nanmedian(sigma))
+        if self.wrong_order_probability is not None:
+            found["expected_wrong_orders"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
         return found
 
     def with_settings(self, config: Mapping[str, Any], calibration: Calibration | None) -> Shape:

@@ -158,8 +158,8 @@ impl Decoder {
             order: map(),
             modulation: map(),
             quality: map(),
-            uncertainty_rad: map(),
             wrong_order_probability: map(),
+            uncertainty_rad: (!self.calibrated).then(map),
             uncertainty_mm: self.calibrated.then(map),
             xyz_mm: self.calibrated.then(|| self.memory.take(Ix3(rows, columns, 3))),
         }
@@ -172,10 +172,13 @@ impl Decoder {
         named.set_item("order", self.memory.lend(py, decoded.order)?)?;
         named.set_item("modulation", self.memory.lend(py, decoded.modulation)?)?;
         named.set_item("quality", self.memory.lend(py, decoded.quality)?)?;
-        named.set_item("uncertainty_rad", self.memory.lend(py, decoded.uncertainty_rad)?)?;
         named.set_item("wrong_order_probability", self.memory.lend(py, decoded.wrong_order_probability)?)?;
-        if let Some(uncertainty_mm) = decoded.uncertainty_mm {
-            named.set_item("uncertainty_mm", self.memory.lend(py, uncertainty_mm)?)?;
+        let uncertain =
+            [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
+        for (name, map) in uncertain {
+            if let Some(map) = map {
+                named.set_item(name, self.memory.lend(py, map)?)?;
+            }
         }
         if let Some(xyz_mm) = decoded.xyz_mm {
             named.set_item("xyz_mm", self.memory.lend(py, xyz_mm)?)?;

@@ -72,15 +72,7 @@ impl Options {
                 return Err(Error::value(name, "a fraction in [0, 1)", value));
             }
         }
-        if let Some(instants) = self.channel_instants_us {
-            if let Some(odd) = instants.into_iter().find(|t| !t.is_finite()) {
-                return Err(Error::value("channel_instants_us", "finite times", odd));
-            }
-            if self.method == Method::Published {
-                let expected = "none with the published method, which cannot undo motion; take the best one";
-                return Err(Error::value("channel_instants_us", expected, format!("{instants:?}")));
-            }
-        }
+        self.channel_instants_us.map_or(Ok(()), |instants| check_instants(instants, self.method))?;
         match self.period_px {
             Some(period) if !(period.is_finite() && period >= 3.0) => {
                 Err(Error::value("period_px", "at least 3 camera pixels", period))
@@ -88,6 +80,16 @@ impl Options {
             _ => Ok(()),
         }
     }
+}
+
+fn check_instants(instants: [f32; 4], method: Method) -> Result<()> {
+    let expected = match method {
+        Method::Published => "none with the published method, which cannot undo motion; take the best one",
+        Method::Best if instants.iter().any(|t| !t.is_finite()) => "finite times",
+        Method::Best if instants.iter().all(|t| *t == instants[0]) => "times that differ, or none",
+        Method::Best => return Ok(()),
+    };
+    Err(Error::value("channel_instants_us", expected, format!("{instants:?}")))
 }
 
 /// Decodes shots of one size and one code: planned once, run many times.

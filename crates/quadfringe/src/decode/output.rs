@@ -21,10 +21,10 @@ pub struct Decoded {
     pub modulation: Array2<f32>,
     /// How far the order is from another one, in [0, 1]; known wherever there is light.
     pub quality: Array2<f32>,
-    /// Standard deviation of the absolute phase in rad, for the order that was chosen.
-    pub uncertainty_rad: Array2<f32>,
     /// Probability that the order is another one, in [0, 1].
     pub wrong_order_probability: Array2<f32>,
+    /// Standard deviation of the absolute phase in rad, for the order that was chosen, when the decoder is not calibrated.
+    pub uncertainty_rad: Option<Array2<f32>>,
     /// Standard deviation of the depth Z in mm, for the order that was chosen, when the decoder is calibrated.
     pub uncertainty_mm: Option<Array2<f32>>,
     /// Points in the camera frame in mm, `(rows, columns, 3)`, when the decoder is calibrated.
@@ -42,8 +42,8 @@ impl Decoded {
             order: map(),
             modulation: map(),
             quality: map(),
-            uncertainty_rad: map(),
             wrong_order_probability: map(),
+            uncertainty_rad: (!calibrated).then(map),
             uncertainty_mm: calibrated.then(map),
             xyz_mm: calibrated.then(|| Array3::zeros([shape[0], shape[1], 3])),
         }
@@ -56,18 +56,23 @@ impl Decoded {
             &self.order,
             &self.modulation,
             &self.quality,
-            &self.uncertainty_rad,
             &self.wrong_order_probability,
         ];
-        for map in maps.into_iter().chain(&self.uncertainty_mm) {
+        // One of the two, or rows would not know which to fill.
+        let (name, uncertainty, other) = match calibrated {
+            true => ("uncertainty_mm", &self.uncertainty_mm, &self.uncertainty_rad),
+            false => ("uncertainty_rad", &self.uncertainty_rad, &self.uncertainty_mm),
+        };
+        if uncertainty.is_none() || other.is_some() {
+            let only = format!("{name}, the only map of uncertainty");
+            return Err(Error::shape(only, &shape, &[0]));
+        }
+        for map in maps.into_iter().chain(uncertainty) {
             if map.shape() != shape || !map.is_standard_layout() {
                 return Err(Error::shape("output map", &shape, map.shape()));
             }
         }
         let expected = [shape[0], shape[1], 3];
-        if calibrated && self.uncertainty_mm.is_none() {
-            return Err(Error::shape("uncertainty_mm", &shape, &[0]));
-        }
         match &self.xyz_mm {
             Some(xyz) if xyz.shape() != expected || !xyz.is_standard_layout() => {
                 Err(Error::shape("xyz_mm", &expected, xyz.shape()))
@@ -91,12 +96,10 @@ impl Decoded {
             &mut self.order,
             &mut self.modulation,
             &mut self.quality,
-            &mut self.uncertainty_rad,
             &mut self.wrong_order_probability,
+            self.uncertainty_mm.as_mut().or(self.uncertainty_rad.as_mut()).expect("checked"),
         ];
         let mut maps = maps.map(|map| map.as_slice_mut().expect("checked layout").chunks_exact_mut(width));
-        let depth = self.uncertainty_mm.as_mut().map(|map| map.as_slice_mut().expect("checked layout"));
-        let mut depth = depth.map(|map| map.chunks_exact_mut(width));
         let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("checked layout"));
         let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
         let mut next = || {
@@ -110,7 +113,6 @@ impl Decoded {
                 quality: quality?,
                 sigma: sigma?,
                 wrong: wrong?,
-                sigma_mm: depth.as_mut().and_then(Iterator::next),
                 xyz: xyz.as_mut().and_then(Iterator::next),
             })
         };
@@ -128,12 +130,10 @@ pub(super) struct OutputRow<'a> {
     pub order: &'a mut [f32],
     pub modulation: &'a mut [f32],
     pub quality: &'a mut [f32],
-    /// Standard deviation of the phase.
-    pub sigma: &'a mut [f32],
-    /// Probability of a wrong order.
+    /// Probability of another order.
     pub wrong: &'a mut [f32],
-    /// Standard deviation of the depth.
-    pub sigma_mm: Option<&'a mut [f32]>,
+    /// Standard deviation: of the phase until the row is finished, then of the depth when calibrated.
+    pub sigma: &'a mut [f32],
     pub xyz: Option<&'a mut [f32]>,
 }
 
@@ -149,32 +149,22 @@ impl Finish<'_> {
         let per_rad = self.code.period_px(0) as f32 / TAU;
         let end = self.code.projector_width() as f32 + 0.5;
         columns_and_orders(per_rad, end, row.phase, row.column, row.order);
-        blank(row.phase, [row.sigma, row.wrong]);
-        let Some(triangulator) = self.triangulator else { return };
-        if let Some(xyz) = &mut row.xyz {
+        let unit = if self.triangulator.is_some() { per_rad } else { 1.0 };
+        sure_only(row.phase, unit, row.sigma, row.wrong);
+        if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
             triangulator.xyz_row(y, row.column, xyz);
-        }
-        if let Some(sigma_mm) = &mut row.sigma_mm {
-            triangulator.depth_per_column_row(y, row.column, sigma_mm);
-            scale(per_rad, row.sigma, sigma_mm);
+            triangulator.depth_uncertainty_row(y, row.column, row.sigma);
         }
     }
 }
 
-/// Where there is no phase nothing is known of it either.
+/// Where there is no phase nothing is known of it either; uncertainty in rad is turned into another unit.
 #[multiversion(targets("x86_64+avx2"))]
-fn blank(phase: &[f32], maps: [&mut [f32]; 2]) {
-    for map in maps {
-        map.iter_mut()
-            .zip(phase)
-            .for_each(|(value, phase)| *value = if phase.is_nan() { f32::NAN } else { *value });
+fn sure_only(phase: &[f32], unit: f32, sigma: &mut [f32], wrong: &mut [f32]) {
+    for (phase, (sigma, wrong)) in phase.iter().zip(sigma.iter_mut().zip(wrong)) {
+        *sigma = if phase.is_nan() { f32::NAN } else { *sigma * unit };
+        *wrong = if phase.is_nan() { f32::NAN } else { *wrong };
     }
-}
-
-/// Depth per column times the columns that the phase is uncertain by.
-#[multiversion(targets("x86_64+avx2"))]
-fn scale(per_rad: f32, sigma: &[f32], depth: &mut [f32]) {
-    depth.iter_mut().zip(sigma).for_each(|(depth, sigma)| *depth = depth.abs() * (sigma * per_rad));
 }
 
 /// No light comes from beside the projector's image, of which a column on each side is noise.

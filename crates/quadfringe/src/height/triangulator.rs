@@ -87,8 +87,9 @@ impl Triangulator {
         points(self, row, columns_px, out);
     }
 
-    /// Change of the depth Z with the column, mm per projector column, of one image row; NaN where [`Self::xyz_row`] has no
-    /// point. What is known of the column to so much is known of Z to this times as much; the point moves along its ray.
+    /// What an uncertain column means for the depth, of one image row: `uncertainty` holds standard deviations of the columns in
+    /// px and receives those of Z in mm, NaN where [`Self::xyz_row`] has no point. The point moves along its ray, so X and Y
+    /// go with Z.
     ///
     /// # Panics
     /// As [`Self::xyz_row`].
@@ -97,20 +98,20 @@ impl Triangulator {
     /// use quadfringe::{height::Triangulator, rig::Bench};
     /// let bench = Bench::reference();
     /// let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-    /// let (mut slopes, mut points) = (vec![0.0; 1024], [vec![0.0; 3 * 1024], vec![0.0; 3 * 1024]]);
-    /// triangulator.depth_per_column_row(384, &[450.0; 1024], &mut slopes);
+    /// let (mut uncertainty, mut points) = (vec![0.5; 1024], [vec![0.0; 3 * 1024], vec![0.0; 3 * 1024]]);
+    /// triangulator.depth_uncertainty_row(384, &[450.0; 1024], &mut uncertainty);
     /// triangulator.xyz_row(384, &[449.5; 1024], &mut points[0]);
     /// triangulator.xyz_row(384, &[450.5; 1024], &mut points[1]);
     /// let z_mm = 3 * 512 + 2;
-    /// assert!((slopes[512] - (points[1][z_mm] - points[0][z_mm])).abs() < 1e-3);
+    /// assert!((2.0 * uncertainty[512] - (points[1][z_mm] - points[0][z_mm]).abs()).abs() < 1e-3);
     /// # Ok::<(), quadfringe::Error>(())
     /// ```
-    pub fn depth_per_column_row(&self, row: usize, columns_px: &[f32], out: &mut [f32]) {
+    pub fn depth_uncertainty_row(&self, row: usize, columns_px: &[f32], uncertainty: &mut [f32]) {
         let (height, width) = self.shape();
         assert!(row < height, "row {row} of an image of {height} rows");
         assert_eq!(columns_px.len(), width, "columns_px must hold one row");
-        assert_eq!(out.len(), width, "out must hold one row");
-        slopes(self, row, columns_px, out);
+        assert_eq!(uncertainty.len(), width, "uncertainty must hold one row");
+        deviations(self, row, columns_px, uncertainty);
     }
 
     /// Points of a whole column map `(height, width)`, float32 `(height, width, 3)` in mm, NaN for no data; rows in
@@ -167,13 +168,13 @@ fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut
     }
 }
 
-/// A row of changes of depth, a block of pixels at a time.
+/// A row of standard deviations, a block of pixels at a time.
 #[multiversion(targets("x86_64+avx2"))]
-fn slopes(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut [f32]) {
-    let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(CHUNK));
-    for (index, (columns, out)) in blocks.enumerate() {
+fn deviations(triangulator: &Triangulator, row: usize, columns_px: &[f32], uncertainty: &mut [f32]) {
+    let blocks = columns_px.chunks(CHUNK).zip(uncertainty.chunks_mut(CHUNK));
+    for (index, (columns, uncertainty)) in blocks.enumerate() {
         let directions = triangulator.directions(row, index * CHUNK, columns.len());
-        triangulator.projector.depth_per_column(columns, &directions, out);
+        triangulator.projector.carry(columns, &directions, uncertainty);
     }
 }
 
@@ -233,9 +234,10 @@ impl ColumnSheets {
         write_points(&depth, x, y, xyz);
     }
 
-    /// Change of the depth with the column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times `dk / du`.
+    /// Standard deviations times the change of the depth with the column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times
+    /// `dk / du`.
     #[inline(always)]
-    fn depth_per_column(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], out: &mut [f32]) {
+    fn carry(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], uncertainty: &mut [f32]) {
         let [k, stretch] = self.ideal(columns, [x, y]);
         let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
         let mut slope = [0.0; CHUNK];
@@ -247,7 +249,7 @@ impl ColumnSheets {
             let grown = (a2 + t * b2) * inverse * stretch[i];
             slope[i] = if (t > 0.0) & (t < f32::INFINITY) { grown } else { f32::NAN };
         }
-        out.copy_from_slice(&slope[..out.len()]);
+        uncertainty.iter_mut().zip(&slope).for_each(|(value, slope)| *value *= slope.abs());
     }
 
     /// Ideal normalised coordinates of `columns`, and how they change with the column.
