@@ -218,7 +218,7 @@ class Shape:
         """Give what the shape says of itself, by name with unit.
 
         `returned_percent`; where pixels came back also `uncertainty_median_mm` (or `_rad`), one standard deviation, and
-        `expected_wrong_orders`, the pixels among them that have another order by the sum of their probabilities.
+        `wrong_orders_at_most`, the sum of their probabilities of another order, an upper bound.
         """
         returned = self.returned
         found = {"returned_percent": 100.0 * float(returned.mean())}
@@ -228,7 +228,7 @@ class Shape:
             if sigma is not None:
                 found[f"uncertainty_median_{name}"] = float(np.nanmedian(sigma))
         if self.wrong_order_probability is not None:
-            found["expected_wrong_orders"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
+            found["wrong_orders_at_most"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
         return found
 
     def with_settings(self, config: Mapping[str, Any], calibration: Calibration | None) -> Shape:

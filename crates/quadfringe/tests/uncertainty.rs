@@ -150,3 +150,11 @@ fn wrong_orders_of_the_best_method_are_not_more_than_promised() {
         }
     }
 }
+
+#[test]
+fn wrong_orders_of_the_published_method_are_not_more_than_promised() {
+    for name in ["plane", "steps"] {
+        let found = promise(Method::Published, name, LIGHTS[0]);
+        assert!(found.wrong <= found.promised, "{name}");
+    }
+}

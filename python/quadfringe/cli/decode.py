@@ -92,8 +92,8 @@ def _sureness(figures: Mapping[str, float]) -> str:
     """Tell how sure the pixels are, in words."""
     for unit in ("mm", "rad"):
         if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
-            wrong = figures.get("expected_wrong_orders", 0.0)
-            return f", uncertainty {sigma:.3g} {unit} (median), {wrong:.3g} wrong orders to be expected"
+            wrong = figures.get("wrong_orders_at_most", 0.0)
+            return f", uncertainty {sigma:.3g} {unit} (median), at most {wrong:.3g} wrong orders to be expected"
     return ""
 
 

@@ -21,7 +21,7 @@ pub struct Decoded {
     pub modulation: Array2<f32>,
     /// How far the order is from another one, in [0, 1]; known wherever there is light.
     pub quality: Array2<f32>,
-    /// Probability that the order is another one, in [0, 1].
+    /// Probability that the order is another one, in [0, 1]; an upper bound.
     pub wrong_order_probability: Array2<f32>,
     /// Standard deviation of the absolute phase in rad, for the order that was chosen, when the decoder is not calibrated.
     pub uncertainty_rad: Option<Array2<f32>>,
