@@ -17,7 +17,7 @@ from quadfringe.cli import app
 from quadfringe.images import read_image, write_image
 
 FRINGES = ["--fringes", "36", "35", "30", "--projector-width", "912"]
-KEYS = {"phase_rad", "column_px", "order", "modulation", "quality"}
+KEYS = {"phase_rad", "column_px", "order", "modulation", "quality", "uncertainty_rad", "wrong_order_probability"}
 
 
 def run(*arguments: object) -> Result:

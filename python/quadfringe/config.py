@@ -219,11 +219,16 @@ class ProjectorsConfig(Model):
 
 
 class DecodeConfig(Model):
-    """Settings of the decoder; what is absent takes the kernel's default."""
+    """Settings of the decoder; what is absent takes the kernel's default.
+
+    `channel_instants_us` are the instants at which R, G, B and IR are seen, from the one that the shape stands for: a
+    projector that shows its colours one after another needs them when the surface moves. Method "best" alone has it.
+    """
 
     method: Literal["published", "best"] | None = None
     modulation_min: NotNegative | None = None
     quality_min: NotNegative | None = None
+    channel_instants_us: Row4 | None = None
     threads: Annotated[int, Field(gt=0)] | None = None
 
 

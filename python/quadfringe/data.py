@@ -20,6 +20,8 @@ __all__ = ["AnyShot", "BayerShot", "Calibration", "ResponseCalibration", "Shape"
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
+MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm")
+SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
 
 
@@ -174,7 +176,9 @@ AnyShot = Shot | BayerShot
 class Shape:
     """A decoded shot: maps (H, W) float32, points (H, W, 3) mm when calibrated; NaN where there is no data.
 
-    `config` and `calibration` are the settings that made it and travel with it into an NPZ file.
+    `uncertainty_mm` is one standard deviation of the depth (`uncertainty_rad` of the phase when not calibrated) for the
+    order that was chosen, `wrong_order_probability` that of another order. `config` and `calibration` are the settings
+    that made it and travel with it into an NPZ file.
     """
 
     phase_rad: Map
@@ -183,14 +187,17 @@ class Shape:
     modulation: Map
     quality: Map
     xyz_mm: Map | None = None
+    wrong_order_probability: Map | None = None
+    uncertainty_rad: Map | None = None
+    uncertainty_mm: Map | None = None
     config: Mapping[str, Any] = field(default_factory=dict, repr=False)
     calibration: Calibration | None = field(default=None, repr=False)
 
     @property
     def maps(self) -> dict[str, Map]:
-        """Every map by name; `xyz_mm` only when calibrated."""
-        maps = {name: getattr(self, name) for name in MAPS}
-        return maps if self.xyz_mm is None else {**maps, "xyz_mm": self.xyz_mm}
+        """Every map by name; `uncertainty_mm` in place of `uncertainty_rad`, and `xyz_mm`, when calibrated."""
+        maps = {name: getattr(self, name) for name in (*MAPS, *MORE_MAPS)}
+        return {name: values for name, values in maps.items() if values is not None}
 
     @property
     def returned(self) -> NDArray[np.bool_]:
@@ -207,6 +214,23 @@ class Shape:
             raise InputError("this shape has phase only: decode with a calibration to have millimetres")
         return self.xyz_mm
 
+    def figures(self) -> dict[str, float]:
+        """Give what the shape says of itself, by name with unit.
+
+        `returned_percent`; where pixels came back also `uncertainty_median_mm` (or `_rad`), one standard deviation, and
+        `wrong_orders_at_most`, the sum of their probabilities of another order, an upper bound.
+        """
+        returned = self.returned
+        found = {"returned_percent": 100.0 * float(returned.mean())}
+        if not returned.any():
+            return found
+        for name, sigma in (("rad", self.uncertainty_rad), ("mm", self.uncertainty_mm)):
+            if sigma is not None:
+                found[f"uncertainty_median_{name}"] = float(np.nanmedian(sigma))
+        if self.wrong_order_probability is not None:
+            found["wrong_orders_at_most"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
+        return found
+
     def with_settings(self, config: Mapping[str, Any], calibration: Calibration | None) -> Shape:
         """Give the same maps with the settings that made them."""
         return replace(self, config=config, calibration=calibration)
@@ -214,7 +238,8 @@ class Shape:
     def save(self, path: Path | str) -> None:
         """Write by suffix: .ply points, .tif depth, .npz everything. Whole or not at all.
 
-        PLY holds the valid points only, with the modulation as grey colour and `quality` as a scalar.
+        PLY holds the valid points only, with the modulation as grey colour, and as scalars `quality`, `uncertainty_mm`
+        and `wrong_order_probability`.
         """
         from quadfringe import export
 
@@ -225,7 +250,8 @@ class Shape:
         elif suffix == ".ply":
             points = self._points()
             valid = np.isfinite(points).all(axis=2)
-            export.write_ply(path, points[valid], _grey(self.modulation)[valid], self.quality[valid])
+            scalars = {name: values[valid] for name, values in self.maps.items() if name in SCALARS}
+            export.write_ply(path, points[valid], _grey(self.modulation)[valid], scalars)
         else:
             export.write_depth(path, self.depth_mm)
 
@@ -249,7 +275,7 @@ class Shape:
             values = json.loads(str(stored["calibration"]))
             calibration = checked(Calibration, values, f"{path}, calibration")
         config = json.loads(str(stored["config"])) if "config" in stored else {}
-        maps = {name: stored[name] for name in (*MAPS, "xyz_mm") if name in stored}
+        maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
         return cls(**maps, config=config, calibration=calibration)
 
 

@@ -5,10 +5,14 @@ use super::guide::Guide;
 use super::judge::{Findings, Judge};
 use super::level::Level;
 use super::output::Finish;
+use super::uncertainty::PhaseNoise;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
+use crate::demod::agreement::Agreement;
 use crate::demod::carrier;
-use crate::demod::cells::{Grid, LANES};
+use crate::demod::cells::{Grid, LANES, RowMaps};
+use crate::demod::motion::{Instants, Motion};
+use crate::demod::scene::Scene;
 use crate::demod::window::Window;
 use crate::{FringeCode, Shot};
 use ndarray::{ArrayView2, s};
@@ -20,6 +24,8 @@ const CELLS: f64 = 3.4;
 const GUIDE_PERIOD_PX: f64 = 12.0;
 /// Pixels that interpolated light reaches into a shadow.
 const MOSAIC_BLUR_PX: usize = 2;
+/// Times that the light of a moving surface is brought to one instant and decoded again.
+const MOTION_ROUNDS: usize = 3;
 
 pub(super) struct Best {
     shape: [usize; 2],
@@ -32,6 +38,12 @@ pub(super) struct Best {
     found: Vec<f32>,
     phase: Vec<f32>,
     modulation: Vec<f32>,
+    agreement: Agreement,
+    /// Probability that the order of a node is another one.
+    another: Vec<f32>,
+    motion: Motion,
+    /// Light as it was seen, when it has to be brought to one instant.
+    seen: [Vec<f32>; 4],
     judge: Judge,
 }
 
@@ -52,6 +64,10 @@ impl Best {
             found: Vec::new(),
             phase: Vec::new(),
             modulation: Vec::new(),
+            agreement: Agreement::default(),
+            another: Vec::new(),
+            motion: Motion::default(),
+            seen: Default::default(),
             judge: Judge::default(),
         }
     }
@@ -69,29 +85,17 @@ impl Best {
         let period_px = options.period_px.unwrap_or_else(|| period_px(&self.full.light[0], self.shape));
         let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS);
         let blur_px = if shot.mosaic().is_some() { MOSAIC_BLUR_PX } else { 0 };
-        let factor = factor(period_px, &grid);
 
-        // 2. to 4. Where light falls, beats, fringe orders, backgrounds: on as few pixels as tell them.
-        let ratios = self.ratios;
-        if factor == 1 {
-            self.guide.run(&mut self.full, (&grid, period_px, 1), blur_px, ratios, options);
-            std::mem::swap(&mut self.phase, &mut self.guide.phase);
-            std::mem::swap(&mut self.modulation, &mut self.guide.modulation);
-        } else {
-            let coarse = grid.shrunk(factor);
-            self.shrunk.shrink(&self.full, [&coarse, &grid], factor);
-            let how = (&coarse, period_px / factor as f64, factor);
-            self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), ratios, options);
-            self.expand([&coarse, &grid], period_px, blur_px);
+        // 2. to 4. From light to the absolute phase of every pixel.
+        let instants = options.channel_instants_us.map(|instants| instants.map(|t| 1e-6 * t));
+        match instants {
+            None => self.measure((&grid, period_px), factor(period_px, &grid), blur_px, options),
+            Some(instants) => self.measure_moving((&grid, period_px), instants, blur_px, options),
         }
 
-        // 4. All four channels measure the same column.
-        let scene = self.full.scene(&grid, period_px, 1);
-        let Guide { slopes, noise, backgrounds, orders, joint, .. } = &mut self.guide;
-        let window = Window::new(&scene, slopes, &self.modulation, *noise);
-        joint.step(&scene, backgrounds, &window, ratios, &mut self.phase);
-
         // 5. What is not sure is no data.
+        let scene = self.full.scene(&grid, period_px, 1);
+        let Guide { noise, backgrounds, orders, joint, .. } = &self.guide;
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
@@ -101,7 +105,59 @@ impl Best {
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
-        self.write(&grid, finish, out);
+        if let Some(instants) = instants {
+            self.motion.rule_out(&scene, instants, &mut self.judge.sure);
+        }
+
+        // 6. How sure the rest is.
+        self.agreement.measure(&scene, (self.ratios, *noise), backgrounds, &self.phase, &self.modulation);
+        orders.another(&scene, &mut self.another);
+        let window = Window::new(&scene, &self.guide.slopes, &self.modulation, *noise);
+        self.write(&scene, &PhaseNoise::new(*noise, window.share()), finish, out);
+    }
+
+    /// Absolute phase of every pixel. Where light falls, beats, fringe orders and backgrounds come from an image of `factor` times
+    /// fewer pixels along a side.
+    fn measure(&mut self, (grid, period_px): (&Grid, f64), factor: usize, blur_px: usize, options: &Options) {
+        if factor == 1 {
+            self.guide.run(&mut self.full, (grid, period_px, 1), blur_px, self.ratios, options);
+            std::mem::swap(&mut self.phase, &mut self.guide.phase);
+            std::mem::swap(&mut self.modulation, &mut self.guide.modulation);
+        } else {
+            let coarse = grid.shrunk(factor);
+            self.shrunk.shrink(&self.full, [&coarse, grid], factor);
+            let how = (&coarse, period_px / factor as f64, factor);
+            self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), self.ratios, options);
+            self.expand([&coarse, grid], period_px, blur_px);
+        }
+        // All four channels measure the same column.
+        let scene = self.full.scene(grid, period_px, 1);
+        let Guide { slopes, noise, backgrounds, joint, .. } = &mut self.guide;
+        let window = Window::new(&scene, slopes, &self.modulation, *noise);
+        joint.step(&scene, backgrounds, &window, self.ratios, &mut self.phase);
+    }
+
+    /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.
+    fn measure_moving(&mut self, image: (&Grid, f64), instants: Instants, blur_px: usize, options: &Options) {
+        let how = (self.ratios, instants);
+        self.seen.clone_from(&self.full.light);
+        for round in 0..=MOTION_ROUNDS {
+            self.measure(image, 1, blur_px, options);
+            let scene = self.full.scene(image.0, image.1, 1);
+            if round == 0 {
+                self.motion.rest(&scene);
+            }
+            if round == MOTION_ROUNDS {
+                break;
+            }
+            let backgrounds = &self.guide.backgrounds;
+            self.motion.measure(&scene, how, backgrounds, &self.phase, &self.modulation);
+            let Level { light, usable, .. } = &mut self.full;
+            let seen = self.seen.each_ref().map(Vec::as_slice);
+            let seen = Scene { light: seen, usable, grid: image.0, period_px: image.1, factor: 1 };
+            let light = light.each_mut().map(Vec::as_mut_slice);
+            self.motion.settle(&seen, how, backgrounds, &self.phase, light);
+        }
     }
 
     /// From the guide to every pixel.
@@ -147,15 +203,20 @@ impl Best {
         );
     }
 
-    fn write(&self, grid: &Grid, finish: &Finish<'_>, out: &mut Decoded) {
-        out.rows().enumerate().for_each(|(y, mut row)| {
+    fn write(&self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
+        let (grid, joint) = (scene.grid, &self.guide.joint);
+        out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
             let known = self.judge.sure[at.clone()].iter().zip(&self.phase[at.clone()]);
             for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
                 *out = if *sure != 0 { *own } else { f32::NAN };
             }
-            row.modulation.copy_from_slice(&self.guide.joint.modulation[at.clone()]);
-            row.quality.copy_from_slice(&self.judge.quality[at]);
+            row.modulation.copy_from_slice(&joint.modulation[at.clone()]);
+            row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
+            let disagreement = self.agreement.row(scene, y, maps);
+            noise.row(&joint.information[at], disagreement, row.sigma);
+            let nodes = &self.another[y / grid.step * grid.columns..];
+            row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);
         });
     }

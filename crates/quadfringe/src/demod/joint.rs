@@ -24,6 +24,9 @@ pub(crate) struct Joint {
     pub misfit: Vec<f32>,
     /// Modulation of R and B in linear light.
     pub modulation: Vec<f32>,
+    /// What the window of the last round knows of the phase of every pixel: sum of weighted squared derivatives, 1/rad^2 in
+    /// units of linear light. The uncertainty is made of it.
+    pub information: Vec<f32>,
 }
 
 /// Model and derivative of the four channels for an albedo of 1, the albedo that fits best, and the mean modulation of R and B
@@ -58,7 +61,8 @@ impl Joint {
         self.steps.resize(grid.pixels());
         self.misfit.resize(grid.pixels(), 0.0);
         self.modulation.resize(grid.pixels(), 0.0);
-        let Self { steps, misfit, modulation, slots } = self;
+        self.information.resize(grid.pixels(), 0.0);
+        let Self { steps, misfit, modulation, information, slots } = self;
         let before = &*phase;
         let out = steps
             .phase
@@ -103,7 +107,7 @@ impl Joint {
                 }
             },
         );
-        window.down(&self.steps, &self.slots, |rows| &mut rows.window, phase);
+        window.down(steps, slots, |rows| &mut rows.window, phase, information);
     }
 }
 
