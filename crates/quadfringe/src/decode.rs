@@ -9,7 +9,10 @@
 //! ```
 
 mod best;
+mod expand;
+mod guide;
 mod judge;
+mod level;
 mod orders;
 mod output;
 mod published;
@@ -21,6 +24,7 @@ use crate::condition::{Plan, Sample};
 use crate::height::Triangulator;
 use crate::{Conditioner, Error, FringeCode, Result, Shot};
 use best::Best;
+use level::Level;
 use output::Finish;
 use published::Published;
 

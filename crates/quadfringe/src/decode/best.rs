@@ -1,29 +1,27 @@
-//! The best chain: local fit, orders with support, joint fit, and a judgement of every pixel.
+//! The best chain: a guide that uses surroundings, a joint fit of every pixel, and a judgement of each.
 
-use super::judge::{Findings, Judge, MISFIT_MAX};
-use super::orders::{Orders, Wrapped};
+use super::expand::{Expander, FACTOR_MAX};
+use super::guide::Guide;
+use super::judge::{Findings, Judge};
+use super::level::Level;
 use super::output::Finish;
 use super::uncertainty::PhaseNoise;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::agreement::Agreement;
-use crate::demod::backgrounds::Backgrounds;
 use crate::demod::carrier;
-use crate::demod::cells::{Grid, RowMaps};
-use crate::demod::joint::Joint;
-use crate::demod::light::LightFinder;
-use crate::demod::local_fit::{LocalFit, PixelMaps};
+use crate::demod::cells::{Grid, LANES, RowMaps};
 use crate::demod::motion::Motion;
 use crate::demod::scene::Scene;
-use crate::demod::slopes::Slopes;
-use crate::demod::window::{Window, noise};
+use crate::demod::window::Window;
 use crate::{FringeCode, Shot};
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
 /// Cells in a fringe period, at least.
-const CELLS: f64 = 4.5;
-
+const CELLS: f64 = 3.4;
+/// Pixels in a fringe period of the image that guides, at least.
+const GUIDE_PERIOD_PX: f64 = 12.0;
 /// Pixels that interpolated light reaches into a shadow.
 const MOSAIC_BLUR_PX: usize = 2;
 
@@ -32,53 +30,46 @@ const MOTION_ROUNDS: usize = 3;
 
 pub(super) struct Best {
     shape: [usize; 2],
+    stride: usize,
     ratios: [f32; 3],
-    light: [Vec<f32>; 4],
-    lit: Vec<f32>,
-    usable: Vec<f32>,
-    modulation: Vec<f32>,
-    wrapped: Vec<f32>,
+    full: Level,
+    shrunk: Level,
+    guide: Guide,
+    expander: Expander,
+    found: Vec<f32>,
     phase: Vec<f32>,
-    finder: LightFinder,
-    fit: LocalFit,
-    slopes: Slopes,
-    orders: Orders,
-    backgrounds: Backgrounds,
-    joint: Joint,
+    modulation: Vec<f32>,
+    judge: Judge,
     agreement: Agreement,
     /// Probability that the order of a node is another one.
     another: Vec<f32>,
     motion: Motion,
     /// Light as it was seen, when it has to be brought to one instant.
     seen: [Vec<f32>; 4],
-    judge: Judge,
 }
 
 impl Best {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
-        let pixels = Grid::new(shape, 1.0).pixels();
-        let plane = || vec![0.0; pixels];
+        let stride = shape[1].next_multiple_of(FACTOR_MAX * LANES);
+        let mut full = Level::default();
+        full.resize(stride * shape[0]);
         let numbers = code.numbers();
         Self {
             shape,
+            stride,
             ratios: numbers.map(|n| (n / numbers[0]) as f32),
-            light: [plane(), plane(), plane(), plane()],
-            lit: plane(),
-            usable: plane(),
-            modulation: plane(),
-            wrapped: plane(),
-            phase: plane(),
-            finder: LightFinder::default(),
-            fit: LocalFit::default(),
-            slopes: Slopes::default(),
-            orders: Orders::new(code),
-            backgrounds: Backgrounds::new(),
-            joint: Joint::default(),
+            full,
+            shrunk: Level::default(),
+            guide: Guide::new(code),
+            expander: Expander::default(),
+            found: Vec::new(),
+            phase: Vec::new(),
+            modulation: Vec::new(),
+            judge: Judge::default(),
             agreement: Agreement::default(),
             another: Vec::new(),
             motion: Motion::default(),
             seen: Default::default(),
-            judge: Judge::default(),
         }
     }
 
@@ -90,95 +81,62 @@ impl Best {
         finish: &Finish<'_>,
         out: &mut Decoded,
     ) {
-        // 1. Linear light (S1), and where it comes from the projector.
+        // 1. Linear light (S1).
         self.condition(plan, shot);
-        let light = self.light.each_ref().map(Vec::as_slice);
-        let period_px = options.period_px.unwrap_or_else(|| period_px(light[0], self.shape));
-        let grid = Grid::new(self.shape, period_px / CELLS);
-        self.finder.find(&grid, light, period_px, 2.0 * options.modulation_min, &mut self.modulation);
-        if shot.mosaic().is_some() {
-            // Interpolated between the samples of a mosaic, light reaches into the shadow beside it.
-            (0..MOSAIC_BLUR_PX).for_each(|_| self.finder.shrink(&grid, &mut self.modulation));
-        }
-        let found = self.modulation.par_chunks(grid.stride);
-        let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
-        masks.zip(found).for_each(|((lit, usable), found)| {
-            for ((lit, usable), found) in lit.iter_mut().zip(usable).zip(found) {
-                *lit *= found;
-                *usable *= *lit;
-            }
-        });
-        let motion = options.channel_instants_us.map(|instants| (self.ratios, instants.map(|t| 1e-6 * t)));
+        let period_px = options.period_px.unwrap_or_else(|| period_px(&self.full.light[0], self.shape));
+        let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS);
+        let blur_px = if shot.mosaic().is_some() { MOSAIC_BLUR_PX } else { 0 };
+        let factor = factor(period_px, &grid);
+
+        let ratios = self.ratios;
+        let motion = options.channel_instants_us.map(|instants| (ratios, instants.map(|t| 1e-6 * t)));
         if motion.is_some() {
-            self.seen = self.light.clone();
+            self.seen.clone_from(&self.full.light);
         }
         let mut rounds = if motion.is_some() { MOTION_ROUNDS } else { 0 };
         let (noise, share) = loop {
-            let light = self.light.each_ref().map(Vec::as_slice);
-            let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
-
-            // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
-            let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
-            self.fit.run(&scene, &self.lit, options.modulation_min, maps);
-            let noise = noise(&scene, &self.wrapped, &self.modulation);
-            let relative_noise = relative(noise, &self.modulation);
-            self.slopes.measure(&scene, &self.wrapped, &self.modulation);
-
-            // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
-            let known = Wrapped {
-                phase: &self.wrapped,
-                modulation: &self.modulation,
-                fit: &self.fit,
-                backgrounds: None,
-                slopes: &self.slopes,
-            };
-            self.orders.choose(&scene, &known, &mut self.phase);
-            self.backgrounds.start(&scene, &self.fit);
-            self.backgrounds.fit(
-                &scene,
-                self.ratios,
-                &self.phase,
-                &self.modulation,
-                (MISFIT_MAX, relative_noise),
-            );
-            let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
-            self.orders.choose(&scene, &known, &mut self.phase);
-
-            // 4. All four channels measure the same column.
-            let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
-            for window in [window.near(), window] {
-                self.backgrounds.fit(
-                    &scene,
-                    self.ratios,
-                    &self.phase,
-                    &self.modulation,
-                    (MISFIT_MAX, relative_noise),
-                );
-                self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
+            // 2. to 4. Where light falls, beats, fringe orders, backgrounds: on as few pixels as tell them.
+            if factor == 1 {
+                self.guide.run(&mut self.full, (&grid, period_px, 1), blur_px, ratios, options);
+                std::mem::swap(&mut self.phase, &mut self.guide.phase);
+                std::mem::swap(&mut self.modulation, &mut self.guide.modulation);
+            } else {
+                let coarse = grid.shrunk(factor);
+                self.shrunk.shrink(&self.full, [&coarse, &grid], factor);
+                let how = (&coarse, period_px / factor as f64, factor);
+                self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), ratios, options);
+                self.expand([&coarse, &grid], period_px, blur_px);
             }
 
+            // 4. All four channels measure the same column.
+            let scene = self.full.scene(&grid, period_px, 1);
+            let Guide { slopes, noise, backgrounds, joint, .. } = &mut self.guide;
+            let window = Window::new(&scene, slopes, &self.modulation, *noise);
+            joint.step(&scene, backgrounds, &window, ratios, &mut self.phase);
+            let Some(motion) = motion.filter(|_| rounds > 0) else { break (*noise, window.share()) };
+
             // What moves is brought to one instant and decoded again.
-            let Some(motion) = motion.filter(|_| rounds > 0) else { break (noise, window.share()) };
             if rounds == MOTION_ROUNDS {
                 self.motion.rest(&scene);
             }
             rounds -= 1;
-            self.motion.measure(&scene, motion, &self.backgrounds, &self.phase, &self.modulation);
-            let light = self.seen.each_ref().map(Vec::as_slice);
-            let seen = Scene { light, usable: &self.usable, grid: &grid, period_px };
-            let light = self.light.each_mut().map(Vec::as_mut_slice);
-            self.motion.settle(&seen, motion, &self.backgrounds, &self.phase, light);
+            self.motion.measure(&scene, motion, backgrounds, &self.phase, &self.modulation);
+            let Level { light, usable, .. } = &mut self.full;
+            let seen = self.seen.each_ref().map(Vec::as_slice);
+            let seen = Scene { light: seen, usable, grid: &grid, period_px, factor: 1 };
+            let light = light.each_mut().map(Vec::as_mut_slice);
+            self.motion.settle(&seen, motion, backgrounds, &self.phase, light);
         };
 
         // 5. What is not sure is no data.
-        let light = self.light.each_ref().map(Vec::as_slice);
-        let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
+        let scene = self.full.scene(&grid, period_px, 1);
+        let Guide { backgrounds, orders, joint, .. } = &self.guide;
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
-            misfit: &self.joint.misfit,
+            misfit: &joint.misfit,
             noise,
-            orders: &self.orders,
+            orders,
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
@@ -188,19 +146,34 @@ impl Best {
 
         // 6. How sure the rest is. Needed: the noise, the share of squared weights in the window and the information it has
         // added up, backgrounds and final phase, leads and misfits of the orders.
-        let known = (self.ratios, noise);
-        self.agreement.measure(&scene, known, &self.backgrounds, &self.phase, &self.modulation);
-        let noise = PhaseNoise::new(noise, share);
-        self.orders.another(&scene, &mut self.another);
-        self.write(&scene, &noise, finish, out);
+        self.agreement.measure(&scene, (ratios, noise), backgrounds, &self.phase, &self.modulation);
+        orders.another(&scene, &mut self.another);
+        self.write(&scene, &PhaseNoise::new(noise, share), finish, out);
     }
 
-    /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
+    /// From the guide to every pixel.
+    fn expand(&mut self, [coarse, grid]: [&Grid; 2], period_px: f64, blur_px: usize) {
+        for plane in [&mut self.found, &mut self.phase, &mut self.modulation] {
+            plane.resize(grid.pixels(), 0.0);
+        }
+        let guide = &mut self.guide;
+        guide.finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), &mut self.found);
+        guide.noise = guide.finder.noise;
+        (0..blur_px).for_each(|_| guide.finder.shrink(grid, &mut self.found));
+        self.full.restrict(grid, &self.found);
+        let factor = grid.step / coarse.step;
+        let shrunk = self.shrunk.scene(coarse, period_px / factor as f64, factor);
+        let scenes = [&shrunk, &self.full.scene(grid, period_px, 1)];
+        let out = [self.phase.as_mut_slice(), &mut self.modulation];
+        self.expander.run(scenes, guide, self.ratios, &self.full.lit, out);
+    }
+
+    /// Planes of linear light; `lit` is 0 for glare and for what one chip does not see, `usable` for pixels that are saturated.
     fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
-        let [_, width] = self.shape;
-        let stride = width.next_multiple_of(crate::demod::cells::LANES);
-        let [red, green, blue, infrared] = self.light.each_mut().map(|plane| plane.par_chunks_mut(stride));
-        let saturation = self.usable.par_chunks_mut(stride).zip(self.lit.par_chunks_mut(stride));
+        let ([_, width], stride) = (self.shape, self.stride);
+        let Level { light, lit, usable } = &mut self.full;
+        let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
+        let saturation = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));
         let rows = red.zip(green).zip(blue.zip(infrared)).zip(saturation).enumerate();
         rows.for_each_init(
             || (vec![false; width], vec![false; width]),
@@ -215,7 +188,7 @@ impl Best {
                         rows.iter_mut().for_each(|row| row[x] = 0.0);
                     }
                     usable[x] = f32::from(u8::from(seen && unsaturated[x]));
-                    lit[x] = f32::from(u8::from(!glare[x]));
+                    lit[x] = f32::from(u8::from(seen && !glare[x]));
                 }
             },
         );
@@ -229,10 +202,10 @@ impl Best {
             for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
                 *out = if *sure != 0 { *own } else { f32::NAN };
             }
-            row.modulation.copy_from_slice(&self.modulation[at.clone()]);
+            row.modulation.copy_from_slice(&self.guide.joint.modulation[at.clone()]);
             row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
             let disagreement = self.agreement.row(scene, y, maps);
-            noise.row(&self.joint.information[at], disagreement, row.sigma);
+            noise.row(&self.guide.joint.information[at], disagreement, row.sigma);
             let nodes = &self.another[y / grid.step * grid.columns..];
             row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);
@@ -240,11 +213,13 @@ impl Best {
     }
 }
 
-/// Noise over the mean modulation of what is lit.
-fn relative(noise: f32, modulation: &[f32]) -> f32 {
-    let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
-    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));
-    noise * count / f32::max(sum, 1e-6)
+/// How many times fewer pixels along a side still show the fringes.
+fn factor(period_px: f64, grid: &Grid) -> usize {
+    let mut factor = 1;
+    while factor < FACTOR_MAX.min(grid.step) && period_px >= 2.0 * GUIDE_PERIOD_PX * factor as f64 {
+        factor *= 2;
+    }
+    factor
 }
 
 /// Fringe period across the fringes, from the red image; a sixteenth of the image when nothing stands out.

@@ -54,7 +54,7 @@ impl Wrapped<'_> {
     fn fringes<'b>(&self, scene: &Scene<'_>, y: usize, maps: &'b mut [RowMaps; 2]) -> [&'b [f32]; 8] {
         match self.backgrounds {
             None => self.fit.fringes(scene, y, maps),
-            Some(backgrounds) => backgrounds.sample(y, &mut maps[0]),
+            Some(backgrounds) => backgrounds.sample(scene, y, &mut maps[0]),
         }
     }
 
@@ -192,10 +192,8 @@ impl Orders {
                     continue;
                 }
                 let [along, down] = slopes.at(other_row, other_column);
-                let step = grid.step as f32;
-                let way = step
-                    * (along * (column as f32 - other_column as f32)
-                        + down * (row as f32 - other_row as f32));
+                let way =
+                    along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32);
                 // What the neighbour expects here, as turns beside what this node has.
                 let turns = -round((gap - way) / TAU);
                 found.add(turns);

@@ -62,7 +62,7 @@ impl Agreement {
             sums,
             excess,
             |maps, y, sums| {
-                let model = backgrounds.sample(y, maps);
+                let model = backgrounds.sample(scene, y, maps);
                 let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
                 add_pairs(model, pixels, scene.rows(y), ratios, sums);
             },
@@ -106,7 +106,7 @@ fn add_pairs(
         let [phase, modulation, usable] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios);
+            let (cosines, derivatives) = carriers(phase[x], ratios, 0.0);
             let (mut mm, mut ms) = (1e-9f32, 0.0f32);
             let (mut seen, mut known, mut mixed) = ([0.0f32; 2], [0.0f32; 2], [0.0f32; 2]);
             for c in 0..4 {

@@ -74,7 +74,7 @@ impl Motion {
             &mut self.sums,
             &mut self.change,
             |maps, y, sums| {
-                let model = backgrounds.sample(y, &mut maps[0]);
+                let model = backgrounds.sample(scene, y, &mut maps[0]);
                 let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
                 add_motion(model, pixels, scene.rows(y), (ratios, instants), sums);
             },
@@ -106,7 +106,7 @@ impl Motion {
             || self.slots.take(),
             |slot, (y, ((red, green), (blue, infrared)))| {
                 let [models, velocities] = &mut slot.0;
-                let model = backgrounds.sample(y, models);
+                let model = backgrounds.sample(scene, y, models);
                 let [velocity] = velocities.sample(grid, &self.velocity, 0, y);
                 let pixels = [scene.row(phase, y), velocity];
                 bring(model, pixels, scene.rows(y), (ratios, instants), [red, green, blue, infrared]);
@@ -145,7 +145,7 @@ fn add_motion(
         let [phase, modulation, usable] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios);
+            let (cosines, derivatives) = carriers(phase[x], ratios, 0.0);
             let (mut m, mut d, mut q) = ([0.0f32; 4], [0.0f32; 4], [0.0f32; 4]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
             let (mut mq, mut dq, mut ms) = (0.0f32, 0.0f32, 0.0f32);

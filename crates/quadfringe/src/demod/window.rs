@@ -73,6 +73,11 @@ impl<'a> Window<'a> {
         self.scene.row(self.modulation, y)
     }
 
+    /// Share of contrast that is lost in row `y`, see [`Slopes::loss`].
+    pub fn loss<'b>(&self, y: usize, maps: &'b mut RowMaps) -> &'b [f32] {
+        self.slopes.loss(self.scene, y, maps)
+    }
+
     /// The same with a reach of two pixels, enough on the way to a solution.
     pub fn near(self) -> Self {
         Self { radius: self.radius.min(2), ..self }
@@ -95,10 +100,11 @@ impl<'a> Window<'a> {
         average_along(&taps, padded, [slope, sharpness], [phase, denominator]);
     }
 
-    /// Distances and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
+    /// Half distances in cells and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
     fn taps(&self, numbers: std::ops::Range<usize>) -> Vec<[f32; 2]> {
         let distance = |k: usize| k as f32 - self.radius as f32;
-        numbers.map(|k| [0.5 * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
+        let half = 0.5 / self.scene.grid.step as f32;
+        numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
     }
 
     /// Average along columns what [`Self::along`] left; `information` receives the weights that the window has added up.
@@ -282,7 +288,7 @@ mod tests {
         let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + 0.02 * uniform()).collect();
         let light = vec![0.5; grid.pixels()];
         let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
-        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0 };
+        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
         let mut slopes = Slopes::default();
         slopes.measure(&scene, &seen, &modulation);
         let window = Window::new(&scene, &slopes, &modulation, noise(&scene, &seen, &modulation));
