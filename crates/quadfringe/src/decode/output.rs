@@ -103,7 +103,7 @@ impl Decoded {
         let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("checked layout"));
         let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
         let mut next = || {
-            let [phase, column, order, modulation, quality, sigma, wrong] =
+            let [phase, column, order, modulation, quality, wrong, sigma] =
                 maps.each_mut().map(Iterator::next);
             Some(OutputRow {
                 phase: phase?,
