@@ -10,7 +10,6 @@ import ctypes
 import logging
 import socket
 import struct
-import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -21,7 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.errors import CameraError, CameraLostError, MissingExtraError
+from quadfringe.errors import CameraError, CameraLostError, CameraNotFoundError, MissingExtraError
 
 __all__ = ["Buffer", "Device", "Found", "Stream", "found"]
 
@@ -58,8 +57,11 @@ def _translated(what: str) -> Iterator[None]:
     try:
         yield
     except GLib.Error as error:
-        lost = error.matches(_aravis().device_error_quark(), _aravis().DeviceError.TIMEOUT)
-        raise (CameraLostError if lost else CameraError)(f"{what}: {error.message}") from error
+        errors = _aravis().DeviceError
+        kinds = {errors.TIMEOUT: CameraLostError, errors.NOT_FOUND: CameraNotFoundError}
+        quark = _aravis().device_error_quark()
+        raised = next((kind for code, kind in kinds.items() if error.matches(quark, code)), CameraError)
+        raise raised(f"{what}: {error.message}") from error
 
 
 @dataclass(frozen=True)
@@ -195,11 +197,9 @@ class Device:
                 return len(answer) < 12 or bool(struct.unpack_from(">I", answer, 8)[0] & 3)
         return False
 
-    def forget(self) -> None:
-        """Let the device go, without waiting for one that no longer answers."""
-        objects = [self.__dict__.pop("_device", None), self.__dict__.pop("_camera", None)]
-        if objects[0] is not None:
-            threading.Thread(target=objects.clear, name="closing a camera", daemon=False).start()
+    def give_up(self) -> list[Any]:
+        """Give what has to be dropped, after the streams, for the device to be free. Nothing else may be called then."""
+        return [self.__dict__.pop(name) for name in ("_device", "_camera") if name in self.__dict__]
 
 
 @dataclass(frozen=True)
@@ -275,9 +275,9 @@ class Stream:
         if stream is not None:
             stream.push_buffer(buffer.held)
 
-    def forget(self) -> None:
-        """End the stream's thread and free its buffers."""
-        self.__dict__.pop("_stream", None)
+    def give_up(self) -> list[Any]:
+        """Give what has to be dropped for the stream to end. Buffers that come back then are freed."""
+        return [self.__dict__.pop("_stream")] if "_stream" in self.__dict__ else []
 
 
 @cache

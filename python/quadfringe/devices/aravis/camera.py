@@ -17,7 +17,7 @@ from quadfringe.data import AnyShot, Calibration
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
 from quadfringe.devices.aravis.link import Link
 from quadfringe.devices.aravis.profiles import CHIPS
-from quadfringe.errors import CameraError, ShotTimeoutError, UnpairedError, WrongFrameError
+from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, UnpairedError, WrongFrameError
 from quadfringe.queues import DroppingQueue
 
 __all__ = ["AravisCamera", "open_devices"]
@@ -76,11 +76,13 @@ class AravisCamera:
             self._earlier = self._counts()
             self._queue, self._first_id = DroppingQueue(length), self._last_id + 1
             try:
+                _check_there(link, 0.0)
                 link.start(self._queue.put, borrow=borrow)
                 yield link, self._queue
-            except CameraError:
-                link.stop()
-                self._disconnect()
+            except CameraError as error:
+                lost = isinstance(error, CameraLostError)
+                link.stop(lost=lost)
+                self._disconnect(lost=lost)
                 raise
             finally:
                 link.stop()
@@ -94,10 +96,10 @@ class AravisCamera:
             self._link = Link(self._asked_for, patience_s=AGAIN_PATIENCE_S)
         return self._link
 
-    def _disconnect(self) -> None:
+    def _disconnect(self, *, lost: bool = False) -> None:
         if self._link is not None:
             self._before = self._chips()
-            self._link.forget()
+            self._link.forget(lost=lost)
             self._link = None
 
     def _next(self, link: Link, queue: DroppingQueue[AnyShot], timeout_s: float | None) -> AnyShot:
@@ -111,8 +113,7 @@ class AravisCamera:
             try:
                 shot = queue.get(min(max(left_s, 0.0), LOOK_S))
             except TimeoutError:
-                if (lost := link.lost(SILENT_S)) is not None:
-                    raise lost from None
+                _check_there(link, SILENT_S)
                 if left_s <= 0:
                     raise self._diagnosis(link, before, timeout_s) from None
                 continue
@@ -177,6 +178,12 @@ class AravisCamera:
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+def _check_there(link: Link, silent_s: float) -> None:
+    lost = link.lost(silent_s)
+    if lost is not None:
+        raise lost from None
 
 
 def open_devices(config: SystemConfig) -> Devices:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 
 import numpy as np
 
@@ -120,17 +120,16 @@ class Link:
         """Ask for one exposure."""
         profiles.trigger(self.device(0))
 
-    def stop(self) -> None:
-        """End the run; what a camera that no longer answers says about it is of no interest."""
+    def stop(self, *, lost: bool = False) -> None:
+        """End the run; a camera that is lost is not told, because that takes seconds."""
         if not self._running:
             return
         self._running = False
-        try:
-            for device in self._devices.values():
-                if device.answers():
-                    device.set("AcquisitionStop", 1)
-        except CameraError:
-            pass
+        with suppress(CameraError):
+            for device in self._devices.values() if not lost else ():
+                device.set("AcquisitionStop", 1)
+        for reader in self.readers:
+            reader.quit()
         for reader in self.readers:
             reader.stop()
         self.pairer.end()
@@ -147,14 +146,16 @@ class Link:
                 )
         return None
 
-    def forget(self) -> None:
-        """Close streams and devices, in this order."""
-        for reader in self.readers:
-            reader.forget()
+    def forget(self, *, lost: bool = False) -> None:
+        """Close streams and devices; for one that is lost Aravis waits for seconds, which then nobody has to."""
+        held = [part for device in self._devices.values() for part in device.give_up()]
+        held += [part for reader in self.readers for part in reader.give_up()]
         self.readers.clear()
-        for device in self._devices.values():
-            device.forget()
         self._devices.clear()
+        if lost:
+            threading.Thread(target=held.clear, name="closing a camera").start()
+        else:
+            held.clear()  # from the end: streams before the devices that they use
 
 
 def _patiently(connect: Callable[[], tuple[Place, Place]], patience_s: float) -> tuple[Place, Place]:

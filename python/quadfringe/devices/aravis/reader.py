@@ -17,7 +17,7 @@ from quadfringe.devices.aravis.formats import PixelFormat
 
 __all__ = ["Agreed", "ChipReader", "Frame"]
 
-POP_S = 0.1
+POP_S = 0.05
 DRAIN_S = 0.02
 
 
@@ -124,9 +124,13 @@ class ChipReader:
             if not lent:
                 self._stream.push(buffer)
 
+    def quit(self) -> None:
+        """Let the thread end; `stop` waits for it."""
+        self._stopping.set()
+
     def stop(self) -> None:
         """End the run, with the frames that were on their way."""
-        self._stopping.set()
+        self.quit()
         if self._thread is not None:
             self._thread.join()
             self._thread = None
@@ -136,6 +140,6 @@ class ChipReader:
         while (buffer := self._stream.pop(DRAIN_S)) is not None:
             self._stream.push(buffer)
 
-    def forget(self) -> None:
-        """Let the stream go; borrowed arrays stay valid."""
-        self._stream.forget()
+    def give_up(self) -> list[Any]:
+        """Give what has to be dropped for the stream to end; borrowed arrays stay valid."""
+        return self._stream.give_up()

@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from quadfringe.devices.aravis.emulator.control import STREAM_0, STREAM_STEP, Control, Identity
-from quadfringe.devices.aravis.emulator.frames import Source, packed
-from quadfringe.devices.aravis.emulator.registers import FEATURES, PIXEL_FORMATS
+from quadfringe.emulator.control import STREAM_0, STREAM_STEP, Control, Identity
+from quadfringe.emulator.frames import Source, packed
+from quadfringe.emulator.registers import FEATURES, PIXEL_FORMATS
 
 __all__ = ["Chip", "EmulatedCamera", "Faults"]
 
@@ -36,6 +36,8 @@ class Faults:
     silent_chip: int = -1  # no frames from this chip
     wrong_size: bool = False  # frames have half the lines that the registers say
     wrong_format: bool = False  # frames are announced in another pixel format of the same size
+    short: bool = False  # frames of the announced size lack their last packets, and their ends do not say so
+    packet_size: int = 0  # packets of another size than the register says
     gone: bool = False  # no answers and no frames, as without power
 
 
@@ -188,6 +190,8 @@ class EmulatedCamera:
         if self.faults.wrong_size:
             height //= 2
             payload = payload[: len(payload) // 2]
+        if self.faults.short:
+            payload = payload[: len(payload) // 2]
         announced = pixel_format ^ 0x80 if self.faults.wrong_format else pixel_format
         leader = struct.pack(">HHQIIIIIHH", 0, 1, device_ns, announced, width, height, 0, 0, 0, 0)
         parts = [(LEADER, leader), *((PAYLOAD, part) for part in self._split(chip, payload))]
@@ -199,5 +203,5 @@ class EmulatedCamera:
         return packets
 
     def _split(self, chip: Chip, payload: memoryview) -> Iterator[memoryview]:
-        size = (chip.register(0x4) & 0xFFFF) - IP_UDP_HEADER - GVSP_HEADER
+        size = (self.faults.packet_size or chip.register(0x4) & 0xFFFF) - IP_UDP_HEADER - GVSP_HEADER
         return (payload[at : at + size] for at in range(0, len(payload), size))

@@ -6,28 +6,29 @@ import argparse
 import sys
 from pathlib import Path
 
-from quadfringe.devices.aravis.emulator import ADDRESSES, MODEL, SERIAL
-from quadfringe.devices.aravis.emulator.camera import EmulatedCamera
-from quadfringe.devices.aravis.emulator.control import Identity
-from quadfringe.devices.aravis.emulator.frames import FileFrames, Source, TestPattern
-from quadfringe.devices.aravis.emulator.registers import PIXEL_FORMATS
+from quadfringe.emulator import ADDRESSES, MODEL, SERIAL
+from quadfringe.emulator.camera import EmulatedCamera
+from quadfringe.emulator.control import Identity
+from quadfringe.emulator.frames import FileFrames, Source, TestPattern
+from quadfringe.emulator.registers import PIXEL_FORMATS
 
 COLOUR = ("BayerRG8", *(name for name in PIXEL_FORMATS if name.startswith(("Bayer", "RGB")) and name != "BayerRG8"))
 GREY = tuple(name for name in PIXEL_FORMATS if name.startswith("Mono"))
 
 
-def _identities(model: str, addresses: list[str]) -> list[Identity]:
+def _identities(model: str, serial: str, addresses: list[str]) -> list[Identity]:
     if model == "two-streams":
-        return [Identity("quadfringe", "TWO-STREAMS", SERIAL, addresses[0], COLOUR + GREY, streams=2)]
+        return [Identity("quadfringe", "TWO-STREAMS", serial, addresses[0], COLOUR + GREY, streams=2)]
     vendor = "JAI Ltd., Japan"
     formats = (COLOUR, GREY)
-    return [Identity(vendor, f"{MODEL}_#{n}", SERIAL, addresses[n], formats[n]) for n in (0, 1)]
+    return [Identity(vendor, f"{MODEL}_#{n}", serial, addresses[n], formats[n]) for n in (0, 1)]
 
 
 def main() -> None:
     """Run the camera until stdin ends."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--model", choices=["jai", "two-streams"], default="jai")
+    parser.add_argument("--serial", default=SERIAL)
     parser.add_argument("--addresses", nargs=2, default=list(ADDRESSES))
     parser.add_argument("--size", default="1024x768")
     parser.add_argument("--clock", nargs=2, type=float, default=[0.0, 0.0])
@@ -36,7 +37,7 @@ def main() -> None:
     width, height = (int(part) for part in options.size.split("x"))
     source: Source = TestPattern((height, width)) if options.frames is None else FileFrames(options.frames)
     try:
-        camera = EmulatedCamera(_identities(options.model, options.addresses), source, clocks=tuple(options.clock))
+        camera = EmulatedCamera(_identities(options.model, options.serial, options.addresses), source, clocks=tuple(options.clock))
     except OSError as error:
         print(f"error: {error}", flush=True)
         sys.exit(1)

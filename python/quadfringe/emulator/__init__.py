@@ -4,8 +4,8 @@ It runs in a process of its own and answers on two addresses of the loopback int
 devices of one serial number, or as one device with two stream channels. It shows frames of yours, obeys triggers, sends
 lost packets again, and fails in the ways that cameras fail.
 
->>> from quadfringe.devices.aravis.emulator import Emulator
->>> with Emulator(rate_hz=30) as camera:        # doctest: +SKIP
+>>> from quadfringe.emulator import Emulator
+>>> with Emulator() as camera:  # doctest: +SKIP
 ...     camera.order("lost_packets", 0.01)
 """
 
@@ -41,9 +41,10 @@ class Emulator:
         model: Literal["jai", "two-streams"] = "jai",
         clock: tuple[float, float] = (0.0, 0.0),
         addresses: tuple[str, str] = ADDRESSES,
+        serial: str = SERIAL,
     ) -> None:
         self.addresses = addresses
-        words = ["--model", model, "--addresses", *addresses, "--size", f"{size_px[0]}x{size_px[1]}"]
+        words = ["--model", model, "--serial", serial, "--addresses", *addresses, "--size", f"{size_px[0]}x{size_px[1]}"]
         words += ["--clock", *map(str, clock)] + ([] if frames is None else ["--frames", str(frames)])
         self._process = subprocess.Popen(
             [sys.executable, "-m", __name__, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.devices.aravis.emulator.registers import PIXEL_FORMATS
+from quadfringe.emulator.registers import PIXEL_FORMATS
 
 __all__ = ["FileFrames", "Source", "TestPattern", "packed"]
 
@@ -27,7 +27,7 @@ class Source(Protocol):
 class TestPattern:
     """Noise that goes on with every exposure; the first two pixels hold the exposure's number modulo 65536.
 
-    >>> from quadfringe.devices.aravis.emulator.frames import TestPattern
+    >>> from quadfringe.emulator.frames import TestPattern
     >>> frame = TestPattern((48, 64)).frame(0, 700, 8)
     >>> TestPattern.exposure(frame)
     700

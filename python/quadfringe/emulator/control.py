@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from quadfringe.devices.aravis.emulator.registers import FEATURES, XML_ADDRESS, genicam
+from quadfringe.emulator.registers import FEATURES, XML_ADDRESS, genicam
 
 __all__ = ["Control", "Identity", "Resend"]
 
