@@ -46,6 +46,7 @@ class Chip:
         self._last = 0
         self._device = self._camera.get_fake_camera()
         height, width = source.shape
+        self._size_px = width, height
         start = {
             SENSOR_WIDTH: width,
             SENSOR_HEIGHT: height,
@@ -62,7 +63,7 @@ class Chip:
         # Both cameras wake at multiples of the period; a late one keeps its place in the row.
         now = library.arv_buffer_get_timestamp(buffer) // self._period_ns
         self._last = max(self._last + 1, now)
-        frame = np.frombuffer(packed(self._source, self._index, self._last, pixel_format), np.uint8)
+        frame = np.frombuffer(packed(self._source, self._index, self._last, pixel_format, self._size_px), np.uint8)
         ctypes.memmove(library.arv_buffer_get_data(buffer, None), frame.ctypes.data, frame.nbytes)
         library.arv_buffer_set_timestamp(buffer, self._last * self._period_ns)
 

@@ -23,6 +23,6 @@ def fake_twin(size_px: tuple[int, int], rate_hz: float, **settings: Any) -> Iter
             assert process.stdout.readline().strip() == "ready"
             visible = ChipConfig(device=FAKES[0], pixel_format="BayerRG8")
             infrared = ChipConfig(device=FAKES[1], pixel_format="Mono8")
-            yield AravisConfig(visible=visible, infrared=infrared, frame_rate_hz=rate_hz, **settings)
+            yield AravisConfig(visible=visible, infrared=infrared, frame_rate_hz=rate_hz, timeout_s=10.0, **settings)
         finally:
             process.kill()

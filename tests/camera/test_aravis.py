@@ -8,7 +8,7 @@ import time
 
 import numpy as np
 import pytest
-from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, two_sources
+from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, pattern, two_sources
 
 from quadfringe.capture import AravisConfig
 from quadfringe.data import BayerShot, Shot
@@ -83,10 +83,11 @@ def test_exposure_steps_are_read_back(emulator: Emulator) -> None:
 
 
 def test_features_by_name(emulator: Emulator) -> None:
-    with pytest.raises(CameraError, match="visible 128 x 48 and infrared 128 x 96 pixels"):
-        AravisCamera(emulated(emulator, features={"Height": 48}))
-    with AravisCamera(emulated(emulator, features={"Height": 96, "GainRaw": 7})) as camera:
-        assert camera.config.visible.gain == 7
+    with AravisCamera(emulated(emulator, features={"Height": 48, "GainRaw": 7})) as camera:
+        assert (camera.config.visible.gain, camera.config.infrared.gain) == (7, 7)
+        shot = camera.snap()
+        whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+        np.testing.assert_array_equal(shot.ir, whole.frame(1, whole.exposure(shot.ir), 8)[:48])
     with pytest.raises(CameraError, match="NoSuchFeature"):
         AravisCamera(emulated(emulator, features={"NoSuchFeature": 1}))
 

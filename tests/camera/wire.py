@@ -31,14 +31,15 @@ def emulated(emulator: Emulator, visible: str | None = None, infrared: str | Non
         name: ChipConfig(device=address, pixel_format=chosen)  # type: ignore[arg-type]
         for name, address, chosen in zip(("visible", "infrared"), emulator.addresses, (visible, infrared), strict=True)
     }
-    return AravisConfig(**chips, **more)
+    # A busy machine may take long until frames come evenly, or at all.
+    return AravisConfig(**chips, **({"timeout_s": 10.0} | more))
 
 
 def two_sources(emulator: Emulator) -> AravisConfig:
     """Settings that open an emulated camera whose chips are two streams of one device."""
     where = emulator.addresses[0]
     chips = {name: ChipConfig(device=where, source=f"Source{n}") for n, name in enumerate(("visible", "infrared"))}
-    return AravisConfig(**chips)  # type: ignore[arg-type]
+    return AravisConfig(**chips, timeout_s=10.0)  # type: ignore[arg-type]
 
 
 @cache

@@ -197,7 +197,7 @@ class EmulatedCamera:
     def _packets(self, chip: Chip, device_ns: int) -> list[tuple[bytes, bytes | memoryview[int]]]:
         width, height = (chip.control.feature(name) for name in ("Width", "Height"))
         pixel_format = chip.control[FEATURES["PixelFormat"] + 4 * chip.stream]
-        payload = memoryview(packed(self._source, chip.index, self._exposure, pixel_format))
+        payload = memoryview(packed(self._source, chip.index, self._exposure, pixel_format, (width, height)))
         if self.faults.wrong_size:
             height //= 2
             payload = payload[: len(payload) // 2]
