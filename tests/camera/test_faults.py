@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -152,3 +153,14 @@ def test_a_camera_that_boots_and_one_that_is_not_there() -> None:
             AravisCamera(config)
         with Emulator(size_px=SIZE_PX, clock=(77.0, -50.0), addresses=OWN):
             right(camera, 10)
+
+
+def test_a_camera_that_is_closed_while_a_shot_is_awaited(emulator: Emulator, camera: AravisCamera) -> None:
+    stream = camera.stream(keep="all")
+    checked_exposure(next(stream))
+    emulator.order("silent", 1)
+    closing = threading.Timer(0.3, camera.close)
+    closing.start()
+    with pytest.raises(ValueError, match="was closed"):
+        rest(stream)
+    closing.join()
