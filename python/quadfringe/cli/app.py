@@ -7,9 +7,9 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce, timing
+from quadfringe.cli import bench, calibrate, camera, decode, demo, info, projector, reproduce, timing
 from quadfringe.cli.output import complain
-from quadfringe.errors import DecodeError, MissingExtraError
+from quadfringe.errors import CameraError, DecodeError, MissingExtraError
 
 __all__ = ["app"]
 
@@ -23,7 +23,7 @@ class Commands(TyperGroup):
         """Run the command and translate its errors."""
         try:
             return super().invoke(ctx)
-        except DecodeError as error:
+        except (DecodeError, CameraError) as error:
             complain(str(error))
             raise typer.Exit(FAILED) from error
         except BrokenPipeError:
@@ -71,3 +71,4 @@ app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(projector.app, name="projector")
+app.add_typer(camera.app, name="camera")
