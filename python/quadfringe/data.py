@@ -16,7 +16,18 @@ from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
 from quadfringe.images import full_scale
 
-__all__ = ["AnyShot", "BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth", "conditioning"]
+__all__ = [
+    "AnyShot",
+    "BayerShot",
+    "Calibration",
+    "FrameStamp",
+    "ResponseCalibration",
+    "Shape",
+    "Shot",
+    "Stamp",
+    "Truth",
+    "conditioning",
+]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
@@ -95,7 +106,46 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Shot:
+class FrameStamp:
+    """One frame of one chip: the device's own number and clock, and the host's clock when its last byte was in (ns)."""
+
+    id: int
+    device_ns: int
+    arrival_ns: int
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """When and by which camera a shot was taken.
+
+    `id` numbers the exposures since the camera was opened and jumps where some were lost; `time_us` is UTC in us since
+    1970, when the exposure was, as well as the host can tell; `frames` are those of the chips, "visible" and "infrared".
+    """
+
+    id: int
+    time_us: int
+    device: str
+    frames: Mapping[str, FrameStamp] = field(default_factory=dict)
+
+
+class Stamped:
+    """What every shot tells of its origin."""
+
+    stamp: Stamp | None
+
+    @property
+    def id(self) -> int | None:
+        """Number of the exposure in its stream; None when the shot comes from files."""
+        return None if self.stamp is None else self.stamp.id
+
+    @property
+    def time_us(self) -> int | None:
+        """UTC in us since 1970 when the exposure began; None when the shot comes from files."""
+        return None if self.stamp is None else self.stamp.time_us
+
+
+@dataclass(frozen=True)
+class Shot(Stamped):
     """One exposure: four images (H, W) of one dtype (uint8, uint16 or float32), and their full scale."""
 
     red: NDArray[Any]
@@ -104,6 +154,7 @@ class Shot:
     ir: NDArray[Any]
     full_scale: float | None = None
     truth: Truth | None = field(default=None, repr=False)
+    stamp: Stamp | None = None
 
     @property
     def channels(self) -> dict[str, NDArray[Any]]:
@@ -122,7 +173,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class BayerShot:
+class BayerShot(Stamped):
     """One exposure of a Bayer chip and an infrared one: the raw mosaic and the infrared image, (H, W) of one dtype.
 
     `bayer` names the colours of the first two pixels of the first row and of the second. Nothing is interpolated
@@ -135,6 +186,7 @@ class BayerShot:
     ir: NDArray[Any]
     full_scale: float | None = None
     truth: Truth | None = field(default=None, repr=False)
+    stamp: Stamp | None = None
 
     def __post_init__(self) -> None:
         if self.bayer not in get_args(BayerPattern):
