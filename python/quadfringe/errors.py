@@ -14,6 +14,7 @@ __all__ = [
     "DecodeError",
     "InputError",
     "MissingExtraError",
+    "RecordingError",
     "ShotTimeoutError",
     "UnpairedError",
     "WrongFrameError",
@@ -59,6 +60,10 @@ class UnpairedError(ShotTimeoutError):
 
 class WrongFrameError(CameraError):
     """Frames came in another size or pixel format than was agreed, or damaged, and none that is right."""
+
+
+class RecordingError(OSError):
+    """A recording that cannot go on; the message says why and how many shots are safe."""
 
 
 class MissingExtraError(ImportError):

@@ -3,6 +3,6 @@
 from quadfringe.recording.reader import Recording
 from quadfringe.recording.recorder import Recorder, RecorderStatistics
 from quadfringe.recording.recover import Recovered, recover
-from quadfringe.recording.writer import RecordingError, RecordingWriter
+from quadfringe.recording.writer import RecordingWriter
 
-__all__ = ["Recorder", "RecorderStatistics", "Recording", "RecordingError", "RecordingWriter", "Recovered", "recover"]
+__all__ = ["Recorder", "RecorderStatistics", "Recording", "RecordingWriter", "Recovered", "recover"]

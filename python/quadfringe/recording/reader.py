@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,6 +20,16 @@ from quadfringe.errors import InputError
 from quadfringe.recording.layout import Header, crcs_of, stamp_at
 
 __all__ = ["Recording"]
+
+LAST_SHOT_BYTES = 64 << 20  # more than a shot that could not be written any more
+LOOK_S = 5.0
+LOOK = """
+import h5py, sys
+with h5py.File(sys.argv[1], "r", libver="latest", swmr=True) as file:
+    for name in file:
+        if file[name].chunks:
+            [file[name].id.get_chunk_info(i) for i in range(file[name].id.get_num_chunks())]
+"""
 
 
 class Recording:
@@ -127,7 +140,23 @@ def _open(path: Path) -> h5py.File:
     if not h5py.is_hdf5(path):
         raise InputError(f"{path}: not a recording: expected HDF5, as `quadfringe record` writes it")
     try:
-        return h5py.File(path, "r", libver="latest", swmr=True)
+        file = h5py.File(path, "r", libver="latest", swmr=True)
     except (OSError, RuntimeError) as error:
-        reason = str(error).splitlines()[0]
-        raise InputError(f"{path}: cannot be opened: {reason}; a file that was cut short cannot be used") from error
+        raise InputError(f"{path}: cannot be opened, damaged or cut short: {str(error).splitlines()[0]}") from error
+    missing = file.id.get_filesize() - path.stat().st_size
+    if missing > 0 and not (missing < LAST_SHOT_BYTES and _has_its_tables(path)):
+        file.close()
+        raise InputError(f"{path}: cut short by {missing} bytes; copy it again from where it was recorded")
+    return file
+
+
+def _has_its_tables(path: Path) -> bool:
+    """Whether every table of a file without its end is there: a writer that failed has written them before.
+
+    HDF5 waits for ever for a table that is missing, and cannot be interrupted; so another process looks.
+    """
+    with suppress(subprocess.TimeoutExpired):
+        return (
+            subprocess.run([sys.executable, "-c", LOOK, str(path)], capture_output=True, timeout=LOOK_S).returncode == 0
+        )
+    return False

@@ -10,9 +10,9 @@ from types import TracebackType
 
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot, Calibration
-from quadfringe.errors import InputError
+from quadfringe.errors import InputError, RecordingError
 from quadfringe.recording.layout import Header
-from quadfringe.recording.writer import RecordingError, RecordingWriter
+from quadfringe.recording.writer import RecordingWriter
 
 __all__ = ["Recorder", "RecorderStatistics"]
 
@@ -111,9 +111,7 @@ class Recorder:
 
     def statistics(self) -> RecorderStatistics:
         """Give the counters, at any time and from any thread."""
-        return RecorderStatistics(
-            self._written, self._refused, self._image_bytes, tuple(self._files), self._fault
-        )
+        return RecorderStatistics(self._written, self._refused, self._image_bytes, tuple(self._files), self._fault)
 
     def close(self) -> None:
         """Close the file in order; closing twice is allowed."""

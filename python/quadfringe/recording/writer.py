@@ -14,17 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Stamp
-from quadfringe.errors import InputError
+from quadfringe.errors import InputError, RecordingError
 from quadfringe.recording.layout import Header, crcs_of, make_datasets, stamp_values
 
-__all__ = ["RecordingError", "RecordingWriter", "require_room"]
+__all__ = ["RecordingWriter", "require_room"]
 
 RESERVE_BYTES = 8 << 20  # HDF5's own tables, and room to close in order
 READABLE_SINCE = ("v110", "v110")  # the file format of HDF5 1.10, the first that survives a killed writer
-
-
-class RecordingError(RuntimeError):
-    """A recording that cannot go on; the message says why and how many shots are safe."""
 
 
 class RecordingWriter:
@@ -38,6 +34,7 @@ class RecordingWriter:
     def __init__(self, path: Path | str, header: Header) -> None:
         self.path, self.header = Path(path), header
         self.written = 0
+        self._failed = False
         self._file = _create(self.path, header)
 
     def append(self, shot: AnyShot) -> None:
@@ -53,6 +50,7 @@ class RecordingWriter:
         try:
             self._write(images, stamp, crcs)
         except (OSError, RuntimeError) as error:  # h5py raises both for a write that failed
+            self._failed = True
             raise RecordingError(
                 f"{self.path}: shot {self.written} could not be written: {_first_line(error)}; "
                 f"the {self.written} before it are safe"
@@ -70,11 +68,11 @@ class RecordingWriter:
         file.flush()  # of the file: what a flush of datasets alone leaves behind is lost to HDF5's own repair
 
     def close(self) -> None:
-        """Mark the file as closed in order and close it; closing twice is allowed. Never raises for a full disk."""
+        """Close the file, marked as closed in order unless a write failed; closing twice is allowed."""
         if not self._file.id.valid:
             return
         with suppress(OSError, RuntimeError):
-            self._file["closed"][()] = 1
+            self._file["closed"][()] = not self._failed
         with suppress(OSError, RuntimeError):
             self._file.close()
 
