@@ -6,6 +6,7 @@ from importlib import import_module
 from types import ModuleType
 
 __all__ = [
+    "BatchError",
     "CameraBusyError",
     "CameraError",
     "CameraLostError",
@@ -64,6 +65,10 @@ class WrongFrameError(CameraError):
 
 class RecordingError(OSError):
     """A recording that cannot go on; the message says why and how many shots are safe."""
+
+
+class BatchError(RuntimeError):
+    """A batch that cannot go on; what was decoded stays, and the same command goes on from there."""
 
 
 class MissingExtraError(ImportError):

@@ -106,10 +106,10 @@ def _write(text: str, json: Path | None) -> None:
 
 
 @contextmanager
-def steps(items: Iterable[Item], title: str) -> Iterator[Iterable[Item]]:
+def steps(items: Iterable[Item], title: str, total: int | None = None) -> Iterator[Iterable[Item]]:
     """Walk over long work with a progress bar on stderr; silent when stderr is not a terminal."""
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
-    yield track(items, description=title, console=console, transient=True, disable=not console.is_terminal)
+    yield track(items, description=title, total=total, console=console, transient=True, disable=not console.is_terminal)
