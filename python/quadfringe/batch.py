@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import pickle
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -242,7 +243,7 @@ def decode_shot(job: Job, shot: int) -> Outcome:
     import zarr
 
     with _ONE_AT_A_TIME:
-        take, scanner = _reader(job.recording, job.config)
+        take, scanner = _reader(job)
         group = zarr.open_group(job.store, mode="r+")
         try:
             shape = scanner.decode(take[shot])
@@ -254,14 +255,14 @@ def decode_shot(job: Job, shot: int) -> Outcome:
         return Outcome(job.recording, shot, 100.0 * float(shape.returned.mean()), None)
 
 
-@lru_cache(maxsize=2)
-def _cached(recording: Path, config: str) -> tuple[Recording, Scanner]:
-    return Recording(recording), _opened(SystemConfig.model_validate_json(config))
-
-
-def _reader(recording: Path, config: SystemConfig) -> tuple[Recording, Scanner]:
+def _reader(job: Job) -> tuple[Recording, Scanner]:
     """Give the recording and its decoder, planned once for each process."""
-    return _cached(recording, config.model_dump_json(exclude_unset=True))
+    return _planned(job.recording, pickle.dumps(job.config))
+
+
+@lru_cache(maxsize=2)
+def _planned(recording: Path, config: bytes) -> tuple[Recording, Scanner]:
+    return Recording(recording), _opened(pickle.loads(config))
 
 
 def _save(job: Job, shot: int, shape: Shape, group: Any) -> None:

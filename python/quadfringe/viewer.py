@@ -10,6 +10,8 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
+from contextlib import redirect_stdout
+from io import StringIO
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -203,7 +205,8 @@ class Viewer:
 
 def _serve(host: str, port: int) -> viser.ViserServer:
     module: Any = require("viser", "view")
-    server: viser.ViserServer = module.ViserServer(host=host, port=port, label="quadfringe", verbose=False)
+    with redirect_stdout(StringIO()):  # a banner, also when asked to be quiet
+        server: viser.ViserServer = module.ViserServer(host=host, port=port, label="quadfringe", verbose=False)
     return server
 
 
