@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -46,7 +47,7 @@ def take(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("make", [numbered_shot, mosaic])
-def test_shots_come_back_as_they_went_in(tmp_path: Path, make) -> None:  # noqa: ANN001
+def test_shots_come_back_as_they_went_in(tmp_path: Path, make: Callable[[int], AnyShot]) -> None:
     shots = [stamped(make(k), k) for k in range(5)]
     with Recording(record(tmp_path / "a.h5", shots)) as take:
         assert (len(take), take.closed_in_order) == (5, True)
@@ -197,10 +198,11 @@ def test_nothing_is_overwritten_and_mixed_shots_are_refused(take: Path, tmp_path
         recorder.write(numbered_shot(0))
         with pytest.raises(InputError, match="this recording holds red, green, blue, ir of 96 x 64 uint8"):
             recorder.write(mosaic(1))
-    with pytest.raises(RecordingError, match="disk is full"), pytest.MonkeyPatch.context() as patch:
-        usage = shutil.disk_usage(tmp_path)
+    usage = shutil.disk_usage(tmp_path)
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr(shutil, "disk_usage", lambda _: usage._replace(free=0))
-        RecordingWriter(tmp_path / "c.h5", Header.of(numbered_shot(0), None, None))
+        with pytest.raises(RecordingError, match="disk is full"):
+            RecordingWriter(tmp_path / "c.h5", Header.of(numbered_shot(0), None, None))
     assert not (tmp_path / "c.h5").exists()
 
 
@@ -224,7 +226,8 @@ def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(tmp_pat
     with open_camera(f"replay:{path}") as camera:
         assert camera.paced
         begin = time.monotonic()
-        assert next(stream := camera.stream(keep="latest")).id == 0
+        stream = camera.stream(keep="latest")
+        assert next(stream).id == 0
         time.sleep(0.1)  # three periods: shots 1 and 2 are gone
         late = next(stream).id
         assert late is not None

@@ -4,7 +4,7 @@ The work is handed to any executor of `concurrent.futures`; `executor_for` gives
 cluster. A shot is a task of its own, and its status is written last, so that a run that was killed goes on where it
 was and ends with the same files.
 
-    OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status; settings as attributes
+    OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status; with the settings
     OUT/take/shot_000000.ply ...
     OUT/take/errors.json     by number of the shot, why it has no shape; only when there are such shots
 """

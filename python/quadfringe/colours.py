@@ -20,11 +20,12 @@ COARSE = 16  # a colour is the mean over so many pixels, times the blur: more th
 
 
 def limits_of(values: Map) -> tuple[float, float]:
-    """Give the range that holds all but a hundredth of the values at each end; (0, 1) when there are none."""
+    """Give the range of most values, a little widened, whatever a few outliers say; (0, 1) when there are none."""
     finite = values[::4, ::4][np.isfinite(values[::4, ::4])]
     if not finite.size:
         return (0.0, 1.0)
-    low, high = (float(v) for v in np.quantile(finite, (0.01, 0.99)))
+    low, high = (float(v) for v in np.quantile(finite, (0.04, 0.96)))
+    low, high = low - 0.1 * (high - low), high + 0.1 * (high - low)
     return (low, high if high > low else low + 1.0)
 
 
@@ -67,7 +68,7 @@ def _tile(image: NDArray[Any], size: tuple[int, ...], full_scale: float, planes:
 def texture(shot: AnyShot, shape: Shape) -> Picture:
     """Give the surface as it looks without fringes: brightness of the modulation, colour of the mean light around."""
     modulation = np.nan_to_num(shape.modulation)
-    _, top = limits_of(shape.modulation)
+    top = limits_of(shape.modulation)[1]
     brightness = (modulation * np.float32(255 / max(top, 1e-6))).clip(0, 255)
     height, width = modulation.shape
     small = (max(1, width // COARSE), max(1, height // COARSE))

@@ -42,7 +42,7 @@ class Film:
 
 
 def hand_system(rate_hz: float = RATE_HZ) -> SystemConfig:
-    """The virtual bench with the moving hand before it, lightly coloured, with noise."""
+    """Give the virtual bench with the moving hand before it, lightly coloured, with noise."""
     scene = SceneConfig(surface="hand", albedo=(0.92, 0.70, 0.58, 0.85), noise=0.01, seed=1)
     return SystemConfig(capture=VirtualConfig(frame_rate_hz=rate_hz), scene=scene)
 
@@ -51,7 +51,7 @@ def hand(out: Path, shots: int = SHOTS) -> tuple[dict[str, float], Path]:
     """Film the moving hand of the virtual bench: `out`/hand.h5, `out`/hand/shot_000000.ply ..., `out`/hand.mp4."""
     with open_system(hand_system()) as scanner:
         made = film(scanner, out, "hand", shots, RATE_HZ)
-    figures = {"hand_shots": made.shots, "hand_shapes": made.shapes, "hand_lost": made.lost}
+    figures: dict[str, float] = {"hand_shots": made.shots, "hand_shapes": made.shapes, "hand_lost": made.lost}
     if made.depth_rms_mm:
         figures["hand_depth_rms_mm_median"] = float(np.median(made.depth_rms_mm))
         figures["hand_depth_rms_mm_worst"] = max(made.depth_rms_mm)

@@ -94,7 +94,8 @@ def _rotation(yaw: float, pitch: float) -> NDArray[np.float32]:
     about_y = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
     sine, cosine = np.sin(pitch), np.cos(pitch)
     about_x = np.array([[1, 0, 0], [0, cosine, -sine], [0, sine, cosine]])
-    return (about_x @ about_y).astype(np.float32)
+    rotation: NDArray[np.float32] = (about_x @ about_y).astype(np.float32)
+    return rotation
 
 
 def _normals(xyz_mm: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -106,13 +107,15 @@ def _normals(xyz_mm: NDArray[np.float32]) -> NDArray[np.float32]:
     normals = np.cross(down, right)
     length = np.linalg.norm(normals, axis=2, keepdims=True)
     towards = np.array([0, 0, -1], np.float32)
-    unit: NDArray[np.float32] = np.where(np.isfinite(length) & (length > 0), normals / length, towards).astype(np.float32)
+    unit: NDArray[np.float32] = np.where(np.isfinite(length) & (length > 0), normals / length, towards).astype(
+        np.float32
+    )
     return unit
 
 
 def _shade(normals: NDArray[np.float32]) -> NDArray[np.float32]:
-    shade: NDArray[np.float32] = 0.25 + 0.9 * np.maximum(normals @ (LIGHT / np.linalg.norm(LIGHT)), 0)
-    return shade
+    light = LIGHT / np.float32(np.linalg.norm(LIGHT))
+    return np.asarray(0.25 + 0.9 * np.maximum(normals @ light, 0), np.float32)
 
 
 def _splat(seen: NDArray[np.float32], painted: Picture, size_px: tuple[int, int], field_mm: float) -> Picture:

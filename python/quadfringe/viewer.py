@@ -36,6 +36,7 @@ M_PER_MM = 1e-3  # the page is in metres: near and far plane of a browser's came
 FIGURES_PERIOD_S = 0.2
 PICTURES_PERIOD_S = 0.1
 LOCAL = "127.0.0.1"
+REPLAYED_MS = 60e3  # older shots come from a recording, which keeps the stamps of its day
 
 
 class Viewer:
@@ -68,13 +69,13 @@ class Viewer:
 
     def _build(self, stride: str, colouring: Colouring) -> None:
         gui = self._server.gui
-        gui.configure_theme(
-            show_logo=False, show_share_button=False, control_layout="collapsible", control_width="large"
-        )
+        gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        gui.main_panel.dock_right()
         gui.set_panel_label("quadfringe live")
         strides = sorted({stride, *STRIDES}, key=int)
         self._colour = gui.add_dropdown("Colour", COLOURINGS, initial_value=colouring)
         self._stride = gui.add_dropdown("Every n-th point", strides, initial_value=stride)
+        self._quality = gui.add_slider("Least quality", min=0.0, max=1.0, step=0.05, initial_value=0.0)
         self._frozen = gui.add_checkbox("Hold still", initial_value=False)
         self._figures = gui.add_markdown(self._message)
         blank = np.full((48, 64, 3), 40, np.uint8)
@@ -90,7 +91,7 @@ class Viewer:
         recorder: Callable[[], RecorderStatistics] | None = None,
         columns: int = 912,
     ) -> int:
-        """Show what a stream measures until it ends; returns the number of shots. Figures go on when the camera fails."""
+        """Show what a stream measures until it ends; returns the number of shots. Figures go on without shots."""
         ended = threading.Event()
 
         def figures() -> None:
@@ -113,7 +114,8 @@ class Viewer:
     def show(self, measured: Measured, columns: int = 912) -> None:
         """Show a shot and its shape, or why there is none; what comes faster than the page goes is left out."""
         now = time.monotonic()
-        latency = f"latency {measured.latency_ms:.0f} ms"
+        replayed = measured.latency_ms > REPLAYED_MS
+        latency = "replayed" if replayed else f"latency {measured.latency_ms:.0f} ms"
         self._message = latency if measured.error is None else f"{latency} · **no shape:** {measured.error}"
         if self._frozen.value or not self._server.get_clients():
             return
@@ -150,7 +152,7 @@ class Viewer:
         part = np.s_[::stride, ::stride]
         xyz_mm = np.asarray(shape.xyz_mm)[part]
         picture = self._painted(shot, shape, part)
-        valid = np.isfinite(xyz_mm[:, :, 2])
+        valid = np.isfinite(xyz_mm[:, :, 2]) & (shape.quality[part] >= self._quality.value)
         return xyz_mm[valid], picture[valid]
 
     def _painted(self, shot: AnyShot, shape: Shape, part: tuple[slice, slice]) -> Picture:
@@ -189,7 +191,8 @@ class Viewer:
 
     def close(self) -> None:
         """Stop serving; closing twice is allowed."""
-        self._server.stop()
+        with redirect_stdout(StringIO()):
+            self._server.stop()
 
     def __enter__(self) -> Viewer:
         return self

@@ -62,25 +62,31 @@ def live(system: Path, **settings: Any) -> Iterator[tuple[Viewer, Recorder]]:
                 follower.join()
 
 
-def until(what: Callable[[], object], why: str) -> Any:
-    """Ask until the answer is true; fail when patience ends."""
+def until(what: Callable[[], Any], why: str) -> Any:
+    """Ask until there is an answer; fail when patience ends."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
-        if answer := what():
+        if (answer := what()) is not None:
             return answer
         time.sleep(0.3)
-    pytest.fail(f"{why} within {PATIENCE_S:g} s")
+    return pytest.fail(f"{why} within {PATIENCE_S:g} s")
 
 
 def picture(page: Any) -> np.ndarray:
-    """The middle of the page, without the panel at the right."""
+    """The middle of the page, without the panel at the right and messages at the top."""
     image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
-    return image[100:700, 100:800]
+    return image[190:700, 60:860]
 
 
 def painted(image: np.ndarray) -> np.ndarray:
     """Pixels that are neither the white of the page nor the grey of its grid."""
     return (image.max(axis=2) < 200) | (np.ptp(image, axis=2) > 30)
+
+
+def shape_on(page: Any) -> np.ndarray | None:
+    """The picture once a shape is on it."""
+    image = picture(page)
+    return image if painted(image).mean() > 0.05 else None
 
 
 def figures(page: Any) -> dict[str, str]:
@@ -94,11 +100,11 @@ def test_the_page_shows_a_moving_shape(browser: Any, system: Path, tmp_path: Pat
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.on("request", lambda request: asked.append(request.url))
         page.goto(viewer.url)
-        until(lambda: float(figures(page).get("decoded", "0 /s").split()[0]) > 0, "no rate on the page")
-        first = until(lambda: (p := picture(page)) is not None and painted(p).mean() > 0.05 and p, "no shape")
+        until(lambda: float(figures(page).get("decoded", "0 /s").split()[0]) or None, "no rate on the page")
+        first = until(lambda: shape_on(page), "no shape")
         shown = painted(first)
-        assert shown[200:400, 250:450].mean() > 0.3, "the shape is not in the middle"
-        until(lambda: np.abs(picture(page) - first).max(axis=2)[shown].mean() > 3, "the shape stands still")
+        assert shown[150:350, 300:500].mean() > 0.3, "the shape is not in the middle"
+        until(lambda: moved if (moved := np.abs(picture(page) - first)[shown].mean()) > 3 else None, "nothing moves")
         assert page.locator("img").count() >= 2
         assert set(figures(page)) >= {"captured", "decoded", "queue decode", "queue view", "queue record", "recorded"}
         assert page.get_by_text("Share").count() == 0
@@ -113,12 +119,19 @@ def test_the_page_shows_a_moving_shape(browser: Any, system: Path, tmp_path: Pat
 
 
 def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
+    with qf.open(system) as scanner, scanner.stream(1) as stream:
+        measured = next(iter(stream))
     seen = {}
     for colouring in ("texture", "height", "quality"):
-        with live(system, stride=4, colouring=colouring) as (viewer, _):
+        with Viewer(port=8235, colouring=colouring) as viewer:  # type: ignore[arg-type]
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.goto(viewer.url)
-            image = until(lambda: (p := picture(page)) is not None and painted(p).mean() > 0.03 and p, "no shape")  # noqa: B023
+
+            def shown(viewer: Viewer = viewer, page: Any = page) -> np.ndarray | None:
+                viewer.show(measured)
+                return shape_on(page)
+
+            image = until(shown, "no shape")
             seen[colouring] = image[painted(image)].mean(axis=0)
             page.close()
     assert np.abs(seen["texture"] - seen["height"]).max() > 20
@@ -129,7 +142,9 @@ def test_only_this_machine_is_served_unless_asked() -> None:
     with Viewer(port=8240) as viewer:
         port = int(viewer.url.rsplit(":", 1)[1])
         assert viewer.url.startswith("http://127.0.0.1:")
-        listening = [line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:] if line.split()[3] == "0A"]
+        listening = [
+            line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:] if line.split()[3] == "0A"
+        ]
         assert f"0100007F:{port:04X}" in listening
         assert f"00000000:{port:04X}" not in listening
         with socket.create_connection(("127.0.0.1", port), timeout=5):

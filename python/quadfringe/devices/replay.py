@@ -1,4 +1,4 @@
-"""A recording as a camera: the same shots with the same stamps, at the pace at which they were taken or at full speed."""
+"""A recording as a camera: the same shots with the same stamps, at the pace of their day or at full speed."""
 
 from __future__ import annotations
 

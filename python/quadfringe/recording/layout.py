@@ -1,13 +1,13 @@
 """What a recording is: one HDF5 file, whose names, types and header stand here and nowhere else.
 
-    /               attributes: format, schema_version, software, created_utc, device, full_scale, bayer (mosaics only)
+    /               attributes: format, schema_version, software, created_utc, device, full_scale, and bayer
     /config         the resolved system, JSON; "null" when there was none
     /calibration    the calibration, JSON; "null" when there was none
     /red /green /blue /ir, or /raw /ir      (N, H, W), one chunk a shot, not compressed
     /id             (N,) uint64, number of the exposure
     /time_us        (N,) int64, begin of the exposure, UTC since 1970
     /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of each chip's frame; attribute chips; only with chips
-    /crc32          (N, images) uint32, of the bytes of each image, in the order of the images above
+    /crc32          (N, images) uint32, of the bytes of each image, in the order above
     /closed         1 once the file was closed in order
 
 Everything is made before HDF5's mode of one writer and many readers begins, because nothing can be added in it.
@@ -65,9 +65,11 @@ class Header:
                 f"a recording needs images (H, W) of one size and type: {', '.join(odd)} "
                 f"unlike ir with {image.dtype} {image.shape}"
             )
+        height_px, width_px = image.shape
         return cls(
             tuple(shot.images),
-            *image.shape,
+            height_px,
+            width_px,
             image.dtype,
             shot.full_scale_value,
             bayer=shot.bayer if isinstance(shot, BayerShot) else None,
@@ -98,8 +100,8 @@ class Header:
         """Make a shot of its images."""
         if self.bayer is not None:
             return BayerShot(images["raw"], self.bayer, images["ir"], self.full_scale, stamp=stamp)
-        channels = (images[name] for name in ("red", "green", "blue", "ir"))
-        return Shot(*channels, self.full_scale, stamp=stamp)
+        red, green, blue, ir = (images[name] for name in ("red", "green", "blue", "ir"))
+        return Shot(red, green, blue, ir, self.full_scale, stamp=stamp)
 
     def write(self, file: h5py.File) -> None:
         """Write the header into a new file."""
@@ -129,7 +131,8 @@ class Header:
         first = file[images[0]]
         chips = tuple(file["chip_stamps"].attrs["chips"]) if "chip_stamps" in file else ()
         full_scale, bayer, device = (file.attrs.get(name) for name in ("full_scale", "bayer", "device"))
-        header = cls(images, *first.shape[1:], first.dtype, float(full_scale), bayer, device, chips)
+        _, height_px, width_px = first.shape
+        header = cls(images, height_px, width_px, first.dtype, float(full_scale), bayer, device, chips)
         config, calibration = (json.loads(file[name].asstr()[()]) for name in ("config", "calibration"))
         return replace(
             header,

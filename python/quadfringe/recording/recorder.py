@@ -86,11 +86,9 @@ class Recorder:
 
     def _writer_for(self, shot: AnyShot) -> RecordingWriter | None:
         """Give the file in use, a new one when there is none, or None while a fault waits for its next try."""
+        if self._is_long_enough():
+            self._end_file()
         writer = self._writer
-        if writer is not None and self._file_bytes is not None:
-            if (writer.written + 1) * writer.header.shot_bytes > self._file_bytes and writer.written:
-                self._end_file()
-                writer = None
         if writer is None:
             if time.monotonic() < self._retry_at:
                 return None
@@ -99,6 +97,12 @@ class Recorder:
             self._writer = writer
             self._files.append(path)
         return writer
+
+    def _is_long_enough(self) -> bool:
+        writer = self._writer
+        if writer is None or self._file_bytes is None or not writer.written:
+            return False
+        return (writer.written + 1) * writer.header.shot_bytes > self._file_bytes
 
     def _next_path(self) -> Path:
         number = len(self._files)
