@@ -109,14 +109,19 @@ class Pairer(Generic[Item]):
         self._tolerance = tolerance_ns
         self._difference: float | None = None  # clock of chip 0 minus that of chip 1, within a pair
         self._agreed_at = 0  # device time of chip 0 when it was last seen
+        self._host_offset_ns = 0
         self._period = 0  # least time between two exposures
         self._waiting: tuple[deque[Stamped[Item]], deque[Stamped[Item]]] = (deque(), deque())
         self._forget()
         self.begin()
 
-    def begin(self, *, sole: bool = False) -> None:
-        """Start a run: ids may begin anew. With `sole` every first two frames answer one trigger and are a pair."""
+    def begin(self, *, sole: bool = False, pending: int = PENDING) -> None:
+        """Start a run: ids may begin anew, and `pending` frames of a chip may wait for the other.
+
+        With `sole` the first two frames answer one trigger and are a pair, whatever the clocks say.
+        """
         self.end()
+        self._pending = pending
         self._sole = sole
         self._numbers = (FrameNumbers(), FrameNumbers())
 
@@ -133,15 +138,22 @@ class Pairer(Generic[Item]):
         self._waiting[chip].append(Stamped(stamp, numbers(stamp.id), item))
         self.missed[chip] += numbers.missed - before
         self._look_at_clock(chip, stamp)
-        while len(self._waiting[chip]) > PENDING:
+        while len(self._waiting[chip]) > self._pending:
             self._give_up(chip)
         if self._difference is None and not self._agree():
             return []
         return self._matches()
 
+    @property
+    def host_offset_ns(self) -> int:
+        """Host time minus the device time of chip 0."""
+        return self._host_offset_ns
+
     def _look_at_clock(self, chip: int, stamp: FrameStamp) -> None:
         """A delay far below those that the clocks were compared by tells that the comparison was wrong."""
         self._clocks[chip].see(stamp)
+        if chip == 0:
+            self._host_offset_ns = self._clocks[0].offset_ns
         if self._difference is not None and self._believed is not None:
             earlier = self._believed[chip] - (stamp.arrival_ns - stamp.device_ns)
             if earlier > self._period / 2 + DRIFT * abs(stamp.arrival_ns - self._believed_at):

@@ -6,7 +6,7 @@
     /red /green /blue /ir, or /raw /ir      (N, H, W), one chunk a shot, not compressed
     /id             (N,) uint64, number of the exposure
     /time_us        (N,) int64, begin of the exposure, UTC since 1970
-    /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of each chip's frame; attribute chips; only with chips
+    /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of each chip's frame; only with chips
     /crc32          (N, images) uint32, of the bytes of each image, in the order above
     /closed         1 once the file was closed in order
 
