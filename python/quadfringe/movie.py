@@ -106,10 +106,8 @@ def _normals(xyz_mm: NDArray[np.float32]) -> NDArray[np.float32]:
     down, right = np.gradient(smooth, axis=(0, 1))
     normals = np.cross(down, right)
     length = np.linalg.norm(normals, axis=2, keepdims=True)
-    towards = np.array([0, 0, -1], np.float32)
-    unit: NDArray[np.float32] = np.where(np.isfinite(length) & (length > 0), normals / length, towards).astype(
-        np.float32
-    )
+    unit = np.full(xyz_mm.shape, (0, 0, -1), np.float32)
+    np.divide(normals, length, out=unit, where=np.isfinite(length) & (length > 0))
     return unit
 
 
