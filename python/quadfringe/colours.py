@@ -73,7 +73,7 @@ def texture(shot: AnyShot, shape: Shape) -> Picture:
     height, width = modulation.shape
     small = (max(1, width // COARSE), max(1, height // COARSE))
     planes = [shot.channels[name] for name in ("red", "green", "blue")]
-    means = [cv2.blur(cv2.resize(p.astype(np.float32), small, interpolation=cv2.INTER_AREA), (3, 3)) for p in planes]
+    means = [cv2.blur(cv2.resize(p.astype(np.float32), small, interpolation=cv2.INTER_AREA), (5, 5)) for p in planes]
     hue = np.dstack(means) / np.maximum(np.max(means, axis=0), 1e-6)[:, :, None]
     full = cv2.resize(hue, (width, height), interpolation=cv2.INTER_LINEAR)
     picture: Picture = (brightness[:, :, None] * full).astype(np.uint8)

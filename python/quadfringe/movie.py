@@ -70,7 +70,7 @@ def solid_picture(
     turn_deg: tuple[float, float] = (25.0, -15.0),
     middle_mm: tuple[float, float, float] | None = None,
     size_px: tuple[int, int] = (640, 480),
-    field_mm: float = 260.0,
+    field_mm: float = 320.0,
 ) -> Picture:
     """Draw a calibrated shape, lit from above left, in its colours (H, W, 3) as (height, width, 3).
 
@@ -86,7 +86,9 @@ def solid_picture(
     seen = (points - np.asarray(middle_mm, np.float32)) @ rotation.T
     shade = _shade(_normals(shape.xyz_mm)[known] @ rotation.T)
     painted = (colours[known] * shade[:, None]).clip(0, 255).astype(np.uint8)
-    return _splat(seen, painted, size_px, field_mm)
+    spacing_mm = float(np.nanmedian(np.abs(np.diff(shape.xyz_mm[:, :, 0], axis=1)))) if len(points) else 0.0
+    dot_px = int(np.clip(np.ceil(1.5 * spacing_mm * size_px[0] / field_mm), 2, 8))
+    return _splat(seen, painted, size_px, field_mm, dot_px)
 
 
 def _rotation(yaw: float, pitch: float) -> NDArray[np.float32]:
@@ -116,17 +118,20 @@ def _shade(normals: NDArray[np.float32]) -> NDArray[np.float32]:
     return np.asarray(0.25 + 0.9 * np.maximum(normals @ light, 0), np.float32)
 
 
-def _splat(seen: NDArray[np.float32], painted: Picture, size_px: tuple[int, int], field_mm: float) -> Picture:
-    """Draw points from far to near, each as a small square, so that near ones hide far ones."""
+def _splat(
+    seen: NDArray[np.float32], painted: Picture, size_px: tuple[int, int], field_mm: float, dot_px: int
+) -> Picture:
+    """Draw points from far to near, each as a square of `dot_px`, so that near ones hide far ones."""
     width, height = size_px
     distance_mm = 3 * field_mm
     scale = width / field_mm * distance_mm / (distance_mm + seen[:, 2])
     column = (width / 2 + scale * seen[:, 0]).astype(np.int32)
     row = (height / 2 + scale * seen[:, 1]).astype(np.int32)
-    inside = (column >= 0) & (column < width - 1) & (row >= 0) & (row < height - 1)
+    inside = (column >= 0) & (column <= width - dot_px) & (row >= 0) & (row <= height - dot_px)
     order = np.argsort(-seen[inside, 2])
     column, row, colours = column[inside][order], row[inside][order], painted[inside][order]
     picture = np.full((height, width, 3), BACKGROUND, np.uint8)
-    for down, right in ((1, 1), (1, 0), (0, 1), (0, 0)):
-        picture[row + down, column + right] = colours
+    for down in range(dot_px):
+        for right in range(dot_px):
+            picture[row + down, column + right] = colours
     return picture
