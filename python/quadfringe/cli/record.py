@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, say, write_figures
+from quadfringe.cli.output import JsonOption, complain, say, steps, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.data import AnyShot
+    from quadfringe.recording import Recorder
     from quadfringe.scanner import Scanner
 
 __all__ = ["record", "recover"]
@@ -38,10 +39,12 @@ def record(
     from quadfringe.recording import Recorder
     from quadfringe.scanner import open_system
 
-    with open_system(system) as scanner:
-        with Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder:
-            for shot in _shots(scanner, shots, seconds):
-                recorder.write(shot)
+    with (
+        open_system(system) as scanner,
+        Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
+        steps(_shots(scanner, shots, seconds), "recording", shots) as taken,
+    ):
+        _write_all(taken, recorder)
         camera = scanner.camera.statistics()
     done = recorder.statistics()
     files = ", ".join(str(path) for path in done.files) or "nothing"
@@ -49,6 +52,17 @@ def record(
     write_figures({"written": done.written, "refused": done.refused, "dropped": camera.dropped}, json)
     if done.refused:
         raise RecordingError(f"{done.refused} shots were not recorded: {done.fault or 'the disk was full for a while'}")
+
+
+def _write_all(shots: Iterable[AnyShot], recorder: Recorder) -> None:
+    """Write shots, and say at once when the disk refuses them and when it takes them again."""
+    fault = None
+    for shot in shots:
+        recorder.write(shot)
+        now = recorder.statistics().fault
+        if (now is None) != (fault is None):
+            complain(now) if now else say("recording goes on in a new file")
+        fault = now
 
 
 def _shots(scanner: Scanner, shots: int | None, seconds: float | None) -> Iterator[AnyShot]:

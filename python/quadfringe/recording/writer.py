@@ -36,6 +36,7 @@ class RecordingWriter:
         self.written = 0
         self._failed = False
         self._file = _create(self.path, header)
+        self._datasets = {name: self._file[name] for name in self._file if self._file[name].chunks}  # slow to look up
 
     def append(self, shot: AnyShot) -> None:
         """Write one shot; when this returns it is safe. A shot without a stamp is numbered and gets the time now."""
@@ -58,14 +59,16 @@ class RecordingWriter:
         self.written += 1
 
     def _write(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
-        n, file = self.written, self._file
+        n, datasets = self.written, self._datasets
         for name, image in images.items():
-            file[name].resize(n + 1, axis=0)
-            file[name].id.write_direct_chunk((n, 0, 0), image)
+            place = datasets[name].id
+            place.set_extent((n + 1, *image.shape))
+            place.write_direct_chunk((n, 0, 0), image)
         for name, value in (stamp_values(stamp) | {"crc32": crcs}).items():
-            file[name].resize(n + 1, axis=0)
-            file[name][n] = value
-        file.flush()  # of the file: what a flush of datasets alone leaves behind is lost to HDF5's own repair
+            dataset = datasets[name]
+            dataset.id.set_extent((n + 1, *dataset.chunks[1:]))
+            dataset[n] = value
+        self._file.flush()  # of the file: what a flush of datasets alone leaves behind is lost to HDF5's own repair
 
     def close(self) -> None:
         """Close the file, marked as closed in order unless a write failed; closing twice is allowed."""
