@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from contextlib import redirect_stdout
 from io import StringIO
+from socket import gethostname
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -36,6 +37,7 @@ M_PER_MM = 1e-3  # the page is in metres: near and far plane of a browser's came
 FIGURES_PERIOD_S = 0.15
 PICTURES_PERIOD_S = 0.1
 LOCAL = "127.0.0.1"
+EVERYBODY = ("0.0.0.0", "::")
 REPLAYED_MS = 60e3  # older shots come from a recording, which keeps the stamps of its day
 
 
@@ -58,14 +60,16 @@ class Viewer:
         colouring: Colouring = "texture",
     ) -> None:
         self._server = _serve(host, port)
-        self.url = f"http://{'localhost' if host in ('0.0.0.0', '::') else host}:{self._server.get_port()}"
+        self.url = f"http://{gethostname() if host in EVERYBODY else host}:{self._server.get_port()}"
         self._cloud_period_s = 1.0 / clouds_per_s
         self._cloud_at = self._pictures_at = 0.0
         self._clouds = 0
         self._depth_mm: tuple[float, float] | None = None
         self._placed = False
+        self._last: tuple[Measured, int] | None = None
         self._message = "waiting for the first shot"
         self._build(str(stride), colouring)
+        self._server.on_client_connect(self._show_again)
 
     def _build(self, stride: str, colouring: Colouring) -> None:
         gui = self._server.gui
@@ -117,6 +121,7 @@ class Viewer:
         replayed = measured.latency_ms > REPLAYED_MS
         latency = "replayed" if replayed else f"latency {measured.latency_ms:.0f} ms"
         self._message = latency if measured.error is None else f"{latency} · **no shape:** {measured.error}"
+        self._last = (measured, columns)
         if self._frozen.value or not self._server.get_clients():
             return
         shape = None if measured.error else measured.shape
@@ -128,6 +133,12 @@ class Viewer:
         if shape is not None and shape.xyz_mm is not None and now - self._cloud_at >= self._cloud_period_s:
             self._cloud_at = max(self._cloud_at + self._cloud_period_s, now - self._cloud_period_s)
             self.show_shape(measured.shot, shape)
+
+    def _show_again(self, _: object) -> None:
+        """Show a page that has just come what the others see."""
+        if self._last is not None:
+            self._cloud_at = self._pictures_at = 0.0
+            self.show(*self._last)
 
     def show_shape(self, shot: AnyShot, shape: Shape) -> None:
         """Show the points of a calibrated shape at once."""

@@ -124,14 +124,10 @@ def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
     seen = {}
     for colouring in ("texture", "height", "quality"):
         with Viewer(port=8235, colouring=colouring) as viewer:  # type: ignore[arg-type]
+            viewer.show(measured)  # nobody looks yet
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.goto(viewer.url)
-
-            def shown(viewer: Viewer = viewer, page: Any = page) -> np.ndarray | None:
-                viewer.show(measured)
-                return shape_on(page)
-
-            image = until(shown, "no shape")
+            image = until(lambda page=page: shape_on(page), "no shape")
             seen[colouring] = image[painted(image)].mean(axis=0)
             page.close()
     assert np.abs(seen["texture"] - seen["height"]).max() > 20
