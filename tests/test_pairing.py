@@ -133,7 +133,7 @@ def test_clocks_that_begin_anew_are_compared_anew() -> None:
 
 def test_extended_ids_do_not_wrap() -> None:
     numbers = FrameNumbers()
-    assert [numbers(id) for id in (65534, 65535, 65536, 65538)] == [0, 1, 2, 4]
+    assert [numbers(number) for number in (65534, 65535, 65536, 65538)] == [0, 1, 2, 4]
     assert numbers.missed == 1
     assert numbers(1) == 5, "a device that begins anew skipped nothing"
     assert numbers.missed == 1

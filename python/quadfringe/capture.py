@@ -78,7 +78,7 @@ class AravisConfig(Model):
     exposure_us: Positive | None = None
     frame_rate_hz: Positive | None = None
     trigger: Annotated[str, Field(min_length=1)] = "free"
-    features: dict[str, bool | int | float | str] = {}
+    features: dict[str, bool | int | float | str] = Field(default_factory=dict)
     packet_size: Annotated[int, Field(ge=576, le=65500)] | None = None
     packet_delay_ns: Annotated[int, Field(ge=0)] | None = None
     buffers: Annotated[int, Field(ge=4, le=256)] = 12

@@ -222,9 +222,9 @@ class DecodeConfig(Model):
 class SystemConfig(Model):
     """A whole system: devices, fringes, what is measured, how it is decoded.
 
-    `capture` says which camera takes the shots; without it the virtual bench does. Devices that are absent are those of
-    the published bench; `infrared` is coaxial with `projector` when absent. Without `projectors` the virtual bench lights
-    its own camera, and every other camera sees what is there.
+    `capture` says which camera takes the shots; without it the virtual bench does. Devices that are absent are those
+    of the published bench; `infrared` is coaxial with `projector` when absent. Without `projectors` the virtual bench
+    lights its own camera, and every other camera sees what is there.
     """
 
     schema_version: Literal[1] = 1

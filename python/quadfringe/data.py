@@ -107,7 +107,7 @@ class Truth:
 
 @dataclass(frozen=True)
 class FrameStamp:
-    """One frame of one chip: the device's own number and clock, and the host's clock when its last byte was in (ns)."""
+    """One frame of one chip: the device's number and clock, and the host's clock when it began to arrive, in ns."""
 
     id: int
     device_ns: int

@@ -1,9 +1,9 @@
 """Which frames of two chips were exposed at the same instant, told from two clocks that know nothing of each other.
 
-A device clock has any offset and drifts by up to 100 ppm; frame numbers start anywhere and jump. What holds is that a frame
-arrives after its exposure, later by a delay that has a minimum. So the running minimum of arrival minus device time
-maps each clock to the host's, as well as the delays are alike; that is enough to tell one exposure from the next. From
-then on pairs are told by the device clocks alone: their difference within a pair creeps, and never jumps.
+A device clock has any offset and drifts by up to 100 ppm; frame numbers start anywhere and jump. What holds is that a
+frame arrives after its exposure, later by a delay that has a minimum. So the running minimum of arrival minus device
+time maps each clock to the host's, as well as the delays are alike; that is enough to tell one exposure from the next.
+From then on pairs are told by the device clocks alone: their difference within a pair creeps, and never jumps.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Generic, TypeVar
 
 from quadfringe.data import FrameStamp
@@ -107,6 +108,7 @@ class Pairer(Generic[Item]):
         self.unpaired = [0, 0]
         self.missed = [0, 0]
         self._tolerance = tolerance_ns
+        self._believed: tuple[int, int] | None = None  # offsets of the clocks when their difference was found
         self._difference: float | None = None  # clock of chip 0 minus that of chip 1, within a pair
         self._agreed_at = 0  # device time of chip 0 when it was last seen
         self._host_offset_ns = 0
@@ -150,7 +152,7 @@ class Pairer(Generic[Item]):
         return self._host_offset_ns
 
     def _look_at_clock(self, chip: int, stamp: FrameStamp) -> None:
-        """A delay far below those that the clocks were compared by tells that the comparison was wrong."""
+        """Forget the difference when a delay far below those that it was found by tells that it was wrong."""
         self._clocks[chip].see(stamp)
         if chip == 0:
             self._host_offset_ns = self._clocks[0].offset_ns
@@ -208,7 +210,7 @@ def _times(frames: Sequence[Stamped[Item]]) -> list[int]:
 
 
 def _least_step(*streams: list[int]) -> int:
-    return min(b - a for times in streams for a, b in zip(times, times[1:], strict=False))
+    return min(b - a for times in streams for a, b in pairwise(times))
 
 
 def _difference(first: list[int], second: list[int], *, guess: float, reach: float) -> float | None:

@@ -58,7 +58,7 @@ class DroppingQueue(Generic[Item]):
             self._changed.notify_all()
 
     def get(self, timeout_s: float | None = None) -> Item:
-        """Take the oldest item; TimeoutError when none comes in time, `EndOfQueue` or the error of `end` after the last."""
+        """Take the oldest item; TimeoutError when none comes in time, and after the end its error or `EndOfQueue`."""
         deadline = None if timeout_s is None else monotonic() + timeout_s
         with self._changed:
             while not self._items:

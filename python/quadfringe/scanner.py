@@ -17,6 +17,7 @@ from quadfringe.config import SystemConfig, load_system
 from quadfringe.data import AnyShot, Calibration, Shape
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.devices import Camera, Keep, Projector, open_devices
+from quadfringe.errors import InputError
 from quadfringe.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
@@ -34,12 +35,19 @@ class Scanner:
         self, config: SystemConfig, projector: Projector, camera: Camera, calibration: Calibration | None
     ) -> None:
         self.config = config
-        self.calibration = calibration
+        self._calibration = calibration
         self.projector = projector
         self.camera = camera
         self._described = config.model_dump(mode="json", exclude_none=True)
         self._decoder: ShotDecoder | None = None
         self._live: LiveStream | None = None
+
+    @property
+    def calibration(self) -> Calibration:
+        """What turns shots into millimetres; raises `InputError` when the system has none."""
+        if self._calibration is None:
+            raise InputError("this system has no calibration: name one in the system file, calibration = FILE")
+        return self._calibration
 
     def grab(self) -> AnyShot:
         """Project the fringes and take one shot of them."""
@@ -51,7 +59,7 @@ class Scanner:
         if self._decoder is None:
             self._decoder = ShotDecoder(shot, self._plan())
         shape = self._decoder.decode(shot)
-        return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self.calibration)
+        return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self._calibration)
 
     def measure(self) -> Shape:
         """Project, grab, decode: one exposure in, one metric shape out."""
@@ -89,11 +97,11 @@ class Scanner:
             self._live = None
 
     def _plan(self) -> Plan:
-        projector = self.config.projector if self.calibration is None else self.calibration.projector
+        projector = self.config.projector if self._calibration is None else self._calibration.projector
         return Plan(
             projector_width_px=LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px,
             fringes=self.config.fringes,
-            calibration=self.calibration,
+            calibration=self._calibration,
             settings=self.config.decode,
         )
 

@@ -129,11 +129,13 @@ class LiveStream:
                     break
             except CameraError as error:
                 if not self._resume:
-                    return self._end(error)
+                    self._end(error)
+                    return
                 self._fault = str(error)
                 self._stop.wait(RETRY_S)
             except BaseException as error:
-                return self._end(error)
+                self._end(error)
+                return
         self._end(None)
 
     def _end(self, error: BaseException | None) -> None:
@@ -193,11 +195,10 @@ class LiveStream:
 
     def statistics(self) -> StreamStatistics:
         """Give rates, queues and counts, at any time and from any thread."""
-        queues = {"decode": self._shots, "view": self._results}
-        waiting = {name: queue.statistics() for name, queue in queues.items()}
+        own = {"decode": self._shots.statistics(), "view": self._results.statistics()}
         return StreamStatistics(
             camera=self._camera.statistics(),
-            queues=waiting | {name: queue.statistics() for name, (_, queue) in self._taps.items()},
+            queues=own | {name: queue.statistics() for name, (_, queue) in self._taps.items()},
             captured_per_s=self._captured.per_s(),
             decoded_per_s=self._decoded.per_s(),
             refused=self._refused,

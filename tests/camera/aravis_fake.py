@@ -46,7 +46,13 @@ class Chip:
         self._last = 0
         self._device = self._camera.get_fake_camera()
         height, width = source.shape
-        start = {SENSOR_WIDTH: width, SENSOR_HEIGHT: height, WIDTH: width, HEIGHT: height, PERIOD_US: self._period_ns // 1000}
+        start = {
+            SENSOR_WIDTH: width,
+            SENSOR_HEIGHT: height,
+            WIDTH: width,
+            HEIGHT: height,
+            PERIOD_US: self._period_ns // 1000,
+        }
         for register, value in start.items():
             self._device.write_register(register, value)
         self._callback = Fill(self._fill)

@@ -7,7 +7,20 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import batch, bench, calibrate, decode, demo, info, live, projector, record, reproduce, timing
+from quadfringe.cli import (
+    batch,
+    bench,
+    calibrate,
+    camera,
+    decode,
+    demo,
+    info,
+    live,
+    projector,
+    record,
+    reproduce,
+    timing,
+)
 from quadfringe.cli.output import complain
 from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
@@ -75,3 +88,4 @@ app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(projector.app, name="projector")
+app.add_typer(camera.app, name="camera")

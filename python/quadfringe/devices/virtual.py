@@ -82,7 +82,7 @@ class VirtualBench:
         truth = self._truth(cast)
         if "raw" in images and self._scene.bayer is not None:
             return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
-        return Shot(**images, full_scale=full_scale, truth=truth)
+        return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scale, truth)
 
     def _look(self, time_s: float) -> _core.Cast:
         relief = self._scene.height_map

@@ -44,7 +44,16 @@ class Emulator:
         serial: str = SERIAL,
     ) -> None:
         self.addresses = addresses
-        words = ["--model", model, "--serial", serial, "--addresses", *addresses, "--size", f"{size_px[0]}x{size_px[1]}"]
+        words = [
+            "--model",
+            model,
+            "--serial",
+            serial,
+            "--addresses",
+            *addresses,
+            "--size",
+            f"{size_px[0]}x{size_px[1]}",
+        ]
         words += ["--clock", *map(str, clock)] + ([] if frames is None else ["--frames", str(frames)])
         self._process = subprocess.Popen(
             [sys.executable, "-m", __name__, *words], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -52,7 +61,7 @@ class Emulator:
         self._answer()
 
     def order(self, *words: object) -> str:
-        """Tell the camera what to do: the name of a fault and its value, "line" for a trigger pulse, "sent" for counts."""
+        """Tell the camera what to do: a fault of `Faults` and its value, "line" for a trigger pulse, or "sent"."""
         assert self._process.stdin is not None
         print(*words, file=self._process.stdin, flush=True)
         return self._answer()

@@ -36,8 +36,9 @@ def main() -> None:
     options = parser.parse_args()
     width, height = (int(part) for part in options.size.split("x"))
     source: Source = TestPattern((height, width)) if options.frames is None else FileFrames(options.frames)
+    devices = _identities(options.model, options.serial, options.addresses)
     try:
-        camera = EmulatedCamera(_identities(options.model, options.serial, options.addresses), source, clocks=tuple(options.clock))
+        camera = EmulatedCamera(devices, source, clocks=tuple(options.clock))
     except OSError as error:
         print(f"error: {error}", flush=True)
         sys.exit(1)

@@ -8,10 +8,10 @@ import struct
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from quadfringe.emulator.control import STREAM_0, STREAM_STEP, Control, Identity
+from quadfringe.emulator.control import STREAM_0, STREAM_STEP, Control, Identity, Resend
 from quadfringe.emulator.frames import Source, packed
 from quadfringe.emulator.registers import FEATURES, PIXEL_FORMATS
 
@@ -52,7 +52,9 @@ class Chip:
     clock_drift_ppm: float = 0.0
     id: int = 0
     sent: int = 0
-    kept: deque[tuple[int, list[tuple[bytes, bytes | memoryview]]]] = field(default_factory=lambda: deque(maxlen=KEPT))
+    kept: deque[tuple[int, list[tuple[bytes, bytes | memoryview[int]]]]] = field(
+        default_factory=lambda: deque(maxlen=KEPT)
+    )
 
     def register(self, offset: int) -> int:
         """Read a register of this chip's stream channel."""
@@ -101,7 +103,7 @@ class EmulatedCamera:
             chosen = control.who.formats[0] if stream == 0 else "Mono8"
             control[FEATURES["PixelFormat"] + 4 * stream] = PIXEL_FORMATS[chosen]
 
-    def _written(self, device: int):  # type: ignore[no-untyped-def]
+    def _written(self, device: int) -> Callable[[int, int], None]:
         def written(address: int, value: int) -> None:
             control = self._controls[device]
             if address == FEATURES["SoftwareTrigger0"] and (device == 0 or control.feature("SyncMode")):
@@ -113,7 +115,7 @@ class EmulatedCamera:
 
         return written
 
-    def _resend(self, device: int):  # type: ignore[no-untyped-def]
+    def _resend(self, device: int) -> Resend:
         def resend(block: int, first: int, last: int) -> None:
             if self.faults.deaf:
                 return
@@ -183,7 +185,7 @@ class EmulatedCamera:
             return False
         return self._random.random() >= self.faults.lost_frames
 
-    def _packets(self, chip: Chip, device_ns: int) -> list[tuple[bytes, bytes | memoryview]]:
+    def _packets(self, chip: Chip, device_ns: int) -> list[tuple[bytes, bytes | memoryview[int]]]:
         width, height = (chip.control.feature(name) for name in ("Width", "Height"))
         pixel_format = chip.control[FEATURES["PixelFormat"] + 4 * chip.stream]
         payload = memoryview(packed(self._source, chip.index, self._exposure, pixel_format))
@@ -194,14 +196,15 @@ class EmulatedCamera:
             payload = payload[: len(payload) // 2]
         announced = pixel_format ^ 0x80 if self.faults.wrong_format else pixel_format
         leader = struct.pack(">HHQIIIIIHH", 0, 1, device_ns, announced, width, height, 0, 0, 0, 0)
-        parts = [(LEADER, leader), *((PAYLOAD, part) for part in self._split(chip, payload))]
+        parts: list[tuple[int, bytes | memoryview[int]]] = [(LEADER, leader)]
+        parts += [(PAYLOAD, part) for part in self._split(chip, payload)]
         parts.append((TRAILER, struct.pack(">HHI", 0, 1, height)))
-        packets: list[tuple[bytes, bytes | memoryview]] = [
+        packets: list[tuple[bytes, bytes | memoryview[int]]] = [
             (struct.pack(">HHI", 0, chip.id, kind << 24 | number), part) for number, (kind, part) in enumerate(parts)
         ]
         chip.kept.append((chip.id, packets))
         return packets
 
-    def _split(self, chip: Chip, payload: memoryview) -> Iterator[memoryview]:
+    def _split(self, chip: Chip, payload: memoryview[int]) -> Iterator[memoryview[int]]:
         size = (self.faults.packet_size or chip.register(0x4) & 0xFFFF) - IP_UDP_HEADER - GVSP_HEADER
         return (payload[at : at + size] for at in range(0, len(payload), size))

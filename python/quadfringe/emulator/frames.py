@@ -41,7 +41,7 @@ class TestPattern:
 
     def frame(self, chip: int, exposure: int, bits: int) -> NDArray[Any]:
         """Give the pattern of a chip at an exposure."""
-        frame = self._noise[chip] + np.uint16(exposure * 40503 & 0xFFFF) >> np.uint16(16 - bits)
+        frame: NDArray[Any] = self._noise[chip] + np.uint16(exposure * 40503 & 0xFFFF) >> np.uint16(16 - bits)
         frame[0, :2] = exposure & 255, exposure >> 8 & 255
         return frame.astype(np.uint8) if bits == 8 else frame
 
@@ -61,11 +61,11 @@ class FileFrames:
 
     def frame(self, chip: int, exposure: int, bits: int) -> NDArray[Any]:
         """Give the frame whose turn it is; 8-bit frames are stretched to deeper formats."""
-        frame = self._chips[chip][exposure % len(self._chips[chip])]
+        frame: NDArray[Any] = self._chips[chip][exposure % len(self._chips[chip])]
         return frame if bits == 8 or frame.dtype != np.uint8 else frame.astype(np.uint16) << (bits - 8)
 
 
-def packed(source: Source, chip: int, exposure: int, pixel_format: int) -> bytes | memoryview:
+def packed(source: Source, chip: int, exposure: int, pixel_format: int) -> bytes:
     """Give the payload of a frame in a pixel format of GigE Vision."""
     name = NAMES[pixel_format]
     bits = int("".join(letter for letter in name if letter.isdigit()))
@@ -73,7 +73,7 @@ def packed(source: Source, chip: int, exposure: int, pixel_format: int) -> bytes
     if name == "RGB8" and frame.ndim == 2:
         frame = np.repeat(frame[:, :, None], 3, axis=2)
     if not name.endswith("Packed"):
-        return memoryview(np.ascontiguousarray(frame)).cast("B")
+        return frame.tobytes()
     pairs = frame.reshape(-1, 2)
     low = bits - 8
     out = np.empty((len(pairs), 3), np.uint8)

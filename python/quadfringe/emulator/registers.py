@@ -62,7 +62,15 @@ def _integer(name: str, least: int, most: int | str, step: int = 1, access: str 
 
 def _enumeration(name: str, entries: dict[str, int], selector: str | None = None) -> str:
     listed = "".join(f'<EnumEntry Name="{key}"><Value>{value}</Value></EnumEntry>' for key, value in entries.items())
-    return f'<Enumeration Name="{name}">{listed}<pValue>{name}Reg</pValue></Enumeration>{_register(name, "RW", selector)}'
+    return (
+        f'<Enumeration Name="{name}">{listed}<pValue>{name}Reg</pValue></Enumeration>{_register(name, "RW", selector)}'
+    )
+
+
+def _choice(name: str, only: str) -> str:
+    """Give an enumeration that has no choice."""
+    entry = f'<EnumEntry Name="{only}"><Value>0</Value></EnumEntry>'
+    return f'<Enumeration Name="{name}">{entry}<Value>0</Value></Enumeration>'
 
 
 def _command(name: str, register: str, value: int) -> str:
@@ -104,22 +112,25 @@ def _nodes(formats: list[str], sources: int) -> dict[str, str]:
         "Height": _integer("Height", 8, "SensorHeight"),
         "PixelFormat": _enumeration("PixelFormat", known, selector),
         "PayloadSize": f'<IntSwissKnife Name="PayloadSize">{variables}{payload}</IntSwissKnife>',
-        "AcquisitionMode": '<Enumeration Name="AcquisitionMode"><EnumEntry Name="Continuous"><Value>0</Value></EnumEntry>'
-        "<Value>0</Value></Enumeration>",
+        "AcquisitionMode": _choice("AcquisitionMode", "Continuous"),
         "AcquisitionStart": _command("AcquisitionStart", "Acquisition", 1) + _register("Acquisition"),
         "AcquisitionStop": _command("AcquisitionStop", "Acquisition", 0),
         "AcquisitionFrameRate": _float(
             "AcquisitionFrameRate", "FramePeriodUs", "1000000 / FROM", "1000000 / TO", 0.1, 1e4
         )
         + _integer("FramePeriodUs", 100, 10_000_000),
-        "TriggerSelector": '<Enumeration Name="TriggerSelector"><EnumEntry Name="FrameStart"><Value>0</Value></EnumEntry>'
-        "<Value>0</Value></Enumeration>",
+        "TriggerSelector": _choice("TriggerSelector", "FrameStart"),
         "TriggerMode": _enumeration("TriggerMode", {"Off": 0, "On": 1}),
         "TriggerSource": _enumeration("TriggerSource", {"Line5": 0, "Software": 1, "PulseGenerator0": 2}),
         "SoftwareTrigger0": _command("SoftwareTrigger0", "SoftwareTrigger0", 1) + _register("SoftwareTrigger0"),
         "ExposureTimeRaw": _integer("ExposureTimeRaw", 0, 792),
         "ExposureTimeAbs": _float(
-            "ExposureTimeAbs", "ExposureTimeRaw", f"(FROM - 20) / {EXPOSURE_STEP_US}", f"20 + TO * {EXPOSURE_STEP_US}", 20, 33340
+            "ExposureTimeAbs",
+            "ExposureTimeRaw",
+            f"(FROM - 20) / {EXPOSURE_STEP_US}",
+            f"20 + TO * {EXPOSURE_STEP_US}",
+            20,
+            33340,
         ),
         "GainRaw": _integer("GainRaw", 0, 400),
         "SyncMode": _enumeration("SyncMode", {"Sync": 0, "Async": 1}),
@@ -131,9 +142,9 @@ def genicam(formats: list[str], sources: int = 1) -> bytes:
     nodes = _nodes(formats, sources)
     root = "".join(f"<pFeature>{name}</pFeature>" for name in nodes)
     head = (
-        '<RegisterDescription ModelName="Emulated" VendorName="quadfringe" StandardNameSpace="GEV" SchemaMajorVersion="1" '
-        'SchemaMinorVersion="1" SchemaSubMinorVersion="0" MajorVersion="1" MinorVersion="0" SubMinorVersion="0" ToolTip="" '
-        'ProductGuid="0" VersionGuid="0" xmlns="http://www.genicam.org/GenApi/Version_1_0">'
+        '<RegisterDescription ModelName="Emulated" VendorName="quadfringe" StandardNameSpace="GEV" '
+        'SchemaMajorVersion="1" SchemaMinorVersion="1" SchemaSubMinorVersion="0" '
+        'MajorVersion="1" MinorVersion="0" SubMinorVersion="0" ToolTip="" ProductGuid="0" VersionGuid="0" xmlns="http://www.genicam.org/GenApi/Version_1_0">'
     )
     locked = '<Integer Name="TLParamsLocked"><Value>0</Value><Min>0</Min><Max>1</Max></Integer>'
     return (

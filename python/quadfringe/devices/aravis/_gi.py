@@ -198,7 +198,7 @@ class Device:
         return False
 
     def give_up(self) -> list[Any]:
-        """Give what has to be dropped, after the streams, for the device to be free. Nothing else may be called then."""
+        """Give what has to be dropped, after the streams, for the device to be free; nothing can be called then."""
         return [self.__dict__.pop(name) for name in ("_device", "_camera") if name in self.__dict__]
 
 
@@ -211,7 +211,7 @@ class Buffer:
 
     @property
     def status(self) -> str:
-        """ "success", or what went wrong."""
+        """The word success, or what went wrong."""
         return str(self.held.get_status().value_nick)
 
     @property

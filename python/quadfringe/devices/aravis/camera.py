@@ -136,7 +136,9 @@ class AravisCamera:
             return UnpairedError(f"{head}frames of the {there} chip came, none of the {missing} chip")
         trigger = link.config.trigger
         cause = "it runs freely" if trigger == "free" else f"it waits for its trigger, {trigger}"
-        return ShotTimeoutError(f"{head}it answers and sends nothing ({cause}); check trigger, firewall and packet size")
+        return ShotTimeoutError(
+            f"{head}it answers and sends nothing ({cause}); check trigger, firewall and packet size"
+        )
 
     def _chips(self) -> dict[str, ChipStatistics]:
         link = self._link

@@ -40,16 +40,16 @@ class PixelFormat:
         >>> FORMATS["Mono12Packed"].pixels(np.array([0x12, 0x43, 0x56], np.uint8), 2, 1)
         array([[291, 1380]], dtype=uint16)
         """
-        data = data[: self.payload(width, height)]
+        values: NDArray[Any] = data[: self.payload(width, height)]
         if self.packed:
-            data = _unpacked(data, self.bits)
+            values = _unpacked(values, self.bits)
         elif self.bits > 8:
-            data = data.view("<u2")
-        return data.reshape((height, width, 3) if self.colours == 3 else (height, width))
+            values = values.view("<u2")
+        return values.reshape((height, width, 3) if self.colours == 3 else (height, width))
 
 
 def _unpacked(data: NDArray[np.uint8], bits: int) -> NDArray[np.uint16]:
-    """The packing of GigE Vision: high bits, low bits of the first (lower half) and second pixel, high bits."""
+    """Undo the packing of GigE Vision: high bits, low bits of the first (lower half) and the second, high bits."""
     triples = data.reshape(-1, 3)
     low = np.uint16(bits - 8)
     out = np.empty((len(triples), 2), np.uint16)

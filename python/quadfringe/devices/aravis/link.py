@@ -10,7 +10,7 @@ from contextlib import ExitStack, suppress
 import numpy as np
 
 from quadfringe.capture import AravisConfig
-from quadfringe.data import AnyShot, BayerShot, FrameStamp, Shot, Stamp
+from quadfringe.data import AnyShot, BayerShot, Shot, Stamp
 from quadfringe.devices.aravis import profiles
 from quadfringe.devices.aravis._gi import Device, found
 from quadfringe.devices.aravis.formats import PixelFormat, format_named
@@ -53,9 +53,7 @@ class Link:
                     f"camera at {where} is controlled by another program; close that one. A program that was killed "
                     "is let go of after 3 s"
                 )
-        names = [
-            profiles.introduced(place, self._devices[place.where], config.profile) for place in (first, second)
-        ]
+        names = [profiles.introduced(place, self._devices[place.where], config.profile) for place in (first, second)]
         return names[0], names[1]
 
     def device(self, chip: int) -> Device:
@@ -175,7 +173,9 @@ def _agreed(device: Device) -> Agreed:
 
 def _check(visible: Agreed, infrared: Agreed) -> None:
     if visible.format.bayer is None and visible.format.colours != 3:
-        raise CameraError(f"visible chip: pixel format {visible.format.name} has no colours; set a Bayer format or RGB8")
+        raise CameraError(
+            f"visible chip: pixel format {visible.format.name} has no colours; set a Bayer format or RGB8"
+        )
     if infrared.format.bayer is not None or infrared.format.colours != 1:
         raise CameraError(f"infrared chip: pixel format {infrared.format.name}; set a Mono format")
     if visible.format.bits != infrared.format.bits:

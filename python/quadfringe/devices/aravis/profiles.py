@@ -192,7 +192,7 @@ def set_trigger(device: Device, place: Place, config: AravisConfig) -> None:
     if device.has("TriggerMode"):
         device.set("TriggerMode", "Off" if config.trigger == "free" else "On")
     elif config.trigger != "free":
-        raise CameraError(f"camera at {place.where} has no TriggerMode; it runs freely: trigger = \"free\"")
+        raise CameraError(f'camera at {place.where} has no TriggerMode; it runs freely: trigger = "free"')
     if config.trigger != "free":
         device.set("TriggerSource", "Software" if config.trigger == "software" else config.trigger)
     if config.frame_rate_hz is not None and config.trigger == "free":

@@ -60,13 +60,13 @@ class _Loan:
     """A buffer's memory as the base of arrays; when the last of them is gone the buffer is filled again."""
 
     def __init__(self, stream: Stream, buffer: Buffer) -> None:
-        self._give_back = lambda: stream.push(buffer)
+        self._stream, self._buffer = stream, buffer
         self.__array_interface__ = buffer.array.__array_interface__ | {
             "data": (buffer.array.ctypes.data, True)  # read-only
         }
 
     def __del__(self) -> None:
-        self._give_back()
+        self._stream.push(self._buffer)
 
 
 class ChipReader:
