@@ -24,7 +24,7 @@ IMAGES = (".png", ".tif", ".tiff", ".bmp")
 
 
 def lines_about(path: Path) -> list[str]:
-    """Describe a shape, calibration, response, system file, recording, array or image; raises `InputError` otherwise."""
+    """Describe a shape, calibration, response, system file, recording, array or image; else raises `InputError`."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
         return _arrays(read_npz(path))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import say
+from quadfringe.cli.output import say, stoppable
 from quadfringe.cli.record import FileSize, ShotsOption, SystemFile
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def live(
 
     Nobody but this machine sees the page unless --host says so; there is no password.
     """
-    from contextlib import ExitStack, suppress
+    from contextlib import ExitStack
 
     from quadfringe.recording import Recorder
     from quadfringe.scanner import open_system
@@ -56,7 +56,7 @@ def live(
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))
         viewer = stack.enter_context(Viewer(host, port, stride=view_stride, colouring=colour.value))
         say(f"live at {viewer.url}; Ctrl-C ends")
-        with suppress(KeyboardInterrupt):
+        with stoppable():
             _follow(scanner, viewer, recorder, shots)
             if shots is None:
                 say("the camera gives no more shots; the last shape stays until Ctrl-C")

@@ -21,6 +21,7 @@ __all__ = [
     "rows",
     "say",
     "steps",
+    "stoppable",
     "table",
     "write_figures",
     "write_record",
@@ -113,3 +114,17 @@ def steps(items: Iterable[Item], title: str, total: int | None = None) -> Iterat
 
     console = Console(stderr=True)
     yield track(items, description=title, total=total, console=console, transient=True, disable=not console.is_terminal)
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let Ctrl-C, or the SIGTERM of a service, end the block in order."""
+    import signal
+
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    finally:
+        signal.signal(signal.SIGTERM, before)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, complain, say, steps, write_figures
+from quadfringe.cli.output import JsonOption, complain, say, steps, stoppable, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.data import AnyShot
@@ -31,7 +31,7 @@ def record(
     file_gb: FileSize = None,
     json: JsonOption = None,
 ) -> None:
-    """Record raw shots with their time stamps, the settings and the calibration, until Ctrl-C, --shots or --seconds.
+    """Record raw shots with their stamps, the settings and the calibration, until Ctrl-C, SIGTERM, --shots or --seconds.
 
     Nothing is decoded. Every shot that was written can be read after a crash or on a full disk.
     """
@@ -44,7 +44,8 @@ def record(
         Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
         steps(_shots(scanner, shots, seconds), "recording", shots) as taken,
     ):
-        _write_all(taken, recorder)
+        with stoppable():
+            _write_all(taken, recorder)
         camera = scanner.camera.statistics()
     done = recorder.statistics()
     files = ", ".join(str(path) for path in done.files) or "nothing"
@@ -66,13 +67,13 @@ def _write_all(shots: Iterable[AnyShot], recorder: Recorder) -> None:
 
 
 def _shots(scanner: Scanner, shots: int | None, seconds: float | None) -> Iterator[AnyShot]:
-    """Give shots of the camera until one of the limits or Ctrl-C."""
-    from contextlib import closing, suppress
+    """Give shots of the camera until one of the limits."""
+    from contextlib import closing
     from time import monotonic
 
     scanner.projector.show(scanner.config.fringes)
     end_s = None if seconds is None else monotonic() + seconds
-    with suppress(KeyboardInterrupt), closing(scanner.camera.stream(shots, keep="all")) as stream:  # type: ignore[type-var]
+    with closing(scanner.camera.stream(shots, keep="all")) as stream:  # type: ignore[type-var]
         for shot in stream:
             yield shot
             if end_s is not None and monotonic() >= end_s:

@@ -56,6 +56,9 @@ class RecordingWriter:
                 f"{self.path}: shot {self.written} could not be written: {_first_line(error)}; "
                 f"the {self.written} before it are safe"
             ) from error
+        except BaseException:  # Ctrl-C in the middle of a shot
+            self._failed = True
+            raise
         self.written += 1
 
     def _write(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
