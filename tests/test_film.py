@@ -52,7 +52,9 @@ def test_a_solid_is_lit_by_its_slope_and_hides_what_lies_behind() -> None:
         shot = scanner.grab()
         shape = scanner.decode(shot)
     white = np.full((*shape.phase_rad.shape, 3), 200, np.uint8)
-    picture = solid_picture(shape, white, turn_deg=(0.0, 0.0))
+    top = np.unravel_index(np.nanargmin(shape.depth_mm), shape.depth_mm.shape)
+    assert shape.xyz_mm is not None
+    picture = solid_picture(shape, white, turn_deg=(0.0, 0.0), middle_mm=tuple(shape.xyz_mm[top]))
     middle = picture[200:280, 280:360].astype(int)
     assert middle[:40, :40].mean() > middle[40:, 40:].mean() + 3  # light comes from above left
     assert texture(shot, shape).shape == white.shape

@@ -65,15 +65,15 @@ def test_a_take_is_recorded_described_and_measured_again(system: Path, tmp_path:
     refused(run("record", system, "--out", take, "--shots", 1), 2, "take.h5", "exists already")
 
 
-def test_seconds_and_a_signal_end_a_take_in_order(system: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("asked", [signal.SIGTERM, signal.SIGINT])
+def test_seconds_and_signals_end_a_take_in_order(system: Path, tmp_path: Path, asked: signal.Signals) -> None:
     assert run("record", system, "--out", tmp_path / "a.h5", "--seconds", 0.2).exit_code == 0
     command = [sys.executable, "-m", "quadfringe", "record", str(system), "--out", str(tmp_path / "b.h5")]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as recording:
         end = time.monotonic() + 60
         while not (tmp_path / "b.h5").exists() and time.monotonic() < end:
             time.sleep(0.05)
-        time.sleep(0.5)
-        recording.send_signal(signal.SIGTERM)
+        recording.send_signal(asked)
         assert "shots" in recording.communicate(timeout=60)[0]
         assert recording.returncode == 0
     for name in ("a.h5", "b.h5"):

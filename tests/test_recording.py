@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -221,27 +220,40 @@ def test_replay_at_full_speed_gives_every_shot_once(take: Path) -> None:
         camera.snap()
 
 
-def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(tmp_path: Path) -> None:
+class Clock:
+    """A clock that goes on when somebody waits; it stands in for the event that ends a wait too."""
+
+    def __init__(self) -> None:
+        self.now_s = 100.0
+
+    def monotonic(self) -> float:
+        return self.now_s
+
+    def wait(self, seconds: float) -> bool:
+        self.now_s += seconds
+        return False
+
+    def is_set(self) -> bool:
+        return False
+
+
+def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     path = record(tmp_path / "a.h5", [stamped(numbered_shot(k), k, period_us=30_000) for k in range(10)])
-    with open_camera(f"replay:{path}") as camera:
-        assert camera.paced
-        begin = time.monotonic()
-        stream = camera.stream(keep="latest")
-        assert next(stream).id == 0
-        time.sleep(0.1)  # three periods: shots 1 and 2 are gone
-        late = next(stream).id
-        assert late is not None
-        assert late >= 3
-        rest = [shot.id for shot in stream]
-        assert rest[-1] == 9
-        assert time.monotonic() - begin >= 9 * 0.030 - 0.005
-        counted = camera.statistics()
-        assert (counted.shots, counted.dropped) == (10, 10 - 2 - len(rest))
-    with open_camera(f"replay:{path}") as camera:
-        stream = camera.stream(keep="all")
-        next(stream)
-        time.sleep(0.1)
-        assert next(stream).id == 1
+    clock = Clock()
+    monkeypatch.setattr("quadfringe.devices.replay.time", clock)
+    for keep, ids, dropped in (("latest", [0, 3, 4, 5, 6, 7, 8, 9], 2), ("all", list(range(10)), 0)):
+        camera = ReplayCamera(Recording(path))
+        camera._closed = clock  # type: ignore[assignment]
+        begin_s = clock.now_s
+        stream = camera.stream(keep=keep)  # type: ignore[arg-type]
+        came = [next(stream).id]
+        clock.now_s += 0.1  # three periods in which nobody takes a shot
+        came += [shot.id for shot in stream]
+        assert came == ids
+        assert clock.now_s - begin_s == pytest.approx(9 * 0.030)
+        assert (camera.statistics().shots, camera.statistics().dropped) == (10, dropped)
 
 
 def test_a_replay_has_one_stream_at_a_time(take: Path) -> None:

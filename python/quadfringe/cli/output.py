@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Any, TypeVar
 
 import typer
@@ -21,6 +22,7 @@ __all__ = [
     "rows",
     "say",
     "steps",
+    "stop_asked",
     "stoppable",
     "table",
     "write_figures",
@@ -128,3 +130,27 @@ def stoppable() -> Iterator[None]:
         pass
     finally:
         signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def stop_asked() -> Iterator[Event]:
+    """Give an event that Ctrl-C or SIGTERM sets; the second Ctrl-C interrupts.
+
+    Nothing is interrupted in the middle, and a signal cannot be lost in a callback of a library.
+    """
+    import signal
+
+    asked = Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def ask(*_: object) -> None:
+        asked.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    for number in before:
+        signal.signal(number, ask)
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, complain, say, steps, stoppable, write_figures
+from quadfringe.cli.output import JsonOption, complain, say, steps, stop_asked, write_figures
 
 if TYPE_CHECKING:
+    from threading import Event
+
     from quadfringe.data import AnyShot
     from quadfringe.recording import Recorder
     from quadfringe.scanner import Scanner
@@ -31,7 +33,7 @@ def record(
     file_gb: FileSize = None,
     json: JsonOption = None,
 ) -> None:
-    """Record raw shots with their stamps, the settings and the calibration, until Ctrl-C, SIGTERM, --shots or --seconds.
+    """Record raw shots with stamps, settings and calibration, until Ctrl-C, SIGTERM, --shots or --seconds.
 
     Nothing is decoded. Every shot that was written can be read after a crash or on a full disk.
     """
@@ -42,10 +44,10 @@ def record(
     with (
         open_system(system) as scanner,
         Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
-        steps(_shots(scanner, shots, seconds), "recording", shots) as taken,
+        stop_asked() as asked,
+        steps(_shots(scanner, shots, seconds, asked), "recording", shots) as taken,
     ):
-        with stoppable():
-            _write_all(taken, recorder)
+        _write_all(taken, recorder)
         camera = scanner.camera.statistics()
     done = recorder.statistics()
     files = ", ".join(str(path) for path in done.files) or "nothing"
@@ -66,8 +68,8 @@ def _write_all(shots: Iterable[AnyShot], recorder: Recorder) -> None:
         fault = now
 
 
-def _shots(scanner: Scanner, shots: int | None, seconds: float | None) -> Iterator[AnyShot]:
-    """Give shots of the camera until one of the limits."""
+def _shots(scanner: Scanner, shots: int | None, seconds: float | None, asked: Event) -> Iterator[AnyShot]:
+    """Give shots of the camera until one of the limits, or until the end is asked for."""
     from contextlib import closing
     from time import monotonic
 
@@ -76,7 +78,7 @@ def _shots(scanner: Scanner, shots: int | None, seconds: float | None) -> Iterat
     with closing(scanner.camera.stream(shots, keep="all")) as stream:  # type: ignore[type-var]
         for shot in stream:
             yield shot
-            if end_s is not None and monotonic() >= end_s:
+            if asked.is_set() or (end_s is not None and monotonic() >= end_s):
                 return
 
 

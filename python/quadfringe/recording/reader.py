@@ -22,7 +22,7 @@ from quadfringe.recording.layout import Header, crcs_of, stamp_at
 __all__ = ["Recording"]
 
 LAST_SHOT_BYTES = 64 << 20  # more than a shot that could not be written any more
-LOOK_S = 5.0
+LOOK_S = 30.0  # a busy machine starts a process slowly
 LOOK = """
 import h5py, sys
 with h5py.File(sys.argv[1], "r", libver="latest", swmr=True) as file:
