@@ -48,33 +48,37 @@ def phase_picture(shape: Shape, columns: int, max_px: int = 480) -> Picture:
 def channels_picture(shot: AnyShot, max_px: int = 640) -> Picture:
     """Put red and green above blue and infrared, each in its own light."""
     tints = {"red": (0,), "green": (1,), "blue": (2,), "ir": (0, 1, 2)}
-    size = shot.channels["red"].shape
-    tiles = {name: _tile(image, size, shot.full_scale_value, tints[name]) for name, image in shot.channels.items()}
-    picture = np.vstack([np.hstack([tiles["red"], tiles["green"]]), np.hstack([tiles["blue"], tiles["ir"]])])
-    scale = min(1.0, max_px / max(picture.shape[:2]))
-    small: Picture = cv2.resize(picture, None, fx=scale, fy=scale, interpolation=cv2.INTER_AREA).astype(np.uint8)
-    return small
+    height, width = shot.channels["red"].shape
+    step = math.ceil(2 * max(height, width) / max_px)
+    size = (max(1, width // step), max(1, height // step))
+    red, green, blue, ir = (
+        _tile(image, size, shot.full_scale_value, tints[name]) for name, image in shot.channels.items()
+    )
+    return np.vstack([np.hstack([red, green]), np.hstack([blue, ir])])
 
 
-def _tile(image: NDArray[Any], size: tuple[int, ...], full_scale: float, planes: tuple[int, ...]) -> Picture:
-    grey = cv2.convertScaleAbs(image, alpha=255 / full_scale) if image.dtype != np.uint8 or full_scale != 255 else image
-    if grey.shape != size:
-        grey = cv2.resize(grey, size[::-1], interpolation=cv2.INTER_AREA)
-    tile = np.zeros((*size, 3), np.uint8)
-    tile[:, :, list(planes)] = np.asarray(grey)[:, :, None]
+def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes: tuple[int, ...]) -> Picture:
+    small = cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_AREA)
+    tile = np.zeros((size[1], size[0], 3), np.uint8)
+    tile[:, :, list(planes)] = cv2.convertScaleAbs(small, alpha=255 / full_scale)[:, :, None]
     return tile
 
 
-def texture(shot: AnyShot, shape: Shape) -> Picture:
-    """Give the surface as it looks without fringes: brightness of the modulation, colour of the mean light around."""
-    modulation = np.nan_to_num(shape.modulation)
-    top = limits_of(shape.modulation)[1]
-    brightness = (modulation * np.float32(255 / max(top, 1e-6))).clip(0, 255)
-    height, width = modulation.shape
-    small = (max(1, width // COARSE), max(1, height // COARSE))
-    planes = [shot.channels[name] for name in ("red", "green", "blue")]
-    means = [cv2.blur(cv2.resize(p.astype(np.float32), small, interpolation=cv2.INTER_AREA), (5, 5)) for p in planes]
-    hue = np.dstack(means) / np.maximum(np.max(means, axis=0), 1e-6)[:, :, None]
-    full = cv2.resize(hue, (width, height), interpolation=cv2.INTER_LINEAR)
-    picture: Picture = (brightness[:, :, None] * full).astype(np.uint8)
-    return picture
+def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
+    """Give the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
+
+    Its brightness is the modulation's, its colour that of the mean light around.
+    """
+    top = max(limits_of(shape.modulation)[1], 1e-6)
+    modulation = np.nan_to_num(shape.modulation[::stride, ::stride])
+    brightness = cv2.convertScaleAbs(modulation, alpha=255 / top)
+    height, width = shape.modulation.shape
+    coarse = (max(1, width // COARSE), max(1, height // COARSE))
+    means = [cv2.blur(_coarse(shot.channels[name], coarse), (5, 5)) for name in ("red", "green", "blue")]
+    hue = (255 * np.dstack(means) / np.maximum(np.max(means, axis=0), 1e-6)[:, :, None]).astype(np.uint8)
+    tint = cv2.resize(hue, brightness.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.multiply(tint, cv2.merge([brightness] * 3), scale=1 / 255), np.uint8)
+
+
+def _coarse(image: NDArray[Any], size: tuple[int, int]) -> Map:
+    return np.asarray(cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_AREA), np.float32)

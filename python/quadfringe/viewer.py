@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = ["Colouring", "Viewer"]
 
 Colouring = Literal["texture", "height", "quality"]
+Map = NDArray[np.float32]
 COLOURINGS: tuple[Colouring, ...] = ("texture", "height", "quality")
 STRIDES = ("1", "2", "4", "8", "16")
 M_PER_MM = 1e-3  # the page is in metres: near and far plane of a browser's camera fit them
@@ -158,31 +159,30 @@ class Viewer:
         )
         self._clouds += 1
 
-    def _points(self, shot: AnyShot, shape: Shape, stride: int) -> tuple[NDArray[np.float32], Picture]:
+    def _points(self, shot: AnyShot, shape: Shape, stride: int) -> tuple[Map, Picture]:
         """Give the points with data, (N, 3) mm, and their colours, (N, 3)."""
-        part = np.s_[::stride, ::stride]
-        xyz_mm = np.asarray(shape.xyz_mm)[part]
-        picture = self._painted(shot, shape, part)
-        valid = np.isfinite(xyz_mm[:, :, 2]) & (shape.quality[part] >= self._quality.value)
-        return xyz_mm[valid], picture[valid]
+        xyz_mm = np.ascontiguousarray(np.asarray(shape.xyz_mm)[::stride, ::stride])
+        quality = shape.quality[::stride, ::stride]
+        valid = np.flatnonzero(np.isfinite(xyz_mm[:, :, 2]) & (quality >= self._quality.value))
+        picture = self._painted(shot, shape, xyz_mm[:, :, 2], quality, stride)
+        return xyz_mm.reshape(-1, 3).take(valid, axis=0), picture.reshape(-1, 3).take(valid, axis=0)
 
-    def _painted(self, shot: AnyShot, shape: Shape, part: tuple[slice, slice]) -> Picture:
+    def _painted(self, shot: AnyShot, shape: Shape, depth_mm: Map, quality: Map, stride: int) -> Picture:
         colouring = self._colour.value
         if colouring == "height":
-            depth_mm = shape.depth_mm[part]
             return coloured(-depth_mm, self._depth_limits(depth_mm))
         if colouring == "quality":
-            return coloured(shape.quality[part], (0.0, 1.0))
-        return np.ascontiguousarray(texture(shot, shape)[part])
+            return coloured(quality, (0.0, 1.0))
+        return texture(shot, shape, stride)
 
-    def _depth_limits(self, depth_mm: NDArray[np.float32]) -> tuple[float, float]:
+    def _depth_limits(self, depth_mm: Map) -> tuple[float, float]:
         """Give a range of negative depths that follows the scene slowly, so that colours do not flicker."""
         near, far = limits_of(depth_mm)
         old = self._depth_mm or (near, far)
         self._depth_mm = (0.9 * old[0] + 0.1 * near, 0.9 * old[1] + 0.1 * far)
         return (-self._depth_mm[1], -self._depth_mm[0])
 
-    def _place_camera(self, points_mm: NDArray[np.float32]) -> None:
+    def _place_camera(self, points_mm: Map) -> None:
         """Look at the first shape from where the camera stands, a little from the side."""
         middle_mm = np.median(points_mm[:: max(1, len(points_mm) // 5000)], axis=0)
         middle = M_PER_MM * middle_mm
@@ -224,7 +224,7 @@ def _serve(host: str, port: int) -> viser.ViserServer:
     return server
 
 
-def _pixel_mm(points_mm: NDArray[np.float32], shape: Shape) -> float:
+def _pixel_mm(points_mm: Map, shape: Shape) -> float:
     """Give how far apart neighbouring pixels lie on the surface, mm."""
     if shape.calibration is None or not len(points_mm):
         return 0.3
