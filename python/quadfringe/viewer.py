@@ -229,7 +229,7 @@ def _pixel_mm(points_mm: Map, shape: Shape) -> float:
     if shape.calibration is None or not len(points_mm):
         return 0.3
     depth_mm = float(np.median(points_mm[:: max(1, len(points_mm) // 5000), 2]))
-    return 1.1 * depth_mm / shape.calibration.camera.focal_px[0]
+    return 1.5 * depth_mm / shape.calibration.camera.focal_px[0]
 
 
 def _table(stream: StreamStatistics, recording: RecorderStatistics | None) -> list[str]:
