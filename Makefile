@@ -50,8 +50,10 @@ test-usb: $(STAMPS)/built
 
 # Two cameras on the wire of GigE Vision, in a network of its own that has nothing but the loopback interface.
 test-camera: $(STAMPS)/camera
-	scripts/loopback $(BIN)/pytest tests/camera
-	scripts/loopback $(BIN)/python benches/camera.py --seconds 3
+	if scripts/loopback true; then \
+		scripts/loopback $(BIN)/pytest tests/camera && \
+		scripts/loopback $(BIN)/python benches/camera.py --seconds 3; \
+	elif [ -n "$${CI:-}" ]; then exit 1; else echo "test-camera is skipped"; fi
 
 $(STAMPS)/camera: $(STAMPS)/built
 	scripts/set-up camera

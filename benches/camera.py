@@ -67,8 +67,8 @@ def wire(seconds: float) -> Figures:
             assert isinstance(shot, BayerShot)
             exposures.append(TestPattern.exposure(shot.raw))
             shots += 1
-            wrong += np.count_nonzero(shot.raw != pattern.frame(0, exposures[-1], 8))
-            wrong += np.count_nonzero(shot.ir != pattern.frame(1, exposures[-1], 8))
+            wrong += int(np.count_nonzero(shot.raw != pattern.frame(0, exposures[-1], 8)))
+            wrong += int(np.count_nonzero(shot.ir != pattern.frame(1, exposures[-1], 8)))
         sent = (exposures[-1] - exposures[0]) % 65536 + 1
         counted = camera.statistics()
     damaged, unpaired = counted.damaged, counted.unpaired
@@ -99,7 +99,7 @@ def decode(seconds: float) -> Figures:
         def compare(shot: AnyShot) -> None:
             nonlocal wrong
             assert isinstance(shot, BayerShot)
-            wrong += np.count_nonzero(shot.raw != sent.raw) + np.count_nonzero(shot.ir != sent.ir)
+            wrong += int(np.count_nonzero(shot.raw != sent.raw) + np.count_nonzero(shot.ir != sent.ir))
 
         latencies_ms, ids = [], []
         with scanner.stream(round(seconds * RATE_HZ), keep="all", taps={"compare": compare}) as stream:

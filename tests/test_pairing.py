@@ -131,6 +131,28 @@ def test_clocks_that_begin_anew_are_compared_anew() -> None:
     assert len(again) > 270
 
 
+@pytest.mark.parametrize("idle_s", [1.0, 5.0, 15.0, 60.0, 3600.0])
+def test_a_pause_makes_no_wrong_pair(idle_s: float) -> None:
+    """After an hour the clocks are 180 ms apart: other exposures look like partners then."""
+    pairer: Pairer[int] = Pairer(TOLERANCE_NS)
+    pause = round(idle_s * 1e9 / PERIOD_NS)
+    frames = list(exposures(8, pause + 400, lost=0.05, late_start=0))
+    found = []
+    for part in (range(200), range(pause + 200, pause + 400)):
+        pairer.begin()
+        found += paired(pairer, (frame for frame in frames if frame[1] in part))
+    assert all(a == b for a, b in found)
+    assert len(found) > 300
+
+
+@pytest.mark.parametrize("period_s", [0.01, 1.0, 20.0])
+def test_exposures_of_any_pace(period_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("test_pairing.PERIOD_NS", round(period_s * 1e9))
+    pairs = paired(Pairer(TOLERANCE_NS), exposures(9, 200, jitter_ms=0.5))
+    assert all(a == b for a, b in pairs)
+    assert len(pairs) > 180
+
+
 def test_extended_ids_do_not_wrap() -> None:
     numbers = FrameNumbers()
     assert [numbers(number) for number in (65534, 65535, 65536, 65538)] == [0, 1, 2, 4]

@@ -34,10 +34,10 @@ class ScriptedCamera:
         self.script, self.paced, self.period_s = script, paced, period_s
         self.closed = False
 
-    def snap(self, timeout_s: float | None = None) -> AnyShot:
+    def snap(self, timeout_s: float | None = None) -> AnyShot:  # noqa: ARG002
         return next(self.stream(1))
 
-    def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:
+    def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
         while self.script and count != 0:
             one = self.script.pop(0)
             if isinstance(one, Exception):
@@ -126,8 +126,7 @@ def test_a_lost_camera_ends_the_stream_with_its_error_after_what_was_taken() -> 
     stream = LiveStream(ScriptedCamera([1, 2, CameraLostError("gone")], paced=False), numbered, keep="all")
     came = []
     with pytest.raises(CameraLostError, match="gone"):
-        for measured in stream:
-            came.append(measured.shot.id)
+        came.extend(measured.shot.id for measured in stream)
     assert came == [1, 2]
 
 

@@ -67,7 +67,7 @@ class AravisConfig(Model):
 
     `device` is part of its name, its serial number or an IP address; empty takes the only one. `trigger` is "free"
     (the camera runs by itself), "software" (every shot is asked for), or a line of the camera such as "Line5".
-    `features` are GenICam features that are set first, in this order, on the visible chip's device.
+    `features` are GenICam features that are set first, in this order, on every device of the camera that has them.
     """
 
     kind: Literal["aravis"] = "aravis"

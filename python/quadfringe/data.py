@@ -119,7 +119,7 @@ class Stamp:
     """When and by which camera a shot was taken.
 
     `id` numbers the exposures since the camera was opened and jumps where some were lost; `time_us` is UTC in us since
-    1970, when the exposure was, as well as the host can tell; `frames` are those of the chips, "visible" and "infrared".
+    1970, when the exposure was, as well as the host can tell; `frames` are by chip, "visible" and "infrared".
     """
 
     id: int

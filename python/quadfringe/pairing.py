@@ -19,12 +19,13 @@ from quadfringe.data import FrameStamp
 __all__ = ["Clock", "FrameNumbers", "Pairer", "Stamped"]
 
 WINDOW = 256  # frames that the running minimum looks back: 50 ppm make 0.4 ms of it at 30 Hz
-SETTLED = 4  # frames in a row that do not lower the minimum: a burst that catches up lowers it with every frame
+CALM = 8  # frames in a row that come evenly, within this share of a period: then nothing holds the host up
+EVEN = 0.25
+MANY = 48  # or so many frames, one of which came without delay
 PENDING = 64  # frames of one chip that may wait for the other
 DRIFT = 2e-4  # how fast the clocks may part while no pair is seen: twice the 100 ppm of a bad pair of crystals
 FRESH_NS = 1_000_000_000  # a difference that was not seen for so long is taken anew from the first pair
-STALE_NS = 10_000_000_000  # and after this long, or so many frames without a partner, it is not believed any more
-MISSES = 8
+MISSES = 8  # frames without a partner after which the difference is not believed any more
 GAIN = 0.1  # how fast the difference of the clocks is followed
 SHORT_IDS = 65535  # ids of GigE Vision without extended ids run from 1 to here, and then from 1 again
 
@@ -59,27 +60,28 @@ class FrameNumbers:
 class Clock:
     """One device clock on the host's: the running minimum of arrival minus device time."""
 
-    def __init__(self, tolerance_ns: float) -> None:
-        self._tolerance = tolerance_ns
+    def __init__(self) -> None:
         self._falling: deque[tuple[int, int]] = deque()  # frame and offset: those that may become the minimum
+        self._recent: deque[int] = deque(maxlen=CALM)
         self._frames = 0
-        self._calm = 0
 
     @property
     def offset_ns(self) -> int:
         """Host time minus device time, with the shortest delay of a frame in it."""
         return self._falling[0][1]
 
-    @property
-    def settled(self) -> bool:
-        """Whether the last frames came no faster than those before them, so that the minimum can be believed."""
-        return self._calm >= SETTLED
+    def settled(self, period_ns: float) -> bool:
+        """Whether the minimum can be believed to a part of the period: frames came evenly, or there were many.
+
+        A host that is held up, or catches up, sees them come unevenly, and its shortest delay may be long.
+        """
+        calm = len(self._recent) == CALM and max(self._recent) - min(self._recent) <= EVEN * period_ns
+        return calm or self._frames >= MANY
 
     def see(self, stamp: FrameStamp) -> None:
         """Look at one more frame."""
         offset = stamp.arrival_ns - stamp.device_ns
-        lowered = not self._falling or offset < self.offset_ns - self._tolerance
-        self._calm = 0 if lowered else self._calm + 1
+        self._recent.append(offset)
         while self._falling and self._falling[-1][1] >= offset:
             self._falling.pop()
         self._falling.append((self._frames, offset))
@@ -100,7 +102,7 @@ class Stamped(Generic[Item]):
 class Pairer(Generic[Item]):
     """Matches the frames of two chips that are exposed together; feed it frames in the order of their arrival.
 
-    Until both clocks have settled frames wait, 5 of each chip as a rule. `begin` starts a run of the camera; the clocks
+    Until both clocks have settled frames wait, 8 of each chip as a rule. `begin` starts a run of the camera; the clocks
     are remembered from one run to the next.
     """
 
@@ -164,7 +166,7 @@ class Pairer(Generic[Item]):
     def _forget(self) -> None:
         self._difference, self._believed, self._believed_at = None, None, 0
         self._misses = 0
-        self._clocks = (Clock(self._tolerance), Clock(self._tolerance))
+        self._clocks = (Clock(), Clock())
 
     def _agree(self) -> bool:
         """Find the difference of the clocks, once both can be believed."""
@@ -173,9 +175,11 @@ class Pairer(Generic[Item]):
             return False
         if self._sole:
             self._difference = float(first[0].stamp.device_ns - second[0].stamp.device_ns)
-        elif self._clocks[0].settled and self._clocks[1].settled:
-            times = _times(first), _times(second)
-            self._period = _least_step(*times)
+            self._agreed_at = first[0].stamp.device_ns
+            return True
+        times = _times(first), _times(second)
+        self._period = _least_step(*times)
+        if all(clock.settled(self._period) for clock in self._clocks):
             offsets = self._clocks[0].offset_ns, self._clocks[1].offset_ns
             self._difference = _difference(*times, guess=offsets[1] - offsets[0], reach=self._period / 2)
             self._believed, self._believed_at = offsets, first[-1].stamp.arrival_ns
@@ -188,7 +192,10 @@ class Pairer(Generic[Item]):
         while first and second and self._difference is not None:
             apart = first[0].stamp.device_ns - second[0].stamp.device_ns - self._difference
             since = abs(first[0].stamp.device_ns - self._agreed_at)
-            if abs(apart) <= self._tolerance + DRIFT * since:
+            if not self._sole and DRIFT * since > self._period / 4:
+                # The clocks may have parted by so much that another exposure lies nearer.
+                self._forget()
+            elif abs(apart) <= self._tolerance + DRIFT * since:
                 self._difference += apart if since > FRESH_NS else GAIN * apart
                 self._agreed_at = first[0].stamp.device_ns
                 self._misses = 0
@@ -196,7 +203,7 @@ class Pairer(Generic[Item]):
             else:
                 self._give_up(0 if apart < 0 else 1)
                 self._misses += 1
-                if self._misses >= MISSES or since > STALE_NS:
+                if self._misses >= MISSES:
                     self._forget()
         return pairs
 
@@ -210,7 +217,7 @@ def _times(frames: Sequence[Stamped[Item]]) -> list[int]:
 
 
 def _least_step(*streams: list[int]) -> int:
-    return min(b - a for times in streams for a, b in pairwise(times))
+    return min((b - a for times in streams for a, b in pairwise(times)), default=0)
 
 
 def _difference(first: list[int], second: list[int], *, guess: float, reach: float) -> float | None:

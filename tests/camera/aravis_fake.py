@@ -1,8 +1,8 @@
 """Aravis' own fake cameras as two chips that show the test pattern: an implementation of the wire that is not ours.
 
-    python tests/camera/aravis_fake.py WIDTH HEIGHT RATE_HZ
+    python tests/camera/aravis_fake.py WIDTH HEIGHT RATE_HZ ADDRESS ADDRESS
 
-One is at 127.0.0.1, the other at 127.0.0.2; "ready" on stdout, and the end of stdin ends them. Frames are made by a C
+"ready" on stdout, and the end of stdin ends them. Frames are made by a C
 callback: the one of the binding is freed at once and crashes, so that it is set through ctypes and kept here.
 """
 
@@ -38,14 +38,15 @@ unwrap.restype, unwrap.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_c
 class Chip:
     """One fake camera whose frames carry the number of the period that they belong to."""
 
-    def __init__(self, index: int, source: TestPattern, rate_hz: float) -> None:
-        self._camera = Aravis.GvFakeCamera(interface_name=f"127.0.0.{index + 1}", serial_number=f"FAKE{index}")
-        assert self._camera.is_running(), f"127.0.0.{index + 1} is taken"
+    def __init__(self, index: int, address: str, source: TestPattern, rate_hz: float) -> None:
+        self._camera = Aravis.GvFakeCamera(interface_name=address, serial_number=f"FAKE{index}")
+        assert self._camera.is_running(), f"{address} is taken"
         self._index, self._source = index, source
         self._period_ns = round(1e6 / rate_hz) * 1000
         self._last = 0
         self._device = self._camera.get_fake_camera()
         height, width = source.shape
+        self._size_px = width, height
         start = {
             SENSOR_WIDTH: width,
             SENSOR_HEIGHT: height,
@@ -62,7 +63,7 @@ class Chip:
         # Both cameras wake at multiples of the period; a late one keeps its place in the row.
         now = library.arv_buffer_get_timestamp(buffer) // self._period_ns
         self._last = max(self._last + 1, now)
-        frame = np.frombuffer(packed(self._source, self._index, self._last, pixel_format), np.uint8)
+        frame = np.frombuffer(packed(self._source, self._index, self._last, pixel_format, self._size_px), np.uint8)
         ctypes.memmove(library.arv_buffer_get_data(buffer, None), frame.ctypes.data, frame.nbytes)
         library.arv_buffer_set_timestamp(buffer, self._last * self._period_ns)
 
@@ -70,7 +71,7 @@ class Chip:
 def main() -> None:
     width, height, rate_hz = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     source = TestPattern((height, width))
-    chips = [Chip(index, source, rate_hz) for index in (0, 1)]
+    chips = [Chip(index, address, source, rate_hz) for index, address in enumerate(sys.argv[4:6])]
     print("ready", flush=True)
     sys.stdin.read()
     del chips

@@ -8,9 +8,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fake_twin import fake_twin
-from wire import SIZE_PX, emulated
+from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
-from quadfringe.capture import AravisConfig, ReplayConfig, VirtualConfig
+from quadfringe.capture import ReplayConfig, VirtualConfig
 from quadfringe.config import DeviceModel, SystemConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
@@ -37,10 +37,9 @@ def virtual(_: Path) -> Iterator[Camera]:
 def wired(**settings: object) -> Callable[[Path], AbstractContextManager[Camera]]:
     @contextmanager
     def emulated_camera(_: Path) -> Iterator[Camera]:
-        with (
-            Emulator(size_px=SIZE_PX) as emulator,
-            opened(SystemConfig(capture=emulated(emulator, **settings))) as camera,  # type: ignore[arg-type]
-        ):
+        emulator = shared_emulator()
+        emulator.order("reset")
+        with opened(SystemConfig(capture=emulated(emulator, **settings))) as camera:  # type: ignore[arg-type]
             yield camera
 
     return emulated_camera
@@ -48,10 +47,11 @@ def wired(**settings: object) -> Callable[[Path], AbstractContextManager[Camera]
 
 @contextmanager
 def two_streams(_: Path) -> Iterator[Camera]:
-    with Emulator(size_px=SIZE_PX, model="two-streams"):
-        capture = AravisConfig.model_validate({"visible": {"source": "Source0"}, "infrared": {"source": "Source1"}})
-        with opened(SystemConfig(capture=capture)) as camera:
-            yield camera
+    with (
+        Emulator(size_px=SIZE_PX, model="two-streams", addresses=TWO_STREAMS) as emulator,
+        opened(SystemConfig(capture=two_sources(emulator))) as camera,
+    ):
+        yield camera
 
 
 @contextmanager

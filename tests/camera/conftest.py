@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 
 import pytest
-from wire import SIZE_PX, emulated
+from wire import emulated, shared_emulator
 
 from quadfringe.devices.aravis import AravisCamera
 from quadfringe.emulator import Emulator
@@ -16,14 +16,15 @@ if "QUADFRINGE_LOOPBACK" not in os.environ:
 
 
 @pytest.fixture
-def emulator() -> Iterator[Emulator]:
-    """A small emulated JAI camera whose second clock is 5000 s ahead and drifts by 50 ppm."""
-    with Emulator(size_px=SIZE_PX, clock=(5000.0, 50.0)) as running:
-        yield running
+def emulator() -> Emulator:
+    """The emulated camera of all tests, as after power-on."""
+    shared = shared_emulator()
+    shared.order("reset")
+    return shared
 
 
 @pytest.fixture
 def camera(emulator: Emulator) -> Iterator[AravisCamera]:
     """The emulated camera, opened."""
-    with AravisCamera(emulated(emulator)) as opened:
+    with AravisCamera(emulated(emulator, timeout_s=3.0)) as opened:
         yield opened

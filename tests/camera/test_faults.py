@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 
 import pytest
-from wire import SIZE_PX, checked_exposure, emulated
+from wire import OWN, SIZE_PX, checked_exposure, emulated
 
 from quadfringe.data import AnyShot
 from quadfringe.devices.aravis import AravisCamera
@@ -71,8 +72,8 @@ def test_a_camera_that_vanishes(emulator: Emulator, camera: AravisCamera) -> Non
 
 def test_a_silent_camera(emulator: Emulator, camera: AravisCamera) -> None:
     emulator.order("silent", 1)
-    with pytest.raises(ShotTimeoutError, match="answers and sends nothing"):
-        camera.snap()
+    with pytest.raises(ShotTimeoutError, match="no shot within 1 s: it answers and sends nothing"):
+        camera.snap(1.0)
     emulator.order("silent", 0)
     right(camera, 10)
 
@@ -81,7 +82,7 @@ def test_a_silent_camera(emulator: Emulator, camera: AravisCamera) -> None:
 def test_a_silent_chip(emulator: Emulator, camera: AravisCamera, chip: int, missing: str) -> None:
     emulator.order("silent_chip", chip)
     with pytest.raises(UnpairedError, match=f"none of the {missing} chip"):
-        camera.snap()
+        camera.snap(2.0)
     assert camera.statistics().unpaired > 0
     emulator.order("silent_chip", -1)
     right(camera, 10)
@@ -105,7 +106,7 @@ def test_a_short_frame_of_the_right_size(emulator: Emulator, camera: AravisCamer
     """Aravis calls a frame a success whose payload is too short for its size."""
     emulator.order("short", 1)
     with pytest.raises(WrongFrameError, match=r"bytes instead of|incomplete"):
-        camera.snap()
+        camera.snap(2.0)
     emulator.order("short", 0)
     right(camera, 10)
 
@@ -140,17 +141,26 @@ def test_the_first_controller_is_not_disturbed(emulator: Emulator, camera: Aravi
         right(second, 5)
 
 
-def test_a_camera_that_is_not_there(emulator: Emulator) -> None:
-    config = emulated(emulator)
-    emulator.close()
-    with pytest.raises(CameraNotFoundError, match=r"127\.0\.0\.1"):
-        AravisCamera(config)
+def test_a_camera_that_boots_and_one_that_is_not_there() -> None:
+    with Emulator(size_px=SIZE_PX, addresses=OWN) as emulator:
+        config = emulated(emulator)
+        camera = AravisCamera(config)
+        checked_exposure(camera.snap())
+    with camera:
+        with pytest.raises(CameraLostError):
+            camera.snap()
+        with pytest.raises(CameraNotFoundError, match=OWN[0]):
+            AravisCamera(config)
+        with Emulator(size_px=SIZE_PX, clock=(77.0, -50.0), addresses=OWN):
+            right(camera, 10)
 
 
-def test_a_camera_that_boots(emulator: Emulator, camera: AravisCamera) -> None:
-    checked_exposure(camera.snap())
-    emulator.close()
-    with pytest.raises(CameraLostError):
-        camera.snap()
-    with Emulator(size_px=SIZE_PX, clock=(77.0, -50.0)):
-        right(camera, 10)
+def test_a_camera_that_is_closed_while_a_shot_is_awaited(emulator: Emulator, camera: AravisCamera) -> None:
+    stream = camera.stream(keep="all")
+    checked_exposure(next(stream))
+    emulator.order("silent", 1)
+    closing = threading.Timer(0.3, camera.close)
+    closing.start()
+    with pytest.raises(ValueError, match="was closed"):
+        rest(stream)
+    closing.join()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 from functools import cache
 from typing import Any
 
@@ -13,6 +14,15 @@ from quadfringe.emulator import Emulator
 from quadfringe.emulator.frames import TestPattern
 
 SIZE_PX = (128, 96)
+SECOND, TWO_STREAMS, OWN = ((f"127.0.0.{n}", f"127.0.0.{n + 1}") for n in (3, 7, 9))
+
+
+@cache
+def shared_emulator() -> Emulator:
+    """A small emulated JAI camera for all tests, whose second clock is 5000 s ahead and drifts by 50 ppm."""
+    emulator = Emulator(size_px=SIZE_PX, clock=(5000.0, 50.0))
+    atexit.register(emulator.close)
+    return emulator
 
 
 def emulated(emulator: Emulator, visible: str | None = None, infrared: str | None = None, **more: Any) -> AravisConfig:
@@ -21,7 +31,15 @@ def emulated(emulator: Emulator, visible: str | None = None, infrared: str | Non
         name: ChipConfig(device=address, pixel_format=chosen)  # type: ignore[arg-type]
         for name, address, chosen in zip(("visible", "infrared"), emulator.addresses, (visible, infrared), strict=True)
     }
-    return AravisConfig(**chips, **more)
+    # A busy machine may take long until frames come evenly, or at all.
+    return AravisConfig(**chips, **({"timeout_s": 10.0} | more))
+
+
+def two_sources(emulator: Emulator) -> AravisConfig:
+    """Settings that open an emulated camera whose chips are two streams of one device."""
+    where = emulator.addresses[0]
+    chips = {name: ChipConfig(device=where, source=f"Source{n}") for n, name in enumerate(("visible", "infrared"))}
+    return AravisConfig(**chips, timeout_s=10.0)  # type: ignore[arg-type]
 
 
 @cache

@@ -61,7 +61,7 @@ class Emulator:
         self._answer()
 
     def order(self, *words: object) -> str:
-        """Tell the camera what to do: a fault of `Faults` and its value, "line" for a trigger pulse, or "sent"."""
+        """Tell the camera what: a fault of `Faults` and its value, "line" for a trigger pulse, "sent", "reset"."""
         assert self._process.stdin is not None
         print(*words, file=self._process.stdin, flush=True)
         return self._answer()

@@ -78,7 +78,6 @@ class EmulatedCamera:
     """
 
     def __init__(self, devices: list[Identity], source: Source, *, clocks: tuple[float, float] = (0.0, 0.0)) -> None:
-        self.faults = Faults()
         self._source = source
         self._random = random.Random(1)
         self._start_ns = time.monotonic_ns()
@@ -90,13 +89,21 @@ class EmulatedCamera:
         places = [(at, stream) for at, who in enumerate(devices) for stream in range(who.streams)]
         self.chips = [Chip(index, self._controls[at], stream) for index, (at, stream) in enumerate(places)]
         self.chips[1].clock_offset_s, self.chips[1].clock_drift_ppm = clocks
-        for control in self._controls:
-            self._set_up(control)
+        self._reset()
         threading.Thread(target=self._expose, name="exposures", daemon=True).start()
+
+    def _reset(self) -> None:
+        """Be as after power-on, and fail no more."""
+        self.faults = Faults()
+        for control in self._controls:
+            control.answering = True
+            control.release()
+            self._set_up(control)
 
     def _set_up(self, control: Control) -> None:
         height, width = self._source.shape
         start = {"SensorWidth": width, "SensorHeight": height, "Width": width, "Height": height}
+        start |= dict.fromkeys(("TriggerMode", "TriggerSource", "GainRaw", "SyncMode"), 0)
         for name, value in (start | {"FramePeriodUs": 33333, "ExposureTimeRaw": 100}).items():
             control[FEATURES[name]] = value
         for stream in range(control.who.streams):
@@ -129,9 +136,11 @@ class EmulatedCamera:
         return resend
 
     def order(self, words: list[str]) -> str:
-        """Do what a line says: a fault and its value, "line" (a pulse at the trigger input), or "sent"."""
+        """Do what a line says: a fault and its value, "line" (a pulse at the trigger input), "sent", or "reset"."""
         if words == ["line"]:
             self._asked.release()
+        elif words == ["reset"]:
+            self._reset()
         elif words == ["sent"]:
             return " ".join(str(chip.sent) for chip in self.chips)
         elif len(words) == 2 and hasattr(self.faults, words[0]):
@@ -142,7 +151,7 @@ class EmulatedCamera:
                 if self.faults.gone:
                     control.release()
         else:
-            raise ValueError(f"expected a fault and its value, line or sent, got {' '.join(words)!r}")
+            raise ValueError(f"expected a fault and its value, line, sent or reset, got {' '.join(words)!r}")
         return "ok"
 
     def _expose(self) -> None:
@@ -188,7 +197,7 @@ class EmulatedCamera:
     def _packets(self, chip: Chip, device_ns: int) -> list[tuple[bytes, bytes | memoryview[int]]]:
         width, height = (chip.control.feature(name) for name in ("Width", "Height"))
         pixel_format = chip.control[FEATURES["PixelFormat"] + 4 * chip.stream]
-        payload = memoryview(packed(self._source, chip.index, self._exposure, pixel_format))
+        payload = memoryview(packed(self._source, chip.index, self._exposure, pixel_format, (width, height)))
         if self.faults.wrong_size:
             height //= 2
             payload = payload[: len(payload) // 2]

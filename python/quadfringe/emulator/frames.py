@@ -65,11 +65,11 @@ class FileFrames:
         return frame if bits == 8 or frame.dtype != np.uint8 else frame.astype(np.uint16) << (bits - 8)
 
 
-def packed(source: Source, chip: int, exposure: int, pixel_format: int) -> bytes:
-    """Give the payload of a frame in a pixel format of GigE Vision."""
+def packed(source: Source, chip: int, exposure: int, pixel_format: int, size_px: tuple[int, int]) -> bytes:
+    """Give the payload of a frame of `size_px` (width, height) in a pixel format of GigE Vision."""
     name = NAMES[pixel_format]
     bits = int("".join(letter for letter in name if letter.isdigit()))
-    frame = source.frame(chip, exposure, bits)
+    frame = source.frame(chip, exposure, bits)[: size_px[1], : size_px[0]]
     if name == "RGB8" and frame.ndim == 2:
         frame = np.repeat(frame[:, :, None], 3, axis=2)
     if not name.endswith("Packed"):

@@ -31,7 +31,7 @@ INSTALL = (
 )
 GVCP_PORT = 3956
 CONTROL_PRIVILEGE = 0x0A00
-PING_S, PINGS = 0.2, 3
+PING_S, PINGS = 0.3, 5
 HEADERS = 28 + 8  # of IP, UDP and GVSP, in every packet
 logger = logging.getLogger(__name__)
 
@@ -181,7 +181,7 @@ class Device:
             return Stream(self._camera.create_stream(None, None), payload, buffers, period_us, self.ethernet)
 
     def answers(self) -> bool:
-        """Whether the device answers within 0.6 s and still obeys this program; Aravis itself finds out after 5 s."""
+        """Whether the device answers within 1.5 s and still obeys this program; Aravis itself finds out after 5 s."""
         if not self.ethernet:
             return True
         question = struct.pack(">BBHHHI", 0x42, 1, 0x0080, 4, 1, CONTROL_PRIVILEGE)

@@ -79,6 +79,8 @@ class AravisCamera:
                 _check_there(link, 0.0)
                 link.start(self._queue.put, borrow=borrow)
                 yield link, self._queue
+            except ShotTimeoutError:
+                raise  # the camera is there
             except CameraError as error:
                 lost = isinstance(error, CameraLostError)
                 link.stop(lost=lost)
@@ -113,6 +115,8 @@ class AravisCamera:
             try:
                 shot = queue.get(min(max(left_s, 0.0), LOOK_S))
             except TimeoutError:
+                if self._closed:
+                    raise ValueError(f"camera at {self.name} was closed while a shot was awaited") from None
                 _check_there(link, SILENT_S)
                 if left_s <= 0:
                     raise self._diagnosis(link, before, timeout_s) from None

@@ -63,7 +63,11 @@ class Link:
     def _set_up(self, config: AravisConfig) -> AravisConfig:
         """Set features, then packets, then the streams with their buffers: in this order, or pixels come out wrong."""
         for name, value in config.features.items():
-            self.device(0).set(name, value)
+            having = [device for device in self._devices.values() if device.has(name)]
+            if not having:
+                raise CameraError(f"features: no device of the camera has {name}, or it cannot be used now")
+            for device in having:
+                device.set(name, value)
         taken, agreed = {}, []
         for n, (chip, place) in enumerate(zip((config.visible, config.infrared), self.places, strict=True)):
             taken[CHIPS[n]] = profiles.set_chip(self.device(n), place, chip, config.exposure_us)
