@@ -12,12 +12,12 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
 
-.PHONY: demo test test-usb test-camera fuzz coverage figures rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live fuzz coverage figures rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
 
-test: rust python test-usb test-camera
+test: rust python test-usb test-camera test-live
 
 rust: $(STAMPS)/tools
 	cargo fmt --all --check
@@ -59,6 +59,11 @@ $(STAMPS)/camera: $(STAMPS)/built
 	scripts/set-up camera
 	$(BIN)/pip install --quiet --disable-pip-version-check "PyGObject>=3.42,<3.52"
 	touch $@
+
+# The live view in Debian's chromium without a screen.
+test-live: $(STAMPS)/built
+	scripts/set-up browser
+	QUADFRINGE_BROWSER=1 $(BIN)/pytest tests/live
 
 # Any bytes to the decoders, the driver and the emulator, on the stable compiler: libFuzzer with LLVM's counters.
 FUZZ_SECONDS ?= 300

@@ -50,7 +50,7 @@ def test_the_script_and_the_module_are_the_same_command() -> None:
     for command in ([str(script)], [sys.executable, "-m", "quadfringe"]):
         done = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True, env=plain)
         commands = ("demo", "pattern", "simulate", "decode", "measure", "info", "calibrate", "projector", "reproduce")
-        for name in (*commands, "bench"):
+        for name in (*commands, "bench", "live", "record", "recover", "batch"):
             assert name in done.stdout
 
 

@@ -6,6 +6,7 @@ from importlib import import_module
 from types import ModuleType
 
 __all__ = [
+    "BatchError",
     "CameraBusyError",
     "CameraError",
     "CameraLostError",
@@ -14,6 +15,7 @@ __all__ = [
     "DecodeError",
     "InputError",
     "MissingExtraError",
+    "RecordingError",
     "ShotTimeoutError",
     "UnpairedError",
     "WrongFrameError",
@@ -59,6 +61,14 @@ class UnpairedError(ShotTimeoutError):
 
 class WrongFrameError(CameraError):
     """Frames came in another size or pixel format than was agreed, or damaged, and none that is right."""
+
+
+class RecordingError(OSError):
+    """A recording that cannot go on; the message says why and how many shots are safe."""
+
+
+class BatchError(RuntimeError):
+    """A batch that cannot go on; what was decoded stays, and the same command goes on from there."""
 
 
 class MissingExtraError(ImportError):

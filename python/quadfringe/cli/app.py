@@ -7,9 +7,22 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, camera, decode, demo, info, projector, reproduce, timing
+from quadfringe.cli import (
+    batch,
+    bench,
+    calibrate,
+    camera,
+    decode,
+    demo,
+    info,
+    live,
+    projector,
+    record,
+    reproduce,
+    timing,
+)
 from quadfringe.cli.output import complain
-from quadfringe.errors import CameraError, DecodeError, MissingExtraError
+from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
 __all__ = ["app"]
 
@@ -23,7 +36,7 @@ class Commands(TyperGroup):
         """Run the command and translate its errors."""
         try:
             return super().invoke(ctx)
-        except (DecodeError, CameraError) as error:
+        except (BatchError, DecodeError, CameraError, RecordingError) as error:
             complain(str(error))
             raise typer.Exit(FAILED) from error
         except BrokenPipeError:
@@ -66,6 +79,10 @@ app.command("pattern")(bench.pattern)
 app.command("simulate")(bench.simulate)
 app.command("decode")(decode.decode)
 app.command("measure")(bench.measure)
+app.command("live")(live.live)
+app.command("record")(record.record)
+app.command("recover")(record.recover)
+app.command("batch")(batch.batch)
 app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)
