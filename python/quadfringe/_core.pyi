@@ -141,9 +141,7 @@ class Bench:
     ) -> Cast:
         """Send one ray through each pixel of a relief over the plane z, (rows, columns) float64 mm."""
 
-    def cast_plate(
-        self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3
-    ) -> Cast:
+    def cast_plate(self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3) -> Cast:
         """Send one ray through each pixel of a plate between two corners (x, y), on z = 0 of a posed board.
 
         The pose is T_camera_board, row by row and in mm; the face looks towards negative z of the board.
@@ -169,7 +167,8 @@ class Bench:
     def render(self, cast: Cast, fringe_numbers: _Vector3, **options: Any) -> dict[str, NDArray[Any]]:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
-        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that is not known is a TypeError.
+        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that
+        is not known is a TypeError.
         """
 
     def render_step(

@@ -26,7 +26,7 @@ def blobs(image: NDArray[np.uint8], target: Target) -> Points:
     import cv2
 
     most = image.size / (target.rows * target.columns)
-    settings = cv2.SimpleBlobDetector_Params()
+    settings = cv2.SimpleBlobDetector.Params()
     settings.filterByColor, settings.blobColor = True, 255 if target.kind == "rings" else 0
     settings.filterByArea, settings.minArea, settings.maxArea = True, AREA_MIN_PX, float(most)
     settings.filterByCircularity, settings.minCircularity = True, 0.55
@@ -34,7 +34,7 @@ def blobs(image: NDArray[np.uint8], target: Target) -> Points:
     settings.filterByConvexity, settings.minConvexity = True, 0.8
     settings.minThreshold, settings.maxThreshold, settings.thresholdStep = 8, 250, 8
     settings.minDistBetweenBlobs, settings.minRepeatability = 5, 2
-    found = cv2.SimpleBlobDetector_create(settings).detect(image)
+    found = cv2.SimpleBlobDetector.create(settings).detect(image)
     places = np.array([blob.pt for blob in found], np.float64).reshape(-1, 2)
     return places[_alike(np.array([blob.size for blob in found]))]
 
@@ -74,14 +74,16 @@ def _cells(target: Target) -> NDArray[np.intp]:
 
 
 def _followed(places: Points, seed: int) -> dict[tuple[int, int], int]:
-    """Number the places from the seed, neighbour by neighbour: whole coordinates to index."""
+    """Give the places by whole coordinates, found from neighbour to neighbour from the seed on."""
     away = places - places[seed]
     distance = np.linalg.norm(away, axis=1)
     nearest = [i for i in np.argsort(distance)[1:9] if distance[i] > 0]
     if len(nearest) < 2:
         return {(0, 0): seed}
     first = away[nearest[0]]
-    across = [v for v in away[nearest] if abs(first[0] * v[1] - first[1] * v[0]) > 0.5 * np.hypot(*first) * np.hypot(*v)]
+    across = [
+        v for v in away[nearest] if abs(first[0] * v[1] - first[1] * v[0]) > 0.5 * np.hypot(*first) * np.hypot(*v)
+    ]
     if not across:
         return {(0, 0): seed}
     cells, steps, queue = {(0, 0): seed}, {(0, 0): (first, across[0])}, [(0, 0)]
@@ -114,7 +116,7 @@ def _matched(cells: dict[tuple[int, int], int], wanted: NDArray[np.intp]) -> NDA
     table[tuple((numbered - low).T)] = list(cells.values())
     best = np.full(len(wanted), -1, np.intp)
     for swap, sx, sy in itertools.product((False, True), (1, -1), (1, -1)):
-        turned = wanted[:, ::-1 if swap else 1] * (sx, sy)
+        turned = wanted[:, :: -1 if swap else 1] * (sx, sy)
         turned = turned - turned.min(axis=0)
         reach = turned.max(axis=0)
         padded = np.pad(table, [(r, r) for r in reach], constant_values=-1)
@@ -139,7 +141,7 @@ def symmetries(target: Target) -> list[NDArray[np.intp]]:
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     orders = []
     for swap, sx, sy in itertools.product((False, True), (1, -1), (1, -1)):
-        turned = (points - centre)[:, ::-1 if swap else 1] * (sx, sy) + centre
+        turned = (points - centre)[:, :: -1 if swap else 1] * (sx, sy) + centre
         apart = np.linalg.norm(turned[:, None] - points, axis=2)
         if apart.min(axis=1).max() < 1e-6 * target.pitch_mm:
             orders.append(apart.argmin(axis=1))
