@@ -226,7 +226,7 @@ def test_projector_points_follow_bent_maps_and_registration() -> None:
     np.testing.assert_allclose(found.slope[:3, 1, 1], 0.7 - 2e-4 * x, atol=1e-4)
     assert np.isnan(found.points_px[3]).all()  # too little around it
     moved = projector_points(flat_map(), view, radius_px=15, ir_registration=((1.0, 0.0, 2.0), (0.0, 1.0, -1.0)))
-    there = replace(view, points_px=view.points_px + (2.0, -1.0))
+    there = replace(view, points_px=view.points_px + np.array((2.0, -1.0)))
     np.testing.assert_allclose(moved.points_px, projector_points(flat_map(), there, radius_px=15).points_px)
     with pytest.raises(InputError, match="one size"):
         projector_points(flat_map(), replace(view, size_px=(100, 100)))
