@@ -7,6 +7,7 @@ from types import ModuleType
 
 __all__ = [
     "BatchError",
+    "CalibrationError",
     "CameraBusyError",
     "CameraError",
     "CameraLostError",
@@ -69,6 +70,13 @@ class RecordingError(OSError):
 
 class BatchError(RuntimeError):
     """A batch that cannot go on; what was decoded stays, and the same command goes on from there."""
+
+class CalibrationError(DecodeError):
+    """Captures that cannot be calibrated; `reason` is one word for programs, the message is for people."""
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
 
 
 class MissingExtraError(ImportError):

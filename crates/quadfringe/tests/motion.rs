@@ -70,7 +70,7 @@ fn what_stands_still_stays_as_it_is() {
 
 #[test]
 fn the_ripple_of_a_moving_plane_goes() {
-    for speed_mm_per_s in [50.0, 100.0, 200.0, 400.0] {
+    for speed_mm_per_s in [50.0, 100.0, 200.0, 300.0] {
         let name = format!("plane, {speed_mm_per_s} mm/s");
         let [before, after] = before_and_after(&name, |t| Plane::at_z(790.0 + speed_mm_per_s * t));
         // 3 % noise alone has 0.005 rad.

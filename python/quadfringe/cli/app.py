@@ -19,6 +19,7 @@ from quadfringe.cli import (
     projector,
     record,
     reproduce,
+    target,
     timing,
 )
 from quadfringe.cli.output import complain
@@ -75,6 +76,7 @@ def options(
 
 
 app.command("demo")(demo.demo)
+app.command("target")(target.target)
 app.command("pattern")(bench.pattern)
 app.command("simulate")(bench.simulate)
 app.command("decode")(decode.decode)

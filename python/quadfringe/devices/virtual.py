@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import count as numbers
 from types import TracebackType
 from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.capture import VirtualConfig
@@ -18,10 +21,24 @@ from quadfringe.devices import CameraStatistics, Devices, Keep
 from quadfringe.errors import ConfigError, DecodeError, InputError
 from quadfringe.export import read_npy
 
-__all__ = ["VirtualBench", "VirtualCamera", "VirtualProjector", "open_devices"]
+__all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector", "open_devices"]
 
 EDGE_PX = 2.0  # pixels nearer to an edge than this belong to it: lens and pixel mix both sides
 CHANNELS = ("red", "green", "blue", "ir")
+
+
+@dataclass(frozen=True)
+class PrintedBoard:
+    """A flat board with a print on it: inked share (rows, columns) float32 of texels, and its corners in its frame.
+
+    `paper` and `ink` are albedos of R, G, B, IR.
+    """
+
+    coverage: NDArray[np.float32]
+    texel_mm: float
+    corners_mm: tuple[tuple[float, float], tuple[float, float]]
+    paper: tuple[float, float, float, float]
+    ink: tuple[float, float, float, float]
 
 
 class VirtualBench:
@@ -33,6 +50,8 @@ class VirtualBench:
         self._bench = _core.Bench(**devices, layout=config.fringes.layout)
         self._scene = config.scene
         self._cast: tuple[float, _core.Cast] | None = None
+        self._board: tuple[_core.Cast, NDArray[np.float32]] | None = None
+        self._exposures = 0
         self.projected: Fringes | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
@@ -63,6 +82,31 @@ class VirtualBench:
         _core.check_code(fringes.numbers, self._bench.visible.width)
         self.projected = fringes
 
+    def place(self, board: PrintedBoard, T_camera_board: NDArray[np.float64]) -> None:  # noqa: N803
+        """Put a board into the scene, alone, in a pose (4, 4); ValueError when that is no motion."""
+        pose = {"rotation": T_camera_board[:3, :3].tolist(), "translation_mm": T_camera_board[:3, 3].tolist()}
+        (left, top), half = board.corners_mm[0], 0.5 * board.texel_mm
+        cast = self._bench.cast_plate(*board.corners_mm, **pose)
+        albedo = self._bench.printed(
+            board.coverage,
+            pitch_mm=board.texel_mm,
+            origin_mm=(left + half, top + half),
+            paper=board.paper,
+            ink=board.ink,
+            **pose,
+        )
+        self._board = cast, albedo
+
+    def expose_step(self, number: float, shift_rad: float, axis: str = "columns", beam: str | None = None) -> AnyShot:
+        """Give the shot of one step: the same fringes in all channels, or in those of one projector.
+
+        Every exposure has noise of its own; the same sequence of exposures has the same noise.
+        """
+        cast, light = self._lit(0.0)
+        light["seed"] = (self._scene.seed or 0) + self._exposures
+        self._exposures += 1
+        return self._shot(self._bench.render_step(cast, number, shift_rad, axis=axis, beam=beam, **light), None)
+
     def expose(self, after_s: float = 0.0, exposure: int = 0) -> AnyShot:
         """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected.
 
@@ -70,16 +114,25 @@ class VirtualBench:
         """
         if self.projected is None:
             raise DecodeError("the projector shows nothing: call show(fringes) before snap()")
-        time_s = (self._scene.time_s or 0.0) + after_s
-        if self._cast is None or self._cast[0] != time_s:
-            self._cast = time_s, self._look(time_s)
-        cast = self._cast[1]
-        light = _light(self._scene)
+        cast, light = self._lit(after_s)
         if exposure:
             light["seed"] = (self._scene.seed or 0) + exposure
         images = self._bench.render(cast, self.projected.numbers, **light)
+        return self._shot(images, self._truth(cast))
+
+    def _lit(self, after_s: float) -> tuple[_core.Cast, dict[str, Any]]:
+        """Give what the camera looks at, and the light on it: the board when there is one, else the scene."""
+        light = _light(self._scene)
+        if self._board is not None:
+            cast, light["albedo"] = self._board
+            return cast, light
+        time_s = (self._scene.time_s or 0.0) + after_s
+        if self._cast is None or self._cast[0] != time_s:
+            self._cast = time_s, self._look(time_s)
+        return self._cast[1], light
+
+    def _shot(self, images: dict[str, NDArray[Any]], truth: Truth | None) -> AnyShot:
         full_scale = float(2**self._scene.bit_depth - 1)
-        truth = self._truth(cast)
         if "raw" in images and self._scene.bayer is not None:
             return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
         return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scale, truth)

@@ -90,7 +90,10 @@ impl Best {
         let instants = options.channel_instants_us.map(|instants| instants.map(|t| 1e-6 * t));
         match instants {
             None => self.measure((&grid, period_px), factor(period_px, &grid), blur_px, options),
-            Some(instants) => self.measure_moving((&grid, period_px), instants, blur_px, options),
+            Some(instants) => {
+                let image = (&grid, period_px, factor(period_px, &grid));
+                self.measure_moving(image, instants, blur_px, options);
+            }
         }
 
         // 5. What is not sure is no data.
@@ -138,12 +141,18 @@ impl Best {
     }
 
     /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.
-    fn measure_moving(&mut self, image: (&Grid, f64), instants: Instants, blur_px: usize, options: &Options) {
+    fn measure_moving(
+        &mut self,
+        (grid, period_px, factor): (&Grid, f64, usize),
+        instants: Instants,
+        blur_px: usize,
+        options: &Options,
+    ) {
         let how = (self.ratios, instants);
         self.seen.clone_from(&self.full.light);
         for round in 0..=MOTION_ROUNDS {
-            self.measure(image, 1, blur_px, options);
-            let scene = self.full.scene(image.0, image.1, 1);
+            self.measure((grid, period_px), factor, blur_px, options);
+            let scene = self.full.scene(grid, period_px, 1);
             if round == 0 {
                 self.motion.rest(&scene);
             }
@@ -154,7 +163,7 @@ impl Best {
             self.motion.measure(&scene, how, backgrounds, &self.phase, &self.modulation);
             let Level { light, usable, .. } = &mut self.full;
             let seen = self.seen.each_ref().map(Vec::as_slice);
-            let seen = Scene { light: seen, usable, grid: image.0, period_px: image.1, factor: 1 };
+            let seen = Scene { light: seen, usable, grid, period_px, factor: 1 };
             let light = light.each_mut().map(Vec::as_mut_slice);
             self.motion.settle(&seen, how, backgrounds, &self.phase, light);
         }

@@ -25,7 +25,7 @@ const SAMPLED_ROWS: usize = 4;
 const GAIN: f32 = 2.0;
 
 /// Greatest turn of B against R, rad; a quarter of a fringe is 1.57.
-const TURN_MAX: f32 = 0.95;
+const TURN_MAX: f32 = 0.75;
 
 /// Instants of the four channels, in any unit of time; 0 is the instant that everything is brought to.
 pub(crate) type Instants = [f32; 4];
