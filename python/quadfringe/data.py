@@ -10,13 +10,25 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from quadfringe.config import Affine, BayerPattern, DeviceModel, Matrix4, Model, Response, Row4, checked
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
 from quadfringe.images import full_scale
 
-__all__ = ["AnyShot", "BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth", "conditioning"]
+__all__ = [
+    "AnyShot",
+    "BayerShot",
+    "Calibration",
+    "CalibrationRecord",
+    "CalibrationStep",
+    "ResponseCalibration",
+    "Shape",
+    "Shot",
+    "Truth",
+    "conditioning",
+]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
@@ -52,25 +64,59 @@ class ResponseCalibration(Stored, Response):
     inputs: tuple[str, ...] = ()
 
 
-class Calibration(Stored):
-    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR)."""
+class CalibrationStep(Model):
+    """One step of a calibration: what went in, what came out, and what is to be thought of it."""
 
-    schema_version: Literal[1] = 1
+    name: str
+    inputs: tuple[str, ...] = ()
+    settings: dict[str, Any] = Field(default_factory=dict)
+    figures: dict[str, float | None] = Field(default_factory=dict)
+    good: bool
+    verdict: str
+
+
+class CalibrationRecord(Model):
+    """When a calibration was made, by which version, of which rig, and every step with its residuals."""
+
+    made_utc: str
+    quadfringe_version: str
+    rig: str
+    steps: tuple[CalibrationStep, ...] = ()
+
+    @property
+    def good(self) -> bool:
+        """Whether every step is good."""
+        return all(step.good for step in self.steps)
+
+
+class Calibration(Stored):
+    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
+
+    `response` is undone before `crosstalk` and `projector_response` after it. `infrared` is the second projector, None
+    when it is coaxial with `projector`. Files of schema 1, which know neither it nor the record, are read as they are.
+    """
+
+    schema_version: Literal[1, 2] = 2
     camera: DeviceModel
     projector: DeviceModel
+    infrared: DeviceModel | None = None
     dark: Row4 | None = None
     response: Response | None = None
     crosstalk: Matrix4 | None = None
+    projector_response: Response | None = None
     ir_registration: Affine | None = None
+    record: CalibrationRecord | None = None
 
 
 def conditioning(calibration: Calibration | None, response: Response | None) -> dict[str, Any]:
     """Give what is known about the intensities as the kernel's keywords; `response` stands in for the calibration's."""
     response = response or (calibration.response if calibration else None)
+    projector = calibration.projector_response if calibration else None
     known = {
         "response": response.rows() if response else None,
         "dark": calibration.dark if calibration else None,
         "crosstalk": calibration.crosstalk if calibration else None,
+        "projector_response": projector.rows() if projector else None,
         "ir_registration": calibration.ir_registration if calibration else None,
     }
     return {name: value for name, value in known.items() if value is not None}

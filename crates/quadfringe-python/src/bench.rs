@@ -10,7 +10,7 @@ use pyo3::types::PyDict;
 use quadfringe::BayerPattern;
 use quadfringe::fringe::FringeCode;
 use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, RenderOptions};
-use quadfringe::surface::{HeightMap, Interpolation, Peaks, Surface, scene};
+use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Sphere, Surface, scene};
 
 /// Camera and two projectors before a surface.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -65,6 +65,20 @@ impl Bench {
         Ok(self.cast_surface(py, &surface))
     }
 
+    /// One ray through each pixel of a plane through a point, whose normal points to the camera.
+    #[pyo3(signature = (*, point_mm, normal))]
+    fn cast_plane(&self, py: Python<'_>, point_mm: [f64; 3], normal: [f64; 3]) -> PyResult<Cast> {
+        let surface = Plane::new(point_mm, normal).map_err(value_error)?;
+        Ok(self.cast_surface(py, &surface))
+    }
+
+    /// One ray through each pixel of a sphere in front of nothing.
+    #[pyo3(signature = (*, centre_mm, radius_mm))]
+    fn cast_sphere(&self, py: Python<'_>, centre_mm: [f64; 3], radius_mm: f64) -> PyResult<Cast> {
+        let surface = Sphere::new(centre_mm, radius_mm).map_err(value_error)?;
+        Ok(self.cast_surface(py, &surface))
+    }
+
     /// One ray through each pixel of a relief.
     #[pyo3(signature = (heights_mm, *, pitch_mm, origin_mm, z_mm))]
     fn cast_height_map(
@@ -104,6 +118,18 @@ impl Bench {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         self.render_lights(py, cast, &Light::step(fringe_number, shift_rad), options)
+    }
+
+    /// The images with each channel lit evenly at a level of its own, 0 to 1.
+    #[pyo3(signature = (cast, levels, **options))]
+    fn render_levels<'py>(
+        &self,
+        py: Python<'py>,
+        cast: &Cast,
+        levels: [f64; 4],
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        self.render_lights(py, cast, &levels.map(Light::Uniform), options)
     }
 }
 

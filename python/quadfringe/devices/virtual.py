@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from quadfringe import _core
-from quadfringe.config import ChannelResponse, Fringes, Response, SceneConfig, SystemConfig
+from quadfringe.config import ChannelResponse, Fringes, Response, Row4, SystemConfig, Triple
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth
 from quadfringe.decoding import core_device, device_model
 from quadfringe.errors import DecodeError, InputError
@@ -26,7 +27,7 @@ class VirtualBench:
         self._bench = _core.Bench(**devices, layout=config.fringes.layout)
         self._scene = config.scene
         self._cast: _core.Cast | None = None
-        self.projected: Fringes | None = None
+        self.projected: Fringes | Row4 | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
         """Give the config with every device written out."""
@@ -36,18 +37,20 @@ class VirtualBench:
     def calibration(self) -> Calibration:
         """Give what a perfect calibration of this bench would find."""
         scene = self._scene
-        pairs = zip(
+        offsets, camera, projector = (
             scene.camera_offset or (0.0,) * 4,
             scene.camera_exponent or (1.0,) * 4,
             scene.projector_exponent or (1.0,) * 4,
-            strict=True,
         )
-        responses = [ChannelResponse(offset=o, exponent=camera / projector) for o, camera, projector in pairs]
+        # Seen through crosstalk, what camera and projector bend cannot be undone in one go.
+        parted = scene.crosstalk is not None
+        together = [seen if parted else seen / sent for seen, sent in zip(camera, projector, strict=True)]
         return Calibration(
             camera=device_model(self._bench.camera),
             projector=device_model(self._bench.visible),
-            response=Response(**dict(zip(CHANNELS, responses, strict=True))),
+            response=_responses(offsets, together),
             crosstalk=scene.crosstalk,
+            projector_response=_responses((0.0,) * 4, [1 / sent for sent in projector]) if parted else None,
             ir_registration=scene.infrared_from_visible,
         )
 
@@ -56,18 +59,49 @@ class VirtualBench:
         _core.check_code(fringes.numbers, self._bench.visible.width)
         self.projected = fringes
 
-    def expose(self) -> AnyShot:
-        """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected."""
+    def project_levels(self, levels: Row4) -> None:
+        """Light the scene evenly from now on, each channel (R, G, B, IR) at a level of its own from 0 to 1."""
+        self.projected = levels
+
+    def place_plane(self, point_mm: Triple, normal: Triple) -> None:
+        """Put a plane through a point before the camera, in place of the scene; its normal points to the camera."""
+        self._cast = self._bench.cast_plane(point_mm=point_mm, normal=normal)
+
+    def place_sphere(self, centre_mm: Triple, radius_mm: float) -> None:
+        """Put a sphere before the camera, in place of the scene."""
+        self._cast = self._bench.cast_sphere(centre_mm=centre_mm, radius_mm=radius_mm)
+
+    def place(self, surface: str) -> None:
+        """Put a ready scene before the camera; ValueError when there is none of that name."""
+        self._cast = self._bench.cast(surface)
+
+    def expose(self, *, seed: int | None = None, exposure: float = 1.0, capped: bool = False) -> AnyShot:
+        """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected.
+
+        `seed` draws other noise than that of the scene, `exposure` is relative to that of the scene, and `capped` keeps
+        all light out.
+        """
         if self.projected is None:
             raise DecodeError("the projector shows nothing: call show(fringes) before grab()")
         if self._cast is None:
             self._cast = self._look()
-        images = self._bench.render(self._cast, self.projected.numbers, **_light(self._scene))
+        light = self._light(seed, 0.0 if capped else exposure)
+        if isinstance(self.projected, Fringes):
+            images = self._bench.render(self._cast, self.projected.numbers, **light)
+        else:
+            images = self._bench.render_levels(self._cast, self.projected, **light)
         full_scale = float(2**self._scene.bit_depth - 1)
         truth = self._truth(self._cast)
         if "raw" in images and self._scene.bayer is not None:
             return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
         return Shot(**images, full_scale=full_scale, truth=truth)
+
+    def _light(self, seed: int | None, exposure: float) -> dict[str, Any]:
+        """Give the settings of light and camera that are present, as the kernel names them."""
+        light = self._scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+        if exposure != 1.0:
+            light["gain"] = tuple(exposure * gain for gain in self._scene.gain or (1.0,) * 4)
+        return light if seed is None else light | {"seed": seed}
 
     def _look(self) -> _core.Cast:
         relief = self._scene.height_map
@@ -88,9 +122,9 @@ class VirtualBench:
         )
 
 
-def _light(scene: SceneConfig) -> dict[str, Any]:
-    """Give the settings of light and camera that are present, as the kernel names them."""
-    return scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+def _responses(offsets: Sequence[float], exponents: Sequence[float]) -> Response:
+    pairs = zip(CHANNELS, offsets, exponents, strict=True)
+    return Response(**{name: ChannelResponse(offset=offset, exponent=exponent) for name, offset, exponent in pairs})
 
 
 class VirtualProjector:
