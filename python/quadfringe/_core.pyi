@@ -20,6 +20,7 @@ __all__ = [
     "PatternSequence",
     "PatternWindow",
     "PolynomialHeight",
+    "__profile__",
     "__version__",
     "background",
     "carrier",
@@ -42,6 +43,7 @@ __all__ = [
     "xyz_from_column",
 ]
 
+__profile__: Final[str]
 __version__: Final[str]
 
 _Vector2 = tuple[float, float]

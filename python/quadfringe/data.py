@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -35,6 +36,11 @@ MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
 
 
+def _short_lists(text: str) -> str:
+    """Put every list of plain numbers on one line: a matrix is then read row by row."""
+    return re.sub(r"\[\n\s*([-+\d.eE,\s]*?)\n\s*\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+
+
 class Stored(Model):
     """A model with a JSON file of its own."""
 
@@ -42,7 +48,7 @@ class Stored(Model):
         """Write the model as JSON, whole or not at all."""
         require_suffix(Path(path), (".json",))
         with atomic(Path(path)) as temporary:
-            temporary.write_text(self.model_dump_json(indent=2, exclude_none=True) + "\n")
+            temporary.write_text(_short_lists(self.model_dump_json(indent=2, exclude_none=True)) + "\n")
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
@@ -246,9 +252,11 @@ class Shape:
     @property
     def depth_mm(self) -> Map:
         """Depth along the camera's axis, (H, W), mm; raises `InputError` when not calibrated."""
-        return self._points()[:, :, 2]
+        return self.points_mm[:, :, 2]
 
-    def _points(self) -> Map:
+    @property
+    def points_mm(self) -> Map:
+        """Points in the camera frame, (H, W, 3), mm; raises `InputError` when not calibrated."""
         if self.xyz_mm is None:
             raise InputError("this shape has phase only: decode with a calibration to have millimetres")
         return self.xyz_mm
@@ -269,7 +277,7 @@ class Shape:
         if suffix == ".npz":
             export.write_npz(path, self.maps, self._texts())
         elif suffix == ".ply":
-            points = self._points()
+            points = self.points_mm
             valid = np.isfinite(points).all(axis=2)
             export.write_ply(path, points[valid], _grey(self.modulation)[valid], self.quality[valid])
         else:

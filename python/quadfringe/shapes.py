@@ -19,7 +19,9 @@ __all__ = [
     "Plane",
     "Sphere",
     "StepsResult",
+    "cap_towards_camera",
     "dominant_plane",
+    "dominant_sphere",
     "fit_plane",
     "fit_sphere",
     "form_of",
@@ -31,6 +33,7 @@ Points = NDArray[np.floating]
 LEFT_OUT = 0.003  # share of points that VDI/VDE 2634 lets be left out
 CUT_SIGMA = 3.0  # half the 6 sigma band
 POINTS_MIN = 100
+SIZE_REACH = 0.05  # share by which a sphere that is looked for may differ from its calibrated diameter
 
 
 @dataclass(frozen=True)
@@ -147,14 +150,54 @@ def dominant_plane(xyz_mm: Points, band_mm: float = 0.5, trials: int = 200, seed
     return best
 
 
+def dominant_sphere(
+    xyz_mm: Points, diameter_mm: float, band_mm: float = 0.5, trials: int = 400, seed: int = 0
+) -> Sphere:
+    """Give the sphere of about the diameter (within 5 %) that most points (..., 3) lie within `band_mm` of.
+
+    Raises `InputError` when fewer than 100 points lie on one.
+    """
+    points = _points(xyz_mm, "sphere")
+    random = np.random.default_rng(seed)
+    sample = points[random.choice(len(points), min(len(points), 5000), replace=False)]
+    best, most = None, 0
+    for start in sample[random.choice(len(sample), trials)]:
+        near = sample[np.linalg.norm(sample - start, axis=1) < 0.5 * diameter_mm]
+        if len(near) < 4:
+            continue
+        trial = _sphere_through(near[random.choice(len(near), 4, replace=False)])
+        if trial is None or abs(2 * trial.radius_mm / diameter_mm - 1) > SIZE_REACH:
+            continue
+        count = int(np.count_nonzero(np.abs(trial.distances_mm(sample)) < band_mm))
+        if count > most:
+            best, most = trial, count
+    for _ in range(3 if best is not None else 0):
+        best = fit_sphere(points[np.abs(best.distances_mm(points)) < band_mm], best)
+    if best is None or np.count_nonzero(np.abs(best.distances_mm(points)) < band_mm) < POINTS_MIN:
+        raise InputError(f"sphere: no sphere of about {diameter_mm:g} mm diameter is among {len(points)} points")
+    return best
+
+
+def cap_towards_camera(xyz_mm: Points, sphere: Sphere, within_deg: float) -> NDArray[np.bool_]:
+    """Tell which points (..., 3) see the camera, at the origin, within an angle of the normal of the sphere."""
+    xyz = np.asarray(xyz_mm, float)
+    outward = xyz - sphere.centre_mm
+    lengths = np.linalg.norm(outward, axis=-1) * np.linalg.norm(xyz, axis=-1)
+    return np.asarray(-(outward * xyz).sum(axis=-1) > np.cos(np.radians(within_deg)) * lengths)
+
+
 @dataclass(frozen=True)
 class StepsResult:
-    """Heights of flat tops over the base, mm, in the order of the nominal ones, and how many points each has."""
+    """Heights of flat tops over the base, mm, in the order of the nominal ones, and how many points each has.
+
+    `height_mm` is the map (H, W) of heights over the base.
+    """
 
     nominal_mm: tuple[float, ...]
     measured_mm: tuple[float, ...]
     points: tuple[int, ...]
     base: Form
+    height_mm: Array
 
     @property
     def errors_mm(self) -> tuple[float, ...]:
@@ -187,7 +230,7 @@ def measure_steps(
             raise InputError(f"steps: {top.size} points lie near {h:g} mm; expected a flat top of that height")
         measured.append(float(top.mean()))
         counts.append(int(top.size))
-    return StepsResult(tuple(nominal), tuple(measured), tuple(counts), form_of(height[base_points]))
+    return StepsResult(tuple(nominal), tuple(measured), tuple(counts), form_of(height[base_points]), height)
 
 
 def _inner(region: NDArray[np.bool_], margin_px: int) -> NDArray[np.bool_]:
@@ -195,6 +238,16 @@ def _inner(region: NDArray[np.bool_], margin_px: int) -> NDArray[np.bool_]:
 
     square = np.ones((2 * margin_px + 1,) * 2, np.uint8)
     return np.asarray(cv2.erode(region.astype(np.uint8), square, borderValue=0), bool)
+
+
+def _sphere_through(four: Array) -> Sphere | None:
+    """Give the sphere through four points (4, 3); None when they lie nearly in a plane."""
+    first = four[0]
+    away = four[1:] - first
+    if abs(np.linalg.det(away)) < 1e-3 * np.prod(np.linalg.norm(away, axis=1)):
+        return None
+    centre = np.linalg.solve(2 * away, np.sum(away**2, axis=1))
+    return Sphere(centre + first, float(np.linalg.norm(centre)))
 
 
 def _finite(values: Points) -> Array:

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce, timing
+from quadfringe.cli import accept, bench, calibrate, decode, demo, doctor, info, projector, reproduce, timing
 from quadfringe.cli.output import complain
 from quadfringe.errors import DecodeError, MissingExtraError
 
@@ -66,6 +66,8 @@ app.command("pattern")(bench.pattern)
 app.command("simulate")(bench.simulate)
 app.command("decode")(decode.decode)
 app.command("measure")(bench.measure)
+app.command("accept")(accept.accept)
+app.command("doctor")(doctor.doctor)
 app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)
