@@ -29,8 +29,10 @@ QUANTILE = 0.95  # of the tiles: the worst that is no accident
 
 @dataclass(frozen=True)
 class Fit:
-    """Amplitudes by channel: of its fringes (share of full scale), of their second harmonic over the first, and of the
-    fringes of each channel (columns) in each channel (rows) over its own, (4, 4)."""
+    """Amplitudes by channel: of its fringes, share of full scale, and of their second harmonic over the first.
+
+    `crosstalk` has the fringes of each channel (columns) in each channel (rows) over its own, (4, 4).
+    """
 
     names: tuple[str, ...]
     amplitude: NDArray[np.float64]
