@@ -37,6 +37,7 @@ __all__ = [
     "pack_flash",
     "pattern",
     "power_on_drive",
+    "step_pattern",
     "two_step",
     "udev_rule",
     "unwrap",
@@ -151,16 +152,51 @@ class Bench:
     def cast_sphere(self, *, centre_mm: _Vector3, radius_mm: float) -> Cast:
         """Send one ray through each pixel of a sphere in front of nothing."""
 
+    def cast_plate(
+        self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3
+    ) -> Cast:
+        """Send one ray through each pixel of a plate between two corners (x, y), on z = 0 of a posed board.
+
+        The pose is T_camera_board, row by row and in mm; the face looks towards negative z of the board.
+        """
+
+    def printed(
+        self,
+        coverage: NDArray[np.float32],
+        *,
+        pitch_mm: float,
+        origin_mm: _Vector2,
+        paper: Sequence[float],
+        ink: Sequence[float],
+        rotation: _Matrix3,
+        translation_mm: _Vector3,
+    ) -> NDArray[np.float32]:
+        """Give the albedo (H, W, 4) that the camera sees of a print: the option `albedo` of `render`.
+
+        `coverage` is (rows, columns) float32, 1 where there is ink; `origin_mm` is the centre of its first texel on
+        z = 0 of the board, in the pose of `cast_plate`; `paper` and `ink` are albedos of R, G, B, IR.
+        """
+
     def render(self, cast: Cast, fringe_numbers: _Vector3, **options: Any) -> dict[str, NDArray[Any]]:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
-        Options are those of `quadfringe.SceneConfig`; an option that is not known is a TypeError.
+        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that is not known is a TypeError.
         """
 
     def render_step(
-        self, cast: Cast, fringe_number: float, shift_rad: float, **options: Any
+        self,
+        cast: Cast,
+        fringe_number: float,
+        shift_rad: float,
+        *,
+        axis: str = "columns",
+        beam: str | None = None,
+        **options: Any,
     ) -> dict[str, NDArray[Any]]:
-        """Give the images with the same fringes in each channel: one step of an N-step capture."""
+        """Give the images with the same fringes in each channel: one step of an N-step capture.
+
+        Fringes count over "columns" or "rows"; with a `beam`, visible or infrared, the other projector is dark.
+        """
 
     def render_levels(self, cast: Cast, levels: _Vector4, **options: Any) -> dict[str, NDArray[Any]]:
         """Give the images with each channel (R, G, B, IR) lit evenly at a level of its own, 0 to 1."""
@@ -237,6 +273,14 @@ def pattern(
     channel: str, fringe_numbers: _Vector3, width: int, height: int, *, layout: str = "regular"
 ) -> NDArray[np.float32]:
     """Give the ideal image of channel R, G, B or IR, (height, width), linear light from 0 to 1."""
+
+def step_pattern(
+    fringe_number: float, shift_rad: float, width: int, height: int, *, axis: str = "columns", layout: str = "regular"
+) -> NDArray[np.float32]:
+    """Give the ideal image of one step of an N-step capture, (height, width), linear light from 0 to 1.
+
+    Fringes count over the "columns" or the "rows" of mirrors in the layout.
+    """
 
 def linear_light(
     red: NDArray[Any],

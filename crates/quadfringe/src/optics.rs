@@ -7,9 +7,11 @@ use crate::error::{Error, Result};
 
 mod bayer;
 mod distortion;
+mod pose;
 mod rotation;
 
 pub use bayer::BayerPattern;
+pub use pose::Pose;
 pub use rotation::rotation_from_vector;
 
 /// Half-line in the camera frame.
