@@ -152,9 +152,7 @@ class Bench:
     def cast_sphere(self, *, centre_mm: _Vector3, radius_mm: float) -> Cast:
         """Send one ray through each pixel of a sphere in front of nothing."""
 
-    def cast_plate(
-        self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3
-    ) -> Cast:
+    def cast_plate(self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3) -> Cast:
         """Send one ray through each pixel of a plate between two corners (x, y), on z = 0 of a posed board.
 
         The pose is T_camera_board, row by row and in mm; the face looks towards negative z of the board.

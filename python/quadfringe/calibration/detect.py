@@ -97,11 +97,13 @@ def _exposed(grey: NDArray[np.float32]) -> None:
     share = float((grey >= 0.999).mean())
     if share > SATURATED:
         raise TargetNotFoundError(
-            "saturated", f"{100 * share:.0f} % of the image is saturated; expose shorter, or turn the board out of glare"
+            "saturated",
+            f"{100 * share:.0f} % of the image is saturated; expose shorter, or turn the board out of glare",
         )
     if high - low < FLAT:
         raise TargetNotFoundError(
-            "low_contrast", f"bright and dark differ by {100 * (high - low):.0f} % of full scale; more light on the board"
+            "low_contrast",
+            f"bright and dark differ by {100 * (high - low):.0f} % of full scale; more light on the board",
         )
 
 

@@ -81,7 +81,9 @@ def _followed(places: Points, seed: int) -> dict[tuple[int, int], int]:
     if len(nearest) < 2:
         return {(0, 0): seed}
     first = away[nearest[0]]
-    across = [v for v in away[nearest] if abs(first[0] * v[1] - first[1] * v[0]) > 0.5 * np.hypot(*first) * np.hypot(*v)]
+    across = [
+        v for v in away[nearest] if abs(first[0] * v[1] - first[1] * v[0]) > 0.5 * np.hypot(*first) * np.hypot(*v)
+    ]
     if not across:
         return {(0, 0): seed}
     cells, steps, queue = {(0, 0): seed}, {(0, 0): (first, across[0])}, [(0, 0)]
@@ -114,7 +116,7 @@ def _matched(cells: dict[tuple[int, int], int], wanted: NDArray[np.intp]) -> NDA
     table[tuple((numbered - low).T)] = list(cells.values())
     best = np.full(len(wanted), -1, np.intp)
     for swap, sx, sy in itertools.product((False, True), (1, -1), (1, -1)):
-        turned = wanted[:, ::-1 if swap else 1] * (sx, sy)
+        turned = wanted[:, :: -1 if swap else 1] * (sx, sy)
         turned = turned - turned.min(axis=0)
         reach = turned.max(axis=0)
         padded = np.pad(table, [(r, r) for r in reach], constant_values=-1)
@@ -139,7 +141,7 @@ def symmetries(target: Target) -> list[NDArray[np.intp]]:
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     orders = []
     for swap, sx, sy in itertools.product((False, True), (1, -1), (1, -1)):
-        turned = (points - centre)[:, ::-1 if swap else 1] * (sx, sy) + centre
+        turned = (points - centre)[:, :: -1 if swap else 1] * (sx, sy) + centre
         apart = np.linalg.norm(turned[:, None] - points, axis=2)
         if apart.min(axis=1).max() < 1e-6 * target.pitch_mm:
             orders.append(apart.argmin(axis=1))

@@ -19,7 +19,17 @@ from pydantic import Field, model_validator
 
 from quadfringe.config import Model, Positive, checked
 
-__all__ = ["Disc", "Rectangle", "Target", "asymmetric_grid", "charuco_board", "circle_grid", "drawing", "raster", "ring_board"]
+__all__ = [
+    "Disc",
+    "Rectangle",
+    "Target",
+    "asymmetric_grid",
+    "charuco_board",
+    "circle_grid",
+    "drawing",
+    "raster",
+    "ring_board",
+]
 
 Count = Annotated[int, Field(ge=3, le=100)]
 MARK_DIAMETER = 0.22  # of the pitch: small enough never to be taken for a point
@@ -71,13 +81,17 @@ class Target(Model):
         given = {name for name in ("diameter_mm", "hole_mm", "marker_mm") if getattr(self, name) is not None}
         needed = {"rings": {"diameter_mm", "hole_mm"}, "charuco": {"marker_mm"}}.get(self.kind, {"diameter_mm"})
         if given != needed:
-            raise ValueError(f"{self.kind}: expected {', '.join(sorted(needed))}, got {', '.join(sorted(given)) or 'none'}")
+            raise ValueError(
+                f"{self.kind}: expected {', '.join(sorted(needed))}, got {', '.join(sorted(given)) or 'none'}"
+            )
         limit_mm = self.pitch_mm if self.kind == "charuco" else 0.7 * self.pitch_mm
         outer_mm = self.diameter_mm or self.marker_mm or 0.0
         if outer_mm >= limit_mm:
             raise ValueError(f"{self.kind}: expected less than {limit_mm:g} mm at this pitch, got {outer_mm:g} mm")
         if self.hole_mm is not None and self.hole_mm > 0.8 * outer_mm:
-            raise ValueError(f"rings: expected a hole of at most 0.8 of the ring, got {self.hole_mm:g} of {outer_mm:g} mm")
+            raise ValueError(
+                f"rings: expected a hole of at most 0.8 of the ring, got {self.hole_mm:g} of {outer_mm:g} mm"
+            )
         return self
 
     @cached_property
@@ -137,7 +151,9 @@ def ring_board(
     """Give the board of the paper, 9 x 12 rings; absent diameters are 0.6 and 0.3 of the pitch."""
     outer_mm = 0.6 * pitch_mm if diameter_mm is None else diameter_mm
     hole_mm = 0.5 * outer_mm if hole_mm is None else hole_mm
-    return _target(kind="rings", rows=rows, columns=columns, pitch_mm=pitch_mm, diameter_mm=outer_mm, hole_mm=hole_mm, marks=marks)
+    return _target(
+        kind="rings", rows=rows, columns=columns, pitch_mm=pitch_mm, diameter_mm=outer_mm, hole_mm=hole_mm, marks=marks
+    )
 
 
 def circle_grid(

@@ -1,0 +1,84 @@
+"""The captures of a session on the virtual bench: the whole guided calibration without hardware."""
+
+from __future__ import annotations
+
+from zlib import crc32
+
+from quadfringe.calibration.projector import ProjectorMap
+from quadfringe.config import SystemConfig
+from quadfringe.data import AnyShot
+from quadfringe.devices.virtual import VirtualBench
+from quadfringe.errors import InputError
+from quadfringe.guide.session import Session
+from quadfringe.rehearsal import BoardRoom, board_poses
+
+__all__ = ["BenchCaptures", "bench_session"]
+
+BOARD_MM = 800.0  # where the white board stands
+FLAT_LEVEL = 0.6
+TILTED = (0.2588, 0.0, -0.9659)  # normal of the plane of the acceptance test
+SPHERE_MM = (-40.0, -30.0, 800.0)
+
+
+def bench_session(config: SystemConfig, poses: int = 12) -> Session:
+    """Give the session of a virtual bench."""
+    bench = VirtualBench(config).resolved(config)
+    assert bench.projector is not None
+    size = (bench.projector.width_px, bench.projector.height_px)
+    return Session(rig="virtual bench", fringes=config.fringes, projector_size_px=size, poses=poses)
+
+
+class BenchCaptures:
+    """Renders every capture when it is asked for; the same name is the same image, noise included.
+
+    The bench of `config` gives devices, light and camera; what stands on it is put there as the step asks.
+    """
+
+    def __init__(self, config: SystemConfig, session: Session | None = None) -> None:
+        if config.scene.bayer is not None and config.scene.demosaic is None:
+            raise InputError("scene.bayer: the rehearsal of a calibration takes whole planes; set scene.demosaic")
+        self.session = session or bench_session(config)
+        self._config = config
+        self._bench = VirtualBench(config)
+        self._poses = dict(zip(self.session.captures("poses"), board_poses(self.session.poses), strict=True))
+        self._room: BoardRoom | None = None
+
+    def missing(self, step: str) -> list[str]:
+        """Nothing is ever missing on a bench that renders."""
+        self.session.captures(step)
+        return []
+
+    def shot(self, step: str, name: str) -> AnyShot:
+        """Render one shot."""
+        exposure = self._arrange(step, name)
+        seed = crc32(f"{self._config.scene.seed or 0}/{step}/{name}".encode())
+        return self._bench.expose(seed=seed, exposure=exposure, capped=step == "dark")
+
+    def pose(self, name: str) -> dict[str, ProjectorMap]:
+        """Render the fringes of one pose of the board, and decode them as those of a folder are."""
+        if self._room is None:
+            self._room = BoardRoom(self._config, self.session.target)
+        taken = self._room.capture(self._poses[name], self.session.step_plan)
+        return {beam: getattr(taken, beam) for beam in self.session.beams}
+
+    def _arrange(self, step: str, name: str) -> float:
+        """Put the right thing under the right light, and give the relative exposure."""
+        board = ((0.0, 0.0, BOARD_MM), (0.0, 0.0, -1.0))
+        if step in ("dark", "levels", "flat"):
+            self._bench.place_plane(*board)
+            plan = self.session.level_plan
+            row = plan.names.index(name) if step == "levels" else 0
+            light = plan.levels[row] if step == "levels" else (FLAT_LEVEL if step == "flat" else 0.0,) * 4
+            self._bench.project_levels((float(light[0]), float(light[1]), float(light[2]), float(light[3])))
+            return float(plan.exposure[row]) if step == "levels" else 1.0
+        self._bench.project(self.session.fringes)
+        if step == "planes":
+            height = self.session.heights_mm[self.session.captures("planes").index(name)]
+            self._bench.place_plane((0.0, 0.0, BOARD_MM - height), board[1])
+        elif name == "plane_1":
+            self._bench.place_plane((0.0, 0.0, BOARD_MM), TILTED)
+        elif name == "sphere_1":
+            self._bench.place_sphere(SPHERE_MM, 0.5 * self.session.sphere_diameter_mm)
+        else:
+            self._bench.place("steps")
+        return 1.0
