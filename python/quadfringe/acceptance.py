@@ -178,7 +178,7 @@ def measure_artefacts(config: SystemConfig, calibration: Calibration | None = No
     for centre in ((-40.0, -30.0, 800.0), (60.0, 40.0, 780.0), (0.0, 20.0, 840.0)):
         bench.place_sphere(centre, 30.0)
         shots.append(bench.expose(seed=_seed(config, len(shots))))
-    bench.place("steps")
+    bench.place_scene("steps")
     shots.append(bench.expose(seed=_seed(config, len(shots))))
     plan = Plan(known.projector.width_px, config.fringes, known, settings=config.decode)
     decoder = ShotDecoder(shots[0], plan)

@@ -137,6 +137,21 @@ def _list_captures(folder: Path) -> bool:
     return lacking
 
 
+@app.command()
+def rehearse(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the captures; made when missing.")],
+    system: Annotated[Path | None, typer.Option(metavar="FILE", help="System of the virtual bench, .toml.")] = None,
+    poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
+) -> None:
+    """Write every capture of a calibration of the virtual bench as images, to see what a session looks like."""
+    from quadfringe.guide.bench import BenchCaptures, bench_session
+    from quadfringe.simulate import bench_config
+
+    config = bench_config(system, noise=None if system else 0.01)
+    written = BenchCaptures(config, bench_session(config, poses)).write(folder)
+    say(f"{folder}: {len(written)} captures; now quadfringe calibrate run --captures {folder} --out calibration.json")
+
+
 @app.command("export")
 def export_opencv(
     calibration: Annotated[Path, typer.Argument(metavar="FILE", help="Calibration, .json.")],

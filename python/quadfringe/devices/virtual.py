@@ -71,7 +71,7 @@ class VirtualBench:
         """Put a sphere before the camera, in place of the scene."""
         self._cast = self._bench.cast_sphere(centre_mm=centre_mm, radius_mm=radius_mm)
 
-    def place(self, surface: str) -> None:
+    def place_scene(self, surface: str) -> None:
         """Put a ready scene before the camera; ValueError when there is none of that name."""
         self._cast = self._bench.cast(surface)
 

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
 from zlib import crc32
 
+import numpy as np
+from numpy.typing import NDArray
+
 from quadfringe.calibration.projector import ProjectorMap
+from quadfringe.calibration.targets import raster
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot
-from quadfringe.devices.virtual import VirtualBench
+from quadfringe.devices.virtual import PrintedBoard, VirtualBench
 from quadfringe.errors import InputError
-from quadfringe.guide.session import Session
-from quadfringe.rehearsal import BoardRoom, board_poses
+from quadfringe.files import folder_for
+from quadfringe.guide.captures import pose_maps
+from quadfringe.guide.session import FILE, STEPS, Session
+from quadfringe.images import write_image
+from quadfringe.rehearsal import INK, PAPER, TEXEL_MM, board_poses
+from quadfringe.shots import write_shot
 
 __all__ = ["BenchCaptures", "bench_session"]
 
@@ -40,8 +51,11 @@ class BenchCaptures:
         self.session = session or bench_session(config)
         self._config = config
         self._bench = VirtualBench(config)
-        self._poses = dict(zip(self.session.captures("poses"), board_poses(self.session.poses), strict=True))
-        self._room: BoardRoom | None = None
+        self._poses = dict(
+            zip(self.session.captures("poses"), board_poses(self.session.target, self.session.poses), strict=True)
+        )
+        target = self.session.target
+        self._board = PrintedBoard(raster(target, TEXEL_MM), TEXEL_MM, target.area_mm, PAPER, INK)
 
     def missing(self, step: str) -> list[str]:
         """Nothing is ever missing on a bench that renders."""
@@ -56,10 +70,40 @@ class BenchCaptures:
 
     def pose(self, name: str) -> dict[str, ProjectorMap]:
         """Render the fringes of one pose of the board, and decode them as those of a folder are."""
-        if self._room is None:
-            self._room = BoardRoom(self._config, self.session.target)
-        taken = self._room.capture(self._poses[name], self.session.step_plan)
-        return {beam: getattr(taken, beam) for beam in self.session.beams}
+        self._bench.place(self._board, self._poses[name])
+        return pose_maps(self.session, lambda image: self._fringes(image) / np.float32(self._full_scale))
+
+    def write(self, folder: Path, steps: Iterable[str] = tuple(step.name for step in STEPS)) -> list[Path]:
+        """Write session.json and the captures of these steps as a camera would have; returns the folders of captures."""
+        self.session.save(folder_for(folder) / FILE)
+        written = []
+        for step in steps:
+            for name in self.session.captures(step):
+                place = folder_for(folder / step / name)
+                if step == "poses":
+                    self._write_pose(place, name)
+                else:
+                    write_shot(place, self.shot(step, name))
+                written.append(place)
+        return written
+
+    def _write_pose(self, folder: Path, name: str) -> None:
+        self._bench.place(self._board, self._poses[name])
+        for beam in self.session.beams:
+            folder_for(folder / beam)
+        for image in self.session.pose_images():
+            write_image(folder / f"{image}.png", self._fringes(image))
+
+    def _fringes(self, image: str) -> NDArray[Any]:
+        """Render one fringe image of the pose that stands there: green for the visible projector, as it was captured."""
+        beam, _, name = image.partition("/")
+        axis, number, step = name.split("_")
+        shot = self._bench.expose_step(float(number), self.session.step_plan.shift_rad(int(step)), axis, beam)
+        return shot.channels["green" if beam == "visible" else "ir"]
+
+    @property
+    def _full_scale(self) -> float:
+        return float(2**self._config.scene.bit_depth - 1)
 
     def _arrange(self, step: str, name: str) -> float:
         """Put the right thing under the right light, and give the relative exposure."""
@@ -80,5 +124,5 @@ class BenchCaptures:
         elif name == "sphere_1":
             self._bench.place_sphere(SPHERE_MM, 0.5 * self.session.sphere_diameter_mm)
         else:
-            self._bench.place("steps")
+            self._bench.place_scene("steps")
         return 1.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -15,7 +16,7 @@ from quadfringe.guide.session import FILE, Session
 from quadfringe.images import full_scale, read_grey
 from quadfringe.shots import SUFFIXES, read_folder
 
-__all__ = ["Captures", "FolderCaptures"]
+__all__ = ["Captures", "FolderCaptures", "pose_maps"]
 
 
 class Captures(Protocol):
@@ -68,18 +69,7 @@ class FolderCaptures:
 
     def pose(self, name: str) -> dict[str, ProjectorMap]:
         """Read the fringe images of a pose."""
-        plan = self.session.step_plan
-        found = {}
-        for beam in self.session.beams:
-            stacks = {
-                axis: [
-                    np.stack([self._fringes(name, f"{beam}/{axis}_{number:g}_{i}") for i in range(plan.steps)])
-                    for number in plan.fringes.numbers
-                ]
-                for axis in AXES
-            }
-            found[beam] = projector_map(stacks["columns"], stacks["rows"], plan)
-        return found
+        return pose_maps(self.session, lambda image: self._fringes(name, image))
 
     def _fringes(self, pose: str, image: str) -> NDArray[np.float32]:
         folder = self.folder / "poses" / pose
@@ -98,6 +88,22 @@ class FolderCaptures:
                 f"{name}: {image.shape[1]} x {image.shape[0]} pixels, the captures before have {self._size[1]} x "
                 f"{self._size[0]}; all captures of a session must be of one camera and one size"
             )
+
+
+def pose_maps(session: Session, image: Callable[[str], NDArray[np.float32]]) -> dict[str, ProjectorMap]:
+    """Give the projector maps of a pose, by projector; `image` gives one by its name, (H, W) shares of full scale."""
+    plan = session.step_plan
+    found = {}
+    for beam in session.beams:
+        columns, rows = (
+            [
+                np.stack([image(f"{beam}/{axis}_{number:g}_{step}") for step in range(plan.steps)])
+                for number in plan.fringes.numbers
+            ]
+            for axis in AXES
+        )
+        found[beam] = projector_map(columns, rows, plan)
+    return found
 
 
 def _has_images(folder: Path) -> bool:
