@@ -74,7 +74,7 @@ class BenchCaptures:
         return pose_maps(self.session, lambda image: self._fringes(image) / np.float32(self._full_scale))
 
     def write(self, folder: Path, steps: Iterable[str] = tuple(step.name for step in STEPS)) -> list[Path]:
-        """Write session.json and the captures of these steps as a camera would have; returns the folders of captures."""
+        """Write session.json and the captures of these steps as a camera would; returns the folders of captures."""
         self.session.save(folder_for(folder) / FILE)
         written = []
         for step in steps:
@@ -95,7 +95,7 @@ class BenchCaptures:
             write_image(folder / f"{image}.png", self._fringes(image))
 
     def _fringes(self, image: str) -> NDArray[Any]:
-        """Render one fringe image of the pose that stands there: green for the visible projector, as it was captured."""
+        """Render one fringe image of the pose that stands there; the green channel stands for the visible ones."""
         beam, _, name = image.partition("/")
         axis, number, step = name.split("_")
         shot = self._bench.expose_step(float(number), self.session.step_plan.shift_rad(int(step)), axis, beam)
