@@ -26,7 +26,9 @@ __all__ = ["Channels", "fit_channels"]
 
 Array = NDArray[np.float64]
 CLIPPED = 0.97  # captured shares of full scale from here on are left out: noise would be cut off
-PRIOR = 2e-3  # share of full scale that one unit of a camera exponent away from 1 costs: a camera is linear unless seen
+CAMERA_PRIOR = 2e-3  # share of full scale that one unit of a camera exponent away from 1 costs: a camera is linear unless seen
+DARK_PRIOR = 0.05  # the same for the dark level, which noise that cannot be negative lifts where a camera bends
+ROBUST = 2e-3  # misses of captures above this count less, share of full scale
 UNLIT = 0.02  # a channel whose own light stays below this share of full scale cannot be calibrated
 OFFSET_MAX = 0.45  # share of full light that room light may add
 USABLE_MIN = 3  # unsaturated levels of a ramp, black left out, that show its bend
@@ -72,7 +74,7 @@ class Channels:
 def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,) * 4) -> Channels:
     """Fit responses and crosstalk to `captured` (K, 4), shares of full scale, NaN where saturated (S1).
 
-    `dark` is the level without light. Raises `InputError` when there are not as many captures as the plan has, when a
+    `dark` is the level without light, where the fit starts. Raises `InputError` when there are not as many captures as the plan has, when a
     projected channel is not seen by its own camera channel, or when too few captures are unsaturated.
     """
     captured = np.asarray(captured, float)
@@ -81,14 +83,15 @@ def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,
             f"levels: expected {len(plan.levels)} captures of four channels, got an array of shape {captured.shape}; "
             "take every level of the plan"
         )
-    lit = np.where(captured < CLIPPED, captured, np.nan) - np.asarray(dark, float)
-    _check_ramps(plan, lit)
-    found, deviations = _solve(plan, lit)
+    seen = np.where(captured < CLIPPED, captured, np.nan)
+    _check_ramps(plan, seen - np.asarray(dark, float))
+    found, deviations = _solve(plan, seen, np.asarray(dark, float))
+    lit = seen - found.dark
     own = np.diag(found.mixing)
     crosstalk = found.mixing / own
     offset = np.linalg.solve(crosstalk, found.ambient).clip(0.0, OFFSET_MAX)
     known: dict[str, Any] = {
-        "dark": row4(dark),
+        "dark": row4(found.dark),
         "response": _responses(np.zeros(4), found.camera),
         "crosstalk": _matrix(crosstalk),
         "projector_response": _responses(offset, 1 / found.projector),
@@ -104,45 +107,50 @@ def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,
 
 @dataclass(frozen=True)
 class _Model:
-    """Exponents of camera and projector, light of projected on captured channels, room light."""
+    """Exponents of camera and projector, light of projected on captured channels, room light, dark level."""
 
     camera: Array
     projector: Array
     mixing: Array
     ambient: Array
+    dark: Array
 
     @classmethod
     def of(cls, numbers: Array) -> _Model:
-        return cls(numbers[:4], numbers[4:8], numbers[8:24].reshape(4, 4), numbers[24:])
+        return cls(numbers[:4], numbers[4:8], numbers[8:24].reshape(4, 4), numbers[24:28], numbers[28:])
 
     def numbers(self) -> Array:
-        return np.concatenate([self.camera, self.projector, self.mixing.ravel(), self.ambient])
+        return np.concatenate([self.camera, self.projector, self.mixing.ravel(), self.ambient, self.dark])
 
     def captured(self, plan: LevelPlan) -> Array:
         light = plan.exposure[:, None] * (plan.levels**self.projector @ self.mixing.T + self.ambient)
-        return np.asarray(np.maximum(light, 0.0) ** (1 / self.camera))
+        return np.asarray(self.dark + np.maximum(light, 0.0) ** (1 / self.camera))
 
 
-def _solve(plan: LevelPlan, lit: Array) -> tuple[_Model, _Model]:
+def _solve(plan: LevelPlan, seen: Array, dark: Array) -> tuple[_Model, _Model]:
     """Give the best model and the standard deviations of its numbers."""
     from scipy.optimize import least_squares
 
-    seen = np.isfinite(lit)
+    counts = np.isfinite(seen)
 
     def misses(numbers: Array) -> Array:
         model = _Model.of(numbers)
-        return np.concatenate([(model.captured(plan) - lit)[seen], PRIOR * (model.camera - 1)])
+        held = [CAMERA_PRIOR * (model.camera - 1), DARK_PRIOR * (model.dark - dark)]
+        return np.concatenate([(model.captured(plan) - seen)[counts], *held])
 
-    start = _first_guess(plan, lit).numbers()
-    low = np.concatenate([np.full(8, 0.2), np.full(20, -0.2)])
-    high = np.concatenate([np.full(8, 5.0), np.full(20, 3.0)])
-    found = least_squares(misses, start.clip(low + 1e-9, high - 1e-9), bounds=(low, high), x_scale="jac", xtol=1e-12)
-    spare = max(int(seen.sum()) - start.size, 1)
+    start = _first_guess(plan, seen - dark, dark).numbers()
+    low = np.concatenate([np.full(8, 0.2), np.full(20, -0.2), np.zeros(4)])
+    high = np.concatenate([np.full(8, 5.0), np.full(20, 3.0), np.full(4, 0.5)])
+    start = start.clip(low + 1e-9, high - 1e-9)
+    found = least_squares(
+        misses, start, bounds=(low, high), x_scale="jac", xtol=1e-12, loss="soft_l1", f_scale=ROBUST, max_nfev=300
+    )
+    spare = max(int(counts.sum()) - start.size, 1)
     covariance = np.linalg.pinv(found.jac.T @ found.jac) * 2 * found.cost / spare
     return _Model.of(found.x), _Model.of(np.sqrt(np.diag(covariance)))
 
 
-def _first_guess(plan: LevelPlan, lit: Array) -> _Model:
+def _first_guess(plan: LevelPlan, lit: Array, dark: Array) -> _Model:
     """Take the camera as linear, the brightest unsaturated level of each ramp as its light, and its bend as a power."""
     black = np.nan_to_num(lit[_black(plan)].mean(axis=0))
     mixing, projector = np.eye(4), np.ones(4)
@@ -156,7 +164,7 @@ def _first_guess(plan: LevelPlan, lit: Array) -> _Model:
         top = int(np.flatnonzero(np.isfinite(own))[-1])
         mixing[:, channel] = np.nan_to_num(light[top]) / level[top] ** slope
         mixing[channel, channel] = np.exp(height)
-    return _Model(np.ones(4), projector, mixing, black)
+    return _Model(np.ones(4), projector, mixing, black, dark)
 
 
 def _black(plan: LevelPlan) -> NDArray[np.intp]:
