@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 import quadfringe as qf
 from quadfringe.cli import app
-from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config import IDENTITY, DeviceModel, SceneConfig, SystemConfig
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
 from quadfringe.doctor import Finding, examine_calibration, examine_installation, examine_shot
 from quadfringe.doctor import installation as installed
@@ -76,19 +76,21 @@ def test_exchanged_channels_are_told() -> None:
 
 
 def test_a_pair_that_has_drifted_is_told() -> None:
+    """Half a millimetre is told; at one and a half all orders are wrong, which no margin shows."""
     with qf.open(SystemConfig(camera=SMALL, scene=SceneConfig(surface="peaks", noise=0.01))) as scanner:
         config = scanner.config
     assert config.projector is not None
-    moved = config.projector.model_copy(
-        update={"translation_mm": tuple(np.add(config.projector.translation_mm, (1.5, 0, 0)))}
-    )
-    with qf.open(config.model_copy(update={"infrared": moved})) as scanner:
-        shot, calibration = scanner.grab(), scanner.calibration
-    coaxial = calibration.model_copy(update={"infrared": None})
-    told = by_name(examine_shot(shot, qf.Plan(912, calibration=coaxial)))["coaxial pair"]
-    assert told.grade in ("warning", "fault")
-    known = calibration.model_copy(update={"infrared": moved})
-    assert by_name(examine_shot(shot, qf.Plan(912, calibration=known)))["coaxial pair"].grade == "good"
+    for shift_mm, grade, known_grade in ((0.5, "warning", "good"), (1.5, "fault", "fault")):
+        shifted = tuple(float(v) for v in np.add(config.projector.translation_mm, (shift_mm, 0, 0)))
+        moved = config.projector.model_copy(update={"translation_mm": shifted})
+        with qf.open(config.model_copy(update={"infrared": moved})) as scanner:
+            shot, calibration = scanner.grab(), scanner.calibration
+        told = [
+            by_name(examine_shot(shot, qf.Plan(912, calibration=calibration.model_copy(update={"infrared": pair}))))
+            for pair in (None, moved)
+        ]
+        assert [one["coaxial pair"].grade for one in told] == [grade, known_grade]
+        assert ("wrong by whole fringes" in told[0]["coaxial pair"].found) == (grade == "fault")
 
 
 def test_a_calibration_tells_what_is_wrong_with_it() -> None:
@@ -96,9 +98,7 @@ def test_a_calibration_tells_what_is_wrong_with_it() -> None:
     assert by_name(examine_calibration(calibration))["record"].grade == "warning"
     bad = CalibrationStep(name="levels", good=False, verdict="channels still see 3 % of one another's light")
     record = CalibrationRecord(made_utc="2020-01-01T00:00:00+00:00", quadfringe_version="0.1.0", rig="r", steps=(bad,))
-    flat = calibration.projector.model_copy(
-        update={"translation_mm": (-10.0, 0.0, 0.0), "rotation": np.eye(3).tolist()}
-    )
+    flat = calibration.projector.model_copy(update={"translation_mm": (-10.0, 0.0, 0.0), "rotation": IDENTITY})
     singular = [[1.0 if i == j else 0.95 for j in range(4)] for i in range(4)]
     values = calibration.model_dump() | {
         "record": record.model_dump(),

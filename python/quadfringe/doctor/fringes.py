@@ -18,12 +18,14 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Plan
 from quadfringe.stages import carrier, linear_light
 
-__all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift_px"]
+__all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift"]
 
 Map = NDArray[np.float32]
 PIXELS_MIN = 5000
 TILE_PX = 96
 TILE_SHARE = 0.3  # of a tile must carry fringes
+TILES_MIN = 2
+SHIFT_MAX = 6  # fringes by which orders may be off
 QUANTILE = 0.95  # of the tiles: the worst that is no accident
 
 
@@ -42,10 +44,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class Drift:
-    """How far infrared fringes are from where they should be, in projector pixels, over tiles of the image."""
+    """How far infrared fringes are from where they should be, in projector pixels, over tiles of the image.
+
+    `off` is the share of tiles whose orders are wrong, all by whole fringes.
+    """
 
     median_px: float
     worst_px: float
+    off: float
 
 
 def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
@@ -69,31 +75,64 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
     return Fit(CHANNELS, amplitude, harmonic, crosstalk)
 
 
-def infrared_drift_px(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
+def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
     """Compare infrared fringes with their place by the pair that the calibration knows; None with too few tiles.
 
-    Without an infrared projector in the calibration both projectors are taken as coaxial.
+    Without an infrared projector in the calibration both projectors are taken as coaxial. A pair that is far off moves
+    every order by the same number of fringes and still looks sound; green, from the projector of red and blue, then
+    tells that number, because its mean over a tile is known to a hundredth of a fringe.
     """
     light, backgrounds, inside = _waves(shot, shape, plan)
-    number = plan.fringes.numbers[2]
-    expected = _expected_ir_column(shape, plan) * (2 * np.pi * number / plan.projector_width_px)
-    wave = light["ir"] / backgrounds["ir"] - 1
-    inside = inside & np.isfinite(expected) & np.isfinite(wave)
-    rows, columns = inside.shape
-    away = []
-    for y in range(0, rows - TILE_PX + 1, TILE_PX):
-        for x in range(0, columns - TILE_PX + 1, TILE_PX):
-            tile = (slice(y, y + TILE_PX), slice(x, x + TILE_PX))
-            mine = inside[tile]
-            if mine.sum() < TILE_SHARE * TILE_PX**2:
-                continue
-            phase = expected[tile][mine]
-            design = np.stack([np.cos(phase), -np.sin(phase), np.ones_like(phase)], axis=1)
-            cos, sin, _ = np.linalg.lstsq(design, wave[tile][mine], rcond=None)[0]
-            away.append(float(np.arctan2(sin, cos)) * plan.projector_width_px / (2 * np.pi * number))
-    if len(away) < 2:
+    width = plan.projector_width_px
+    periods = [width / number for number in plan.fringes.numbers]
+    column = shape.column_px.astype(float)
+    places = (column, column, _expected_ir_column(shape, plan))
+    inside = inside & np.isfinite(places[2])
+    waves = [light[name] / backgrounds[name] - 1 for name in ("red", "green", "ir")]
+    away, shifts = [], []
+    for tile in _tiles(inside):
+        mine = inside[tile]
+        first, second, third = (
+            _offset_px(wave[tile][mine], place[tile][mine], period)
+            for wave, place, period in zip(waves, places, periods, strict=True)
+        )
+        shift = _fringes_off(_wrapped(second - first, periods[1]), periods)
+        away.append(_wrapped(third - first - shift * periods[0], periods[2]))
+        shifts.append(shift)
+    if len(away) < TILES_MIN:
         return None
-    return Drift(float(np.median(away)), float(np.quantile(np.abs(away), QUANTILE)))
+    off = float(np.mean(np.array(shifts) != 0))
+    return Drift(float(np.median(away)), float(np.quantile(np.abs(away), QUANTILE)), off)
+
+
+def _tiles(inside: NDArray[np.bool_]) -> list[tuple[slice, slice]]:
+    rows, columns = inside.shape
+    tiles = [
+        (slice(y, y + TILE_PX), slice(x, x + TILE_PX))
+        for y in range(0, rows - TILE_PX + 1, TILE_PX)
+        for x in range(0, columns - TILE_PX + 1, TILE_PX)
+    ]
+    return [tile for tile in tiles if inside[tile].mean() >= TILE_SHARE]
+
+
+def _offset_px(wave: NDArray[np.floating], column: NDArray[np.float64], period: float) -> float:
+    """Give how many projector pixels the fringes of a wave lie after their place, within half a period."""
+    phase = 2 * np.pi * column / period
+    design = np.stack([np.cos(phase), -np.sin(phase), np.ones_like(phase)], axis=1)
+    cos, sin, _ = np.linalg.lstsq(design, wave, rcond=None)[0]
+    return float(np.arctan2(sin, cos)) * period / (2 * np.pi)
+
+
+def _fringes_off(green_px: float, periods: list[float]) -> int:
+    """Give the least number of fringes of red and blue that explains where those of green lie."""
+    shifts = sorted(range(-SHIFT_MAX, SHIFT_MAX + 1), key=abs)
+    missed = [abs(_wrapped(green_px - shift * periods[0], periods[1])) for shift in shifts]
+    close = min(missed) + 0.25 * abs(periods[0] - periods[1])
+    return next(shift for shift, miss in zip(shifts, missed, strict=True) if miss <= close)
+
+
+def _wrapped(offset_px: float, period: float) -> float:
+    return (offset_px + period / 2) % period - period / 2
 
 
 def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> tuple[dict[str, Map], dict[str, Map], NDArray[np.bool_]]:

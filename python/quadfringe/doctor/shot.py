@@ -7,18 +7,19 @@ import numpy as np
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.doctor.finding import Finding, graded
-from quadfringe.doctor.fringes import Fit, fit_fringes, infrared_drift_px
+from quadfringe.doctor.fringes import Fit, fit_fringes, infrared_drift
 from quadfringe.errors import DecodeError
 
 __all__ = ["examine_shot"]
 
 SATURATED = (0.01, 0.2)  # share of pixels
 CONTRAST = (0.10, 0.04)  # amplitude of the fringes, share of full scale
-NOT_LINEAR = (0.03, 0.12)  # second harmonic over first
+NOT_LINEAR = (0.04, 0.08)  # second harmonic over first
 CROSSTALK = (0.04, 0.15)  # of another channel's fringes
 MARGIN = (0.7, 0.5)  # median order margin, in [0, 1]
 RETURNED = (0.8, 0.3)  # share of lit pixels
-DRIFT_PX = (1.0, 4.0)  # projector pixels between where infrared fringes are and where they should be
+OFF_MAX = 0.1  # share of the image with orders that are wrong by whole fringes
+DRIFT_PX = (1.0, 2.5)  # projector pixels between where infrared fringes are and where they should be
 
 
 def examine_shot(shot: AnyShot, plan: Plan) -> list[Finding]:
@@ -115,10 +116,13 @@ def _crosstalk(fit: Fit, plan: Plan) -> Finding:
 
 
 def _drift(shot: AnyShot, shape: Shape, plan: Plan) -> Finding:
-    drift = infrared_drift_px(shot, shape, plan)
+    drift = infrared_drift(shot, shape, plan)
     if drift is None:
         words = "too few pixels with fringes to look at the coaxial pair"
         return Finding("coaxial pair", "warning", words, "fill more of the field with the object")
     fix = "one projector has moved against the other: calibrate the pair again and show the corrected infrared pattern"
     words = f"infrared fringes lie {drift.median_px:+.2f} projector pixels from their place, up to {drift.worst_px:.2f}"
+    if drift.off > OFF_MAX:
+        words += f"; the fringe orders are wrong by whole fringes in {drift.off:.0%} of the image"
+        return Finding("coaxial pair", "fault", words, fix, drift.worst_px)
     return graded("coaxial pair", drift.worst_px, DRIFT_PX, words, fix)
