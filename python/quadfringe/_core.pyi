@@ -178,7 +178,8 @@ class Bench:
     def render(self, cast: Cast, fringe_numbers: _Vector3, **options: Any) -> dict[str, NDArray[Any]]:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
-        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that is not known is a TypeError.
+        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that
+        is not known is a TypeError.
         """
 
     def render_step(

@@ -21,7 +21,7 @@ class DecodeError(RuntimeError):
 
 
 class CalibrationError(DecodeError):
-    """Captures from which no calibration can be trusted; `reason` is one word for programs, the message is for people."""
+    """Captures that cannot be calibrated; `reason` is one word for programs, the message is for people."""
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)

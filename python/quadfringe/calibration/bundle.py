@@ -113,7 +113,7 @@ def _sizes(poses: Sequence[Pose]) -> dict[str, tuple[int, int]]:
         found = {points.size_px for pose in poses if (points := getattr(pose, name)) is not None}
         if len(found) > 1:
             raise InputError(f"{name}: projector sizes {sorted(found)} are mixed; a projector has one")
-        sizes |= {name: size for size in found}
+        sizes |= dict.fromkeys([name] if found else [], next(iter(found), (0, 0)))
     return sizes
 
 
@@ -190,13 +190,17 @@ def _covariance(jacobian: Any) -> Array:
 
 
 def _point_sd(adjustment: Adjustment, values: Array, covariance: Array) -> dict[str, float]:
-    """Standard deviation of a coordinate by device: its residuals over its share of the redundancy."""
+    """Give the standard deviation of a coordinate by device: its residuals over its share of the redundancy."""
     residuals, jacobian = adjustment.residuals(values), adjustment.jacobian(values)
     leverage = np.asarray((jacobian @ covariance * jacobian.toarray()).sum(axis=1)).ravel()
     found = {}
     for device in adjustment.devices:
         rows = np.concatenate(
-            [np.arange(r.start, r.stop) for r, s in zip(adjustment.rows, adjustment.sights, strict=True) if s.device == device]
+            [
+                np.arange(r.start, r.stop)
+                for r, s in zip(adjustment.rows, adjustment.sights, strict=True)
+                if s.device == device
+            ]
         )
         redundancy = len(rows) - leverage[rows].sum()
         found[device] = float(adjustment.sd_px[device] * np.sqrt(np.square(residuals[rows]).sum() / redundancy))

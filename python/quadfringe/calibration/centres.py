@@ -75,7 +75,7 @@ def _centroid(
     total = dark.sum()
     if total < 0.05 * inside.sum():
         return np.full(2, np.nan)
-    return np.array([(dark * x).sum(), (dark * y).sum()]) / total
+    return np.array([(dark * x).sum() / total, (dark * y).sum() / total])
 
 
 def perspective_shift(matrix: Points, target: Target) -> Points:

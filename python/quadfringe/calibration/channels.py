@@ -26,7 +26,9 @@ __all__ = ["Channels", "fit_channels"]
 
 Array = NDArray[np.float64]
 CLIPPED = 0.97  # captured shares of full scale from here on are left out: noise would be cut off
-CAMERA_PRIOR = 2e-3  # share of full scale that one unit of a camera exponent away from 1 costs: a camera is linear unless seen
+CAMERA_PRIOR = (
+    2e-3  # share of full scale that one unit of a camera exponent away from 1 costs: a camera is linear unless seen
+)
 DARK_PRIOR = 0.05  # the same for the dark level, which noise that cannot be negative lifts where a camera bends
 ROBUST = 2e-3  # misses of captures above this count less, share of full scale
 UNLIT = 0.02  # a channel whose own light stays below this share of full scale cannot be calibrated

@@ -65,6 +65,8 @@ def find_target(image: NDArray[Any], target: Target, full_scale: float | None = 
     if target.kind == "charuco":
         return _charuco(grey, stretched, target)
     ordered = _ordered(stretched, target)
+    if not _is_sharp(stretched):
+        raise TargetNotFoundError("blurred", f"all points are found, but {BLURRED}")
     centres = refined_centres(grey, target, _turned(grey, target, ordered))
     if not np.isfinite(centres).all():
         lost = int((~np.isfinite(centres).all(axis=1)).sum())
@@ -94,12 +96,6 @@ def _exposed(grey: NDArray[np.float32]) -> None:
         raise TargetNotFoundError(
             "dark", f"the image is dark: its bright parts have {100 * high:.0f} % of full scale; expose longer"
         )
-    share = float((grey >= 0.999).mean())
-    if share > SATURATED:
-        raise TargetNotFoundError(
-            "saturated",
-            f"{100 * share:.0f} % of the image is saturated; expose shorter, or turn the board out of glare",
-        )
     if high - low < FLAT:
         raise TargetNotFoundError(
             "low_contrast",
@@ -123,24 +119,33 @@ def _ordered(stretched: NDArray[np.uint8], target: Target) -> Points:
 
 def _diagnosed(stretched: NDArray[np.uint8], target: Target, count: int) -> TargetNotFoundError:
     """Say why no grid was found."""
+    share = float((stretched == 255).mean())
+    if share > SATURATED:
+        return TargetNotFoundError(
+            "saturated",
+            f"{100 * share:.0f} % of the image are as bright as can be; expose shorter, turn it out of glare",
+        )
+    expected, name = target.rows * target.columns, "rings" if target.kind == "rings" else "discs"
+    if not _is_sharp(stretched):
+        return TargetNotFoundError("blurred", f"{count} of {expected} {name} found, and {BLURRED}")
+    if count >= expected // 4:
+        return TargetNotFoundError("partial", f"{count} of {expected} {name} found; {WHOLE}")
+    return TargetNotFoundError(
+        "not_found",
+        f"{count} of {expected} {name} found; is it this board ({_named(target)}), flat and in the picture?",
+    )
+
+
+BLURRED = "no edge is sharp; focus the lens, hold the board still"
+
+
+def _is_sharp(stretched: NDArray[np.uint8]) -> bool:
+    """Tell whether any edges rise within some five pixels."""
     import cv2
 
-    expected, name = target.rows * target.columns, "rings" if target.kind == "rings" else "discs"
     soft = cv2.GaussianBlur(stretched, (0, 0), 1.0).astype(np.float32) / 255
     slope = np.hypot(cv2.Sobel(soft, cv2.CV_32F, 1, 0, scale=1 / 8), cv2.Sobel(soft, cv2.CV_32F, 0, 1, scale=1 / 8))
-    if count < expected // 2 and np.quantile(slope, 0.995) < SHARP:
-        return TargetNotFoundError(
-            "blurred", f"{count} of {expected} {name} found, and no edge is sharp; focus the lens, hold the board still"
-        )
-    if expected // 4 <= count < expected:
-        return TargetNotFoundError("partial", f"{count} of {expected} {name} found; {WHOLE}")
-    if count < expected:
-        return TargetNotFoundError(
-            "not_found", f"{count} of {expected} {name} found; is it this board ({_named(target)}), and in the picture?"
-        )
-    return TargetNotFoundError(
-        "not_found", f"{count} {name} found, but no grid of {_named(target)} among them; is it this board, and flat?"
-    )
+    return bool(np.quantile(slope, 0.995) >= SHARP)
 
 
 def _named(target: Target) -> str:
@@ -164,12 +169,12 @@ def _turned(grey: NDArray[np.float32], target: Target, places: Points) -> Points
     if darkness[best] < MARK_MIN:
         raise TargetNotFoundError(
             "not_found",
-            "the two marks in the first cells of the board are not seen; free them, or say that it has none (marks off)",
+            "the two marks in the first cells of the board are not seen; free them, or state that it has none",
         )
     if not upright[best]:
         raise TargetNotFoundError(
             "mirrored",
-            "the board is seen mirrored; switch off the mirroring of the camera, or print the board the right way round",
+            "the board is seen mirrored; switch off the mirroring of the camera, or print it the right way round",
         )
     return choices[best]
 
@@ -219,7 +224,7 @@ def _charuco(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Ta
     places = np.asarray(corners, np.float32).reshape(-1, 1, 2)
     _not_on_a_line(target.points_mm[chosen, :2])
     ending = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 50, 1e-4)
-    half = _corner_window_px(target, chosen, places.reshape(-1, 2))
+    half = _corner_window_px(target, chosen, places.reshape(-1, 2).astype(np.float64))
     refined = cv2.cornerSubPix(grey, places, (half, half), (-1, -1), ending)
     return View(refined.reshape(-1, 2).astype(np.float64), chosen, (grey.shape[1], grey.shape[0]))
 

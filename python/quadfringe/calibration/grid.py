@@ -26,7 +26,7 @@ def blobs(image: NDArray[np.uint8], target: Target) -> Points:
     import cv2
 
     most = image.size / (target.rows * target.columns)
-    settings = cv2.SimpleBlobDetector_Params()
+    settings = cv2.SimpleBlobDetector.Params()
     settings.filterByColor, settings.blobColor = True, 255 if target.kind == "rings" else 0
     settings.filterByArea, settings.minArea, settings.maxArea = True, AREA_MIN_PX, float(most)
     settings.filterByCircularity, settings.minCircularity = True, 0.55
@@ -34,7 +34,7 @@ def blobs(image: NDArray[np.uint8], target: Target) -> Points:
     settings.filterByConvexity, settings.minConvexity = True, 0.8
     settings.minThreshold, settings.maxThreshold, settings.thresholdStep = 8, 250, 8
     settings.minDistBetweenBlobs, settings.minRepeatability = 5, 2
-    found = cv2.SimpleBlobDetector_create(settings).detect(image)
+    found = cv2.SimpleBlobDetector.create(settings).detect(image)
     places = np.array([blob.pt for blob in found], np.float64).reshape(-1, 2)
     return places[_alike(np.array([blob.size for blob in found]))]
 
@@ -74,7 +74,7 @@ def _cells(target: Target) -> NDArray[np.intp]:
 
 
 def _followed(places: Points, seed: int) -> dict[tuple[int, int], int]:
-    """Number the places from the seed, neighbour by neighbour: whole coordinates to index."""
+    """Give the places by whole coordinates, found from neighbour to neighbour from the seed on."""
     away = places - places[seed]
     distance = np.linalg.norm(away, axis=1)
     nearest = [i for i in np.argsort(distance)[1:9] if distance[i] > 0]

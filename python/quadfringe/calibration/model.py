@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,14 @@ __all__ = ["DEVICES", "LENS", "Adjustment", "Sight"]
 Array = NDArray[np.float64]
 DEVICES = ("camera", "visible", "infrared")
 LENS = ("focal_x_px", "focal_y_px", "centre_x_px", "centre_y_px", "k1", "k2", "p1", "p2", "k3")
-MOTION = ("rotation_x_rad", "rotation_y_rad", "rotation_z_rad", "translation_x_mm", "translation_y_mm", "translation_z_mm")
+MOTION = (
+    "rotation_x_rad",
+    "rotation_y_rad",
+    "rotation_z_rad",
+    "translation_x_mm",
+    "translation_y_mm",
+    "translation_z_mm",
+)
 
 
 @dataclass(frozen=True)
@@ -60,7 +68,7 @@ class Adjustment:
             self._add(names, f"pose_{pose + 1}", "motion", MOTION)
         self.names = tuple(names)
         ends = np.cumsum([0, *(2 * len(s.points_px) for s in sights)])
-        self.rows = [slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self.rows = [slice(int(a), int(b)) for a, b in pairwise(ends)]
         self.count = int(ends[-1])
         self._at: tuple[NDArray[np.intp], ...] | None = None
 
@@ -87,7 +95,7 @@ class Adjustment:
         for sight, residual in zip(self.sights, raw, strict=True):
             own = residual
             if sight.slope is not None:
-                own = residual - np.einsum("nij,nj->ni", sight.slope, camera[sight.pose][sight.camera_rows])
+                own = residual - (sight.slope @ camera[sight.pose][sight.camera_rows][:, :, None])[:, :, 0]
             out.append(own / self.sd_px[sight.device])
         return out
 
@@ -101,10 +109,9 @@ class Adjustment:
             slopes = self._predicted(values, sight)[1]
             if sight.device == "camera":
                 camera[sight.pose] = slopes
-            else:
+            elif sight.slope is not None:
                 slopes = slopes + [
-                    (columns, -np.einsum("nij,njk->nik", sight.slope, part[sight.camera_rows]))
-                    for columns, part in camera[sight.pose]
+                    (columns, -(sight.slope @ part[sight.camera_rows])) for columns, part in camera[sight.pose]
                 ]
             sd = self.sd_px[sight.device]
             blocks += [(rows, columns, part.reshape(-1, part.shape[2]) / sd) for columns, part in slopes]
@@ -118,7 +125,10 @@ class Adjustment:
         """Give the predicted pixels (n, 2), and their derivatives (n, 2, k) by the place of k parameters."""
         import cv2
 
-        pose, board = self.places[f"pose_{sight.pose + 1}", "motion"], values[self.places[f"pose_{sight.pose + 1}", "motion"]]
+        pose, board = (
+            self.places[f"pose_{sight.pose + 1}", "motion"],
+            values[self.places[f"pose_{sight.pose + 1}", "motion"]],
+        )
         motion, chains = board, [(pose, np.eye(6))]
         if sight.device != "camera":
             device = self.places[sight.device, "motion"]

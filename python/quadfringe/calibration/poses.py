@@ -93,7 +93,7 @@ def check_poses(views: Sequence[View], target: Target) -> PoseSpread:
     if found.depth_range < DEPTH_MIN:
         raise DegeneratePosesError(
             "one_depth",
-            f"all boards are near one depth: distances differ by {100 * found.depth_range:.1f} %, {100 * DEPTH_MIN:.0f} % "
-            "are needed; hold some nearer and some farther, over the whole depth that will be measured",
+            f"all boards are near one depth: distances differ by {100 * found.depth_range:.1f} %, "
+            f"{100 * DEPTH_MIN:.0f} % are needed; hold some nearer and some farther, over all the depth to be measured",
         )
     return found

@@ -19,13 +19,25 @@ from quadfringe.calibration.detect import View
 from quadfringe.config import Affine, Fringes
 from quadfringe.errors import InputError
 
-__all__ = ["AXES", "ProjectorMap", "ProjectorPoints", "StepPlan", "position_map", "projector_map", "projector_points", "step_image"]
+__all__ = [
+    "AXES",
+    "Positions",
+    "ProjectorMap",
+    "ProjectorPoints",
+    "StepPlan",
+    "joined",
+    "position_map",
+    "projector_map",
+    "projector_points",
+    "step_image",
+]
 
 Map = NDArray[np.float32]
 Axis = Literal["columns", "rows"]
 AXES: tuple[Axis, Axis] = ("columns", "rows")
 MODULATION_MIN = 0.02  # share of full scale
 MARGIN_MIN = 0.3  # of the fringe orders
+SATURATED = 0.999  # share of full scale
 REACH = 0.5  # of the distance to the nearest point: how far around a point the fit looks
 SHARE_MIN = 0.4  # of the pixels around a point that must be lit
 
@@ -110,8 +122,8 @@ def joined(columns: Positions, rows: Positions, plan: StepPlan) -> ProjectorMap:
     """Give the map of both directions."""
     if columns.position_px.shape != rows.position_px.shape:
         raise InputError(
-            f"fringes over columns were captured at {columns.position_px.shape}, over rows at {rows.position_px.shape}; "
-            "all images of a calibration must have one size"
+            f"fringes over columns were captured at {columns.position_px.shape}, over rows at "
+            f"{rows.position_px.shape}; all images of a calibration must have one size"
         )
     dark = np.isnan(columns.position_px) | np.isnan(rows.position_px)
     column_px, row_px = (np.where(dark, np.float32(np.nan), p.position_px) for p in (columns, rows))
@@ -127,8 +139,9 @@ def position_map(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> Positions
     _check_stacks(stacks, plan, axis)
     size = plan.size_px[AXES.index(axis)]
     numbers = np.array(plan.fringes.numbers)
-    phases, backgrounds, modulations = zip(*(_core.n_step(np.ascontiguousarray(s)) for s in stacks), strict=True)
-    absolute, margin = _core.unwrap(*phases, plan.fringes.numbers, size)
+    found = [_core.n_step(np.ascontiguousarray(stack)) for stack in stacks]
+    phases, backgrounds, modulations = ([maps[i] for maps in found] for i in range(3))
+    absolute, margin = _core.unwrap(phases[0], phases[1], phases[2], plan.fringes.numbers, size)
     turns = absolute.astype(np.float64) / (2 * np.pi * numbers[0])
     position = np.zeros_like(turns)
     for number, phase in zip(numbers, phases, strict=True):
@@ -136,7 +149,8 @@ def position_map(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> Positions
         position += number * (seen + np.rint(turns * number - seen))
     position *= size / np.square(numbers).sum()
     modulation = np.minimum.reduce(modulations)
-    unlit = (modulation < MODULATION_MIN) | (margin < MARGIN_MIN)
+    saturated = np.logical_or.reduce([stack.max(axis=0) >= SATURATED for stack in stacks])
+    unlit = (modulation < MODULATION_MIN) | (margin < MARGIN_MIN) | saturated
     position[unlit] = np.nan
     return Positions(position.astype(np.float32), modulation, np.mean(backgrounds, axis=0, dtype=np.float32))
 
@@ -149,7 +163,8 @@ def _check_stacks(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> None:
         if len(shape) != 3 or shape[0] != plan.steps:
             have = f"{shape[0]} images" if len(shape) == 3 else f"an array of shape {shape}"
             raise InputError(
-                f"{number:g} fringes over {axis}: expected {plan.steps} steps (steps, H, W), got {have}; capture every step"
+                f"{number:g} fringes over {axis}: expected {plan.steps} steps (steps, H, W), got {have}; "
+                "capture every step"
             )
         if shape[1:] != shapes[0][1:]:
             raise InputError(

@@ -49,8 +49,10 @@ def _alone(device: str, sights: list[Sight], size_px: tuple[int, int]) -> tuple[
     except cv2.error as error:
         raise CalibrationError("not_fitted", f"{device}: no lens fits the points ({error.err})") from error
     lens = np.array([matrix[0, 0], matrix[1, 1], matrix[0, 2], matrix[1, 2], *distortion.ravel()[:5]])
-    if not np.isfinite(lens).all() or not (0 < lens[:2]).all():
-        raise CalibrationError("not_fitted", f"{device}: no lens fits the points; are the boards of all poses the same?")
+    if not np.isfinite(lens).all() or not (lens[:2] > 0).all():
+        raise CalibrationError(
+            "not_fitted", f"{device}: no lens fits the points; are the boards of all poses the same?"
+        )
     motions = []
     for turn, move in zip(turns, moves, strict=True):
         motion = np.eye(4)

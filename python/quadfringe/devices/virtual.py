@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config import ChannelResponse, Fringes, Response, Row4, SystemConfig, Triple
@@ -12,10 +16,24 @@ from quadfringe.decoding import core_device, device_model
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.export import read_npy
 
-__all__ = ["VirtualBench", "VirtualCamera", "VirtualProjector"]
+__all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector"]
 
 EDGE_PX = 2.0  # pixels nearer to an edge than this belong to it: lens and pixel mix both sides
 CHANNELS = ("red", "green", "blue", "ir")
+
+
+@dataclass(frozen=True)
+class PrintedBoard:
+    """A flat board with a print on it: inked share (rows, columns) float32 of texels, and its corners in its frame.
+
+    `paper` and `ink` are albedos of R, G, B, IR.
+    """
+
+    coverage: NDArray[np.float32]
+    texel_mm: float
+    corners_mm: tuple[tuple[float, float], tuple[float, float]]
+    paper: tuple[float, float, float, float]
+    ink: tuple[float, float, float, float]
 
 
 class VirtualBench:
@@ -27,6 +45,8 @@ class VirtualBench:
         self._bench = _core.Bench(**devices, layout=config.fringes.layout)
         self._scene = config.scene
         self._cast: _core.Cast | None = None
+        self._albedo: NDArray[np.float32] | None = None
+        self._exposures = 0
         self.projected: Fringes | Row4 | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
@@ -65,15 +85,40 @@ class VirtualBench:
 
     def place_plane(self, point_mm: Triple, normal: Triple) -> None:
         """Put a plane through a point before the camera, in place of the scene; its normal points to the camera."""
-        self._cast = self._bench.cast_plane(point_mm=point_mm, normal=normal)
+        self._cast, self._albedo = self._bench.cast_plane(point_mm=point_mm, normal=normal), None
 
     def place_sphere(self, centre_mm: Triple, radius_mm: float) -> None:
         """Put a sphere before the camera, in place of the scene."""
-        self._cast = self._bench.cast_sphere(centre_mm=centre_mm, radius_mm=radius_mm)
+        self._cast, self._albedo = self._bench.cast_sphere(centre_mm=centre_mm, radius_mm=radius_mm), None
 
     def place_scene(self, surface: str) -> None:
         """Put a ready scene before the camera; ValueError when there is none of that name."""
-        self._cast = self._bench.cast(surface)
+        self._cast, self._albedo = self._bench.cast(surface), None
+
+    def place(self, board: PrintedBoard, T_camera_board: NDArray[np.float64]) -> None:  # noqa: N803
+        """Put a board into the scene, alone, in a pose (4, 4); ValueError when that is no motion."""
+        pose = {"rotation": T_camera_board[:3, :3].tolist(), "translation_mm": T_camera_board[:3, 3].tolist()}
+        (left, top), half = board.corners_mm[0], 0.5 * board.texel_mm
+        self._cast = self._bench.cast_plate(*board.corners_mm, **pose)
+        self._albedo = self._bench.printed(
+            board.coverage,
+            pitch_mm=board.texel_mm,
+            origin_mm=(left + half, top + half),
+            paper=board.paper,
+            ink=board.ink,
+            **pose,
+        )
+
+    def expose_step(self, number: float, shift_rad: float, axis: str = "columns", beam: str | None = None) -> AnyShot:
+        """Give the shot of one step: the same fringes in all channels, or in those of one projector.
+
+        Every exposure has noise of its own; the same sequence of exposures has the same noise.
+        """
+        if self._cast is None:
+            self._cast = self._look()
+        light = self._light((self._scene.seed or 0) + self._exposures)
+        self._exposures += 1
+        return self._shot(self._bench.render_step(self._cast, number, shift_rad, axis=axis, beam=beam, **light), None)
 
     def expose(self, *, seed: int | None = None, exposure: float = 1.0, capped: bool = False) -> AnyShot:
         """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected.
@@ -88,19 +133,22 @@ class VirtualBench:
         light = self._light(seed, 0.0 if capped else exposure)
         if isinstance(self.projected, Fringes):
             images = self._bench.render(self._cast, self.projected.numbers, **light)
-        else:
-            images = self._bench.render_levels(self._cast, self.projected, **light)
+            return self._shot(images, self._truth(self._cast))
+        return self._shot(self._bench.render_levels(self._cast, self.projected, **light), None)
+
+    def _shot(self, images: dict[str, NDArray[Any]], truth: Truth | None) -> AnyShot:
         full_scale = float(2**self._scene.bit_depth - 1)
-        truth = self._truth(self._cast)
         if "raw" in images and self._scene.bayer is not None:
             return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
         return Shot(**images, full_scale=full_scale, truth=truth)
 
-    def _light(self, seed: int | None, exposure: float) -> dict[str, Any]:
+    def _light(self, seed: int | None, exposure: float = 1.0) -> dict[str, Any]:
         """Give the settings of light and camera that are present, as the kernel names them."""
         light = self._scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
         if exposure != 1.0:
             light["gain"] = tuple(exposure * gain for gain in self._scene.gain or (1.0,) * 4)
+        if self._albedo is not None:
+            light["albedo"] = self._albedo
         return light if seed is None else light | {"seed": seed}
 
     def _look(self) -> _core.Cast:

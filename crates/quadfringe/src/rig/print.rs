@@ -53,7 +53,12 @@ impl Print {
             return Ok(());
         }
         let expected = "a positive pitch, a finite origin and albedos of at least 0";
-        let actual = format!("pitch {} mm, origin {:?} mm, {:?}", self.pitch_mm, self.origin_mm, [self.paper, self.ink]);
+        let actual = format!(
+            "pitch {} mm, origin {:?} mm, {:?}",
+            self.pitch_mm,
+            self.origin_mm,
+            [self.paper, self.ink]
+        );
         Err(Error::value("print", expected, actual))
     }
 
@@ -117,9 +122,8 @@ impl Bench {
     pub fn printed(&self, print: &Print) -> Result<Array3<f32>> {
         print.check()?;
         let (rows, columns) = (self.camera.height, self.camera.width);
-        let corner = |row: usize, column: usize| {
-            print.texel(&self.camera, [column as f64 - 0.5, row as f64 - 0.5])
-        };
+        let corner =
+            |row: usize, column: usize| print.texel(&self.camera, [column as f64 - 0.5, row as f64 - 0.5]);
         let mut albedo = Array3::zeros((rows, columns, 4));
         albedo.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
             let [upper, lower] =
@@ -146,7 +150,8 @@ mod tests {
     fn disc(pose: Pose) -> Print {
         let pitch_mm = 0.1;
         let inside = |r: usize, c: usize| (r as f64 - 80.0).hypot(c as f64 - 80.0) * pitch_mm;
-        let coverage = Array2::from_shape_fn((161, 161), |(r, c)| (6.05 - inside(r, c)).mul_add(10.0, 0.0).clamp(0.0, 1.0) as f32);
+        let coverage =
+            Array2::from_shape_fn((161, 161), |(r, c)| (10.0 * (6.05 - inside(r, c))).clamp(0.0, 1.0) as f32);
         Print { coverage, pitch_mm, origin_mm: [-8.0; 2], paper: [1.0; 4], ink: [0.0; 4], pose }
     }
 
