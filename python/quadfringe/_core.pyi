@@ -149,9 +149,6 @@ class Bench:
     def cast_plane(self, *, point_mm: _Vector3, normal: _Vector3) -> Cast:
         """Send one ray through each pixel of a plane through a point; its normal points to the camera."""
 
-    def cast_sphere(self, *, centre_mm: _Vector3, radius_mm: float) -> Cast:
-        """Send one ray through each pixel of a sphere in front of nothing."""
-
     def cast_plate(self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3) -> Cast:
         """Send one ray through each pixel of a plate between two corners (x, y), on z = 0 of a posed board.
 

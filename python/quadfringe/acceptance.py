@@ -26,6 +26,8 @@ from quadfringe.shapes import (
 )
 
 __all__ = [
+    "SPHERE_DIAMETER_MM",
+    "STEP_HEIGHTS_MM",
     "Acceptance",
     "Artefacts",
     "Limits",
@@ -40,7 +42,9 @@ Map = NDArray[np.float32]
 BORDER_PX = 30  # about a fringe: windows that reach beyond the image know less
 CAP_DEG = 60.0  # of a sphere, what is seen more steeply than this is left out
 BAND_MM = 1.0  # points farther from the artefact than this belong to something else
-STEP_HEIGHTS_MM = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 45.0, 50.0)  # of the ready scene
+# Of the ready scenes of the virtual bench.
+SPHERE_DIAMETER_MM = 68.0
+STEP_HEIGHTS_MM = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 45.0, 50.0)
 
 
 @dataclass(frozen=True)
@@ -165,7 +169,7 @@ def measure_artefacts(config: SystemConfig, calibration: Calibration | None = No
     """Measure planes, spheres and the steps of the virtual bench of `config` about 800 mm away.
 
     Light and camera are those of its scene; without a calibration that of the bench itself is taken. The plane stands
-    level, and tilted by 15 degrees; the sphere of 60 mm stands at three places; every shot has its own noise.
+    level, and tilted by 15 degrees; sphere and steps are the ready scenes; every shot has its own noise.
     """
     bench = VirtualBench(config)
     known = calibration or bench.calibration()
@@ -175,15 +179,13 @@ def measure_artefacts(config: SystemConfig, calibration: Calibration | None = No
     for normal in ((0.0, 0.0, -1.0), (float(np.sin(tilt)), 0.0, -float(np.cos(tilt)))):
         bench.place_plane((0.0, 0.0, 800.0), normal)
         shots.append(bench.expose(seed=_seed(config, len(shots))))
-    for centre in ((-40.0, -30.0, 800.0), (60.0, 40.0, 780.0), (0.0, 20.0, 840.0)):
-        bench.place_sphere(centre, 30.0)
+    for surface in ("sphere", "steps"):
+        bench.place_scene(surface)
         shots.append(bench.expose(seed=_seed(config, len(shots))))
-    bench.place_scene("steps")
-    shots.append(bench.expose(seed=_seed(config, len(shots))))
     plan = Plan(known.projector.width_px, config.fringes, known, settings=config.decode)
     decoder = ShotDecoder(shots[0], plan)
     points = [decoder.decode(shot).points_mm for shot in shots]
-    return Artefacts(tuple(points[:2]), tuple(points[2:5]), 60.0, (points[5],), STEP_HEIGHTS_MM)
+    return Artefacts(tuple(points[:2]), (points[2],), SPHERE_DIAMETER_MM, (points[3],), STEP_HEIGHTS_MM)
 
 
 def _seed(config: SystemConfig, number: int) -> int:

@@ -11,7 +11,7 @@ use quadfringe::BayerPattern;
 use quadfringe::fringe::FringeCode;
 use quadfringe::optics::Pose;
 use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, Print, RenderOptions};
-use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Sphere, Surface, scene};
+use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
 
 /// Camera and two projectors before a surface.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -70,13 +70,6 @@ impl Bench {
     #[pyo3(signature = (*, point_mm, normal))]
     fn cast_plane(&self, py: Python<'_>, point_mm: [f64; 3], normal: [f64; 3]) -> PyResult<Cast> {
         let surface = Plane::new(point_mm, normal).map_err(value_error)?;
-        Ok(self.cast_surface(py, &surface))
-    }
-
-    /// One ray through each pixel of a sphere in front of nothing.
-    #[pyo3(signature = (*, centre_mm, radius_mm))]
-    fn cast_sphere(&self, py: Python<'_>, centre_mm: [f64; 3], radius_mm: f64) -> PyResult<Cast> {
-        let surface = Sphere::new(centre_mm, radius_mm).map_err(value_error)?;
         Ok(self.cast_surface(py, &surface))
     }
 

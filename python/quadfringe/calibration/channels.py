@@ -76,8 +76,8 @@ class Channels:
 def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,) * 4) -> Channels:
     """Fit responses and crosstalk to `captured` (K, 4), shares of full scale, NaN where saturated (S1).
 
-    `dark` is the level without light, where the fit starts. Raises `InputError` when there are not as many captures as the plan has, when a
-    projected channel is not seen by its own camera channel, or when too few captures are unsaturated.
+    `dark` is the level without light, where the fit starts. Raises `InputError` when there are not as many captures as
+    the plan has, when a projected channel is not seen by its own camera channel, or when too few are unsaturated.
     """
     captured = np.asarray(captured, float)
     if captured.shape != plan.levels.shape:

@@ -87,10 +87,6 @@ class VirtualBench:
         """Put a plane through a point before the camera, in place of the scene; its normal points to the camera."""
         self._cast, self._albedo = self._bench.cast_plane(point_mm=point_mm, normal=normal), None
 
-    def place_sphere(self, centre_mm: Triple, radius_mm: float) -> None:
-        """Put a sphere before the camera, in place of the scene."""
-        self._cast, self._albedo = self._bench.cast_sphere(centre_mm=centre_mm, radius_mm=radius_mm), None
-
     def place_scene(self, surface: str) -> None:
         """Put a ready scene before the camera; ValueError when there is none of that name."""
         self._cast, self._albedo = self._bench.cast(surface), None

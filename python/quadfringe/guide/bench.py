@@ -28,7 +28,6 @@ __all__ = ["BenchCaptures", "bench_session"]
 BOARD_MM = 800.0  # where the white board stands
 FLAT_LEVEL = 0.6
 TILTED = (0.2588, 0.0, -0.9659)  # normal of the plane of the acceptance test
-SPHERE_MM = (-40.0, -30.0, 800.0)
 
 
 def bench_session(config: SystemConfig, poses: int = 12) -> Session:
@@ -122,7 +121,7 @@ class BenchCaptures:
         elif name == "plane_1":
             self._bench.place_plane((0.0, 0.0, BOARD_MM), TILTED)
         elif name == "sphere_1":
-            self._bench.place_sphere(SPHERE_MM, 0.5 * self.session.sphere_diameter_mm)
+            self._bench.place_scene("sphere")
         else:
             self._bench.place_scene("steps")
         return 1.0

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from quadfringe.acceptance import SPHERE_DIAMETER_MM, STEP_HEIGHTS_MM
 from quadfringe.calibration.levels import LevelPlan, level_plan
 from quadfringe.calibration.projector import AXES, StepPlan
 from quadfringe.calibration.targets import Target, ring_board
@@ -109,8 +110,8 @@ class Session(Stored):
     distance_mm: Positive | None = None
     heights_mm: tuple[Finite, ...] = (-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
     height_degree: Annotated[int, Field(ge=1, le=5)] = 3
-    sphere_diameter_mm: Positive = 60.0
-    step_heights_mm: tuple[Positive, ...] = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 45.0, 50.0)
+    sphere_diameter_mm: Positive = SPHERE_DIAMETER_MM
+    step_heights_mm: tuple[Positive, ...] = STEP_HEIGHTS_MM
 
     @property
     def level_plan(self) -> LevelPlan:
