@@ -145,9 +145,9 @@ def test_captures_at_fault_are_explained() -> None:
 
 def test_a_flat_field_is_made_even() -> None:
     random = np.random.default_rng(1)
-    y, x = np.mgrid[:120, :160]
-    fall = 1 - 0.4 * (((x - 80) / 80) ** 2 + ((y - 60) / 60) ** 2) / 2
-    gain = fall * (1 + 0.01 * random.standard_normal((120, 160)))
+    y, x = np.mgrid[:480, :640]
+    fall = 1 - 0.4 * (((x - 320) / 320) ** 2 + ((y - 240) / 240) ** 2) / 2
+    gain = fall * (1 + 0.01 * random.standard_normal((480, 640)))
     gain[30, 40] = 0.0
 
     def shot() -> Shot:

@@ -206,10 +206,12 @@ def read_artefacts(
 
 def write_acceptance(path: Path, found: Acceptance) -> None:
     """Write the deviations of every measurement as one PNG; needs matplotlib (extra `plot`)."""
-    panels = [Panel(name, image, "mm", "coolwarm", _limits(name)) for name, image in found.deviations_mm.items()]
+    panels = [_panel(name, image) for name, image in found.deviations_mm.items()]
     word = "accepted" if found.accepted else "not accepted"
     draw_panels(path, f"acceptance: {word}", [panels[i : i + 3] for i in range(0, len(panels), 3)])
 
 
-def _limits(name: str) -> tuple[float, float] | None:
-    return None if name.startswith("steps") else (-0.1, 0.1)
+def _panel(name: str, image: NDArray[np.float64]) -> Panel:
+    if name.startswith("steps"):
+        return Panel(name, image, "mm")
+    return Panel(name, image, "mm", "coolwarm", (-0.1, 0.1))

@@ -186,12 +186,13 @@ def _check_ramps(plan: LevelPlan, lit: Array) -> None:
         raise InputError("levels: no capture is black; take one with all projectors showing black")
     for channel, name in enumerate(CHANNELS):
         ramp = lit[_ramp(plan, channel)]
-        own = ramp[:, channel] - np.nanmean(lit[black, channel])
-        if np.isfinite(own).sum() < USABLE_MIN:
+        usable = np.isfinite(ramp[:, channel]).sum()
+        if usable < USABLE_MIN or np.isnan(lit[black, channel]).all():
             raise InputError(
-                f"levels: {name} is saturated in all but {np.isfinite(own).sum()} captures of its ramp; shorten the "
+                f"levels: {name} is saturated in all but {usable} captures of its ramp; shorten the "
                 "exposure until the brightest one stays below 97 % of full scale"
             )
+        own = ramp[:, channel] - np.nanmean(lit[black, channel])
         if np.nanmax(own) < UNLIT:
             brightest = CHANNELS[int(np.nanargmax(np.nanmax(ramp, axis=0)))]
             raise InputError(
