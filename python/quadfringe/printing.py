@@ -66,7 +66,12 @@ def _patch(item: Any, shift: tuple[float, float]) -> Any:
     """Give a shape of matplotlib; snapping would move edges of a PNG to whole pixels."""
     from matplotlib.patches import Circle, Rectangle
 
-    look: dict[str, Any] = {"facecolor": "black" if item.ink else "white", "edgecolor": "none", "linewidth": 0, "snap": False}
+    look: dict[str, Any] = {
+        "facecolor": "black" if item.ink else "white",
+        "edgecolor": "none",
+        "linewidth": 0,
+        "snap": False,
+    }
     place = (item.x_mm + shift[0], item.y_mm + shift[1])
     if isinstance(item, Disc):
         return Circle(place, 0.5 * item.diameter_mm, **look)

@@ -19,7 +19,7 @@ __all__ = ["TargetNotFoundError", "View", "find_target"]
 Points = NDArray[np.float64]
 CORNERS_MIN = 8  # of a ChArUco board: less says little about a pose
 DARK, FLAT = 0.06, 0.05  # shares of full scale
-SATURATED = 0.25  # share of the image
+SATURATED, FULL = 0.25, 0.999  # share of the image that has this share of full scale
 SMOOTHING_PX = (1.0, 2.0, 0.5)
 SHARP = 0.08  # steepest edges, as a share of the contrast per pixel
 MARK_MIN = 0.35  # darkness of a mark, where solid ink has 1
@@ -64,7 +64,7 @@ def find_target(image: NDArray[Any], target: Target, full_scale: float | None = 
     stretched = np.clip((grey - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
     if target.kind == "charuco":
         return _charuco(grey, stretched, target)
-    ordered = _ordered(stretched, target)
+    ordered = _ordered(grey, stretched, target)
     if not _is_sharp(stretched):
         raise TargetNotFoundError("blurred", f"all points are found, but {BLURRED}")
     centres = refined_centres(grey, target, _turned(grey, target, ordered))
@@ -103,7 +103,7 @@ def _exposed(grey: NDArray[np.float32]) -> None:
         )
 
 
-def _ordered(stretched: NDArray[np.uint8], target: Target) -> Points:
+def _ordered(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Target) -> Points:
     """Give the blobs in grid order; noise is smoothed as far as needed and no farther, for small holes close."""
     import cv2
 
@@ -114,16 +114,18 @@ def _ordered(stretched: NDArray[np.uint8], target: Target) -> Points:
         if ordered is not None:
             return ordered
         most = max(most, count)
-    raise _diagnosed(stretched, target, most)
+    raise _diagnosed(grey, stretched, target, most)
 
 
-def _diagnosed(stretched: NDArray[np.uint8], target: Target, count: int) -> TargetNotFoundError:
+def _diagnosed(
+    grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Target, count: int
+) -> TargetNotFoundError:
     """Say why no grid was found."""
-    share = float((stretched == 255).mean())
+    share = float((grey >= FULL).mean())
     if share > SATURATED:
         return TargetNotFoundError(
             "saturated",
-            f"{100 * share:.0f} % of the image are as bright as can be; expose shorter, turn it out of glare",
+            f"{100 * share:.0f} % of the image is saturated; expose shorter, or turn the board out of glare",
         )
     expected, name = target.rows * target.columns, "rings" if target.kind == "rings" else "discs"
     if not _is_sharp(stretched):

@@ -40,6 +40,7 @@ MARGIN_MIN = 0.3  # of the fringe orders
 SATURATED = 0.999  # share of full scale
 REACH = 0.5  # of the distance to the nearest point: how far around a point the fit looks
 SHARE_MIN = 0.4  # of the pixels around a point that must be lit
+EDGE = 0.06  # change of the modulation from pixel to pixel, as a share of it, at which the edge of a print begins
 
 
 @dataclass(frozen=True)
@@ -179,7 +180,7 @@ def projector_points(
     """Give the projector pixels of the points of a view, by a quadratic fit to the map around each.
 
     A quadratic holds what a local homography can express, and the curvature of both lenses; pixels count by the square
-    of their modulation. `radius_px` is half the distance of neighbouring points when absent. `ir_registration` is the
+    of their modulation, those at the edges of the print a hundredth of it. `radius_px` is half the distance of neighbouring points when absent. `ir_registration` is the
     affine map from visible to infrared pixels, for a map of the infrared chip. NaN where less than 40 % of the pixels
     around a point are lit. Raises `InputError` when map and view differ in size.
     """
@@ -193,11 +194,22 @@ def projector_points(
     places = view.points_px @ affine[:, :2].T + affine[:, 2]
     reach = REACH * _spacing_px(places) if radius_px is None else radius_px
     points, slopes = np.full_like(places, np.nan), np.full((len(places), 2, 2), np.nan)
+    weight = _weights(lit.modulation)
     for i, place in enumerate(places):
-        fitted = _around(lit, place, reach)
+        fitted = _around(lit, weight, place, reach)
         if fitted is not None:
             points[i], slopes[i] = fitted[:, 0], fitted[:, 1:] @ affine[:, :2]
     return ProjectorPoints(points, slopes, view.ids, lit.size_px)
+
+
+def _weights(modulation: Map) -> Map:
+    """Give the weight of each pixel: its modulation, a tenth of it at the edges of a print.
+
+    There a pixel sees paper and ink, and its phase is that of the paper beside it.
+    """
+    down, right = np.gradient(modulation)
+    edge = np.hypot(down, right) > EDGE * modulation
+    return np.where(edge, np.float32(0.1) * modulation, modulation).astype(np.float32)
 
 
 def _spacing_px(places: NDArray[np.float64]) -> float:
@@ -205,7 +217,7 @@ def _spacing_px(places: NDArray[np.float64]) -> float:
     return float(np.median(np.sort(apart, axis=1)[:, 1]))
 
 
-def _around(lit: ProjectorMap, place: NDArray[np.float64], reach: float) -> NDArray[np.float64] | None:
+def _around(lit: ProjectorMap, weights: Map, place: NDArray[np.float64], reach: float) -> NDArray[np.float64] | None:
     """Give value and slopes (2, 3) of column and row at a place; None where too little is lit."""
     low = np.maximum(np.floor(place - reach).astype(int), 0)
     high = np.ceil(place + reach).astype(int) + 1
@@ -218,7 +230,7 @@ def _around(lit: ProjectorMap, place: NDArray[np.float64], reach: float) -> NDAr
     if inside.sum() < SHARE_MIN * np.pi * reach**2:
         return None
     x, y, values = dx[inside] / reach, dy[inside] / reach, seen[inside]
-    weight = lit.modulation[part][inside].astype(np.float64)
+    weight = weights[part][inside].astype(np.float64)
     terms = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
     for _ in range(2):
         fitted, *_ = np.linalg.lstsq(terms * weight[:, None], values * weight[:, None], rcond=None)
