@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import SystemConfig
-from quadfringe.data import Calibration, Shape
+from quadfringe.data import AnyShot, Calibration, Shape
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.report import Panel, draw_panels
@@ -175,7 +175,7 @@ def measure_artefacts(config: SystemConfig, calibration: Calibration | None = No
     known = calibration or bench.calibration()
     bench.project(config.fringes)
     tilt = np.radians(15.0)
-    shots = []
+    shots: list[AnyShot] = []
     for normal in ((0.0, 0.0, -1.0), (float(np.sin(tilt)), 0.0, -float(np.cos(tilt)))):
         bench.place_plane((0.0, 0.0, 800.0), normal)
         shots.append(bench.expose(seed=_seed(config, len(shots))))

@@ -160,7 +160,8 @@ def dominant_sphere(
     points = _points(xyz_mm, "sphere")
     random = np.random.default_rng(seed)
     sample = points[random.choice(len(points), min(len(points), 5000), replace=False)]
-    best, most = None, 0
+    best: Sphere | None = None
+    most = 0
     for start in sample[random.choice(len(sample), trials)]:
         near = sample[np.linalg.norm(sample - start, axis=1) < 0.5 * diameter_mm]
         if len(near) < 4:
@@ -171,11 +172,12 @@ def dominant_sphere(
         count = int(np.count_nonzero(np.abs(trial.distances_mm(sample)) < band_mm))
         if count > most:
             best, most = trial, count
-    for _ in range(3 if best is not None else 0):
-        best = fit_sphere(points[np.abs(best.distances_mm(points)) < band_mm], best)
     if best is None or np.count_nonzero(np.abs(best.distances_mm(points)) < band_mm) < POINTS_MIN:
         raise InputError(f"sphere: no sphere of about {diameter_mm:g} mm diameter is among {len(points)} points")
-    return best
+    found = best
+    for _ in range(3):
+        found = fit_sphere(points[np.abs(found.distances_mm(points)) < band_mm], found)
+    return found
 
 
 def cap_towards_camera(xyz_mm: Points, sphere: Sphere, within_deg: float) -> NDArray[np.bool_]:
