@@ -17,7 +17,9 @@ impl PolynomialHeight {
     fn new(reference_rad: &Bound<'_, PyAny>, coefficients: &Bound<'_, PyAny>) -> PyResult<Self> {
         let reference_rad = expected::<f32, 2>("reference_rad", reference_rad)?.to_owned_array();
         let coefficients = expected::<f64, 3>("coefficients", coefficients)?.to_owned_array();
-        height::PolynomialHeight::from_coefficients(reference_rad, coefficients).map(Self).map_err(value_error)
+        height::PolynomialHeight::from_coefficients(reference_rad, coefficients)
+            .map(Self)
+            .map_err(value_error)
     }
 
     /// Fitted to planes at known heights.
@@ -30,7 +32,8 @@ impl PolynomialHeight {
         degree: usize,
     ) -> PyResult<Self> {
         let reference = expected::<f32, 2>("reference_rad", reference_rad)?;
-        let phases: PyResult<Vec<_>> = phases_rad.iter().map(|map| expected::<f32, 2>("phases_rad", map)).collect();
+        let phases: PyResult<Vec<_>> =
+            phases_rad.iter().map(|map| expected::<f32, 2>("phases_rad", map)).collect();
         let phases = phases?;
         let planes: Vec<_> =
             heights_mm.into_iter().zip(phases.iter().map(PyReadonlyArray2::as_array)).collect();
@@ -71,6 +74,7 @@ pub fn xyz_from_column<'py>(
 ) -> PyResult<Bound<'py, PyArray3<f32>>> {
     let column_px = expected::<f32, 2>("column_px", column_px)?;
     let view = column_px.as_array();
-    let found = py.detach(|| Triangulator::new(&camera.0, &projector.0)?.xyz_mm(view)).map_err(value_error)?;
+    let found =
+        py.detach(|| Triangulator::new(&camera.0, &projector.0)?.xyz_mm(view)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }

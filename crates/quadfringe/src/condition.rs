@@ -77,7 +77,9 @@ impl Conditioner {
                 return Err(Error::value(name, "a fraction of full scale in [0, 1)", dark));
             }
         }
-        for (what, responses) in [("response", &self.response), ("projector response", &self.projector_response)] {
+        for (what, responses) in
+            [("response", &self.response), ("projector response", &self.projector_response)]
+        {
             for (channel, response) in Channel::ALL.iter().zip(responses) {
                 response.check(what, channel.name())?;
             }
@@ -208,7 +210,8 @@ mod tests {
         }
         let unmixed = Conditioner { crosstalk: Conditioner::default().crosstalk, ..conditioner };
         let both = [0.36f32; 4].map(|light| Array2::from_elem((1, 3), light));
-        let [red, ..] = linearise(&Shot::new(both.each_ref().map(|image| image.view())).unwrap(), &unmixed).unwrap();
+        let [red, ..] =
+            linearise(&Shot::new(both.each_ref().map(|image| image.view())).unwrap(), &unmixed).unwrap();
         assert!((red[[0, 1]] - 0.36f32.powf(1.5 / 2.2)).abs() < 1e-6);
     }
 

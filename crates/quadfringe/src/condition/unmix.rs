@@ -55,7 +55,11 @@ impl Curve {
     fn new(response: Response) -> Option<Self> {
         let entry = |i: usize| response.linear(i as f32 / ENTRIES as f32);
         let range = response.offset * ENTRIES as f32 + STEEP..ENTRIES as f32;
-        (response != Response::default()).then(|| Self { response, table: (0..=ENTRIES).map(entry).collect(), range })
+        (response != Response::default()).then(|| Self {
+            response,
+            table: (0..=ENTRIES).map(entry).collect(),
+            range,
+        })
     }
 
     fn at(&self, light: f32) -> f32 {
