@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quadfringe.calibration.levels import CHANNELS, row4, stacked
 from quadfringe.config import Row4
-from quadfringe.data import Shot
+from quadfringe.data import AnyShot
 from quadfringe.errors import InputError
 
 __all__ = ["FlatField", "flat_field"]
@@ -48,7 +48,7 @@ class FlatField:
         return {name: max(getattr(self, name)) for name in names} | {"defects_pixels": float(self.defects)}
 
 
-def flat_field(shots: Sequence[Shot], dark: Sequence[float] = (0.0,) * 4) -> FlatField:
+def flat_field(shots: Sequence[AnyShot], dark: Sequence[float] = (0.0,) * 4) -> FlatField:
     """Give the gain of every pixel from four shots or more of an evenly lit white surface, best out of focus.
 
     Every second shot makes the gain, the others judge it. Raises `InputError` for fewer shots, shots of different size,

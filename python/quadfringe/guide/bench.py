@@ -18,7 +18,7 @@ from quadfringe.devices.virtual import PrintedBoard, VirtualBench
 from quadfringe.errors import InputError
 from quadfringe.files import folder_for
 from quadfringe.guide.captures import pose_maps
-from quadfringe.guide.session import FILE, STEPS, Session
+from quadfringe.guide.session import FILE, STEP_NAMES, Session
 from quadfringe.images import write_image
 from quadfringe.rehearsal import INK, PAPER, TEXEL_MM, board_poses
 from quadfringe.shots import write_shot
@@ -70,9 +70,9 @@ class BenchCaptures:
     def pose(self, name: str) -> dict[str, ProjectorMap]:
         """Render the fringes of one pose of the board, and decode them as those of a folder are."""
         self._bench.place(self._board, self._poses[name])
-        return pose_maps(self.session, lambda image: self._fringes(image) / np.float32(self._full_scale))
+        return pose_maps(self.session, lambda image: np.asarray(self._fringes(image) / self._full_scale, np.float32))
 
-    def write(self, folder: Path, steps: Iterable[str] = tuple(step.name for step in STEPS)) -> list[Path]:
+    def write(self, folder: Path, steps: Iterable[str] = STEP_NAMES) -> list[Path]:
         """Write session.json and the captures of these steps as a camera would; returns the folders of captures."""
         self.session.save(folder_for(folder) / FILE)
         written = []

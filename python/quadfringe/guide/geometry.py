@@ -86,7 +86,7 @@ def coverage(views: list[View]) -> NDArray[np.intp]:
     counts = np.histogram2d(points[:, 1], points[:, 0], bins=COARSE, range=((-0.5, height - 0.5), (-0.5, width - 0.5)))[
         0
     ]
-    return counts.astype(np.intp)
+    return np.asarray(counts, np.intp)
 
 
 def _view(lit: ProjectorMap, target: Any, words: str) -> View:

@@ -18,7 +18,7 @@ from quadfringe.guide.outcome import Outcome
 __all__ = ["write_pictures"]
 
 COLOURS = ("tab:red", "tab:green", "tab:blue", "tab:gray")
-ARROW = 100.0  # times larger than the residual
+ARROW = 0.1  # greatest length of an arrow, share of the width of the image
 
 
 def write_pictures(folder: Path, guided: Guided) -> list[Path]:
@@ -93,9 +93,12 @@ def _poses(figure: Any, outcome: Outcome) -> None:
         left.plot(*pose.view.points_px.T, ".", ms=2)
         left.text(*pose.view.points_px.mean(axis=0), str(i), fontsize=9)
     left.set(title="where the board was seen", xlabel="x, px", ylabel="y, px", xlim=(0, width), ylim=(height, 0))
+    longest = max(float(np.abs(missed).max()) for missed in rig.camera.residuals_px)
+    times = 10.0 ** np.floor(np.log10(ARROW * width / max(longest, 1e-9)))
     for pose, missed in zip(observed, rig.camera.residuals_px, strict=True):
-        middle.quiver(*pose.view.points_px.T, *missed.T, angles="xy", scale_units="xy", scale=1 / ARROW, width=0.002)
-    middle.set(title=f"camera residuals, {ARROW:g} times", xlim=(0, width), ylim=(height, 0), xlabel="x, px")
+        middle.quiver(*pose.view.points_px.T, *missed.T, angles="xy", scale_units="xy", scale=1 / times, width=0.003)
+    middle.set(title=f"camera residuals, {times:g} times", xlim=(0, width), ylim=(height, 0), xlabel="x, px")
+    middle.set_aspect("equal")
     fits = [("camera", rig.camera), ("projector", rig.visible), ("infrared", rig.infrared)]
     shown = [(name, fit) for name, fit in fits if fit is not None]
     for i, (name, fit) in enumerate(shown):

@@ -19,7 +19,7 @@ from quadfringe.config import BayerPattern, Finite, Fringes, Pixels, Positive
 from quadfringe.data import Stored
 from quadfringe.errors import InputError
 
-__all__ = ["BEAMS", "STEPS", "Session", "Step", "step_named"]
+__all__ = ["BEAMS", "STEPS", "STEP_NAMES", "Session", "Step", "step_named"]
 
 BEAMS = ("visible", "infrared")
 FILE = "session.json"
@@ -77,6 +77,8 @@ STEPS = (
         False,
     ),
 )
+
+STEP_NAMES = tuple(step.name for step in STEPS)
 
 
 def step_named(name: str) -> Step:
