@@ -19,6 +19,8 @@ __all__ = [
     "Pattern",
     "PatternSequence",
     "PatternWindow",
+    "PolynomialHeight",
+    "__profile__",
     "__version__",
     "background",
     "carrier",
@@ -39,12 +41,15 @@ __all__ = [
     "two_step",
     "udev_rule",
     "unwrap",
+    "xyz_from_column",
 ]
 
+__profile__: Final[str]
 __version__: Final[str]
 
 _Vector2 = tuple[float, float]
 _Vector3 = tuple[float, float, float]
+_Vector4 = tuple[float, float, float, float]
 _Vector5 = tuple[float, float, float, float, float]
 _Matrix3 = tuple[_Vector3, _Vector3, _Vector3]
 _Bytes3 = tuple[int, int, int]
@@ -141,6 +146,9 @@ class Bench:
     ) -> Cast:
         """Send one ray through each pixel of a relief over the plane z, (rows, columns) float64 mm."""
 
+    def cast_plane(self, *, point_mm: _Vector3, normal: _Vector3) -> Cast:
+        """Send one ray through each pixel of a plane through a point; its normal points to the camera."""
+
     def cast_plate(self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3) -> Cast:
         """Send one ray through each pixel of a plate between two corners (x, y), on z = 0 of a posed board.
 
@@ -186,6 +194,9 @@ class Bench:
         Fringes count over "columns" or "rows"; with a `beam`, visible or infrared, the other projector is dark.
         """
 
+    def render_levels(self, cast: Cast, levels: _Vector4, **options: Any) -> dict[str, NDArray[Any]]:
+        """Give the images with each channel (R, G, B, IR) lit evenly at a level of its own, 0 to 1."""
+
 @final
 class Cast:
     """A scene as the bench sees it, and the truth to judge by."""
@@ -226,6 +237,7 @@ class Decoder:
         dark: Sequence[float] | None = None,
         response: Sequence[_Vector3] | None = None,
         crosstalk: Sequence[Sequence[float]] | None = None,
+        projector_response: Sequence[_Vector3] | None = None,
         ir_registration: Sequence[Sequence[float]] | None = None,
         camera: Device | None = None,
         projector: Device | None = None,
@@ -280,6 +292,7 @@ def linear_light(
     dark: Sequence[float] | None = None,
     response: Sequence[_Vector3] | None = None,
     crosstalk: Sequence[Sequence[float]] | None = None,
+    projector_response: Sequence[_Vector3] | None = None,
     ir_registration: Sequence[Sequence[float]] | None = None,
 ) -> dict[str, NDArray[np.float32]]:
     """Give red, green, blue, ir as linear light, fractions of full scale; NaN where the infrared chip sees nothing.
@@ -296,6 +309,7 @@ def linear_light_bayer(
     dark: Sequence[float] | None = None,
     response: Sequence[_Vector3] | None = None,
     crosstalk: Sequence[Sequence[float]] | None = None,
+    projector_response: Sequence[_Vector3] | None = None,
     ir_registration: Sequence[Sequence[float]] | None = None,
 ) -> dict[str, NDArray[np.float32]]:
     """Give the same of a raw mosaic: each colour at every pixel, interpolated from its own samples.
@@ -337,6 +351,38 @@ def estimate_response(stacks: Sequence[NDArray[np.float32]]) -> dict[str, float]
     Each stack is (steps, H, W) in fractions of full scale. ValueError when a stack is out of order, too dark,
     saturated or without fringes.
     """
+
+@final
+class PolynomialHeight:
+    """Height as a polynomial of the phase difference to a reference plane, for each pixel (S6).
+
+    Made by `fit`, or from `reference_rad` and `coefficients` of an earlier one.
+    """
+
+    def __new__(cls, reference_rad: NDArray[np.float32], coefficients: NDArray[np.float64]) -> Self: ...
+    @staticmethod
+    def fit(
+        reference_rad: NDArray[np.float32],
+        heights_mm: Sequence[float],
+        phases_rad: Sequence[NDArray[np.float32]],
+        degree: int,
+    ) -> PolynomialHeight:
+        """Fit planes at known heights, one absolute phase map (H, W) float32 for each.
+
+        ValueError when there are fewer different heights than degree + 1, or a map has another size.
+        """
+
+    def reference_rad(self) -> NDArray[np.float32]:
+        """Give the phase of the reference plane, (H, W)."""
+
+    def coefficients(self) -> NDArray[np.float64]:
+        """Give the coefficients, (H, W, degree + 1) in mm / rad^n; NaN where a pixel has none."""
+
+    def height_from_phase(self, phase_rad: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Give heights in mm, (H, W); NaN where phase or coefficients have no data."""
+
+def xyz_from_column(column_px: NDArray[np.float32], camera: Device, projector: Device) -> NDArray[np.float32]:
+    """Triangulate a map of projector columns (S7): points in the camera frame, (H, W, 3) mm, NaN for no data."""
 
 @final
 class LightCrafter:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -10,6 +11,7 @@ from typing import Any, Literal, Self, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from quadfringe.config import Affine, BayerPattern, DeviceModel, Matrix4, Model, Response, Row4, checked
 from quadfringe.errors import ConfigError, InputError
@@ -20,6 +22,8 @@ __all__ = [
     "AnyShot",
     "BayerShot",
     "Calibration",
+    "CalibrationRecord",
+    "CalibrationStep",
     "FrameStamp",
     "ResponseCalibration",
     "Shape",
@@ -36,6 +40,11 @@ SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
 
 
+def _short_lists(text: str) -> str:
+    """Put every list of plain numbers on one line: a matrix is then read row by row."""
+    return re.sub(r"\[\n\s*([-+\d.eE,\s]*?)\n\s*\]", lambda m: f"[{' '.join(m[1].split())}]", text)
+
+
 class Stored(Model):
     """A model with a JSON file of its own."""
 
@@ -43,7 +52,7 @@ class Stored(Model):
         """Write the model as JSON, whole or not at all."""
         require_suffix(Path(path), (".json",))
         with atomic(Path(path)) as temporary:
-            temporary.write_text(self.model_dump_json(indent=2, exclude_none=True) + "\n")
+            temporary.write_text(_short_lists(self.model_dump_json(indent=2, exclude_none=True)) + "\n")
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
@@ -65,25 +74,59 @@ class ResponseCalibration(Stored, Response):
     inputs: tuple[str, ...] = ()
 
 
-class Calibration(Stored):
-    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR)."""
+class CalibrationStep(Model):
+    """One step of a calibration: what went in, what came out, and what is to be thought of it."""
 
-    schema_version: Literal[1] = 1
+    name: str
+    inputs: tuple[str, ...] = ()
+    settings: dict[str, Any] = Field(default_factory=dict)
+    figures: dict[str, float | None] = Field(default_factory=dict)
+    good: bool
+    verdict: str
+
+
+class CalibrationRecord(Model):
+    """When a calibration was made, by which version, of which rig, and every step with its residuals."""
+
+    made_utc: str
+    quadfringe_version: str
+    rig: str
+    steps: tuple[CalibrationStep, ...] = ()
+
+    @property
+    def good(self) -> bool:
+        """Whether every step is good."""
+        return all(step.good for step in self.steps)
+
+
+class Calibration(Stored):
+    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
+
+    `response` is undone before `crosstalk` and `projector_response` after it. `infrared` is the second projector, None
+    when it is coaxial with `projector`. Files of schema 1, which know neither it nor the record, are read as they are.
+    """
+
+    schema_version: Literal[1, 2] = 2
     camera: DeviceModel
     projector: DeviceModel
+    infrared: DeviceModel | None = None
     dark: Row4 | None = None
     response: Response | None = None
     crosstalk: Matrix4 | None = None
+    projector_response: Response | None = None
     ir_registration: Affine | None = None
+    record: CalibrationRecord | None = None
 
 
 def conditioning(calibration: Calibration | None, response: Response | None) -> dict[str, Any]:
     """Give what is known about the intensities as the kernel's keywords; `response` stands in for the calibration's."""
     response = response or (calibration.response if calibration else None)
+    projector = calibration.projector_response if calibration else None
     known = {
         "response": response.rows() if response else None,
         "dark": calibration.dark if calibration else None,
         "crosstalk": calibration.crosstalk if calibration else None,
+        "projector_response": projector.rows() if projector else None,
         "ir_registration": calibration.ir_registration if calibration else None,
     }
     return {name: value for name, value in known.items() if value is not None}
@@ -259,9 +302,11 @@ class Shape:
     @property
     def depth_mm(self) -> Map:
         """Depth along the camera's axis, (H, W), mm; raises `InputError` when not calibrated."""
-        return self._points()[:, :, 2]
+        return self.points_mm[:, :, 2]
 
-    def _points(self) -> Map:
+    @property
+    def points_mm(self) -> Map:
+        """Points in the camera frame, (H, W, 3), mm; raises `InputError` when not calibrated."""
         if self.xyz_mm is None:
             raise InputError("this shape has phase only: decode with a calibration to have millimetres")
         return self.xyz_mm
@@ -300,7 +345,7 @@ class Shape:
         if suffix == ".npz":
             export.write_npz(path, self.maps, self._texts())
         elif suffix == ".ply":
-            points = self._points()
+            points = self.points_mm
             valid = np.isfinite(points).all(axis=2)
             scalars = {name: values[valid] for name, values in self.maps.items() if name in SCALARS}
             export.write_ply(path, points[valid], _grey(self.modulation)[valid], scalars)

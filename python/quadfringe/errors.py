@@ -71,6 +71,7 @@ class RecordingError(OSError):
 class BatchError(RuntimeError):
     """A batch that cannot go on; what was decoded stays, and the same command goes on from there."""
 
+
 class CalibrationError(DecodeError):
     """Captures that cannot be calibrated; `reason` is one word for programs, the message is for people."""
 

@@ -14,9 +14,10 @@ from quadfringe.data import AnyShot, BayerShot, Shot
 from quadfringe.errors import InputError
 from quadfringe.images import full_scale, read_grey, read_rgb, write_image
 
-__all__ = ["read_bayer_shot", "read_shot", "write_shot"]
+__all__ = ["read_bayer_shot", "read_folder", "read_shot", "write_shot"]
 
 COLOURS = ("red", "green", "blue")
+SUFFIXES = (".png", ".tif", ".tiff", ".bmp")
 
 
 def read_shot(files: Mapping[str, Path | None], bits: int | None = None) -> Shot:
@@ -44,6 +45,31 @@ def read_bayer_shot(raw: Path, bayer: BayerPattern, ir: Path, bits: int | None =
     if images["raw"].dtype != images["ir"].dtype:
         images, full_scales = _fractions(images, full_scales), {"ir": 1.0}
     return BayerShot(images["raw"], bayer, images["ir"], full_scales["ir"])
+
+
+def read_folder(folder: Path, bayer: BayerPattern | None = None, bits: int | None = None) -> AnyShot:
+    """Read a shot from a folder: red, green, blue or rgb, and ir; raw and ir when `bayer` is given.
+
+    The images are .png, .tif, .tiff or .bmp. Raises `InputError` that names what is missing.
+    """
+    files = {name: _image_of(folder, name) for name in ("rgb", *COLOURS, "raw", "ir")}
+    if bayer is not None:
+        raw, ir = (files[name] for name in ("raw", "ir"))
+        if raw is None or ir is None:
+            raise InputError(f"{folder}: expected raw.png and ir.png")
+        return read_bayer_shot(raw, bayer, ir, bits)
+    del files["raw"]
+    missing = [name for name in (*COLOURS, "ir") if files[name] is None]
+    if files["ir"] is None or (files["rgb"] is None and missing):
+        raise InputError(f"{folder}: no {', '.join(f'{name}.png' for name in missing)}")
+    return read_shot(files, bits)
+
+
+def _image_of(folder: Path, name: str) -> Path | None:
+    found = [folder / f"{name}{suffix}" for suffix in SUFFIXES if (folder / f"{name}{suffix}").is_file()]
+    if len(found) > 1:
+        raise InputError(f"{folder}: {' and '.join(path.name for path in found)}; leave one of them")
+    return found[0] if found else None
 
 
 def _fractions(images: Mapping[str, NDArray[Any]], full_scales: Mapping[str, float]) -> dict[str, NDArray[np.float32]]:

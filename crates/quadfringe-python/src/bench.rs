@@ -11,7 +11,7 @@ use quadfringe::BayerPattern;
 use quadfringe::fringe::FringeCode;
 use quadfringe::optics::Pose;
 use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, Print, RenderOptions};
-use quadfringe::surface::{HeightMap, Interpolation, Peaks, Posed, Surface, scene};
+use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
 
 /// Camera and two projectors before a surface.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -63,6 +63,13 @@ impl Bench {
     #[pyo3(signature = (*, z_mm, scale_mm))]
     fn cast_peaks(&self, py: Python<'_>, z_mm: f64, scale_mm: f64) -> PyResult<Cast> {
         let surface = Peaks::new(z_mm, scale_mm).map_err(value_error)?;
+        Ok(self.cast_surface(py, &surface))
+    }
+
+    /// One ray through each pixel of a plane through a point, whose normal points to the camera.
+    #[pyo3(signature = (*, point_mm, normal))]
+    fn cast_plane(&self, py: Python<'_>, point_mm: [f64; 3], normal: [f64; 3]) -> PyResult<Cast> {
+        let surface = Plane::new(point_mm, normal).map_err(value_error)?;
         Ok(self.cast_surface(py, &surface))
     }
 
@@ -145,6 +152,18 @@ impl Bench {
         let beam = beam.map(beam_named).transpose()?;
         let lights = Light::step(fringe_number, shift_rad, axis_named(axis)?, beam);
         self.render_lights(py, cast, &lights, options)
+    }
+
+    /// The images with each channel lit evenly at a level of its own, 0 to 1.
+    #[pyo3(signature = (cast, levels, **options))]
+    fn render_levels<'py>(
+        &self,
+        py: Python<'py>,
+        cast: &Cast,
+        levels: [f64; 4],
+        options: Option<&Bound<'py, PyDict>>,
+    ) -> PyResult<Bound<'py, PyDict>> {
+        self.render_lights(py, cast, &levels.map(Light::Uniform), options)
     }
 }
 

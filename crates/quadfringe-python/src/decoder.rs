@@ -13,6 +13,9 @@ use quadfringe::{BayerPattern, Conditioner, Decoded, FringeCode, Method, Options
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Arc, Mutex, PoisonError};
 
+/// Offset, exponent and knee of the four channels.
+pub type Responses = [(f32, f32, f32); 4];
+
 /// Decodes shots of one size; planned and checked when made.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct Decoder {
@@ -29,7 +32,7 @@ impl Decoder {
     #[new]
     #[pyo3(signature = (shape, fringe_numbers, projector_width, *, full_scale = None, method = None,
         modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, threads = None, dark = None, response = None,
-        crosstalk = None, ir_registration = None, camera = None, projector = None))]
+        crosstalk = None, projector_response = None, ir_registration = None, camera = None, projector = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         py: Python<'_>,
@@ -44,8 +47,9 @@ impl Decoder {
         channel_instants_us: Option<[f32; 4]>,
         threads: Option<usize>,
         dark: Option<[f32; 4]>,
-        response: Option<[(f32, f32, f32); 4]>,
+        response: Option<Responses>,
         crosstalk: Option<[[f64; 4]; 4]>,
+        projector_response: Option<Responses>,
         ir_registration: Option<[[f64; 3]; 2]>,
         camera: Option<Device>,
         projector: Option<Device>,
@@ -59,7 +63,7 @@ impl Decoder {
             period_px: period_px.or(plain.period_px),
             channel_instants_us: channel_instants_us.or(plain.channel_instants_us),
         };
-        let conditioner = conditioner_of(dark, response, crosstalk, ir_registration);
+        let conditioner = conditioner_of(dark, response, crosstalk, projector_response, ir_registration);
         let kernel = py.detach(|| {
             let decoder = quadfringe::Decoder::new(code, shape, &conditioner, options)?;
             match (&camera, &projector) {
@@ -198,8 +202,9 @@ pub fn scaled<T: Sample>(shot: Shot<'_, T>, full_scale: Option<f32>) -> quadfrin
 /// What is known about the intensities; what is absent is ideal.
 pub fn conditioner_of(
     dark: Option<[f32; 4]>,
-    response: Option<[(f32, f32, f32); 4]>,
+    response: Option<Responses>,
     crosstalk: Option<[[f64; 4]; 4]>,
+    projector_response: Option<Responses>,
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> Conditioner {
     let ideal = Conditioner::default();
@@ -207,6 +212,7 @@ pub fn conditioner_of(
         dark: dark.unwrap_or(ideal.dark),
         response: response.map_or(ideal.response, |four| four.map(response_of)),
         crosstalk: crosstalk.unwrap_or(ideal.crosstalk),
+        projector_response: projector_response.map_or(ideal.projector_response, |four| four.map(response_of)),
         ir_registration: ir_registration.unwrap_or(ideal.ir_registration),
     }
 }

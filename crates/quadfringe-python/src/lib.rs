@@ -4,6 +4,7 @@ mod arrays;
 mod bench;
 mod decoder;
 mod device;
+mod height;
 mod memory;
 mod projector;
 mod stages;
@@ -13,10 +14,12 @@ use pyo3::prelude::*;
 #[pymodule(gil_used = true)]
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add("__profile__", if cfg!(debug_assertions) { "debug" } else { "release" })?;
     module.add_class::<device::Device>()?;
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;
     module.add_class::<decoder::Decoder>()?;
+    module.add_class::<height::PolynomialHeight>()?;
     module.add_class::<projector::LightCrafter>()?;
     module.add_class::<projector::Pattern>()?;
     module.add_class::<projector::PatternSequence>()?;
@@ -34,6 +37,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::n_step, module)?)?;
     module.add_function(wrap_pyfunction!(stages::unwrap, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
+    module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
     module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
     module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;
     module.add_function(wrap_pyfunction!(projector::power_on_drive, module)?)?;

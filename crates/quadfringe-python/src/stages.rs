@@ -1,7 +1,7 @@
 //! The stages one by one, for those who teach or debug; all on (H, W) float32.
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, expected, value_error, views};
-use crate::decoder::{conditioner_of, scaled};
+use crate::decoder::{Responses, conditioner_of, scaled};
 use crate::device::unknown;
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
@@ -20,7 +20,7 @@ fn map<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2
 /// The four channels as linear light, by name.
 #[pyfunction]
 #[pyo3(signature = (red, green, blue, ir, *, full_scale = None, dark = None, response = None, crosstalk = None,
-    ir_registration = None))]
+    projector_response = None, ir_registration = None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn linear_light<'py>(
     py: Python<'py>,
@@ -30,11 +30,12 @@ pub fn linear_light<'py>(
     ir: &Bound<'py, PyAny>,
     full_scale: Option<f32>,
     dark: Option<[f32; 4]>,
-    response: Option<[(f32, f32, f32); 4]>,
+    response: Option<Responses>,
     crosstalk: Option<[[f64; 4]; 4]>,
+    projector_response: Option<Responses>,
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let known = (full_scale, conditioner_of(dark, response, crosstalk, ir_registration));
+    let known = (full_scale, conditioner_of(dark, response, crosstalk, projector_response, ir_registration));
     let planes = match &Images::borrow(CHANNELS, [red, green, blue, ir])? {
         Images::U8(four) => linearise(py, views(four), Shot::new, &known),
         Images::U16(four) => linearise(py, views(four), Shot::new, &known),
@@ -46,7 +47,7 @@ pub fn linear_light<'py>(
 /// The four channels at every pixel as linear light, by name, from a raw mosaic and an infrared image.
 #[pyfunction]
 #[pyo3(signature = (raw, bayer, ir, *, full_scale = None, dark = None, response = None, crosstalk = None,
-    ir_registration = None))]
+    projector_response = None, ir_registration = None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn linear_light_bayer<'py>(
     py: Python<'py>,
@@ -55,12 +56,13 @@ pub fn linear_light_bayer<'py>(
     ir: &Bound<'py, PyAny>,
     full_scale: Option<f32>,
     dark: Option<[f32; 4]>,
-    response: Option<[(f32, f32, f32); 4]>,
+    response: Option<Responses>,
     crosstalk: Option<[[f64; 4]; 4]>,
+    projector_response: Option<Responses>,
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
-    let known = (full_scale, conditioner_of(dark, response, crosstalk, ir_registration));
+    let known = (full_scale, conditioner_of(dark, response, crosstalk, projector_response, ir_registration));
     let planes = match &Images::borrow(BAYER_IMAGES, [raw, ir])? {
         Images::U8(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
         Images::U16(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),

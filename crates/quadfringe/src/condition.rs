@@ -12,6 +12,7 @@ mod registered;
 mod response;
 mod sample;
 mod shot;
+mod unmix;
 
 pub use estimate::{ResponseEstimate, estimate_response};
 pub(crate) use plan::Plan;
@@ -39,10 +40,13 @@ use ndarray::Array2;
 pub struct Conditioner {
     /// Dark level per channel, as a fraction of full scale.
     pub dark: [f32; 4],
-    /// Inverse response per channel.
+    /// Inverse response per captured channel, undone before crosstalk: that of the camera, or of camera and projector
+    /// together where there is no crosstalk to tell them apart.
     pub response: [Response; 4],
     /// Captured from projected light: rows captured R, G, B, IR; columns projected R, G, B, IR.
     pub crosstalk: [[f64; 4]; 4],
+    /// Inverse response per projected channel, undone after crosstalk, which mixes light and not what the projector was told.
+    pub projector_response: [Response; 4],
     /// Affine map from a visible pixel (x, y, 1) to the infrared pixel (x, y) that sees the same point.
     pub ir_registration: [[f64; 3]; 2],
 }
@@ -55,6 +59,7 @@ impl Default for Conditioner {
             dark: [0.0; 4],
             response: [Response::default(); 4],
             crosstalk,
+            projector_response: [Response::default(); 4],
             ir_registration: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
         }
     }
@@ -72,8 +77,12 @@ impl Conditioner {
                 return Err(Error::value(name, "a fraction of full scale in [0, 1)", dark));
             }
         }
-        for (channel, response) in Channel::ALL.iter().zip(self.response) {
-            response.check(channel.name())?;
+        for (what, responses) in
+            [("response", &self.response), ("projector response", &self.projector_response)]
+        {
+            for (channel, response) in Channel::ALL.iter().zip(responses) {
+                response.check(what, channel.name())?;
+            }
         }
         if self.ir_registration.iter().flatten().any(|v| !v.is_finite()) {
             let actual = format!("{:?}", self.ir_registration);
@@ -175,6 +184,35 @@ mod tests {
         for (row, expected) in out.iter().zip(light) {
             assert!(row.iter().all(|v| (v - expected).abs() < 1e-6));
         }
+    }
+
+    /// The light of a projector of gamma 2.2, mixed, seen by a camera of gamma 1.5.
+    #[test]
+    fn projector_and_camera_responses_are_undone_on_their_own_sides_of_crosstalk() {
+        let mut crosstalk = [[0.15; 4]; 4];
+        (0..4).for_each(|i| crosstalk[i][i] = 1.0);
+        let response = |exponent: f32| [Response { exponent, ..Response::default() }; 4];
+        let conditioner = Conditioner {
+            response: response(1.5),
+            crosstalk,
+            projector_response: response(1.0 / 2.2),
+            ..Conditioner::default()
+        };
+        let levels = [0.0f32, 0.3, 0.5, 0.65];
+        let seen = crosstalk.map(|row| {
+            let light: f32 = row.iter().zip(levels).map(|(c, l)| *c as f32 * l.powf(2.2)).sum();
+            Array2::from_elem((1, 3), light.powf(1.0 / 1.5))
+        });
+        let shot = Shot::new(seen.each_ref().map(|image| image.view())).unwrap();
+        let found = linearise(&shot, &conditioner).unwrap();
+        for (plane, level) in found.iter().zip(levels) {
+            assert!(plane.iter().all(|v| (v - level).abs() < 5e-3), "{plane} for {level}");
+        }
+        let unmixed = Conditioner { crosstalk: Conditioner::default().crosstalk, ..conditioner };
+        let both = [0.36f32; 4].map(|light| Array2::from_elem((1, 3), light));
+        let [red, ..] =
+            linearise(&Shot::new(both.each_ref().map(|image| image.view())).unwrap(), &unmixed).unwrap();
+        assert!((red[[0, 1]] - 0.36f32.powf(1.5 / 2.2)).abs() < 1e-6);
     }
 
     #[test]

@@ -8,12 +8,14 @@ import typer
 from typer.core import TyperGroup
 
 from quadfringe.cli import (
+    accept,
     batch,
     bench,
     calibrate,
     camera,
     decode,
     demo,
+    doctor,
     info,
     live,
     projector,
@@ -85,6 +87,8 @@ app.command("live")(live.live)
 app.command("record")(record.record)
 app.command("recover")(record.recover)
 app.command("batch")(batch.batch)
+app.command("accept")(accept.accept)
+app.command("doctor")(doctor.doctor)
 app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)

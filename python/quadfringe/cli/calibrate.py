@@ -8,11 +8,12 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, table, write_figures
+from quadfringe.cli.output import JsonOption, say, table, write_figures, write_record
 
 __all__ = ["app"]
 
-app = typer.Typer(help="Estimate what a bench must know of itself.", no_args_is_help=True)
+app = typer.Typer(help="Calibrate a bench, step by step.", no_args_is_help=True)
+NOT_GOOD = 1
 
 
 class ChannelName(StrEnum):
@@ -27,7 +28,153 @@ class ChannelName(StrEnum):
 
 @app.callback()
 def calibrate() -> None:
-    """Estimate what a bench must know of itself."""
+    """Calibrate a bench, step by step: run does it all, on the virtual bench or with the captures of a folder."""
+
+
+@app.command()
+def run(
+    out: Annotated[Path, typer.Option(metavar="FILE", help="The calibration, .json.")],
+    captures: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder of captures, see plan; else the virtual bench.")
+    ] = None,
+    rig: Annotated[str | None, typer.Option(help="Name of the bench that the captures must be of.")] = None,
+    system: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="System of the virtual bench, .toml, without --captures.")
+    ] = None,
+    poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board on the virtual bench.")] = 12,
+    pictures: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder for coverage, residuals and the rest as PNG.")
+    ] = None,
+    heights: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="The height polynomial of every pixel, .npz.")
+    ] = None,
+    json: JsonOption = None,
+) -> None:
+    """Do every step whose captures are there: say what is missing, what came out, and whether it is good.
+
+    The status is 1 when a needed step is missing, in which case nothing is written, or when a step is not good.
+    """
+    from quadfringe.errors import InputError
+    from quadfringe.files import require_suffix
+    from quadfringe.guide import FolderCaptures, guide
+    from quadfringe.guide.bench import BenchCaptures, bench_session
+    from quadfringe.guide.geometry import height_calibration
+    from quadfringe.simulate import bench_config
+
+    require_suffix(out, (".json",))
+    if heights is not None:
+        require_suffix(heights, (".npz",))
+    if captures is not None and system is not None:
+        raise InputError(
+            "--captures and --system: the one is a folder of images, the other the virtual bench; give one"
+        )
+    if captures is not None:
+        found = guide(FolderCaptures(captures, rig), lambda words: say(words, json))
+    else:
+        config = bench_config(system, noise=None if system else 0.01)
+        found = guide(BenchCaptures(config, bench_session(config, poses)), lambda words: say(words, json))
+    if found.calibration is None:
+        say("no calibration: take the missing captures and run this again", json)
+        raise typer.Exit(NOT_GOOD)
+    if pictures is not None:
+        from quadfringe.guide.pictures import write_pictures
+
+        say("\n".join(str(path) for path in write_pictures(pictures, found)), json)
+    planes = found.outcome("planes")
+    polynomial = None if planes is None else height_calibration(planes)
+    if heights is not None and polynomial is not None:
+        polynomial.save(heights)
+    found.calibration.save(out)
+    say(f"{out}: {'every step is good' if found.good else 'NOT every step is good; see above'}", json)
+    write_record({"good": found.good, "steps": [one.step.model_dump(mode="json") for one in found.outcomes]}, json)
+    if not found.good:
+        raise typer.Exit(NOT_GOOD)
+
+
+@app.command()
+def plan(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the captures; made when missing.")],
+    rig: Annotated[str, typer.Option(help="Name of the bench.")],
+    poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
+) -> None:
+    """Write session.json, whose settings may then be edited, and list every capture to take."""
+    from quadfringe.errors import InputError
+    from quadfringe.files import folder_for
+    from quadfringe.guide.session import FILE, Session
+
+    if (folder / FILE).exists():
+        raise InputError(f"{folder / FILE}: is there already; edit it, or take another folder")
+    session = Session(rig=rig, poses=poses)
+    session.save(folder_for(folder) / FILE)
+    _list_captures(folder)
+
+
+@app.command()
+def check(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of captures.")],
+) -> None:
+    """Say which captures of a folder are missing, step by step; the status is 1 when a needed one is."""
+    if _list_captures(folder):
+        raise typer.Exit(NOT_GOOD)
+
+
+def _list_captures(folder: Path) -> bool:
+    """Say what is there and what is not; tell whether a needed step is incomplete."""
+    from quadfringe.guide import FolderCaptures
+    from quadfringe.guide.session import STEPS
+
+    captures, lacking = FolderCaptures(folder), False
+    for step in STEPS:
+        missing, total = captures.missing(step.name), len(captures.session.captures(step.name))
+        need = "needed" if step.needed else "may be left out"
+        say(f"{step.name}: {total - len(missing)} of {total} captures ({need})")
+        if missing:
+            say(f"  {step.how}")
+            say("\n".join(f"  {folder / step.name / name}" for name in missing))
+            lacking = lacking or step.needed
+    if not lacking:
+        say("nothing that is needed is missing: quadfringe calibrate run")
+    return lacking
+
+
+@app.command()
+def rehearse(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder for the captures; made when missing.")],
+    system: Annotated[Path | None, typer.Option(metavar="FILE", help="System of the virtual bench, .toml.")] = None,
+    poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
+) -> None:
+    """Write every capture of a calibration of the virtual bench as images, to see what a session looks like."""
+    from quadfringe.guide.bench import BenchCaptures, bench_session
+    from quadfringe.simulate import bench_config
+
+    config = bench_config(system, noise=None if system else 0.01)
+    written = BenchCaptures(config, bench_session(config, poses)).write(folder)
+    say(f"{folder}: {len(written)} captures; now quadfringe calibrate run --captures {folder} --out calibration.json")
+
+
+@app.command("export")
+def export_opencv(
+    calibration: Annotated[Path, typer.Argument(metavar="FILE", help="Calibration, .json.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="OpenCV FileStorage: .yml, .yaml, .xml or .json.")],
+) -> None:
+    """Write the devices of a calibration for OpenCV."""
+    from quadfringe.calibration.opencv_files import write_opencv
+    from quadfringe.data import Calibration
+
+    write_opencv(out, Calibration.load(calibration))
+    say(str(out))
+
+
+@app.command("import")
+def import_opencv(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="OpenCV FileStorage: .yml, .yaml, .xml or .json.")],
+    out: Annotated[Path, typer.Option(metavar="FILE", help="Calibration, .json.")],
+) -> None:
+    """Make a calibration of the devices in a file of OpenCV."""
+    from quadfringe.calibration.opencv_files import read_opencv
+
+    read_opencv(file).save(out)
+    say(str(out))
 
 
 @app.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import count as numbers
 from types import TracebackType
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.capture import VirtualConfig
-from quadfringe.config import ChannelResponse, Fringes, Response, SceneConfig, SystemConfig
+from quadfringe.config import ChannelResponse, Fringes, Response, Row4, SystemConfig, Triple
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Stamp, Truth
 from quadfringe.decoding import core_device, device_model
 from quadfringe.devices import CameraStatistics, Devices, Keep
@@ -50,9 +50,9 @@ class VirtualBench:
         self._bench = _core.Bench(**devices, layout=config.fringes.layout)
         self._scene = config.scene
         self._cast: tuple[float, _core.Cast] | None = None
-        self._board: tuple[_core.Cast, NDArray[np.float32]] | None = None
+        self._placed: tuple[_core.Cast, NDArray[np.float32] | None] | None = None
         self._exposures = 0
-        self.projected: Fringes | None = None
+        self.projected: Fringes | Row4 | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
         """Give the config with every device written out."""
@@ -62,18 +62,20 @@ class VirtualBench:
     def calibration(self) -> Calibration:
         """Give what a perfect calibration of this bench would find."""
         scene = self._scene
-        pairs = zip(
+        offsets, camera, projector = (
             scene.camera_offset or (0.0,) * 4,
             scene.camera_exponent or (1.0,) * 4,
             scene.projector_exponent or (1.0,) * 4,
-            strict=True,
         )
-        responses = [ChannelResponse(offset=o, exponent=camera / projector) for o, camera, projector in pairs]
+        # Seen through crosstalk, what camera and projector bend cannot be undone in one go.
+        parted = scene.crosstalk is not None
+        together = [seen if parted else seen / sent for seen, sent in zip(camera, projector, strict=True)]
         return Calibration(
             camera=device_model(self._bench.camera),
             projector=device_model(self._bench.visible),
-            response=Response(**dict(zip(CHANNELS, responses, strict=True))),
+            response=_responses(offsets, together),
             crosstalk=scene.crosstalk,
+            projector_response=_responses((0.0,) * 4, [1 / sent for sent in projector]) if parted else None,
             ir_registration=scene.infrared_from_visible,
         )
 
@@ -81,6 +83,18 @@ class VirtualBench:
         """Light the scene with these fringes from now on."""
         _core.check_code(fringes.numbers, self._bench.visible.width)
         self.projected = fringes
+
+    def project_levels(self, levels: Row4) -> None:
+        """Light the scene evenly from now on, each channel (R, G, B, IR) at a level of its own from 0 to 1."""
+        self.projected = levels
+
+    def place_plane(self, point_mm: Triple, normal: Triple) -> None:
+        """Put a plane through a point before the camera, in place of the scene; its normal points to the camera."""
+        self._placed = self._bench.cast_plane(point_mm=point_mm, normal=normal), None
+
+    def place_scene(self, surface: str) -> None:
+        """Put a ready scene before the camera; ValueError when there is none of that name."""
+        self._placed = self._bench.cast(surface), None
 
     def place(self, board: PrintedBoard, T_camera_board: NDArray[np.float64]) -> None:  # noqa: N803
         """Put a board into the scene, alone, in a pose (4, 4); ValueError when that is no motion."""
@@ -95,47 +109,61 @@ class VirtualBench:
             ink=board.ink,
             **pose,
         )
-        self._board = cast, albedo
+        self._placed = cast, albedo
+
+    def seed(self, exposure: int) -> int:
+        """Give the seed of the noise of an exposure by its number; the first has that of the scene."""
+        return (self._scene.seed or 0) + exposure
 
     def expose_step(self, number: float, shift_rad: float, axis: str = "columns", beam: str | None = None) -> AnyShot:
         """Give the shot of one step: the same fringes in all channels, or in those of one projector.
 
         Every exposure has noise of its own; the same sequence of exposures has the same noise.
         """
-        cast, light = self._lit(0.0)
-        light["seed"] = (self._scene.seed or 0) + self._exposures
+        light = self._light(self.seed(self._exposures))
         self._exposures += 1
-        return self._shot(self._bench.render_step(cast, number, shift_rad, axis=axis, beam=beam, **light), None)
+        return self._shot(
+            self._bench.render_step(self._before_camera(), number, shift_rad, axis=axis, beam=beam, **light), None
+        )
 
-    def expose(self, after_s: float = 0.0, exposure: int = 0) -> AnyShot:
+    def expose(
+        self, after_s: float = 0.0, *, seed: int | None = None, exposure: float = 1.0, capped: bool = False
+    ) -> AnyShot:
         """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected.
 
-        `after_s` is how long after the time of the scene it is taken; every exposure has noise of its own.
+        `after_s` is how long after the time of the scene it is taken, `seed` draws other noise than that of the scene,
+        `exposure` is relative to that of the scene, and `capped` keeps all light out.
         """
         if self.projected is None:
             raise DecodeError("the projector shows nothing: call show(fringes) before snap()")
-        cast, light = self._lit(after_s)
-        if exposure:
-            light["seed"] = (self._scene.seed or 0) + exposure
-        images = self._bench.render(cast, self.projected.numbers, **light)
-        return self._shot(images, self._truth(cast))
+        cast, light = self._before_camera(after_s), self._light(seed, 0.0 if capped else exposure)
+        if isinstance(self.projected, Fringes):
+            return self._shot(self._bench.render(cast, self.projected.numbers, **light), self._truth(cast))
+        return self._shot(self._bench.render_levels(cast, self.projected, **light), None)
 
-    def _lit(self, after_s: float) -> tuple[_core.Cast, dict[str, Any]]:
-        """Give what the camera looks at, and the light on it: the board when there is one, else the scene."""
-        light = _light(self._scene)
-        if self._board is not None:
-            cast, light["albedo"] = self._board
-            return cast, light
+    def _before_camera(self, after_s: float = 0.0) -> _core.Cast:
+        """Give what the camera looks at: what was placed there, else the scene."""
+        if self._placed is not None:
+            return self._placed[0]
         time_s = (self._scene.time_s or 0.0) + after_s
         if self._cast is None or self._cast[0] != time_s:
             self._cast = time_s, self._look(time_s)
-        return self._cast[1], light
+        return self._cast[1]
 
     def _shot(self, images: dict[str, NDArray[Any]], truth: Truth | None) -> AnyShot:
         full_scale = float(2**self._scene.bit_depth - 1)
         if "raw" in images and self._scene.bayer is not None:
             return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
         return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scale, truth)
+
+    def _light(self, seed: int | None, exposure: float = 1.0) -> dict[str, Any]:
+        """Give the settings of light and camera that are present, as the kernel names them."""
+        light = self._scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+        if exposure != 1.0:
+            light["gain"] = tuple(exposure * gain for gain in self._scene.gain or (1.0,) * 4)
+        if self._placed is not None and self._placed[1] is not None:
+            light["albedo"] = self._placed[1]
+        return light if seed is None else light | {"seed": seed}
 
     def _look(self, time_s: float) -> _core.Cast:
         relief = self._scene.height_map
@@ -156,9 +184,9 @@ class VirtualBench:
         )
 
 
-def _light(scene: SceneConfig) -> dict[str, Any]:
-    """Give the settings of light and camera that are present, as the kernel names them."""
-    return scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+def _responses(offsets: Sequence[float], exponents: Sequence[float]) -> Response:
+    pairs = zip(CHANNELS, offsets, exponents, strict=True)
+    return Response(**{name: ChannelResponse(offset=offset, exponent=exponent) for name, offset, exponent in pairs})
 
 
 class VirtualProjector:
@@ -210,7 +238,7 @@ class VirtualCamera:
     def _expose(self) -> AnyShot:
         self._check_open()
         exposure = self._exposures if self._rate_hz else 0
-        shot = self._bench.expose(exposure / self._rate_hz if self._rate_hz else 0.0, exposure)
+        shot = self._bench.expose(exposure / self._rate_hz if self._rate_hz else 0.0, seed=self._bench.seed(exposure))
         self._exposures += 1
         return replace(shot, stamp=Stamp(self._exposures, time.time_ns() // 1000, self.name))
 

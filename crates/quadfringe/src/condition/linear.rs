@@ -5,21 +5,24 @@ use std::borrow::Cow;
 
 use ndarray::ArrayView2;
 
-/// Dark level and response of the four channels, ready for one type of sample and one full scale.
+/// Dark level and responses of the four channels, ready for one type of sample and one full scale.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
     dark: [f32; 4],
     response: [Response; 4],
+    /// Undone here only where no crosstalk has to be undone in between.
+    projector_response: [Response; 4],
     full_scale: f32,
     tables: [Vec<f32>; 4],
     tables_for: Option<(usize, f32)>,
 }
 
 impl Linear {
-    pub fn new(conditioner: &Conditioner) -> Self {
+    pub fn new(conditioner: &Conditioner, mixed: bool) -> Self {
         Self {
             dark: conditioner.dark,
             response: conditioner.response,
+            projector_response: if mixed { Default::default() } else { conditioner.projector_response },
             full_scale: 1.0,
             tables: std::array::from_fn(|_| Vec::new()),
             tables_for: None,
@@ -40,7 +43,7 @@ impl Linear {
     }
 
     fn linear(&self, c: usize, fraction: f32) -> f32 {
-        self.response[c].linear(fraction - self.dark[c])
+        self.projector_response[c].linear(self.response[c].linear(fraction - self.dark[c]))
     }
 
     /// A row of channel `c`.
@@ -48,7 +51,7 @@ impl Linear {
     pub fn row<T: Sample>(&self, c: usize, row: &[T], out: &mut [f32]) {
         let (table, scale) = (&self.tables[c][..T::LEVELS], 1.0 / self.full_scale);
         let pixels = out.iter_mut().zip(row);
-        if self.response[c] == Response::default() {
+        if [self.response[c], self.projector_response[c]] == [Response::default(); 2] {
             // Arithmetic runs on vectors, which a table does not.
             let dark = self.dark[c];
             return pixels.for_each(|(value, raw)| *value = raw.intensity() * scale - dark);

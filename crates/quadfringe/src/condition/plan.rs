@@ -4,6 +4,7 @@ use super::linear::{Linear, row_of};
 use super::mosaic::{self, Mosaic};
 use super::registered::Registered;
 use super::shot::Images;
+use super::unmix::Unmix;
 use super::{Conditioner, Sample, Shot};
 use crate::Result;
 
@@ -14,7 +15,7 @@ const CLIPPED: f32 = 0.998;
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     linear: Linear,
-    unmix: Option<[[f32; 4]; 4]>,
+    unmix: Option<Unmix>,
     registered: Option<Registered>,
     mosaic: Mosaic,
 }
@@ -23,11 +24,10 @@ impl Plan {
     /// `conditioner` must have been checked.
     pub fn new(conditioner: &Conditioner) -> Result<Self> {
         let identity = Conditioner::default();
+        let mixed = conditioner.crosstalk != identity.crosstalk;
         Ok(Self {
-            linear: Linear::new(conditioner),
-            unmix: (conditioner.crosstalk != identity.crosstalk)
-                .then(|| conditioner.crosstalk_inverse())
-                .transpose()?,
+            linear: Linear::new(conditioner, mixed),
+            unmix: mixed.then(|| Unmix::new(conditioner)).transpose()?,
             registered: (conditioner.ir_registration != identity.ir_registration)
                 .then(|| Registered::new(conditioner.ir_registration)),
             mosaic: Mosaic::default(),
@@ -62,7 +62,7 @@ impl Plan {
             None => self.linear.row(3, &row_of(shot.infrared(), y), infrared),
         }
         if let Some(unmix) = &self.unmix {
-            unmix_row(unmix, out);
+            unmix.row(out);
         }
     }
 
@@ -96,19 +96,5 @@ impl Plan {
                 pixels.for_each(|(unsaturated, raw)| *unsaturated &= raw.intensity() < limit);
             }
         }
-    }
-}
-
-/// Crosstalk undone. Where the infrared chip sees nothing, the others are freed from one another alone: no data must not
-/// spread to them, as filters along rows would carry it on.
-fn unmix_row(unmix: &[[f32; 4]; 4], rows: &mut [&mut [f32]; 4]) {
-    for x in 0..rows[0].len() {
-        let mut seen = [rows[0][x], rows[1][x], rows[2][x], rows[3][x]];
-        let blind = seen[3].is_nan();
-        seen[3] = if blind { 0.0 } else { seen[3] };
-        for (row, weights) in rows.iter_mut().zip(unmix) {
-            row[x] = weights.iter().zip(seen).map(|(w, s)| w * s).sum();
-        }
-        rows[3][x] = if blind { f32::NAN } else { rows[3][x] };
     }
 }

@@ -51,16 +51,16 @@ impl Response {
     /// Whether every number is in its range.
     ///
     /// # Errors
-    /// [`Error::Value`] that names the channel and the number.
-    pub fn check(&self, channel: &str) -> Result<()> {
+    /// [`Error::Value`] that names the response by `what` it is of and the channel, and the number.
+    pub fn check(&self, what: &str, channel: &str) -> Result<()> {
         let numbers = [
             ("offset", self.offset, 0.0..0.5, "[0, 0.5)"),
             ("exponent", self.exponent, 0.05..5.0, "[0.05, 5)"),
             ("knee", self.knee, 0.0..0.9801, "[0, 0.98]"),
         ];
-        for (what, value, range, expected) in numbers {
+        for (number, value, range, expected) in numbers {
             if !range.contains(&value) {
-                let name = format!("response {what} of {channel}");
+                let name = format!("{what} {number} of {channel}");
                 return Err(Error::value(name, format!("a number in {expected}"), value));
             }
         }

@@ -66,6 +66,26 @@ impl PolynomialHeight {
         Ok(Self { reference_rad: reference_rad.to_owned(), coefficients })
     }
 
+    /// A calibration that was fitted earlier: the phase of the reference plane, and coefficients as
+    /// [`PolynomialHeight::coefficients`] gave them.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] unless the coefficients are `(rows, columns, degree + 1)` of degree 1 to 6 for the size of the reference.
+    pub fn from_coefficients(reference_rad: Array2<f32>, coefficients: Array3<f64>) -> Result<Self> {
+        let (rows, columns) = reference_rad.dim();
+        let terms = coefficients.dim().2.clamp(2, DEGREE_MAX + 1);
+        if coefficients.dim() != (rows, columns, terms) {
+            return Err(Error::shape("coefficients", &[rows, columns, terms], coefficients.shape()));
+        }
+        Ok(Self { reference_rad, coefficients })
+    }
+
+    /// Absolute phase of the reference plane, rad.
+    #[must_use]
+    pub fn reference_rad(&self) -> &Array2<f32> {
+        &self.reference_rad
+    }
+
     /// The coefficients `a_n`, `(rows, columns, degree + 1)` in mm / rad^n, NaN where a pixel has none.
     #[must_use]
     pub fn coefficients(&self) -> &Array3<f64> {
@@ -224,5 +244,14 @@ mod tests {
         let map = height.height_from_phase(planes[2].1.view()).expect("same size");
         assert!(map[[1, 1]].is_nan() && map[[0, 0]].is_finite());
         assert!(height.height_from_phase(Array2::zeros((2, 2)).view()).is_err());
+    }
+
+    #[test]
+    fn stored_coefficients_give_the_same_heights() {
+        let planes = planes(&[0.0, 10.0, 20.0]);
+        let height = fitted(&planes, 2).expect("enough planes");
+        let (reference, terms) = (height.reference_rad().clone(), height.coefficients().clone());
+        assert_eq!(PolynomialHeight::from_coefficients(reference.clone(), terms).expect("fits"), height);
+        assert!(PolynomialHeight::from_coefficients(reference, Array3::zeros((3, 4, 1))).is_err());
     }
 }

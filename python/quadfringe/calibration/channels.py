@@ -1,0 +1,264 @@
+"""Responses of camera and projector, and crosstalk of the four channels, from evenly lit captures.
+
+What is seen of levels l (R, G, B, IR, shares of full light) under a relative exposure e is taken to be
+
+    captured_i = dark_i + (e (sum_j M_ij l_j ^ gamma_j + ambient_i)) ^ (1 / kappa_i),
+
+with the light M_ij of projected channel j on captured channel i. That is the virtual bench, and step 1 of the chain
+turned round (S1): dark level, camera, crosstalk, projector. Crosstalk is M with columns scaled to 1 on the diagonal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe import _core
+from quadfringe.calibration.levels import CHANNELS, LevelPlan, row4
+from quadfringe.config import ChannelResponse, Matrix4, Response, Row4
+from quadfringe.errors import InputError
+
+__all__ = ["Channels", "fit_channels"]
+
+Array = NDArray[np.float64]
+CLIPPED = 0.97  # captured shares of full scale from here on are left out: noise would be cut off
+CAMERA_PRIOR = (
+    2e-3  # share of full scale that one unit of a camera exponent away from 1 costs: a camera is linear unless seen
+)
+DARK_PRIOR = 0.05  # the same for the dark level, which noise that cannot be negative lifts where a camera bends
+ROBUST = 2e-3  # misses of captures above this count less, share of full scale
+UNLIT = 0.02  # a channel whose own light stays below this share of full scale cannot be calibrated
+OFFSET_MAX = 0.45  # share of full light that room light may add
+USABLE_MIN = 3  # unsaturated levels of a ramp, black left out, that show its bend
+
+
+@dataclass(frozen=True)
+class Channels:
+    """What was found, with one standard deviation of each number, and what is left of the defects.
+
+    Errors are shares of a channel's own full light, (K, 4), NaN where a capture does not count. `level_before` and
+    `level_after` compare what is seen with the projected level; `stray_before` and `stray_after` are the light of
+    other channels that a channel sees while its own projector is black.
+    """
+
+    dark: Row4
+    response: Response
+    crosstalk: Matrix4
+    projector_response: Response
+    camera_exponent_sd: Row4
+    projector_exponent_sd: Row4
+    crosstalk_sd: Matrix4
+    level_before: Array
+    level_after: Array
+    stray_before: Array
+    stray_after: Array
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Give what is left by name: the worst stray light, RMS and worst error of the levels, per cent."""
+        found = {}
+        for when in ("before", "after"):
+            stray, level = (getattr(self, f"{kind}_{when}") for kind in ("stray", "level"))
+            found[f"stray_{when}_percent"] = 100 * float(np.nanmax(np.abs(stray)))
+            found[f"level_rms_{when}_percent"] = 100 * float(np.sqrt(np.nanmean(level**2)))
+            found[f"level_worst_{when}_percent"] = 100 * float(np.nanmax(np.abs(level)))
+        return found
+
+    def keywords(self) -> dict[str, Any]:
+        """Give what was found as fields of a `Calibration`."""
+        return {name: getattr(self, name) for name in ("dark", "response", "crosstalk", "projector_response")}
+
+
+def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,) * 4) -> Channels:
+    """Fit responses and crosstalk to `captured` (K, 4), shares of full scale, NaN where saturated (S1).
+
+    `dark` is the level without light, where the fit starts. Raises `InputError` when there are not as many captures as
+    the plan has, when a projected channel is not seen by its own camera channel, or when too few are unsaturated.
+    """
+    captured = np.asarray(captured, float)
+    if captured.shape != plan.levels.shape:
+        raise InputError(
+            f"levels: expected {len(plan.levels)} captures of four channels, got an array of shape {captured.shape}; "
+            "take every level of the plan"
+        )
+    seen = np.where(captured < CLIPPED, captured, np.nan)
+    _check_ramps(plan, seen - np.asarray(dark, float))
+    found, deviations = _solve(plan, seen, np.asarray(dark, float))
+    lit = seen - found.dark
+    own = np.diag(found.mixing)
+    crosstalk = found.mixing / own
+    offset = np.linalg.solve(crosstalk, found.ambient).clip(0.0, OFFSET_MAX)
+    known: dict[str, Any] = {
+        "dark": row4(found.dark),
+        "response": _responses(np.zeros(4), found.camera),
+        "crosstalk": _matrix(crosstalk),
+        "projector_response": _responses(offset, 1 / found.projector),
+    }
+    return Channels(
+        **known,
+        camera_exponent_sd=row4(deviations.camera),
+        projector_exponent_sd=row4(deviations.projector),
+        crosstalk_sd=_matrix(deviations.mixing / own),
+        **_errors(plan, lit, captured, known),
+    )
+
+
+@dataclass(frozen=True)
+class _Model:
+    """Exponents of camera and projector, light of projected on captured channels, room light, dark level."""
+
+    camera: Array
+    projector: Array
+    mixing: Array
+    ambient: Array
+    dark: Array
+
+    @classmethod
+    def of(cls, numbers: Array) -> _Model:
+        return cls(numbers[:4], numbers[4:8], numbers[8:24].reshape(4, 4), numbers[24:28], numbers[28:])
+
+    def numbers(self) -> Array:
+        return np.concatenate([self.camera, self.projector, self.mixing.ravel(), self.ambient, self.dark])
+
+    def captured(self, plan: LevelPlan) -> Array:
+        light = plan.exposure[:, None] * (plan.levels**self.projector @ self.mixing.T + self.ambient)
+        return np.asarray(self.dark + np.maximum(light, 0.0) ** (1 / self.camera))
+
+
+def _solve(plan: LevelPlan, seen: Array, dark: Array) -> tuple[_Model, _Model]:
+    """Give the best model and the standard deviations of its numbers."""
+    from scipy.optimize import least_squares
+
+    counts = np.isfinite(seen)
+
+    def misses(numbers: Array) -> Array:
+        model = _Model.of(numbers)
+        held = [CAMERA_PRIOR * (model.camera - 1), DARK_PRIOR * (model.dark - dark)]
+        return np.concatenate([(model.captured(plan) - seen)[counts], *held])
+
+    start = _first_guess(plan, seen - dark, dark).numbers()
+    low = np.concatenate([np.full(8, 0.2), np.full(20, -0.2), np.zeros(4)])
+    high = np.concatenate([np.full(8, 5.0), np.full(20, 3.0), np.full(4, 0.5)])
+    start = start.clip(low + 1e-9, high - 1e-9)
+    found = least_squares(
+        misses, start, bounds=(low, high), x_scale="jac", xtol=1e-12, loss="soft_l1", f_scale=ROBUST, max_nfev=300
+    )
+    spare = max(int(counts.sum()) - start.size, 1)
+    covariance = np.linalg.pinv(found.jac.T @ found.jac) * 2 * found.cost / spare
+    return _Model.of(found.x), _Model.of(np.sqrt(np.diag(covariance)))
+
+
+def _first_guess(plan: LevelPlan, lit: Array, dark: Array) -> _Model:
+    """Take the camera as linear, the brightest unsaturated level of each ramp as its light, and its bend as a power."""
+    black = np.nan_to_num(lit[_black(plan)].mean(axis=0))
+    mixing, projector = np.eye(4), np.ones(4)
+    for channel in range(4):
+        rows = _ramp(plan, channel)
+        light = np.where(np.isfinite(lit[rows]), lit[rows] - black, np.nan)
+        level, own = plan.levels[rows, channel], light[:, channel]
+        usable = np.isfinite(own) & (own > 0.002)
+        slope, height = np.polyfit(np.log(level[usable]), np.log(own[usable]), 1)
+        projector[channel] = slope
+        top = int(np.flatnonzero(np.isfinite(own))[-1])
+        mixing[:, channel] = np.nan_to_num(light[top]) / level[top] ** slope
+        mixing[channel, channel] = np.exp(height)
+    return _Model(np.ones(4), projector, mixing, black, dark)
+
+
+def _black(plan: LevelPlan) -> NDArray[np.intp]:
+    return np.flatnonzero(~plan.levels.any(axis=1))
+
+
+def _ramp(plan: LevelPlan, channel: int) -> NDArray[np.intp]:
+    """Give the captures in which this channel alone is lit, at full exposure, from dark to bright."""
+    others = np.delete(plan.levels, channel, axis=1).any(axis=1)
+    rows = np.flatnonzero((plan.levels[:, channel] > 0) & ~others & (plan.exposure == 1))
+    return rows[np.argsort(plan.levels[rows, channel])]
+
+
+def _check_ramps(plan: LevelPlan, lit: Array) -> None:
+    black = _black(plan)
+    if not black.size:
+        raise InputError("levels: no capture is black; take one with all projectors showing black")
+    for channel, name in enumerate(CHANNELS):
+        ramp = lit[_ramp(plan, channel)]
+        usable = np.isfinite(ramp[:, channel]).sum()
+        if usable < USABLE_MIN or np.isnan(lit[black, channel]).all():
+            raise InputError(
+                f"levels: {name} is saturated in all but {usable} captures of its ramp; shorten the "
+                "exposure until the brightest one stays below 97 % of full scale"
+            )
+        own = ramp[:, channel] - np.nanmean(lit[black, channel])
+        if np.nanmax(own) < UNLIT:
+            brightest = CHANNELS[int(np.nanargmax(np.nanmax(ramp, axis=0)))]
+            raise InputError(
+                f"levels: {name} hardly sees its own light ({np.nanmax(own):.1%} of full scale); the ramp of {name} is "
+                f"seen best by {brightest}: are the channels in the order red, green, blue, ir?"
+            )
+
+
+def _errors(plan: LevelPlan, lit: Array, captured: Array, known: dict[str, Any]) -> dict[str, Any]:
+    """Give level and stray errors before and after, shares of a channel's own light, through the kernel."""
+    counts = (plan.exposure == 1)[:, None] & np.isfinite(lit)
+    after = _conditioned(captured, known)
+    before = np.where(counts, lit, np.nan)
+    after = np.where(counts & np.isfinite(lit).all(axis=1, keepdims=True), after, np.nan)
+    # Stray light is judged as light, before the inverse of a gamma, which has no slope to speak of in the dark.
+    light = _conditioned(captured, {name: known[name] for name in ("dark", "response", "crosstalk")})
+    light = np.where(np.isfinite(after), light, np.nan)
+    unlit = plan.levels == 0
+    return {
+        "level_before": _level_error(plan, before - np.nanmean(before[_black(plan)], axis=0)),
+        "level_after": _level_error(plan, after),
+        "stray_before": np.where(unlit, _per_own(plan, before), np.nan),
+        "stray_after": np.where(unlit, _per_own(plan, light), np.nan),
+    }
+
+
+def _conditioned(captured: Array, known: dict[str, Any]) -> Array:
+    """Condition mean intensities (K, 4) as the decoder conditions pixels."""
+    images = [np.ascontiguousarray(column[None], np.float32) for column in np.nan_to_num(captured).T]
+    rows: dict[str, Any] = {
+        name: value.rows() if isinstance(value, Response) else value for name, value in known.items()
+    }
+    light = _core.linear_light(images[0], images[1], images[2], images[3], **rows)
+    return np.stack([light[name][0] for name in CHANNELS], axis=1).astype(float)
+
+
+def _own_light(plan: LevelPlan, seen: Array) -> Array:
+    """Give what each channel sees of its own full light, by the brightest unsaturated capture of its ramp."""
+    tops = []
+    for channel in range(4):
+        rows = _ramp(plan, channel)
+        usable = rows[np.isfinite(seen[rows, channel])]
+        tops.append(seen[usable[-1], channel] / plan.levels[usable[-1], channel])
+    return np.array(tops)
+
+
+def _per_own(plan: LevelPlan, seen: Array) -> Array:
+    return np.asarray((seen - np.nanmean(seen[_black(plan)], axis=0)) / _own_light(plan, seen))
+
+
+def _level_error(plan: LevelPlan, seen: Array) -> Array:
+    """Give how far lit captures are from a line through zero, shares of full light; black ones are stray light."""
+    lit = np.isfinite(seen) & (plan.levels > 0)
+    found = np.full(seen.shape, np.nan)
+    for channel in range(4):
+        rows = lit[:, channel]
+        level, value = plan.levels[rows, channel], seen[rows, channel]
+        found[rows, channel] = value / (value @ level / (level @ level)) - level
+    return found
+
+
+def _responses(offset: Array, exponent: Array) -> Response:
+    pairs = zip(CHANNELS, offset, exponent, strict=True)
+    return Response(**{name: ChannelResponse(offset=float(o), exponent=float(e)) for name, o, e in pairs})
+
+
+def _matrix(values: Array) -> Matrix4:
+    red, green, blue, ir = (row4(row) for row in values)
+    return red, green, blue, ir

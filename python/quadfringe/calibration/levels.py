@@ -1,0 +1,118 @@
+"""Evenly lit captures: which levels to show, the mean intensities of shots, and the dark level of a camera."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.config import Row4
+from quadfringe.data import AnyShot
+from quadfringe.errors import InputError
+
+__all__ = ["CHANNELS", "DarkLevel", "LevelPlan", "dark_level", "level_plan", "mean_levels", "row4", "stacked"]
+
+Array = NDArray[np.float64]
+CHANNELS = ("red", "green", "blue", "ir")
+STEPS = 8  # levels of a ramp
+DARK_MAX = 0.2  # share of full scale that is no dark level any more
+HOT = 0.02  # share of full scale above the level from which on a pixel is hot
+
+
+@dataclass(frozen=True)
+class LevelPlan:
+    """What to show: `levels` (K, 4) of R, G, B, IR from 0 to 1, and the relative `exposure` (K,) of each capture."""
+
+    levels: Array
+    exposure: Array
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Give a name to each capture, as in r100_g000_b000_ir050_e100; numbers are per cent."""
+        words = ("r", "g", "b", "ir", "e")
+        rows = np.column_stack([self.levels, self.exposure])
+        return tuple("_".join(f"{w}{round(100 * v):03d}" for w, v in zip(words, row, strict=True)) for row in rows)
+
+
+def level_plan(steps: int = STEPS) -> LevelPlan:
+    """Give the captures that `fit_channels` needs: black, a ramp of each channel, and all four together.
+
+    The last ones, at three exposures, tell the response of the camera from that of the projector.
+
+    >>> from quadfringe.calibration.levels import level_plan
+    >>> level_plan(4).names[:2]
+    ('r000_g000_b000_ir000_e100', 'r025_g000_b000_ir000_e100')
+    """
+    ramp = np.round(np.arange(1, steps + 1) / steps, 2)
+    single = [level * np.eye(4)[channel] for channel in range(4) for level in ramp]
+    together = [np.full(4, level) for level in ramp]
+    bright = [np.full(4, ramp[-1])] * 2
+    levels = np.array([np.zeros(4), *single, *together, *bright])
+    exposure = np.ones(len(levels))
+    exposure[-2:] = (0.25, 0.5)
+    return LevelPlan(levels, exposure)
+
+
+@dataclass(frozen=True)
+class DarkLevel:
+    """Intensities without any light, shares of full scale: mean, its spread between pixels, and noise in time."""
+
+    level: Row4
+    fixed_pattern: Row4
+    noise: Row4
+    hot_pixels: int
+
+
+def dark_level(shots: Sequence[AnyShot]) -> DarkLevel:
+    """Give the dark level of each channel from two shots or more with the lens covered.
+
+    A hot pixel is more than 2 % of full scale above the level in the mean of the shots. Raises `InputError` when there
+    is one shot only, when shots differ in size, or when they are not dark.
+    """
+    if len(shots) < 2:
+        raise InputError(f"dark level: expected two shots or more with the lens covered, got {len(shots)}")
+    stacks = [stacked(shots, name) for name in CHANNELS]
+    levels = [float(np.median(stack.mean(axis=0))) for stack in stacks]
+    if max(levels) > DARK_MAX:
+        worst = CHANNELS[int(np.argmax(levels))]
+        raise InputError(
+            f"dark level: {worst} has {max(levels):.0%} of full scale with the lens covered; put the cap on and switch "
+            "the projectors off, or lower the black level of the camera"
+        )
+    means = [stack.mean(axis=0) - level for stack, level in zip(stacks, levels, strict=True)]
+    return DarkLevel(
+        level=row4(levels),
+        fixed_pattern=row4([float(np.std(np.clip(mean, -HOT, HOT))) for mean in means]),
+        noise=row4([float(np.sqrt(np.mean(np.var(stack, axis=0, ddof=1)))) for stack in stacks]),
+        hot_pixels=int(np.count_nonzero(np.any([mean > HOT for mean in means], axis=0))),
+    )
+
+
+def mean_levels(shot: AnyShot, share: float = 0.25) -> Array:
+    """Give the mean intensity of each channel, (4,), shares of full scale, over the middle `share` of rows and columns.
+
+    A channel with a saturated pixel there is NaN: its mean is not that of the light.
+    """
+    found = []
+    for image in shot.channels.values():
+        rows, columns = (slice(round(n * (1 - share) / 2), round(n * (1 + share) / 2)) for n in image.shape)
+        patch = image[rows, columns] / shot.full_scale_value
+        found.append(float(patch.mean()) if np.mean(patch >= 0.998) < 1e-3 else np.nan)
+    return np.array(found)
+
+
+def row4(values: Sequence[float] | Array) -> Row4:
+    """Give four numbers as a row of R, G, B, IR."""
+    red, green, blue, ir = (float(v) for v in values)
+    return red, green, blue, ir
+
+
+def stacked(shots: Sequence[AnyShot], name: str) -> Array:
+    """Give one channel of shots, (N, H, W), shares of full scale; `InputError` when they differ in size."""
+    images = [shot.channels[name] for shot in shots]
+    if len({image.shape for image in images}) > 1:
+        sizes = ", ".join(sorted({f"{i.shape[1]} x {i.shape[0]}" for i in images}))
+        raise InputError(f"{name}: shots of {sizes} pixels; all captures of a calibration must be of one size")
+    return np.stack([i / shot.full_scale_value for i, shot in zip(images, shots, strict=True)]).astype(float)

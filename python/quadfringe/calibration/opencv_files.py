@@ -1,0 +1,122 @@
+"""Calibrations as OpenCV's FileStorage (.yml, .yaml, .xml, .json) and back: intrinsics, distortion and poses.
+
+Each device has `<name>_matrix` (3 x 3), `<name>_distortion` (1 x 5: k1, k2, p1, p2, k3), `<name>_size` (1 x 2: width,
+height) and, but for the camera, `R_<name>_camera` (3 x 3) and `T_<name>_camera` (3 x 1, mm) with
+P_device = R P_camera + T, as `cv2.stereoCalibrate` gives them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.config import DeviceModel
+from quadfringe.data import Calibration
+from quadfringe.errors import ConfigError, InputError
+from quadfringe.files import atomic, read_bytes, require_suffix
+
+__all__ = ["SUFFIXES", "devices_from_opencv", "read_opencv", "write_opencv"]
+
+SUFFIXES = (".yml", ".yaml", ".xml", ".json")
+DEVICES = ("camera", "projector", "infrared")
+SKEW_MAX = 1e-6
+
+
+def write_opencv(path: Path, calibration: Calibration) -> None:
+    """Write the devices of a calibration for OpenCV, whole or not at all; the format follows the suffix."""
+    import cv2
+
+    require_suffix(path, SUFFIXES)
+    with atomic(path) as temporary:
+        storage = cv2.FileStorage(str(temporary), cv2.FILE_STORAGE_WRITE)
+        try:
+            for name in DEVICES:
+                device = getattr(calibration, name)
+                for key, matrix in ({} if device is None else _matrices(name, device)).items():
+                    storage.write(key, matrix)
+        finally:
+            storage.release()
+
+
+def _matrices(name: str, device: DeviceModel) -> dict[str, NDArray[np.float64]]:
+    (fx, fy), (cx, cy) = device.focal_px, device.centre_px
+    found = {
+        f"{name}_matrix": np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float),
+        f"{name}_distortion": np.array([device.distortion], float),
+        f"{name}_size": np.array([[device.width_px, device.height_px]], float),
+    }
+    if name != "camera":
+        found[f"R_{name}_camera"] = np.array(device.rotation, float)
+        found[f"T_{name}_camera"] = np.array(device.translation_mm, float)[:, None]
+    return found
+
+
+def read_opencv(path: Path) -> Calibration:
+    """Read the devices that `write_opencv` or a program of one's own wrote; `infrared` may be absent.
+
+    Raises `InputError` that names the file and the matrix at fault: one that is missing, of another size, with skew, or
+    distortion beyond k3, which the kernel does not know.
+    """
+    import cv2
+
+    require_suffix(path, SUFFIXES)
+    read_bytes(path)  # a missing file is named in our own words
+    try:
+        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+        nodes = {key: storage.getNode(key).mat() for key in storage.root().keys()}  # noqa: SIM118 - no mapping
+        storage.release()
+    except (cv2.error, SystemError) as error:
+        raise InputError(f"{path}: not a readable file of OpenCV's FileStorage: {error}") from error
+    matrices = {key: np.asarray(matrix, float) for key, matrix in nodes.items() if matrix is not None}
+    return devices_from_opencv(matrices, str(path))
+
+
+def devices_from_opencv(matrices: dict[str, NDArray[np.float64]], source: str = "matrices") -> Calibration:
+    """Give the calibration of matrices by name; the camera is the frame, so that it needs no pose."""
+    names = ("camera", "projector", *(("infrared",) if "infrared_matrix" in matrices else ()))
+    devices: dict[str, Any] = {name: _device(name, matrices, source) for name in names}
+    return Calibration(**devices)
+
+
+def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) -> DeviceModel:
+    matrix = _matrix(f"{name}_matrix", (3, 3), matrices, source)
+    skewed = max(abs(matrix[0, 1]), np.abs(matrix[2] - (0, 0, 1)).max(), abs(matrix[1, 0])) > SKEW_MAX
+    if skewed:
+        raise ConfigError(f"{source}: {name}_matrix: expected fx, 0, cx, 0, fy, cy, 0, 0, 1, got {matrix.tolist()}")
+    size = _matrix(f"{name}_size", (1, 2), matrices, source)[0]
+    distortion = matrices.get(f"{name}_distortion", np.zeros(5)).ravel()
+    if distortion.size not in (4, 5):
+        raise ConfigError(
+            f"{source}: {name}_distortion: expected k1, k2, p1, p2 and k3, got {distortion.size} numbers; calibrate "
+            "without the rational, thin prism and tilted models"
+        )
+    pose = {}
+    if name != "camera":
+        rotation = _matrix(f"R_{name}_camera", (3, 3), matrices, source)
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+            raise ConfigError(f"{source}: R_{name}_camera: expected a rotation matrix, got {rotation.tolist()}")
+        translation = _matrix(f"T_{name}_camera", (3, 1), matrices, source)[:, 0]
+        pose = {"rotation": rotation.tolist(), "translation_mm": translation.tolist()}
+    return DeviceModel.model_validate(
+        {
+            "width_px": round(size[0]),
+            "height_px": round(size[1]),
+            "focal_px": (matrix[0, 0], matrix[1, 1]),
+            "centre_px": (matrix[0, 2], matrix[1, 2]),
+            "distortion": np.pad(distortion, (0, 5 - distortion.size)).tolist(),
+            **pose,
+        }
+    )
+
+
+def _matrix(
+    key: str, shape: tuple[int, int], matrices: dict[str, NDArray[np.float64]], source: str
+) -> NDArray[np.float64]:
+    if key not in matrices:
+        raise ConfigError(f"{source}: {key} is missing; there are {', '.join(sorted(matrices)) or 'no matrices'}")
+    if matrices[key].size != shape[0] * shape[1]:
+        raise ConfigError(f"{source}: {key}: expected {shape[0]} x {shape[1]}, got {matrices[key].shape}")
+    return matrices[key].reshape(shape)

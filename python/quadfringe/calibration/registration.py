@@ -1,0 +1,109 @@
+"""Where the infrared chip of a 2CCD camera sees what the visible chip sees: an affine map from points seen by both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.config import Affine
+from quadfringe.errors import DecodeError, InputError
+
+__all__ = ["Registration", "register_infrared"]
+
+Array = NDArray[np.float64]
+POINTS_MIN = 12
+OUTLIER = 4.0  # robust standard deviations
+RMS_MAX_PX = 0.5  # chips that no affine map brings together better than this do not see the same points
+SPREAD_MIN = 0.1  # of the shorter side of the points' extent to its longer one
+
+
+@dataclass(frozen=True)
+class Registration:
+    """The map from a visible pixel (x, y, 1) to the infrared pixel (x, y), and the distances before and after, px.
+
+    `shift_px` is at the middle of the points; scale and rotation are those of the nearest similarity.
+    """
+
+    ir_registration: Affine
+    points: int
+    left_out: int
+    before_rms_px: float
+    after_rms_px: float
+    shift_px: tuple[float, float]
+    scale: float
+    rotation_deg: float
+    residuals_px: Array
+
+    @property
+    def figures(self) -> dict[str, float]:
+        """Give the distances and the map by name."""
+        names = ("points", "left_out", "before_rms_px", "after_rms_px", "scale", "rotation_deg")
+        shift = {"shift_x_px": self.shift_px[0], "shift_y_px": self.shift_px[1]}
+        return {name: float(getattr(self, name)) for name in names} | shift
+
+
+def register_infrared(visible_px: Array, infrared_px: Array) -> Registration:
+    """Fit the affine map to points (n, 2) that both chips see, in the same order; NaN is no point.
+
+    Points farther off than four robust standard deviations are left out. Raises `InputError` for fewer than 12 points
+    or points nearly in a line, `DecodeError` when no affine map brings the two sets together.
+    """
+    visible, infrared = np.asarray(visible_px, float), np.asarray(infrared_px, float)
+    if visible.shape != infrared.shape or visible.ndim != 2 or visible.shape[1] != 2:
+        raise InputError(f"registration: expected two lists of points (n, 2), got {visible.shape}, {infrared.shape}")
+    both = np.isfinite(visible).all(axis=1) & np.isfinite(infrared).all(axis=1)
+    visible, infrared = visible[both], infrared[both]
+    _check_spread(visible)
+    kept = np.ones(len(visible), bool)
+    for _ in range(5):
+        affine = _fit(visible[kept], infrared[kept])
+        missed = infrared - _applied(affine, visible)
+        away = np.linalg.norm(missed, axis=1)
+        kept = away <= max(OUTLIER * 1.2 * float(np.median(away[kept])), 1e-6)
+    after = float(np.sqrt(np.mean(away[kept] ** 2)))
+    if after > RMS_MAX_PX or kept.sum() < POINTS_MIN:
+        raise DecodeError(
+            f"registration: the points of the two chips still lie {after:.2f} px apart; they are not the same points, "
+            "or the target moved between the captures"
+        )
+    middle = visible[kept].mean(axis=0)
+    scale, rotation = _similarity(affine)
+    shift = (_applied(affine, middle[None]) - middle)[0]
+    return Registration(
+        ir_registration=tuple(tuple(float(v) for v in row) for row in affine),  # type: ignore[arg-type]
+        points=int(kept.sum()),
+        left_out=int((~kept).sum()),
+        before_rms_px=float(np.sqrt(np.mean(np.sum((infrared - visible)[kept] ** 2, axis=1)))),
+        after_rms_px=after,
+        shift_px=(float(shift[0]), float(shift[1])),
+        scale=scale,
+        rotation_deg=rotation,
+        residuals_px=missed[kept],
+    )
+
+
+def _fit(visible: Array, infrared: Array) -> Array:
+    middle = visible.mean(axis=0)
+    design = np.column_stack([visible - middle, np.ones(len(visible))])
+    solved = np.linalg.lstsq(design, infrared, rcond=None)[0].T
+    solved[:, 2] -= solved[:, :2] @ middle
+    return np.asarray(solved)
+
+
+def _applied(affine: Array, points: Array) -> Array:
+    return np.asarray(points @ affine[:, :2].T + affine[:, 2])
+
+
+def _similarity(affine: Array) -> tuple[float, float]:
+    cos, sin = (affine[0, 0] + affine[1, 1]) / 2, (affine[1, 0] - affine[0, 1]) / 2
+    return float(np.hypot(cos, sin)), float(np.degrees(np.arctan2(sin, cos)))
+
+
+def _check_spread(points: Array) -> None:
+    if len(points) < POINTS_MIN:
+        raise InputError(f"registration: {len(points)} points are seen by both chips; {POINTS_MIN} are needed")
+    lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    if lengths[1] < SPREAD_MIN * lengths[0]:
+        raise InputError("registration: the points lie nearly in a line; show the target over the whole field")

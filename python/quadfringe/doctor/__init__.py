@@ -1,0 +1,8 @@
+"""What is wrong with a shot, a calibration or the installation, and how to mend it."""
+
+from quadfringe.doctor.calibration import examine_calibration
+from quadfringe.doctor.finding import Finding
+from quadfringe.doctor.installation import examine_installation
+from quadfringe.doctor.shot import examine_shot
+
+__all__ = ["Finding", "examine_calibration", "examine_installation", "examine_shot"]

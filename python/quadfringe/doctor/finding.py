@@ -1,0 +1,35 @@
+"""What the doctor says: one finding for each thing looked at, good ones included."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+__all__ = ["Finding", "Grade", "graded"]
+
+Grade = Literal["good", "warning", "fault"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing that was looked at: its grade, what was found, and the fix, which is empty when it is good."""
+
+    name: str
+    grade: Grade
+    found: str
+    fix: str = ""
+    value: float | None = None
+
+
+def graded(name: str, value: float, limits: tuple[float, float], found: str, fix: str) -> Finding:
+    """Grade a value by its limits, above which it is a warning, and a fault; falling limits are lower bounds.
+
+    >>> from quadfringe.doctor.finding import graded
+    >>> graded("saturation", 0.02, (0.01, 0.1), "2 % of the pixels", "shorten the exposure").grade
+    'warning'
+    """
+    warning, fault = limits
+    sign = 1 if fault > warning else -1
+    beyond = [sign * value > sign * limit for limit in (warning, fault)]
+    grade: Grade = "fault" if beyond[1] else "warning" if beyond[0] else "good"
+    return Finding(name, grade, found, "" if grade == "good" else fix, value)

@@ -1,0 +1,177 @@
+"""What the fringes of a decoded shot say about the light that made them.
+
+With the absolute phase known at every pixel, each channel is a sum of known waves: its own fringes, their second
+harmonic (a response that is not linear) and the fringes of the other channels (crosstalk). Their amplitudes follow by
+least squares over the whole image, in which even 36 and 35 fringes are told apart.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.calibration.levels import CHANNELS
+from quadfringe.config import DeviceModel
+from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding import Plan
+from quadfringe.stages import carrier, linear_light
+
+__all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift"]
+
+Map = NDArray[np.float32]
+PIXELS_MIN = 5000
+TILE_PX = 96
+TILE_SHARE = 0.3  # of a tile must carry fringes
+TILES_MIN = 2
+SHIFT_MAX = 6  # fringes by which orders may be off
+QUANTILE = 0.95  # of the tiles: the worst that is no accident
+
+
+@dataclass(frozen=True)
+class Fit:
+    """Amplitudes by channel: of its fringes, share of full scale, and of their second harmonic over the first.
+
+    `crosstalk` has the fringes of each channel (columns) in each channel (rows) over its own, (4, 4).
+    """
+
+    names: tuple[str, ...]
+    amplitude: NDArray[np.float64]
+    harmonic: NDArray[np.float64]
+    crosstalk: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How far infrared fringes are from where they should be, in projector pixels, over tiles of the image.
+
+    `off` is the share of tiles whose orders are wrong, all by whole fringes.
+    """
+
+    median_px: float
+    worst_px: float
+    off: float
+
+
+def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
+    """Fit every channel of linear light; None when fewer than 5000 pixels carry fringes."""
+    light, backgrounds, inside = _waves(shot, shape, plan)
+    if inside.sum() < PIXELS_MIN:
+        return None
+    phases = _phases(shape, plan, inside)
+    first, second, third = phases
+    quadrature = -np.sin(first)  # blue, a quarter period before red
+    shown = np.stack([np.cos(first), np.cos(second), quadrature, np.cos(third)], axis=1)
+    amplitude, harmonic, crosstalk = np.zeros(4), np.zeros(4), np.zeros((4, 4))
+    for i, name in enumerate(CHANNELS):
+        own = (first, second, first, third)[i]
+        twice = np.stack([np.cos(2 * own), np.sin(2 * own), np.ones_like(own)], axis=1)
+        wave = (light[name] / backgrounds[name] - 1)[inside]
+        found = np.linalg.lstsq(np.hstack([shown, twice]), wave, rcond=None)[0]
+        crosstalk[i] = found[:4] / found[i]
+        harmonic[i] = float(np.hypot(found[4], found[5]) / abs(found[i]))
+        amplitude[i] = abs(found[i]) * float(np.median(backgrounds[name][inside]))
+    return Fit(CHANNELS, amplitude, harmonic, crosstalk)
+
+
+def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
+    """Compare infrared fringes with their place by the pair that the calibration knows; None with too few tiles.
+
+    Without an infrared projector in the calibration both projectors are taken as coaxial. A pair that is far off moves
+    every order by the same number of fringes and still looks sound; green, from the projector of red and blue, then
+    tells that number, because its mean over a tile is known to a hundredth of a fringe.
+    """
+    light, backgrounds, inside = _waves(shot, shape, plan)
+    width = plan.projector_width_px
+    periods = [width / number for number in plan.fringes.numbers]
+    column = shape.column_px.astype(float)
+    places = (column, column, _expected_ir_column(shape, plan))
+    inside = inside & np.isfinite(places[2])
+    waves = [light[name] / backgrounds[name] - 1 for name in ("red", "green", "ir")]
+    away, shifts = [], []
+    for tile in _tiles(inside):
+        mine = inside[tile]
+        first, second, third = (
+            _offset_px(wave[tile][mine], place[tile][mine], period)
+            for wave, place, period in zip(waves, places, periods, strict=True)
+        )
+        shift = _fringes_off(_wrapped(second - first, periods[1]), periods)
+        away.append(_wrapped(third - first - shift * periods[0], periods[2]))
+        shifts.append(shift)
+    if len(away) < TILES_MIN:
+        return None
+    off = float(np.mean(np.array(shifts) != 0))
+    return Drift(float(np.median(away)), float(np.quantile(np.abs(away), QUANTILE)), off)
+
+
+def _tiles(inside: NDArray[np.bool_]) -> list[tuple[slice, slice]]:
+    rows, columns = inside.shape
+    tiles = [
+        (slice(y, y + TILE_PX), slice(x, x + TILE_PX))
+        for y in range(0, rows - TILE_PX + 1, TILE_PX)
+        for x in range(0, columns - TILE_PX + 1, TILE_PX)
+    ]
+    return [tile for tile in tiles if inside[tile].mean() >= TILE_SHARE]
+
+
+def _offset_px(wave: NDArray[np.floating], column: NDArray[np.float64], period: float) -> float:
+    """Give how many projector pixels the fringes of a wave lie after their place, within half a period."""
+    phase = 2 * np.pi * column / period
+    design = np.stack([np.cos(phase), -np.sin(phase), np.ones_like(phase)], axis=1)
+    cos, sin, _ = np.linalg.lstsq(design, wave, rcond=None)[0]
+    return float(np.arctan2(sin, cos)) * period / (2 * np.pi)
+
+
+def _fringes_off(green_px: float, periods: list[float]) -> int:
+    """Give the least number of fringes of red and blue that explains where those of green lie."""
+    shifts = sorted(range(-SHIFT_MAX, SHIFT_MAX + 1), key=abs)
+    missed = [abs(_wrapped(green_px - shift * periods[0], periods[1])) for shift in shifts]
+    close = min(missed) + 0.25 * abs(periods[0] - periods[1])
+    return next(shift for shift, miss in zip(shifts, missed, strict=True) if miss <= close)
+
+
+def _wrapped(offset_px: float, period: float) -> float:
+    return (offset_px + period / 2) % period - period / 2
+
+
+def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> tuple[dict[str, Map], dict[str, Map], NDArray[np.bool_]]:
+    """Give linear light, its mean over about a fringe, and the pixels where both and the phase are known."""
+    import cv2
+
+    light = linear_light(shot, plan.calibration, plan.response)
+    period_px, _ = carrier(np.nan_to_num(light["red"]))
+    period_px = period_px if np.isfinite(period_px) else 20.0
+    known = shape.returned & np.all([np.isfinite(image) for image in light.values()], axis=0)
+    weight = cv2.GaussianBlur(known.astype(np.float32), (0, 0), period_px)
+    backgrounds = {}
+    for name, image in light.items():
+        summed = cv2.GaussianBlur(np.where(known, image, 0).astype(np.float32), (0, 0), period_px)
+        backgrounds[name] = summed / np.maximum(weight, 1e-6)
+    inside = known & (weight > 0.95) & np.all([b > 0.02 for b in backgrounds.values()], axis=0)
+    return light, backgrounds, inside
+
+
+def _phases(shape: Shape, plan: Plan, inside: NDArray[np.bool_]) -> tuple[NDArray[np.float64], ...]:
+    column = shape.column_px[inside].astype(float)
+    return tuple(2 * np.pi * number * column / plan.projector_width_px for number in plan.fringes.numbers)
+
+
+def _expected_ir_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
+    """Give the column of the infrared projector that lights each point, as the calibration has it."""
+    calibration = plan.calibration
+    if calibration is None or calibration.infrared is None or shape.xyz_mm is None:
+        return shape.column_px.astype(float)
+    return _columns_px(shape.xyz_mm, calibration.infrared)
+
+
+def _columns_px(xyz_mm: Map, device: DeviceModel) -> NDArray[np.float64]:
+    import cv2
+
+    turn, _ = cv2.Rodrigues(np.array(device.rotation))
+    (fx, fy), (cx, cy) = device.focal_px, device.centre_px
+    matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float)
+    points = np.nan_to_num(xyz_mm.reshape(-1, 3).astype(float), nan=1.0)
+    pixels, _ = cv2.projectPoints(points, turn, np.array(device.translation_mm), matrix, np.array(device.distortion))
+    columns = pixels[:, 0, 0].reshape(xyz_mm.shape[:2])
+    return np.where(np.isfinite(xyz_mm[:, :, 2]), columns, np.nan)

@@ -1,0 +1,179 @@
+"""The guided calibration: the whole way on the virtual bench and from a folder, and what it says when captures lack."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from quadfringe.cli import app
+from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.data import Calibration
+from quadfringe.doctor import examine_calibration
+from quadfringe.errors import InputError
+from quadfringe.guide import FolderCaptures, Guided, Session, guide
+from quadfringe.guide.bench import BenchCaptures
+from quadfringe.guide.pictures import write_pictures
+from quadfringe.images import write_image
+
+CAMERA = DeviceModel(
+    width_px=512,
+    height_px=384,
+    focal_px=(1290.0, 1291.0),
+    centre_px=(257.0, 189.0),
+    distortion=(-0.05, 0.02, 2e-4, -3e-4, 0.0),
+)
+MIXED = tuple(tuple(1.0 if i == j else 0.05 for j in range(4)) for i in range(4))
+CHIPS = ((1.001, 0.002, 1.2), (-0.002, 1.001, -0.8))
+CONFIG = SystemConfig(
+    camera=CAMERA,
+    scene=SceneConfig.model_validate(
+        {
+            "noise": 0.002,  # with a quarter of the pixels and a gamma, 1 % is beyond the limits of acceptance
+            "bit_depth": 12,
+            "gain": 0.75,
+            "blur_px": 0.5,
+            "crosstalk": MIXED,
+            "projector_exponent": 1.8,
+            "ambient": 0.01,
+            "infrared_from_visible": CHIPS,
+        }
+    ),
+)
+SESSION = Session(
+    rig="virtual bench", poses=6, phase_steps=4, level_steps=4, heights_mm=(-40.0, -20.0, 0.0, 20.0, 40.0)
+)
+
+
+@pytest.fixture(scope="module")
+def told() -> list[str]:
+    return []
+
+
+@pytest.fixture(scope="module")
+def guided(told: list[str]) -> Guided:
+    return guide(BenchCaptures(CONFIG, SESSION), told.append)
+
+
+def test_every_step_is_good(guided: Guided, told: list[str]) -> None:
+    assert {one.step.name: one.step.verdict for one in guided.outcomes if not one.step.good} == {}
+    names = ["dark", "levels", "flat", "registration", "poses", "planes", "acceptance"]
+    assert [one.step.name for one in guided.outcomes] == names
+    assert guided.good
+    assert not guided.missing
+    assert sum("good:" in words for words in told) == len(names)
+
+
+def test_the_bench_is_found_again(guided: Guided) -> None:
+    found = guided.calibration
+    assert found is not None
+    assert found.camera.focal_px == pytest.approx(CAMERA.focal_px, rel=1e-3)
+    assert found.camera.centre_px == pytest.approx(CAMERA.centre_px, abs=1.0)
+    assert np.array(found.ir_registration) == pytest.approx(np.array(CHIPS), abs=0.05)
+    assert np.array(found.crosstalk) == pytest.approx(np.array(MIXED), abs=0.01)
+    figures = {one.step.name: one.step.figures for one in guided.outcomes}
+    assert figures["poses"]["camera_mean_px"] <= 0.15
+    assert figures["poses"]["projector_mean_px"] <= 0.15
+    assert figures["levels"]["level_rms_after_percent"] <= 0.5
+    assert figures["planes"]["agreement_rms_mm"] <= 0.1
+
+
+def test_the_file_keeps_inputs_and_residuals(guided: Guided, tmp_path: Path) -> None:
+    assert guided.calibration is not None
+    guided.calibration.save(tmp_path / "c.json")
+    again = Calibration.load(tmp_path / "c.json")
+    assert again == guided.calibration
+    assert again.record is not None
+    assert again.record.good
+    poses = next(step for step in again.record.steps if step.name == "poses")
+    assert poses.inputs == SESSION.captures("poses")
+    assert np.array(poses.settings["pose_1"]["camera_px"]).shape == (108, 2)
+    assert [one for one in examine_calibration(again) if one.grade == "fault"] == []
+
+
+def test_the_pictures_are_drawn(guided: Guided, tmp_path: Path) -> None:
+    written = write_pictures(tmp_path / "pictures", guided)
+    names = {"levels.png", "flat.png", "registration.png", "poses.png", "planes.png", "acceptance.png"}
+    assert {path.name for path in written} == names
+    assert all(path.stat().st_size > 10_000 for path in written)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Dark shots and levels of the bench as files, and no more."""
+    place = tmp_path_factory.mktemp("session") / "captures"
+    BenchCaptures(CONFIG, SESSION).write(place, ("dark", "levels"))
+    return place
+
+
+def run(*words: object) -> Result:
+    return CliRunner().invoke(app, ["calibrate", *map(str, words)])
+
+
+def test_a_folder_gives_what_the_bench_gave(folder: Path, guided: Guided) -> None:
+    found = guide(FolderCaptures(folder))
+    for name in ("dark", "levels"):
+        first, second = found.outcome(name), guided.outcome(name)
+        assert first is not None
+        assert second is not None
+        assert first.step == second.step
+    assert found.calibration is None
+    assert found.missing["poses"] == SESSION.captures("poses")
+
+
+def test_pose_images_of_a_folder_give_what_the_bench_gave(tmp_path: Path) -> None:
+    session = SESSION.model_copy(update={"poses": 4, "phase_steps": 4})
+    captures = BenchCaptures(CONFIG, session)
+    session.save(tmp_path / "session.json")
+    (tmp_path / "poses" / "01").mkdir(parents=True)
+    captures._write_pose(tmp_path / "poses" / "01", "01")
+    maps = FolderCaptures(tmp_path).pose("01")
+    expected = BenchCaptures(CONFIG, session).pose("01")
+    for beam in ("visible", "infrared"):
+        np.testing.assert_allclose(maps[beam].column_px, expected[beam].column_px, atol=1e-4)
+    missing = FolderCaptures(tmp_path).missing("poses")
+    assert missing == ["02", "03", "04"]
+
+
+def test_what_is_missing_is_said_and_nothing_written(folder: Path, tmp_path: Path) -> None:
+    done = run("run", "--captures", folder, "--out", tmp_path / "c.json")
+    assert done.exit_code == 1
+    assert "missing (needed): 01, 02, 03, 04, 05, 06" in done.stdout
+    assert "Tilt it to all four sides" in done.stdout
+    assert list(tmp_path.iterdir()) == []
+    listed = run("check", folder)
+    assert listed.exit_code == 1
+    assert "levels: 23 of 23" in listed.stdout.replace("  ", " ")
+    assert str(folder / "poses" / "01") in listed.stdout
+
+
+def test_folders_at_fault_are_explained(folder: Path, tmp_path: Path) -> None:
+    out = ("--out", tmp_path / "c.json")
+    assert "no session.json; make it" in run("run", "--captures", tmp_path, *out).stderr
+    other = run("run", "--captures", folder, "--rig", "bench 2", *out)
+    assert (other.exit_code, "captures of 'virtual bench', not of 'bench 2'" in other.stderr) == (2, True)
+    mixed = tmp_path / "mixed"
+    shutil.copytree(folder, mixed)
+    for name in ("red", "green", "blue", "ir"):
+        write_image(mixed / "dark" / "02" / f"{name}.png", np.zeros((10, 12), np.uint8))
+    refused = run("run", "--captures", mixed, *out)
+    assert (refused.exit_code, "12 x 10 pixels, the captures before have 512 x 384" in refused.stderr) == (2, True)
+    (mixed / "levels" / "r000_g000_b000_ir000_e100" / "ir.png").unlink()
+    shutil.rmtree(mixed / "dark")
+    lacking = run("run", "--captures", mixed, *out)
+    assert (lacking.exit_code, "no ir.png" in lacking.stderr) == (2, True)
+    assert not (tmp_path / "c.json").exists()
+
+
+def test_a_plan_is_written_once(tmp_path: Path) -> None:
+    planned = run("plan", tmp_path / "s", "--rig", "bench 1", "--poses", 9)
+    assert planned.exit_code == 0
+    assert "Cover the lens" in planned.stdout
+    assert json.loads((tmp_path / "s" / "session.json").read_text())["rig"] == "bench 1"
+    assert run("plan", tmp_path / "s", "--rig", "bench 1").exit_code == 2
+    with pytest.raises(InputError, match="expected one of dark, levels"):
+        Session(rig="r").captures("light")
