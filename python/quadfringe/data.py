@@ -53,11 +53,15 @@ class ResponseCalibration(Stored, Response):
 
 
 class Calibration(Stored):
-    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR)."""
+    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
+
+    `projector` is the visible one; `infrared` is known when both were calibrated.
+    """
 
     schema_version: Literal[1] = 1
     camera: DeviceModel
     projector: DeviceModel
+    infrared: DeviceModel | None = None
     dark: Row4 | None = None
     response: Response | None = None
     crosstalk: Matrix4 | None = None

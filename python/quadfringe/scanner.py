@@ -92,4 +92,4 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
         )
     bench = VirtualBench(config)
     calibration = bench.calibration() if config.calibration is None else Calibration.load(config.calibration)
-    return Scanner(bench.resolved(config), VirtualProjector(bench), VirtualCamera(bench), calibration)
+    return Scanner(bench.resolved(config), VirtualProjector(bench, calibration), VirtualCamera(bench), calibration)

@@ -8,9 +8,9 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::BayerPattern;
-use quadfringe::fringe::FringeCode;
+use quadfringe::fringe::{Channel, FringeCode};
 use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, RenderOptions};
-use quadfringe::surface::{HeightMap, Interpolation, Peaks, Surface, scene};
+use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Surface, scene};
 
 /// Camera and two projectors before a surface.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -58,6 +58,12 @@ impl Bench {
         Ok(self.cast_surface(py, surface.as_ref()))
     }
 
+    /// One ray through each pixel of the plane z.
+    #[pyo3(signature = (*, z_mm))]
+    fn cast_plane(&self, py: Python<'_>, z_mm: f64) -> Cast {
+        self.cast_surface(py, &Plane::at_z(z_mm))
+    }
+
     /// One ray through each pixel of the peaks function over the plane z.
     #[pyo3(signature = (*, z_mm, scale_mm))]
     fn cast_peaks(&self, py: Python<'_>, z_mm: f64, scale_mm: f64) -> PyResult<Cast> {
@@ -81,16 +87,22 @@ impl Bench {
     }
 
     /// The images of a shot by name: four channels, or the raw mosaic and infrared of a Bayer chip.
-    #[pyo3(signature = (cast, fringe_numbers, **options))]
+    #[pyo3(signature = (cast, fringe_numbers, *, infrared_image = None, **options))]
     fn render<'py>(
         &self,
         py: Python<'py>,
         cast: &Cast,
         fringe_numbers: [f64; 3],
+        infrared_image: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let code = FringeCode::new(fringe_numbers, self.0.visible.width).map_err(value_error)?;
-        self.render_lights(py, cast, &Light::shot(&code), options)
+        let image = infrared_image.map(|image| expected::<f32, 2>("infrared_image", image)).transpose()?;
+        let mut lights = Light::shot(&code);
+        if let Some(image) = &image {
+            lights[Channel::Ir.index()] = Light::Image(image.as_array());
+        }
+        self.render_lights(py, cast, &lights, options)
     }
 
     /// The images with the same fringes in all channels: one step of an N-step capture.
@@ -155,9 +167,11 @@ impl Cast {
         py.detach(|| self.0.xyz_mm()).into_pyarray(py)
     }
 
-    /// Column of the visible projector that lights each pixel, (H, W) float32.
-    fn column_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        py.detach(|| self.0.column_px(Beam::Visible)).into_pyarray(py)
+    /// Column of a projector that lights each pixel, (H, W) float32.
+    #[pyo3(signature = (*, infrared = false))]
+    fn column_px<'py>(&self, py: Python<'py>, infrared: bool) -> Bound<'py, PyArray2<f32>> {
+        let beam = if infrared { Beam::Infrared } else { Beam::Visible };
+        py.detach(|| self.0.column_px(beam)).into_pyarray(py)
     }
 
     /// Where a surface is seen that a projector does not light, (H, W) bool.

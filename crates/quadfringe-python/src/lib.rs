@@ -5,6 +5,7 @@ mod bench;
 mod decoder;
 mod device;
 mod memory;
+mod pair;
 mod projector;
 mod stages;
 
@@ -17,6 +18,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;
     module.add_class::<decoder::Decoder>()?;
+    module.add_class::<pair::PairTable>()?;
     module.add_class::<projector::LightCrafter>()?;
     module.add_class::<projector::Pattern>()?;
     module.add_class::<projector::PatternSequence>()?;
@@ -24,6 +26,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(device::optimum, module)?)?;
     module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
     module.add_function(wrap_pyfunction!(device::pattern, module)?)?;
+    module.add_function(wrap_pyfunction!(pair::predeform, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light_bayer, module)?)?;
     module.add_function(wrap_pyfunction!(stages::background, module)?)?;

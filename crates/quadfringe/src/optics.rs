@@ -7,9 +7,12 @@ use crate::error::{Error, Result};
 
 mod bayer;
 mod distortion;
+mod pair;
 mod rotation;
 
 pub use bayer::BayerPattern;
+pub use pair::CoaxialPair;
+pub(crate) use pair::check_plane;
 pub use rotation::rotation_from_vector;
 
 /// Half-line in the camera frame.

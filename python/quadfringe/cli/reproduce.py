@@ -17,6 +17,10 @@ class Published(StrEnum):
     """What can be reproduced."""
 
     peaks = "peaks"
+    pair_deviation = "pair-deviation"
+    pair_tolerance = "pair-tolerance"
+    pair_correction = "pair-correction"
+    pair_depth = "pair-depth"
 
 
 def reproduce(

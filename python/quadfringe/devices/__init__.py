@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Protocol
 
 from quadfringe.config import Fringes, SystemConfig
-from quadfringe.data import AnyShot
+from quadfringe.data import AnyShot, Calibration
 
 __all__ = ["Camera", "Projector", "open_projector"]
 
@@ -41,4 +41,5 @@ def open_projector(config: SystemConfig) -> Projector:
         return VirtualProjector(VirtualBench(config))
     from quadfringe.devices.lightcrafter import CoaxialPair
 
-    return CoaxialPair(config.projectors)
+    known = None if config.calibration is None else Calibration.load(config.calibration)
+    return CoaxialPair(config.projectors, known)

@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from quadfringe import _core
 from quadfringe.config import ChannelResponse, Fringes, Response, SceneConfig, SystemConfig
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth
 from quadfringe.decoding import core_device, device_model
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.export import read_npy
+from quadfringe.projection import eight_bit, predeformation
 
 __all__ = ["VirtualBench", "VirtualCamera", "VirtualProjector"]
 
@@ -27,6 +31,7 @@ class VirtualBench:
         self._scene = config.scene
         self._cast: _core.Cast | None = None
         self.projected: Fringes | None = None
+        self._infrared_image: NDArray[np.float32] | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
         """Give the config with every device written out."""
@@ -46,14 +51,20 @@ class VirtualBench:
         return Calibration(
             camera=device_model(self._bench.camera),
             projector=device_model(self._bench.visible),
+            infrared=device_model(self._bench.infrared),
             response=Response(**dict(zip(CHANNELS, responses, strict=True))),
             crosstalk=scene.crosstalk,
             ir_registration=scene.infrared_from_visible,
         )
 
-    def project(self, fringes: Fringes) -> None:
-        """Light the scene with these fringes from now on."""
+    def project(self, fringes: Fringes, calibration: Calibration | None = None) -> None:
+        """Light the scene with these fringes from now on; pre-deformed by the calibration, or else by the truth."""
         _core.check_code(fringes.numbers, self._bench.visible.width)
+        deformed = predeformation(fringes, calibration or self.calibration())
+        self._infrared_image = None
+        if deformed is not None:
+            shown = eight_bit(deformed.light(fringes.numbers[2], fringes.layout))
+            self._infrared_image = shown.astype(np.float32) / np.float32(255)
         self.projected = fringes
 
     def expose(self) -> AnyShot:
@@ -62,7 +73,8 @@ class VirtualBench:
             raise DecodeError("the projector shows nothing: call show(fringes) before grab()")
         if self._cast is None:
             self._cast = self._look()
-        images = self._bench.render(self._cast, self.projected.numbers, **_light(self._scene))
+        infrared = self._infrared_image
+        images = self._bench.render(self._cast, self.projected.numbers, infrared_image=infrared, **_light(self._scene))
         full_scale = float(2**self._scene.bit_depth - 1)
         truth = self._truth(self._cast)
         if "raw" in images and self._scene.bayer is not None:
@@ -96,12 +108,13 @@ def _light(scene: SceneConfig) -> dict[str, Any]:
 class VirtualProjector:
     """The projectors of the virtual bench."""
 
-    def __init__(self, bench: VirtualBench) -> None:
+    def __init__(self, bench: VirtualBench, calibration: Calibration | None = None) -> None:
         self._bench = bench
+        self._calibration = calibration
 
     def show(self, fringes: Fringes) -> None:
         """Light the bench with these fringes; ValueError when they cannot number the field."""
-        self._bench.project(fringes)
+        self._bench.project(fringes, self._calibration)
 
     def close(self) -> None:
         """Switch the light off."""
