@@ -69,7 +69,8 @@ def pair_pose(
 
     >>> from quadfringe.calibration.pair import pair_pose
     >>> import numpy as np
-    >>> pose = pair_pose(np.eye(3), [-200, 0, 0], np.eye(3), [-199.5, 0, 0], np.diag([1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1] * 2) ** 2)
+    >>> sd = np.array([1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1] * 2)  # rad and mm
+    >>> pose = pair_pose(np.eye(3), [-200, 0, 0], np.eye(3), [-199.5, 0, 0], np.diag(sd**2))
     >>> pose.translation_mm.tolist(), pose.sd[3:].round(3).tolist()
     ([0.5, 0.0, 0.0], [0.141, 0.142, 0.142])
     """
@@ -97,8 +98,9 @@ def pair_pose(
 
 
 def deviated(device: DeviceModel, rotation_deg: ArrayLike, translation_mm: ArrayLike) -> DeviceModel:
-    """Give the same device turned by a rotation vector (deg) and moved (mm) in its own frame: the inverse of `pair_pose`.
+    """Give the same device turned by a rotation vector (deg) and moved (mm) in its own frame.
 
+    `pair_pose` finds both back.
     Raises `InputError` unless both have three finite numbers.
     """
     turn = cv2.Rodrigues(np.radians(_array("rotation_deg", rotation_deg, (3,))))[0]

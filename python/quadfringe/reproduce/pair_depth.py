@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe.report import Graph, draw_panels
 from quadfringe.reproduce.pair_bench import (
@@ -30,6 +31,7 @@ WAYS: dict[str, tuple[bool, Unwrapping]] = {
     "corrected": (True, "coaxial"),
     "searched": (False, "pair"),
 }
+Map = NDArray[np.float32]
 WORDS = {
     "plain": "plain image, published unwrapping",
     "corrected": "pre-deformed image, published unwrapping",
@@ -40,17 +42,18 @@ WORDS = {
 def pair_depth(out: Path, shrink: int = 1, depths_mm: Sequence[float] = DEPTHS_MM) -> tuple[dict[str, float], Path]:
     """Move a plane through the measuring volume of a deviated pair, 1 degree and 0.5 or 5 mm apart on every axis.
 
-    The bench has all defects of a real one. Writes `out`/pair-depth.png. Figures are the worst over all depths, for each
-    translation and way: `infrared_rms_rad` of the infrared fringes against what the unwrapping takes them for (36
-    fringes), `rms_rad` of the unwrapped phase against that of a single projector, wrong orders in per cent, and the least
-    share of pixels returned of those that a single projector has returned.
+    The bench has all defects of a real one. Writes `out`/pair-depth.png. Figures are the worst over all depths, for
+    each translation and way: `infrared_rms_rad` of the infrared fringes against what the unwrapping takes them for (36
+    fringes), `rms_rad` of the unwrapped phase against that of a single projector, wrong orders in per cent, and the
+    least share of pixels returned of those that a single projector has returned.
     """
     figures: dict[str, float] = {}
     graphs: list[list[Graph]] = []
     depths = np.array(depths_mm)
+    alone = {z: decoded(expose(real_pair(shrink=shrink).single, z)) for z in depths_mm}
     for translation_mm in TRANSLATIONS_MM:
         pair = real_pair(translation_mm=(translation_mm,) * 3, shrink=shrink)
-        curves = {way: np.array([_measured(pair, way, z) for z in depths]) for way in WAYS}
+        curves = {way: np.array([_measured(pair, way, z, alone[z]) for z in depths_mm]) for way in WAYS}
         for way, found in curves.items():
             name = f"{way}_{translation_mm:g}mm"
             figures[f"{name}_infrared_rms_rad"], figures[f"{name}_rms_rad"] = found[:, :2].max(axis=0).tolist()
@@ -61,11 +64,10 @@ def pair_depth(out: Path, shrink: int = 1, depths_mm: Sequence[float] = DEPTHS_M
     return figures, out / "pair-depth.png"
 
 
-def _measured(pair: Pair, way: str, z_mm: float) -> tuple[float, float, float, float]:
-    """Give the four figures of one way at one depth."""
+def _measured(pair: Pair, way: str, z_mm: float, alone: Map) -> tuple[float, float, float, float]:
+    """Give the four figures of one way at one depth, where one projector alone finds the phase `alone`."""
     deformed, unwrapping = WAYS[way]
     shot = expose(pair, z_mm, pair.calibration if deformed else None)
-    alone = decoded(expose(pair.single, z_mm))
     phase_rad = decoded(shot, unwrapping=unwrapping)
     both_lit = np.isfinite(alone) & np.isfinite(shot.phase_rad)
     returned = 100.0 * float(np.isfinite(phase_rad[both_lit]).mean())
@@ -73,7 +75,7 @@ def _measured(pair: Pair, way: str, z_mm: float) -> tuple[float, float, float, f
     return rms(infrared_error_rad(shot, unwrapping)), off, wrong_percent(phase_rad, shot.phase_rad), returned
 
 
-def _graphs(title: str, depths: np.ndarray, curves: dict[str, np.ndarray]) -> list[Graph]:
+def _graphs(title: str, depths: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> list[Graph]:
     quantities = (
         ("infrared fringes against expectation", "rad RMS at 36 fringes", True),
         ("unwrapped phase against one projector", "rad RMS", False),
