@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -128,9 +129,11 @@ def _shrunk(camera: DeviceModel, shrink: int) -> DeviceModel:
 
 @dataclass(frozen=True)
 class Exposure:
-    """A shot of a plane, and its truth: the exact phase in rad, (H, W), NaN where a projector does not light it.
+    """A shot of a plane, and its truth: the exact phase in rad, (H, W), NaN where it is not judged.
 
-    `apart_rad` is how far plain infrared fringes lie from the visible ones, stated for fringes of the first number.
+    What a projector does not light is not, nor the border of one infrared fringe beside it and beside the ends of the
+    rows, where the Fourier filter of the published method leaks, whatever the projectors do. `apart_rad` is how
+    far plain infrared fringes lie from the visible ones, stated for fringes of the first number.
     """
 
     shot: Shot
@@ -159,9 +162,18 @@ def expose(pair: Pair, z_mm: float = PLANE_MM, corrected_by: Calibration | None 
     per_px = np.float32(2 * np.pi * fringes.numbers[0] / pair.visible.width_px)
     visible_rad, infrared_rad = (per_px * cast.column_px(infrared=infrared) for infrared in (False, True))
     apart_rad = infrared_rad - visible_rad
-    truth_rad = np.where(np.isfinite(apart_rad), visible_rad, np.float32(np.nan))
+    truth_rad = np.where(_inside(visible_rad, apart_rad, fringes), visible_rad, np.float32(np.nan))
     shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
     return Exposure(shot, truth_rad, apart_rad, corrected_by or pair.calibration, fringes)
+
+
+def _inside(visible_rad: Map, apart_rad: Map, fringes: Fringes) -> NDArray[np.bool_]:
+    """Tell which pixels have light of both projectors for an infrared fringe to either side, (H, W)."""
+    slope = abs(float(np.nanmedian(np.diff(visible_rad, axis=1))))
+    reach = int(np.ceil(2 * np.pi / slope * fringes.numbers[0] / fringes.numbers[2]))
+    lit = np.pad(np.isfinite(apart_rad), ((0, 0), (reach, reach)))
+    window = np.ones((1, 2 * reach + 1), np.uint8)
+    return cv2.erode(lit.astype(np.uint8), window)[:, reach:-reach] > 0
 
 
 def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrapping = "coaxial") -> Map:
@@ -180,8 +192,7 @@ def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrap
 def infrared_error_rad(exposure: Exposure, unwrapping: Unwrapping = "coaxial") -> Map:
     """Give how far the infrared fringes are from what the unwrapping takes them for, (H, W).
 
-    The phase is that of the Fourier filter, its error is stated for fringes of the first number (36), and a border of
-    one period, where the filter leaks, is left out.
+    The phase is that of the Fourier filter; its error is stated for fringes of the first number (36).
     """
     first, _, third = exposure.fringes.numbers
     light = linear_light(exposure.shot, exposure.calibration)
@@ -192,8 +203,6 @@ def infrared_error_rad(exposure: Exposure, unwrapping: Unwrapping = "coaxial") -
         expected = _table(exposure).infrared_rad(exposure.phase_rad)
     error = seen - expected
     error -= 2 * np.pi * np.round(error / (2 * np.pi))
-    border = int(np.ceil(period_px))
-    error[:, :border] = error[:, -border:] = np.nan
     return (error * np.float32(first / third)).astype(np.float32)
 
 
