@@ -37,6 +37,7 @@ __all__ = [
     "pattern",
     "power_on_drive",
     "predeform",
+    "step_pattern",
     "two_step",
     "udev_rule",
     "unwrap",
@@ -148,6 +149,29 @@ class Bench:
     ) -> Cast:
         """Send one ray through each pixel of a relief over the plane z, (rows, columns) float64 mm."""
 
+    def cast_plate(self, low_mm: _Vector2, high_mm: _Vector2, rotation: _Matrix3, translation_mm: _Vector3) -> Cast:
+        """Send one ray through each pixel of a plate between two corners (x, y), on z = 0 of a posed board.
+
+        The pose is T_camera_board, row by row and in mm; the face looks towards negative z of the board.
+        """
+
+    def printed(
+        self,
+        coverage: NDArray[np.float32],
+        *,
+        pitch_mm: float,
+        origin_mm: _Vector2,
+        paper: Sequence[float],
+        ink: Sequence[float],
+        rotation: _Matrix3,
+        translation_mm: _Vector3,
+    ) -> NDArray[np.float32]:
+        """Give the albedo (H, W, 4) that the camera sees of a print: the option `albedo` of `render`.
+
+        `coverage` is (rows, columns) float32, 1 where there is ink; `origin_mm` is the centre of its first texel on
+        z = 0 of the board, in the pose of `cast_plate`; `paper` and `ink` are albedos of R, G, B, IR.
+        """
+
     def render(
         self,
         cast: Cast,
@@ -159,13 +183,24 @@ class Bench:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
         The infrared projector shows its fringes, or `infrared_image` (rows, columns), linear light from 0 to 1.
-        Options are those of `quadfringe.SceneConfig`; an option that is not known is a TypeError.
+        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that
+        is not known is a TypeError.
         """
 
     def render_step(
-        self, cast: Cast, fringe_number: float, shift_rad: float, **options: Any
+        self,
+        cast: Cast,
+        fringe_number: float,
+        shift_rad: float,
+        *,
+        axis: str = "columns",
+        beam: str | None = None,
+        **options: Any,
     ) -> dict[str, NDArray[Any]]:
-        """Give the images with the same fringes in each channel: one step of an N-step capture."""
+        """Give the images with the same fringes in each channel: one step of an N-step capture.
+
+        Fringes count over "columns" or "rows"; with a `beam`, visible or infrared, the other projector is dark.
+        """
 
 @final
 class Cast:
@@ -277,6 +312,14 @@ class PairTable:
         self, first: NDArray[np.float32], second: NDArray[np.float32], third: NDArray[np.float32]
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         """Give absolute phase in rad and margin in [0, 1], as `unwrap` does, but searched along the camera rays."""
+
+def step_pattern(
+    fringe_number: float, shift_rad: float, width: int, height: int, *, axis: str = "columns", layout: str = "regular"
+) -> NDArray[np.float32]:
+    """Give the ideal image of one step of an N-step capture, (height, width), linear light from 0 to 1.
+
+    Fringes count over the "columns" or the "rows" of mirrors in the layout.
+    """
 
 def linear_light(
     red: NDArray[Any],

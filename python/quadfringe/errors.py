@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-__all__ = ["ConfigError", "DecodeError", "InputError", "MissingExtraError", "require"]
+__all__ = ["CalibrationError", "ConfigError", "DecodeError", "InputError", "MissingExtraError", "require"]
 
 
 class InputError(ValueError):
@@ -18,6 +18,14 @@ class ConfigError(InputError):
 
 class DecodeError(RuntimeError):
     """A shot from which no shape can be trusted; the message says why and what to look at."""
+
+
+class CalibrationError(DecodeError):
+    """Captures that cannot be calibrated; `reason` is one word for programs, the message is for people."""
+
+    def __init__(self, reason: str, message: str) -> None:
+        super().__init__(message)
+        self.reason = reason
 
 
 class MissingExtraError(ImportError):

@@ -1,7 +1,7 @@
 //! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` knows the truth.
 
-use crate::arrays::{BAYER_IMAGES, CHANNELS, expected, value_error};
-use crate::device::{Device, layout_named, unknown};
+use crate::arrays::{BAYER_IMAGES, CHANNELS, borrowed, expected, value_error};
+use crate::device::{Device, axis_named, layout_named, unknown};
 use ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::exceptions::PyTypeError;
@@ -9,8 +9,9 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::BayerPattern;
 use quadfringe::fringe::{Channel, FringeCode};
-use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, RenderOptions};
-use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Surface, scene};
+use quadfringe::optics::Pose;
+use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, Print, RenderOptions};
+use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
 
 /// Camera and two projectors before a surface.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -86,6 +87,41 @@ impl Bench {
         Ok(self.cast_surface(py, &surface.map_err(value_error)?))
     }
 
+    /// One ray through each pixel of a plate between two corners (x, y) on the plane z = 0 of a posed board.
+    fn cast_plate(
+        &self,
+        py: Python<'_>,
+        low_mm: [f64; 2],
+        high_mm: [f64; 2],
+        rotation: [[f64; 3]; 3],
+        translation_mm: [f64; 3],
+    ) -> PyResult<Cast> {
+        let pose = Pose::new(rotation, translation_mm).map_err(value_error)?;
+        let plate = Posed::plate(low_mm, high_mm, pose).map_err(value_error)?;
+        Ok(self.cast_surface(py, &plate))
+    }
+
+    /// Albedo that the camera sees of a print on the plane z = 0 of a posed board, (H, W, 4) float32.
+    #[pyo3(signature = (coverage, *, pitch_mm, origin_mm, paper, ink, rotation, translation_mm))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
+    fn printed<'py>(
+        &self,
+        py: Python<'py>,
+        coverage: &Bound<'py, PyAny>,
+        pitch_mm: f64,
+        origin_mm: [f64; 2],
+        paper: [f32; 4],
+        ink: [f32; 4],
+        rotation: [[f64; 3]; 3],
+        translation_mm: [f64; 3],
+    ) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        let coverage = expected::<f32, 2>("coverage", coverage)?.to_owned_array();
+        let pose = Pose::new(rotation, translation_mm).map_err(value_error)?;
+        let print = Print { coverage, pitch_mm, origin_mm, paper, ink, pose };
+        let albedo = py.detach(|| self.0.printed(&print)).map_err(value_error)?;
+        Ok(albedo.into_pyarray(py))
+    }
+
     /// The images of a shot by name: four channels, or the raw mosaic and infrared of a Bayer chip.
     #[pyo3(signature = (cast, fringe_numbers, *, infrared_image = None, **options))]
     fn render<'py>(
@@ -105,17 +141,22 @@ impl Bench {
         self.render_lights(py, cast, &lights, options)
     }
 
-    /// The images with the same fringes in all channels: one step of an N-step capture.
-    #[pyo3(signature = (cast, fringe_number, shift_rad, **options))]
+    /// The images with the same fringes in all channels, or in those of one projector: one step of an N-step capture.
+    #[pyo3(signature = (cast, fringe_number, shift_rad, *, axis = "columns", beam = None, **options))]
+    #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn render_step<'py>(
         &self,
         py: Python<'py>,
         cast: &Cast,
         fringe_number: f64,
         shift_rad: f64,
+        axis: &str,
+        beam: Option<&str>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        self.render_lights(py, cast, &Light::step(fringe_number, shift_rad), options)
+        let beam = beam.map(beam_named).transpose()?;
+        let lights = Light::step(fringe_number, shift_rad, axis_named(axis)?, beam);
+        self.render_lights(py, cast, &lights, options)
     }
 }
 
@@ -192,7 +233,7 @@ fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> 
     for (name, value) in given.into_iter().flatten() {
         let name: String = name.extract()?;
         match name.as_str() {
-            "albedo" => options.albedo = Albedo::Uniform(value.extract()?),
+            "albedo" => options.albedo = albedo(&value)?,
             "patch_mm" => patch_mm = Some(value.extract()?),
             "ambient" => options.ambient = value.extract()?,
             "shading" => options.shading = value.extract()?,
@@ -219,6 +260,22 @@ fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> 
         options.albedo = Albedo::Patches { side_mm, albedo: *albedo };
     }
     Ok(options)
+}
+
+/// One albedo for each channel, or an image of them.
+fn albedo(value: &Bound<'_, PyAny>) -> PyResult<Albedo> {
+    if let Some(image) = borrowed::<f32, 3>(value)? {
+        return Ok(Albedo::Image(image.to_owned_array()));
+    }
+    Ok(Albedo::Uniform(value.extract()?))
+}
+
+fn beam_named(name: &str) -> PyResult<Beam> {
+    match name {
+        "visible" => Ok(Beam::Visible),
+        "infrared" => Ok(Beam::Infrared),
+        _ => Err(unknown("beam", name, "visible or infrared")),
+    }
 }
 
 fn demosaic_named(name: &str) -> PyResult<Demosaic> {

@@ -4,7 +4,7 @@ use crate::arrays::value_error;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use quadfringe::fringe::{Channel, DmdLayout, FringeCode};
+use quadfringe::fringe::{Axis, Channel, DmdLayout, FringeCode};
 use quadfringe::optics;
 
 /// A camera or a projector.
@@ -119,9 +119,36 @@ pub fn pattern<'py>(
     Ok(image.into_pyarray(py))
 }
 
+/// Ideal image of one step of an N-step capture, (height, width) float32.
+#[pyfunction]
+#[pyo3(signature = (fringe_number, shift_rad, width, height, *, axis = "columns", layout = "regular"))]
+pub fn step_pattern<'py>(
+    py: Python<'py>,
+    fringe_number: f64,
+    shift_rad: f64,
+    width: usize,
+    height: usize,
+    axis: &str,
+    layout: &str,
+) -> PyResult<Bound<'py, PyArray2<f32>>> {
+    let (axis, layout) = (axis_named(axis)?, layout_named(layout)?);
+    let size = [width, height];
+    let image = py.detach(|| quadfringe::fringe::step_pattern(fringe_number, shift_rad, axis, size, layout));
+    Ok(image.map_err(value_error)?.into_pyarray(py))
+}
+
 fn channel_named(name: &str) -> PyResult<Channel> {
     let found = Channel::ALL.into_iter().find(|channel| channel.name() == name);
     found.ok_or_else(|| unknown("channel", name, "R, G, B or IR"))
+}
+
+/// The direction in which fringes count, of this name.
+pub fn axis_named(name: &str) -> PyResult<Axis> {
+    match name {
+        "columns" => Ok(Axis::Columns),
+        "rows" => Ok(Axis::Rows),
+        _ => Err(unknown("axis", name, "columns or rows")),
+    }
 }
 
 /// The mirror layout of this name.

@@ -27,6 +27,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
     module.add_function(wrap_pyfunction!(device::pattern, module)?)?;
     module.add_function(wrap_pyfunction!(pair::predeform, module)?)?;
+    module.add_function(wrap_pyfunction!(device::step_pattern, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light_bayer, module)?)?;
     module.add_function(wrap_pyfunction!(stages::background, module)?)?;

@@ -10,7 +10,7 @@ use crate::error::{Error, Result};
 mod layout;
 
 pub(crate) use layout::row_shift;
-pub use layout::{DmdLayout, mirror_column, pattern};
+pub use layout::{Axis, DmdLayout, mirror_column, pattern, step_pattern};
 
 /// Least distance in phase space (rad) between two columns for them to be told apart.
 const MARGIN_NEEDED_RAD: f64 = 0.3;

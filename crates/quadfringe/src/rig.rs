@@ -10,16 +10,19 @@ mod light;
 mod mosaic;
 mod options;
 mod predeform;
+mod print;
 mod render;
 mod resample;
 mod truth;
 
 pub use cast::{Cast, Hit};
-pub use light::{Axis, Light};
+pub use light::Light;
 pub use options::{Albedo, BitDepth, Demosaic, RenderOptions};
+pub use print::Print;
 pub use render::Planes;
 
 use crate::error::Result;
+pub use crate::fringe::Axis;
 use crate::fringe::{Channel, DmdLayout};
 use crate::optics::{Device, dot, rotation_from_vector};
 

@@ -9,12 +9,14 @@ mod face;
 mod hand;
 mod march;
 mod peaks;
+mod posed;
 mod relief;
 mod solids;
 
 pub use face::Face;
 pub use hand::Hand;
 pub use peaks::Peaks;
+pub use posed::Posed;
 pub use relief::{HeightMap, Interpolation};
 pub use solids::{Cuboid, Plane, Sphere};
 

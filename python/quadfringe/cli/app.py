@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce, timing
+from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce, target, timing
 from quadfringe.cli.output import complain
 from quadfringe.errors import DecodeError, MissingExtraError
 
@@ -62,6 +62,7 @@ def options(
 
 
 app.command("demo")(demo.demo)
+app.command("target")(target.target)
 app.command("pattern")(bench.pattern)
 app.command("simulate")(bench.simulate)
 app.command("decode")(decode.decode)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,10 +16,24 @@ from quadfringe.errors import DecodeError, InputError
 from quadfringe.export import read_npy
 from quadfringe.projection import eight_bit, predeformation
 
-__all__ = ["VirtualBench", "VirtualCamera", "VirtualProjector"]
+__all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector"]
 
 EDGE_PX = 2.0  # pixels nearer to an edge than this belong to it: lens and pixel mix both sides
 CHANNELS = ("red", "green", "blue", "ir")
+
+
+@dataclass(frozen=True)
+class PrintedBoard:
+    """A flat board with a print on it: inked share (rows, columns) float32 of texels, and its corners in its frame.
+
+    `paper` and `ink` are albedos of R, G, B, IR.
+    """
+
+    coverage: NDArray[np.float32]
+    texel_mm: float
+    corners_mm: tuple[tuple[float, float], tuple[float, float]]
+    paper: tuple[float, float, float, float]
+    ink: tuple[float, float, float, float]
 
 
 class VirtualBench:
@@ -30,6 +45,8 @@ class VirtualBench:
         self._bench = _core.Bench(**devices, layout=config.fringes.layout)
         self._scene = config.scene
         self._cast: _core.Cast | None = None
+        self._albedo: NDArray[np.float32] | None = None
+        self._exposures = 0
         self.projected: Fringes | None = None
         self._infrared_image: NDArray[np.float32] | None = None
 
@@ -67,6 +84,33 @@ class VirtualBench:
             self._infrared_image = shown.astype(np.float32) / np.float32(255)
         self.projected = fringes
 
+    def place(self, board: PrintedBoard, T_camera_board: NDArray[np.float64]) -> None:  # noqa: N803
+        """Put a board into the scene, alone, in a pose (4, 4); ValueError when that is no motion."""
+        pose = {"rotation": T_camera_board[:3, :3].tolist(), "translation_mm": T_camera_board[:3, 3].tolist()}
+        (left, top), half = board.corners_mm[0], 0.5 * board.texel_mm
+        self._cast = self._bench.cast_plate(*board.corners_mm, **pose)
+        self._albedo = self._bench.printed(
+            board.coverage,
+            pitch_mm=board.texel_mm,
+            origin_mm=(left + half, top + half),
+            paper=board.paper,
+            ink=board.ink,
+            **pose,
+        )
+
+    def expose_step(self, number: float, shift_rad: float, axis: str = "columns", beam: str | None = None) -> AnyShot:
+        """Give the shot of one step: the same fringes in all channels, or in those of one projector.
+
+        Every exposure has noise of its own; the same sequence of exposures has the same noise.
+        """
+        if self._cast is None:
+            self._cast = self._look()
+        light = _light(self._scene) | {"seed": (self._scene.seed or 0) + self._exposures}
+        if self._albedo is not None:
+            light["albedo"] = self._albedo
+        self._exposures += 1
+        return self._shot(self._bench.render_step(self._cast, number, shift_rad, axis=axis, beam=beam, **light), None)
+
     def expose(self) -> AnyShot:
         """Give the shot of the scene as it is lit now; raises `DecodeError` when nothing is projected."""
         if self.projected is None:
@@ -75,8 +119,10 @@ class VirtualBench:
             self._cast = self._look()
         infrared = self._infrared_image
         images = self._bench.render(self._cast, self.projected.numbers, infrared_image=infrared, **_light(self._scene))
+        return self._shot(images, self._truth(self._cast))
+
+    def _shot(self, images: dict[str, NDArray[Any]], truth: Truth | None) -> AnyShot:
         full_scale = float(2**self._scene.bit_depth - 1)
-        truth = self._truth(self._cast)
         if "raw" in images and self._scene.bayer is not None:
             return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
         return Shot(**images, full_scale=full_scale, truth=truth)

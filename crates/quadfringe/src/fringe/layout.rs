@@ -1,8 +1,11 @@
 //! Where the mirrors lie, and the ideal images for them.
 
+use std::f64::consts::TAU;
+
 use ndarray::Array2;
 
 use super::{Channel, FringeCode, phase_at};
+use crate::error::{Error, Result};
 
 /// How the mirrors of a projector's micromirror array lie.
 ///
@@ -28,6 +31,23 @@ impl DmdLayout {
             Self::Diamond => [10.8, 5.4],
         }
     }
+}
+
+/// Direction in which fringes count.
+///
+/// ```
+/// use quadfringe::fringe::Axis;
+/// use quadfringe::rig::Light;
+/// let horizontal = Light::Fringes { number: 45.0, shift_rad: 0.0, axis: Axis::Rows };
+/// assert_ne!(horizontal, Light::fringes(45.0, 0.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Axis {
+    /// Vertical fringes, counted over the columns.
+    #[default]
+    Columns,
+    /// Horizontal fringes, counted over the rows; for calibrating a projector.
+    Rows,
 }
 
 /// Where the mirror stored at (row, column) lies, in columns.
@@ -68,6 +88,38 @@ pub fn pattern(code: &FringeCode, channel: Channel, height: usize, layout: DmdLa
     let kinds: Vec<Vec<f32>> =
         (0..2).map(|row| (0..code.projector_width).map(|column| level(row, column)).collect()).collect();
     Array2::from_shape_fn((height, code.projector_width), |(row, column)| kinds[row % 2][column])
+}
+
+/// Ideal image of one step of an N-step capture, `(height, width)`, linear light `0.5 + 0.5 cos(2 pi number u / size + shift)`
+/// with the column or the row for `u`, at the places of the mirrors.
+///
+/// # Errors
+/// [`Error::Value`] when the image has no pixels or a number is not finite.
+///
+/// ```
+/// use quadfringe::fringe::{Axis, DmdLayout, step_pattern};
+/// let image = step_pattern(36.0, 0.0, Axis::Rows, [912, 1140], DmdLayout::Diamond)?;
+/// assert!((image[[0, 5]], image[[1140 / 72, 5]]) > (0.99, 0.0) && image[[1140 / 72, 5]] < 0.01);
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+pub fn step_pattern(
+    number: f64,
+    shift_rad: f64,
+    axis: Axis,
+    [width, height]: [usize; 2],
+    layout: DmdLayout,
+) -> Result<Array2<f32>> {
+    if width == 0 || height == 0 || !(number.is_finite() && shift_rad.is_finite()) {
+        let actual = format!("{width} x {height}, number {number}, shift {shift_rad} rad");
+        return Err(Error::value("step pattern", "an image size and a finite number and shift", actual));
+    }
+    Ok(Array2::from_shape_fn((height, width), |(row, column)| {
+        let cycles = match axis {
+            Axis::Columns => mirror_column(layout, row, column) / width as f64,
+            Axis::Rows => row as f64 / height as f64,
+        };
+        (0.5 + 0.5 * (TAU * number * cycles + shift_rad).cos()) as f32
+    }))
 }
 
 #[cfg(test)]

@@ -5,24 +5,10 @@ use std::f64::consts::TAU;
 use ndarray::ArrayView2;
 
 use crate::error::{Error, Result};
-use crate::fringe::{Channel, DmdLayout, FringeCode, row_shift};
+use crate::fringe::{Axis, Channel, DmdLayout, FringeCode, row_shift};
 use crate::optics::Device;
 
-/// Direction in which fringes count.
-///
-/// ```
-/// use quadfringe::rig::{Axis, Light};
-/// let horizontal = Light::Fringes { number: 45.0, shift_rad: 0.0, axis: Axis::Rows };
-/// assert_ne!(horizontal, Light::fringes(45.0, 0.0));
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
-pub enum Axis {
-    /// Vertical fringes, counted over the columns.
-    #[default]
-    Columns,
-    /// Horizontal fringes, counted over the rows; for calibrating a projector.
-    Rows,
-}
+use super::Beam;
 
 /// Light of one channel before the projector's response, 0 to 1.
 ///
@@ -62,10 +48,19 @@ impl Light<'_> {
         Channel::ALL.map(|channel| Self::fringes(code.numbers()[channel.phase_index()], channel.shift_rad()))
     }
 
-    /// The same fringes in all four channels: one step of an N-step capture.
+    /// The same fringes in all four channels: one step of an N-step capture. With a beam, the other projector is dark.
+    ///
+    /// ```
+    /// use quadfringe::rig::{Axis, Beam, Light};
+    /// let lights = Light::step(36.0, 0.0, Axis::Rows, Some(Beam::Infrared));
+    /// assert_eq!(lights[0], Light::Uniform(0.0));
+    /// ```
     #[must_use]
-    pub fn step(number: f64, shift_rad: f64) -> [Self; 4] {
-        [(); 4].map(|()| Self::fringes(number, shift_rad))
+    pub fn step(number: f64, shift_rad: f64, axis: Axis, beam: Option<Beam>) -> [Self; 4] {
+        Channel::ALL.map(|channel| match beam {
+            Some(beam) if beam != Beam::of(channel) => Self::Uniform(0.0),
+            _ => Self::Fringes { number, shift_rad, axis },
+        })
     }
 
     pub(super) fn check(&self, projector: &Device) -> Result<()> {

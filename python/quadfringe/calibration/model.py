@@ -1,0 +1,148 @@
+"""What is adjusted and how it is measured: parameters by name, residuals, and their sparse derivatives.
+
+A board point is seen by the camera, and lit by each projector as by an inverse camera (S8). The camera's residual is
+what its lens and pose predict less what was found. A projector pixel was read where the camera found the point, so an
+error of the camera's point is in it too, times the slope of the map between them: that part is taken off, and what is
+left is independent from device to device. Without it the confidence intervals of two projectors would be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["DEVICES", "LENS", "Adjustment", "Sight"]
+
+Array = NDArray[np.float64]
+DEVICES = ("camera", "visible", "infrared")
+LENS = ("focal_x_px", "focal_y_px", "centre_x_px", "centre_y_px", "k1", "k2", "p1", "p2", "k3")
+MOTION = (
+    "rotation_x_rad",
+    "rotation_y_rad",
+    "rotation_z_rad",
+    "translation_x_mm",
+    "translation_y_mm",
+    "translation_z_mm",
+)
+
+
+@dataclass(frozen=True)
+class Sight:
+    """Points of one pose as one device sees them.
+
+    `board_mm` (n, 3), `points_px` (n, 2); for a projector `slope` (n, 2, 2) and `camera_rows` (n,), the camera's own
+    points of this pose that they were read at.
+    """
+
+    device: str
+    pose: int
+    board_mm: Array
+    points_px: Array
+    slope: Array | None = None
+    camera_rows: NDArray[np.intp] | None = None
+
+
+class Adjustment:
+    """Residuals and Jacobian over all sights, for scipy's least squares; parameters are found by name.
+
+    With `radial3` false the third radial coefficient stays 0. `sd_px` are the standard deviations by device, by which
+    residuals are divided.
+    """
+
+    def __init__(self, sights: Sequence[Sight], poses: int, radial3: bool, sd_px: Mapping[str, float]) -> None:
+        self.sights, self.poses, self.sd_px = sights, poses, dict(sd_px)
+        self.devices = [name for name in DEVICES if any(s.device == name for s in sights)]
+        lens = LENS if radial3 else LENS[:-1]
+        names: list[str] = []
+        self.places: dict[tuple[str, str], slice] = {}
+        for device in self.devices:
+            self._add(names, device, "lens", lens)
+            if device != "camera":
+                self._add(names, device, "motion", MOTION)
+        for pose in range(poses):
+            self._add(names, f"pose_{pose + 1}", "motion", MOTION)
+        self.names = tuple(names)
+        ends = np.cumsum([0, *(2 * len(s.points_px) for s in sights)])
+        self.rows = [slice(int(a), int(b)) for a, b in pairwise(ends)]
+        self.count = int(ends[-1])
+        self._at: tuple[NDArray[np.intp], ...] | None = None
+
+    def _add(self, names: list[str], owner: str, part: str, fields: Sequence[str]) -> None:
+        self.places[owner, part] = slice(len(names), len(names) + len(fields))
+        names.extend(f"{owner}.{field}" for field in fields)
+
+    def part(self, values: Array, owner: str, part: str) -> Array:
+        """Give the parameters of an owner ("camera", "pose_3"), its "lens" or its "motion"."""
+        return values[self.places[owner, part]]
+
+    def raw(self, values: Array) -> list[Array]:
+        """Give the residuals (n, 2) in px of each sight: predicted less found."""
+        return [self._predicted(values, sight)[0] - sight.points_px for sight in self.sights]
+
+    def residuals(self, values: Array) -> Array:
+        """Give independent residuals of unit variance, in one vector."""
+        raw = self.raw(values)
+        return np.concatenate([r.ravel() for r in self._decorrelated(raw)])
+
+    def _decorrelated(self, raw: list[Array]) -> list[Array]:
+        camera = {s.pose: r for s, r in zip(self.sights, raw, strict=True) if s.device == "camera"}
+        out = []
+        for sight, residual in zip(self.sights, raw, strict=True):
+            own = residual
+            if sight.slope is not None:
+                own = residual - (sight.slope @ camera[sight.pose][sight.camera_rows][:, :, None])[:, :, 0]
+            out.append(own / self.sd_px[sight.device])
+        return out
+
+    def jacobian(self, values: Array) -> Any:
+        """Give the derivatives of `residuals` as a sparse matrix."""
+        from scipy import sparse
+
+        blocks: list[tuple[slice, slice, Array]] = []
+        camera: dict[int, list[tuple[slice, Array]]] = {}
+        for sight, rows in zip(self.sights, self.rows, strict=True):
+            slopes = self._predicted(values, sight)[1]
+            if sight.device == "camera":
+                camera[sight.pose] = slopes
+            elif sight.slope is not None:
+                slopes = slopes + [
+                    (columns, -(sight.slope @ part[sight.camera_rows])) for columns, part in camera[sight.pose]
+                ]
+            sd = self.sd_px[sight.device]
+            blocks += [(rows, columns, part.reshape(-1, part.shape[2]) / sd) for columns, part in slopes]
+        if self._at is None:  # where derivatives stand never changes
+            index = [np.mgrid[r, c] for r, c, _ in blocks]
+            self._at = tuple(np.concatenate([i[k].ravel() for i in index]) for k in (0, 1))
+        data = np.concatenate([part.ravel() for *_, part in blocks])
+        return sparse.coo_matrix((data, self._at), shape=(self.count, len(self.names))).tocsr()
+
+    def _predicted(self, values: Array, sight: Sight) -> tuple[Array, list[tuple[slice, Array]]]:
+        """Give the predicted pixels (n, 2), and their derivatives (n, 2, k) by the place of k parameters."""
+        import cv2
+
+        pose, board = (
+            self.places[f"pose_{sight.pose + 1}", "motion"],
+            values[self.places[f"pose_{sight.pose + 1}", "motion"]],
+        )
+        motion, chains = board, [(pose, np.eye(6))]
+        if sight.device != "camera":
+            device = self.places[sight.device, "motion"]
+            own = values[device]
+            found = cv2.composeRT(board[:3], board[3:], own[:3], own[3:])
+            motion = np.concatenate([found[0].ravel(), found[1].ravel()])
+            by = [np.hstack([np.asarray(d) for d in row]) for row in (found[2:6], found[6:10])]
+            both = np.vstack(by)  # rows: rotation and translation; columns: board's six, then the device's six
+            chains = [(pose, both[:, :6]), (device, both[:, 6:])]
+        lens = self.places[sight.device, "lens"]
+        fx, fy, cx, cy, *distortion = values[lens]
+        matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+        coefficients = np.array([*distortion, 0.0][:5])
+        seen, slope = cv2.projectPoints(sight.board_mm, motion[:3], motion[3:], matrix, coefficients)
+        slope = slope.reshape(len(sight.board_mm), 2, -1)
+        moved, optics = slope[:, :, :6], slope[:, :, 6 : 6 + lens.stop - lens.start]
+        return seen.reshape(-1, 2), [(lens, optics), *((place, moved @ chain) for place, chain in chains)]

@@ -1,0 +1,276 @@
+"""Camera and projectors from boards: the whole chain on the virtual bench, the adjustment alone, and bad captures."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+from conftest import ROOT
+from numpy.typing import NDArray
+
+sys.path.append(str(ROOT / "benches"))
+import calibration as bench
+
+from quadfringe import _core
+from quadfringe.calibration.bundle import Pose, RigCalibration, calibrate_camera, calibrate_rig
+from quadfringe.calibration.detect import View
+from quadfringe.calibration.grid import homography, jacobians
+from quadfringe.calibration.model import Adjustment, Sight
+from quadfringe.calibration.poses import DegeneratePosesError
+from quadfringe.calibration.projector import (
+    ProjectorMap,
+    ProjectorPoints,
+    StepPlan,
+    projector_map,
+    projector_points,
+    step_image,
+)
+from quadfringe.calibration.targets import ring_board
+from quadfringe.config import Fringes
+from quadfringe.decoding import core_device
+from quadfringe.errors import CalibrationError, InputError
+from quadfringe.rehearsal import board_poses
+
+BOARD = ring_board()
+SYSTEM = bench.bench_system()
+POINT_SD_PX = 0.01
+TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
+
+
+@pytest.mark.parametrize("layout", ["regular", "diamond"])
+def test_the_bars_hold_on_the_bench(layout: str) -> None:
+    """A camera of half the size: the whole of `benches/calibration.py` in a fraction of its time."""
+    figures = bench.measured(bench.bench_system(layout, camera_scale=0.5), poses=8, steps=6)
+    missed = {name: figures[name] for name, bar in bench.BARS.items() if not figures[name] <= bar}
+    assert not missed, figures
+
+
+def points_of(device: Any, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    core = core_device(device)
+    return np.array([core.project(tuple(p)) for p in points_mm.tolist()])
+
+
+def simulated(places: NDArray[np.float64], seed: int, sd_px: float = POINT_SD_PX) -> list[Pose]:
+    """Points as detection gives them: an error of the camera's point is in the projectors' points too."""
+    random = np.random.default_rng(seed)
+    ids, found = np.arange(len(BOARD.points_mm)), []
+    for place in places:
+        points = BOARD.points_mm @ place[:3, :3].T + place[:3, 3]
+        exact = points_of(SYSTEM.camera, points)
+        error = sd_px * random.standard_normal(exact.shape)
+        lit = []
+        for device in (SYSTEM.projector, SYSTEM.infrared):
+            pixels = points_of(device, points)
+            slope = jacobians(homography(exact, pixels), exact)
+            noise = sd_px * random.standard_normal(exact.shape)
+            lit.append(ProjectorPoints(pixels + (slope @ error[:, :, None])[:, :, 0] + noise, slope, ids, (912, 1140)))
+        found.append(Pose(View(exact + error, ids, (1024, 768)), *lit))
+    return found
+
+
+@pytest.fixture(scope="module")
+def places() -> NDArray[np.float64]:
+    return board_poses(BOARD, 9)
+
+
+@pytest.fixture(scope="module")
+def found(places: NDArray[np.float64]) -> RigCalibration:
+    return calibrate_rig(simulated(places, seed=0), BOARD)
+
+
+def test_stated_uncertainties_are_those_of_repeated_calibrations(places: NDArray[np.float64]) -> None:
+    off = []
+    for seed in range(12):
+        done = calibrate_rig(simulated(places, seed), BOARD)
+        error = np.array([*done.pair.rotation_deg, *done.pair.translation_mm]) - TRUE_PAIR
+        lens = [
+            (np.subtract(fit.device.focal_px, model.focal_px) / fit.sd.focal_px)
+            for fit, model in ((done.camera, SYSTEM.camera), (done.visible, SYSTEM.projector))
+        ]
+        off.append(np.concatenate([error / done.pair.sd, *lens]))
+    off = np.array(off)
+    # 120 numbers of unit variance that hang together by tens: their mean square within a factor of two.
+    assert 0.5 < np.square(off).mean() < 2.0
+    assert (np.abs(off) < 1.96).mean() > 0.85
+
+
+def test_projectors_share_the_errors_of_the_camera_and_that_is_known(found: RigCalibration) -> None:
+    assert found.point_sd_px == pytest.approx(dict.fromkeys(("camera", "visible", "infrared"), POINT_SD_PX), rel=0.1)
+    assert found.visible.rms_px > 1.2 * POINT_SD_PX * np.sqrt(2)  # both errors are in what is seen
+
+
+def test_records_are_whole(found: RigCalibration, places: NDArray[np.float64]) -> None:
+    count = 3 * 8 + 2 * 6 + len(places) * 6
+    assert len(found.names) == len(set(found.names)) == len(found.values) == count
+    assert found.covariance.shape == (count, count)
+    sd = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
+    assert sd["visible.focal_x_px"] == pytest.approx(found.visible.sd.focal_px[0])
+    np.testing.assert_allclose(found.T_camera_board, places, atol=0.2)
+    assert [r.shape for r in found.infrared.residuals_px] == [(108, 2)] * len(places)
+    assert found.camera.device.rotation == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    np.testing.assert_allclose(found.visible.device.translation_mm, SYSTEM.projector.translation_mm, atol=0.1)
+    alone = calibrate_camera([pose.view for pose in simulated(places, seed=0)], BOARD)
+    assert alone.visible is None
+    assert alone.pair is None
+    np.testing.assert_allclose(alone.camera.device.focal_px, SYSTEM.camera.focal_px, rtol=1e-3)
+
+
+def test_derivatives_are_those_of_the_residuals(places: NDArray[np.float64], found: RigCalibration) -> None:
+    pose = simulated(places[:1], seed=4)[0]
+    rows = np.arange(0, 108, 9)
+    sights = [Sight("camera", 0, BOARD.points_mm, pose.view.points_px)]
+    for name in ("visible", "infrared"):
+        lit = getattr(pose, name)
+        sights.append(Sight(name, 0, BOARD.points_mm[rows], lit.points_px[rows], lit.slope[rows], rows))
+    adjustment = Adjustment(sights, 1, radial3=True, sd_px=dict.fromkeys(("camera", "visible", "infrared"), 0.5))
+    by_name = dict(zip(found.names, found.values, strict=True))
+    values = np.array([by_name.get(name, 0.01) for name in adjustment.names])
+    exact = adjustment.jacobian(values).toarray()
+    for column, value in enumerate(values):
+        step = 1e-6 * max(abs(value), 1.0)
+        moved = np.eye(len(values))[column] * step
+        numeric = (adjustment.residuals(values + moved) - adjustment.residuals(values - moved)) / (2 * step)
+        scale = max(np.abs(numeric).max(), 1e-3)
+        np.testing.assert_allclose(
+            exact[:, column] / scale, numeric / scale, atol=2e-5, err_msg=adjustment.names[column]
+        )
+
+
+def turned(turns: list[tuple[float, float, float]], depths_mm: NDArray[np.float64]) -> NDArray[np.float64]:
+    middle = BOARD.points_mm.mean(axis=0)
+    motions = np.tile(np.eye(4), (len(turns), 1, 1))
+    for motion, turn, depth_mm in zip(motions, turns, depths_mm, strict=True):
+        motion[:3, :3] = cv2.Rodrigues(np.array(turn))[0]
+        motion[:3, 3] = (3.0, -5.0, depth_mm) - motion[:3, :3] @ middle
+    return motions
+
+
+DEEP_MM = np.linspace(720, 900, 9)
+DEGENERATE = {
+    "too_few": board_poses(BOARD, 9)[:3],
+    "fronto_parallel": turned([(0.0, 0.0, 0.02 * i) for i in range(9)], DEEP_MM),
+    "fronto_parallel, all tilted alike": turned([(0.4, 0.2, 0.0)] * 9, DEEP_MM),
+    "one_axis": turned([(a, 0.0, 0.0) for a in np.linspace(-0.5, 0.5, 9)], DEEP_MM),
+    "one_depth": board_poses(BOARD, 9, range_mm=1.0),
+}
+
+
+@pytest.mark.parametrize("what", DEGENERATE)
+def test_poses_that_cannot_tell_are_named_and_not_fitted(what: str) -> None:
+    views = [pose.view for pose in simulated(DEGENERATE[what], seed=1)]
+    with pytest.raises(DegeneratePosesError) as refused:
+        calibrate_camera(views, BOARD)
+    assert refused.value.reason == what.split(",")[0]
+
+
+def spoiled(poses: list[Pose], what: str) -> list[Pose]:
+    pose = poses[2]
+    if what == "mixed image sizes":
+        return [*poses[:2], replace(pose, view=replace(pose.view, size_px=(512, 384))), *poses[3:]]
+    if what == "missing fringes":
+        return [*poses[:2], replace(pose, infrared=None), *poses[3:]]
+    if what == "other points":
+        return [*poses[:2], replace(pose, visible=replace(pose.visible, ids=pose.visible.ids[::-1])), *poses[3:]]
+    if what == "not lit":
+        dark = np.where(np.arange(108)[:, None] < 5, pose.visible.points_px, np.nan)
+        return [*poses[:2], replace(pose, visible=replace(pose.visible, points_px=dark)), *poses[3:]]
+    if what == "mirrored projector":
+        return [replace(p, visible=replace(p.visible, slope=p.visible.slope * ((-1.0,), (1.0,)))) for p in poses]
+    other = [replace(p, visible=replace(p.visible, size_px=(1280, 800))) for p in poses[:1]]
+    return other + poses[1:]
+
+
+SPOILED = {
+    "mixed image sizes": "512 x 384, 1024 x 768",
+    "missing fringes": r"infrared: no points in the poses \[3\]",
+    "other points": "pose 3 are not those of its view",
+    "not lit": "5 of 108 points of pose 3 are lit",
+    "mirrored projector": "shows a mirrored image",
+    "mixed projectors": "are mixed",
+}
+
+
+@pytest.mark.parametrize("what", SPOILED)
+def test_bad_captures_are_named(what: str, places: NDArray[np.float64]) -> None:
+    poses = spoiled(simulated(places, seed=2), what)
+    with pytest.raises((InputError, CalibrationError), match=SPOILED[what]):
+        calibrate_rig(poses, BOARD)
+
+
+def test_a_wrong_size_of_the_board_shows_in_its_distance(places: NDArray[np.float64]) -> None:
+    poses = simulated(places, seed=3)
+    wrong = ring_board(pitch_mm=25.0)
+    with pytest.raises(CalibrationError, match=r"its pitch is nearer to 20(\.\d)? mm than to 25 mm"):
+        calibrate_rig(poses, wrong, distance_mm=740.0)
+    calibrate_rig(poses, BOARD, distance_mm=740.0)
+
+
+def flat_map(width: int = 200, height: int = 150) -> ProjectorMap:
+    """A map that bends as perspective and lenses bend it."""
+    y, x = np.mgrid[:height, :width].astype(np.float64)
+    column = 300 + 0.6 * x + 0.02 * y + 1e-4 * (x - 80) ** 2
+    row = 400 - 0.01 * x + 0.7 * y - 2e-4 * x * y
+    full = np.full((height, width), 0.4, np.float32)
+    return ProjectorMap(column.astype(np.float32), row.astype(np.float32), full, full, (912, 1140))
+
+
+def test_projector_points_follow_bent_maps_and_registration() -> None:
+    view = View(np.array([[60.3, 70.7], [100.2, 70.1], [60.4, 30.9], [198.0, 148.0]]), np.arange(4), (200, 150))
+    found = projector_points(flat_map(), view, radius_px=15)
+    x, y = view.points_px[:3].T
+    np.testing.assert_allclose(found.points_px[:3, 0], 300 + 0.6 * x + 0.02 * y + 1e-4 * (x - 80) ** 2, atol=1e-3)
+    np.testing.assert_allclose(found.slope[:3, 1, 1], 0.7 - 2e-4 * x, atol=1e-4)
+    assert np.isnan(found.points_px[3]).all()  # too little around it
+    moved = projector_points(flat_map(), view, radius_px=15, ir_registration=((1.0, 0.0, 2.0), (0.0, 1.0, -1.0)))
+    there = replace(view, points_px=view.points_px + np.array((2.0, -1.0)))
+    np.testing.assert_allclose(moved.points_px, projector_points(flat_map(), there, radius_px=15).points_px)
+    with pytest.raises(InputError, match="one size"):
+        projector_points(flat_map(), replace(view, size_px=(100, 100)))
+
+
+def stacks(plan: StepPlan, axis: Any) -> list[NDArray[np.float32]]:
+    """What a camera sees that looks at the mirrors one to one."""
+    return [
+        np.stack([0.05 + 0.9 * step_image(plan, axis, f, step) for step in range(plan.steps)]).astype(np.float32)
+        for f in range(3)
+    ]
+
+
+@pytest.mark.parametrize("layout", ["regular", "diamond"])
+def test_patterns_of_both_layouts_lead_back_to_their_mirrors(layout: Any) -> None:
+    plan = StepPlan(Fringes(layout=layout), steps=4, size_px=(228, 286))
+    found = projector_map(stacks(plan, "columns"), stacks(plan, "rows"), plan)
+    y, x = np.mgrid[:286, :228]
+    shift = 0.5 * (y % 2) if layout == "diamond" else 0.0
+    np.testing.assert_allclose(found.column_px, x + shift, atol=2e-3)
+    np.testing.assert_allclose(found.row_px, y, atol=2e-3)
+
+
+def test_missing_steps_and_mixed_sizes_are_named() -> None:
+    plan = StepPlan(steps=4, size_px=(228, 286))
+    columns, rows = stacks(plan, "columns"), stacks(plan, "rows")
+    for bad, words in (
+        (columns[:2], "expected 3 stacks"),
+        ([columns[0], columns[1][:3], columns[2]], "35 fringes over columns: expected 4 steps"),
+        ([columns[0], columns[1][:, :100], columns[2]], "must have one size"),
+        ([stack[:, :100] for stack in columns], "must have one size"),
+    ):
+        with pytest.raises(InputError, match=words):
+            projector_map(bad, rows, plan)
+    with pytest.raises(InputError, match="at least 4"):
+        StepPlan(steps=3)
+    with pytest.raises(ValueError, match="columns"):
+        _core.step_pattern(36.0, 0.0, 10, 10, axis="diagonal")
+
+
+def test_saturated_pixels_are_no_data() -> None:
+    plan = StepPlan(steps=4, size_px=(228, 286))
+    columns = stacks(plan, "columns")
+    columns[1][2, 10, 20] = 1.0
+    found = projector_map(columns, stacks(plan, "rows"), plan)
+    assert np.isnan(found.column_px[10, 20])
+    assert np.isfinite(found.column_px).sum() == found.column_px.size - 1
