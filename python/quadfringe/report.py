@@ -49,7 +49,7 @@ class Panel:
 
 @dataclass(frozen=True)
 class Graph:
-    """Lines over a common axis, each x and y by its name; `limit` is a dashed line with a name of its own."""
+    """Lines over a common axis, or points: x and y by name; `limit` is a dashed line with a name of its own."""
 
     title: str
     x_label: str
@@ -57,11 +57,13 @@ class Graph:
     lines: Mapping[str, tuple[NDArray[Any], NDArray[Any]]]
     limit: tuple[str, float] | None = None
     log: bool = False
+    points: bool = False
 
     def draw(self, _figure: Any, axes: Any) -> None:
         """Draw the lines with their names."""
         for name, (x, y) in self.lines.items():
-            axes.plot(x, y, label=name, linewidth=1.2, marker="." if len(x) < 50 else None)
+            marker = "." if self.points or len(x) < 50 else None
+            axes.plot(x, y, label=name, linewidth=0 if self.points else 1.2, marker=marker, markersize=4)
         if self.limit is not None:
             axes.axhline(self.limit[1], color="black", linestyle="--", linewidth=0.9, label=self.limit[0])
         if self.log:
@@ -71,7 +73,7 @@ class Graph:
         axes.set_ylabel(self.y_label, fontsize=8)
         axes.tick_params(labelsize=7)
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=7)
+        axes.legend(fontsize=6.5, framealpha=0.6)
 
 
 def _limits(image: NDArray[Any]) -> tuple[float, float]:

@@ -19,6 +19,7 @@ class Published(StrEnum):
     peaks = "peaks"
     pair_deviation = "pair-deviation"
     pair_tolerance = "pair-tolerance"
+    pair_calibration = "pair-calibration"
     pair_correction = "pair-correction"
     pair_depth = "pair-depth"
 

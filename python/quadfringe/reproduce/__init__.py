@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from quadfringe.reproduce.pair_calibration import pair_calibration
 from quadfringe.reproduce.pair_correction import pair_correction
 from quadfringe.reproduce.pair_depth import pair_depth
 from quadfringe.reproduce.pair_deviation import pair_deviation
@@ -19,6 +20,7 @@ __all__ = [
     "REPRODUCTIONS",
     "WIDTH_PX",
     "inside",
+    "pair_calibration",
     "pair_correction",
     "pair_depth",
     "pair_deviation",
@@ -31,6 +33,7 @@ REPRODUCTIONS: dict[str, Callable[[Path], tuple[dict[str, float], Path]]] = {
     "peaks": peaks,
     "pair-deviation": pair_deviation,
     "pair-tolerance": pair_tolerance,
+    "pair-calibration": pair_calibration,
     "pair-correction": pair_correction,
     "pair-depth": pair_depth,
 }

@@ -143,18 +143,17 @@ class Exposure:
     fringes: Fringes
 
 
-def expose(pair: Pair, z_mm: float = PLANE_MM, corrected_by: Calibration | None = None) -> Exposure:
-    """Take a shot of the plane at depth `z_mm`.
+def expose(pair: Pair, z_mm: float = PLANE_MM, known: Calibration | None = None, predeformed: bool = False) -> Exposure:
+    """Take a shot of the plane at depth `z_mm` that is to be decoded with what is `known` of the pair, or the truth.
 
-    With `corrected_by` the infrared image is pre-deformed for the reference plane by that calibration, as the 8-bit
-    image that a projector takes; otherwise it is plain.
+    The infrared image is plain, or pre-deformed for the reference plane by what is known, as the 8-bit image that a
+    projector takes.
     """
-    fringes = FRINGES.model_copy(update={"layout": pair.layout})
+    known = known or pair.calibration
+    fringes = FRINGES.model_copy(update={"layout": pair.layout, "predeformed_z_mm": PLANE_MM if predeformed else None})
     image = None
-    if corrected_by is not None:
-        fringes = fringes.model_copy(update={"predeformed_z_mm": PLANE_MM})
-        deformed = predeformation(fringes, corrected_by)
-        assert deformed is not None
+    deformed = predeformation(fringes, known)
+    if deformed is not None:
         image = eight_bit(deformed.light(fringes.numbers[2], pair.layout)).astype(np.float32) / np.float32(255)
     bench = pair.bench
     cast = bench.cast_plane(z_mm=z_mm)
@@ -164,7 +163,7 @@ def expose(pair: Pair, z_mm: float = PLANE_MM, corrected_by: Calibration | None 
     apart_rad = infrared_rad - visible_rad
     truth_rad = np.where(_inside(visible_rad, apart_rad, fringes), visible_rad, np.float32(np.nan))
     shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
-    return Exposure(shot, truth_rad, apart_rad, corrected_by or pair.calibration, fringes)
+    return Exposure(shot, truth_rad, apart_rad, known, fringes)
 
 
 def _inside(visible_rad: Map, apart_rad: Map, fringes: Fringes) -> NDArray[np.bool_]:
@@ -173,7 +172,7 @@ def _inside(visible_rad: Map, apart_rad: Map, fringes: Fringes) -> NDArray[np.bo
     reach = int(np.ceil(2 * np.pi / slope * fringes.numbers[0] / fringes.numbers[2]))
     lit = np.pad(np.isfinite(apart_rad), ((0, 0), (reach, reach)))
     window = np.ones((1, 2 * reach + 1), np.uint8)
-    return cv2.erode(lit.astype(np.uint8), window)[:, reach:-reach] > 0
+    return np.asarray(cv2.erode(lit.astype(np.uint8), window)[:, reach:-reach], dtype=np.bool_)
 
 
 def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrapping = "coaxial") -> Map:

@@ -52,7 +52,11 @@ def pair_correction(
     """
     pair = real_pair(shrink=shrink)
     known = calibration or pair.calibration
-    shots = {"single": expose(pair.single), "before": expose(pair), "after": expose(pair, corrected_by=known)}
+    shots = {
+        "single": expose(pair.single),
+        "before": expose(pair),
+        "after": expose(pair, known=known, predeformed=True),
+    }
     row = ROW // shrink
     errors: dict[str, Map] = {}
     figures: dict[str, float] = {}

@@ -67,7 +67,7 @@ def pair_depth(out: Path, shrink: int = 1, depths_mm: Sequence[float] = DEPTHS_M
 def _measured(pair: Pair, way: str, z_mm: float, alone: Map) -> tuple[float, float, float, float]:
     """Give the four figures of one way at one depth, where one projector alone finds the phase `alone`."""
     deformed, unwrapping = WAYS[way]
-    shot = expose(pair, z_mm, pair.calibration if deformed else None)
+    shot = expose(pair, z_mm, predeformed=deformed)
     phase_rad = decoded(shot, unwrapping=unwrapping)
     both_lit = np.isfinite(alone) & np.isfinite(shot.phase_rad)
     returned = 100.0 * float(np.isfinite(phase_rad[both_lit]).mean())
@@ -78,7 +78,7 @@ def _measured(pair: Pair, way: str, z_mm: float, alone: Map) -> tuple[float, flo
 def _graphs(title: str, depths: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> list[Graph]:
     quantities = (
         ("infrared fringes against expectation", "rad RMS at 36 fringes", True),
-        ("unwrapped phase against one projector", "rad RMS", False),
+        ("unwrapped phase against one projector", "rad RMS", True),
         ("wrong orders", "%", False),
     )
     return [

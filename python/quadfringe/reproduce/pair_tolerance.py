@@ -18,10 +18,11 @@ LIMITS = (5.0, 5.0, 5.0, 100.0, 100.0, 100.0)  # deg and mm: beyond them the inf
 PRECISION = 1e-3  # of a tolerance, relative
 
 
-def pair_tolerance(out: Path, shrink: int = 1) -> tuple[dict[str, float], Path]:
+def pair_tolerance(out: Path, shrink: int = 4) -> tuple[dict[str, float], Path]:
     """Find the largest deviation of each of the six parameters for which every order of a plane is still right.
 
-    Writes `out`/pair-tolerance.png: the share of wrong orders over each deviation. Figures are by the names of
+    Every `shrink`-th pixel of the camera is asked. Writes `out`/pair-tolerance.png: the share of wrong orders over each
+    deviation. Figures are by the names of
     `quadfringe.calibration.pair.AXES`, deg and mm; one that stands at its limit in `LIMITS` does no harm at all.
     """
     found = tolerances(shrink)
@@ -32,14 +33,14 @@ def pair_tolerance(out: Path, shrink: int = 1) -> tuple[dict[str, float], Path]:
         for axis, allowed in found.items():
             if axis.endswith(kind):
                 deviations = factors * min(allowed, LIMITS[AXES.index(axis)] / 3)
-                wrong = np.array([_wrong_percent(_deviated(axis, d, max(shrink, 4))) for d in deviations])
+                wrong = np.array([_wrong_percent(_deviated(axis, d, shrink)) for d in deviations])
                 lines[f"{axis[:2]}: {allowed:.3g} {kind}"] = (np.maximum(deviations, deviations[1] / 10), wrong)
         graphs.append(Graph(f"one parameter at a time, {kind}", f"deviation, {kind}", "wrong orders, %", lines))
     draw_panels(out / "pair-tolerance.png", "allowable deviations of the infrared projector", [graphs])
     return found, out / "pair-tolerance.png"
 
 
-def tolerances(shrink: int = 1) -> dict[str, float]:
+def tolerances(shrink: int = 4) -> dict[str, float]:
     """Give the largest allowable deviation of each parameter, of either sign, by bisection on exact phases."""
     return {axis: min(_tolerance(axis, sign, shrink) for sign in (1.0, -1.0)) for axis in AXES}
 
