@@ -180,9 +180,9 @@ impl Plan<'_> {
         for (x, (ray, ends)) in rays.iter().zip(&ends).enumerate() {
             let points = nodes_mm.each_ref().map(|depths| at(*ray, depths[x]));
             let Some(cubic) = self.cubic(points) else { continue };
-            let per_px = self.first / self.pair.visible().width as f64;
-            let slack = [-SLACK_PX, SLACK_PX];
-            let range = [0, 1].map(|i| (ends[i] + slack[i]) * per_px);
+            let width = self.pair.visible().width as f64;
+            let slack = SLACK_PX.min(0.5 * (width - (ends[1] - ends[0])));
+            let range = [ends[0] - slack, ends[1] + slack].map(|px| self.first * px / width);
             for (k, value) in cubic.into_iter().chain(range).enumerate() {
                 out[k * columns + x] = value as f32;
             }

@@ -12,7 +12,8 @@ const BLOCK: usize = 64;
 pub struct RayRow<'a> {
     /// The infrared phase in rad as a cubic of the first absolute phase, from the constant term up.
     pub infrared: [&'a [f32]; 4],
-    /// Least and greatest first absolute phase in rad that a surface on the ray can have; NaN where there is none.
+    /// Least and greatest first absolute phase in rad that a surface on the ray can have, no farther apart than the field
+    /// is wide; NaN where there is none.
     pub range_rad: [&'a [f32]; 2],
 }
 
@@ -28,19 +29,54 @@ impl RayRow<'_> {
 /// Orders of one pixel at a time, searched along the camera ray: each candidate is a point of the ray, which both
 /// projectors light with phases that are known. The one that the second and third phase agree with best wins, whether
 /// the projectors are coaxial or not.
+///
+/// Where the beat of the first two fringe numbers has one fringe over the field, it says which candidates are near: those
+/// farther away than half a beat of the third number cannot win.
 #[derive(Debug, Clone)]
 pub(crate) struct AlongRay {
     /// Second fringe number over the first.
     ratio: f32,
     /// Square of the distance of neighbouring candidates, turns.
     apart: f32,
+    near: Option<Near>,
+}
+
+/// How the beat of the first two phases leads to candidates.
+#[derive(Debug, Clone, Copy)]
+struct Near {
+    /// 1, or -1 when the second number is the greater.
+    sign: f32,
+    /// Orders after which all phases but the infrared one repeat.
+    cycle: f32,
+    /// Candidates to either side.
+    reach: i32,
+}
+
+impl Near {
+    fn of([first, second, third]: [f64; 3]) -> Option<Self> {
+        let whole = first.fract() == 0.0 && (first - second).abs() == 1.0;
+        let reach = (0.5 * first / (first - third).abs()).ceil();
+        let shorter = 2.0 * reach + 1.0 < first;
+        (whole && shorter).then_some(Self {
+            sign: (first - second) as f32,
+            cycle: first as f32,
+            reach: reach as i32,
+        })
+    }
+}
+
+/// What is known of the candidates of a block of pixels so far.
+struct Best {
+    least: [f32; BLOCK],
+    next: [f32; BLOCK],
 }
 
 impl AlongRay {
     pub fn new(code: &FringeCode) -> Self {
         let numbers = code.numbers();
         let apart = code.ambiguity_margin_rad() as f32 / TAU;
-        Self { ratio: (numbers[1] / numbers[0]) as f32, apart: apart * apart }
+        let ratio = (numbers[1] / numbers[0]) as f32;
+        Self { ratio, apart: apart * apart, near: Near::of(numbers) }
     }
 
     /// Order a row of pixels: absolute phase, and 1 when the second and third phase are met exactly, 0 when another
@@ -55,40 +91,93 @@ impl AlongRay {
                 infrared: rays.infrared.map(|row| &row[at.clone()]),
                 range_rad: rays.range_rad.map(|row| &row[at.clone()]),
             };
-            self.order_block(wrapped, &rays, phase, margin);
+            let mut best = Best { least: [f32::INFINITY; BLOCK], next: [self.apart; BLOCK] };
+            match self.near {
+                Some(near) => self.ask_near(near, wrapped, &rays, &mut best, phase),
+                None => self.ask_all(wrapped, &rays, &mut best, phase),
+            }
+            best.settle(phase, margin);
         }
     }
 
+    /// The candidates that the beat of the first two phases leads to.
     #[inline(always)]
-    fn order_block(&self, wrapped: [&[f32]; 3], rays: &RayRow<'_>, phase: &mut [f32], margin: &mut [f32]) {
-        let ([first, second, third], [low, high]) = (wrapped, rays.range_rad);
-        let [e0, e1, e2, e3] = rays.infrared;
-        let count = phase.len();
-        let (mut least, mut next) = ([f32::INFINITY; BLOCK], [self.apart; BLOCK]);
-        // Neighbours have nearly the same candidates.
-        let ends =
-            (low.iter().fold(f32::INFINITY, |a, b| a.min(*b)), high.iter().fold(0.0, |a: f32, b| a.max(*b)));
-        let orders = (ends.0 / TAU).floor() as i32 - 1..(ends.1 / TAU).ceil() as i32;
-        for order in orders {
-            let turns = TAU * order as f32;
-            for i in 0..count {
-                let guess = wrap_positive(first[i]) + turns;
-                let infrared = e0[i] + guess * (e1[i] + guess * (e2[i] + guess * e3[i]));
-                let cost = miss(guess * self.ratio, second[i]) + miss(infrared, third[i]);
-                let on_the_ray = (guess >= low[i]) & (guess <= high[i]);
-                let cost = if on_the_ray { cost } else { f32::INFINITY };
-                let better = cost < least[i];
-                let behind = if better { least[i] } else { cost };
-                next[i] = if behind < next[i] { behind } else { next[i] };
-                least[i] = if better { cost } else { least[i] };
-                phase[i] = if better { guess } else { phase[i] };
-            }
+    fn ask_near(
+        &self,
+        near: Near,
+        wrapped: [&[f32]; 3],
+        rays: &RayRow<'_>,
+        best: &mut Best,
+        phase: &mut [f32],
+    ) {
+        let ([first, second, _], [low, high]) = (wrapped, rays.range_rad);
+        let mut start = [0.0; BLOCK];
+        for i in 0..phase.len() {
+            let own = wrap_positive(first[i]);
+            let coarse = wrap_positive((first[i] - second[i]) * near.sign) * near.cycle;
+            start[i] = own + TAU * round((coarse - own) * (1.0 / TAU));
         }
-        for i in 0..count {
-            let found = least[i].is_finite();
-            let lead = 1.0 - (least[i] / next[i].max(f32::MIN_POSITIVE)).sqrt();
-            phase[i] = if found { phase[i] } else { f32::NAN };
-            margin[i] = if found { lead.max(0.0) } else { f32::NAN };
+        let cycle = TAU * near.cycle;
+        for step in -near.reach..=near.reach {
+            let turns = TAU * step as f32;
+            let guess = |i: usize| {
+                // The ends of the field look alike to the beat.
+                let guess = start[i] + turns;
+                let guess = if guess > high[i] { guess - cycle } else { guess };
+                if guess < low[i] { guess + cycle } else { guess }
+            };
+            self.ask(guess, wrapped, rays, best, phase);
+        }
+    }
+
+    /// Every order that a pixel of the block can have.
+    #[inline(always)]
+    fn ask_all(&self, wrapped: [&[f32]; 3], rays: &RayRow<'_>, best: &mut Best, phase: &mut [f32]) {
+        let [low, high] = rays.range_rad;
+        let low = low.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let high = high.iter().fold(0.0, |a: f32, b| a.max(*b));
+        for order in (low / TAU).floor() as i32 - 1..(high / TAU).ceil() as i32 {
+            let turns = TAU * order as f32;
+            self.ask(|i| wrap_positive(wrapped[0][i]) + turns, wrapped, rays, best, phase);
+        }
+    }
+
+    /// One candidate for each pixel.
+    #[inline(always)]
+    fn ask(
+        &self,
+        guess: impl Fn(usize) -> f32,
+        wrapped: [&[f32]; 3],
+        rays: &RayRow<'_>,
+        best: &mut Best,
+        phase: &mut [f32],
+    ) {
+        let ([_, second, third], [low, high]) = (wrapped, rays.range_rad);
+        let [e0, e1, e2, e3] = rays.infrared;
+        for i in 0..phase.len() {
+            let guess = guess(i);
+            let infrared = e0[i] + guess * (e1[i] + guess * (e2[i] + guess * e3[i]));
+            let cost = miss(guess * self.ratio, second[i]) + miss(infrared, third[i]);
+            let on_the_ray = (guess >= low[i]) & (guess <= high[i]);
+            let cost = if on_the_ray { cost } else { f32::INFINITY };
+            let better = cost < best.least[i];
+            let behind = if better { best.least[i] } else { cost };
+            best.next[i] = if behind < best.next[i] { behind } else { best.next[i] };
+            best.least[i] = if better { cost } else { best.least[i] };
+            phase[i] = if better { guess } else { phase[i] };
+        }
+    }
+}
+
+impl Best {
+    /// Margins, and no data where there was no candidate.
+    #[inline(always)]
+    fn settle(&self, phase: &mut [f32], margin: &mut [f32]) {
+        for (i, (phase, margin)) in phase.iter_mut().zip(margin).enumerate() {
+            let found = self.least[i].is_finite();
+            let lead = 1.0 - (self.least[i] / self.next[i].max(f32::MIN_POSITIVE)).sqrt();
+            *phase = if found { *phase } else { f32::NAN };
+            *margin = if found { lead.max(0.0) } else { f32::NAN };
         }
     }
 }
@@ -106,39 +195,73 @@ mod tests {
     use super::*;
     use crate::angle::wrap;
 
-    fn search(first: f32, infrared: [f32; 4], range: [f32; 2], truth: f32) -> (f32, f32) {
-        let code = FringeCode::optimum(36, 912).expect("valid code");
+    const COAXIAL: [f32; 4] = [0.0, 30.0 / 36.0, 0.0, 0.0];
+    const APART: [f32; 4] = [4.0, 0.85, -1e-4, 1e-7];
+
+    fn optimum() -> AlongRay {
+        AlongRay::new(&FringeCode::optimum(36, 912).expect("valid code"))
+    }
+
+    /// Phase and margin of a pixel at the absolute phase `truth`, whose phases stray by `noise`.
+    fn search(
+        way: &AlongRay,
+        infrared: [f32; 4],
+        range: [f32; 2],
+        truth: f32,
+        noise: [f32; 3],
+    ) -> (f32, f32) {
         let [e0, e1, e2, e3] = infrared;
         let seen = e0 + truth * (e1 + truth * (e2 + truth * e3));
-        let wrapped = [wrap(first), wrap(truth * 35.0 / 36.0), wrap(seen)].map(|v| [v]);
+        let exact = [truth, truth * way.ratio, seen];
+        let wrapped: [[f32; 1]; 3] = std::array::from_fn(|i| [wrap(exact[i] + noise[i])]);
         let (coefficients, range) = (infrared.map(|v| [v]), range.map(|v| [v]));
         let rays = RayRow {
             infrared: coefficients.each_ref().map(|v| v.as_slice()),
             range_rad: range.each_ref().map(|v| v.as_slice()),
         };
         let (mut phase, mut margin) = ([0.0], [0.0]);
-        let wrapped = wrapped.each_ref().map(|v| v.as_slice());
-        AlongRay::new(&code).order_row(wrapped, &rays, &mut phase, &mut margin);
+        way.order_row(wrapped.each_ref().map(|v| v.as_slice()), &rays, &mut phase, &mut margin);
         (phase[0], margin[0])
     }
 
     #[test]
     fn a_pair_that_is_far_from_coaxial_is_ordered_right() {
-        for i in 0..2000 {
-            let truth = 0.11 * i as f32;
-            let (phase, margin) = search(truth, [4.0, 0.85, -1e-4, 1e-7], [-0.3, 226.5], truth);
-            assert!((phase - truth).abs() < 1e-3 && margin > 0.98, "{truth}: {phase} {margin}");
+        let other = FringeCode::new([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920).expect("valid code");
+        let backwards = FringeCode::new([35.0, 36.0, 30.0], 912).expect("valid code");
+        for way in [optimum(), AlongRay::new(&other), AlongRay::new(&backwards)] {
+            for i in 0..1990 {
+                let truth = 0.11 * i as f32;
+                let (phase, margin) = search(&way, APART, [-0.3, 219.5], truth, [0.0; 3]);
+                assert!((phase - truth).abs() < 1e-3 && margin > 0.97, "{way:?} {truth}: {phase} {margin}");
+            }
+        }
+    }
+
+    #[test]
+    fn near_candidates_are_as_good_as_all() {
+        let near = optimum();
+        let all = AlongRay { near: None, ..near.clone() };
+        assert!(near.near.is_some());
+        for i in 0..4000 {
+            let truth = 0.0564 * i as f32 + 0.12;
+            let stray = |k: f32| 0.12 * (k * i as f32).sin();
+            let noise = [stray(1.3), stray(2.7), stray(3.9)];
+            let found = [&near, &all].map(|way| search(way, APART, [-0.124, 226.07], truth, noise));
+            assert!((found[0].0 - found[1].0).abs() < 1e-3, "{truth}: {found:?}");
+            assert!((found[0].0 - truth).abs() < 0.5, "{truth}: {found:?}");
         }
     }
 
     #[test]
     fn candidates_end_with_the_ray() {
-        let coaxial = [0.0, 30.0 / 36.0, 0.0, 0.0];
-        let (phase, margin) = search(100.0, coaxial, [60.0, 90.0], 100.0);
-        assert!((60.0..=90.0).contains(&phase) && margin < 0.2, "{phase} {margin}");
-        for range in [[f32::NAN, f32::NAN], [99.0, 99.5]] {
-            assert!(search(100.0, coaxial, range, 100.0).0.is_nan());
+        for way in [optimum(), AlongRay { near: None, ..optimum() }] {
+            let none = [0.0; 3];
+            let (phase, margin) = search(&way, COAXIAL, [60.0, 90.0], 100.0, none);
+            assert!(phase.is_nan() || ((60.0..=90.0).contains(&phase) && margin < 0.2), "{phase} {margin}");
+            for range in [[f32::NAN, f32::NAN], [99.0, 99.5]] {
+                assert!(search(&way, COAXIAL, range, 100.0, none).0.is_nan());
+            }
+            assert!(search(&way, COAXIAL, [0.0, 226.0], f32::NAN, none).0.is_nan());
         }
-        assert!(search(f32::NAN, coaxial, [0.0, 226.0], 100.0).0.is_nan());
     }
 }
