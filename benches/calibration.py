@@ -119,7 +119,8 @@ def figures_of(found: RigCalibration, config: SystemConfig) -> dict[str, float]:
     figures |= {"focal_error_percent": 100 * focal, "centre_error_px": centre}
     truth = np.array([*DEVIATION_DEG, *DEVIATION_MM])
     error = np.array([*found.pair.rotation_deg, *found.pair.translation_mm]) - truth
-    outside = int(((truth < found.pair.interval95[:, 0]) | (truth > found.pair.interval95[:, 1])).sum())
+    low, high = found.pair.interval(0.95).T
+    outside = int(((truth < low) | (truth > high)).sum())
     figures["pair_rotation_error_deg"] = float(np.linalg.norm(error[:3]))
     figures["pair_translation_error_mm"] = float(np.linalg.norm(error[3:]))
     figures["pair_rotation_sd_deg"] = float(found.pair.sd[:3].max())

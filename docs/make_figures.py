@@ -68,6 +68,35 @@ PEAKS = (
     ("proposed_rms_rad", "proposed, full field, rad", "0.0099"),
     ("proposed_rms_rad_row760", "the same along row 760, rad (published 0.0099)", "0.0099"),
 )
+PAIR_TOLERANCE = tuple(
+    (axis, f"allowable deviation of the infrared projector, {axis.replace('_', ', ')}", "")
+    for axis in ("rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm")
+)
+PAIR_CORRECTION = (
+    ("infrared_before_rms_rad_row130", "pair 1 degree and 0.5 mm apart, row 130: infrared fringes before, rad", ""),
+    ("infrared_after_rms_rad_row130", "the same with a pre-deformed image, rad (published 0.031)", "0.02"),
+    ("infrared_after_rms_rad", "the same over the field, rad", "0.02"),
+    ("after_rms_rad", "unwrapped phase against one projector, published method, rad", "0.02"),
+    ("after_best_rms_rad", "unwrapped phase against one projector, best method, rad", "0.02"),
+    ("after_wrong_order_percent", "wrong orders after the correction, %", "0"),
+)
+PAIR_DEPTH = tuple(
+    row
+    for way, words in (("corrected", "pre-deformed image"), ("searched", "search along the ray"))
+    for row in (
+        (
+            f"{way}_0.5mm_infrared_rms_rad",
+            f"{words}, 700 to 900 mm: infrared against expectation, worst, rad",
+            "0.02" if way == "searched" else "",
+        ),
+        (f"{way}_0.5mm_wrong_order_percent", f"{words}, 1 degree and 0.5 mm apart: wrong orders, worst, %", "0"),
+        (
+            f"{way}_5mm_wrong_order_percent",
+            f"{words}, 1 degree and 5 mm apart: wrong orders, worst, %",
+            "0" if way == "searched" else "",
+        ),
+    )
+)
 CAPTURES = (
     *(
         row
@@ -127,6 +156,9 @@ SOURCES = (
     Source(("benches/bayer.py",), BAYER),
     Source(("quadfringe", "demo"), DEMO),
     Source(("quadfringe", "reproduce", "peaks"), PEAKS),
+    Source(("quadfringe", "reproduce", "pair-tolerance"), PAIR_TOLERANCE),
+    Source(("quadfringe", "reproduce", "pair-correction"), PAIR_CORRECTION),
+    Source(("quadfringe", "reproduce", "pair-depth"), PAIR_DEPTH),
     Source(("benches/captures_report.py",), CAPTURES, needs_data=True),
     Source(("benches/bench_decode.py",), SPEED),
     Source(("benches/first_frame.py",), (("first_frame_s", "first frame from process start, s", "1.5"),)),

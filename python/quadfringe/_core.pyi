@@ -16,6 +16,7 @@ __all__ = [
     "Decoder",
     "Device",
     "LightCrafter",
+    "PairTable",
     "Pattern",
     "PatternSequence",
     "PatternWindow",
@@ -37,6 +38,7 @@ __all__ = [
     "pack_flash",
     "pattern",
     "power_on_drive",
+    "predeform",
     "step_pattern",
     "two_step",
     "udev_rule",
@@ -117,6 +119,9 @@ class Device:
     def ray(self, pixel: _Vector2) -> tuple[_Vector3, _Vector3]:
         """Give origin (mm) and unit direction, in the camera frame, of the ray of a pixel (column, row)."""
 
+    def through_plane(self, position: _Vector2, other: Device, z_mm: float) -> _Vector2 | None:
+        """Give the position in `other` of what a position lights, or sees, on the plane z; None when out of reach."""
+
 @final
 class Bench:
     """The virtual bench: a camera and two projectors. What is absent is the published geometry."""
@@ -172,9 +177,17 @@ class Bench:
         z = 0 of the board, in the pose of `cast_plate`; `paper` and `ink` are albedos of R, G, B, IR.
         """
 
-    def render(self, cast: Cast, fringe_numbers: _Vector3, **options: Any) -> dict[str, NDArray[Any]]:
+    def render(
+        self,
+        cast: Cast,
+        fringe_numbers: _Vector3,
+        *,
+        infrared_image: NDArray[np.float32] | None = None,
+        **options: Any,
+    ) -> dict[str, NDArray[Any]]:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
+        The infrared projector shows its fringes, or `infrared_image` (rows, columns), linear light from 0 to 1.
         Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that
         is not known is a TypeError.
         """
@@ -204,8 +217,8 @@ class Cast:
     def xyz_mm(self) -> NDArray[np.float32]:
         """Give the points in the camera frame, (H, W, 3) mm, NaN where nothing is seen."""
 
-    def column_px(self) -> NDArray[np.float32]:
-        """Give the column of the visible projector that lights each pixel, (H, W), NaN in the dark."""
+    def column_px(self, *, infrared: bool = False) -> NDArray[np.float32]:
+        """Give the column of the visible (or infrared) projector that lights each pixel, (H, W), NaN in the dark."""
 
     def shadow(self) -> NDArray[np.bool_]:
         """Tell where a surface is seen that a projector does not light, (H, W)."""
@@ -217,8 +230,9 @@ class Cast:
 class Decoder:
     """Decodes shots of one size; planned and checked when made.
 
-    What is absent takes the kernel's default. Raises ValueError when the fringe numbers do not cover the projector
-    or a setting is out of range.
+    What is absent takes the kernel's default. With `camera`, `projector` and `infrared` orders are searched along the
+    camera rays, with the infrared image plain or pre-deformed, within a range of depths or at all of them. Raises
+    ValueError when the fringe numbers do not cover the projector or a setting is out of range.
     """
 
     def __new__(
@@ -241,6 +255,9 @@ class Decoder:
         ir_registration: Sequence[Sequence[float]] | None = None,
         camera: Device | None = None,
         projector: Device | None = None,
+        infrared: Device | None = None,
+        predeformed_z_mm: float | None = None,
+        depth_range_mm: _Vector2 | None = None,
     ) -> Decoder: ...
     def settings(self) -> dict[str, str | float | list[float] | None]:
         """Give every setting of the method with defaults included; period_px None is taken from every shot."""
@@ -273,6 +290,41 @@ def pattern(
     channel: str, fringe_numbers: _Vector3, width: int, height: int, *, layout: str = "regular"
 ) -> NDArray[np.float32]:
     """Give the ideal image of channel R, G, B or IR, (height, width), linear light from 0 to 1."""
+
+def predeform(
+    visible: Device, infrared: Device, fringe_number: float, *, z_mm: float, layout: str = "regular"
+) -> NDArray[np.float32]:
+    """Give the image that lets the infrared projector show on the plane z what the visible one would (S11).
+
+    (height, width) of the infrared projector, linear light from 0 to 1, 0 where a mirror misses the plane. Both lens
+    distortions and the layout of the mirrors are taken into account.
+    """
+
+@final
+class PairTable:
+    """The infrared phase along every camera ray, for calibrated projectors wherever they stand; planned once.
+
+    Raises ValueError when the devices cannot triangulate, when the fringes do not cover the visible projector, and for
+    a `depth_range_mm` that does not grow.
+    """
+
+    def __new__(
+        cls,
+        camera: Device,
+        visible: Device,
+        infrared: Device,
+        fringe_numbers: _Vector3,
+        *,
+        predeformed_z_mm: float | None = None,
+        depth_range_mm: _Vector2 | None = None,
+    ) -> PairTable: ...
+    def infrared_rad(self, phase_rad: NDArray[np.float32]) -> NDArray[np.float32]:
+        """Give the infrared phase, not wrapped, where the first absolute phase is known, both (H, W) rad."""
+
+    def unwrap(
+        self, first: NDArray[np.float32], second: NDArray[np.float32], third: NDArray[np.float32]
+    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+        """Give absolute phase in rad and margin in [0, 1], as `unwrap` does, but searched along the camera rays."""
 
 def step_pattern(
     fringe_number: float, shift_rad: float, width: int, height: int, *, axis: str = "columns", layout: str = "regular"

@@ -91,10 +91,15 @@ class Response(Model):
 
 
 class Fringes(Model):
-    """Fringe numbers over the full projector width: red and blue, green, infrared. The kernel checks them."""
+    """Fringe numbers over the full projector width: red and blue, green, infrared. The kernel checks them.
+
+    With `predeformed_z_mm` the infrared image is pre-deformed, from the calibration of both projectors, so that it lies
+    right on the plane at this depth (S11).
+    """
 
     numbers: tuple[float, float, float] = (36.0, 35.0, 30.0)
     layout: Literal["regular", "diamond"] = "regular"
+    predeformed_z_mm: Positive | None = None
 
 
 class HeightMapConfig(Model):
@@ -215,13 +220,24 @@ class DecodeConfig(Model):
 
     `channel_instants_us` are the instants at which R, G, B and IR are seen, from the one that the shape stands for: a
     projector that shows its colours one after another needs them when the surface moves. Method "best" alone has it.
+    `unwrapping` says what the infrared light is taken for: "coaxial" with the visible (as published, and when absent),
+    or where the calibrated "pair" really puts it, so that the order is searched along the camera ray of each pixel,
+    at depths within `depth_range_mm` (nearest, farthest) when given.
     """
 
     method: Literal["published", "best"] | None = None
+    unwrapping: Literal["coaxial", "pair"] | None = None
+    depth_range_mm: tuple[NotNegative, Positive] | None = None
     modulation_min: NotNegative | None = None
     quality_min: NotNegative | None = None
     channel_instants_us: Row4 | None = None
     threads: Annotated[int, Field(gt=0)] | None = None
+
+    @model_validator(mode="after")
+    def _range_is_searched(self) -> DecodeConfig:
+        if self.depth_range_mm is not None and self.unwrapping != "pair":
+            raise ValueError('depth_range_mm needs unwrapping = "pair", which searches depths')
+        return self
 
 
 class SystemConfig(Model):

@@ -6,12 +6,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from quadfringe import _core
-from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response
+from quadfringe.config import DecodeConfig, Fringes, Response
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, conditioning
 from quadfringe.errors import InputError
+from quadfringe.optics import core_device, device_model
 from quadfringe.verdict import judge
 
-__all__ = ["Plan", "ShotDecoder", "core_device", "decode", "device_model"]
+__all__ = ["Plan", "ShotDecoder", "core_device", "decode", "device_model", "kernel_decoder"]
 
 
 @dataclass(frozen=True)
@@ -37,32 +38,6 @@ class Plan:
         }
 
 
-def core_device(model: DeviceModel) -> _core.Device:
-    """Make the kernel's device from its settings."""
-    return _core.Device(
-        model.width_px,
-        model.height_px,
-        model.focal_px,
-        model.centre_px,
-        distortion=model.distortion,
-        rotation=model.rotation,
-        translation_mm=model.translation_mm,
-    )
-
-
-def device_model(device: _core.Device) -> DeviceModel:
-    """Write out a device of the kernel as settings."""
-    return DeviceModel(
-        width_px=device.width,
-        height_px=device.height,
-        focal_px=device.focal_px,
-        centre_px=device.centre_px,
-        distortion=device.distortion,
-        rotation=device.rotation,
-        translation_mm=device.translation_mm,
-    )
-
-
 class ShotDecoder:
     """Decodes shots of one size; planned and checked when made.
 
@@ -74,16 +49,7 @@ class ShotDecoder:
     def __init__(self, like: AnyShot, plan: Plan) -> None:
         self.plan = plan
         self._channels_known = False
-        _check_sizes(like, plan)
-        self._core = _core.Decoder(
-            next(iter(like.images.values())).shape,
-            plan.fringes.numbers,
-            plan.projector_width_px,
-            full_scale=like.full_scale_value,
-            **conditioning(plan.calibration, plan.response),
-            **_geometry(plan.calibration),
-            **plan.settings.model_dump(exclude_none=True),
-        )
+        self._core = kernel_decoder(like, plan)
         self._described = plan.described() | {"decode": self._core.settings()}
 
     def decode(self, shot: AnyShot) -> Shape:
@@ -99,6 +65,20 @@ class ShotDecoder:
         else:
             maps = self._core.decode(shot.red, shot.green, shot.blue, shot.ir)
         return Shape(**maps, config=self._described, calibration=self.plan.calibration)
+
+
+def kernel_decoder(like: AnyShot, plan: Plan) -> _core.Decoder:
+    """Plan the kernel's decoder for shots like this one, which passes no verdict; errors as `ShotDecoder`."""
+    _check_sizes(like, plan)
+    return _core.Decoder(
+        next(iter(like.images.values())).shape,
+        plan.fringes.numbers,
+        plan.projector_width_px,
+        full_scale=like.full_scale_value,
+        **conditioning(plan.calibration, plan.response),
+        **_geometry(plan),
+        **plan.settings.model_dump(exclude_none=True, exclude={"unwrapping"}),
+    )
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:
@@ -125,10 +105,19 @@ def _check_sizes(shot: AnyShot, plan: Plan) -> None:
         )
 
 
-def _geometry(calibration: Calibration | None) -> dict[str, Any]:
+def _geometry(plan: Plan) -> dict[str, Any]:
+    calibration = plan.calibration
+    searched = plan.settings.unwrapping == "pair"
+    if searched and (calibration is None or calibration.infrared is None):
+        raise InputError(
+            'unwrapping = "pair" needs a calibration with both projectors: one that has an `infrared` device'
+        )
     if calibration is None:
         return {}
-    return {
-        "camera": core_device(calibration.camera),
-        "projector": core_device(calibration.projector),
+    known = {"camera": core_device(calibration.camera), "projector": core_device(calibration.projector)}
+    if not searched or calibration.infrared is None:
+        return known
+    return known | {
+        "infrared": core_device(calibration.infrared),
+        "predeformed_z_mm": plan.fringes.predeformed_z_mm,
     }

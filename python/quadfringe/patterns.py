@@ -6,16 +6,20 @@ from pathlib import Path
 
 from quadfringe.files import folder_for
 from quadfringe.images import write_image
-from quadfringe.projection import projector_images
+from quadfringe.projection import Predeformation, projector_images
 
 __all__ = ["write_patterns"]
 
 
 def write_patterns(
-    folder: Path, fringes: tuple[float, float, float], size_px: tuple[int, int], layout: str
+    folder: Path,
+    fringes: tuple[float, float, float],
+    size_px: tuple[int, int],
+    layout: str,
+    deformed: Predeformation | None = None,
 ) -> list[Path]:
-    """Write visible.png and infrared.png into `folder`; returns their paths."""
-    visible, infrared = projector_images(fringes, size_px, layout)
+    """Write visible.png and infrared.png into `folder`, the latter pre-deformed or not; returns their paths."""
+    visible, infrared = projector_images(fringes, size_px, layout, deformed)
     folder_for(folder)
     paths = [folder / "visible.png", folder / "infrared.png"]
     for path, image in zip(paths, (visible, infrared), strict=True):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from quadfringe.errors import require
 from quadfringe.files import atomic
 from quadfringe.truth import Comparison
 
-__all__ = ["Panel", "draw_panels", "write_report"]
+__all__ = ["Graph", "Panel", "draw_panels", "write_report"]
 
 NO_DATA = "#d8d8d8"
 
@@ -33,6 +34,47 @@ class Panel:
         self.title, self.image, self.unit = title, image, unit
         self.colours, self.limits = colours, limits or _limits(image)
 
+    def draw(self, figure: Any, axes: Any) -> None:
+        """Draw the picture with its colour bar."""
+        low, high = self.limits
+        drawn = axes.imshow(self.image, cmap=self.colours, vmin=low, vmax=high, interpolation="nearest")
+        axes.set_facecolor(NO_DATA)
+        axes.set_title(self.title, fontsize=10)
+        axes.tick_params(labelsize=7)
+        if self.unit:
+            bar = figure.colorbar(drawn, ax=axes, shrink=0.85)
+            bar.set_label(self.unit, fontsize=8)
+            bar.ax.tick_params(labelsize=7)
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Lines over a common axis, or points: x and y by name; `limit` is a dashed line with a name of its own."""
+
+    title: str
+    x_label: str
+    y_label: str
+    lines: Mapping[str, tuple[NDArray[Any], NDArray[Any]]]
+    limit: tuple[str, float] | None = None
+    log: bool = False
+    points: bool = False
+
+    def draw(self, _figure: Any, axes: Any) -> None:
+        """Draw the lines with their names."""
+        for name, (x, y) in self.lines.items():
+            marker = "." if self.points or len(x) < 50 else None
+            axes.plot(x, y, label=name, linewidth=0 if self.points else 1.2, marker=marker, markersize=4)
+        if self.limit is not None:
+            axes.axhline(self.limit[1], color="black", linestyle="--", linewidth=0.9, label=self.limit[0])
+        if self.log:
+            axes.set_yscale("log")
+        axes.set_title(self.title, fontsize=10)
+        axes.set_xlabel(self.x_label, fontsize=8)
+        axes.set_ylabel(self.y_label, fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.grid(alpha=0.3)
+        axes.legend(fontsize=6.5, framealpha=0.6)
+
 
 def _limits(image: NDArray[Any]) -> tuple[float, float]:
     finite = image[np.isfinite(image)]
@@ -42,8 +84,8 @@ def _limits(image: NDArray[Any]) -> tuple[float, float]:
     return (low, high if high > low else low + 1.0)
 
 
-def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel]]) -> None:
-    """Write rows of panels as one PNG; needs matplotlib (extra `plot`)."""
+def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]]) -> None:
+    """Write rows of panels and graphs as one PNG; needs matplotlib (extra `plot`)."""
     require("matplotlib", "plot")
     from matplotlib.figure import Figure
 
@@ -53,21 +95,9 @@ def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel]]) -> None
     grid = figure.add_gridspec(len(rows), columns)
     for i, row in enumerate(rows):
         for j, panel in enumerate(row):
-            _draw(figure, figure.add_subplot(grid[i, j]), panel)
+            panel.draw(figure, figure.add_subplot(grid[i, j]))
     with atomic(path) as temporary:
         figure.savefig(temporary, format="png")
-
-
-def _draw(figure: Any, axes: Any, panel: Panel) -> None:
-    low, high = panel.limits
-    drawn = axes.imshow(panel.image, cmap=panel.colours, vmin=low, vmax=high, interpolation="nearest")
-    axes.set_facecolor(NO_DATA)
-    axes.set_title(panel.title, fontsize=10)
-    axes.tick_params(labelsize=7)
-    if panel.unit:
-        bar = figure.colorbar(drawn, ax=axes, shrink=0.85)
-        bar.set_label(panel.unit, fontsize=8)
-        bar.ax.tick_params(labelsize=7)
 
 
 def fringe_panels(shot: AnyShot) -> list[Panel]:

@@ -8,7 +8,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::BayerPattern;
-use quadfringe::fringe::FringeCode;
+use quadfringe::fringe::{Channel, FringeCode};
 use quadfringe::optics::Pose;
 use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, Print, RenderOptions};
 use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
@@ -124,16 +124,22 @@ impl Bench {
     }
 
     /// The images of a shot by name: four channels, or the raw mosaic and infrared of a Bayer chip.
-    #[pyo3(signature = (cast, fringe_numbers, **options))]
+    #[pyo3(signature = (cast, fringe_numbers, *, infrared_image = None, **options))]
     fn render<'py>(
         &self,
         py: Python<'py>,
         cast: &Cast,
         fringe_numbers: [f64; 3],
+        infrared_image: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let code = FringeCode::new(fringe_numbers, self.0.visible.width).map_err(value_error)?;
-        self.render_lights(py, cast, &Light::shot(&code), options)
+        let image = infrared_image.map(|image| expected::<f32, 2>("infrared_image", image)).transpose()?;
+        let mut lights = Light::shot(&code);
+        if let Some(image) = &image {
+            lights[Channel::Ir.index()] = Light::Image(image.as_array());
+        }
+        self.render_lights(py, cast, &lights, options)
     }
 
     /// The images with the same fringes in all channels, or in those of one projector: one step of an N-step capture.
@@ -215,9 +221,11 @@ impl Cast {
         py.detach(|| self.0.xyz_mm()).into_pyarray(py)
     }
 
-    /// Column of the visible projector that lights each pixel, (H, W) float32.
-    fn column_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        py.detach(|| self.0.column_px(Beam::Visible)).into_pyarray(py)
+    /// Column of a projector that lights each pixel, (H, W) float32.
+    #[pyo3(signature = (*, infrared = false))]
+    fn column_px<'py>(&self, py: Python<'py>, infrared: bool) -> Bound<'py, PyArray2<f32>> {
+        let beam = if infrared { Beam::Infrared } else { Beam::Visible };
+        py.detach(|| self.0.column_px(beam)).into_pyarray(py)
     }
 
     /// Where a surface is seen that a projector does not light, (H, W) bool.

@@ -3,12 +3,13 @@
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, value_error, views};
 use crate::device::{Device, unknown};
 use crate::memory::Memory;
+use crate::pair::pair_of;
 use ndarray::{Ix2, Ix3};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::Sample;
-use quadfringe::height::Triangulator;
+use quadfringe::height::{PairTable, Triangulator};
 use quadfringe::{BayerPattern, Conditioner, Decoded, FringeCode, Method, Options, Response, Shot};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -32,7 +33,8 @@ impl Decoder {
     #[new]
     #[pyo3(signature = (shape, fringe_numbers, projector_width, *, full_scale = None, method = None,
         modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, threads = None, dark = None, response = None,
-        crosstalk = None, projector_response = None, ir_registration = None, camera = None, projector = None))]
+        crosstalk = None, projector_response = None, ir_registration = None, camera = None, projector = None, infrared = None,
+        predeformed_z_mm = None, depth_range_mm = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
         py: Python<'_>,
@@ -53,6 +55,9 @@ impl Decoder {
         ir_registration: Option<[[f64; 3]; 2]>,
         camera: Option<Device>,
         projector: Option<Device>,
+        infrared: Option<Device>,
+        predeformed_z_mm: Option<f64>,
+        depth_range_mm: Option<[f64; 2]>,
     ) -> PyResult<Self> {
         let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
         let plain = Options::default();
@@ -65,13 +70,14 @@ impl Decoder {
         };
         let conditioner = conditioner_of(dark, response, crosstalk, projector_response, ir_registration);
         let kernel = py.detach(|| {
-            let decoder = quadfringe::Decoder::new(code, shape, &conditioner, options)?;
-            match (&camera, &projector) {
-                (Some(camera), Some(projector)) => {
-                    decoder.triangulate_with(Triangulator::new(&camera.0, &projector.0)?)
-                }
-                _ => Ok(decoder),
-            }
+            let decoder = quadfringe::Decoder::new(code.clone(), shape, &conditioner, options)?;
+            let (Some(camera), Some(projector)) = (&camera, &projector) else {
+                return Ok(decoder);
+            };
+            let decoder = decoder.triangulate_with(Triangulator::new(&camera.0, &projector.0)?)?;
+            let Some(infrared) = &infrared else { return Ok(decoder) };
+            let pair = pair_of(projector, infrared, predeformed_z_mm)?;
+            decoder.unwrap_along_rays(PairTable::new(&camera.0, &pair, &code, depth_range_mm)?)
         });
         Ok(Self {
             kernel: Mutex::new(kernel.map_err(value_error)?),
@@ -93,6 +99,7 @@ impl Decoder {
         named.set_item("quality_min", options.quality_min)?;
         named.set_item("period_px", options.period_px)?;
         named.set_item("channel_instants_us", options.channel_instants_us)?;
+        named.set_item("unwrapping", if kernel.searches_rays() { "pair" } else { "coaxial" })?;
         Ok(named)
     }
 

@@ -77,6 +77,12 @@ impl Device {
         (ray.origin_mm, ray.direction)
     }
 
+    /// Position in another device of what a position lights, or sees, on the plane z; None when it is not reached.
+    #[pyo3(signature = (position, other, z_mm))]
+    fn through_plane(&self, position: [f64; 2], other: &Self, z_mm: f64) -> Option<[f64; 2]> {
+        self.0.through_plane(position, &other.0, z_mm)
+    }
+
     fn __repr__(&self) -> String {
         format!("Device({} x {}, focal_px={:?})", self.0.width, self.0.height, self.0.focal_px)
     }

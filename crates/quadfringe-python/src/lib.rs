@@ -6,6 +6,7 @@ mod decoder;
 mod device;
 mod height;
 mod memory;
+mod pair;
 mod projector;
 mod stages;
 
@@ -20,6 +21,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<bench::Cast>()?;
     module.add_class::<decoder::Decoder>()?;
     module.add_class::<height::PolynomialHeight>()?;
+    module.add_class::<pair::PairTable>()?;
     module.add_class::<projector::LightCrafter>()?;
     module.add_class::<projector::Pattern>()?;
     module.add_class::<projector::PatternSequence>()?;
@@ -27,6 +29,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(device::optimum, module)?)?;
     module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
     module.add_function(wrap_pyfunction!(device::pattern, module)?)?;
+    module.add_function(wrap_pyfunction!(pair::predeform, module)?)?;
     module.add_function(wrap_pyfunction!(device::step_pattern, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light, module)?)?;
     module.add_function(wrap_pyfunction!(stages::linear_light_bayer, module)?)?;

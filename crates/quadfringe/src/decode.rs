@@ -5,6 +5,7 @@
 //! demodulate  R and B by two-step phase shifting                                       (S2)
 //!             G and IR against them: local fit (best) or Fourier filter (published)    (S3)
 //! unwrap      orders with support (best) or the ladder, point by point (published)     (S4)
+//!             or along the camera ray, when both projectors are calibrated
 //! height      camera ray and projector column -> X, Y, Z                               (S7)
 //! ```
 
@@ -21,7 +22,7 @@ mod uncertainty;
 pub use output::Decoded;
 
 use crate::condition::{Plan, Sample};
-use crate::height::Triangulator;
+use crate::height::{PairTable, Triangulator};
 use crate::{Conditioner, Error, FringeCode, Result, Shot};
 use best::Best;
 use level::Level;
@@ -159,6 +160,29 @@ impl Decoder {
         Ok(self)
     }
 
+    /// Choose fringe orders along the camera ray with both projectors calibrated: each candidate order is a depth, at
+    /// which the infrared projector lights the ray with a phase that is known. Without this the infrared light is taken as
+    /// coaxial with the visible.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when the table was made for another size of image; [`Error::Value`] for a method other than
+    /// [`Method::Published`].
+    pub fn unwrap_along_rays(mut self, table: PairTable) -> Result<Self> {
+        let (rows, columns) = table.shape();
+        if [rows, columns] != self.shape {
+            return Err(Error::shape("calibrated camera", &self.shape, &[rows, columns]));
+        }
+        match &mut self.engine {
+            Engine::Published(engine) => engine.unwrap_along_rays(table),
+            Engine::Best(_) => {
+                let expected =
+                    "published, the one that can search along the camera rays of a calibrated pair";
+                return Err(Error::value("method", expected, "best"));
+            }
+        }
+        Ok(self)
+    }
+
     /// The code that is decoded.
     #[must_use]
     pub fn code(&self) -> &FringeCode {
@@ -169,6 +193,12 @@ impl Decoder {
     #[must_use]
     pub fn options(&self) -> &Options {
         &self.options
+    }
+
+    /// Whether orders are searched along the camera rays of a calibrated pair.
+    #[must_use]
+    pub fn searches_rays(&self) -> bool {
+        matches!(&self.engine, Engine::Published(engine) if engine.searches_rays())
     }
 
     /// Decode one shot.

@@ -7,10 +7,13 @@ use crate::error::{Error, Result};
 
 mod bayer;
 mod distortion;
+mod pair;
 mod pose;
 mod rotation;
 
 pub use bayer::BayerPattern;
+pub use pair::CoaxialPair;
+pub(crate) use pair::check_plane;
 pub use pose::Pose;
 pub use rotation::rotation_from_vector;
 

@@ -106,6 +106,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         response: [Response { exponent: 1.8, ..Response::default() }; 4],
         crosstalk,
         ir_registration: MISALIGNED,
+        ..Conditioner::default()
     };
     for method in [Method::Published, Method::Best] {
         let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), method);

@@ -15,8 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.calibration.detect import View
-from quadfringe.calibration.fits import DeviceFit, PairFit, device_fit, pair_fit
+from quadfringe.calibration.fits import DeviceFit, device_fit, pair_fit
 from quadfringe.calibration.model import DEVICES, Adjustment, Sight
+from quadfringe.calibration.pair import PairPose
 from quadfringe.calibration.poses import PoseSpread, check_poses
 from quadfringe.calibration.projector import ProjectorPoints
 from quadfringe.calibration.start import check_distance, first_values
@@ -52,7 +53,7 @@ class RigCalibration:
     camera: DeviceFit
     visible: DeviceFit | None
     infrared: DeviceFit | None
-    pair: PairFit | None
+    pair: PairPose | None
     T_camera_board: Array
     spread: PoseSpread
     names: tuple[str, ...]

@@ -8,13 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.calibration.model import Adjustment
+from quadfringe.calibration.pair import PairPose, pair_pose
 from quadfringe.config import DeviceModel
 
-__all__ = ["DeviceFit", "DeviceSd", "PairFit", "device_fit", "pair_fit"]
+__all__ = ["DeviceFit", "DeviceSd", "device_fit", "pair_fit"]
 
 Array = NDArray[np.float64]
-NORMAL_95 = 1.959964  # standard deviations that hold 95 % of a normal distribution
-STEP = 1e-6  # of the derivative of the pair, in rad and mm
 
 
 @dataclass(frozen=True)
@@ -43,21 +42,6 @@ class DeviceFit:
     mean_px: float
     rms_px: float
     max_px: float
-
-
-@dataclass(frozen=True)
-class PairFit:
-    """The infrared projector seen from the visible one, T_infrared_visible: R12 and T12 of (S10).
-
-    A rotation vector in degrees and a translation in mm, as six numbers in `covariance` (6, 6) and `sd` (6,);
-    `interval95` (6, 2) are the bounds that hold the truth in 95 of 100 calibrations, each number on its own.
-    """
-
-    rotation_deg: tuple[float, float, float]
-    translation_mm: tuple[float, float, float]
-    covariance: Array
-    sd: Array
-    interval95: Array
 
 
 def device_fit(
@@ -99,25 +83,17 @@ def _padded(lens: Array) -> Array:
     return np.concatenate([lens, np.zeros(9 - len(lens))])
 
 
-def pair_fit(adjustment: Adjustment, values: Array, covariance: Array) -> PairFit:
-    """Give the motion between the projectors: R12 = R2 R1^-1, T12 = T2 - R12 T1 (S10), with its covariance."""
-    places = [adjustment.places[name, "motion"] for name in ("visible", "infrared")]
-    chosen = np.concatenate([np.arange(p.start, p.stop) for p in places])
-    at = values[chosen]
-    steps = STEP * np.eye(12)
-    slope = np.stack([(_between(at + s) - _between(at - s)) / (2 * STEP) for s in steps], axis=1)
-    found = _between(at)
-    spread = slope @ covariance[np.ix_(chosen, chosen)] @ slope.T
-    sd = np.sqrt(np.diag(spread))
-    bounds = np.stack([found - NORMAL_95 * sd, found + NORMAL_95 * sd], axis=1)
-    rx, ry, rz, tx, ty, tz = found.tolist()
-    return PairFit((rx, ry, rz), (tx, ty, tz), spread, sd, bounds)
-
-
-def _between(motions: Array) -> Array:
-    """Motion from the first (6) to the second (6): rotation vector in degrees and translation in mm."""
+def pair_fit(adjustment: Adjustment, values: Array, covariance: Array) -> PairPose:
+    """Give the motion between the projectors of an adjustment, with its uncertainty (S10)."""
     import cv2
 
-    first, second = (cv2.Rodrigues(motions[i : i + 3])[0] for i in (0, 6))
-    turn = second @ first.T
-    return np.concatenate([np.degrees(cv2.Rodrigues(turn)[0].ravel()), motions[9:] - turn @ motions[3:6]])
+    places = [adjustment.places[name, "motion"] for name in ("visible", "infrared")]
+    chosen = np.concatenate([np.arange(p.start, p.stop) for p in places])
+    first, second = values[chosen[:6]], values[chosen[6:]]
+    return pair_pose(
+        cv2.Rodrigues(first[:3])[0],
+        first[3:],
+        cv2.Rodrigues(second[:3])[0],
+        second[3:],
+        covariance[np.ix_(chosen, chosen)],
+    )

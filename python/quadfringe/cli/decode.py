@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import Bayer, Fringes3, JsonOption, say, write_figures
+from quadfringe.cli.output import Bayer, Fringes3, JsonOption, PredeformedOption, say, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
 
-__all__ = ["Bits", "Method", "decode"]
+__all__ = ["Bits", "Method", "Unwrapping", "decode"]
 
 ImageOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Image of this channel.")]
 
@@ -24,6 +24,13 @@ class Method(StrEnum):
 
     published = "published"
     best = "best"
+
+
+class Unwrapping(StrEnum):
+    """Infrared light as coaxial with the visible, or where the calibrated pair really puts it."""
+
+    coaxial = "coaxial"
+    pair = "pair"
 
 
 class Bits(StrEnum):
@@ -49,6 +56,14 @@ def decode(
     response: Annotated[Path | None, typer.Option(metavar="FILE", help="Response of the channels, JSON.")] = None,
     calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Calibration, JSON.")] = None,
     method: Annotated[Method | None, typer.Option(help="How to demodulate and unwrap.")] = None,
+    unwrapping: Annotated[
+        Unwrapping | None, typer.Option(help="Take both projectors as one, or where --calibration puts them.")
+    ] = None,
+    depth_range_mm: Annotated[
+        tuple[float, float] | None,
+        typer.Option(metavar="MM MM", help="Nearest and farthest depth that --unwrapping pair searches."),
+    ] = None,
+    predeformed_z_mm: PredeformedOption = None,
     bits: Annotated[Bits | None, typer.Option(help="Bits in use in 16-bit files.")] = None,
     channel_instants_us: Annotated[
         tuple[float, float, float, float] | None,
@@ -57,7 +72,7 @@ def decode(
     json: JsonOption = None,
 ) -> None:
     """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
-    from quadfringe.config import DecodeConfig, Fringes
+    from quadfringe.config import DecodeConfig, Fringes, checked
     from quadfringe.data import SUFFIXES, AnyShot, Calibration, ResponseCalibration
     from quadfringe.decoding import Plan
     from quadfringe.decoding import decode as decode_shot
@@ -67,12 +82,18 @@ def decode(
 
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without it write .npz")
+    settings = {
+        "method": None if method is None else method.value,
+        "unwrapping": None if unwrapping is None else unwrapping.value,
+        "depth_range_mm": depth_range_mm,
+        "channel_instants_us": channel_instants_us,
+    }
     plan = Plan(
         projector_width_px=projector_width,
-        fringes=Fringes(numbers=fringes),
+        fringes=Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
         calibration=None if calibration is None else Calibration.load(calibration),
         response=None if response is None else ResponseCalibration.load(response),
-        settings=DecodeConfig(method=None if method is None else method.value, channel_instants_us=channel_instants_us),
+        settings=checked(DecodeConfig, settings, "options"),
     )
     bits_in_use = None if bits is None else int(bits)
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}

@@ -18,6 +18,7 @@ __all__ = [
     "Bayer",
     "Fringes3",
     "JsonOption",
+    "PredeformedOption",
     "complain",
     "rows",
     "say",
@@ -38,6 +39,13 @@ JsonOption = Annotated[
 Fringes3 = Annotated[
     tuple[float, float, float],
     typer.Option("--fringes", metavar="N N N", help="Fringe numbers: red and blue, green, infrared."),
+]
+
+PredeformedOption = Annotated[
+    float | None,
+    typer.Option(
+        "--predeformed-z-mm", min=1.0, metavar="MM", help="Infrared pre-deformed for the plane at this depth."
+    ),
 ]
 
 

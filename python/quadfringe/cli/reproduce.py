@@ -18,6 +18,11 @@ class Published(StrEnum):
 
     hand = "hand"
     peaks = "peaks"
+    pair_deviation = "pair-deviation"
+    pair_tolerance = "pair-tolerance"
+    pair_calibration = "pair-calibration"
+    pair_correction = "pair-correction"
+    pair_depth = "pair-depth"
 
 
 def reproduce(

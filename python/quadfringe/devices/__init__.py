@@ -170,7 +170,8 @@ def open_projector(config: SystemConfig) -> Projector:
     if config.projectors is not None:
         from quadfringe.devices.lightcrafter import CoaxialPair
 
-        return CoaxialPair(config.projectors)
+        known = None if config.calibration is None else Calibration.load(config.calibration)
+        return CoaxialPair(config.projectors, known)
     if config.capture.kind != "virtual":
         return ExternalLight()
     from quadfringe.devices.virtual import VirtualBench, VirtualProjector

@@ -26,7 +26,8 @@ from quadfringe._core import (
     udev_rule,
 )
 from quadfringe.config import Fringes, HdmiRoute, ProjectorConfig, ProjectorsConfig
-from quadfringe.projection import projector_images
+from quadfringe.data import Calibration
+from quadfringe.projection import predeformation, projector_images
 
 __all__ = [
     "SIZE_PX",
@@ -148,20 +149,28 @@ class PatternProjector:
 class CoaxialPair:
     """The visible and the infrared projector as one: shows the four fringe images of a shot.
 
+    Pre-deformed fringes need the calibration of both.
+
     >>> from quadfringe.devices.lightcrafter import CoaxialPair
     >>> with CoaxialPair(config.projectors) as pair:  # doctest: +SKIP
     ...     pair.show(config.fringes)
     """
 
-    def __init__(self, config: ProjectorsConfig) -> None:
+    def __init__(self, config: ProjectorsConfig, calibration: Calibration | None = None) -> None:
+        self._calibration = calibration
         with ExitStack() as opened:
             self.visible = opened.enter_context(PatternProjector(config.visible, colour=True))
             self.infrared = opened.enter_context(PatternProjector(config.infrared, colour=False))
             self._opened = opened.pop_all()
 
     def show(self, fringes: Fringes) -> None:
-        """Show these fringes until told otherwise; ValueError when they cannot number the field or are not in flash."""
-        visible, infrared = projector_images(fringes.numbers, SIZE_PX, fringes.layout)
+        """Show these fringes until told otherwise.
+
+        ValueError when they cannot number the field, are not in flash, or are pre-deformed and the calibration does not
+        know both projectors.
+        """
+        deformed = predeformation(fringes, self._calibration)
+        visible, infrared = projector_images(fringes.numbers, SIZE_PX, fringes.layout, deformed)
         self.visible.show(fringes, visible)
         self.infrared.show(fringes, infrared)
 
@@ -235,4 +244,5 @@ def _as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _named(fringes: Fringes) -> str:
-    return " ".join(f"{number:g}" for number in fringes.numbers) + f" ({fringes.layout})"
+    plane = "" if fringes.predeformed_z_mm is None else f", pre-deformed for {fringes.predeformed_z_mm:g} mm"
+    return " ".join(f"{number:g}" for number in fringes.numbers) + f" ({fringes.layout}{plane})"

@@ -20,6 +20,7 @@ from quadfringe.decoding import core_device, device_model
 from quadfringe.devices import CameraStatistics, Devices, Keep
 from quadfringe.errors import ConfigError, DecodeError, InputError
 from quadfringe.export import read_npy
+from quadfringe.projection import eight_bit, predeformation
 
 __all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector", "open_devices"]
 
@@ -53,6 +54,7 @@ class VirtualBench:
         self._placed: tuple[_core.Cast, NDArray[np.float32] | None] | None = None
         self._exposures = 0
         self.projected: Fringes | Row4 | None = None
+        self._infrared_image: NDArray[np.float32] | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
         """Give the config with every device written out."""
@@ -73,15 +75,21 @@ class VirtualBench:
         return Calibration(
             camera=device_model(self._bench.camera),
             projector=device_model(self._bench.visible),
+            infrared=device_model(self._bench.infrared),
             response=_responses(offsets, together),
             crosstalk=scene.crosstalk,
             projector_response=_responses((0.0,) * 4, [1 / sent for sent in projector]) if parted else None,
             ir_registration=scene.infrared_from_visible,
         )
 
-    def project(self, fringes: Fringes) -> None:
-        """Light the scene with these fringes from now on."""
+    def project(self, fringes: Fringes, calibration: Calibration | None = None) -> None:
+        """Light the scene with these fringes from now on; pre-deformed by the calibration, or else by the truth."""
         _core.check_code(fringes.numbers, self._bench.visible.width)
+        deformed = predeformation(fringes, calibration or self.calibration())
+        self._infrared_image = None
+        if deformed is not None:
+            shown = eight_bit(deformed.light(fringes.numbers[2], fringes.layout))
+            self._infrared_image = shown.astype(np.float32) / np.float32(255)
         self.projected = fringes
 
     def project_levels(self, levels: Row4) -> None:
@@ -138,6 +146,7 @@ class VirtualBench:
             raise DecodeError("the projector shows nothing: call show(fringes) before snap()")
         cast, light = self._before_camera(after_s), self._light(seed, 0.0 if capped else exposure)
         if isinstance(self.projected, Fringes):
+            light["infrared_image"] = self._infrared_image
             return self._shot(self._bench.render(cast, self.projected.numbers, **light), self._truth(cast))
         return self._shot(self._bench.render_levels(cast, self.projected, **light), None)
 
@@ -192,12 +201,13 @@ def _responses(offsets: Sequence[float], exponents: Sequence[float]) -> Response
 class VirtualProjector:
     """The projectors of the virtual bench."""
 
-    def __init__(self, bench: VirtualBench) -> None:
+    def __init__(self, bench: VirtualBench, calibration: Calibration | None = None) -> None:
         self._bench = bench
+        self._calibration = calibration
 
     def show(self, fringes: Fringes) -> None:
         """Light the bench with these fringes; ValueError when they cannot number the field."""
-        self._bench.project(fringes)
+        self._bench.project(fringes, self._calibration)
 
     def close(self) -> None:
         """Switch the light off."""
@@ -275,4 +285,5 @@ def open_devices(config: SystemConfig) -> Devices:
         )
     bench = VirtualBench(config)
     settings = config.capture if isinstance(config.capture, VirtualConfig) else None
-    return Devices(VirtualCamera(bench, settings), VirtualProjector(bench), bench.resolved(config))
+    known = None if config.calibration is None else Calibration.load(config.calibration)
+    return Devices(VirtualCamera(bench, settings), VirtualProjector(bench, known), bench.resolved(config))

@@ -15,9 +15,10 @@ from quadfringe.acceptance import SPHERE_DIAMETER_MM, STEP_HEIGHTS_MM
 from quadfringe.calibration.levels import LevelPlan, level_plan
 from quadfringe.calibration.projector import AXES, StepPlan
 from quadfringe.calibration.targets import Target, ring_board
-from quadfringe.config import BayerPattern, Finite, Fringes, Pixels, Positive
+from quadfringe.config import BayerPattern, Fringes, Pixels
 from quadfringe.data import Stored
 from quadfringe.errors import InputError
+from quadfringe.models import Finite, Positive
 
 __all__ = ["BEAMS", "STEPS", "STEP_NAMES", "Session", "Step", "step_named"]
 

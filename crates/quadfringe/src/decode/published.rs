@@ -7,6 +7,7 @@ use super::uncertainty::Sureness;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::{Band, LineSpectrum, RowFilter};
+use crate::height::PairTable;
 use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
 use ndarray::ArrayView1;
@@ -18,8 +19,16 @@ const CARRIER_ROWS: usize = 16;
 /// One pixel in so many of those rows is asked for noise and margin.
 const LOOK_STRIDE: usize = 3;
 
+/// How the order of a pixel is found.
+enum Unwrapping {
+    /// By beats, taking both projectors as one.
+    Ladder(Ladder),
+    /// Among the points of the camera ray.
+    AlongRay(Box<PairTable>),
+}
+
 pub(super) struct Published {
-    ladder: Ladder,
+    unwrapping: Unwrapping,
     filter: RowFilter,
     spectrum: LineSpectrum,
     numbers: [f64; 3],
@@ -29,12 +38,21 @@ pub(super) struct Published {
 impl Published {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
         Self {
-            ladder: Ladder::new(code),
+            unwrapping: Unwrapping::Ladder(Ladder::new(code)),
             filter: RowFilter::new(shape[1]),
             spectrum: LineSpectrum::new(shape[1]),
             numbers: code.numbers(),
             shape,
         }
+    }
+
+    /// Search the camera rays from now on.
+    pub fn unwrap_along_rays(&mut self, table: PairTable) {
+        self.unwrapping = Unwrapping::AlongRay(Box::new(table));
+    }
+
+    pub fn searches_rays(&self) -> bool {
+        matches!(self.unwrapping, Unwrapping::AlongRay(_))
     }
 
     pub fn run<T: Sample>(
@@ -52,7 +70,7 @@ impl Published {
         let periods_px = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
         let mut row_plan = RowPlan {
             conditioning: plan,
-            ladder: &self.ladder,
+            unwrapping: &self.unwrapping,
             filter: &self.filter,
             periods_px,
             weights: [1, 2].map(|i: usize| self.filter.weights(Band::Improved, periods_px[i])),

@@ -5,7 +5,7 @@
 //! about half of what they differ by.
 
 use super::backgrounds::{Backgrounds, carriers};
-use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, add, lanes, take};
+use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, add, kernel, lanes, take};
 use super::scene::Scene;
 use crate::slots::Slots;
 use multiversion::multiversion;
@@ -52,8 +52,8 @@ impl Agreement {
     ) {
         let grid = scene.grid;
         let sigma = scene.cells(WINDOW);
-        // Sum of squares of the weights of a Gaussian, along rows times along columns.
-        let share = (1.0 / (2.0 * std::f32::consts::PI.sqrt() * sigma)).min(1.0).powi(2);
+        // Sum of squares of the weights of the window, along rows times along columns.
+        let share = kernel(sigma).iter().map(|weight| weight * weight).sum::<f32>().powi(2);
         let variance = noise * noise * share;
         let Self { excess, sums, slots, variance: out, .. } = self;
         grid.window_sums::<4, RowMaps>(

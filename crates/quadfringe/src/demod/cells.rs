@@ -381,7 +381,7 @@ fn smooth_line(kernel: &[f32], line: &mut [f32], spare: &mut [f32]) {
 }
 
 /// A Gaussian cut at three sigma; one tap for a sigma of 0.
-fn kernel(sigma: f32) -> Vec<f32> {
+pub(crate) fn kernel(sigma: f32) -> Vec<f32> {
     if sigma <= 0.0 {
         return vec![1.0];
     }

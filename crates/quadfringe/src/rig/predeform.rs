@@ -4,8 +4,9 @@ use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use super::{Bench, Light};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::fringe::mirror_column;
+use crate::optics::check_plane;
 
 impl Bench {
     /// Image for the infrared projector, `(rows, columns)`, linear light 0 to 1, that puts on the plane z = `plane_z_mm`
@@ -15,7 +16,7 @@ impl Bench {
     /// The result is exact on that plane. Where the centres of the projectors differ it drifts with depth.
     ///
     /// # Errors
-    /// [`Error::Value`] when the plane is not at a finite positive depth or the light is not valid; [`Error::Shape`] when
+    /// [`crate::Error::Value`] when the plane is not at a finite positive depth or the light is not valid; [`crate::Error::Shape`] when
     /// it is an image of another size than the visible projector's.
     ///
     /// ```
@@ -26,30 +27,18 @@ impl Bench {
     /// # Ok::<(), quadfringe::error::Error>(())
     /// ```
     pub fn predeform(&self, light: &Light<'_>, plane_z_mm: f64) -> Result<Array2<f32>> {
-        if !(plane_z_mm.is_finite() && plane_z_mm > 0.0) {
-            return Err(Error::value("plane_z_mm", "a positive depth in mm", plane_z_mm));
-        }
+        check_plane(plane_z_mm)?;
         light.check(&self.visible)?;
         let mut image = Array2::zeros((self.infrared.height, self.infrared.width));
         image.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
             for (column, level) in line.iter_mut().enumerate() {
                 let mirror = [mirror_column(self.layout, row, column), row as f64];
-                let Some(seen) = self.visible_from_infrared(mirror, plane_z_mm) else {
+                let Some(seen) = self.infrared.through_plane(mirror, &self.visible, plane_z_mm) else {
                     continue;
                 };
                 *level = light.level(&self.visible, self.layout, seen) as f32;
             }
         });
         Ok(image)
-    }
-
-    /// Position (column, row) in the visible projector of what an infrared position lights on the plane z = `plane_z_mm`;
-    /// `None` when it lights nothing there or the visible projector cannot reach it.
-    #[must_use]
-    pub fn visible_from_infrared(&self, position: [f64; 2], plane_z_mm: f64) -> Option<[f64; 2]> {
-        let ray = self.infrared.ray(position);
-        let distance_mm = (plane_z_mm - ray.origin_mm[2]) / ray.direction[2];
-        let reached = distance_mm > 0.0 && distance_mm.is_finite();
-        reached.then(|| self.visible.project(ray.at(distance_mm)))?
     }
 }

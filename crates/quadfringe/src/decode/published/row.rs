@@ -1,18 +1,18 @@
 //! Steps 2 to 6 of the published chain on one row, small enough to stay in the nearest cache.
 
+use super::Unwrapping;
 use crate::Shot;
 use crate::angle::{atan2, coarse_atan2};
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::decode::uncertainty::{Sureness, two_step_deviation};
 use crate::demod::{Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, background_row};
-use crate::unwrap::Ladder;
 use multiversion::multiversion;
 
 /// What is the same for all rows of a shot.
 pub(super) struct RowPlan<'a> {
     pub conditioning: &'a Plan,
-    pub ladder: &'a Ladder,
+    pub unwrapping: &'a Unwrapping,
     pub filter: &'a RowFilter,
     pub periods_px: [f32; 3],
     /// Filters of G and IR.
@@ -58,7 +58,7 @@ pub(super) fn decode_row<T: Sample>(
     out: &mut OutputRow<'_>,
 ) {
     plan.conditioning.row(shot, y, &mut rows.light_mut());
-    rows.decode(plan, out);
+    rows.decode(plan, y, out);
 }
 
 impl Rows {
@@ -89,7 +89,7 @@ impl Rows {
 
     /// Phase, modulation and quality from the light that was filled in.
     #[inline(always)]
-    fn decode(&mut self, plan: &RowPlan<'_>, out: &mut OutputRow<'_>) {
+    fn decode(&mut self, plan: &RowPlan<'_>, y: usize, out: &mut OutputRow<'_>) {
         let unseen = fill_gaps(&mut self.light[3]);
         let [first, second, third] = plan.periods_px;
         for (channel, period_px) in [first, second, first, third].into_iter().enumerate() {
@@ -101,7 +101,10 @@ impl Rows {
         self.fourier(plan, Half::Real, out.modulation);
         self.fourier(plan, Half::Imaginary, out.modulation);
         let wrapped = self.wrapped.each_ref().map(|row| &**row);
-        plan.ladder.order_row(wrapped, out.phase, out.quality);
+        match plan.unwrapping {
+            Unwrapping::Ladder(ladder) => ladder.order_row(wrapped, out.phase, out.quality),
+            Unwrapping::AlongRay(table) => table.order_row(y, wrapped, out.phase, out.quality),
+        }
         plan.trust(out);
         let odds = &plan.sureness.odds;
         out.wrong.iter_mut().zip(&*out.quality).for_each(|(wrong, margin)| *wrong = odds.another(*margin));

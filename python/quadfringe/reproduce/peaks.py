@@ -1,13 +1,9 @@
-"""Published results, computed again: each function writes its picture and returns its figures.
-
-The method: "Single-shot 3D shape measurement of discontinuous objects based on a coaxial fringe projection
-system", Applied Optics (2019).
-"""
+"""Peaks under noise: three ways of demodulation against the exact phase."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +14,11 @@ from quadfringe import _core
 from quadfringe.config import DeviceModel, Fringes
 from quadfringe.data import Shot
 from quadfringe.decoding import Plan, core_device, decode
-from quadfringe.film import hand
 from quadfringe.report import Panel, draw_panels
 from quadfringe.stages import carrier, fourier, linear_light
 from quadfringe.truth import rms
 
-__all__ = ["REPRODUCTIONS", "WIDTH_PX", "inside", "peaks", "peaks_shot"]
+__all__ = ["WIDTH_PX", "inside", "peaks", "peaks_shot"]
 
 Map = NDArray[np.float32]
 
@@ -68,7 +63,13 @@ def peaks_shot(**light: Any) -> tuple[Shot, Map]:
     """
     bench = _core.Bench(camera=core_device(_camera()), visible=core_device(_projector()))
     cast = bench.cast_peaks(z_mm=DEPTH_MM, scale_mm=PEAKS_SCALE_MM)
-    published = {"albedo": (1.0,) * 4, "ambient": (0.0,) * 4, "noise": NOISE, "seed": SEED, "bit_depth": 8}
+    published: dict[str, Any] = {
+        "albedo": (1.0,) * 4,
+        "ambient": (0.0,) * 4,
+        "noise": NOISE,
+        "seed": SEED,
+        "bit_depth": 8,
+    }
     images = bench.render(cast, Fringes().numbers, **(published | light))
     phase_rad = 2 * np.pi * Fringes().numbers[0] / WIDTH_PX * cast.column_px().astype(np.float64)
     shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
@@ -122,6 +123,3 @@ def _draw(path: Path, shot: Shot, truth_rad: Map, errors: Mapping[str, Map], fig
         [Panel("captured red", shot.red, "", "gray", (0.0, 255.0)), *misses],
     ]
     draw_panels(path, "peaks, 3 % noise, 8 bit", rows)
-
-
-REPRODUCTIONS: dict[str, Callable[[Path], tuple[dict[str, float], Path]]] = {"hand": hand, "peaks": peaks}

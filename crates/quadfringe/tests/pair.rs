@@ -1,0 +1,163 @@
+//! A pair of projectors that is not coaxial, decoded with both calibrated.
+
+mod common;
+
+use common::{bench, clean, code, decode_planes, noisy};
+use quadfringe::fringe::phase_at;
+use quadfringe::height::{PairTable, Triangulator};
+use quadfringe::optics::CoaxialPair;
+use quadfringe::rig::{Beam, Bench, Cast, Light, RenderOptions};
+use quadfringe::surface::{Plane, Surface, scene};
+use quadfringe::{Conditioner, Decoded, Decoder, DmdLayout, Method, Options, Result};
+use std::f32::consts::PI;
+
+const DEPTHS_MM: [f64; 5] = [700.0, 750.0, 800.0, 850.0, 900.0];
+
+/// The reference bench with lenses that distort, each in its own way, and 1 degree and 0.5 mm on every axis.
+fn apart(shrink: usize, layout: DmdLayout) -> Bench {
+    let reference = Bench { ..Bench::reference_with(layout) };
+    let lens = |device: quadfringe::Device, k| device.with_distortion(k).expect("finite");
+    let bench = Bench { camera: bench(shrink).camera, ..reference };
+    let bench = bench.deviated([1f64.to_radians(); 3], [0.5; 3]).expect("finite");
+    Bench {
+        camera: lens(bench.camera, [-0.12, 0.08, 2e-4, -3e-4, 0.0]),
+        visible: lens(bench.visible, [-0.05, 0.03, 3e-4, -2e-4, 0.0]),
+        infrared: lens(bench.infrared, [-0.06, 0.04, -2e-4, 3e-4, 0.0]),
+        layout,
+    }
+}
+
+fn pair_of(bench: &Bench) -> CoaxialPair {
+    CoaxialPair::new(bench.visible.clone(), bench.infrared.clone())
+}
+
+fn decode(
+    bench: &Bench,
+    cast: &Cast,
+    ir: Option<Light<'_>>,
+    light: &RenderOptions,
+    table: Option<PairTable>,
+) -> Result<Decoded> {
+    let code = code();
+    let mut lights = Light::shot(&code);
+    if let Some(ir) = ir {
+        lights[3] = ir;
+    }
+    let planes = bench.render(cast, &lights, light)?;
+    let (rows, columns) = planes.shape();
+    let options = Options { method: Method::Published, ..Options::default() };
+    let decoder = Decoder::new(code, [rows, columns], &Conditioner::default(), options)?;
+    let mut decoder = decoder.triangulate_with(Triangulator::new(&bench.camera, &bench.visible)?)?;
+    if let Some(table) = table {
+        decoder = decoder.unwrap_along_rays(table)?;
+    }
+    decode_planes(&mut decoder, &planes)
+}
+
+/// Returned and wrong pixels, of those that both projectors light.
+fn counts(decoded: &Decoded, cast: &Cast) -> (usize, usize, usize) {
+    let (truth, lit) = (cast.phase_rad(&code()), cast.column_px(Beam::Infrared));
+    let both = || {
+        truth.iter().zip(&lit).zip(&decoded.phase_rad).filter(|((t, ir), _)| t.is_finite() && ir.is_finite())
+    };
+    let returned = both().filter(|(_, phase)| phase.is_finite());
+    let wrong = returned.clone().filter(|((t, _), phase)| (**phase - **t).abs() > PI);
+    (both().count(), returned.count(), wrong.count())
+}
+
+/// Plain or pre-deformed, in both layouts, the table knows the infrared phase at every depth.
+#[test]
+fn the_table_knows_the_infrared_phase() {
+    let code = code();
+    for layout in [DmdLayout::Regular, DmdLayout::Diamond] {
+        let bench = apart(16, layout);
+        for pair in [pair_of(&bench), pair_of(&bench).predeformed(800.0).expect("a depth")] {
+            let limits = [(None, 0.03), (Some([690.0, 910.0]), 2e-3)];
+            for (range_mm, limit) in limits {
+                let table = PairTable::new(&bench.camera, &pair, &code, range_mm).expect("valid pair");
+                for z_mm in DEPTHS_MM {
+                    let cast = bench.cast(&Plane::at_z(z_mm));
+                    let known = table.infrared_rad(cast.phase_rad(&code).view()).expect("same size");
+                    for ((pixel, hit), known) in cast.hits().indexed_iter().zip(&known) {
+                        let lit = hit.is_lit(Beam::Visible);
+                        let turns = pair.infrared_turns(hit.xyz_mm).filter(|_| lit);
+                        let Some(turns) = turns else { continue };
+                        let error = known - phase_at(&code, 2, turns * 912.0) as f32;
+                        assert!(error.abs() < limit, "{layout:?} {range_mm:?} {z_mm} {pixel:?}: {error}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn every_order_is_right_at_every_depth_where_the_ladder_fails() {
+    let bench = apart(4, DmdLayout::Regular);
+    let table = PairTable::new(&bench.camera, &pair_of(&bench), &code(), None).expect("valid pair");
+    let light = RenderOptions { noise: 0.01, seed: 5, blur_px: 0.7, ..clean() };
+    for z_mm in DEPTHS_MM {
+        let cast = bench.cast(&Plane::at_z(z_mm));
+        let searched = decode(&bench, &cast, None, &light, Some(table.clone())).expect("a shot");
+        let (lit, returned, wrong) = counts(&searched, &cast);
+        assert!(wrong == 0 && returned * 100 > lit * 97, "{z_mm}: {wrong} of {returned} of {lit}");
+        let ladder = decode(&bench, &cast, None, &light, None).expect("a shot");
+        let (_, returned, wrong) = counts(&ladder, &cast);
+        assert!(wrong * 2 > returned, "{z_mm}: the ladder has {wrong} of {returned}");
+    }
+}
+
+#[test]
+fn steps_and_noise_are_no_harder_than_for_one_projector() {
+    let apart = apart(2, DmdLayout::Regular);
+    let alone = Bench { infrared: apart.visible.clone(), ..apart.clone() };
+    let surface = scene("steps", 0.0).expect("known scene");
+    let table = PairTable::new(&apart.camera, &pair_of(&apart), &code(), Some([600.0, 1000.0]));
+    let shares = [(&apart, Some(table.expect("valid pair"))), (&alone, None)].map(|(bench, table)| {
+        let cast = bench.cast(surface.as_ref() as &dyn Surface);
+        let (lit, returned, wrong) =
+            counts(&decode(bench, &cast, None, &noisy(3), table).expect("a shot"), &cast);
+        (wrong as f64 / returned as f64, returned as f64 / lit as f64)
+    });
+    let [(wrong, returned), (wrong_alone, returned_alone)] = shares;
+    assert!(wrong <= wrong_alone && returned >= 0.97 * returned_alone, "{shares:?}");
+}
+
+/// The published correction and the search together: the table knows what a pre-deformed image shows.
+#[test]
+fn a_predeformed_image_is_read_both_ways() {
+    let bench = apart(4, DmdLayout::Diamond);
+    let image = bench.predeform(&Light::fringes(30.0, 0.0), 800.0).expect("a depth");
+    let pair = pair_of(&bench).predeformed(800.0).expect("a depth");
+    let table = PairTable::new(&bench.camera, &pair, &code(), None).expect("valid pair");
+    for z_mm in [750.0, 800.0, 850.0] {
+        let cast = bench.cast(&Plane::at_z(z_mm));
+        for table in [None, Some(table.clone())] {
+            let found =
+                decode(&bench, &cast, Some(Light::Image(image.view())), &clean(), table).expect("a shot");
+            let (lit, returned, wrong) = counts(&found, &cast);
+            assert!(wrong == 0 && returned * 100 > lit * 97, "{z_mm}: {wrong} of {returned} of {lit}");
+        }
+    }
+}
+
+#[test]
+fn bad_input_is_refused() {
+    let bench = apart(16, DmdLayout::Regular);
+    let table = |range_mm| PairTable::new(&bench.camera, &pair_of(&bench), &code(), range_mm);
+    for range_mm in [[900.0, 700.0], [-1.0, 700.0], [f64::NAN, 700.0], [700.0, f64::NAN]] {
+        assert!(table(Some(range_mm)).is_err(), "{range_mm:?}");
+    }
+    assert!(pair_of(&bench).predeformed(-800.0).is_err());
+    let narrow = quadfringe::FringeCode::optimum(16, 400).expect("valid code");
+    assert!(PairTable::new(&bench.camera, &pair_of(&bench), &narrow, None).is_err());
+    let plan = |shape, method| {
+        let options = Options { method, ..Options::default() };
+        let decoder = Decoder::new(code(), shape, &Conditioner::default(), options).expect("a plan");
+        decoder.unwrap_along_rays(table(None).expect("valid pair")).map(|decoder| decoder.searches_rays())
+    };
+    assert_eq!(plan([48, 64], Method::Published), Ok(true));
+    assert!(plan([48, 60], Method::Published).is_err());
+    let refused = plan([48, 64], Method::Best).expect_err("not yet").to_string();
+    assert!(refused.contains("published"), "{refused}");
+}
