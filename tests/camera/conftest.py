@@ -26,5 +26,5 @@ def emulator() -> Emulator:
 @pytest.fixture
 def camera(emulator: Emulator) -> Iterator[AravisCamera]:
     """The emulated camera, opened."""
-    with AravisCamera(emulated(emulator, timeout_s=3.0)) as opened:
+    with AravisCamera(emulated(emulator, timeout_s=6.0)) as opened:
         yield opened
