@@ -100,8 +100,8 @@ def accept(artefacts: Artefacts, limits: Limits | None = None) -> Acceptance:
     """Judge measured artefacts; raises `InputError` when one cannot be found in its points.
 
     Form is the range of distances from the fitted surface with the worst 3 of 1000 points left out, by which planes
-    are judged; the figure with `6sigma` in its name is that inside +-3 standard deviations, by which spheres are. Points within 30 px of the image border are left out,
-    and those of a sphere that are seen more steeply than 60 degrees.
+    are judged; the figure with `6sigma` in its name is that inside +-3 standard deviations, by which spheres are.
+    Points within 30 px of the image border are left out, and those of a sphere seen more steeply than 60 degrees.
     """
     limits = limits or Limits()
     found = [
