@@ -33,12 +33,12 @@ CONFIG = SystemConfig(
     camera=CAMERA,
     scene=SceneConfig.model_validate(
         {
-            "noise": 0.002,  # with a quarter of the pixels and a gamma, 1 % is beyond the limits of acceptance
+            "noise": 0.002,  # with a quarter of the pixels 1 % is beyond the limits of acceptance
             "bit_depth": 12,
             "gain": 0.75,
             "blur_px": 0.5,
             "crosstalk": MIXED,
-            "projector_exponent": 1.8,
+            "projector_exponent": 1.2,
             "ambient": 0.01,
             "infrared_from_visible": CHIPS,
         }

@@ -99,9 +99,9 @@ class Acceptance:
 def accept(artefacts: Artefacts, limits: Limits | None = None) -> Acceptance:
     """Judge measured artefacts; raises `InputError` when one cannot be found in its points.
 
-    Form is the range of distances from the fitted surface with the worst 3 of 1000 points left out, and the figure
-    with `6sigma` in its name that inside +-3 standard deviations. Points within 30 px of the image border are left out,
-    and those of a sphere that are seen more steeply than 60 degrees.
+    Form is the range of distances from the fitted surface with the worst 3 of 1000 points left out, by which planes
+    are judged; the figure with `6sigma` in its name is that inside +-3 standard deviations, by which spheres are.
+    Points within 30 px of the image border are left out, and those of a sphere seen more steeply than 60 degrees.
     """
     limits = limits or Limits()
     found = [
@@ -137,7 +137,7 @@ def _sphere(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acc
     form = form_of(away)
     size = 2 * sphere.radius_mm - artefacts.sphere_diameter_mm
     lines = (
-        Line(f"{name}_form_mm", form.form_mm, limits.sphere_form_mm),
+        Line(f"{name}_form_6sigma_mm", form.form_6sigma_mm, limits.sphere_form_mm),
         Line(f"{name}_size_error_mm", size, limits.sphere_size_mm),
     )
     x, y, z = (float(c) for c in sphere.centre_mm)
@@ -160,6 +160,7 @@ def _form_figures(name: str, form: Form) -> dict[str, float]:
     return {
         f"{name}_points": float(form.points),
         f"{name}_sigma_mm": form.sigma_mm,
+        f"{name}_form_mm": form.form_mm,
         f"{name}_form_6sigma_mm": form.form_6sigma_mm,
         f"{name}_cut_6sigma_percent": form.cut_percent,
     }
