@@ -180,9 +180,10 @@ def projector_points(
     """Give the projector pixels of the points of a view, by a quadratic fit to the map around each.
 
     A quadratic holds what a local homography can express, and the curvature of both lenses; pixels count by the square
-    of their modulation, those at the edges of the print a hundredth of it. `radius_px` is half the distance of neighbouring points when absent. `ir_registration` is the
-    affine map from visible to infrared pixels, for a map of the infrared chip. NaN where less than 40 % of the pixels
-    around a point are lit. Raises `InputError` when map and view differ in size.
+    of their modulation, those at the edges of the print a hundredth of it. `radius_px` is half the distance of
+    neighbouring points when absent. `ir_registration` is the affine map from visible to infrared pixels, for a map of
+    the infrared chip. NaN where less than 40 % of the pixels around a point are lit. Raises `InputError` when map and
+    view differ in size.
     """
     shape = lit.column_px.shape
     if ir_registration is None and shape != view.size_px[::-1]:
