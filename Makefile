@@ -12,12 +12,12 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
 
-.PHONY: demo test test-usb fuzz coverage figures rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live fuzz coverage figures rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
 
-test: rust python test-usb
+test: rust python test-usb test-camera test-live
 
 rust: $(STAMPS)/tools
 	cargo fmt --all --check
@@ -47,6 +47,23 @@ test-usb: $(STAMPS)/built
 	scripts/set-up testbed
 	cargo test --package lightcrafter --all-features --lib --test libusb --test window
 	cargo run --quiet --package lightcrafter --no-default-features --features testbed --bin lightcrafter-testbed -- $(BIN)/pytest tests/usb
+
+# Two cameras on the wire of GigE Vision, in a network of its own that has nothing but the loopback interface.
+test-camera: $(STAMPS)/camera
+	if scripts/loopback true; then \
+		scripts/loopback $(BIN)/pytest tests/camera && \
+		scripts/loopback $(BIN)/python benches/camera.py --seconds 3; \
+	elif [ -n "$${CI:-}" ]; then exit 1; else echo "test-camera is skipped"; fi
+
+$(STAMPS)/camera: $(STAMPS)/built
+	scripts/set-up camera
+	$(BIN)/pip install --quiet --disable-pip-version-check "PyGObject>=3.42,<3.52"
+	touch $@
+
+# The live view in Debian's chromium without a screen.
+test-live: $(STAMPS)/built
+	scripts/set-up browser
+	QUADFRINGE_BROWSER=1 $(BIN)/pytest tests/live
 
 # Any bytes to the decoders, the driver and the emulator, on the stable compiler: libFuzzer with LLVM's counters.
 FUZZ_SECONDS ?= 300

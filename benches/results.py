@@ -80,7 +80,13 @@ def times(bench: Record, first_frame: Record) -> str:
             "## Memory of a decoder\n",
             columns(bench["memory"], case | weight),
             "## Cost against pixels\n",
-            "The same field of view at every size.\n",
+            "The same field of view at every size. "
+            + " ".join(
+                f"{method}: the dearest pixel costs {bench['figures'][key]:.0f} % more than the cheapest."
+                for method in METHODS
+                if (key := f"{method}_cost_spread_percent") in bench["figures"]
+            )
+            + "\n",
             columns(bench["scaling"], case | spent | grown),
         ]
     )

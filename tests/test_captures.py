@@ -16,6 +16,7 @@ from quadfringe import ResponseCalibration
 
 RIGHT_PERCENT = 90.0  # of all object pixels; a missing pixel counts as wrong
 RIGHT_OF_RETURNED_PERCENT = 97.0
+MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
 
 
 def quadfringe(*words: object) -> None:
@@ -52,7 +53,7 @@ def test_command_line_decodes_a_capture(scene: scoring.Scene, response_file: Pat
     quadfringe("decode", *words, "--response", response_file, "--out", out)
     with np.load(out) as maps:
         assert_bars(scoring.score(scene, maps["phase_rad"]))
-        for name in ("phase_rad", "column_px", "order", "modulation", "quality"):
+        for name in (*MAPS, "wrong_order_probability", "uncertainty_rad"):
             assert maps[name].shape == scene.red.shape
             assert maps[name].dtype == np.float32
         returned = np.isfinite(maps["phase_rad"])

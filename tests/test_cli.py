@@ -17,7 +17,7 @@ from quadfringe.cli import app
 from quadfringe.images import read_image, write_image
 
 FRINGES = ["--fringes", "36", "35", "30", "--projector-width", "912"]
-KEYS = {"phase_rad", "column_px", "order", "modulation", "quality"}
+KEYS = {"phase_rad", "column_px", "order", "modulation", "quality", "uncertainty_rad", "wrong_order_probability"}
 
 
 def run(*arguments: object) -> Result:
@@ -50,7 +50,7 @@ def test_the_script_and_the_module_are_the_same_command() -> None:
     for command in ([str(script)], [sys.executable, "-m", "quadfringe"]):
         done = subprocess.run([*command, "--help"], capture_output=True, text=True, check=True, env=plain)
         commands = ("demo", "pattern", "simulate", "decode", "measure", "info", "calibrate", "projector", "reproduce")
-        for name in (*commands, "bench"):
+        for name in (*commands, "bench", "live", "record", "recover", "batch"):
             assert name in done.stdout
 
 

@@ -31,7 +31,7 @@ def test_an_empty_file_is_the_virtual_bench(tmp_path: Path) -> None:
 
 def test_every_problem_is_listed_with_its_path(tmp_path: Path) -> None:
     text = """
-    kind = "quantum"
+    colour = "quantum"
     [fringes]
     number = [36, 35, 30]
     [scene]
@@ -44,7 +44,7 @@ def test_every_problem_is_listed_with_its_path(tmp_path: Path) -> None:
     message = str(caught.value)
     assert "system.toml: 4 problems" in message
     assert "fringes.number: this key is not known" in message
-    for path in ("kind:", "scene.noise:", "decode.threads:"):
+    for path in ("colour:", "scene.noise:", "decode.threads:"):
         assert path in message
 
 
@@ -127,5 +127,5 @@ def test_projectors_at_fault_are_named(visible: dict[str, object], infrared: dic
 
 def test_a_virtual_camera_is_not_sold_as_a_real_one() -> None:
     config = checked(SystemConfig, {"projectors": {"visible": VISIBLE, "infrared": INFRARED}}, "s.toml")
-    with pytest.raises(ConfigError, match="the only camera is that of the virtual bench"):
+    with pytest.raises(ConfigError, match="the camera of the virtual bench cannot see them"):
         open_system(config)

@@ -34,11 +34,13 @@ CALIBRATION = Calibration(
 @pytest.fixture
 def shape() -> Shape:
     rng = np.random.default_rng(7)
-    maps = rng.random((5, 6, 8), np.float32)
+    maps = rng.random((7, 6, 8), np.float32)
     maps[:, 2, 3] = np.nan
+    names = ("wrong_order_probability", "uncertainty_mm")
+    sureness = dict(zip(names, maps[5:], strict=True))
     xyz = rng.random((6, 8, 3), np.float32) * 800
     xyz[2, 3] = np.nan
-    return Shape(*maps, xyz_mm=xyz, config={"fringes": [36, 35, 30]}, calibration=CALIBRATION)
+    return Shape(*maps[:5], xyz_mm=xyz, **sureness, config={"fringes": [36, 35, 30]}, calibration=CALIBRATION)
 
 
 def test_npz_gives_everything_back(tmp_path: Path, shape: Shape) -> None:
@@ -59,7 +61,20 @@ def test_ply_is_binary_and_holds_valid_points_only(tmp_path: Path, shape: Shape)
     valid = np.isfinite(shape.quality)
     np.testing.assert_array_equal(cloud.vertices, shape.xyz_mm[valid])
     stored = cloud.metadata["_ply_raw"]["vertex"]["data"]
-    np.testing.assert_array_equal(stored["quality"], shape.quality[valid])
+    for name in ("quality", "uncertainty_mm", "wrong_order_probability"):
+        np.testing.assert_array_equal(stored[name], shape.maps[name][valid])
+
+
+def test_figures_say_what_came_back_and_how_sure_it_is(shape: Shape) -> None:
+    assert shape.uncertainty_mm is not None
+    assert shape.wrong_order_probability is not None
+    figures = shape.figures()
+    assert figures["returned_percent"] == pytest.approx(100 * 47 / 48)
+    assert figures["uncertainty_median_mm"] == pytest.approx(np.nanmedian(shape.uncertainty_mm))
+    assert figures["wrong_orders_at_most"] == pytest.approx(np.nansum(shape.wrong_order_probability))
+    phase_only = replace(shape, uncertainty_mm=None, uncertainty_rad=shape.uncertainty_mm, xyz_mm=None).figures()
+    assert "uncertainty_median_rad" in phase_only
+    assert "uncertainty_median_mm" not in phase_only
 
 
 @pytest.mark.parametrize("name", ["depth.tif", "depth.tiff"])

@@ -63,6 +63,15 @@ def test_times_are_consistent(measured: dict[str, Any]) -> None:
         assert found["returned_percent"] > 80
 
 
+def test_cost_is_linear_when_every_pixel_costs_the_same() -> None:
+    def timed(width_px: int, median_ms: float) -> timing.Timing:
+        case = timing.Case(width_px, 100, "best", 1)
+        return timing.Timing(case, 3, median_ms, median_ms, 0.0, 1.0, 100.0)
+
+    assert timing.cost_spread_percent([timed(100, 1.0), timed(400, 4.0)]) == pytest.approx(0.0)
+    assert timing.cost_spread_percent([timed(100, 1.0), timed(400, 5.0), timed(200, 2.0)]) == pytest.approx(25.0)
+
+
 def test_a_process_keeps_to_its_threads(measured: dict[str, Any]) -> None:
     for found in measured["timings"]:
         assert found["busy_cores"] <= found["threads"] + 0.1

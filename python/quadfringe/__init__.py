@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from quadfringe._core import Decoder, Device, __version__, check_code, optimum, pattern
     from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response, SceneConfig, SystemConfig
-    from quadfringe.data import BayerShot, Calibration, ResponseCalibration, Shape, Shot, Truth
+    from quadfringe.data import BayerShot, Calibration, ResponseCalibration, Shape, Shot, Stamp, Truth
     from quadfringe.decoding import Plan, ShotDecoder, decode
-    from quadfringe.devices import open_projector
-    from quadfringe.errors import ConfigError, DecodeError, InputError, MissingExtraError
+    from quadfringe.devices import open_camera, open_projector
+    from quadfringe.errors import CameraError, ConfigError, DecodeError, InputError, MissingExtraError
     from quadfringe.scanner import Scanner
     from quadfringe.scanner import open_system as open  # noqa: A004 - read as quadfringe.open
     from quadfringe.shots import read_bayer_shot, read_shot
@@ -26,10 +26,10 @@ if TYPE_CHECKING:
 _HOME = {
     "_core": ("Decoder", "Device", "__version__", "check_code", "optimum", "pattern"),
     "config": ("DecodeConfig", "DeviceModel", "Fringes", "Response", "SceneConfig", "SystemConfig"),
-    "data": ("BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth"),
+    "data": ("BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Stamp", "Truth"),
     "decoding": ("Plan", "ShotDecoder", "decode"),
-    "devices": ("open_projector",),
-    "errors": ("ConfigError", "DecodeError", "InputError", "MissingExtraError"),
+    "devices": ("open_camera", "open_projector"),
+    "errors": ("CameraError", "ConfigError", "DecodeError", "InputError", "MissingExtraError"),
     "scanner": ("Scanner", "open_system"),
     "shots": ("read_bayer_shot", "read_shot"),
 }
@@ -38,6 +38,7 @@ _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 __all__ = [
     "BayerShot",
     "Calibration",
+    "CameraError",
     "ConfigError",
     "DecodeConfig",
     "DecodeError",
@@ -55,12 +56,14 @@ __all__ = [
     "Shape",
     "Shot",
     "ShotDecoder",
+    "Stamp",
     "SystemConfig",
     "Truth",
     "__version__",
     "check_code",
     "decode",
     "open",
+    "open_camera",
     "open_projector",
     "optimum",
     "pattern",

@@ -221,6 +221,7 @@ class Decoder:
         modulation_min: float | None = None,
         quality_min: float | None = None,
         period_px: float | None = None,
+        channel_instants_us: Sequence[float] | None = None,
         threads: int | None = None,
         dark: Sequence[float] | None = None,
         response: Sequence[_Vector3] | None = None,
@@ -229,13 +230,16 @@ class Decoder:
         camera: Device | None = None,
         projector: Device | None = None,
     ) -> Decoder: ...
-    def settings(self) -> dict[str, str | float | None]:
-        """Give method, modulation_min, quality_min and period_px (None: from every shot), defaults included."""
+    def settings(self) -> dict[str, str | float | list[float] | None]:
+        """Give every setting of the method with defaults included; period_px None is taken from every shot."""
 
     def decode(
         self, red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], ir: NDArray[Any]
     ) -> dict[str, NDArray[np.float32]]:
-        """Give phase_rad, column_px, order, modulation, quality, and xyz_mm (H, W, 3) when devices are known.
+        """Give maps (H, W) by name.
+
+        phase_rad, column_px, order, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
+        when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3).
 
         The images are (H, W) uint8, uint16 or float32, all of one type; strided views are welcome, nothing is
         copied. Raises TypeError for another type, ValueError for another size or values that are not finite.

@@ -11,14 +11,15 @@ kernel's own default, which is written once, in Rust.
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from quadfringe.capture import AnyCapture, ReplayConfig, VirtualConfig
 from quadfringe.errors import ConfigError
 from quadfringe.files import read_bytes
+from quadfringe.models import Finite, Model, NotNegative, Positive, checked
 
 __all__ = [
     "BayerPattern",
@@ -39,9 +40,6 @@ __all__ = [
     "load_system",
 ]
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Finite = Annotated[float, Field(allow_inf_nan=False)]
 Pixels = Annotated[int, Field(gt=0, le=65536)]
 Triple = tuple[Finite, Finite, Finite]
 Matrix3 = tuple[Triple, Triple, Triple]
@@ -51,12 +49,6 @@ PerChannel = Annotated[Row4, BeforeValidator(lambda v: (v,) * 4 if isinstance(v,
 Affine = tuple[Triple, Triple]
 BayerPattern = Literal["rggb", "grbg", "gbrg", "bggr"]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
-class Model(BaseModel):
-    """Frozen data; an unknown key is refused."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
 
 class DeviceModel(Model):
@@ -219,23 +211,29 @@ class ProjectorsConfig(Model):
 
 
 class DecodeConfig(Model):
-    """Settings of the decoder; what is absent takes the kernel's default."""
+    """Settings of the decoder; what is absent takes the kernel's default.
+
+    `channel_instants_us` are the instants at which R, G, B and IR are seen, from the one that the shape stands for: a
+    projector that shows its colours one after another needs them when the surface moves. Method "best" alone has it.
+    """
 
     method: Literal["published", "best"] | None = None
     modulation_min: NotNegative | None = None
     quality_min: NotNegative | None = None
+    channel_instants_us: Row4 | None = None
     threads: Annotated[int, Field(gt=0)] | None = None
 
 
 class SystemConfig(Model):
     """A whole system: devices, fringes, what is measured, how it is decoded.
 
-    Devices that are absent are those of the published bench; `infrared` is coaxial with `projector` when absent.
-    Without `projectors` the fringes are shown by the virtual bench.
+    `capture` says which camera takes the shots; without it the virtual bench does. Devices that are absent are those
+    of the published bench; `infrared` is coaxial with `projector` when absent. Without `projectors` the virtual bench
+    lights its own camera, and every other camera sees what is there.
     """
 
     schema_version: Literal[1] = 1
-    kind: Literal["virtual"] = "virtual"
+    capture: AnyCapture = VirtualConfig()
     camera: DeviceModel | None = None
     projector: DeviceModel | None = None
     infrared: DeviceModel | None = None
@@ -244,31 +242,6 @@ class SystemConfig(Model):
     fringes: Fringes = Fringes()
     scene: SceneConfig = SceneConfig()
     decode: DecodeConfig = DecodeConfig()
-
-
-AnyModel = TypeVar("AnyModel", bound=Model)
-
-
-def checked(model: type[AnyModel], values: Mapping[str, Any], source: str) -> AnyModel:
-    """Validate `values`; raise `ConfigError` that lists every problem of `source` with its path."""
-    try:
-        return model.model_validate(values)
-    except ValidationError as error:
-        problems = [f"  {_path(p['loc'])}: {_reason(p)}" for p in error.errors(include_url=False)]
-        count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
-        raise ConfigError("\n".join([f"{source}: {count}", *problems])) from error
-
-
-def _path(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location) or "(top level)"
-
-
-def _reason(problem: Any) -> str:
-    if problem["type"] == "extra_forbidden":
-        return "this key is not known"
-    if problem["type"] == "missing":
-        return "this key is required and missing"
-    return f"{problem['msg']}, got {problem['input']!r}"
 
 
 def load_system(path: Path) -> SystemConfig:
@@ -287,4 +260,7 @@ def _with_absolute_paths(config: SystemConfig, folder: Path) -> SystemConfig:
         file = folder / scene.height_map.file
         scene = scene.model_copy(update={"height_map": scene.height_map.model_copy(update={"file": file})})
     calibration = None if config.calibration is None else folder / config.calibration
-    return config.model_copy(update={"scene": scene, "calibration": calibration})
+    capture = config.capture
+    if isinstance(capture, ReplayConfig):
+        capture = capture.model_copy(update={"file": folder / capture.file})
+    return config.model_copy(update={"scene": scene, "calibration": calibration, "capture": capture})

@@ -16,10 +16,23 @@ from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
 from quadfringe.images import full_scale
 
-__all__ = ["AnyShot", "BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Truth", "conditioning"]
+__all__ = [
+    "AnyShot",
+    "BayerShot",
+    "Calibration",
+    "FrameStamp",
+    "ResponseCalibration",
+    "Shape",
+    "Shot",
+    "Stamp",
+    "Truth",
+    "conditioning",
+]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
+MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm")
+SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
 
 
@@ -95,7 +108,46 @@ class Truth:
 
 
 @dataclass(frozen=True)
-class Shot:
+class FrameStamp:
+    """One frame of one chip: the device's number and clock, and the host's clock when it began to arrive, in ns."""
+
+    id: int
+    device_ns: int
+    arrival_ns: int
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """When and by which camera a shot was taken.
+
+    `id` numbers the exposures since the camera was opened and jumps where some were lost; `time_us` is UTC in us since
+    1970, when the exposure was, as well as the host can tell; `frames` are by chip, "visible" and "infrared".
+    """
+
+    id: int
+    time_us: int
+    device: str
+    frames: Mapping[str, FrameStamp] = field(default_factory=dict)
+
+
+class Stamped:
+    """What every shot tells of its origin."""
+
+    stamp: Stamp | None
+
+    @property
+    def id(self) -> int | None:
+        """Number of the exposure in its stream; None when the shot comes from files."""
+        return None if self.stamp is None else self.stamp.id
+
+    @property
+    def time_us(self) -> int | None:
+        """UTC in us since 1970 when the exposure began; None when the shot comes from files."""
+        return None if self.stamp is None else self.stamp.time_us
+
+
+@dataclass(frozen=True)
+class Shot(Stamped):
     """One exposure: four images (H, W) of one dtype (uint8, uint16 or float32), and their full scale."""
 
     red: NDArray[Any]
@@ -104,6 +156,7 @@ class Shot:
     ir: NDArray[Any]
     full_scale: float | None = None
     truth: Truth | None = field(default=None, repr=False)
+    stamp: Stamp | None = None
 
     @property
     def channels(self) -> dict[str, NDArray[Any]]:
@@ -122,7 +175,7 @@ class Shot:
 
 
 @dataclass(frozen=True)
-class BayerShot:
+class BayerShot(Stamped):
     """One exposure of a Bayer chip and an infrared one: the raw mosaic and the infrared image, (H, W) of one dtype.
 
     `bayer` names the colours of the first two pixels of the first row and of the second. Nothing is interpolated
@@ -135,6 +188,7 @@ class BayerShot:
     ir: NDArray[Any]
     full_scale: float | None = None
     truth: Truth | None = field(default=None, repr=False)
+    stamp: Stamp | None = None
 
     def __post_init__(self) -> None:
         if self.bayer not in get_args(BayerPattern):
@@ -174,7 +228,9 @@ AnyShot = Shot | BayerShot
 class Shape:
     """A decoded shot: maps (H, W) float32, points (H, W, 3) mm when calibrated; NaN where there is no data.
 
-    `config` and `calibration` are the settings that made it and travel with it into an NPZ file.
+    `uncertainty_mm` is one standard deviation of the depth (`uncertainty_rad` of the phase when not calibrated) for the
+    order that was chosen, `wrong_order_probability` that of another order. `config` and `calibration` are the settings
+    that made it and travel with it into an NPZ file.
     """
 
     phase_rad: Map
@@ -183,14 +239,17 @@ class Shape:
     modulation: Map
     quality: Map
     xyz_mm: Map | None = None
+    wrong_order_probability: Map | None = None
+    uncertainty_rad: Map | None = None
+    uncertainty_mm: Map | None = None
     config: Mapping[str, Any] = field(default_factory=dict, repr=False)
     calibration: Calibration | None = field(default=None, repr=False)
 
     @property
     def maps(self) -> dict[str, Map]:
-        """Every map by name; `xyz_mm` only when calibrated."""
-        maps = {name: getattr(self, name) for name in MAPS}
-        return maps if self.xyz_mm is None else {**maps, "xyz_mm": self.xyz_mm}
+        """Every map by name; `uncertainty_mm` in place of `uncertainty_rad`, and `xyz_mm`, when calibrated."""
+        maps = {name: getattr(self, name) for name in (*MAPS, *MORE_MAPS)}
+        return {name: values for name, values in maps.items() if values is not None}
 
     @property
     def returned(self) -> NDArray[np.bool_]:
@@ -207,6 +266,23 @@ class Shape:
             raise InputError("this shape has phase only: decode with a calibration to have millimetres")
         return self.xyz_mm
 
+    def figures(self) -> dict[str, float]:
+        """Give what the shape says of itself, by name with unit.
+
+        `returned_percent`; where pixels came back also `uncertainty_median_mm` (or `_rad`), one standard deviation, and
+        `wrong_orders_at_most`, the sum of their probabilities of another order, an upper bound.
+        """
+        returned = self.returned
+        found = {"returned_percent": 100.0 * float(returned.mean())}
+        if not returned.any():
+            return found
+        for name, sigma in (("rad", self.uncertainty_rad), ("mm", self.uncertainty_mm)):
+            if sigma is not None:
+                found[f"uncertainty_median_{name}"] = float(np.nanmedian(sigma))
+        if self.wrong_order_probability is not None:
+            found["wrong_orders_at_most"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
+        return found
+
     def with_settings(self, config: Mapping[str, Any], calibration: Calibration | None) -> Shape:
         """Give the same maps with the settings that made them."""
         return replace(self, config=config, calibration=calibration)
@@ -214,7 +290,8 @@ class Shape:
     def save(self, path: Path | str) -> None:
         """Write by suffix: .ply points, .tif depth, .npz everything. Whole or not at all.
 
-        PLY holds the valid points only, with the modulation as grey colour and `quality` as a scalar.
+        PLY holds the valid points only, with the modulation as grey colour, and as scalars `quality`, `uncertainty_mm`
+        and `wrong_order_probability`.
         """
         from quadfringe import export
 
@@ -225,7 +302,8 @@ class Shape:
         elif suffix == ".ply":
             points = self._points()
             valid = np.isfinite(points).all(axis=2)
-            export.write_ply(path, points[valid], _grey(self.modulation)[valid], self.quality[valid])
+            scalars = {name: values[valid] for name, values in self.maps.items() if name in SCALARS}
+            export.write_ply(path, points[valid], _grey(self.modulation)[valid], scalars)
         else:
             export.write_depth(path, self.depth_mm)
 
@@ -249,7 +327,7 @@ class Shape:
             values = json.loads(str(stored["calibration"]))
             calibration = checked(Calibration, values, f"{path}, calibration")
         config = json.loads(str(stored["config"])) if "config" in stored else {}
-        maps = {name: stored[name] for name in (*MAPS, "xyz_mm") if name in stored}
+        maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
         return cls(**maps, config=config, calibration=calibration)
 
 

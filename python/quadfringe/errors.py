@@ -1,11 +1,27 @@
-"""What can go wrong, by who can mend it: the caller (`InputError`), the set-up on the bench (`DecodeError`)."""
+"""What can go wrong, by who can mend it: the caller (`InputError`), the bench (`DecodeError`, `CameraError`)."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from types import ModuleType
 
-__all__ = ["CalibrationError", "ConfigError", "DecodeError", "InputError", "MissingExtraError", "require"]
+__all__ = [
+    "BatchError",
+    "CalibrationError",
+    "CameraBusyError",
+    "CameraError",
+    "CameraLostError",
+    "CameraNotFoundError",
+    "ConfigError",
+    "DecodeError",
+    "InputError",
+    "MissingExtraError",
+    "RecordingError",
+    "ShotTimeoutError",
+    "UnpairedError",
+    "WrongFrameError",
+    "require",
+]
 
 
 class InputError(ValueError):
@@ -26,6 +42,42 @@ class CalibrationError(DecodeError):
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
         self.reason = reason
+
+
+class CameraError(OSError):
+    """What a camera did; the message says what to look at. The camera may be asked again: it reconnects."""
+
+
+class CameraNotFoundError(CameraError):
+    """No camera answers to this name, or more than one does; the message lists those that answer."""
+
+
+class CameraBusyError(CameraError):
+    """Another program controls the camera."""
+
+
+class CameraLostError(CameraError):
+    """The camera no longer answers: power, cable, network, or another program took it over."""
+
+
+class ShotTimeoutError(CameraError):
+    """The camera answers, and no shot came in time: no trigger, or all of its packets are lost."""
+
+
+class UnpairedError(ShotTimeoutError):
+    """Frames of one chip came, and none of the other chip of the same instant."""
+
+
+class WrongFrameError(CameraError):
+    """Frames came in another size or pixel format than was agreed, or damaged, and none that is right."""
+
+
+class RecordingError(OSError):
+    """A recording that cannot go on; the message says why and how many shots are safe."""
+
+
+class BatchError(RuntimeError):
+    """A batch that cannot go on; what was decoded stays, and the same command goes on from there."""
 
 
 class MissingExtraError(ImportError):

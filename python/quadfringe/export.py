@@ -20,15 +20,15 @@ def write_ply(
     path: Path,
     points_mm: NDArray[np.float32],
     colour: NDArray[np.uint8],
-    quality: NDArray[np.float32],
+    scalars: Mapping[str, NDArray[np.float32]],
 ) -> None:
-    """Write N points as binary PLY: x, y, z in mm (N, 3), colour (N, 3), and a scalar `quality` (N,)."""
+    """Write N points as binary PLY: x, y, z in mm (N, 3), colour (N, 3), and scalars (N,) by name."""
     require("trimesh", "export")
     from trimesh import PointCloud
     from trimesh.exchange.ply import export_ply
 
     cloud = PointCloud(points_mm, colors=colour)
-    cloud.vertex_attributes = {"quality": np.ascontiguousarray(quality, np.float32)}
+    cloud.vertex_attributes = {name: np.ascontiguousarray(values, np.float32) for name, values in scalars.items()}
     with atomic(path) as temporary:
         temporary.write_bytes(export_ply(cloud))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from quadfringe.errors import ConfigError, InputError
 from quadfringe.export import read_npy, read_npz
 from quadfringe.files import read_bytes
 from quadfringe.images import read_image
+from quadfringe.recording import Recording
 
 __all__ = ["lines_about"]
 
@@ -22,7 +24,7 @@ IMAGES = (".png", ".tif", ".tiff", ".bmp")
 
 
 def lines_about(path: Path) -> list[str]:
-    """Describe a shape, calibration, response, system file, array or image; raises `InputError` otherwise."""
+    """Describe a shape, calibration, response, system file, recording, array or image; else raises `InputError`."""
     suffix = path.suffix.lower()
     if suffix == ".npz":
         return _arrays(read_npz(path))
@@ -36,7 +38,9 @@ def lines_about(path: Path) -> list[str]:
         return _arrays({"image": read_image(path)})
     if suffix == ".ply":
         return _ply_header(path)
-    raise InputError(f"{path}: expected .npz, .npy, .json, .toml, .ply or {', '.join(IMAGES)}")
+    if suffix == ".h5":
+        return _recording(path)
+    raise InputError(f"{path}: expected .npz, .npy, .json, .toml, .ply, .h5 or {', '.join(IMAGES)}")
 
 
 def _arrays(stored: dict[str, NDArray[Any]]) -> list[str]:
@@ -67,6 +71,22 @@ def _calibration(path: Path) -> list[str]:
         type(loaded).__name__,
         *loaded.model_dump_json(indent=2, exclude_none=True).splitlines(),
     ]
+
+
+def _recording(path: Path) -> list[str]:
+    with Recording(path) as take:
+        times_us = take.times_us
+        lines = [f"Recording: {len(take)} shots of {take.header.described()}"]
+        if len(take):
+            lost = int(take.ids[-1] - take.ids[0]) + 1 - len(take)
+            begin = datetime.fromtimestamp(times_us[0] / 1e6, UTC).isoformat(timespec="milliseconds")
+            lines.append(f"begin: {begin}, {(times_us[-1] - times_us[0]) / 1e6:.3f} s, {lost} exposures missing")
+        if not take.closed_in_order:
+            lines.append("not closed in order: still being written, or its writer was killed (quadfringe recover)")
+        for name, model in (("calibration", take.calibration), ("config", take.config)):
+            known = None if model is None else model.model_dump_json(indent=2, exclude_none=True)
+            lines += [f"{name}:", *("none" if known is None else known).splitlines()]
+    return lines
 
 
 def _ply_header(path: Path) -> list[str]:

@@ -18,6 +18,7 @@ from quadfringe import _core
 from quadfringe.config import DeviceModel, Fringes
 from quadfringe.data import Shot
 from quadfringe.decoding import Plan, core_device, decode
+from quadfringe.film import hand
 from quadfringe.report import Panel, draw_panels
 from quadfringe.stages import carrier, fourier, linear_light
 from quadfringe.truth import rms
@@ -123,4 +124,4 @@ def _draw(path: Path, shot: Shot, truth_rad: Map, errors: Mapping[str, Map], fig
     draw_panels(path, "peaks, 3 % noise, 8 bit", rows)
 
 
-REPRODUCTIONS: dict[str, Callable[[Path], tuple[dict[str, float], Path]]] = {"peaks": peaks}
+REPRODUCTIONS: dict[str, Callable[[Path], tuple[dict[str, float], Path]]] = {"hand": hand, "peaks": peaks}

@@ -9,58 +9,109 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 
 from quadfringe.config import SystemConfig, load_system
 from quadfringe.data import AnyShot, Calibration, Shape
 from quadfringe.decoding import Plan, ShotDecoder
-from quadfringe.devices import Camera, Projector
-from quadfringe.devices.virtual import VirtualBench, VirtualCamera, VirtualProjector
-from quadfringe.errors import ConfigError
+from quadfringe.devices import Camera, Keep, Projector, open_devices
+from quadfringe.errors import InputError
+from quadfringe.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
 
+LIGHTCRAFTER_COLUMNS = 912  # projector columns that fringes cover when no calibration and no system file says otherwise
+
 
 class Scanner:
-    """A projector, a camera and a decoder that belong together; close it, or use it in a `with` block."""
+    """A projector, a camera and a decoder that belong together; close it, or use it in a `with` block.
 
-    def __init__(self, config: SystemConfig, projector: Projector, camera: Camera, calibration: Calibration) -> None:
+    Without a calibration shapes have a phase and no millimetres.
+    """
+
+    def __init__(
+        self, config: SystemConfig, projector: Projector, camera: Camera, calibration: Calibration | None
+    ) -> None:
         self.config = config
-        self.calibration = calibration
-        self._projector = projector
-        self._camera = camera
+        self._calibration = calibration
+        self.projector = projector
+        self.camera = camera
+        self._described = config.model_dump(mode="json", exclude_none=True)
         self._decoder: ShotDecoder | None = None
+        self._live: LiveStream | None = None
+
+    @property
+    def calibration(self) -> Calibration:
+        """What turns shots into millimetres; raises `InputError` when the system has none."""
+        if self._calibration is None:
+            raise InputError("this system has no calibration: name one in the system file, calibration = FILE")
+        return self._calibration
 
     def grab(self) -> AnyShot:
         """Project the fringes and take one shot of them."""
-        self._projector.show(self.config.fringes)
-        return self._camera.grab()
+        self.projector.show(self.config.fringes)
+        return self.camera.snap()
 
     def decode(self, shot: AnyShot) -> Shape:
         """Give the shape of a shot of this system; raises `DecodeError` when none can be trusted."""
         if self._decoder is None:
             self._decoder = ShotDecoder(shot, self._plan())
         shape = self._decoder.decode(shot)
-        resolved = self.config.model_dump(mode="json", exclude_none=True) | {"decode": shape.config["decode"]}
-        return shape.with_settings(resolved, self.calibration)
+        return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self._calibration)
 
     def measure(self) -> Shape:
         """Project, grab, decode: one exposure in, one metric shape out."""
         return self.decode(self.grab())
 
+    def stream(
+        self,
+        count: int | None = None,
+        *,
+        keep: Keep = "latest",
+        taps: Mapping[str, Tap] | None = None,
+        resume: bool = False,
+    ) -> LiveStream:
+        """Measure without pause: `count` shots are captured, or as many as come until the stream is closed.
+
+        Capture, decode and the caller run at a pace of their own; "latest" gives the newest shape there is, "all" keeps
+        up to 64 shots waiting. Both drop the oldest shot when they must, and count it. `taps` are called with every
+        captured shot, each in a thread of its own: a recorder, say. With `resume` a camera that fails is asked again
+        until the stream is closed; otherwise its `CameraError` ends the stream. A second stream ends the first.
+
+        >>> import quadfringe as qf
+        >>> with qf.open() as scanner, scanner.stream(2, keep="all") as stream:
+        ...     depths = [measured.shape.depth_mm for measured in stream]
+        >>> len(depths)
+        2
+        """
+        self._end_stream()
+        self.projector.show(self.config.fringes)
+        self._live = LiveStream(self.camera, self.decode, count, keep=keep, taps=taps, resume=resume)
+        return self._live
+
+    def _end_stream(self) -> None:
+        if self._live is not None:
+            self._live.close()
+            self._live = None
+
     def _plan(self) -> Plan:
+        projector = self.config.projector if self._calibration is None else self._calibration.projector
         return Plan(
-            projector_width_px=self.calibration.projector.width_px,
+            projector_width_px=LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px,
             fringes=self.config.fringes,
-            calibration=self.calibration,
+            calibration=self._calibration,
             settings=self.config.decode,
         )
 
     def close(self) -> None:
-        """Release the devices."""
-        self._camera.close()
-        self._projector.close()
+        """End the stream and release the devices, the light also when the camera fails."""
+        self._end_stream()
+        try:
+            self.camera.close()
+        finally:
+            self.projector.close()
 
     def __enter__(self) -> Scanner:
         return self
@@ -77,7 +128,8 @@ class Scanner:
 def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
     """Open the system of a TOML file, of a config, or the virtual bench as it comes.
 
-    Raises `ConfigError` when the file has unknown keys or wrong values, or names projectors of a real bench.
+    Raises `ConfigError` when the file has unknown keys or wrong values, or names devices that do not go together;
+    OSError when a device cannot be opened.
     """
     if system is None:
         config = SystemConfig()
@@ -85,11 +137,7 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
         config = system
     else:
         config = load_system(Path(system))
-    if config.projectors is not None:
-        raise ConfigError(
-            "projectors: the only camera is that of the virtual bench, which cannot see them; show the fringes with "
-            "quadfringe.devices.open_projector or `quadfringe projector show --system FILE`, and decode the images"
-        )
-    bench = VirtualBench(config)
-    calibration = bench.calibration() if config.calibration is None else Calibration.load(config.calibration)
-    return Scanner(bench.resolved(config), VirtualProjector(bench), VirtualCamera(bench), calibration)
+    # The file is read first: a device that is open for nothing stays busy.
+    calibration = None if config.calibration is None else Calibration.load(config.calibration)
+    devices = open_devices(config)
+    return Scanner(devices.config, devices.projector, devices.camera, calibration or devices.camera.calibration)

@@ -32,7 +32,18 @@ from quadfringe.machine import resident_bytes
 from quadfringe.scanner import open_system
 from quadfringe.verdict import judge
 
-__all__ = ["METHODS", "SCALING_SIZES", "Case", "Memory", "Timing", "memory", "scaling", "time_decoding", "work"]
+__all__ = [
+    "METHODS",
+    "SCALING_SIZES",
+    "Case",
+    "Memory",
+    "Timing",
+    "cost_spread_percent",
+    "memory",
+    "scaling",
+    "time_decoding",
+    "work",
+]
 
 METHODS = ("published", "best")
 NOISE = 0.03
@@ -125,6 +136,12 @@ def scaling(methods: Sequence[str], threads: int, *, repeats: int, surface: str)
         with _shot_folder(size, surface) as folder:
             for method in methods:  # one after the other: two decoders of 16 million pixels need some GB
                 yield from _time_in_turns(folder, [Case(*size, method, threads)], fewer)
+
+
+def cost_spread_percent(timings: Sequence[Timing]) -> float:
+    """Give how much more a pixel costs at the dearest size than at the cheapest, in percent; 0 where cost is linear."""
+    costs = [timing.ns_per_pixel for timing in timings]
+    return 100.0 * (max(costs) / min(costs) - 1.0)
 
 
 def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, surface: str) -> list[Memory]:

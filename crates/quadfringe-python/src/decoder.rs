@@ -28,7 +28,7 @@ pub struct Decoder {
 impl Decoder {
     #[new]
     #[pyo3(signature = (shape, fringe_numbers, projector_width, *, full_scale = None, method = None,
-        modulation_min = None, quality_min = None, period_px = None, threads = None, dark = None, response = None,
+        modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, threads = None, dark = None, response = None,
         crosstalk = None, ir_registration = None, camera = None, projector = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn new(
@@ -41,6 +41,7 @@ impl Decoder {
         modulation_min: Option<f32>,
         quality_min: Option<f32>,
         period_px: Option<f64>,
+        channel_instants_us: Option<[f32; 4]>,
         threads: Option<usize>,
         dark: Option<[f32; 4]>,
         response: Option<[(f32, f32, f32); 4]>,
@@ -56,6 +57,7 @@ impl Decoder {
             modulation_min: modulation_min.unwrap_or(plain.modulation_min),
             quality_min: quality_min.unwrap_or(plain.quality_min),
             period_px: period_px.or(plain.period_px),
+            channel_instants_us: channel_instants_us.or(plain.channel_instants_us),
         };
         let conditioner = conditioner_of(dark, response, crosstalk, ir_registration);
         let kernel = py.detach(|| {
@@ -86,6 +88,7 @@ impl Decoder {
         named.set_item("modulation_min", options.modulation_min)?;
         named.set_item("quality_min", options.quality_min)?;
         named.set_item("period_px", options.period_px)?;
+        named.set_item("channel_instants_us", options.channel_instants_us)?;
         Ok(named)
     }
 
@@ -155,6 +158,9 @@ impl Decoder {
             order: map(),
             modulation: map(),
             quality: map(),
+            wrong_order_probability: map(),
+            uncertainty_rad: (!self.calibrated).then(map),
+            uncertainty_mm: self.calibrated.then(map),
             xyz_mm: self.calibrated.then(|| self.memory.take(Ix3(rows, columns, 3))),
         }
     }
@@ -166,6 +172,14 @@ impl Decoder {
         named.set_item("order", self.memory.lend(py, decoded.order)?)?;
         named.set_item("modulation", self.memory.lend(py, decoded.modulation)?)?;
         named.set_item("quality", self.memory.lend(py, decoded.quality)?)?;
+        named.set_item("wrong_order_probability", self.memory.lend(py, decoded.wrong_order_probability)?)?;
+        let uncertain =
+            [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
+        for (name, map) in uncertain {
+            if let Some(map) = map {
+                named.set_item(name, self.memory.lend(py, map)?)?;
+            }
+        }
         if let Some(xyz_mm) = decoded.xyz_mm {
             named.set_item("xyz_mm", self.memory.lend(py, xyz_mm)?)?;
         }

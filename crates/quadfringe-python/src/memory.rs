@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Most maps that wait for a shot: those of two shots.
-const WAITING: usize = 12;
+const WAITING: usize = 16;
 
 /// Maps that wait for the next shot.
 #[derive(Default)]

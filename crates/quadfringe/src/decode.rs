@@ -9,10 +9,14 @@
 //! ```
 
 mod best;
+mod expand;
+mod guide;
 mod judge;
+mod level;
 mod orders;
 mod output;
 mod published;
+mod uncertainty;
 
 pub use output::Decoded;
 
@@ -20,6 +24,7 @@ use crate::condition::{Plan, Sample};
 use crate::height::Triangulator;
 use crate::{Conditioner, Error, FringeCode, Result, Shot};
 use best::Best;
+use level::Level;
 use output::Finish;
 use published::Published;
 
@@ -45,11 +50,21 @@ pub struct Options {
     pub quality_min: f32,
     /// Fringe period in camera pixels; `None` estimates it from every shot.
     pub period_px: Option<f64>,
+    /// Instants at which R, G, B and IR are seen (the middle of each exposure), in us from the instant that the result is to
+    /// stand for; `None` when all see the same. A projector that shows its colours one after another needs them when the
+    /// surface moves. [`Method::Best`] alone can do this.
+    pub channel_instants_us: Option<[f32; 4]>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { method: Method::default(), modulation_min: 0.02, quality_min: 0.15, period_px: None }
+        Self {
+            method: Method::default(),
+            modulation_min: 0.02,
+            quality_min: 0.15,
+            period_px: None,
+            channel_instants_us: None,
+        }
     }
 }
 
@@ -61,6 +76,7 @@ impl Options {
                 return Err(Error::value(name, "a fraction in [0, 1)", value));
             }
         }
+        self.channel_instants_us.map_or(Ok(()), |instants| check_instants(instants, self.method))?;
         match self.period_px {
             Some(period) if !(period.is_finite() && period >= 3.0) => {
                 Err(Error::value("period_px", "at least 3 camera pixels", period))
@@ -68,6 +84,16 @@ impl Options {
             _ => Ok(()),
         }
     }
+}
+
+fn check_instants(instants: [f32; 4], method: Method) -> Result<()> {
+    let expected = match method {
+        Method::Published => "none with the published method, which cannot undo motion; take the best one",
+        Method::Best if instants.iter().any(|t| !t.is_finite()) => "finite times",
+        Method::Best if instants.iter().all(|t| *t == instants[0]) => "times that differ, or none",
+        Method::Best => return Ok(()),
+    };
+    Err(Error::value("channel_instants_us", expected, format!("{instants:?}")))
 }
 
 /// Decodes shots of one size and one code: planned once, run many times.

@@ -1,5 +1,6 @@
 //! Planes -> wrapped phase: background, two-step (TPS), Fourier (FTP), N-step, and the local fit of all channels.
 
+pub(crate) mod agreement;
 mod aligned;
 mod background;
 pub(crate) mod backgrounds;
@@ -9,6 +10,7 @@ mod fourier;
 pub(crate) mod joint;
 pub(crate) mod light;
 pub(crate) mod local_fit;
+pub(crate) mod motion;
 mod n_step;
 pub(crate) mod scene;
 pub(crate) mod slopes;

@@ -97,6 +97,11 @@ fn plans_out_of_range_are_refused() {
     assert_says(settings(Options { modulation_min, ..plain.clone() }), &["modulation_min", "NaN"]);
     assert_says(settings(Options { quality_min: 1.0, ..plain.clone() }), &["quality_min"]);
     assert_says(settings(Options { period_px: Some(1.0), ..plain.clone() }), &["period_px"]);
+    let instants = |instants| Options { channel_instants_us: Some(instants), ..plain.clone() };
+    assert_says(settings(instants([0.0, f32::NAN, 1.0, 0.0])), &["channel_instants_us", "finite", "NaN"]);
+    assert_says(settings(instants([5.0; 4])), &["channel_instants_us", "differ"]);
+    let published = Options { method: Method::Published, ..instants([-1.0, 0.0, 1.0, 0.0]) };
+    assert_says(settings(published), &["channel_instants_us", "best"]);
     let response = [Response { exponent: -1.0, ..Response::default() }; 4];
     let light = Conditioner { response, ..Conditioner::default() };
     assert_says(plan(light, plain), &["exponent", "-1"]);

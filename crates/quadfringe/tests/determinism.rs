@@ -9,10 +9,17 @@ use quadfringe::{Conditioner, Decoded, Decoder, Method, Options};
 use rayon::ThreadPoolBuilder;
 
 fn bits(decoded: &Decoded) -> Vec<u32> {
-    let maps: [&Array2<f32>; 5] =
-        [&decoded.phase_rad, &decoded.column_px, &decoded.order, &decoded.modulation, &decoded.quality];
+    let maps: [&Array2<f32>; 6] = [
+        &decoded.phase_rad,
+        &decoded.column_px,
+        &decoded.order,
+        &decoded.modulation,
+        &decoded.quality,
+        &decoded.wrong_order_probability,
+    ];
     let xyz = decoded.xyz_mm.iter().flatten();
-    let values = maps.into_iter().flatten().chain(xyz);
+    let values =
+        maps.into_iter().chain(&decoded.uncertainty_rad).chain(&decoded.uncertainty_mm).flatten().chain(xyz);
     values.map(|v| v.to_bits()).collect()
 }
 

@@ -9,7 +9,7 @@ use quadfringe::Method;
 const FRINGE_PX: f32 = 28.0;
 /// Share of returned pixels whose order may be wrong without noise: a few beside edges where R and B see the same phase
 /// on both sides, and a few that the lens blurs into a shadow, out of 780 thousand.
-const WRONG_MAX: f64 = 1e-4;
+const WRONG_MAX: f64 = 2e-5;
 
 #[test]
 fn without_noise_the_surface_comes_back() {
@@ -21,7 +21,7 @@ fn without_noise_the_surface_comes_back() {
         println!("{name}: {found:?}");
         assert!(found.phase_rms_rad < 0.005, "{name}: {found:?}");
         assert!(found.wrong_share() <= WRONG_MAX, "{name}: {found:?}");
-        assert!(found.in_shadow * 20_000 < found.returned, "{name}: {found:?}");
+        assert!(found.in_shadow * 100_000 < found.returned, "{name}: {found:?}");
         assert!(found.returned_share() > 0.95, "{name}: {found:?}");
         assert!(found.smooth * 2 > found.lit, "{name}: {found:?}");
     }

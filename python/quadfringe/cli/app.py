@@ -7,9 +7,23 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from quadfringe.cli import bench, calibrate, decode, demo, info, projector, reproduce, target, timing
+from quadfringe.cli import (
+    batch,
+    bench,
+    calibrate,
+    camera,
+    decode,
+    demo,
+    info,
+    live,
+    projector,
+    record,
+    reproduce,
+    target,
+    timing,
+)
 from quadfringe.cli.output import complain
-from quadfringe.errors import DecodeError, MissingExtraError
+from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
 __all__ = ["app"]
 
@@ -23,7 +37,7 @@ class Commands(TyperGroup):
         """Run the command and translate its errors."""
         try:
             return super().invoke(ctx)
-        except DecodeError as error:
+        except (BatchError, DecodeError, CameraError, RecordingError) as error:
             complain(str(error))
             raise typer.Exit(FAILED) from error
         except BrokenPipeError:
@@ -67,8 +81,13 @@ app.command("pattern")(bench.pattern)
 app.command("simulate")(bench.simulate)
 app.command("decode")(decode.decode)
 app.command("measure")(bench.measure)
+app.command("live")(live.live)
+app.command("record")(record.record)
+app.command("recover")(record.recover)
+app.command("batch")(batch.batch)
 app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
 app.command("bench")(timing.bench)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(projector.app, name="projector")
+app.add_typer(camera.app, name="camera")

@@ -50,6 +50,10 @@ def decode(
     calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Calibration, JSON.")] = None,
     method: Annotated[Method | None, typer.Option(help="How to demodulate and unwrap.")] = None,
     bits: Annotated[Bits | None, typer.Option(help="Bits in use in 16-bit files.")] = None,
+    channel_instants_us: Annotated[
+        tuple[float, float, float, float] | None,
+        typer.Option(metavar="R G B IR", help="When each channel is seen, us from the instant of the result."),
+    ] = None,
     json: JsonOption = None,
 ) -> None:
     """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
@@ -68,7 +72,7 @@ def decode(
         fringes=Fringes(numbers=fringes),
         calibration=None if calibration is None else Calibration.load(calibration),
         response=None if response is None else ResponseCalibration.load(response),
-        settings=DecodeConfig(method=None if method is None else method.value),
+        settings=DecodeConfig(method=None if method is None else method.value, channel_instants_us=channel_instants_us),
     )
     bits_in_use = None if bits is None else int(bits)
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}
@@ -78,9 +82,19 @@ def decode(
         shot = read_bayer_shot(*_mosaic(raw, bayer, files), bits_in_use)
     shape = decode_shot(shot, plan)
     shape.save(out)
-    percent = 100.0 * float(shape.returned.mean())
-    say(f"{out}: {percent:.1f} % of {shape.phase_rad.size} pixels returned", json)
-    write_figures({"returned_percent": percent}, json)
+    figures = shape.figures()
+    percent = figures["returned_percent"]
+    say(f"{out}: {percent:.1f} % of {shape.phase_rad.size} pixels returned{_sureness(figures)}", json)
+    write_figures(figures, json)
+
+
+def _sureness(figures: Mapping[str, float]) -> str:
+    """Tell how sure the pixels are, in words."""
+    for unit in ("mm", "rad"):
+        if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
+            wrong = figures.get("wrong_orders_at_most", 0.0)
+            return f", uncertainty {sigma:.3g} {unit} (median), at most {wrong:.3g} wrong orders to be expected"
+    return ""
 
 
 def _mosaic(raw: Path | None, bayer: Bayer | None, files: Mapping[str, Path | None]) -> tuple[Path, BayerPattern, Path]:

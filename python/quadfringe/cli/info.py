@@ -13,7 +13,7 @@ __all__ = ["info"]
 
 
 def info(
-    file: Annotated[Path, typer.Argument(help="A shape, calibration, response, system file or image.")],
+    file: Annotated[Path, typer.Argument(help="A shape, calibration, response, system file, recording or image.")],
 ) -> None:
     """Say what a file holds: maps and their ranges, settings, calibration."""
     from quadfringe.inspection import lines_about

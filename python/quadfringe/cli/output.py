@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
+from threading import Event
 from typing import Annotated, Any, TypeVar
 
 import typer
@@ -21,6 +22,8 @@ __all__ = [
     "rows",
     "say",
     "steps",
+    "stop_asked",
+    "stoppable",
     "table",
     "write_figures",
     "write_record",
@@ -106,10 +109,48 @@ def _write(text: str, json: Path | None) -> None:
 
 
 @contextmanager
-def steps(items: Iterable[Item], title: str) -> Iterator[Iterable[Item]]:
+def steps(items: Iterable[Item], title: str, total: int | None = None) -> Iterator[Iterable[Item]]:
     """Walk over long work with a progress bar on stderr; silent when stderr is not a terminal."""
     from rich.console import Console
     from rich.progress import track
 
     console = Console(stderr=True)
-    yield track(items, description=title, console=console, transient=True, disable=not console.is_terminal)
+    yield track(items, description=title, total=total, console=console, transient=True, disable=not console.is_terminal)
+
+
+@contextmanager
+def stoppable() -> Iterator[None]:
+    """Let Ctrl-C, or the SIGTERM of a service, end the block in order."""
+    import signal
+
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler)
+    try:
+        yield
+    except KeyboardInterrupt:
+        pass
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@contextmanager
+def stop_asked() -> Iterator[Event]:
+    """Give an event that Ctrl-C or SIGTERM sets; the second Ctrl-C interrupts.
+
+    Nothing is interrupted in the middle, and a signal cannot be lost in a callback of a library.
+    """
+    import signal
+
+    asked = Event()
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def ask(*_: object) -> None:
+        asked.set()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+    for number in before:
+        signal.signal(number, ask)
+    try:
+        yield asked
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -16,6 +16,7 @@ __all__ = ["reproduce"]
 class Published(StrEnum):
     """What can be reproduced."""
 
+    hand = "hand"
     peaks = "peaks"
 
 

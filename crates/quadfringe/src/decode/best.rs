@@ -1,67 +1,73 @@
-//! The best chain: local fit, orders with support, joint fit, and a judgement of every pixel.
+//! The best chain: a guide that uses surroundings, a joint fit of every pixel, and a judgement of each.
 
-use super::judge::{Findings, Judge, MISFIT_MAX};
-use super::orders::{Orders, Wrapped};
+use super::expand::{Expander, FACTOR_MAX};
+use super::guide::Guide;
+use super::judge::{Findings, Judge};
+use super::level::Level;
 use super::output::Finish;
+use super::uncertainty::PhaseNoise;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
-use crate::demod::backgrounds::Backgrounds;
+use crate::demod::agreement::Agreement;
 use crate::demod::carrier;
-use crate::demod::cells::Grid;
-use crate::demod::joint::Joint;
-use crate::demod::light::LightFinder;
-use crate::demod::local_fit::{LocalFit, PixelMaps};
+use crate::demod::cells::{Grid, LANES, RowMaps};
+use crate::demod::motion::{Instants, Motion};
 use crate::demod::scene::Scene;
-use crate::demod::slopes::Slopes;
-use crate::demod::window::{Window, noise};
+use crate::demod::window::Window;
 use crate::{FringeCode, Shot};
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
 /// Cells in a fringe period, at least.
-const CELLS: f64 = 4.5;
-
+const CELLS: f64 = 3.4;
+/// Pixels in a fringe period of the image that guides, at least.
+const GUIDE_PERIOD_PX: f64 = 12.0;
 /// Pixels that interpolated light reaches into a shadow.
 const MOSAIC_BLUR_PX: usize = 2;
+/// Times that the light of a moving surface is brought to one instant and decoded again.
+const MOTION_ROUNDS: usize = 3;
 
 pub(super) struct Best {
     shape: [usize; 2],
+    stride: usize,
     ratios: [f32; 3],
-    light: [Vec<f32>; 4],
-    lit: Vec<f32>,
-    usable: Vec<f32>,
-    modulation: Vec<f32>,
-    wrapped: Vec<f32>,
+    full: Level,
+    shrunk: Level,
+    guide: Guide,
+    expander: Expander,
+    found: Vec<f32>,
     phase: Vec<f32>,
-    finder: LightFinder,
-    fit: LocalFit,
-    slopes: Slopes,
-    orders: Orders,
-    backgrounds: Backgrounds,
-    joint: Joint,
+    modulation: Vec<f32>,
+    agreement: Agreement,
+    /// Probability that the order of a node is another one.
+    another: Vec<f32>,
+    motion: Motion,
+    /// Light as it was seen, when it has to be brought to one instant.
+    seen: [Vec<f32>; 4],
     judge: Judge,
 }
 
 impl Best {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
-        let pixels = Grid::new(shape, 1.0).pixels();
-        let plane = || vec![0.0; pixels];
+        let stride = shape[1].next_multiple_of(FACTOR_MAX * LANES);
+        let mut full = Level::default();
+        full.resize(stride * shape[0]);
         let numbers = code.numbers();
         Self {
             shape,
+            stride,
             ratios: numbers.map(|n| (n / numbers[0]) as f32),
-            light: [plane(), plane(), plane(), plane()],
-            lit: plane(),
-            usable: plane(),
-            modulation: plane(),
-            wrapped: plane(),
-            phase: plane(),
-            finder: LightFinder::default(),
-            fit: LocalFit::default(),
-            slopes: Slopes::default(),
-            orders: Orders::new(code),
-            backgrounds: Backgrounds::new(),
-            joint: Joint::default(),
+            full,
+            shrunk: Level::default(),
+            guide: Guide::new(code),
+            expander: Expander::default(),
+            found: Vec::new(),
+            phase: Vec::new(),
+            modulation: Vec::new(),
+            agreement: Agreement::default(),
+            another: Vec::new(),
+            motion: Motion::default(),
+            seen: Default::default(),
             judge: Judge::default(),
         }
     }
@@ -74,85 +80,109 @@ impl Best {
         finish: &Finish<'_>,
         out: &mut Decoded,
     ) {
-        // 1. Linear light (S1), and where it comes from the projector.
+        // 1. Linear light (S1).
         self.condition(plan, shot);
-        let light = self.light.each_ref().map(Vec::as_slice);
-        let period_px = options.period_px.unwrap_or_else(|| period_px(light[0], self.shape));
-        let grid = Grid::new(self.shape, period_px / CELLS);
-        self.finder.find(&grid, light, period_px, 2.0 * options.modulation_min, &mut self.modulation);
-        if shot.mosaic().is_some() {
-            // Interpolated between the samples of a mosaic, light reaches into the shadow beside it.
-            (0..MOSAIC_BLUR_PX).for_each(|_| self.finder.shrink(&grid, &mut self.modulation));
-        }
-        let found = self.modulation.par_chunks(grid.stride);
-        let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
-        masks.zip(found).for_each(|((lit, usable), found)| {
-            for ((lit, usable), found) in lit.iter_mut().zip(usable).zip(found) {
-                *lit *= found;
-                *usable *= *lit;
-            }
-        });
-        let scene = Scene { light, usable: &self.usable, grid: &grid, period_px };
+        let period_px = options.period_px.unwrap_or_else(|| period_px(&self.full.light[0], self.shape));
+        let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS);
+        let blur_px = if shot.mosaic().is_some() { MOSAIC_BLUR_PX } else { 0 };
 
-        // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
-        let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
-        self.fit.run(&scene, &self.lit, options.modulation_min, maps);
-        let noise = noise(&scene, &self.wrapped, &self.modulation);
-        let relative_noise = relative(noise, &self.modulation);
-        self.slopes.measure(&scene, &self.wrapped, &self.modulation);
-
-        // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
-        let known = Wrapped {
-            phase: &self.wrapped,
-            modulation: &self.modulation,
-            fit: &self.fit,
-            backgrounds: None,
-            slopes: &self.slopes,
-        };
-        self.orders.choose(&scene, &known, &mut self.phase);
-        self.backgrounds.start(&scene, &self.fit);
-        self.backgrounds.fit(
-            &scene,
-            self.ratios,
-            &self.phase,
-            &self.modulation,
-            (MISFIT_MAX, relative_noise),
-        );
-        let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
-        self.orders.choose(&scene, &known, &mut self.phase);
-
-        // 4. All four channels measure the same column.
-        let window = Window::new(&scene, &self.slopes, &self.modulation, noise);
-        for window in [window.near(), window] {
-            self.backgrounds.fit(
-                &scene,
-                self.ratios,
-                &self.phase,
-                &self.modulation,
-                (MISFIT_MAX, relative_noise),
-            );
-            self.joint.step(&scene, &self.backgrounds, &window, self.ratios, &mut self.phase);
+        // 2. to 4. From light to the absolute phase of every pixel.
+        let instants = options.channel_instants_us.map(|instants| instants.map(|t| 1e-6 * t));
+        match instants {
+            None => self.measure((&grid, period_px), factor(period_px, &grid), blur_px, options),
+            Some(instants) => self.measure_moving((&grid, period_px), instants, blur_px, options),
         }
 
         // 5. What is not sure is no data.
+        let scene = self.full.scene(&grid, period_px, 1);
+        let Guide { noise, backgrounds, orders, joint, .. } = &self.guide;
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
-            misfit: &self.joint.misfit,
-            noise,
-            orders: &self.orders,
+            misfit: &joint.misfit,
+            noise: *noise,
+            orders,
             quality_min: options.quality_min,
         };
         self.judge.run(&scene, &findings);
-        self.write(&grid, finish, out);
+        if let Some(instants) = instants {
+            self.motion.rule_out(&scene, instants, &mut self.judge.sure);
+        }
+
+        // 6. How sure the rest is.
+        self.agreement.measure(&scene, (self.ratios, *noise), backgrounds, &self.phase, &self.modulation);
+        orders.another(&scene, &mut self.another);
+        let window = Window::new(&scene, &self.guide.slopes, &self.modulation, *noise);
+        self.write(&scene, &PhaseNoise::new(*noise, window.share()), finish, out);
     }
 
-    /// Planes of linear light; `lit` is 0 for glare, `usable` for pixels that are saturated.
+    /// Absolute phase of every pixel. Where light falls, beats, fringe orders and backgrounds come from an image of `factor` times
+    /// fewer pixels along a side.
+    fn measure(&mut self, (grid, period_px): (&Grid, f64), factor: usize, blur_px: usize, options: &Options) {
+        if factor == 1 {
+            self.guide.run(&mut self.full, (grid, period_px, 1), blur_px, self.ratios, options);
+            std::mem::swap(&mut self.phase, &mut self.guide.phase);
+            std::mem::swap(&mut self.modulation, &mut self.guide.modulation);
+        } else {
+            let coarse = grid.shrunk(factor);
+            self.shrunk.shrink(&self.full, [&coarse, grid], factor);
+            let how = (&coarse, period_px / factor as f64, factor);
+            self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), self.ratios, options);
+            self.expand([&coarse, grid], period_px, blur_px);
+        }
+        // All four channels measure the same column.
+        let scene = self.full.scene(grid, period_px, 1);
+        let Guide { slopes, noise, backgrounds, joint, .. } = &mut self.guide;
+        let window = Window::new(&scene, slopes, &self.modulation, *noise);
+        joint.step(&scene, backgrounds, &window, self.ratios, &mut self.phase);
+    }
+
+    /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.
+    fn measure_moving(&mut self, image: (&Grid, f64), instants: Instants, blur_px: usize, options: &Options) {
+        let how = (self.ratios, instants);
+        self.seen.clone_from(&self.full.light);
+        for round in 0..=MOTION_ROUNDS {
+            self.measure(image, 1, blur_px, options);
+            let scene = self.full.scene(image.0, image.1, 1);
+            if round == 0 {
+                self.motion.rest(&scene);
+            }
+            if round == MOTION_ROUNDS {
+                break;
+            }
+            let backgrounds = &self.guide.backgrounds;
+            self.motion.measure(&scene, how, backgrounds, &self.phase, &self.modulation);
+            let Level { light, usable, .. } = &mut self.full;
+            let seen = self.seen.each_ref().map(Vec::as_slice);
+            let seen = Scene { light: seen, usable, grid: image.0, period_px: image.1, factor: 1 };
+            let light = light.each_mut().map(Vec::as_mut_slice);
+            self.motion.settle(&seen, how, backgrounds, &self.phase, light);
+        }
+    }
+
+    /// From the guide to every pixel.
+    fn expand(&mut self, [coarse, grid]: [&Grid; 2], period_px: f64, blur_px: usize) {
+        for plane in [&mut self.found, &mut self.phase, &mut self.modulation] {
+            plane.resize(grid.pixels(), 0.0);
+        }
+        let guide = &mut self.guide;
+        guide.finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), &mut self.found);
+        guide.noise = guide.finder.noise;
+        (0..blur_px).for_each(|_| guide.finder.shrink(grid, &mut self.found));
+        self.full.restrict(grid, &self.found);
+        let factor = grid.step / coarse.step;
+        let shrunk = self.shrunk.scene(coarse, period_px / factor as f64, factor);
+        let scenes = [&shrunk, &self.full.scene(grid, period_px, 1)];
+        let out = [self.phase.as_mut_slice(), &mut self.modulation];
+        self.expander.run(scenes, guide, self.ratios, &self.full.lit, out);
+    }
+
+    /// Planes of linear light; `lit` is 0 for glare and for what one chip does not see, `usable` for pixels that are saturated.
     fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
-        let [_, width] = self.shape;
-        let stride = width.next_multiple_of(crate::demod::cells::LANES);
-        let [red, green, blue, infrared] = self.light.each_mut().map(|plane| plane.par_chunks_mut(stride));
-        let saturation = self.usable.par_chunks_mut(stride).zip(self.lit.par_chunks_mut(stride));
+        let ([_, width], stride) = (self.shape, self.stride);
+        let Level { light, lit, usable } = &mut self.full;
+        let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
+        let saturation = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));
         let rows = red.zip(green).zip(blue.zip(infrared)).zip(saturation).enumerate();
         rows.for_each_init(
             || (vec![false; width], vec![false; width]),
@@ -167,31 +197,38 @@ impl Best {
                         rows.iter_mut().for_each(|row| row[x] = 0.0);
                     }
                     usable[x] = f32::from(u8::from(seen && unsaturated[x]));
-                    lit[x] = f32::from(u8::from(!glare[x]));
+                    lit[x] = f32::from(u8::from(seen && !glare[x]));
                 }
             },
         );
     }
 
-    fn write(&self, grid: &Grid, finish: &Finish<'_>, out: &mut Decoded) {
-        out.rows().enumerate().for_each(|(y, mut row)| {
+    fn write(&self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
+        let (grid, joint) = (scene.grid, &self.guide.joint);
+        out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
             let known = self.judge.sure[at.clone()].iter().zip(&self.phase[at.clone()]);
             for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
                 *out = if *sure != 0 { *own } else { f32::NAN };
             }
-            row.modulation.copy_from_slice(&self.modulation[at.clone()]);
-            row.quality.copy_from_slice(&self.judge.quality[at]);
+            row.modulation.copy_from_slice(&joint.modulation[at.clone()]);
+            row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
+            let disagreement = self.agreement.row(scene, y, maps);
+            noise.row(&joint.information[at], disagreement, row.sigma);
+            let nodes = &self.another[y / grid.step * grid.columns..];
+            row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);
         });
     }
 }
 
-/// Noise over the mean modulation of what is lit.
-fn relative(noise: f32, modulation: &[f32]) -> f32 {
-    let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
-    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));
-    noise * count / f32::max(sum, 1e-6)
+/// How many times fewer pixels along a side still show the fringes.
+fn factor(period_px: f64, grid: &Grid) -> usize {
+    let mut factor = 1;
+    while factor < FACTOR_MAX.min(grid.step) && period_px >= 2.0 * GUIDE_PERIOD_PX * factor as f64 {
+        factor *= 2;
+    }
+    factor
 }
 
 /// Fringe period across the fringes, from the red image; a sixteenth of the image when nothing stands out.

@@ -151,11 +151,6 @@ fn verdict(
         let most = floor + share * share;
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
         quality[x] = if lit { own_quality } else { f32::NAN };
-        let dbg = std::env::var("DBG").ok().and_then(|v| v.parse::<u32>().ok()).unwrap_or(7);
-        sure[x] = u8::from(
-            lit & (dbg & 2 == 0 || agrees)
-                & (dbg & 1 == 0 || own_quality >= quality_min)
-                & (dbg & 4 == 0 || seams[x] == 0),
-        );
+        sure[x] = u8::from(lit & agrees & (own_quality >= quality_min) & (seams[x] == 0));
     }
 }

@@ -1,5 +1,6 @@
 //! The orders of a scene: a node on every cell, and the pixels beside edges one by one.
 
+use super::uncertainty::CostOdds;
 use crate::angle::{atan2, round, sin_cos, wrap, wrap_positive};
 use crate::demod::backgrounds::Backgrounds;
 use crate::demod::cells::{LANES, Lanes, RowMaps, add, lanes, take};
@@ -11,7 +12,7 @@ use crate::unwrap::{Evidence, Seen, Support};
 use crate::{Channel, FringeCode};
 use multiversion::multiversion;
 use rayon::prelude::*;
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 
 /// A change of the surface costs as much as contradictions over so many fringe periods.
 const JUMP_PERIODS: f64 = 1.25;
@@ -53,7 +54,7 @@ impl Wrapped<'_> {
     fn fringes<'b>(&self, scene: &Scene<'_>, y: usize, maps: &'b mut [RowMaps; 2]) -> [&'b [f32]; 8] {
         match self.backgrounds {
             None => self.fit.fringes(scene, y, maps),
-            Some(backgrounds) => backgrounds.sample(y, &mut maps[0]),
+            Some(backgrounds) => backgrounds.sample(scene, y, &mut maps[0]),
         }
     }
 
@@ -97,8 +98,7 @@ impl Orders {
             .enumerate()
             .for_each(|(row, phase)| node_phases(scene, known, row, phase));
         let (phase, ratios, slots) = (&self.phase, self.ratios, &self.slots);
-        let jump_nodes = JUMP_PERIODS * scene.period_px / grid.step as f64;
-        self.support.choose([grid.rows, grid.columns], jump_nodes, |row, out| {
+        self.support.choose([grid.rows, grid.columns], jump_nodes(scene), |row, out| {
             let mut rows = slots.take();
             let nodes = &phase[row * grid.columns..][..grid.columns];
             gather(scene, known, ratios, row, nodes, &mut rows);
@@ -125,6 +125,20 @@ impl Orders {
         known
             .zip(&self.support.nodes[at])
             .map(|((margin, misfit), node)| (margin.min(1.0), *misfit, node.lit))
+    }
+
+    /// Probability for every node that its order is another one. Evidence comes from the window of the local fit, which is so
+    /// many nodes wide as an equal weight for each would make it.
+    pub fn another(&self, scene: &Scene<'_>, out: &mut Vec<f32>) {
+        let grid = scene.grid;
+        let lit = (0..grid.rows).flat_map(|row| self.verdict(scene, row)).filter(|(_, _, lit)| *lit);
+        let together = scene.cells(2.0 * PI.sqrt() * LocalFit::WINDOW);
+        let odds = CostOdds::new(lit.map(|(_, misfit, _)| misfit), jump_nodes(scene) as f32, together);
+        out.resize(grid.rows * grid.columns, 0.0);
+        out.par_chunks_mut(grid.columns).enumerate().for_each(|(row, out)| {
+            let nodes = out.iter_mut().zip(self.verdict(scene, row));
+            nodes.for_each(|(out, (lead, misfit, _))| *out = odds.another(lead, misfit));
+        });
     }
 
     fn absolute(&self, at: usize) -> f32 {
@@ -178,10 +192,8 @@ impl Orders {
                     continue;
                 }
                 let [along, down] = slopes.at(other_row, other_column);
-                let step = grid.step as f32;
-                let way = step
-                    * (along * (column as f32 - other_column as f32)
-                        + down * (row as f32 - other_row as f32));
+                let way =
+                    along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32);
                 // What the neighbour expects here, as turns beside what this node has.
                 let turns = -round((gap - way) / TAU);
                 found.add(turns);
@@ -189,6 +201,11 @@ impl Orders {
         }
         found
     }
+}
+
+/// Nodes in a row whose contradiction costs as much as a change of the surface.
+fn jump_nodes(scene: &Scene<'_>) -> f64 {
+    JUMP_PERIODS * scene.period_px / scene.grid.step as f64
 }
 
 /// Turns beside the order of the own node; the first is 0.

@@ -21,6 +21,12 @@ pub struct Decoded {
     pub modulation: Array2<f32>,
     /// How far the order is from another one, in [0, 1]; known wherever there is light.
     pub quality: Array2<f32>,
+    /// Probability that the order is another one, in [0, 1]; an upper bound.
+    pub wrong_order_probability: Array2<f32>,
+    /// Standard deviation of the absolute phase in rad, for the order that was chosen, when the decoder is not calibrated.
+    pub uncertainty_rad: Option<Array2<f32>>,
+    /// Standard deviation of the depth Z in mm, for the order that was chosen, when the decoder is calibrated.
+    pub uncertainty_mm: Option<Array2<f32>>,
     /// Points in the camera frame in mm, `(rows, columns, 3)`, when the decoder is calibrated.
     pub xyz_mm: Option<Array3<f32>>,
 }
@@ -36,12 +42,32 @@ impl Decoded {
             order: map(),
             modulation: map(),
             quality: map(),
+            wrong_order_probability: map(),
+            uncertainty_rad: (!calibrated).then(map),
+            uncertainty_mm: calibrated.then(map),
             xyz_mm: calibrated.then(|| Array3::zeros([shape[0], shape[1], 3])),
         }
     }
 
     pub(super) fn check(&self, shape: [usize; 2], calibrated: bool) -> Result<()> {
-        for map in [&self.phase_rad, &self.column_px, &self.order, &self.modulation, &self.quality] {
+        let maps = [
+            &self.phase_rad,
+            &self.column_px,
+            &self.order,
+            &self.modulation,
+            &self.quality,
+            &self.wrong_order_probability,
+        ];
+        // One of the two, or rows would not know which to fill.
+        let (name, uncertainty, other) = match calibrated {
+            true => ("uncertainty_mm", &self.uncertainty_mm, &self.uncertainty_rad),
+            false => ("uncertainty_rad", &self.uncertainty_rad, &self.uncertainty_mm),
+        };
+        if uncertainty.is_none() || other.is_some() {
+            let only = format!("{name}, the only map of uncertainty");
+            return Err(Error::shape(only, &shape, &[0]));
+        }
+        for map in maps.into_iter().chain(uncertainty) {
             if map.shape() != shape || !map.is_standard_layout() {
                 return Err(Error::shape("output map", &shape, map.shape()));
             }
@@ -58,6 +84,11 @@ impl Decoded {
 
     /// All maps row by row, for an engine to fill.
     pub(super) fn rows(&mut self) -> impl IndexedParallelIterator<Item = OutputRow<'_>> {
+        self.row_by_row().into_par_iter().with_min_len(ROWS_AT_ONCE)
+    }
+
+    /// The same one after the other.
+    pub(super) fn row_by_row(&mut self) -> Vec<OutputRow<'_>> {
         let width = self.phase_rad.ncols();
         let maps = [
             &mut self.phase_rad,
@@ -65,23 +96,27 @@ impl Decoded {
             &mut self.order,
             &mut self.modulation,
             &mut self.quality,
+            &mut self.wrong_order_probability,
+            self.uncertainty_mm.as_mut().or(self.uncertainty_rad.as_mut()).expect("checked"),
         ];
         let mut maps = maps.map(|map| map.as_slice_mut().expect("checked layout").chunks_exact_mut(width));
         let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("checked layout"));
         let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
         let mut next = || {
-            let [phase, column, order, modulation, quality] = maps.each_mut().map(Iterator::next);
+            let [phase, column, order, modulation, quality, wrong, sigma] =
+                maps.each_mut().map(Iterator::next);
             Some(OutputRow {
                 phase: phase?,
                 column: column?,
                 order: order?,
                 modulation: modulation?,
                 quality: quality?,
+                sigma: sigma?,
+                wrong: wrong?,
                 xyz: xyz.as_mut().and_then(Iterator::next),
             })
         };
-        let rows: Vec<_> = std::iter::from_fn(&mut next).collect();
-        rows.into_par_iter().with_min_len(ROWS_AT_ONCE)
+        std::iter::from_fn(&mut next).collect()
     }
 }
 
@@ -95,24 +130,40 @@ pub(super) struct OutputRow<'a> {
     pub order: &'a mut [f32],
     pub modulation: &'a mut [f32],
     pub quality: &'a mut [f32],
+    /// Probability of another order.
+    pub wrong: &'a mut [f32],
+    /// Standard deviation: of the phase until the row is finished, then of the depth when calibrated.
+    pub sigma: &'a mut [f32],
     pub xyz: Option<&'a mut [f32]>,
 }
 
-/// The last step of either method, row by row: columns, orders and points from the phase.
+/// The last step of either method, row by row: columns, orders, points and their uncertainty from the phase and its own.
 pub(super) struct Finish<'a> {
     pub code: &'a FringeCode,
     pub triangulator: Option<&'a Triangulator>,
 }
 
 impl Finish<'_> {
-    /// Row `y`, of which phase, modulation and quality are known.
+    /// Row `y`, of which phase, modulation, quality, uncertainty of the phase and probability of a wrong order are known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
         let per_rad = self.code.period_px(0) as f32 / TAU;
         let end = self.code.projector_width() as f32 + 0.5;
         columns_and_orders(per_rad, end, row.phase, row.column, row.order);
+        let unit = if self.triangulator.is_some() { per_rad } else { 1.0 };
+        sure_only(row.phase, unit, row.sigma, row.wrong);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
             triangulator.xyz_row(y, row.column, xyz);
+            triangulator.depth_uncertainty_row(y, row.column, row.sigma);
         }
+    }
+}
+
+/// Where there is no phase nothing is known of it either; uncertainty in rad is turned into another unit.
+#[multiversion(targets("x86_64+avx2"))]
+fn sure_only(phase: &[f32], unit: f32, sigma: &mut [f32], wrong: &mut [f32]) {
+    for (phase, (sigma, wrong)) in phase.iter().zip(sigma.iter_mut().zip(wrong)) {
+        *sigma = if phase.is_nan() { f32::NAN } else { *sigma * unit };
+        *wrong = if phase.is_nan() { f32::NAN } else { *wrong };
     }
 }
 

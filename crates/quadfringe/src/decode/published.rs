@@ -3,6 +3,7 @@
 mod row;
 
 use super::output::Finish;
+use super::uncertainty::Sureness;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::{Band, LineSpectrum, RowFilter};
@@ -14,6 +15,8 @@ use row::{RowPlan, Rows, decode_row};
 
 /// Rows of the red image that are looked at for the carrier.
 const CARRIER_ROWS: usize = 16;
+/// One pixel in so many of those rows is asked for noise and margin.
+const LOOK_STRIDE: usize = 3;
 
 pub(super) struct Published {
     ladder: Ladder,
@@ -47,7 +50,7 @@ impl Published {
             None => self.period_px(plan, shot),
         };
         let periods_px = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
-        let row_plan = RowPlan {
+        let mut row_plan = RowPlan {
             conditioning: plan,
             ladder: &self.ladder,
             filter: &self.filter,
@@ -55,7 +58,10 @@ impl Published {
             weights: [1, 2].map(|i: usize| self.filter.weights(Band::Improved, periods_px[i])),
             modulation_min: options.modulation_min,
             quality_min: options.quality_min,
+            sureness: Sureness::none(),
         };
+        row_plan.sureness = self.look(&row_plan, shot, out);
+        let row_plan = row_plan;
         out.rows().enumerate().for_each_init(
             || Rows::new(&self.filter, self.shape[1]),
             |rows, (y, mut out)| {
@@ -63,6 +69,29 @@ impl Published {
                 finish.row(y, &mut out);
             },
         );
+    }
+
+    /// Noise of the shot and of its orders, from a few rows.
+    fn look<T: Sample>(&self, plan: &RowPlan<'_>, shot: &Shot<'_, T>, out: &mut Decoded) -> Sureness {
+        let [height, width] = self.shape;
+        let mut rows = Rows::new(&self.filter, width);
+        let (mut bends, mut margins) = (Vec::new(), Vec::new());
+        let looked_at = out.row_by_row().into_iter().enumerate().take(height - 1).skip(1);
+        for (y, mut out) in looked_at.step_by(height.div_ceil(CARRIER_ROWS)) {
+            let mut bend = [vec![0.0; width], vec![0.0; width]];
+            for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
+                plan.conditioning.row(shot, other, &mut rows.light_mut());
+                for (bend, light) in bend.iter_mut().zip([rows.red(), rows.blue()]) {
+                    bend.iter_mut().zip(light).for_each(|(bend, light)| *bend += weight * light);
+                }
+            }
+            decode_row(&mut rows, plan, shot, y, &mut out);
+            for x in (0..width).step_by(LOOK_STRIDE).filter(|&x| out.quality[x].is_finite()) {
+                bends.extend([bend[0][x], bend[1][x]]);
+                margins.push(out.quality[x]);
+            }
+        }
+        Sureness::new(&mut bends, &mut margins)
     }
 
     /// Fringe period along rows, from a few rows of red light; the whole row when there is none to see.

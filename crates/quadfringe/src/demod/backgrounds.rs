@@ -8,6 +8,7 @@
 use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, take};
 use super::local_fit::LocalFit;
 use super::scene::Scene;
+use super::slopes::Slopes;
 use crate::angle::sin_cos;
 use crate::slots::Slots;
 use multiversion::multiversion;
@@ -22,8 +23,9 @@ const OWN_COLOUR_NOISES: f32 = 0.2;
 const OWN_COLOUR_MIN: f32 = 0.01;
 /// Sides of the cells in fringe periods.
 const CELL: f64 = 0.35;
-/// Rows of pixels that stand for a row of cells.
-const SAMPLED_ROWS: usize = 4;
+/// Rows of pixels that stand for a row of cells: in the last fits, and on the way there.
+pub(crate) const ROWS: usize = 4;
+pub(crate) const ROUGH_ROWS: usize = 2;
 /// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
 const RIDGE: f32 = 5e-2;
 /// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
@@ -38,7 +40,7 @@ pub(crate) struct Backgrounds {
     maps: CellMaps,
     next: CellMaps,
     sums: CellMaps,
-    slots: Slots<(RowMaps, CellWork)>,
+    slots: Slots<([RowMaps; 2], CellWork)>,
 }
 
 impl Backgrounds {
@@ -54,14 +56,20 @@ impl Backgrounds {
 
     /// Start from what is known without orders, averaged over the surroundings: where the phase hardly changes in a window
     /// the fit has nothing better to go by.
-    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit) {
+    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit, slopes: &Slopes, ratios: [f32; 3]) {
         let fine = scene.grid;
-        self.grid = Grid::new([fine.height, fine.width], (CELL * scene.period_px).max(fine.step as f64));
+        let side = (CELL * scene.period_px).max(fine.step as f64);
+        self.grid = Grid::with_stride([fine.height, fine.width], fine.stride, side);
         let times = self.grid.step / fine.step;
         self.next.fill::<8>(&self.grid, |row, mut lines| {
             for column in 0..lines[0].len() {
                 let inside = |at: usize, count: usize| (at * times + times / 2).min(count - 1);
-                let channels = fit.cell(inside(row, fine.rows), inside(column, fine.columns));
+                let cell = [inside(row, fine.rows), inside(column, fine.columns)];
+                let mut channels = fit.cell(cell[0], cell[1]);
+                let loss = slopes.loss_at(scene, cell);
+                for ([_, b], ratio) in channels.iter_mut().zip([ratios[0], ratios[1], ratios[0], ratios[2]]) {
+                    *b /= 1.0 - loss * ratio * ratio;
+                }
                 for (line, value) in lines.iter_mut().zip(channels.as_flattened()) {
                     line[column] = *value;
                 }
@@ -70,37 +78,40 @@ impl Backgrounds {
         self.draw_together(scene, f32::INFINITY);
     }
 
-    /// Backgrounds and modulations at row `y`: a, b of R, of G, of B, of IR.
-    pub fn sample<'a>(&self, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 8] {
-        maps.sample(&self.grid, &self.maps, 0, y)
+    /// Backgrounds and modulations at row `y` of a scene, that of the fit or a finer one: a, b of R, of G, of B, of IR.
+    pub fn sample<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 8] {
+        maps.sample(&self.grid.over(scene.grid), &self.maps, 0, y)
     }
 
     /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.
     pub fn cell(&self, scene: &Scene<'_>, row: usize, column: usize) -> [[f32; 2]; 4] {
-        let times = self.grid.step / scene.grid.step;
+        let times = self.grid.over(scene.grid).step / scene.grid.step;
         [0, 2, 4, 6].map(|c| [c, c + 1].map(|k| self.maps.line(row / times, k)[column / times]))
     }
 
-    /// Fit them to an absolute phase in rad. Pixels that are further from any such model than `misfit_max` times their
+    /// Fit them to an absolute phase in rad by `most` rows of pixels for a row of cells. Pixels that are further from any such model than `misfit_max` times their
     /// modulation (root mean square) take no part. `relative_noise` is the noise over the modulation.
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
         ratios: [f32; 3],
-        phase: &[f32],
-        modulation: &[f32],
+        [phase, modulation]: [&[f32]; 2],
+        slopes: &Slopes,
         (misfit_max, relative_noise): (f32, f32),
+        most: usize,
     ) {
         let Self { grid, maps, next, sums, slots } = self;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
-        grid.window_sums::<SUMS, RowMaps>(
-            (sigma, SAMPLED_ROWS),
+        grid.window_sums::<SUMS, [RowMaps; 2]>(
+            (sigma, most),
             slots,
             sums,
             next,
-            |rows, y, sums| {
+            |[rows, losses], y, sums| {
                 let model = rows.sample::<8>(grid, maps, 0, y);
-                let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
+                let [phase, modulation, usable] =
+                    [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
+                let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
                 add_projected(model, pixels, scene.rows(y), ratios, 4.0 * misfit_max * misfit_max, sums);
             },
             |row, sums, out| {
@@ -116,7 +127,7 @@ impl Backgrounds {
         let Self { grid, maps, next, sums, slots } = self;
         let sigma = SURROUNDINGS * scene.period_px as f32 / grid.step as f32;
         let own = &*next;
-        grid.smooth::<8, RowMaps>(
+        grid.smooth::<8, [RowMaps; 2]>(
             sigma,
             slots,
             sums,
@@ -145,19 +156,22 @@ fn blend(threshold: f32, own: [&[f32]; 8], wide: [&[f32]; 8], out: &mut [f32]) {
     }
 }
 
-/// Cosines of the four channels and the derivative of each by the phase of the first.
+/// Cosines of the four channels and the derivative of each by the phase of the first; `loss` is the share of the contrast
+/// of the first that is lost, see [`Slopes::loss`].
 #[inline(always)]
-pub(crate) fn carriers(phase: f32, [_, second, third]: [f32; 3]) -> ([f32; 4], [f32; 4]) {
+pub(crate) fn carriers(phase: f32, [_, second, third]: [f32; 3], loss: f32) -> ([f32; 4], [f32; 4]) {
     let (s, c) = sin_cos(phase);
     let (s_g, c_g) = sin_cos(second * phase);
     let (s_ir, c_ir) = sin_cos(third * phase);
-    ([c, c_g, -s, c_ir], [-s, -second * s_g, -c, -third * s_ir])
+    let kept = [1.0, second * second, 1.0, third * third].map(|square| 1.0 - loss * square);
+    let scale = |values: [f32; 4]| [0, 1, 2, 3].map(|k| kept[k] * values[k]);
+    (scale([c, c_g, -s, c_ir]), scale([-s, -second * s_g, -c, -third * s_ir]))
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_projected(
     model: [&[f32]; 8],
-    pixels: [&[f32]; 3],
+    pixels: [&[f32]; 4],
     light: [&[f32]; 4],
     ratios: [f32; 3],
     misfit_max: f32,
@@ -166,12 +180,12 @@ fn add_projected(
     let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
         let (model, light) = (take(&model, i), take(&light, i));
-        let [phase, modulation, usable] = take(&pixels, i);
+        let [phase, modulation, usable, loss] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
-            let pixel = [phase[x], modulation[x], usable[x]];
+            let pixel = [phase[x], modulation[x], usable[x], loss[x]];
             let own = project(model, pixel, seen, ratios, misfit_max);
             for k in 0..SUMS {
                 terms[k][x] = own[k];
@@ -185,12 +199,12 @@ fn add_projected(
 #[inline(always)]
 fn project(
     model: [f32; 8],
-    [phase, modulation, usable]: [f32; 3],
+    [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
     ratios: [f32; 3],
     misfit_max: f32,
 ) -> [f32; SUMS] {
-    let (cosines, derivatives) = carriers(phase, ratios);
+    let (cosines, derivatives) = carriers(phase, ratios, loss);
     let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
     let (mut mm, mut md, mut dd, mut ms) = (1e-9f32, 0.0f32, 1e-9f32, 0.0f32);
     for c in 0..4 {
@@ -374,23 +388,23 @@ mod tests {
         let fringes = [[0.5, 0.4], [0.45, 0.38], [0.55, 0.42], [0.4, 0.37]];
         let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
             let [a, b] = fringes[c];
-            (0..grid.pixels()).map(|i| texture(i) * (a + b * carriers(truth[i], ratios).0[c])).collect()
+            (0..grid.pixels()).map(|i| texture(i) * (a + b * carriers(truth[i], ratios, 0.0).0[c])).collect()
         });
         let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
         let light = planes.each_ref().map(Vec::as_slice);
-        let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0 };
-        let (mut fit, mut found) = (LocalFit::default(), Backgrounds::new());
+        let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+        let (mut fit, mut found, slopes) = (LocalFit::default(), Backgrounds::new(), Slopes::flat(&grid));
         let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
         let maps = super::super::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
         fit.run(&scene, &usable, 0.02, maps);
-        found.start(&scene, &fit);
+        found.start(&scene, &fit, &slopes, ratios);
         // The phase given is 0.05 rad off, as a two-step phase with wrong backgrounds is.
         let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
         for _ in 0..3 {
-            found.fit(&scene, ratios, &phase, &modulation, (0.3, 0.0));
+            found.fit(&scene, ratios, [&phase, &modulation], &slopes, (0.3, 0.0), ROWS);
         }
         let mut maps = RowMaps::default();
-        let rows = found.sample(48, &mut maps);
+        let rows = found.sample(&scene, 48, &mut maps);
         for x in 40..216 {
             // Only ratios are defined.
             let scale = rows[0][x] / fringes[0][0];

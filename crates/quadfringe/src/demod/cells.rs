@@ -69,10 +69,31 @@ pub(crate) struct CellWork {
 
 impl Grid {
     /// Cells of at most `side` pixels.
-    pub fn new([height, width]: [usize; 2], side: f64) -> Self {
+    pub fn new(shape: [usize; 2], side: f64) -> Self {
+        Self::with_stride(shape, shape[1].next_multiple_of(LANES), side)
+    }
+
+    /// The same over planes with rows of `stride` pixels, whole vectors.
+    pub fn with_stride([height, width]: [usize; 2], stride: usize, side: f64) -> Self {
         let step = 1 << (side.clamp(1.0, LANES as f64).log2() as usize);
-        let stride = width.next_multiple_of(LANES);
         Self { height, width, stride, step, rows: height.div_ceil(step), columns: stride / step }
+    }
+
+    /// The same cells over an image with one pixel for every `factor` x `factor`.
+    pub fn shrunk(&self, factor: usize) -> Self {
+        Self {
+            height: self.height.div_ceil(factor),
+            width: self.width.div_ceil(factor),
+            stride: self.stride / factor,
+            step: self.step / factor,
+            ..*self
+        }
+    }
+
+    /// The same cells over the pixels of `other`.
+    pub fn over(&self, other: &Self) -> Self {
+        let Self { height, width, stride, .. } = *other;
+        Self { height, width, stride, step: self.step * stride / self.stride, ..*self }
     }
 
     /// Pixels of a padded plane.
@@ -190,12 +211,7 @@ impl Grid {
 
     /// Term `k` of columns of pixels as one sum per cell.
     pub fn fold<const N: usize>(&self, k: usize, columns: &[[Lanes; N]], line: &mut [f32]) {
-        let per_vector = LANES / self.step;
-        for (vector, cells) in columns.iter().zip(line.chunks_exact_mut(per_vector)) {
-            for (cell, pixels) in cells.iter_mut().zip(vector[k].chunks_exact(self.step)) {
-                *cell = pixels.iter().sum();
-            }
-        }
+        fold(self.step, k, columns.as_flattened(), N, line);
     }
 
     /// A map given on the cells, at row `y` of the image: bilinear, level at the borders.
@@ -263,18 +279,60 @@ impl RowMaps {
         first: usize,
         y: usize,
     ) -> [&[f32]; N] {
+        self.sample_mut(grid, maps, first, y).map(|row| &*row)
+    }
+
+    /// The same, to be changed.
+    pub fn sample_mut<const N: usize>(
+        &mut self,
+        grid: &Grid,
+        maps: &CellMaps,
+        first: usize,
+        y: usize,
+    ) -> [&mut [f32]; N] {
         self.rows.resize_with(self.rows.len().max(N), Vec::new);
         for (k, row) in self.rows[..N].iter_mut().enumerate() {
             row.resize(grid.stride, 0.0);
             grid.expand(maps, first + k, y, &mut self.mix, row);
         }
-        std::array::from_fn(|k| self.rows[k].as_slice())
+        let mut rows = self.rows.iter_mut();
+        std::array::from_fn(|_| rows.next().expect("made above").as_mut_slice())
+    }
+}
+
+/// Sums of `step` pixels of every `count`th vector from number `k` on.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn fold(step: usize, k: usize, vectors: &[Lanes], count: usize, line: &mut [f32]) {
+    match step {
+        1 => fold_by::<1>(k, vectors, count, line),
+        2 => fold_by::<2>(k, vectors, count, line),
+        4 => fold_by::<4>(k, vectors, count, line),
+        8 => fold_by::<8>(k, vectors, count, line),
+        _ => fold_by::<16>(k, vectors, count, line),
+    }
+}
+
+#[inline(always)]
+fn fold_by<const S: usize>(k: usize, vectors: &[Lanes], count: usize, line: &mut [f32]) {
+    for (vector, cells) in vectors[k..].iter().step_by(count).zip(line.chunks_exact_mut(LANES / S)) {
+        for (cell, pixels) in cells.iter_mut().zip(vector.as_chunks::<S>().0) {
+            // By halves: a sum one after the other would wait for each.
+            let mut sums = *pixels;
+            let mut half = S / 2;
+            while half > 0 {
+                for x in 0..half {
+                    sums[x] += sums[x + half];
+                }
+                half /= 2;
+            }
+            *cell = sums[0];
+        }
     }
 }
 
 /// Linear interpolation between centres of cells `step` pixels wide; `mix` has one cell more on each side.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
+pub(crate) fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
     match step {
         1 => out.copy_from_slice(&mix[1..=out.len()]),
         2 => spread_by::<2>(mix, out),
@@ -299,7 +357,7 @@ fn spread_by<const S: usize>(mix: &[f32], out: &mut [f32]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn blend(above: &[f32], below: &[f32], weight: f32, out: &mut [f32]) {
+pub(crate) fn blend(above: &[f32], below: &[f32], weight: f32, out: &mut [f32]) {
     for ((out, a), b) in out.iter_mut().zip(above).zip(below) {
         *out = a + (b - a) * weight;
     }

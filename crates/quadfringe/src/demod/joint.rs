@@ -22,18 +22,25 @@ pub(crate) struct Joint {
     slots: Slots<Rows>,
     /// Misfit of the four channels: mean square in linear light.
     pub misfit: Vec<f32>,
+    /// Modulation of R and B in linear light.
+    pub modulation: Vec<f32>,
+    /// What the window of the last round knows of the phase of every pixel: sum of weighted squared derivatives, 1/rad^2 in
+    /// units of linear light. The uncertainty is made of it.
+    pub information: Vec<f32>,
 }
 
-/// Model and derivative of the four channels for an albedo of 1, and the albedo that fits best, on one row.
+/// Model and derivative of the four channels for an albedo of 1, the albedo that fits best, and the mean modulation of R and B
+/// for an albedo of 1, on one row.
 #[derive(Debug, Default)]
 struct ModelRow {
-    rows: [Vec<f32>; 9],
+    rows: [Vec<f32>; 10],
 }
 
 /// Rows of one task.
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
+    losses: RowMaps,
     ring: [ModelRow; 3],
     albedo: Vec<f32>,
     smooth: Vec<f32>,
@@ -53,14 +60,16 @@ impl Joint {
         let grid = scene.grid;
         self.steps.resize(grid.pixels());
         self.misfit.resize(grid.pixels(), 0.0);
-        let Self { steps, misfit, slots } = self;
+        self.modulation.resize(grid.pixels(), 0.0);
+        self.information.resize(grid.pixels(), 0.0);
+        let Self { steps, misfit, modulation, information, slots } = self;
         let before = &*phase;
         let out = steps
             .phase
             .par_chunks_mut(grid.stride)
             .zip(steps.numerator.par_chunks_mut(grid.stride))
             .zip(steps.denominator.par_chunks_mut(grid.stride))
-            .zip(misfit.par_chunks_mut(grid.stride))
+            .zip(misfit.par_chunks_mut(grid.stride).zip(modulation.par_chunks_mut(grid.stride)))
             .chunks(BLOCK)
             .enumerate();
         out.for_each_init(
@@ -69,12 +78,15 @@ impl Joint {
                 let rows = &mut **rows;
                 let first = block * BLOCK;
                 let model = |rows: &mut Rows, y: usize, at: usize| {
-                    let maps = backgrounds.sample(y, &mut rows.maps);
-                    rows.ring[at].fill(maps, scene.row(before, y), scene.rows(y), ratios);
+                    let maps = backgrounds.sample(scene, y, &mut rows.maps);
+                    let loss = window.loss(y, &mut rows.losses);
+                    rows.ring[at].fill(maps, [scene.row(before, y), loss], scene.rows(y), ratios);
                 };
                 model(rows, around(first, grid.height)[0], 0);
                 model(rows, first, 1);
-                for (i, (((phase, numerator), denominator), misfit)) in out.into_iter().enumerate() {
+                for (i, (((phase, numerator), denominator), (misfit, modulation))) in
+                    out.into_iter().enumerate()
+                {
                     let y = first + i;
                     model(rows, around(y, grid.height)[2], (i + 2) % 3);
                     let Rows { ring, albedo, smooth, window: window_rows, .. } = rows;
@@ -83,31 +95,44 @@ impl Joint {
                     binomial(near, grid.width, smooth, albedo);
                     let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
                     let lit = [window.modulation(y), scene.row(scene.usable, y)];
-                    linearise(model, albedo, scene.rows(y), lit, [numerator, denominator, misfit]);
+                    linearise(
+                        model,
+                        albedo,
+                        scene.rows(y),
+                        lit,
+                        [numerator, denominator, misfit, modulation],
+                    );
                     phase.copy_from_slice(scene.row(before, y));
                     window.along(y, window_rows, [phase, numerator, denominator]);
                 }
             },
         );
-        window.down(&self.steps, &self.slots, |rows| &mut rows.window, phase);
+        window.down(steps, slots, |rows| &mut rows.window, phase, information);
     }
 }
 
 impl ModelRow {
-    fn fill(&mut self, maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3]) {
-        self.rows.iter_mut().for_each(|row| row.resize(phase.len(), 0.0));
-        predict(maps, phase, light, ratios, self.rows.each_mut().map(Vec::as_mut_slice));
+    fn fill(&mut self, maps: [&[f32]; 8], pixels: [&[f32]; 2], light: [&[f32]; 4], ratios: [f32; 3]) {
+        self.rows.iter_mut().for_each(|row| row.resize(pixels[0].len(), 0.0));
+        predict(maps, pixels, light, ratios, self.rows.each_mut().map(Vec::as_mut_slice));
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn predict(maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3], out: [&mut [f32]; 9]) {
-    let (maps, phase, light, mut out) = (maps.map(lanes), lanes(phase), light.map(lanes), out.map(lanes_mut));
-    for (i, phase) in phase.iter().enumerate() {
-        let (maps, light) = (take(&maps, i), take(&light, i));
-        let mut found = [[0.0; LANES]; 9];
+fn predict(
+    maps: [&[f32]; 8],
+    pixels: [&[f32]; 2],
+    light: [&[f32]; 4],
+    ratios: [f32; 3],
+    out: [&mut [f32]; 10],
+) {
+    let (maps, pixels, light) = (maps.map(lanes), pixels.map(lanes), light.map(lanes));
+    let mut out = out.map(lanes_mut);
+    for i in 0..pixels[0].len() {
+        let (maps, [phase, loss], light) = (take(&maps, i), take(&pixels, i), take(&light, i));
+        let mut found = [[0.0; LANES]; 10];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios);
+            let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
             for c in 0..4 {
                 let (a, b) = (maps[2 * c][x], maps[2 * c + 1][x]);
@@ -120,6 +145,7 @@ fn predict(maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3
             }
             let albedo = top / bottom;
             found[8][x] = if albedo > 1e-4 { albedo } else { 1e-4 };
+            found[9][x] = 0.5 * (maps[1][x] + maps[5][x]);
         }
         put(&mut out, i, &found);
     }
@@ -127,12 +153,18 @@ fn predict(maps: [&[f32]; 8], phase: &[f32], light: [&[f32]; 4], ratios: [f32; 3
 
 /// Gauss-Newton terms of every pixel with the albedo eliminated, and how far the channels are from their model.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn linearise(model: [&[f32]; 9], albedo: &[f32], light: [&[f32]; 4], lit: [&[f32]; 2], out: [&mut [f32]; 3]) {
+fn linearise(
+    model: [&[f32]; 10],
+    albedo: &[f32],
+    light: [&[f32]; 4],
+    lit: [&[f32]; 2],
+    out: [&mut [f32]; 4],
+) {
     let (model, albedo, light, lit) = (model.map(lanes), lanes(albedo), light.map(lanes), lit.map(lanes));
     let mut out = out.map(lanes_mut);
     for (i, albedo) in albedo.iter().enumerate() {
         let (model, light, lit) = (take(&model, i), take(&light, i), take(&lit, i));
-        let mut found = [[0.0; LANES]; 3];
+        let mut found = [[0.0; LANES]; 4];
         for x in 0..LANES {
             let albedo = albedo[x];
             let (mut top, mut bottom, mut square) = (0.0f32, 0.0f32, 0.0f32);
@@ -154,6 +186,7 @@ fn linearise(model: [&[f32]; 9], albedo: &[f32], light: [&[f32]; 4], lit: [&[f32
             found[0][x] = if on { top } else { 0.0 };
             found[1][x] = if on { kept } else { 0.0 };
             found[2][x] = square;
+            found[3][x] = if lit[0][x] > 0.0 { albedo * model[9][x] } else { 0.0 };
         }
         put(&mut out, i, &found);
     }

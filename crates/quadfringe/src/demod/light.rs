@@ -26,6 +26,8 @@ pub(crate) struct LightFinder {
     heights: Vec<f32>,
     sums: CellMaps,
     slots: Slots<(Rows, CellWork)>,
+    /// Standard deviation of the intensities of the last image, in linear light.
+    pub noise: f32,
 }
 
 /// Rows of one task.
@@ -41,7 +43,13 @@ impl LightFinder {
     pub fn find(&mut self, grid: &Grid, light: [&[f32]; 4], period_px: f64, range_min: f32, lit: &mut [f32]) {
         let reach = (SURROUNDINGS * period_px as f32 / grid.step as f32).ceil();
         self.surroundings(grid, light, reach, range_min);
+        self.refind(grid, light, lit);
+    }
+
+    /// The same on a finer image of the same scene: its grid has the cells of the last [`Self::find`].
+    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lit: &mut [f32]) {
         let (stride, noise) = (grid.stride, noise(light[0], grid));
+        self.noise = noise;
         self.heights.resize(grid.pixels(), 0.0);
         let (smoothed, slots) = (&self.smoothed, &self.slots);
         self.heights.par_chunks_mut(stride).enumerate().for_each_init(

@@ -13,8 +13,6 @@ use crate::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Width (sigma) of the fitting window in fringe periods: shorter follows edges, longer averages noise.
-const WINDOW: f32 = 0.3;
 /// Width (sigma) of the first window, which has to average whole fringes away.
 const FIRST_WINDOW: f32 = 0.5;
 /// Rows of pixels that stand for a row of cells: neighbours tell nearly the same, and the window holds hundreds.
@@ -81,6 +79,9 @@ struct Rows {
 }
 
 impl LocalFit {
+    /// Width (sigma) of the fitting window in fringe periods: shorter follows edges, longer averages noise.
+    pub const WINDOW: f32 = 0.3;
+
     /// Fit a scene with fringes in any direction. `lit` is 1 where light of the projector falls; `least` is the least
     /// modulation that counts.
     pub fn run(&mut self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
@@ -134,7 +135,7 @@ impl LocalFit {
     fn solve(&mut self, scene: &Scene<'_>) {
         let start = &self.start;
         scene.grid.window_sums::<SUMS, Rows>(
-            (scene.cells(WINDOW), SAMPLED_ROWS),
+            (scene.cells(Self::WINDOW), SAMPLED_ROWS),
             &self.slots,
             &mut self.sums,
             &mut self.maps,

@@ -11,6 +11,8 @@ pub(crate) struct Scene<'a> {
     pub grid: &'a Grid,
     /// Fringe period across the fringes in pixels.
     pub period_px: f64,
+    /// Pixels of the camera along a side of a pixel, which is their mean.
+    pub factor: usize,
 }
 
 impl<'a> Scene<'a> {

@@ -7,12 +7,12 @@ use crate::slots::Slots;
 use multiversion::multiversion;
 use std::f32::consts::PI;
 
-/// Width (sigma) in cells over which slopes are averaged.
-const CELLS: f32 = 3.0;
+/// Width (sigma) in fringe periods over which slopes are averaged.
+const WIDTH: f32 = 0.43;
 /// Rows of pixels that stand for a row of cells.
 const SAMPLED_ROWS: usize = 2;
 
-/// Slopes of the phase in rad per pixel.
+/// Slopes of the phase in rad per cell, which stays right when the cells are laid over another image.
 #[derive(Debug)]
 pub(crate) struct Slopes {
     maps: CellMaps,
@@ -22,7 +22,7 @@ pub(crate) struct Slopes {
 
 impl Default for Slopes {
     fn default() -> Self {
-        Self { maps: CellMaps::new(2), sums: CellMaps::default(), slots: Slots::default() }
+        Self { maps: CellMaps::new(3), sums: CellMaps::default(), slots: Slots::default() }
     }
 }
 
@@ -31,7 +31,7 @@ impl Slopes {
     pub fn measure(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
         let grid = scene.grid;
         grid.window_sums::<4, [Vec<f32>; 2]>(
-            (CELLS, SAMPLED_ROWS),
+            (scene.cells(WIDTH), SAMPLED_ROWS),
             &self.slots,
             &mut self.sums,
             &mut self.maps,
@@ -47,18 +47,42 @@ impl Slopes {
                 add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
             },
             |_, [w, along, v, down], out| {
-                let columns = w.len();
+                let (columns, step) = (w.len(), grid.step as f32);
                 for i in 0..columns {
-                    out[i] = along[i] / w[i].max(1e-6);
-                    out[columns + i] = down[i] / v[i].max(1e-6);
+                    out[i] = step * along[i] / w[i].max(1e-6);
+                    out[columns + i] = step * down[i] / v[i].max(1e-6);
+                    out[2 * columns + i] = (out[i] * out[i] + out[columns + i] * out[columns + i]) / 24.0;
                 }
             },
         );
     }
 
+    /// Slopes of nothing.
+    #[cfg(test)]
+    pub fn flat(grid: &super::cells::Grid) -> Self {
+        let mut flat = Self::default();
+        flat.maps.fill::<3>(grid, |_, lines| lines.into_iter().for_each(|line| line.fill(0.0)));
+        flat
+    }
+
     /// Slopes along and down at a cell.
     pub fn at(&self, row: usize, column: usize) -> [f32; 2] {
         [0, 1].map(|k| self.maps.line(row, k)[column])
+    }
+
+    /// Share of the contrast of the first fringes that averaging camera pixels has cost in row `y`; that of others goes with
+    /// the square of their number. Of a phase with the step `s` per pixel, the mean of `f` parts of it, it is
+    /// `(1 - 1 / f^2) s^2 / 24` in each direction.
+    pub fn loss<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample_mut(scene.grid, &self.maps, 2, y);
+        let scale = loss_scale(scene);
+        row.iter_mut().for_each(|loss| *loss *= scale);
+        row
+    }
+
+    /// The same at a cell.
+    pub fn loss_at(&self, scene: &Scene<'_>, [row, column]: [usize; 2]) -> f32 {
+        self.maps.line(row, 2)[column] * loss_scale(scene)
     }
 
     /// Slopes along row `y`.
@@ -72,6 +96,10 @@ impl Slopes {
         let [row] = maps.sample(scene.grid, &self.maps, 1, y);
         row
     }
+}
+
+fn loss_scale(scene: &Scene<'_>) -> f32 {
+    (1.0 - 1.0 / (scene.factor * scene.factor) as f32) / (scene.grid.step * scene.grid.step) as f32
 }
 
 /// Adds weights and weighted differences between lit pixels; a difference near half a turn belongs to an edge.

@@ -73,6 +73,11 @@ impl<'a> Window<'a> {
         self.scene.row(self.modulation, y)
     }
 
+    /// Share of contrast that is lost in row `y`, see [`Slopes::loss`].
+    pub fn loss<'b>(&self, y: usize, maps: &'b mut RowMaps) -> &'b [f32] {
+        self.slopes.loss(self.scene, y, maps)
+    }
+
     /// The same with a reach of two pixels, enough on the way to a solution.
     pub fn near(self) -> Self {
         Self { radius: self.radius.min(2), ..self }
@@ -95,32 +100,44 @@ impl<'a> Window<'a> {
         average_along(&taps, padded, [slope, sharpness], [phase, denominator]);
     }
 
-    /// Distances and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
+    /// Half distances in cells and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
     fn taps(&self, numbers: std::ops::Range<usize>) -> Vec<[f32; 2]> {
         let distance = |k: usize| k as f32 - self.radius as f32;
-        numbers.map(|k| [0.5 * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
+        let half = 0.5 / self.scene.grid.step as f32;
+        numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
     }
 
-    /// Average along columns what [`Self::along`] left.
+    /// Average along columns what [`Self::along`] left; `information` receives the weights that the window has added up.
     pub fn down<T: Send>(
         &self,
         steps: &Steps,
         slots: &Slots<T>,
         rows: impl Fn(&mut T) -> &mut WindowRows + Sync,
         phase: &mut [f32],
+        information: &mut [f32],
     ) {
         let stride = self.scene.grid.stride;
-        phase.par_chunks_mut(BLOCK * stride).enumerate().for_each_init(
+        let out = phase.par_chunks_mut(BLOCK * stride).zip(information.par_chunks_mut(BLOCK * stride));
+        out.enumerate().for_each_init(
             || slots.take(),
-            |slot, (block, phase)| {
+            |slot, (block, (phase, information))| {
                 let first = block * BLOCK;
                 let rows = rows(slot);
                 self.slopes_down(first, phase.len() / stride, rows);
-                for (i, phase) in phase.chunks_exact_mut(stride).enumerate() {
-                    self.row_down(steps, first + i, i, rows, phase);
+                let lines = phase.chunks_exact_mut(stride).zip(information.chunks_exact_mut(stride));
+                for (i, (phase, information)) in lines.enumerate() {
+                    self.row_down(steps, first + i, i, rows, [phase, information]);
                 }
             },
         );
+    }
+
+    /// Sum of squared weights over the sum of weights, for a window that lies on one surface, or is cut in half by an edge:
+    /// noise of the mean is this share of noise over information.
+    pub fn share(&self) -> f32 {
+        let taps = self.taps(0..2 * self.radius + 1);
+        let [squares, sum] = [2, 1].map(|power| taps.iter().map(|[_, near]| near.powi(power)).sum::<f32>());
+        (squares / sum).powi(2)
     }
 
     /// Slopes of the rows that `count` rows from `first` on need.
@@ -134,7 +151,7 @@ impl<'a> Window<'a> {
     }
 
     /// Row `y`, number `index` of its block.
-    fn row_down(&self, steps: &Steps, y: usize, index: usize, rows: &mut WindowRows, out: &mut [f32]) {
+    fn row_down(&self, steps: &Steps, y: usize, index: usize, rows: &mut WindowRows, out: [&mut [f32]; 2]) {
         let grid = self.scene.grid;
         self.sharpen(y, &mut rows.sharpness);
         let slope = |k: usize| &rows.slopes[(index + k) * grid.stride..][..grid.stride];
@@ -206,9 +223,10 @@ fn average_along(taps: &[[f32; 2]], there: [&[f32]; 4], here: [&[f32]; 2], out: 
 
 /// The same along columns, over `there`: phase, weight and slope of every neighbouring row.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out: &mut [f32]) {
+fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out: [&mut [f32]; 2]) {
     let here = here.map(lanes);
-    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
+    let mut out = out.map(lanes_mut);
+    for i in 0..here[0].len() {
         let [phase, slope, sharpness] = take(&here, i);
         let mut sums = [[0.0; LANES]; 2];
         for (&[half, near], there) in taps.iter().zip(there) {
@@ -220,9 +238,11 @@ fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out
                 sums[1][x] += known;
             }
         }
+        let mut found = [phase, sums[1]];
         for x in 0..LANES {
-            out[x] = phase[x] + sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
+            found[0][x] += sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
         }
+        put(&mut out, i, &found);
     }
 }
 
@@ -268,7 +288,7 @@ mod tests {
         let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + 0.02 * uniform()).collect();
         let light = vec![0.5; grid.pixels()];
         let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
-        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0 };
+        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
         let mut slopes = Slopes::default();
         slopes.measure(&scene, &seen, &modulation);
         let window = Window::new(&scene, &slopes, &modulation, noise(&scene, &seen, &modulation));
@@ -282,8 +302,8 @@ mod tests {
         for (y, ((phase, numerator), denominator)) in lines.enumerate() {
             window.along(y, &mut rows, [phase, numerator, denominator]);
         }
-        let mut phase = vec![0.0; grid.pixels()];
-        window.down(&steps, &Slots::<WindowRows>::default(), |rows| rows, &mut phase);
+        let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
+        window.down(&steps, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut information);
         let error = |i: usize| (phase[i] - truth(i)).abs();
         let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
         // Beside the step its rise leaks into the slopes.

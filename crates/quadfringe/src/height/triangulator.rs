@@ -87,6 +87,33 @@ impl Triangulator {
         points(self, row, columns_px, out);
     }
 
+    /// What an uncertain column means for the depth, of one image row: `uncertainty` holds standard deviations of the columns in
+    /// px and receives those of Z in mm, NaN where [`Self::xyz_row`] has no point. The point moves along its ray, so X and Y
+    /// go with Z.
+    ///
+    /// # Panics
+    /// As [`Self::xyz_row`].
+    ///
+    /// ```
+    /// use quadfringe::{height::Triangulator, rig::Bench};
+    /// let bench = Bench::reference();
+    /// let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
+    /// let (mut uncertainty, mut points) = (vec![0.5; 1024], [vec![0.0; 3 * 1024], vec![0.0; 3 * 1024]]);
+    /// triangulator.depth_uncertainty_row(384, &[450.0; 1024], &mut uncertainty);
+    /// triangulator.xyz_row(384, &[449.5; 1024], &mut points[0]);
+    /// triangulator.xyz_row(384, &[450.5; 1024], &mut points[1]);
+    /// let z_mm = 3 * 512 + 2;
+    /// assert!((2.0 * uncertainty[512] - (points[1][z_mm] - points[0][z_mm]).abs()).abs() < 1e-3);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    pub fn depth_uncertainty_row(&self, row: usize, columns_px: &[f32], uncertainty: &mut [f32]) {
+        let (height, width) = self.shape();
+        assert!(row < height, "row {row} of an image of {height} rows");
+        assert_eq!(columns_px.len(), width, "columns_px must hold one row");
+        assert_eq!(uncertainty.len(), width, "uncertainty must hold one row");
+        deviations(self, row, columns_px, uncertainty);
+    }
+
     /// Points of a whole column map `(height, width)`, float32 `(height, width, 3)` in mm, NaN for no data; rows in
     /// parallel.
     ///
@@ -141,6 +168,16 @@ fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut
     }
 }
 
+/// A row of standard deviations, a block of pixels at a time.
+#[multiversion(targets("x86_64+avx2"))]
+fn deviations(triangulator: &Triangulator, row: usize, columns_px: &[f32], uncertainty: &mut [f32]) {
+    let blocks = columns_px.chunks(CHUNK).zip(uncertainty.chunks_mut(CHUNK));
+    for (index, (columns, uncertainty)) in blocks.enumerate() {
+        let directions = triangulator.directions(row, index * CHUNK, columns.len());
+        triangulator.projector.carry(columns, &directions, uncertainty);
+    }
+}
+
 fn directions_of(camera: &Device) -> Array2<[f32; 2]> {
     let mut table = Array2::from_elem((camera.height, camera.width), [f32::NAN; 2]);
     table.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
@@ -185,16 +222,7 @@ impl ColumnSheets {
     /// Points where rays `(x, y, 1)` meet the sheets of `columns`, written as X, Y, Z; NaN behind the camera.
     #[inline(always)]
     fn intersect(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], xyz: &mut [f32]) {
-        let mut k = [f32::NAN; CHUNK];
-        let scale = 1.0 / self.focal_px;
-        for (k, u) in k.iter_mut().zip(columns) {
-            *k = (u - self.centre_px) * scale;
-        }
-        if let Some(distortion) = &self.distortion {
-            for (k, (x, y)) in k.iter_mut().zip(x.iter().zip(y)) {
-                *k = self.ideal_coordinate(distortion, *k, *x, *y);
-            }
-        }
+        let [k, _] = self.ideal(columns, [x, y]);
         let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
         let mut depth = [0.0; CHUNK];
         for i in 0..CHUNK {
@@ -206,9 +234,45 @@ impl ColumnSheets {
         write_points(&depth, x, y, xyz);
     }
 
-    /// Ideal normalised column where the projector's image of the ray `(x, y, 1)` has the distorted column `measured`.
+    /// Standard deviations times the change of the depth with the column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times
+    /// `dk / du`.
     #[inline(always)]
-    fn ideal_coordinate(&self, distortion: &[f32; 5], measured: f32, x: f32, y: f32) -> f32 {
+    fn carry(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], uncertainty: &mut [f32]) {
+        let [k, stretch] = self.ideal(columns, [x, y]);
+        let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
+        let mut slope = [0.0; CHUNK];
+        for i in 0..CHUNK {
+            let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
+            let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
+            let inverse = 1.0 / (b0 - k[i] * b2);
+            let t = (k[i] * a2 - a0) * inverse;
+            let grown = (a2 + t * b2) * inverse * stretch[i];
+            slope[i] = if (t > 0.0) & (t < f32::INFINITY) { grown } else { f32::NAN };
+        }
+        uncertainty.iter_mut().zip(&slope).for_each(|(value, slope)| *value *= slope.abs());
+    }
+
+    /// Ideal normalised coordinates of `columns`, and how they change with the column.
+    #[inline(always)]
+    fn ideal(&self, columns: &[f32], [x, y]: [&[f32; CHUNK]; 2]) -> [[f32; CHUNK]; 2] {
+        let scale = 1.0 / self.focal_px;
+        let (mut k, mut stretch) = ([f32::NAN; CHUNK], [scale; CHUNK]);
+        for (k, u) in k.iter_mut().zip(columns) {
+            *k = (u - self.centre_px) * scale;
+        }
+        if let Some(distortion) = &self.distortion {
+            for i in 0..CHUNK {
+                let (ideal, slope) = self.ideal_coordinate(distortion, k[i], x[i], y[i]);
+                (k[i], stretch[i]) = (ideal, scale / slope);
+            }
+        }
+        [k, stretch]
+    }
+
+    /// Ideal normalised column where the projector's image of the ray `(x, y, 1)` has the distorted column `measured`, and how
+    /// the distorted coordinate changes with the ideal one there.
+    #[inline(always)]
+    fn ideal_coordinate(&self, distortion: &[f32; 5], measured: f32, x: f32, y: f32) -> (f32, f32) {
         let [k1, k2, p1, p2, k3] = *distortion;
         let b = self.rotation.map(|r| r[0] * x + r[1] * y + r[2]);
         let a = self.centre;
@@ -216,7 +280,7 @@ impl ColumnSheets {
         let across = 1.0 / (a[2] * b[0] - a[0] * b[2]);
         let m0 = (a[1] * b[0] - a[0] * b[1]) * across;
         let s = (a[2] * b[1] - a[1] * b[2]) * across;
-        let mut k = measured;
+        let (mut k, mut slope) = (measured, 1.0);
         for _ in 0..NEWTON_STEPS {
             let m = m0 + s * k;
             let r2 = k * k + m * m;
@@ -224,10 +288,10 @@ impl ColumnSheets {
             let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
             let growth = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
             let value = k * radial + 2.0 * p1 * k * m + p2 * (r2 + 2.0 * k * k);
-            let slope = radial + k * growth * along + 2.0 * p1 * (m + k * s) + p2 * (2.0 * along + 4.0 * k);
+            slope = radial + k * growth * along + 2.0 * p1 * (m + k * s) + p2 * (2.0 * along + 4.0 * k);
             k -= (value - measured) / slope;
         }
-        k
+        (k, slope)
     }
 }
 

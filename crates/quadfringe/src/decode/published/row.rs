@@ -4,6 +4,7 @@ use crate::Shot;
 use crate::angle::{atan2, coarse_atan2};
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
+use crate::decode::uncertainty::{Sureness, two_step_deviation};
 use crate::demod::{Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, background_row};
 use crate::unwrap::Ladder;
 use multiversion::multiversion;
@@ -18,6 +19,8 @@ pub(super) struct RowPlan<'a> {
     pub weights: [Vec<f32>; 2],
     pub modulation_min: f32,
     pub quality_min: f32,
+    /// What the shot shows of its own noise.
+    pub sureness: Sureness,
 }
 
 impl RowPlan<'_> {
@@ -79,6 +82,11 @@ impl Rows {
         &self.light[0]
     }
 
+    /// Linear blue light.
+    pub fn blue(&self) -> &[f32] {
+        &self.light[2]
+    }
+
     /// Phase, modulation and quality from the light that was filled in.
     #[inline(always)]
     fn decode(&mut self, plan: &RowPlan<'_>, out: &mut OutputRow<'_>) {
@@ -87,7 +95,7 @@ impl Rows {
         for (channel, period_px) in [first, second, first, third].into_iter().enumerate() {
             self.remove_background(channel, period_px);
         }
-        self.two_step(out.modulation);
+        self.two_step(plan.sureness.noise, out.modulation, out.sigma);
         let fringes = [&*self.light[1], &*self.light[3]];
         plan.filter.transform(fringes, [second, third], &mut self.fourier);
         self.fourier(plan, Half::Real, out.modulation);
@@ -95,6 +103,8 @@ impl Rows {
         let wrapped = self.wrapped.each_ref().map(|row| &**row);
         plan.ladder.order_row(wrapped, out.phase, out.quality);
         plan.trust(out);
+        let odds = &plan.sureness.odds;
+        out.wrong.iter_mut().zip(&*out.quality).for_each(|(wrong, margin)| *wrong = odds.another(*margin));
         for x in unseen {
             (out.phase[x], out.modulation[x], out.quality[x]) = (f32::NAN, f32::NAN, f32::NAN);
         }
@@ -112,14 +122,15 @@ impl Rows {
     /// Step 3: R and B, their modulations made equal, (S2). The square of the modulation stands in for it until all
     /// channels are known.
     #[inline(always)]
-    fn two_step(&mut self, modulation: &mut [f32]) {
+    fn two_step(&mut self, noise: f32, modulation: &mut [f32], sigma: &mut [f32]) {
         let [red, _, blue, _] = self.light.each_ref().map(|row| &**row);
         let equal = (power(red) / power(blue).max(f32::MIN_POSITIVE)).sqrt();
-        let out = self.wrapped[0].iter_mut().zip(modulation);
-        for ((&red, &blue), (phase, modulation)) in red.iter().zip(blue).zip(out) {
+        let out = self.wrapped[0].iter_mut().zip(modulation).zip(sigma);
+        for ((&red, &blue), ((phase, modulation), sigma)) in red.iter().zip(blue).zip(out) {
             let blue = blue * equal;
             *phase = atan2(-blue, red);
             *modulation = red * red + blue * blue;
+            *sigma = two_step_deviation([red, blue], equal, noise);
         }
     }
 

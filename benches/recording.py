@@ -1,0 +1,122 @@
+"""Recording: megabytes a second against the disk itself, and shots that kill -9 takes away.
+
+    python benches/recording.py [--folder DIR] [--shots 300] [--kills 20] [--json FILE]
+
+Raw shots of 1024 x 768, four images of 8 bit with noise in them, 3.1 MB, are written into DIR as fast as they go, in
+turns with the same bytes written to a plain file; both are synced to the disk before the clock stops. Then writers are
+killed with SIGKILL at random times: a shot that one of them had reported and that is not on file, to the last byte,
+counts as lost. The bar is 150 MB/s or the plain file's speed, whichever is lower, and no shot lost; exit status 1
+otherwise.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+from time import perf_counter, process_time
+
+import numpy as np
+
+from quadfringe.data import AnyShot, Shot
+from quadfringe.files import figures_text
+from quadfringe.recording import Recorder, Recording
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
+from takes import kill_writer, whole
+
+SHAPE = (768, 1024)
+BAR_MB_PER_S = 150.0
+TURNS = 5
+
+
+def noisy_shots(count: int) -> list[AnyShot]:
+    noise = np.random.default_rng(1)
+    return [Shot(*(noise.integers(0, 256, SHAPE, np.uint8) for _ in range(4))) for _ in range(count)]
+
+
+def recorded(path: Path, shots: list[AnyShot], count: int) -> tuple[float, float]:
+    """Give MB/s and processor ms a shot of a recording."""
+    begin, busy = perf_counter(), process_time()
+    with Recorder(path) as recorder:
+        for number in range(count):
+            recorder.write(shots[number % len(shots)])
+    _sync(path)
+    spent_s, busy_s = perf_counter() - begin, process_time() - busy
+    assert recorder.statistics().written == count
+    return recorder.statistics().image_bytes / 1e6 / spent_s, 1e3 * busy_s / count
+
+
+def plain(path: Path, shots: list[AnyShot], count: int) -> float:
+    """Give MB/s of the same bytes in a plain file."""
+    begin = perf_counter()
+    with path.open("wb", buffering=0) as file:
+        for number in range(count):
+            for image in shots[number % len(shots)].images.values():
+                file.write(image.data)
+    _sync(path)
+    return path.stat().st_size / 1e6 / (perf_counter() - begin)
+
+
+def _sync(path: Path) -> None:
+    with path.open("rb+") as file:
+        os.fsync(file.fileno())
+
+
+def lost_after_kills(folder: Path, kills: int) -> tuple[int, int]:
+    """Give how many reported shots are not on file, and how many were reported."""
+    chance = random.Random(1)
+    lost = reported = 0
+    for kill in range(kills):
+        path = folder / f"kill{kill}.h5"
+        promised = kill_writer(path, chance.uniform(0.0, 0.5), SHAPE)
+        with Recording(path) as take:
+            safe = sum(whole(take[number], number) for number in range(min(promised, len(take))))
+        lost += promised - safe
+        reported += promised
+        path.unlink()
+    return lost, reported
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--folder", type=Path, default=Path())
+    parser.add_argument("--shots", type=int, default=300)
+    parser.add_argument("--kills", type=int, default=20)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    shots = noisy_shots(16)
+    with tempfile.TemporaryDirectory(dir=options.folder) as name:
+        folder = Path(name)
+        speeds, bare, busy = [], [], []
+        for _ in range(TURNS):
+            bare.append(plain(folder / "plain.bin", shots, options.shots))
+            (folder / "plain.bin").unlink()
+            speed, busy_ms = recorded(folder / "take.h5", shots, options.shots)
+            (folder / "take.h5").unlink()
+            speeds.append(speed)
+            busy.append(busy_ms)
+        lost, reported = lost_after_kills(folder, options.kills)
+    figures = {
+        "recording_mb_per_s": statistics.median(speeds),
+        "plain_file_mb_per_s": statistics.median(bare),
+        "recording_of_plain_file": statistics.median(s / b for s, b in zip(speeds, bare, strict=True)),
+        "recording_busy_ms_per_shot": statistics.median(busy),
+        "kills": options.kills,
+        "kills_shots_reported": reported,
+        "kills_shots_lost": lost,
+    }
+    for key, value in figures.items():
+        print(f"{key:28}{value:12.4g}")
+    if options.json:
+        options.json.write_text(figures_text(figures))
+    bar = min(BAR_MB_PER_S, figures["plain_file_mb_per_s"])
+    return int(figures["recording_mb_per_s"] < bar or lost > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

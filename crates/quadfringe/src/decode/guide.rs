@@ -1,0 +1,169 @@
+//! All that needs surroundings: light, beats, orders, backgrounds. It runs on an image whose fringes are no wider than
+//! they have to be, and guides the pixels of the full one.
+
+use super::judge::MISFIT_MAX;
+use super::orders::{Orders, Wrapped};
+use super::{Level, Options};
+use crate::FringeCode;
+use crate::demod::backgrounds::{Backgrounds, ROUGH_ROWS, ROWS};
+use crate::demod::cells::Grid;
+use crate::demod::joint::Joint;
+use crate::demod::light::LightFinder;
+use crate::demod::local_fit::{LocalFit, PixelMaps};
+use crate::demod::scene::around;
+use crate::demod::slopes::Slopes;
+use crate::demod::window::{Window, noise};
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+/// Greatest second difference of the phase, in rad, of a surface without tears.
+const BEND_MAX: f32 = 0.3;
+
+/// Fits of the backgrounds once the phase is good: where it hardly changes within their window they converge slowly.
+const LAST_FITS: usize = 2;
+
+/// What is known of a shot with the help of surroundings.
+pub(super) struct Guide {
+    /// Absolute phase of every pixel in rad.
+    pub phase: Vec<f32>,
+    /// Modulation of R and B in linear light, 0 where there is no light.
+    pub modulation: Vec<f32>,
+    /// 1 beside tears of the surface, shadows and borders.
+    pub torn: Vec<f32>,
+    /// Standard deviation of the intensities.
+    pub noise: f32,
+    pub finder: LightFinder,
+    pub slopes: Slopes,
+    pub orders: Orders,
+    pub backgrounds: Backgrounds,
+    pub joint: Joint,
+    wrapped: Vec<f32>,
+    sound: Vec<f32>,
+    fit: LocalFit,
+}
+
+impl Guide {
+    pub fn new(code: &FringeCode) -> Self {
+        Self {
+            phase: Vec::new(),
+            modulation: Vec::new(),
+            torn: Vec::new(),
+            noise: 0.0,
+            finder: LightFinder::default(),
+            slopes: Slopes::default(),
+            orders: Orders::new(code),
+            backgrounds: Backgrounds::new(),
+            joint: Joint::default(),
+            wrapped: Vec::new(),
+            sound: Vec::new(),
+            fit: LocalFit::default(),
+        }
+    }
+
+    /// Decode `level`, whose light may reach `blur_px` pixels into a shadow, up to the first round of the joint fit.
+    pub fn run(
+        &mut self,
+        level: &mut Level,
+        (grid, period_px, factor): (&Grid, f64, usize),
+        blur_px: usize,
+        ratios: [f32; 3],
+        options: &Options,
+    ) {
+        let planes =
+            [&mut self.phase, &mut self.modulation, &mut self.wrapped, &mut self.torn, &mut self.sound];
+        for plane in planes {
+            plane.resize(grid.pixels(), 0.0);
+        }
+        let light = level.light.each_ref().map(Vec::as_slice);
+        self.finder.find(grid, light, period_px, 2.0 * options.modulation_min, &mut self.modulation);
+        (0..blur_px).for_each(|_| self.finder.shrink(grid, &mut self.modulation));
+        level.restrict(grid, &self.modulation);
+        let scene = level.scene(grid, period_px, factor);
+
+        // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
+        let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
+        self.fit.run(&scene, &level.lit, options.modulation_min, maps);
+        self.noise = noise(&scene, &self.wrapped, &self.modulation);
+        let relative_noise = relative(self.noise, &self.modulation);
+        self.slopes.measure(&scene, &self.wrapped, &self.modulation);
+
+        // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
+        let known = Wrapped {
+            phase: &self.wrapped,
+            modulation: &self.modulation,
+            fit: &self.fit,
+            backgrounds: None,
+            slopes: &self.slopes,
+        };
+        self.orders.choose(&scene, &known, &mut self.phase);
+        self.backgrounds.start(&scene, &self.fit, &self.slopes, ratios);
+        let limits = (MISFIT_MAX, relative_noise);
+        self.backgrounds.fit(
+            &scene,
+            ratios,
+            [&self.phase, &self.modulation],
+            &self.slopes,
+            limits,
+            ROUGH_ROWS,
+        );
+        let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
+        self.orders.choose(&scene, &known, &mut self.phase);
+
+        // 4. All four channels measure the same column.
+        self.backgrounds.fit(
+            &scene,
+            ratios,
+            [&self.phase, &self.modulation],
+            &self.slopes,
+            limits,
+            ROUGH_ROWS,
+        );
+        let window = Window::new(&scene, &self.slopes, &self.modulation, self.noise).near();
+        self.joint.step(&scene, &self.backgrounds, &window, ratios, &mut self.phase);
+        self.find_tears(grid);
+        for _ in 0..LAST_FITS {
+            self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);
+        }
+    }
+
+    fn find_tears(&mut self, grid: &Grid) {
+        let Self { phase, modulation, torn, sound, .. } = self;
+        let out = torn.par_chunks_mut(grid.stride).zip(sound.par_chunks_mut(grid.stride)).enumerate();
+        out.for_each(|(y, (torn, sound))| {
+            let near = around(y, grid.height);
+            let [phases, lights] =
+                [&*phase, &*modulation].map(|plane| near.map(|y| &plane[y * grid.stride..][..grid.stride]));
+            tears(phases, lights, grid.width, torn, sound);
+        });
+    }
+}
+
+/// `torn` is 1 where a pixel and its neighbours are not one lit surface; `sound` is the modulation elsewhere.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn tears(phase: [&[f32]; 3], light: [&[f32]; 3], width: usize, torn: &mut [f32], sound: &mut [f32]) {
+    torn.fill(1.0);
+    sound.fill(0.0);
+    let n = width - 2;
+    let [a, b, c] = phase.map(|row| [0, 1, 2].map(|k| &row[k..k + n]));
+    let lit = light.map(|row| [0, 1, 2].map(|k| &row[k..k + n]));
+    let (torn, sound) = (&mut torn[1..=n], &mut sound[1..=n]);
+    for x in 0..n {
+        let twice = 2.0 * b[1][x];
+        let bend = |p: f32, q: f32| (p + q - twice).abs();
+        let upper = |p: f32, q: f32| if p > q { p } else { q };
+        let lower = |p: f32, q: f32| if p < q { p } else { q };
+        let straight = upper(bend(b[0][x], b[2][x]), bend(a[1][x], c[1][x]));
+        let diagonal = upper(bend(a[0][x], c[2][x]), bend(a[2][x], c[0][x]));
+        let dark = lit.map(|row| lower(lower(row[0][x], row[1][x]), row[2][x]));
+        let least = lower(lower(dark[0], dark[1]), dark[2]);
+        let whole = (upper(straight, diagonal) < BEND_MAX) & (least > 0.0);
+        (torn[x], sound[x]) = if whole { (0.0, lit[1][1][x]) } else { (1.0, 0.0) };
+    }
+}
+
+/// Noise over the mean modulation of what is lit.
+fn relative(noise: f32, modulation: &[f32]) -> f32 {
+    let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
+    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));
+    noise * count / f32::max(sum, 1e-6)
+}

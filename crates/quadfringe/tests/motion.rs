@@ -1,0 +1,99 @@
+//! Colours shown one after another before a surface that moves: shots of the virtual bench, fixed seeds.
+
+mod common;
+
+use common::{bench, code, decode_planes};
+use quadfringe::height::Triangulator;
+use quadfringe::rig::{Bench, Cast, Light, Planes, RenderOptions};
+use quadfringe::surface::{Hand, Plane, Surface};
+use quadfringe::{Conditioner, Decoded, Decoder, Options};
+use std::f32::consts::PI;
+
+/// R, G and B share a frame of 60 Hz; infrared is lit throughout.
+const INSTANTS_US: [f32; 4] = [-5556.0, 0.0, 5556.0, 0.0];
+/// Pixels of a fringe of the reference bench.
+const FRINGE_PX: usize = 28;
+
+/// A shot with 3 % noise of a surface that stands somewhere else at each of the three instants, and what the middle one sees.
+fn film<S: Surface>(bench: &Bench, at: impl Fn(f64) -> S) -> (Planes, Cast) {
+    let instants = [0, 1, 2].map(|c| f64::from(INSTANTS_US[c]) * 1e-6);
+    let casts = instants.map(|time_s| bench.cast(&at(time_s)));
+    let render = RenderOptions { noise: 0.03, seed: 3, ..RenderOptions::default() };
+    let planes = bench.render_moving(casts.each_ref(), &Light::shot(&code()), &render);
+    let [_, middle, _] = casts;
+    (planes.expect("a valid scene"), middle)
+}
+
+fn decode(bench: &Bench, planes: &Planes, channel_instants_us: Option<[f32; 4]>) -> Decoded {
+    let (rows, columns) = planes.shape();
+    let options = Options { channel_instants_us, ..Options::default() };
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
+    let decoder = Decoder::new(code(), [rows, columns], &Conditioner::default(), options);
+    let mut decoder = decoder.and_then(|d| d.triangulate_with(triangulator)).expect("valid options");
+    decode_planes(&mut decoder, planes).expect("a valid shot")
+}
+
+/// RMS of the phase in rad over right orders a fringe away from edges and border; share of pixels with light that come back,
+/// and of these the share with a wrong order.
+fn errors(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
+    let (truth, edge) = (cast.phase_rad(&code()), cast.edge_distance_px());
+    let (rows, columns) = truth.dim();
+    let (mut count, mut sum, mut returned, mut wrong, mut lit) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for ((y, x), phase) in decoded.phase_rad.indexed_iter() {
+        lit += f64::from(u8::from(truth[[y, x]].is_finite()));
+        let error = phase - truth[[y, x]];
+        let border = y.min(x).min(rows - 1 - y).min(columns - 1 - x);
+        returned += f64::from(u8::from(phase.is_finite()));
+        if error.abs() >= PI {
+            wrong += 1.0;
+        } else if error.is_finite() && border > FRINGE_PX && edge[[y, x]] > FRINGE_PX as f32 {
+            (count, sum) = (count + 1.0, sum + f64::from(error).powi(2));
+        }
+    }
+    [(sum / f64::max(count, 1.0)).sqrt(), returned / lit, wrong / f64::max(returned, 1.0)]
+}
+
+/// Errors without and with the instants.
+fn before_and_after<S: Surface>(name: &str, at: impl Fn(f64) -> S) -> [[f64; 3]; 2] {
+    let bench = bench(1);
+    let (planes, truth) = film(&bench, at);
+    let found = [None, Some(INSTANTS_US)].map(|instants| errors(&decode(&bench, &planes, instants), &truth));
+    println!("{name}: RMS rad, returned, wrong: {:.4?} before, {:.4?} after", found[0], found[1]);
+    found
+}
+
+#[test]
+fn what_stands_still_stays_as_it_is() {
+    let [before, after] = before_and_after("plane at rest", |_| Plane::at_z(790.0));
+    assert!(after[0] < 1.1 * before[0], "{before:?} {after:?}");
+}
+
+#[test]
+fn the_ripple_of_a_moving_plane_goes() {
+    for speed_mm_per_s in [50.0, 100.0, 200.0, 400.0] {
+        let name = format!("plane, {speed_mm_per_s} mm/s");
+        let [before, after] = before_and_after(&name, |t| Plane::at_z(790.0 + speed_mm_per_s * t));
+        // 3 % noise alone has 0.005 rad.
+        assert!(after[0] < 0.008 + 0.15 * before[0], "{name}: {before:?} {after:?}");
+        assert!(after[1] > 0.99 && after[2] == 0.0, "{name}: {after:?}");
+    }
+}
+
+#[test]
+fn a_moving_hand_is_brought_to_one_instant() {
+    // As fast as the hand of the bench moves, and three times as fast.
+    for faster in [1.0, 3.0] {
+        let name = format!("hand, {faster} times as fast");
+        let [before, after] =
+            before_and_after(&name, |t| Hand::at(0.37 + faster * t).expect("a finite time"));
+        assert!(after[0] < 0.7 * before[0], "{name}: {before:?} {after:?}");
+        assert!(after[1] >= before[1] - 0.005, "{name}: {before:?} {after:?}");
+    }
+}
+
+#[test]
+fn what_moves_too_fast_is_no_data() {
+    // B has turned against R by a fifth of a fringe, where they hardly differ.
+    let [before, after] = before_and_after("plane, 600 mm/s", |t| Plane::at_z(790.0 + 600.0 * t));
+    assert!(after[1] < 0.2 && after[2] < before[2].max(0.01), "{before:?} {after:?}");
+}

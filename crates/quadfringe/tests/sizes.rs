@@ -1,0 +1,60 @@
+//! Images of any size with fringes of any width: the image that guides has one pixel for one, four or sixteen.
+
+mod common;
+
+use common::decode_planes;
+use ndarray::{Array2, s};
+use quadfringe::rig::Planes;
+use quadfringe::{Channel, Conditioner, Decoder, DmdLayout, FringeCode, Options, fringe};
+use std::f64::consts::TAU;
+
+/// What a camera sees that sees the projector's columns one to one, but those from `step` on `shift` columns further.
+fn images(code: &FringeCode, [rows, columns]: [usize; 2], step: usize, shift: usize) -> [Array2<f32>; 4] {
+    let source = |x: usize| if x < step { x } else { x + shift };
+    Channel::ALL.map(|channel| {
+        let image = fringe::pattern(code, channel, rows, DmdLayout::Regular);
+        Array2::from_shape_fn((rows, columns), |(y, x)| 0.1 + 0.8 * image[[y, source(x)]])
+    })
+}
+
+#[test]
+fn every_size_and_period_gives_every_pixel_its_column() {
+    // Fringes of 14, 29 and 59 pixels; sizes that no factor divides.
+    for numbers in [[64.0, 63.0, 56.0], [31.0, 30.0, 26.0], [15.5, 14.5, 12.0]] {
+        let code = FringeCode::new(numbers, 912).expect("valid");
+        for shape in [[97, 601], [130, 643], [163, 702]] {
+            let (step, shift) = (301, 101);
+            let images = images(&code, shape, step, shift);
+            let mut decoder = Decoder::new(code.clone(), shape, &Conditioner::default(), Options::default())
+                .expect("valid");
+            let phase = decode_planes(&mut decoder, &Planes::F32(images)).expect("valid shot").phase_rad;
+            let (mut returned, mut worst) = (0, 0.0f64);
+            for ((_, x), phase) in phase.indexed_iter().filter(|(_, phase)| phase.is_finite()) {
+                let column = if x < step { x } else { x + shift };
+                let error = f64::from(*phase) - TAU * numbers[0] * column as f64 / 912.0;
+                // Beside the step pixels of both sides are averaged.
+                worst = worst.max(if x.abs_diff(step) > 8 { error.abs() } else { 0.1 * error.abs() });
+                returned += 1;
+            }
+            let share = f64::from(returned) / phase.len() as f64;
+            println!("{numbers:?} {shape:?}: {share:.4} returned, worst {worst:.4} rad");
+            assert!(share > 0.96, "{numbers:?} {shape:?}: {share}");
+            assert!(worst < 0.1, "{numbers:?} {shape:?}: {worst}");
+        }
+    }
+}
+
+#[test]
+fn the_border_is_measured_too() {
+    let code = FringeCode::new([31.0, 30.0, 26.0], 912).expect("valid");
+    let shape = [131, 643];
+    let images = images(&code, shape, 643, 0);
+    let mut decoder = Decoder::new(code, shape, &Conditioner::default(), Options::default()).expect("valid");
+    let phase = decode_planes(&mut decoder, &Planes::F32(images)).expect("valid shot").phase_rad;
+    for row in [phase.slice(s![0, ..]), phase.slice(s![130, ..])] {
+        assert!(row.iter().filter(|phase| phase.is_finite()).count() > 630);
+    }
+    for column in [phase.slice(s![.., 0]), phase.slice(s![.., 642])] {
+        assert!(column.iter().filter(|phase| phase.is_finite()).count() > 125);
+    }
+}

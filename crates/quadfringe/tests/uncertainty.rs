@@ -1,0 +1,160 @@
+//! Is the uncertainty that comes with a shape the error that it has? Shots of the virtual bench at full size, fixed seeds.
+
+mod common;
+
+use common::{bench, cast_scene, code, decode_planes};
+use quadfringe::height::Triangulator;
+use quadfringe::rig::{Albedo, Bench, Cast, Light, RenderOptions};
+use quadfringe::{Conditioner, Decoded, Decoder, Method, Options};
+use std::f32::consts::PI;
+
+/// A fringe of the reference bench: smooth parts are farther than this from edges and from the border.
+const FRINGE_PX: usize = 28;
+
+/// Noise, albedo and room light, as shares of full scale.
+const LIGHTS: [(f64, f32, f64); 4] =
+    [(0.01, 0.9, 0.055), (0.03, 0.9, 0.055), (0.03, 0.45, 0.2), (0.05, 0.6, 0.2)];
+
+fn decode(
+    bench: &Bench,
+    cast: &Cast,
+    (noise, albedo, ambient): (f64, f32, f64),
+    options: Options,
+) -> Decoded {
+    let render = RenderOptions {
+        noise,
+        albedo: Albedo::Uniform([albedo; 4]),
+        ambient: [ambient; 4],
+        seed: 11,
+        ..RenderOptions::default()
+    };
+    let planes = bench.render(cast, &Light::shot(&code()), &render).expect("a valid scene");
+    let (rows, columns) = planes.shape();
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
+    let decoder = Decoder::new(code(), [rows, columns], &Conditioner::default(), options);
+    let mut decoder = decoder.and_then(|d| d.triangulate_with(triangulator)).expect("valid options");
+    decode_planes(&mut decoder, &planes).expect("a valid shot")
+}
+
+/// Shares of the errors of smooth parts inside one, two and three standard deviations, of the depth.
+fn inside(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
+    let (truth, depth, edge) = (cast.phase_rad(&code()), cast.depth_mm(), cast.edge_distance_px());
+    let xyz = decoded.xyz_mm.as_ref().expect("calibrated");
+    let sigma = decoded.uncertainty_mm.as_ref().expect("calibrated");
+    let (rows, columns) = truth.dim();
+    let (mut count, mut shares) = (0.0, [0.0; 3]);
+    for ((y, x), phase) in decoded.phase_rad.indexed_iter() {
+        let border = y.min(x).min(rows - 1 - y).min(columns - 1 - x);
+        let right = (phase - truth[[y, x]]).abs() < PI;
+        if right && border > FRINGE_PX && edge[[y, x]] > FRINGE_PX as f32 {
+            let error = (xyz[[y, x, 2]] - depth[[y, x]]).abs() / sigma[[y, x]];
+            count += 1.0;
+            (0..3).for_each(|k| shares[k] += f64::from(u8::from(error < (k + 1) as f32)));
+        }
+    }
+    shares.map(|share| share / count)
+}
+
+/// Shares of normal errors.
+const NORMAL: [f64; 3] = [0.683, 0.954, 0.997];
+
+/// Whether every share keeps within a tolerance, below and above, of those of normal errors.
+fn hold_shares(method: Method, surfaces: &[&str], below: [f64; 3], above: [f64; 3]) {
+    let bench = bench(1);
+    let mut off = Vec::new();
+    for name in surfaces {
+        let cast = cast_scene(&bench, name);
+        for light in LIGHTS {
+            let decoded = decode(&bench, &cast, light, Options { method, ..Options::default() });
+            let shares = inside(&decoded, &cast);
+            let line = format!("{method:?} {name} {light:?}: {shares:.4?}");
+            println!("{line}");
+            let held = |k: usize| (-below[k]..=above[k]).contains(&(shares[k] - NORMAL[k]));
+            off.extend((!(0..3).all(held)).then_some(line));
+        }
+    }
+    assert!(off.is_empty(), "{}", off.join("\n"));
+}
+
+#[test]
+fn errors_of_the_best_method_are_as_large_as_it_says() {
+    let surfaces = ["plane", "peaks", "steps", "sphere"];
+    hold_shares(Method::Best, &surfaces, [0.04, 0.025, 0.01], [0.06, 0.025, 0.003]);
+}
+
+/// Features smaller than the window are smoothed away by all four channels alike, which none of them can tell.
+#[test]
+fn errors_on_small_features_are_little_larger_than_it_says() {
+    hold_shares(Method::Best, &["face"], [0.1, 0.12, 0.09], [0.06, 0.025, 0.003]);
+}
+
+#[test]
+fn errors_of_the_published_method_are_as_large_as_it_says() {
+    hold_shares(Method::Published, &["plane", "peaks"], [0.04, 0.025, 0.01], [0.04, 0.025, 0.003]);
+}
+
+/// What the probabilities of a shot promise, before quality decides.
+#[derive(Default)]
+struct Promise {
+    returned: f64,
+    wrong: f64,
+    promised: f64,
+    /// Pixels that are said to be right by 99 in 100, and how many of them are wrong.
+    sure: f64,
+    surely_wrong: f64,
+}
+
+impl Promise {
+    fn of(decoded: &Decoded, cast: &Cast) -> Self {
+        let truth = cast.phase_rad(&code());
+        let mut found = Self::default();
+        let returned = decoded.phase_rad.indexed_iter().filter(|(_, phase)| phase.is_finite());
+        for (at, phase) in returned {
+            let probability = f64::from(decoded.wrong_order_probability[at]);
+            // In shadow there is no right order.
+            let wrong = f64::from(u8::from((phase - truth[at]).abs() >= PI));
+            found.returned += 1.0;
+            found.wrong += wrong;
+            found.promised += probability;
+            if probability < 0.01 {
+                found.sure += 1.0;
+                found.surely_wrong += wrong;
+            }
+        }
+        found
+    }
+}
+
+fn promise(method: Method, name: &str, light: (f64, f32, f64)) -> Promise {
+    let bench = bench(1);
+    let cast = cast_scene(&bench, name);
+    let decoded = decode(&bench, &cast, light, Options { method, quality_min: 0.0, ..Options::default() });
+    let found = Promise::of(&decoded, &cast);
+    let Promise { returned, wrong, promised, sure, surely_wrong } = found;
+    println!(
+        "{method:?} {name} {light:?}: {wrong} of {returned} wrong, {promised:.0} promised; sure {sure}, of them {surely_wrong} wrong"
+    );
+    found
+}
+
+#[test]
+fn wrong_orders_of_the_best_method_are_not_more_than_promised() {
+    for name in ["plane", "steps", "sphere", "face"] {
+        for light in [LIGHTS[0], LIGHTS[1], LIGHTS[2]] {
+            let found = promise(Method::Best, name, light);
+            assert!(found.wrong <= found.promised, "{name} {light:?}");
+            // A bound that says something: few pixels are doubtful, and the others are right.
+            assert!(found.promised < 0.005 * found.returned, "{name} {light:?}");
+            assert!(found.sure > 0.95 * found.returned, "{name} {light:?}");
+            assert!(found.surely_wrong <= 1e-5 * found.sure, "{name} {light:?}");
+        }
+    }
+}
+
+#[test]
+fn wrong_orders_of_the_published_method_are_not_more_than_promised() {
+    for name in ["plane", "steps"] {
+        let found = promise(Method::Published, name, LIGHTS[0]);
+        assert!(found.wrong <= found.promised, "{name}");
+    }
+}

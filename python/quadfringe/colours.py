@@ -1,0 +1,84 @@
+"""Maps and channels to pictures for the eye: (H, W) to (H, W, 3) uint8 in R, G, B order; no data is grey."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import AnyShot, Shape
+
+__all__ = ["Picture", "channels_picture", "coloured", "limits_of", "phase_picture", "texture"]
+
+Picture = NDArray[np.uint8]
+Map = NDArray[np.float32]
+NO_DATA = 90
+COARSE = 16  # a colour is the mean over so many pixels, times the blur: more than a fringe
+
+
+def limits_of(values: Map) -> tuple[float, float]:
+    """Give the range of most values, a little widened, whatever a few outliers say; (0, 1) when there are none."""
+    finite = values[::4, ::4][np.isfinite(values[::4, ::4])]
+    if not finite.size:
+        return (0.0, 1.0)
+    low, high = (float(v) for v in np.quantile(finite, (0.04, 0.96)))
+    low, high = low - 0.1 * (high - low), high + 0.1 * (high - low)
+    return (low, high if high > low else low + 1.0)
+
+
+def coloured(values: Map, limits: tuple[float, float], colours: int = cv2.COLORMAP_TURBO) -> Picture:
+    """Paint a map with a colour map of OpenCV."""
+    low, high = limits
+    known = np.isfinite(values)
+    level = np.where(known, (values - low) * np.float32(255 / (high - low)), 0).clip(0, 255).astype(np.uint8)
+    picture: Picture = np.ascontiguousarray(cv2.applyColorMap(level, colours)[..., ::-1])
+    picture[~known] = NO_DATA
+    return picture
+
+
+def phase_picture(shape: Shape, columns: int, max_px: int = 480) -> Picture:
+    """Paint the absolute phase, through the projector's `columns`, from blue to red."""
+    step = max(1, math.ceil(max(shape.column_px.shape) / max_px))
+    return coloured(shape.column_px[::step, ::step], (0.0, float(columns)))
+
+
+def channels_picture(shot: AnyShot, max_px: int = 640) -> Picture:
+    """Put red and green above blue and infrared, each in its own light."""
+    tints = {"red": (0,), "green": (1,), "blue": (2,), "ir": (0, 1, 2)}
+    height, width = shot.channels["red"].shape
+    step = math.ceil(2 * max(height, width) / max_px)
+    size = (max(1, width // step), max(1, height // step))
+    red, green, blue, ir = (
+        _tile(image, size, shot.full_scale_value, tints[name]) for name, image in shot.channels.items()
+    )
+    return np.vstack([np.hstack([red, green]), np.hstack([blue, ir])])
+
+
+def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes: tuple[int, ...]) -> Picture:
+    small = cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_AREA)
+    tile = np.zeros((size[1], size[0], 3), np.uint8)
+    tile[:, :, list(planes)] = cv2.convertScaleAbs(small, alpha=255 / full_scale)[:, :, None]
+    return tile
+
+
+def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
+    """Give the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
+
+    Its brightness is the modulation's, its colour that of the mean light around.
+    """
+    top = max(limits_of(shape.modulation)[1], 1e-6)
+    modulation = np.nan_to_num(shape.modulation[::stride, ::stride])
+    brightness = cv2.convertScaleAbs(modulation, alpha=255 / top)
+    height, width = shape.modulation.shape
+    coarse = (max(1, width // COARSE), max(1, height // COARSE))
+    means = [cv2.blur(_coarse(shot.channels[name], coarse), (5, 5)) for name in ("red", "green", "blue")]
+    hue = (255 * np.dstack(means) / np.maximum(np.max(means, axis=0), 1e-6)[:, :, None]).astype(np.uint8)
+    tint = cv2.resize(hue, brightness.shape[::-1], interpolation=cv2.INTER_LINEAR)
+    return np.asarray(cv2.multiply(tint, cv2.merge([brightness] * 3), scale=1 / 255), np.uint8)
+
+
+def _coarse(image: NDArray[Any], size: tuple[int, int]) -> Map:
+    return np.asarray(cv2.resize(np.ascontiguousarray(image), size, interpolation=cv2.INTER_AREA), np.float32)

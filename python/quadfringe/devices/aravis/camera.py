@@ -1,0 +1,203 @@
+"""The camera that users hold: snap, stream, counts, and errors that say what to look at."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from itertools import count as numbers
+from types import TracebackType
+from typing import Self
+
+from quadfringe.capture import AravisConfig
+from quadfringe.config import SystemConfig
+from quadfringe.data import AnyShot, Calibration
+from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
+from quadfringe.devices.aravis.link import Link
+from quadfringe.devices.aravis.profiles import CHIPS
+from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, UnpairedError, WrongFrameError
+from quadfringe.queues import DroppingQueue
+
+__all__ = ["AravisCamera", "open_devices"]
+
+LENGTH = {"latest": 1, "all": 64}
+FIRST_PATIENCE_S, AGAIN_PATIENCE_S = 1.0, 5.0
+LOOK_S = 0.25  # how often a wait looks whether the camera is still there
+SILENT_S = 0.5  # a chip that says nothing for so long is asked
+
+
+class AravisCamera:
+    """A GenICam camera with two chips; close it, or use it in a `with` block.
+
+    Shots own their pixels. With `borrow` (of `snap` and `stream`) unpacked ones are the memory that the wire filled,
+    read-only and without a copy; it goes back when the last array is dropped, and shots that are kept starve the wire.
+    Raises `CameraNotFoundError`, `CameraBusyError`, or another `CameraError` that says what the camera refused.
+    """
+
+    paced = True
+
+    def __init__(self, config: AravisConfig | None = None) -> None:
+        self._asked_for = config or AravisConfig()
+        self._link: Link | None = Link(self._asked_for, patience_s=FIRST_PATIENCE_S)
+        self.config = self._link.config
+        self.name = self._link.name
+        self._in_use = threading.Lock()
+        self._closed = False
+        self._last_id = 0
+        self._queue: DroppingQueue[AnyShot] = DroppingQueue(1)
+        self._earlier = (0, 0)  # shots and dropped ones of the runs before
+        self._before = {chip: ChipStatistics() for chip in CHIPS}  # of links that were lost
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """A camera knows nothing of its bench."""
+        return None
+
+    def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> AnyShot:
+        """Take one shot that is exposed after this call; raises a `CameraError` when none comes in time."""
+        with self._run("all", borrow) as (link, queue):  # the first shot, and no newer one
+            return self._next(link, queue, timeout_s)
+
+    def stream(self, count: int | None = None, *, keep: Keep = "latest", borrow: bool = False) -> Iterator[AnyShot]:
+        """Take shots until `count` or until the iterator is closed; raises a `CameraError` when they cease to come."""
+        with self._run(keep, borrow) as (link, queue):
+            for _ in numbers() if count is None else range(count):
+                yield self._next(link, queue, None)
+
+    @contextmanager
+    def _run(self, keep: Keep, borrow: bool) -> Iterator[tuple[Link, DroppingQueue[AnyShot]]]:
+        if not self._in_use.acquire(blocking=False):
+            raise ValueError(f"camera at {self.name}: a stream runs already; close it first")
+        try:
+            link = self._connected()
+            length = min(LENGTH[keep], max(link.config.buffers // 3, 1)) if borrow else LENGTH[keep]
+            self._earlier = self._counts()
+            self._queue, self._first_id = DroppingQueue(length), self._last_id + 1
+            try:
+                _check_there(link, 0.0)
+                link.start(self._queue.put, borrow=borrow)
+                yield link, self._queue
+            except ShotTimeoutError:
+                raise  # the camera is there
+            except CameraError as error:
+                lost = isinstance(error, CameraLostError)
+                link.stop(lost=lost)
+                self._disconnect(lost=lost)
+                raise
+            finally:
+                link.stop()
+        finally:
+            self._in_use.release()
+
+    def _connected(self) -> Link:
+        if self._closed:
+            raise ValueError(f"camera at {self.name} is closed")
+        if self._link is None:
+            self._link = Link(self._asked_for, patience_s=AGAIN_PATIENCE_S)
+        return self._link
+
+    def _disconnect(self, *, lost: bool = False) -> None:
+        if self._link is not None:
+            self._before = self._chips()
+            self._link.forget(lost=lost)
+            self._link = None
+
+    def _next(self, link: Link, queue: DroppingQueue[AnyShot], timeout_s: float | None) -> AnyShot:
+        timeout_s = link.config.timeout_s if timeout_s is None else timeout_s
+        before = self._chips()
+        if link.config.trigger == "software":
+            link.trigger()
+        deadline = time.monotonic() + timeout_s
+        while True:
+            left_s = deadline - time.monotonic()
+            try:
+                shot = queue.get(min(max(left_s, 0.0), LOOK_S))
+            except TimeoutError:
+                if self._closed:
+                    raise ValueError(f"camera at {self.name} was closed while a shot was awaited") from None
+                _check_there(link, SILENT_S)
+                if left_s <= 0:
+                    raise self._diagnosis(link, before, timeout_s) from None
+                continue
+            assert shot.stamp is not None
+            self._last_id = self._first_id + shot.stamp.id
+            return replace(shot, stamp=replace(shot.stamp, id=self._last_id))
+
+    def _diagnosis(self, link: Link, before: dict[str, ChipStatistics], timeout_s: float) -> CameraError:
+        """Say why there was no shot in time."""
+        now = self._chips()
+        came = {chip: now[chip].frames - before[chip].frames for chip in CHIPS}
+        head = f"camera at {self.name}: no shot within {timeout_s:g} s: "
+        for chip, reader in zip(CHIPS, link.readers, strict=True):
+            if not came[chip] and now[chip].damaged > before[chip].damaged:
+                return WrongFrameError(f"{head}frames of the {chip} chip are refused, the last one: {reader.fault}")
+        if all(came.values()):
+            return UnpairedError(f"{head}frames of both chips came, none of the same instant; are the chips in sync?")
+        if any(came.values()):
+            there, missing = sorted(CHIPS, key=lambda chip: -came[chip])
+            return UnpairedError(f"{head}frames of the {there} chip came, none of the {missing} chip")
+        trigger = link.config.trigger
+        cause = "it runs freely" if trigger == "free" else f"it waits for its trigger, {trigger}"
+        return ShotTimeoutError(
+            f"{head}it answers and sends nothing ({cause}); check trigger, firewall and packet size"
+        )
+
+    def _chips(self) -> dict[str, ChipStatistics]:
+        link = self._link
+        if link is None or not link.readers:
+            return self._before
+        chips = {}
+        for n, (chip, reader) in enumerate(zip(CHIPS, link.readers, strict=True)):
+            so_far = self._before[chip]
+            chips[chip] = ChipStatistics(
+                so_far.frames + reader.frames,
+                so_far.damaged + reader.damaged,
+                so_far.missed + link.pairer.missed[n],
+                so_far.unpaired + link.pairer.unpaired[n],
+            )
+        return chips
+
+    def statistics(self) -> CameraStatistics:
+        """Give the counts since the camera was opened; from any thread."""
+        return CameraStatistics(*self._counts(), self._chips())
+
+    def _counts(self) -> tuple[int, int]:
+        now = self._queue.statistics()
+        return self._earlier[0] + now.passed + now.dropped, self._earlier[1] + now.dropped
+
+    def close(self) -> None:
+        """Stop and release the camera; closing twice is allowed."""
+        self._closed = True
+        if self._link is not None:
+            self._link.stop()
+        self._disconnect()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def _check_there(link: Link, silent_s: float) -> None:
+    lost = link.lost(silent_s)
+    if lost is not None:
+        raise lost from None
+
+
+def open_devices(config: SystemConfig) -> Devices:
+    """Open the camera of `capture`, and the projectors of the system if it has any."""
+    assert isinstance(config.capture, AravisConfig)
+    camera = AravisCamera(config.capture)
+    try:
+        return Devices(camera, open_projector(config), config.model_copy(update={"capture": camera.config}))
+    except BaseException:
+        camera.close()
+        raise

@@ -1,0 +1,86 @@
+"""Pixel formats of GenICam: what the bytes of a frame are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.config import BayerPattern
+from quadfringe.errors import CameraError
+
+__all__ = ["FORMATS", "PixelFormat", "format_named"]
+
+
+@dataclass(frozen=True)
+class PixelFormat:
+    """A format of the naming convention: its code, bits in use, and whether two pixels share three bytes."""
+
+    name: str
+    code: int
+    bits: int
+    packed: bool = False
+    colours: int = 1
+    bayer: BayerPattern | None = None
+
+    @property
+    def full_scale(self) -> float:
+        """The value of a full pixel."""
+        return float(2**self.bits - 1)
+
+    def payload(self, width: int, height: int) -> int:
+        """Give the bytes of a frame."""
+        return width * height * (self.code >> 16 & 0xFF) // 8
+
+    def pixels(self, data: NDArray[np.uint8], width: int, height: int) -> NDArray[Any]:
+        """Give the pixels (H, W), or (H, W, 3) of a colour image, uint8 or uint16; a view unless they are packed.
+
+        >>> FORMATS["Mono12Packed"].pixels(np.array([0x12, 0x43, 0x56], np.uint8), 2, 1)
+        array([[291, 1380]], dtype=uint16)
+        """
+        values: NDArray[Any] = data[: self.payload(width, height)]
+        if self.packed:
+            values = _unpacked(values, self.bits)
+        elif self.bits > 8:
+            values = values.view("<u2")
+        return values.reshape((height, width, 3) if self.colours == 3 else (height, width))
+
+
+def _unpacked(data: NDArray[np.uint8], bits: int) -> NDArray[np.uint16]:
+    """Undo the packing of GigE Vision: high bits, low bits of the first (lower half) and the second, high bits."""
+    triples = data.reshape(-1, 3)
+    low = np.uint16(bits - 8)
+    out = np.empty((len(triples), 2), np.uint16)
+    out[:, 0], out[:, 1] = triples[:, 0], triples[:, 2]
+    out <<= low
+    mask = np.uint8((1 << (bits - 8)) - 1)
+    out[:, 0] |= triples[:, 1] & mask
+    out[:, 1] |= triples[:, 1] >> np.uint8(4) & mask
+    return out
+
+
+_KNOWN = (
+    PixelFormat("Mono8", 0x01080001, 8),
+    PixelFormat("Mono10", 0x01100003, 10),
+    PixelFormat("Mono10Packed", 0x010C0004, 10, packed=True),
+    PixelFormat("Mono12", 0x01100005, 12),
+    PixelFormat("Mono12Packed", 0x010C0006, 12, packed=True),
+    PixelFormat("BayerRG8", 0x01080009, 8, bayer="rggb"),
+    PixelFormat("BayerRG10", 0x0110000D, 10, bayer="rggb"),
+    PixelFormat("BayerRG10Packed", 0x010C0027, 10, packed=True, bayer="rggb"),
+    PixelFormat("BayerRG12", 0x01100011, 12, bayer="rggb"),
+    PixelFormat("BayerRG12Packed", 0x010C002B, 12, packed=True, bayer="rggb"),
+    PixelFormat("RGB8", 0x02180014, 8, colours=3),
+)
+FORMATS = {known.name: known for known in _KNOWN}
+ALIASES = {"RGB8Packed": "RGB8"}
+
+
+def format_named(name: str) -> PixelFormat:
+    """Give the format of this name; raises `CameraError` that lists those that are known."""
+    known = FORMATS.get(ALIASES.get(name, name))
+    if known is None:
+        raise CameraError(f"pixel format {name} is not known here; set pixel_format to one of {', '.join(FORMATS)}")
+    return known

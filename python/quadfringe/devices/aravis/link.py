@@ -1,0 +1,194 @@
+"""An open camera: both devices set up, both streams ready, frames paired into shots while it runs."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+
+import numpy as np
+
+from quadfringe.capture import AravisConfig
+from quadfringe.data import AnyShot, BayerShot, Shot, Stamp
+from quadfringe.devices.aravis import profiles
+from quadfringe.devices.aravis._gi import Device, found
+from quadfringe.devices.aravis.formats import PixelFormat, format_named
+from quadfringe.devices.aravis.profiles import CHIPS, Place
+from quadfringe.devices.aravis.reader import Agreed, ChipReader, Frame
+from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError
+from quadfringe.pairing import Pairer, Stamped
+
+__all__ = ["Link"]
+
+RETRY_S = 0.2
+
+
+class Link:
+    """The connection to both chips of a camera. What is not right raises a `CameraError`, and leaves nothing open.
+
+    `patience_s` is how long a camera that is busy or missing is asked again: one that was lost boots, or is still held
+    by the connection before, for 3 s.
+    """
+
+    def __init__(self, config: AravisConfig, *, patience_s: float) -> None:
+        self.readers: list[ChipReader] = []
+        self._devices: dict[str, Device] = {}
+        self._running = False
+        with ExitStack() as undo:
+            undo.callback(self.forget)
+            self.places = _patiently(lambda: self._open_devices(config), patience_s)
+            self.config = self._set_up(config)
+            self.pairer: Pairer[Frame] = Pairer(1000 * config.pair_tolerance_us)
+            undo.pop_all()
+        self._pairing = threading.Lock()
+
+    def _open_devices(self, config: AravisConfig) -> tuple[Place, Place]:
+        self.forget()
+        first, second = profiles.places(config, found)
+        for where in dict.fromkeys(place.where for place in (first, second)):
+            self._devices[where] = Device(where)
+            if not self._devices[where].controlled:
+                raise CameraBusyError(
+                    f"camera at {where} is controlled by another program; close that one. A program that was killed "
+                    "is let go of after 3 s"
+                )
+        names = [profiles.introduced(place, self._devices[place.where], config.profile) for place in (first, second)]
+        return names[0], names[1]
+
+    def device(self, chip: int) -> Device:
+        """Give the device of a chip."""
+        return self._devices[self.places[chip].where]
+
+    def _set_up(self, config: AravisConfig) -> AravisConfig:
+        """Set features, then packets, then the streams with their buffers: in this order, or pixels come out wrong."""
+        for name, value in config.features.items():
+            having = [device for device in self._devices.values() if device.has(name)]
+            if not having:
+                raise CameraError(f"features: no device of the camera has {name}, or it cannot be used now")
+            for device in having:
+                device.set(name, value)
+        taken, agreed = {}, []
+        for n, (chip, place) in enumerate(zip((config.visible, config.infrared), self.places, strict=True)):
+            taken[CHIPS[n]] = profiles.set_chip(self.device(n), place, chip, config.exposure_us)
+            agreed.append(_agreed(self.device(n)))
+            taken[CHIPS[n]]["pixel_format"] = agreed[n].format.name
+        _check(*agreed)
+        for where, device in self._devices.items():
+            profiles.set_trigger(device, next(place for place in self.places if place.where == where), config)
+        exposures_us = [float(chip.get("exposure_us", 0.0)) for chip in taken.values()]
+        self.period_us = max(profiles.period_us(device, exposures_us) for device in self._devices.values())
+        for n, place in enumerate(self.places):
+            device = self.device(n)
+            device.set_packets(place.stream, config.packet_size, config.packet_delay_ns)
+            stream = device.stream(place.stream, agreed[n].payload, config.buffers, self.period_us)
+            self.readers.append(ChipReader(stream, agreed[n]))
+        return profiles.resolved(config, taken)
+
+    def start(self, deliver: Callable[[AnyShot], None], *, borrow: bool) -> None:
+        """Start a run: readers first, then the chips, the one that triggers the other last."""
+        # What waits for its partner holds buffers only when they are borrowed.
+        pending = {"pending": max(self.config.buffers // 3, 2)} if borrow else {}
+        self.pairer.begin(sole=self.config.trigger == "software", **pending)
+        self._running = True
+        for n, reader in enumerate(self.readers):
+            reader.start(lambda frame, n=n: self._pair(n, frame, deliver), borrow=borrow)  # type: ignore[misc]
+        for device in reversed(self._devices.values()):
+            device.set("AcquisitionStart", 1)
+
+    def _pair(self, chip: int, frame: Frame, deliver: Callable[[AnyShot], None]) -> None:
+        with self._pairing:
+            pairs = self.pairer.push(chip, frame.stamp, frame)
+            offset_ns = self.pairer.host_offset_ns
+            for visible, infrared in pairs:
+                deliver(self._shot(visible, infrared, offset_ns))
+
+    def _shot(self, visible: Stamped[Frame], infrared: Stamped[Frame], offset_ns: int) -> AnyShot:
+        frames = dict(zip(CHIPS, (visible.stamp, infrared.stamp), strict=True))
+        stamp = Stamp(visible.number, (visible.stamp.device_ns + offset_ns) // 1000, self.name, frames)
+        chip: PixelFormat = self.readers[0].agreed.format
+        pixels, ir = visible.item.pixels, infrared.item.pixels
+        if chip.bayer is not None:
+            return BayerShot(pixels, chip.bayer, ir, chip.full_scale, stamp=stamp)
+        red, green, blue = (np.ascontiguousarray(pixels[:, :, n]) for n in range(3))
+        return Shot(red, green, blue, ir, chip.full_scale, stamp=stamp)
+
+    @property
+    def name(self) -> str:
+        """Which camera this is, for people."""
+        return self.places[0].name
+
+    def trigger(self) -> None:
+        """Ask for one exposure."""
+        profiles.trigger(self.device(0))
+
+    def stop(self, *, lost: bool = False) -> None:
+        """End the run; a camera that is lost is not told, because that takes seconds."""
+        if not self._running:
+            return
+        self._running = False
+        with suppress(CameraError):
+            for device in self._devices.values() if not lost else ():
+                device.set("AcquisitionStop", 1)
+        for reader in self.readers:
+            reader.quit()
+        for reader in self.readers:
+            reader.stop()
+        self.pairer.end()
+
+    def lost(self, silent_s: float) -> CameraLostError | None:
+        """Ask the devices of chips that have been silent for so long; give the error of one that does not answer."""
+        now = time.monotonic()
+        for n, reader in enumerate(self.readers):
+            device = self.device(n)
+            if now - reader.heard > silent_s and not (device.answers() and device.controlled):
+                return CameraLostError(
+                    f"camera at {device.where} ({CHIPS[n]} chip) no longer answers: power, cable or network, or "
+                    "another program took it over; asked again, it is connected anew"
+                )
+        return None
+
+    def forget(self, *, lost: bool = False) -> None:
+        """Close streams and devices; for one that is lost Aravis waits for seconds, which then nobody has to."""
+        held = [part for device in self._devices.values() for part in device.give_up()]
+        held += [part for reader in self.readers for part in reader.give_up()]
+        self.readers.clear()
+        self._devices.clear()
+        if lost:
+            threading.Thread(target=held.clear, name="closing a camera").start()
+        else:
+            held.clear()  # from the end: streams before the devices that they use
+
+
+def _patiently(connect: Callable[[], tuple[Place, Place]], patience_s: float) -> tuple[Place, Place]:
+    deadline = time.monotonic() + patience_s
+    while True:
+        try:
+            return connect()
+        except (CameraBusyError, CameraNotFoundError, CameraLostError):
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(RETRY_S)
+
+
+def _agreed(device: Device) -> Agreed:
+    return Agreed(format_named(device.get("PixelFormat")), int(device.get("Width")), int(device.get("Height")))
+
+
+def _check(visible: Agreed, infrared: Agreed) -> None:
+    if visible.format.bayer is None and visible.format.colours != 3:
+        raise CameraError(
+            f"visible chip: pixel format {visible.format.name} has no colours; set a Bayer format or RGB8"
+        )
+    if infrared.format.bayer is not None or infrared.format.colours != 1:
+        raise CameraError(f"infrared chip: pixel format {infrared.format.name}; set a Mono format")
+    if visible.format.bits != infrared.format.bits:
+        raise CameraError(
+            f"visible {visible.format.name} and infrared {infrared.format.name} have different full scales; set "
+            "pixel_format of both chips to the same number of bits"
+        )
+    if (visible.width, visible.height) != (infrared.width, infrared.height):
+        raise CameraError(
+            f"visible {visible.width} x {visible.height} and infrared {infrared.width} x {infrared.height} pixels; set "
+            "Width and Height of both chips to the same region"
+        )

@@ -1,0 +1,229 @@
+"""What a camera is made of and how its features are called: the JAI AD-080GE and its family, and GenICam in general."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from quadfringe.capture import AravisConfig, ChipConfig
+from quadfringe.devices.aravis._gi import Device, Found
+from quadfringe.errors import CameraError, CameraNotFoundError
+
+__all__ = [
+    "CHIPS",
+    "Place",
+    "exposure_steps",
+    "introduced",
+    "matching",
+    "period_us",
+    "places",
+    "resolved",
+    "set_chip",
+    "set_trigger",
+    "trigger",
+]
+
+CHIPS = ("visible", "infrared")
+JAI_MODEL = re.compile(r"(AD-\d+GE)_#([01])$")
+JAI_LEAST_US, JAI_STEP_US, JAI_STEPS = 20.0, 42.07, 792
+JAI_EXPOSURES = ("JAIExposureTimeRaw", "ExposureTimeRaw")
+EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
+GAINS = ("Gain", "GainRaw")
+RATES = ("AcquisitionFrameRate", "AcquisitionFrameRateAbs")
+SOFTWARE_TRIGGERS = ("SoftwareTrigger0", "TriggerSoftware")
+IP = re.compile(r"\d+\.\d+\.\d+\.\d+")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the frames of a chip come from: a device, one of its stream channels, one of its sources."""
+
+    where: str
+    stream: int
+    source: str | None
+    jai: bool
+    name: str
+
+
+def matching(name: str, devices: Iterable[Found]) -> list[Found]:
+    """Give the devices whose vendor, model, serial number or address contain this name."""
+    return [device for device in devices if name.casefold() in str(device).casefold()]
+
+
+def places(config: AravisConfig, look: Callable[[], Sequence[Found]]) -> tuple[Place, Place]:
+    """Find the visible and the infrared chip; raises `CameraNotFoundError` that lists what answered.
+
+    The short name of a JAI camera is that of two devices with one serial number: the suffix of the model tells the
+    visible one, #0, from the infrared one, #1. A camera with one device has its chips on stream channels 0 and 1.
+    """
+    chips = (config.visible, config.infrared)
+    named = [chip.device or config.device for chip in chips]
+    direct = all(IP.fullmatch(name) for name in named) and bool(config.visible.device and config.infrared.device)
+    devices = [] if direct else look()
+    if config.visible.device and config.infrared.device:
+        found = [_one(name, devices) for name in named]
+    else:
+        found = _both(named[0] if config.visible.device else config.device, config.infrared.device, devices)
+    same = found[0].where == found[1].where
+    streams = [chip.stream if chip.stream is not None else int(same and n) for n, chip in enumerate(chips)]
+    if same and streams[0] == streams[1] and config.visible.source == config.infrared.source:
+        raise CameraNotFoundError(f"{found[0]}: both chips are stream {streams[0]} of it; they have to differ")
+    first, second = (
+        Place(device.where, stream, chip.source, config.profile == "jai-ad-080ge", device.name)
+        for device, stream, chip in zip(found, streams, chips, strict=True)
+    )
+    return first, second
+
+
+def introduced(place: Place, device: Device, profile: str | None) -> Place:
+    """Give the place with what the opened device says of itself: who it is, and whether it is a JAI camera."""
+    vendor, model = (str(device.get(f"Device{part}Name")) for part in ("Vendor", "Model"))
+    serial = next((str(device.get(name)) for name in ("DeviceSerialNumber", "DeviceID") if device.has(name)), "")
+    jai = JAI_MODEL.search(model) is not None if profile is None else place.jai
+    return replace(place, name=Found(place.where, vendor, model, serial).name, jai=jai)
+
+
+def _one(name: str, devices: Sequence[Found]) -> Found:
+    fit = matching(name, devices)
+    exact = [device for device in fit if name in (device.where, device.model)]
+    if len(exact) == 1:
+        return exact[0]
+    if len(fit) == 1:
+        return fit[0]
+    if not fit and IP.fullmatch(name):
+        return Found(name, "", "", "")  # an address that no broadcast reaches is asked directly
+    raise _not_one(name, fit, devices)
+
+
+def _both(name: str, infrared: str | None, devices: Sequence[Found]) -> list[Found]:
+    """Find the devices of both chips by one name, and the infrared one by its own if it has one."""
+    fit = matching(name, devices)
+    if IP.fullmatch(name):
+        fit = [device for device in fit if device.where == name] or fit
+        fit += [twin for twin in devices if fit and twin is not fit[0] and _twins(fit[0], twin)]
+    if infrared is not None:
+        other = _one(infrared, devices)
+        fit = [device for device in fit if device != other]
+        if len(fit) != 1:
+            raise _not_one(name, fit, devices)
+        return [fit[0], other]
+    if len(fit) == 2 and _twins(*fit):
+        return sorted(fit, key=lambda device: device.model)
+    if len(fit) == 1 and JAI_MODEL.search(fit[0].model):
+        raise CameraNotFoundError(
+            f"{fit[0]} is one chip of two, and the other one does not answer; check its link, and name the camera "
+            "without the suffix of a chip"
+        )
+    if len(fit) == 1:
+        return [fit[0], fit[0]]
+    raise _not_one(name, fit, devices)
+
+
+def _twins(first: Found, second: Found) -> bool:
+    """Whether two devices are the chips of one JAI camera."""
+    models = JAI_MODEL.search(first.model), JAI_MODEL.search(second.model)
+    if models[0] is None or models[1] is None or first.serial != second.serial:
+        return False
+    return models[0][1] == models[1][1] and {models[0][2], models[1][2]} == {"0", "1"}
+
+
+def _not_one(name: str, fit: Sequence[Found], devices: Sequence[Found]) -> CameraNotFoundError:
+    wanted = f"the name {name!r}" if name else "no name"
+    listed = "\n".join(f"  {device}" for device in (fit or devices)) or "  none"
+    if fit:
+        return CameraNotFoundError(f"{wanted} fits several cameras; give a serial number or an address:\n{listed}")
+    return CameraNotFoundError(
+        f"no camera answers to {wanted}; check power, cable and network, and that the host has an address in the "
+        f"camera's subnet. Cameras that answer:\n{listed}"
+    )
+
+
+def exposure_steps(exposure_us: float) -> int:
+    """Give the number of steps of a JAI camera for an exposure, 20 us and n times 42.07 us.
+
+    >>> exposure_steps(20.0), exposure_steps(10_000.0)
+    (0, 237)
+    """
+    steps = round((exposure_us - JAI_LEAST_US) / JAI_STEP_US)
+    if not 0 <= steps <= JAI_STEPS or exposure_us < JAI_LEAST_US:
+        most = JAI_LEAST_US + JAI_STEPS * JAI_STEP_US
+        raise CameraError(f"exposure_us: expected {JAI_LEAST_US:g} to {most:.0f} us, got {exposure_us:g}")
+    return steps
+
+
+def set_chip(device: Device, place: Place, chip: ChipConfig, exposure_us: float | None) -> dict[str, Any]:
+    """Set format, exposure and gain; give what the camera made of it, by the names of `ChipConfig`."""
+    if place.source is not None:
+        device.set("SourceSelector", place.source)
+    taken: dict[str, Any] = {"device": place.where, "stream": place.stream, "source": place.source}
+    if chip.pixel_format is not None:
+        device.set("PixelFormat", chip.pixel_format)
+    wanted_us = chip.exposure_us if chip.exposure_us is not None else exposure_us
+    raw = _first(device, JAI_EXPOSURES) if place.jai else None
+    if raw is not None:
+        if wanted_us is not None:
+            device.set(raw, exposure_steps(wanted_us))
+        taken["exposure_us"] = JAI_LEAST_US + JAI_STEP_US * int(device.get(raw))
+    elif (name := _first(device, EXPOSURES)) is not None:
+        if wanted_us is not None:
+            device.set(name, JAI_LEAST_US + JAI_STEP_US * exposure_steps(wanted_us) if place.jai else wanted_us)
+        taken["exposure_us"] = float(device.get(name))
+    elif wanted_us is not None:
+        raise CameraError(f"camera at {place.where} has none of {', '.join(EXPOSURES)}; set the exposure by `features`")
+    if (name := _first(device, GAINS)) is not None:
+        if chip.gain is not None:
+            device.set(name, chip.gain)
+        taken["gain"] = float(device.get(name))
+    elif chip.gain is not None:
+        raise CameraError(f"camera at {place.where} has none of {', '.join(GAINS)}; set the gain by `features`")
+    return taken
+
+
+def set_trigger(device: Device, place: Place, config: AravisConfig) -> None:
+    """Set what starts an exposure, and that both chips of a JAI camera follow it."""
+    if place.jai and device.has("SyncMode"):
+        device.set("SyncMode", "Sync")
+    if device.has("AcquisitionMode"):
+        device.set("AcquisitionMode", "Continuous")
+    if device.has("TriggerSelector"):
+        device.set("TriggerSelector", "FrameStart")
+    if device.has("TriggerMode"):
+        device.set("TriggerMode", "Off" if config.trigger == "free" else "On")
+    elif config.trigger != "free":
+        raise CameraError(f'camera at {place.where} has no TriggerMode; it runs freely: trigger = "free"')
+    if config.trigger != "free":
+        device.set("TriggerSource", "Software" if config.trigger == "software" else config.trigger)
+    if config.frame_rate_hz is not None and config.trigger == "free":
+        name = _first(device, RATES)
+        if name is None:
+            raise CameraError(f"camera at {place.where} has none of {', '.join(RATES)}; leave frame_rate_hz out")
+        if device.has("AcquisitionFrameRateEnable"):
+            device.set("AcquisitionFrameRateEnable", True)
+        device.set(name, config.frame_rate_hz)
+
+
+def period_us(device: Device, exposures_us: Iterable[float]) -> float:
+    """Give the time from one exposure to the next, as far as the camera says."""
+    name = _first(device, RATES)
+    rate_hz = float(device.get(name)) if name is not None else 0.0
+    return max([1e6 / rate_hz if rate_hz > 0 else 0.0, *exposures_us])
+
+
+def trigger(device: Device) -> None:
+    """Ask for one exposure of both chips."""
+    name = _first(device, SOFTWARE_TRIGGERS)
+    if name is None:
+        raise CameraError(f"camera at {device.where} has none of {', '.join(SOFTWARE_TRIGGERS)}: no software trigger")
+    device.set(name, 1)
+
+
+def _first(device: Device, names: Iterable[str]) -> str | None:
+    return next((name for name in names if device.has(name)), None)
+
+
+def resolved(config: AravisConfig, taken: Mapping[str, Mapping[str, Any]]) -> AravisConfig:
+    """Give the settings with what the camera made of them."""
+    chips = {chip: ChipConfig.model_validate(dict(taken[chip])) for chip in CHIPS}
+    return config.model_copy(update={"exposure_us": None, **chips})

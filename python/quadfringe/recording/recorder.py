@@ -1,0 +1,134 @@
+"""Recording beside a live stream: goes on in a new file when a full disk has room again."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from threading import Lock
+from types import TracebackType
+
+from quadfringe.config import SystemConfig
+from quadfringe.data import AnyShot, Calibration
+from quadfringe.errors import InputError, RecordingError
+from quadfringe.recording.layout import Header
+from quadfringe.recording.writer import RecordingWriter
+
+__all__ = ["Recorder", "RecorderStatistics"]
+
+RETRY_S = 1.0
+
+
+@dataclass(frozen=True)
+class RecorderStatistics:
+    """Shots that are safe on file, shots that the disk refused, bytes of images, and what is wrong right now."""
+
+    written: int
+    refused: int
+    image_bytes: int
+    files: tuple[Path, ...]
+    fault: str | None
+
+
+class Recorder:
+    """Writes shots into take.h5, and into take_001.h5 and so on after a fault of the disk or at `file_gb`.
+
+    `write` is made for a tap of a stream: it blocks for one write and does not raise for a full disk. The shot is
+    then counted as refused, `statistics().fault` says why, and a new file is begun once a second until one can be.
+    Raises `InputError` for a file that exists and for shots that are unlike each other.
+    """
+
+    def __init__(
+        self,
+        path: Path | str,
+        config: SystemConfig | None = None,
+        calibration: Calibration | None = None,
+        *,
+        file_gb: float | None = None,
+    ) -> None:
+        self.path = Path(path)
+        self.config, self.calibration = config, calibration
+        self._file_bytes = None if file_gb is None else file_gb * 1e9
+        self._writer: RecordingWriter | None = None
+        self._files: list[Path] = []
+        self._written = self._refused = self._image_bytes = 0
+        self._fault: str | None = None
+        self._retry_at = 0.0
+        self._lock = Lock()
+        if self.path.suffix != ".h5":
+            raise InputError(f"{path}: expected a name that ends in .h5")
+        if self.path.exists():
+            raise InputError(f"{path}: exists already; recordings are never overwritten")
+        if not self.path.parent.is_dir():
+            raise InputError(f"{path}: the folder {self.path.parent} does not exist; create it first")
+
+    def write(self, shot: AnyShot) -> None:
+        """Write a shot; it is counted as written when it is safe."""
+        with self._lock:
+            try:
+                writer = self._writer_for(shot)
+                if writer is None:
+                    self._refused += 1
+                    return
+                writer.append(shot)
+            except RecordingError as error:
+                self._fail(str(error))
+            else:
+                self._written += 1
+                self._image_bytes += writer.header.shot_bytes
+                self._fault = None
+
+    def _fail(self, reason: str) -> None:
+        self._refused += 1
+        self._fault = reason
+        self._retry_at = time.monotonic() + RETRY_S
+        self._end_file()
+
+    def _writer_for(self, shot: AnyShot) -> RecordingWriter | None:
+        """Give the file in use, a new one when there is none, or None while a fault waits for its next try."""
+        if self._is_long_enough():
+            self._end_file()
+        writer = self._writer
+        if writer is None:
+            if time.monotonic() < self._retry_at:
+                return None
+            path = self._next_path()
+            writer = RecordingWriter(path, Header.of(shot, self.config, self.calibration))
+            self._writer = writer
+            self._files.append(path)
+        return writer
+
+    def _is_long_enough(self) -> bool:
+        writer = self._writer
+        if writer is None or self._file_bytes is None or not writer.written:
+            return False
+        return (writer.written + 1) * writer.header.shot_bytes > self._file_bytes
+
+    def _next_path(self) -> Path:
+        number = len(self._files)
+        return self.path if number == 0 else self.path.with_name(f"{self.path.stem}_{number:03d}.h5")
+
+    def _end_file(self) -> None:
+        if self._writer is not None:
+            self._writer.close()
+            self._writer = None
+
+    def statistics(self) -> RecorderStatistics:
+        """Give the counters, at any time and from any thread."""
+        return RecorderStatistics(self._written, self._refused, self._image_bytes, tuple(self._files), self._fault)
+
+    def close(self) -> None:
+        """Close the file in order; closing twice is allowed."""
+        with self._lock:
+            self._end_file()
+
+    def __enter__(self) -> Recorder:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()

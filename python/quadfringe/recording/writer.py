@@ -1,0 +1,132 @@
+"""One recording, one shot at a time: a shot is on file when `append` returns, and survives whatever comes after."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from contextlib import suppress
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import AnyShot, Stamp
+from quadfringe.errors import InputError, RecordingError
+from quadfringe.recording.layout import Header, crcs_of, make_datasets, stamp_values
+
+__all__ = ["RecordingWriter", "require_room"]
+
+RESERVE_BYTES = 8 << 20  # HDF5's own tables, and room to close in order
+READABLE_SINCE = ("v110", "v110")  # the file format of HDF5 1.10, the first that survives a killed writer
+
+
+class RecordingWriter:
+    """Writes shots into a new file; use it in a `with` block, from one thread.
+
+    The file is in HDF5's mode of one writer and many readers from the first shot on: it can be read while it grows,
+    and every shot that `append` has returned for is readable after the process was killed. Raises `InputError` when
+    the file exists or cannot be made, `RecordingError` when the disk is full or fails.
+    """
+
+    def __init__(self, path: Path | str, header: Header) -> None:
+        self.path, self.header = Path(path), header
+        self.written = 0
+        self._failed = False
+        self._file = _create(self.path, header)
+        self._datasets = {name: self._file[name] for name in self._file if self._file[name].chunks}  # slow to look up
+
+    def append(self, shot: AnyShot) -> None:
+        """Write one shot; when this returns it is safe. A shot without a stamp is numbered and gets the time now."""
+        self.header.require_alike(shot)
+        require_room(self.path.parent, self.header.shot_bytes, self.written)
+        images = {name: np.ascontiguousarray(image) for name, image in shot.images.items()}
+        stamp = shot.stamp or Stamp(self.written, time.time_ns() // 1000, "", {})
+        self.append_images(images, stamp, crcs_of(images))
+
+    def append_images(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
+        """Write images whose bytes have these CRC-32s, unlooked at."""
+        try:
+            self._write(images, stamp, crcs)
+        except (OSError, RuntimeError) as error:  # h5py raises both for a write that failed
+            self._failed = True
+            raise RecordingError(
+                f"{self.path}: shot {self.written} could not be written: {_first_line(error)}; "
+                f"the {self.written} before it are safe"
+            ) from error
+        except BaseException:  # Ctrl-C in the middle of a shot
+            self._failed = True
+            raise
+        self.written += 1
+
+    def _write(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
+        n, datasets = self.written, self._datasets
+        for name, image in images.items():
+            place = datasets[name].id
+            place.set_extent((n + 1, *image.shape))
+            place.write_direct_chunk((n, 0, 0), image)
+        for name, value in (stamp_values(stamp) | {"crc32": crcs}).items():
+            dataset = datasets[name]
+            dataset.id.set_extent((n + 1, *dataset.chunks[1:]))
+            dataset[n] = value
+        self._file.flush()  # of the file: what a flush of datasets alone leaves behind is lost to HDF5's own repair
+
+    def close(self) -> None:
+        """Close the file, marked as closed in order unless a write failed; closing twice is allowed."""
+        if not self._file.id.valid:
+            return
+        with suppress(OSError, RuntimeError):
+            self._file["closed"][()] = not self._failed
+        with suppress(OSError, RuntimeError):
+            self._file.close()
+
+    def __enter__(self) -> RecordingWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def require_room(folder: Path, shot_bytes: int, written: int) -> None:
+    """Raise `RecordingError` while the disk has room for one more shot no longer: HDF5 is then never cut short."""
+    free = shutil.disk_usage(folder).free
+    if free < shot_bytes + RESERVE_BYTES:
+        raise RecordingError(
+            f"{folder}: the disk is full ({free / 1e6:.0f} MB left); the {written} shots written before are safe"
+        )
+
+
+def _create(path: Path, header: Header) -> h5py.File:
+    if path.suffix != ".h5":
+        raise InputError(f"{path}: expected a name that ends in .h5")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
+    require_room(path.parent, header.shot_bytes, 0)
+    try:
+        file = h5py.File(path, "x", libver=READABLE_SINCE)
+    except FileExistsError as error:
+        raise InputError(f"{path}: exists already; recordings are never overwritten") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be created: {_first_line(error)}") from error
+    try:
+        header.write(file)
+        make_datasets(file, header)
+        file.swmr_mode = True
+        file.flush()
+    except (OSError, RuntimeError) as error:
+        with suppress(OSError, RuntimeError):
+            file.close()
+        path.unlink(missing_ok=True)
+        raise RecordingError(f"{path}: cannot be written: {_first_line(error)}") from error
+    return file
+
+
+def _first_line(error: BaseException) -> str:
+    return str(error).splitlines()[0] if str(error) else type(error).__name__

@@ -1,0 +1,81 @@
+"""Aravis' own fake cameras as two chips that show the test pattern: an implementation of the wire that is not ours.
+
+    python tests/camera/aravis_fake.py WIDTH HEIGHT RATE_HZ ADDRESS ADDRESS
+
+"ready" on stdout, and the end of stdin ends them. Frames are made by a C
+callback: the one of the binding is freed at once and crashes, so that it is set through ctypes and kept here.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import sys
+from typing import Any
+
+import gi
+import numpy as np
+
+gi.require_version("Aravis", "0.8")
+from gi.repository import Aravis  # noqa: E402
+
+from quadfringe.emulator.frames import TestPattern, packed  # noqa: E402
+
+Fill = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
+WIDTH, HEIGHT, SENSOR_WIDTH, SENSOR_HEIGHT, PERIOD_US = 0x100, 0x104, 0x11C, 0x118, 0x138
+library = ctypes.CDLL("libaravis-0.8.so.0")
+library.arv_buffer_get_data.restype = ctypes.c_void_p
+library.arv_buffer_get_data.argtypes = [ctypes.c_void_p, ctypes.c_void_p]
+library.arv_buffer_get_timestamp.restype = ctypes.c_uint64
+library.arv_buffer_get_timestamp.argtypes = [ctypes.c_void_p]
+library.arv_buffer_set_timestamp.argtypes = [ctypes.c_void_p, ctypes.c_uint64]
+library.arv_fake_camera_set_fill_pattern.argtypes = [ctypes.c_void_p, Fill, ctypes.c_void_p, ctypes.c_void_p]
+library.arv_fake_camera_set_fill_pattern.restype = None
+unwrap = ctypes.pythonapi.PyCapsule_GetPointer
+unwrap.restype, unwrap.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
+
+
+class Chip:
+    """One fake camera whose frames carry the number of the period that they belong to."""
+
+    def __init__(self, index: int, address: str, source: TestPattern, rate_hz: float) -> None:
+        self._camera = Aravis.GvFakeCamera(interface_name=address, serial_number=f"FAKE{index}")
+        assert self._camera.is_running(), f"{address} is taken"
+        self._index, self._source = index, source
+        self._period_ns = round(1e6 / rate_hz) * 1000
+        self._last = 0
+        self._device = self._camera.get_fake_camera()
+        height, width = source.shape
+        self._size_px = width, height
+        start = {
+            SENSOR_WIDTH: width,
+            SENSOR_HEIGHT: height,
+            WIDTH: width,
+            HEIGHT: height,
+            PERIOD_US: self._period_ns // 1000,
+        }
+        for register, value in start.items():
+            self._device.write_register(register, value)
+        self._callback = Fill(self._fill)
+        library.arv_fake_camera_set_fill_pattern(unwrap(self._device.__gpointer__, None), self._callback, None, None)
+
+    def _fill(self, buffer: int, _data: Any, _exposure: int, _gain: int, pixel_format: int) -> None:
+        # Both cameras wake at multiples of the period; a late one keeps its place in the row.
+        now = library.arv_buffer_get_timestamp(buffer) // self._period_ns
+        self._last = max(self._last + 1, now)
+        frame = np.frombuffer(packed(self._source, self._index, self._last, pixel_format, self._size_px), np.uint8)
+        ctypes.memmove(library.arv_buffer_get_data(buffer, None), frame.ctypes.data, frame.nbytes)
+        library.arv_buffer_set_timestamp(buffer, self._last * self._period_ns)
+
+
+def main() -> None:
+    width, height, rate_hz = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
+    source = TestPattern((height, width))
+    chips = [Chip(index, address, source, rate_hz) for index, address in enumerate(sys.argv[4:6])]
+    print("ready", flush=True)
+    sys.stdin.read()
+    del chips
+    os._exit(0)
+
+
+main()

@@ -1,0 +1,81 @@
+"""Every kind of camera, opened; a new kind adds one line to `CAMERAS`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, closing, contextmanager
+from dataclasses import replace
+from pathlib import Path
+
+from fake_twin import fake_twin
+from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
+
+from quadfringe.capture import ReplayConfig, VirtualConfig
+from quadfringe.config import DeviceModel, SystemConfig
+from quadfringe.data import Stamp
+from quadfringe.devices import Camera, open_devices
+from quadfringe.emulator import Emulator
+from quadfringe.recording import Recorder
+
+SMALL = DeviceModel(width_px=128, height_px=96, focal_px=(322.5, 322.5), centre_px=(63.5, 47.5))
+
+
+@contextmanager
+def opened(config: SystemConfig) -> Iterator[Camera]:
+    devices = open_devices(config)
+    devices.projector.show(devices.config.fringes)
+    with closing(devices.projector), devices.camera as camera:
+        yield camera
+
+
+@contextmanager
+def virtual(_: Path) -> Iterator[Camera]:
+    with opened(SystemConfig(camera=SMALL, capture=VirtualConfig(frame_rate_hz=30.0))) as camera:
+        yield camera
+
+
+def wired(**settings: object) -> Callable[[Path], AbstractContextManager[Camera]]:
+    @contextmanager
+    def emulated_camera(_: Path) -> Iterator[Camera]:
+        emulator = shared_emulator()
+        emulator.order("reset")
+        with opened(SystemConfig(capture=emulated(emulator, **settings))) as camera:  # type: ignore[arg-type]
+            yield camera
+
+    return emulated_camera
+
+
+@contextmanager
+def two_streams(_: Path) -> Iterator[Camera]:
+    with (
+        Emulator(size_px=SIZE_PX, model="two-streams", addresses=TWO_STREAMS) as emulator,
+        opened(SystemConfig(capture=two_sources(emulator))) as camera,
+    ):
+        yield camera
+
+
+@contextmanager
+def aravis_fake(_: Path) -> Iterator[Camera]:
+    with fake_twin(SIZE_PX, 30.0) as capture, opened(SystemConfig(capture=capture)) as camera:
+        yield camera
+
+
+@contextmanager
+def replay(folder: Path) -> Iterator[Camera]:
+    with opened(SystemConfig(camera=SMALL)) as source, Recorder(folder / "take.h5") as recorder:
+        shot = source.snap()
+        for number in range(300):
+            recorder.write(replace(shot, stamp=Stamp(number + 1, 10_000 * (number + 1), "bench")))
+    with opened(SystemConfig(capture=ReplayConfig(file=folder / "take.h5"))) as camera:
+        yield camera
+
+
+CAMERAS: dict[str, Callable[[Path], AbstractContextManager[Camera]]] = {
+    "virtual": virtual,
+    "replay": replay,
+    "emulated": wired(),
+    "emulated, software trigger": wired(trigger="software"),
+    "emulated, 12 bit packed": wired(visible="BayerRG12Packed", infrared="Mono12Packed"),
+    "two streams": two_streams,
+    "fake of Aravis": aravis_fake,
+}

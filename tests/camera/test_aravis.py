@@ -1,0 +1,155 @@
+"""The 2CCD camera over a real GigE Vision wire: formats, triggers, buffers, settings that are read back."""
+
+from __future__ import annotations
+
+import gc
+import threading
+import time
+
+import numpy as np
+import pytest
+from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, pattern, two_sources
+
+from quadfringe.capture import AravisConfig
+from quadfringe.data import BayerShot, Shot
+from quadfringe.devices.aravis import AravisCamera, found
+from quadfringe.emulator import MODEL, SERIAL, Emulator
+from quadfringe.errors import CameraError, CameraNotFoundError
+
+FORMATS = [
+    ("BayerRG8", "Mono8"),
+    ("BayerRG10", "Mono10"),
+    ("BayerRG10Packed", "Mono10Packed"),
+    ("BayerRG12", "Mono12Packed"),
+    ("BayerRG12Packed", "Mono12"),
+    ("RGB8", "Mono8"),
+]
+
+
+@pytest.mark.parametrize(("visible", "infrared"), FORMATS)
+def test_every_format_is_right_to_the_bit(emulator: Emulator, visible: str, infrared: str) -> None:
+    with AravisCamera(emulated(emulator, visible, infrared)) as camera:
+        shots = list(camera.stream(5, keep="all"))
+    exposures = [checked_exposure(shot) for shot in shots]
+    assert exposures == list(range(exposures[0], exposures[0] + 5))
+    assert isinstance(shots[0], Shot if visible == "RGB8" else BayerShot)
+    assert all(image.flags.writeable for image in shots[0].images.values())
+    assert camera.config.visible.pixel_format == visible
+    assert camera.config.infrared.pixel_format == infrared
+
+
+def test_one_device_with_two_streams() -> None:
+    with (
+        Emulator(size_px=SIZE_PX, model="two-streams", addresses=TWO_STREAMS) as emulator,
+        AravisCamera(two_sources(emulator)) as camera,
+    ):
+        assert len({checked_exposure(shot) for shot in camera.stream(10, keep="all")}) == 10
+        emulator.order("lost_packets", 0.05)
+        assert len({checked_exposure(shot) for shot in camera.stream(20, keep="all")}) == 20
+
+
+def test_the_short_name_finds_both_chips(emulator: Emulator) -> None:
+    assert [device.model for device in found()] == [f"{MODEL}_#0", f"{MODEL}_#1"]
+    for name in (MODEL, SERIAL, "127.0.0.1", ""):
+        with AravisCamera(AravisConfig(device=name)) as camera:
+            assert camera.name == f"JAI Ltd., Japan {MODEL} {SERIAL}"
+            assert (camera.config.visible.device, camera.config.infrared.device) == emulator.addresses
+    with pytest.raises(CameraNotFoundError, match=r"one chip of two"):
+        AravisCamera(AravisConfig(device=f"{MODEL}_#0"))
+    with pytest.raises(CameraNotFoundError, match=r"no camera answers to the name 'BFLY'(?s:.)*AD-080GE_#0 E000001 at"):
+        AravisCamera(AravisConfig(device="BFLY"))
+
+
+@pytest.mark.usefixtures("emulator")
+def test_an_ambiguous_name_is_refused() -> None:
+    with Emulator(size_px=SIZE_PX, addresses=SECOND, serial="E000002"):
+        with pytest.raises(CameraNotFoundError, match="fits several cameras"):
+            AravisCamera(AravisConfig(device=MODEL))
+        with AravisCamera(AravisConfig(device="E000002")) as camera:
+            assert camera.config.visible.device == "127.0.0.3"
+            checked_exposure(camera.snap())
+
+
+def test_exposure_steps_are_read_back(emulator: Emulator) -> None:
+    config = emulated(emulator, exposure_us=10_000.0, frame_rate_hz=50.0)
+    with AravisCamera(config) as camera:
+        assert camera.config.visible.exposure_us == pytest.approx(20 + 237 * 42.07)
+        assert camera.config.infrared.exposure_us == camera.config.visible.exposure_us
+        began = time.monotonic()
+        list(camera.stream(25, keep="all"))
+        assert time.monotonic() - began > 0.4, "50 frames a second, not more"
+    with pytest.raises(CameraError, match=r"exposure_us: expected 20 to 33339 us, got 40000"):
+        AravisCamera(emulated(emulator, exposure_us=40_000.0))
+
+
+def test_features_by_name(emulator: Emulator) -> None:
+    with AravisCamera(emulated(emulator, features={"Height": 48, "GainRaw": 7})) as camera:
+        assert (camera.config.visible.gain, camera.config.infrared.gain) == (7, 7)
+        shot = camera.snap()
+        whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+        np.testing.assert_array_equal(shot.ir, whole.frame(1, whole.exposure(shot.ir), 8)[:48])
+    with pytest.raises(CameraError, match="NoSuchFeature"):
+        AravisCamera(emulated(emulator, features={"NoSuchFeature": 1}))
+
+
+@pytest.mark.parametrize(
+    ("visible", "infrared", "reason"),
+    [
+        ("BayerRG12", "Mono8", "different full scales"),
+        ("Mono8", None, "Mono8"),
+        (None, "BayerRG8", "BayerRG8"),
+    ],
+)
+def test_formats_that_do_not_fit(emulator: Emulator, visible: str, infrared: str, reason: str) -> None:
+    with pytest.raises(CameraError, match=reason):
+        AravisCamera(emulated(emulator, visible, infrared))
+    with AravisCamera(emulated(emulator, "BayerRG8", "Mono8")) as camera:
+        checked_exposure(camera.snap())
+
+
+def test_software_triggers(emulator: Emulator) -> None:
+    before = [int(count) for count in emulator.order("sent").split()]
+    with AravisCamera(emulated(emulator, trigger="software")) as camera:
+        first = checked_exposure(camera.snap())
+        assert [checked_exposure(camera.snap()) for _ in range(3)] == [first + n for n in (1, 2, 3)]
+        assert [checked_exposure(shot) for shot in camera.stream(5)] == [first + n for n in (4, 5, 6, 7, 8)]
+        after = [int(count) for count in emulator.order("sent").split()]
+        assert after == [count + 9 for count in before], "one exposure for each trigger"
+
+
+def test_a_line_trigger(emulator: Emulator) -> None:
+    with AravisCamera(emulated(emulator, trigger="Line5", timeout_s=5.0)) as camera:
+        pulses = threading.Thread(target=lambda: [(time.sleep(0.05), emulator.order("line")) for _ in range(20)])
+        pulses.start()
+        exposures = [checked_exposure(shot) for shot in camera.stream(5, keep="all")]
+        pulses.join()
+    assert exposures == list(range(exposures[0], exposures[0] + 5))
+
+
+def test_borrowed_arrays_go_back_by_themselves(emulator: Emulator) -> None:
+    config = emulated(emulator, frame_rate_hz=100.0, buffers=8)
+    with AravisCamera(config) as camera:
+        kept = []
+        for number, shot in enumerate(camera.stream(60, keep="all", borrow=True)):
+            checked_exposure(shot)
+            assert isinstance(shot, BayerShot)
+            assert not shot.raw.flags.owndata
+            assert not shot.raw.flags.writeable
+            if number in (20, 40):
+                kept.append((checked_exposure(shot), shot.raw[1:], shot))
+    del shot
+    gc.collect()
+    for exposure, part, shot in kept:
+        assert checked_exposure(shot) == exposure, "what is kept stays as it was, also after the camera is closed"
+        np.testing.assert_array_equal(part, shot.raw[1:])
+
+
+def test_a_camera_leaves_nothing_behind(emulator: Emulator) -> None:
+    before = threading.active_count()
+    for _ in range(3):
+        with AravisCamera(emulated(emulator)) as camera:
+            camera.snap()
+    deadline = time.monotonic() + 3
+    while threading.active_count() > before and time.monotonic() < deadline:
+        time.sleep(0.05)
+    assert threading.active_count() <= before

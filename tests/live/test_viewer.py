@@ -1,0 +1,163 @@
+"""What people see: a page with the shape, the pictures and the figures, and nothing that leaves the machine."""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import quadfringe as qf
+from quadfringe.recording import Recorder, Recording
+from quadfringe.viewer import Viewer
+
+SMALL_HAND = """
+capture = { kind = "virtual", frame_rate_hz = 8 }
+
+[camera]
+width_px = 320
+height_px = 240
+focal_px = [806.0, 806.0]
+centre_px = [159.5, 119.5]
+
+[scene]
+surface = "hand"
+albedo = [0.92, 0.7, 0.58, 0.85]
+noise = 0.01
+
+[decode]
+method = "published"
+"""
+PATIENCE_S = 120.0
+
+
+@pytest.fixture(scope="module")
+def system(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("hand") / "system.toml"
+    path.write_text(SMALL_HAND)
+    return path
+
+
+@contextmanager
+def live(system: Path, **settings: Any) -> Iterator[tuple[Viewer, Recorder]]:
+    """A scanner that measures without pause, its page and its recorder, until the block ends."""
+    with qf.open(system) as scanner, Viewer(port=8230, **settings) as viewer:
+        recorder = Recorder(system.parent / f"{time.time_ns()}.h5", scanner.config, scanner.calibration)
+        with recorder, scanner.stream(taps={"record": recorder.write}) as stream:
+            follower = threading.Thread(target=viewer.follow, args=(stream, recorder.statistics))
+            follower.start()
+            try:
+                yield viewer, recorder
+            finally:
+                stream.close()
+                follower.join()
+
+
+def until(what: Callable[[], Any], why: str) -> Any:
+    """Ask until there is an answer; fail when patience ends."""
+    end = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end:
+        if (answer := what()) is not None:
+            return answer
+        time.sleep(0.3)
+    return pytest.fail(f"{why} within {PATIENCE_S:g} s")
+
+
+def picture(page: Any) -> np.ndarray:
+    """The middle of the page, without the panel at the right and messages at the top."""
+    image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
+    return image[190:700, 60:860]
+
+
+def painted(image: np.ndarray) -> np.ndarray:
+    """Pixels that are neither the white of the page nor the grey of its grid."""
+    return (image.max(axis=2) < 200) | (np.ptp(image, axis=2) > 30)
+
+
+def shape_on(page: Any) -> np.ndarray | None:
+    """The picture once a shape is on it."""
+    image = picture(page)
+    return image if painted(image).mean() > 0.05 else None
+
+
+def figures(page: Any) -> dict[str, str]:
+    rows = page.locator("table tr").all_inner_texts()
+    return dict(row.split("\t", 1) for row in rows if "\t" in row)
+
+
+def test_the_page_shows_a_moving_shape(browser: Any, system: Path, tmp_path: Path) -> None:
+    asked: list[str] = []
+    with live(system, stride=2) as (viewer, recorder):
+        page = browser.new_page(viewport={"width": 1280, "height": 800})
+        page.on("request", lambda request: asked.append(request.url))
+        page.goto(viewer.url)
+        until(lambda: float(figures(page).get("decoded", "0 /s").split()[0]) or None, "no rate on the page")
+        first = until(lambda: shape_on(page), "no shape")
+        shown = painted(first)
+        assert shown[150:350, 300:500].mean() > 0.3, "the shape is not in the middle"
+        until(lambda: moved if (moved := np.abs(picture(page) - first)[shown].mean()) > 3 else None, "nothing moves")
+        assert page.locator("img").count() >= 2
+        assert set(figures(page)) >= {"captured", "decoded", "queue decode", "queue view", "queue record", "recorded"}
+        assert page.get_by_text("Share").count() == 0
+        (Path(os.environ.get("QUADFRINGE_SHOTS", tmp_path)) / "live.png").write_bytes(page.screenshot())
+        page.close()
+    hosts = {url.split("/")[2].split(":")[0] for url in asked if url.startswith(("http", "ws"))}
+    assert hosts == {"127.0.0.1"}
+    done = recorder.statistics()
+    with Recording(done.files[0]) as take:
+        assert len(take) == done.written > 0
+        assert done.refused == 0
+
+
+def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
+    with qf.open(system) as scanner, scanner.stream(1) as stream:
+        measured = next(iter(stream))
+    seen = {}
+    for colouring in ("texture", "height", "quality"):
+        with Viewer(port=8235, colouring=colouring) as viewer:  # type: ignore[arg-type]
+            viewer.show(measured)  # nobody looks yet
+            page = browser.new_page(viewport={"width": 1280, "height": 800})
+            page.goto(viewer.url)
+            image = until(lambda page=page: shape_on(page), "no shape")
+            vivid = np.ptp(image, axis=2)
+            seen[colouring] = image[vivid >= np.quantile(vivid[painted(image)], 0.8)].mean(axis=0)
+            page.close()
+    assert np.abs(seen["texture"] - seen["height"]).max() > 20
+    assert np.abs(seen["height"] - seen["quality"]).max() > 20
+
+
+def test_only_this_machine_is_served_unless_asked() -> None:
+    with Viewer(port=8240) as viewer:
+        port = int(viewer.url.rsplit(":", 1)[1])
+        assert viewer.url.startswith("http://127.0.0.1:")
+        listening = [
+            line.split()[1] for line in Path("/proc/net/tcp").read_text().splitlines()[1:] if line.split()[3] == "0A"
+        ]
+        assert f"0100007F:{port:04X}" in listening
+        assert f"00000000:{port:04X}" not in listening
+        with socket.create_connection(("127.0.0.1", port), timeout=5):
+            pass
+    with pytest.raises(OSError, match=r".*"), socket.create_connection(("127.0.0.1", port), timeout=1):
+        pass
+
+
+def test_a_shot_without_a_shape_says_why(system: Path) -> None:
+    from quadfringe.errors import DecodeError
+    from quadfringe.streaming import Measured
+
+    with qf.open(system) as scanner, Viewer(port=8250) as viewer:
+        viewer.show(Measured(scanner.grab(), DecodeError("channel ir is black"), 7.0))
+        with scanner.stream(1) as stream:
+            list(stream)
+            viewer.show_figures(stream.statistics())
+        assert "channel ir is black" in viewer._figures.content
+        assert "| decoded |" in viewer._figures.content

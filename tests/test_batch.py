@@ -1,0 +1,140 @@
+"""Many shots on many processes: the same files however often the work was interrupted."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import zarr
+
+import quadfringe as qf
+from quadfringe.batch import decode_recordings, executor_for, prepare, run
+from quadfringe.data import Shot, Stamp
+from quadfringe.errors import InputError
+from quadfringe.recording import Recorder, Recording
+
+CAMERA = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
+SYSTEM = qf.SystemConfig(
+    camera=CAMERA, scene=qf.SceneConfig(surface="steps", noise=0.01), decode=qf.DecodeConfig(method="published")
+)
+SHOTS, BLACK = 6, 3
+
+
+@pytest.fixture(scope="module")
+def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Shots with noise of their own, one of them without infrared light."""
+    path = tmp_path_factory.mktemp("takes") / "take.h5"
+    with qf.open(SYSTEM) as scanner, Recorder(path, scanner.config, scanner.calibration) as recorder:
+        shot = scanner.grab()
+        noise = np.random.default_rng(5)
+        for number in range(SHOTS):
+            images = {n: (i // 2 + noise.integers(0, 3, i.shape)).astype(np.uint8) for n, i in shot.images.items()}
+            if number == BLACK:
+                images["ir"] = np.zeros_like(images["ir"])
+            recorder.write(Shot(**images, stamp=Stamp(number + 1, 1000 * number, "bench")))
+    return path
+
+
+@pytest.fixture(scope="module")
+def whole(take: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What a run without interruption writes, on one process."""
+    out = tmp_path_factory.mktemp("whole")
+    outcomes = {o.shot: o for o in decode_recordings([take], out, workers=1)}
+    assert sorted(outcomes) == list(range(SHOTS))
+    assert [shot for shot, o in outcomes.items() if o.error] == [BLACK]
+    return out
+
+
+def digests(folder: Path) -> dict[str, str]:
+    files = (path for path in sorted(folder.rglob("*")) if path.is_file())
+    return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
+
+
+def test_results_are_those_of_decoding_by_hand(take: Path, whole: Path) -> None:
+    group = zarr.open_group(whole / "take.zarr", mode="r")
+    assert group["status"][:].tolist() == [2 if shot == BLACK else 1 for shot in range(SHOTS)]
+    assert group["id"][:].tolist() == [1, 2, 3, 4, 5, 6]
+    assert np.isnan(group["xyz_mm"][BLACK]).all()
+    with Recording(take) as recorded, qf.open(SYSTEM) as scanner:
+        shape = scanner.decode(recorded[1])
+    for name, expected in (("xyz_mm", shape.xyz_mm), ("phase_rad", shape.phase_rad), ("quality", shape.quality)):
+        np.testing.assert_array_equal(group[name][1], expected)
+    settings = group.attrs["settings"]
+    assert settings["config"]["decode"]["method"] == "published"
+    assert settings["calibration"]["camera"]["width_px"] == CAMERA.width_px
+    plys = sorted(path.name for path in (whole / "take").glob("*.ply"))
+    assert plys == [f"shot_{shot:06d}.ply" for shot in range(SHOTS) if shot != BLACK]
+    errors = json.loads((whole / "take" / "errors.json").read_text())
+    assert list(errors) == [str(BLACK)]
+    assert "channel ir is black" in errors[str(BLACK)]
+
+
+def test_finished_shots_are_not_done_again(take: Path, whole: Path) -> None:
+    before = digests(whole)
+    again = list(decode_recordings([take], whole, workers=1))
+    assert [outcome.shot for outcome in again] == [BLACK]
+    assert digests(whole) == before
+
+
+def test_a_killed_run_goes_on_and_ends_with_the_same_files(take: Path, whole: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "quadfringe", "batch", str(take), "--out", str(tmp_path), "--workers", "1"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as killed:
+        end = time.monotonic() + 120
+        while not list(tmp_path.rglob("shot_*.ply")) and time.monotonic() < end:
+            time.sleep(0.02)
+        import os
+        import signal
+
+        os.killpg(killed.pid, signal.SIGKILL)
+    assert 0 < len(list((tmp_path / "take").glob("shot_*.ply"))) < SHOTS - 1
+    (tmp_path / "take" / ".shot_000000-left.ply").write_text("torn")
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1, done.stderr
+    assert "1 of 6 shots have no shape" in done.stderr
+    assert digests(tmp_path) == digests(whole)
+
+
+def test_a_dask_scheduler_gives_the_same_files(take: Path, whole: Path, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed")
+    cluster = distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, protocol="tcp://", host="127.0.0.1"
+    )
+    with cluster:
+        list(decode_recordings([take], tmp_path, scheduler=cluster.scheduler_address))
+    assert digests(tmp_path) == digests(whole)
+
+
+def test_what_cannot_be_done_is_said_before_anything_is_written(take: Path, whole: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="two recordings are named take"):
+        prepare([take, take], tmp_path)
+    with pytest.raises(InputError, match="no such file"):
+        prepare([tmp_path / "no.h5"], tmp_path / "out")
+    other = SYSTEM.model_copy(update={"decode": qf.DecodeConfig(method="best")})
+    with pytest.raises(InputError, match="made with other settings"):
+        prepare([take], whole, other)
+    (tmp_path / "take.zarr").mkdir()
+    with pytest.raises(InputError, match="not the result of a batch"):
+        prepare([take], tmp_path)
+    with pytest.raises(InputError, match="no dask scheduler at"), executor_for(scheduler="tcp://127.0.0.1:9"):
+        pass
+
+
+def test_without_a_calibration_there_is_phase_but_no_ply(take: Path, tmp_path: Path) -> None:
+    path = tmp_path / "bare.h5"
+    with Recording(take) as recorded, Recorder(path) as recorder:
+        recorder.write(replace(recorded[0], stamp=None))
+    with pytest.raises(InputError, match="without a calibration"):
+        prepare([path], tmp_path / "out")
+    jobs = prepare([path], tmp_path / "out", ply=False)
+    with executor_for(1) as executor:
+        assert [outcome.error for outcome in run(jobs, executor)] == [None]
+    group = zarr.open_group(jobs[0].store, mode="r")
+    assert "xyz_mm" not in group
+    assert np.isfinite(group["phase_rad"][0]).mean() > 0.3

@@ -1,0 +1,115 @@
+"""Cameras without a wire: which devices are meant, what their bytes are, and what is said when the extra is missing."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from quadfringe.capture import AravisConfig, ReplayConfig, VirtualConfig, capture_config
+from quadfringe.cli.app import app
+from quadfringe.config import SystemConfig, checked
+from quadfringe.devices.aravis import _gi, profiles
+from quadfringe.devices.aravis.formats import FORMATS, format_named
+from quadfringe.emulator.frames import TestPattern, packed
+from quadfringe.errors import CameraError, CameraNotFoundError, ConfigError, MissingExtraError
+
+VISIBLE = _gi.Found("192.168.1.10", "JAI Ltd., Japan", "AD-080GE_#0", "4711")
+INFRARED = _gi.Found("192.168.1.11", "JAI Ltd., Japan", "AD-080GE_#1", "4711")
+OTHER = _gi.Found("192.168.1.20", "Basler", "acA1300", "99")
+
+
+def chosen(config: AravisConfig, *devices: _gi.Found) -> list[tuple[str, int]]:
+    return [(place.where, place.stream) for place in profiles.places(config, lambda: devices)]
+
+
+@pytest.mark.parametrize("name", ["AD-080GE", "ad-080ge", "4711", "JAI", "192.168.1.10", "192.168.1.11"])
+def test_both_chips_of_a_jai_camera(name: str) -> None:
+    both = [(VISIBLE.where, 0), (INFRARED.where, 0)]
+    assert chosen(AravisConfig(device=name), INFRARED, OTHER, VISIBLE) == both
+
+
+def test_a_camera_with_two_streams_and_chips_of_two_cameras() -> None:
+    assert chosen(AravisConfig(), OTHER) == [(OTHER.where, 0), (OTHER.where, 1)]
+    mixed = AravisConfig.model_validate({"visible": {"device": "4711"}, "infrared": {"device": "99"}})
+    with pytest.raises(CameraNotFoundError, match="fits several"):
+        chosen(mixed, VISIBLE, INFRARED, OTHER)
+    mixed = AravisConfig.model_validate({"visible": {"device": "_#0"}, "infrared": {"device": "99"}})
+    assert chosen(mixed, VISIBLE, INFRARED, OTHER) == [(VISIBLE.where, 0), (OTHER.where, 0)]
+
+
+def test_cameras_that_are_not_meant() -> None:
+    twin = [_gi.Found(f"192.168.1.3{n}", "JAI Ltd., Japan", f"AD-080GE_#{n}", "4712") for n in (0, 1)]
+    with pytest.raises(CameraNotFoundError, match=r"fits several cameras(?s:.)*4711(?s:.)*4712"):
+        chosen(AravisConfig(device="AD-080GE"), VISIBLE, INFRARED, *twin)
+    with pytest.raises(CameraNotFoundError, match="one chip of two"):
+        chosen(AravisConfig(), VISIBLE)
+    with pytest.raises(CameraNotFoundError, match=r"no camera answers to no name(?s:.)*none"):
+        chosen(AravisConfig())
+    with pytest.raises(CameraNotFoundError, match="no camera answers to the name 'Flir'"):
+        chosen(AravisConfig(device="Flir"), OTHER)
+
+
+def test_exposures_of_a_jai_camera() -> None:
+    assert [profiles.exposure_steps(us) for us in (20.0, 62.0, 33338.0)] == [0, 1, 792]
+    for us in (19.0, 33400.0):
+        with pytest.raises(CameraError, match="expected 20 to 33339 us"):
+            profiles.exposure_steps(us)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_every_format_to_the_bit(name: str) -> None:
+    chosen_format = format_named(name)
+    pattern = TestPattern((6, 8))
+    data = np.frombuffer(packed(pattern, 0, 77, chosen_format.code, (8, 6)), np.uint8)
+    assert len(data) == chosen_format.payload(8, 6)
+    pixels = chosen_format.pixels(data, 8, 6)
+    expected = pattern.frame(0, 77, chosen_format.bits)
+    np.testing.assert_array_equal(pixels if chosen_format.colours == 1 else pixels[:, :, 1], expected)
+
+
+def test_packing_as_the_standard_has_it() -> None:
+    """Two pixels 0x123, 0x564 of 12 bits, and 0x123, 0x2AB of 10 bits, packed by hand."""
+    twelve = FORMATS["BayerRG12Packed"].pixels(np.array([0x12, 0x43, 0x56], np.uint8), 2, 1)
+    ten = FORMATS["Mono10Packed"].pixels(np.array([0x48, 0x33, 0xAA], np.uint8), 2, 1)
+    assert twelve.tolist() == [[0x123, 0x564]]
+    assert ten.tolist() == [[0x123, 0x2AB]]
+    with pytest.raises(CameraError, match="YUV422_8 is not known here; set pixel_format to one of Mono8"):
+        format_named("YUV422_8")
+
+
+def test_without_the_binding_the_install_lines_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "gi", None)
+    _gi._aravis.cache_clear()
+    with pytest.raises(MissingExtraError, match=r"apt-get install (?s:.)*aravis-0\.8(?s:.)*quadfringe\[aravis\]"):
+        _gi.found()
+    result = CliRunner().invoke(app, ["camera", "list"])
+    assert result.exit_code == 2
+    assert "apt-get install" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("word", "kind"), [("virtual:", VirtualConfig), ("aravis:", AravisConfig), ("replay:a.h5", ReplayConfig)]
+)
+def test_a_camera_in_one_word(word: str, kind: type[Any]) -> None:
+    assert isinstance(capture_config(word), kind)
+    assert isinstance(checked(SystemConfig, {"capture": word}, "s.toml").capture, kind)
+
+
+@pytest.mark.parametrize(
+    ("capture", "reason"),
+    [
+        ("camera", r'capture: .*expected "virtual:", "aravis:NAME" or "replay:FILE"'),
+        ("virtual:x", "nothing behind the colon"),
+        ({"kind": "aravis", "devise": "x"}, r"capture\.aravis\.devise: this key is not known"),
+        ({"kind": "aravis", "visible": {"pixel_format": "RAW"}}, r"capture\.aravis\.visible\.pixel_format"),
+        ({"kind": "aravis", "exposure_us": 5, "visible": {"exposure_us": 5}}, "once for both chips, or for each chip"),
+        ({"kind": "webcam"}, "webcam"),
+    ],
+)
+def test_captures_at_fault_are_named(capture: object, reason: str) -> None:
+    with pytest.raises(ConfigError, match=reason):
+        checked(SystemConfig, {"capture": capture}, "s.toml")
