@@ -17,7 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from quadfringe.config import Model, Positive, checked
+from quadfringe.config import Model, checked
+from quadfringe.models import Positive
 
 __all__ = [
     "Disc",
