@@ -128,7 +128,7 @@ def test_a_folder_gives_what_the_bench_gave(folder: Path, guided: Guided) -> Non
 def test_pose_images_of_a_folder_give_what_the_bench_gave(tmp_path: Path) -> None:
     session = SESSION.model_copy(update={"poses": 4, "phase_steps": 4})
     captures = BenchCaptures(CONFIG, session)
-    session.save(tmp_path / "session.json")
+    captures.session.save(tmp_path / "session.json")
     (tmp_path / "poses" / "01").mkdir(parents=True)
     captures._write_pose(tmp_path / "poses" / "01", "01")
     maps = FolderCaptures(tmp_path).pose("01")

@@ -47,7 +47,8 @@ class BenchCaptures:
     def __init__(self, config: SystemConfig, session: Session | None = None) -> None:
         if config.scene.bayer is not None and config.scene.demosaic is None:
             raise InputError("scene.bayer: the rehearsal of a calibration takes whole planes; set scene.demosaic")
-        self.session = session or bench_session(config)
+        bits = None if config.scene.bit_depth == 8 else config.scene.bit_depth
+        self.session = (session or bench_session(config)).model_copy(update={"bits": bits})
         self._config = config
         self._bench = VirtualBench(config)
         self._poses = dict(
