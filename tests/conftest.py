@@ -8,8 +8,6 @@ from pathlib import Path
 import pytest
 from scoring import data_folder
 
-ROOT = Path(__file__).resolve().parents[1]
-
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:

@@ -27,6 +27,7 @@ Image = NDArray[Any]
 Map = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
 
+ROOT = Path(__file__).resolve().parents[1]
 CAPTURES = ("plate", "bottle")
 RENDERS = ("plane", "peaks")
 STEPS = 12
@@ -55,7 +56,7 @@ class Scene:
 
 def data_folder() -> Path:
     """Where the captures and renders lie: QUADFRINGE_DATA, else shared/data beside the checkout."""
-    beside = Path(__file__).resolve().parents[2] / "shared" / "data"
+    beside = ROOT.parent / "shared" / "data"
     return Path(os.environ.get("QUADFRINGE_DATA", beside))
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from numpy.typing import NDArray
+from scoring import ROOT
 
 sys.path.append(str(ROOT / "benches"))
 import accuracy

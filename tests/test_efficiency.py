@@ -6,9 +6,9 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import ROOT
 from numpy.typing import NDArray
 from scipy import ndimage
+from scoring import ROOT
 
 sys.path.append(str(ROOT / "benches"))
 import efficiency as measure

@@ -9,8 +9,8 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
-from conftest import ROOT
 from numpy.typing import NDArray
+from scoring import ROOT
 
 sys.path.append(str(ROOT / "benches"))
 import calibration as bench
