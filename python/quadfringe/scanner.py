@@ -43,6 +43,11 @@ class Scanner:
         self._live: LiveStream | None = None
 
     @property
+    def known_calibration(self) -> Calibration | None:
+        """What turns shots into millimetres; None when the system has none."""
+        return self._calibration
+
+    @property
     def calibration(self) -> Calibration:
         """What turns shots into millimetres; raises `InputError` when the system has none."""
         if self._calibration is None:
