@@ -183,3 +183,14 @@ fn the_check_sees_what_it_must() {
         assert_eq!(fault(module, text), None, "{module}: {text}");
     }
 }
+
+/// The result depends on the arguments alone: nothing asks the environment, files or the console.
+#[test]
+fn the_kernel_asks_nobody_else() {
+    for file in rust_files(&sources()) {
+        let code = code_of(&fs::read_to_string(&file).expect("readable"));
+        for word in ["std::env", "std::fs", "println!", "dbg!"] {
+            assert!(!code.contains(word), "{}: {word}", file.display());
+        }
+    }
+}
