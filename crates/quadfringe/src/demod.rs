@@ -20,7 +20,7 @@ pub(crate) mod window;
 
 pub(crate) use aligned::Aligned;
 pub use background::{Background, background};
-pub(crate) use background::{Scratch as BackgroundScratch, background_row};
+pub(crate) use background::{Scratch as BackgroundScratch, remove_background};
 pub(crate) use carrier::LineSpectrum;
 pub use carrier::{Carrier, carrier};
 pub use fourier::{Band, fourier};

@@ -54,7 +54,10 @@ impl Linear {
         if [self.response[c], self.projector_response[c]] == [Response::default(); 2] {
             // Arithmetic runs on vectors, which a table does not.
             let dark = self.dark[c];
-            return pixels.for_each(|(value, raw)| *value = raw.intensity() * scale - dark);
+            for (value, raw) in pixels {
+                *value = raw.intensity() * scale - dark;
+            }
+            return;
         }
         for (value, &raw) in pixels {
             *value = self.value(c, table, raw);

@@ -148,33 +148,28 @@ impl Finish<'_> {
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
         let per_rad = self.code.period_px(0) as f32 / TAU;
         let end = self.code.projector_width() as f32 + 0.5;
-        columns_and_orders(per_rad, end, row.phase, row.column, row.order);
         let unit = if self.triangulator.is_some() { per_rad } else { 1.0 };
-        sure_only(row.phase, unit, row.sigma, row.wrong);
+        let OutputRow { phase, column, order, wrong, sigma, .. } = row;
+        columns_and_orders([per_rad, end, unit], [phase, column, order, wrong, sigma]);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
-            triangulator.xyz_row(y, row.column, xyz);
-            triangulator.depth_uncertainty_row(y, row.column, row.sigma);
+            triangulator.finish_row(y, row.column, xyz, row.sigma);
         }
     }
 }
 
-/// Where there is no phase nothing is known of it either; uncertainty in rad is turned into another unit.
+/// No light comes from beside the projector's image, of which a column on each side is noise. Where there is no phase
+/// nothing is known of it either; uncertainty in rad is turned into another unit.
 #[multiversion(targets("x86_64+avx2"))]
-fn sure_only(phase: &[f32], unit: f32, sigma: &mut [f32], wrong: &mut [f32]) {
-    for (phase, (sigma, wrong)) in phase.iter().zip(sigma.iter_mut().zip(wrong)) {
-        *sigma = if phase.is_nan() { f32::NAN } else { *sigma * unit };
-        *wrong = if phase.is_nan() { f32::NAN } else { *wrong };
-    }
-}
-
-/// No light comes from beside the projector's image, of which a column on each side is noise.
-#[multiversion(targets("x86_64+avx2"))]
-fn columns_and_orders(per_rad: f32, end: f32, phase: &mut [f32], column: &mut [f32], order: &mut [f32]) {
-    for ((phase, column), order) in phase.iter_mut().zip(column).zip(order) {
+fn columns_and_orders([per_rad, end, unit]: [f32; 3], maps: [&mut [f32]; 5]) {
+    let [phase, column, order, wrong, sigma] = maps;
+    let found = phase.iter_mut().zip(column).zip(order);
+    for (((phase, column), order), (wrong, sigma)) in found.zip(wrong.iter_mut().zip(sigma)) {
         let found = *phase * per_rad;
         let inside = (found >= -1.5) & (found < end);
         *phase = if inside { *phase } else { f32::NAN };
         *column = if inside { found } else { f32::NAN };
         *order = floor(*phase / TAU);
+        *wrong = if inside { *wrong } else { f32::NAN };
+        *sigma = if inside { *sigma * unit } else { f32::NAN };
     }
 }

@@ -92,24 +92,28 @@ impl Published {
     /// Noise of the shot and of its orders, from a few rows.
     fn look<T: Sample>(&self, plan: &RowPlan<'_>, shot: &Shot<'_, T>, out: &mut Decoded) -> Sureness {
         let [height, width] = self.shape;
-        let mut rows = Rows::new(&self.filter, width);
-        let (mut bends, mut margins) = (Vec::new(), Vec::new());
         let looked_at = out.row_by_row().into_iter().enumerate().take(height - 1).skip(1);
-        for (y, mut out) in looked_at.step_by(height.div_ceil(CARRIER_ROWS)) {
-            let mut bend = [vec![0.0; width], vec![0.0; width]];
-            for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
-                plan.conditioning.row(shot, other, &mut rows.light_mut());
-                for (bend, light) in bend.iter_mut().zip([rows.red(), rows.blue()]) {
-                    bend.iter_mut().zip(light).for_each(|(bend, light)| *bend += weight * light);
+        let looked_at: Vec<_> = looked_at.step_by(height.div_ceil(CARRIER_ROWS)).collect();
+        let seen = looked_at.into_par_iter().map_init(
+            || (Rows::new(&self.filter, width), [vec![0.0; width], vec![0.0; width]]),
+            |(rows, bend), (y, mut out)| {
+                for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
+                    plan.conditioning.row(shot, other, &mut rows.light_mut());
+                    for (bend, light) in bend.iter_mut().zip([rows.red(), rows.blue()]) {
+                        let kept = if other < y { 0.0 } else { 1.0 };
+                        bend.iter_mut()
+                            .zip(light)
+                            .for_each(|(bend, light)| *bend = kept * *bend + weight * light);
+                    }
                 }
-            }
-            decode_row(&mut rows, plan, shot, y, &mut out);
-            for x in (0..width).step_by(LOOK_STRIDE).filter(|&x| out.quality[x].is_finite()) {
-                bends.extend([bend[0][x], bend[1][x]]);
-                margins.push(out.quality[x]);
-            }
-        }
-        Sureness::new(&mut bends, &mut margins)
+                decode_row(rows, plan, shot, y, &mut out);
+                let trusted = || (0..width).step_by(LOOK_STRIDE).filter(|&x| out.quality[x].is_finite());
+                let bends: Vec<f32> = trusted().flat_map(|x| [bend[0][x], bend[1][x]]).collect();
+                (bends, trusted().map(|x| out.quality[x]).collect::<Vec<f32>>())
+            },
+        );
+        let (bends, margins): (Vec<_>, Vec<_>) = seen.unzip();
+        Sureness::new(&mut bends.concat(), &mut margins.concat())
     }
 
     /// Fringe period along rows, from a few rows of red light; the whole row when there is none to see.

@@ -16,8 +16,10 @@ use std::f32::consts::PI;
 /// Least margin up to which margins are counted as strays.
 const FAR_MARGIN_MIN: f32 = 0.25;
 
-/// Steps of the table of probabilities.
+/// Steps of the table of probabilities, a power of two.
 const STEPS: usize = 1024;
+/// A number of this size has its last bit at 1: what is added to it is rounded and stands in the last bits.
+const WHOLE: f32 = 8_388_608.0;
 
 /// Least temperature of costs, in units of the greatest that counts: costs are whole numbers, 333 at most.
 const TEMPERATURE_MIN: f32 = 1.0 / 333.0;
@@ -105,7 +107,7 @@ impl CostOdds {
 /// and 0 for a toss-up.
 #[derive(Debug, Clone)]
 pub(super) struct MarginOdds {
-    table: Vec<f32>,
+    table: Box<[f32; STEPS]>,
 }
 
 impl MarginOdds {
@@ -118,21 +120,21 @@ impl MarginOdds {
         let far = (1.0 - 4.0 * sigma / PI).max(FAR_MARGIN_MIN);
         let beyond = margins.iter().filter(|margin| **margin < far).count() as f32;
         let stray = (beyond / (far * margins.len().max(1) as f32)).min(1.0);
-        let table = (0..=STEPS).map(|step| {
-            let apart = PI * (1.0 - step as f32 / STEPS as f32);
+        let probability = |step: usize| {
+            let apart = PI * (1.0 - step as f32 / (STEPS - 1) as f32);
             let normal = (2.0 * PI).sqrt() / sigma * (-0.5 * (apart / sigma).powi(2)).exp();
             let random = stray / (stray + (1.0 - stray) * normal).max(f32::MIN_POSITIVE);
             let lead = 2.0 * PI * (PI - apart) / (sigma * sigma);
             let toss = 1.0 / (1.0 + lead.min(80.0).exp());
             1.0 - (1.0 - random) * (1.0 - toss)
-        });
-        Self { table: table.collect() }
+        };
+        Self { table: Box::new(std::array::from_fn(probability)) }
     }
 
     /// Probability of another order; NaN for NaN.
     #[inline(always)]
     pub fn another(&self, margin: f32) -> f32 {
-        let step = (margin.clamp(0.0, 1.0) * STEPS as f32) as usize;
+        let step = (margin.clamp(0.0, 1.0) * (STEPS - 1) as f32 + WHOLE).to_bits() as usize % STEPS;
         if margin.is_nan() { f32::NAN } else { self.table[step] }
     }
 }
@@ -148,7 +150,7 @@ pub(super) struct Sureness {
 impl Sureness {
     /// Before anything is known.
     pub fn none() -> Self {
-        Self { noise: 0.0, odds: MarginOdds { table: vec![0.0; STEPS + 1] } }
+        Self { noise: 0.0, odds: MarginOdds { table: Box::new([0.0; STEPS]) } }
     }
 
     /// From second differences of intensities down columns, which see little of the fringes, and from margins of orders.

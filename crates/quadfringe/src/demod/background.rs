@@ -4,7 +4,6 @@ mod envelope;
 mod moving_mean;
 mod waves;
 
-use super::Aligned;
 use crate::{Error, Result};
 use envelope::mean_envelope;
 use moving_mean::{Sums, moving_mean};
@@ -46,7 +45,8 @@ pub fn background(image: ArrayView2<'_, f32>, kind: Background, period_px: f64) 
         |scratch, (mut target, row)| {
             let row = row.to_vec();
             let target = target.as_slice_mut().expect("a fresh array is contiguous");
-            target.copy_from_slice(background_row(&row, kind, period_px as f32, scratch));
+            remove_background(&row, kind, period_px as f32, scratch, target);
+            target.iter_mut().zip(&row).for_each(|(level, value)| *level = value - *level);
         },
     );
     Ok(out)
@@ -60,32 +60,35 @@ pub(crate) fn check_period(period_px: f64, columns: usize) -> Result<()> {
     Err(Error::value("period_px", expected, period_px))
 }
 
-/// Working memory of [`background_row`].
+/// Working memory of [`remove_background`].
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     sums: Sums,
     envelope: envelope::Scratch,
-    mean: Aligned<f32>,
 }
 
-/// Background of one row.
+/// One row without its background.
 #[inline(always)]
-pub(crate) fn background_row<'a>(
+pub(crate) fn remove_background(
     row: &[f32],
     kind: Background,
     period_px: f32,
-    scratch: &'a mut Scratch,
-) -> &'a [f32] {
-    let Scratch { sums, envelope, mean } = scratch;
-    let drawn = match kind {
+    scratch: &mut Scratch,
+    out: &mut [f32],
+) {
+    let Scratch { sums, envelope } = scratch;
+    let drawing = match kind {
         Background::MeanEnvelope => mean_envelope(row, period_px, sums, envelope),
         Background::MovingMean => None,
     };
-    drawn.unwrap_or_else(|| {
-        mean.resize(row.len());
-        moving_mean(row, period_px, sums, mean);
-        mean
-    })
+    if let Some(drawing) = drawing {
+        drawing.subtract_from(row, out);
+    } else {
+        moving_mean(row, period_px, sums, out);
+        for (level, value) in out.iter_mut().zip(row) {
+            *level = value - *level;
+        }
+    }
 }
 
 #[cfg(test)]

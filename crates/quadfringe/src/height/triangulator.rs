@@ -114,6 +114,17 @@ impl Triangulator {
         deviations(self, row, columns_px, uncertainty);
     }
 
+    /// [`Self::xyz_row`] and [`Self::depth_uncertainty_row`] in one go.
+    pub(crate) fn finish_row(
+        &self,
+        row: usize,
+        columns_px: &[f32],
+        out: &mut [f32],
+        uncertainty: &mut [f32],
+    ) {
+        points_and_deviations(self, row, columns_px, out, uncertainty);
+    }
+
     /// Points of a whole column map `(height, width)`, float32 `(height, width, 3)` in mm, NaN for no data; rows in
     /// parallel.
     ///
@@ -164,7 +175,8 @@ fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut
     let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
     for (index, (columns, xyz)) in blocks.enumerate() {
         let directions = triangulator.directions(row, index * CHUNK, columns.len());
-        triangulator.projector.intersect(columns, &directions, xyz);
+        let [depth, _] = triangulator.projector.intersect(columns, &directions);
+        write_points(&depth, &directions, xyz);
     }
 }
 
@@ -174,7 +186,26 @@ fn deviations(triangulator: &Triangulator, row: usize, columns_px: &[f32], uncer
     let blocks = columns_px.chunks(CHUNK).zip(uncertainty.chunks_mut(CHUNK));
     for (index, (columns, uncertainty)) in blocks.enumerate() {
         let directions = triangulator.directions(row, index * CHUNK, columns.len());
-        triangulator.projector.carry(columns, &directions, uncertainty);
+        let [_, growth] = triangulator.projector.intersect(columns, &directions);
+        carry(&growth, uncertainty);
+    }
+}
+
+/// Both, with the work that they have in common done once.
+#[multiversion(targets("x86_64+avx2"))]
+fn points_and_deviations(
+    triangulator: &Triangulator,
+    row: usize,
+    columns_px: &[f32],
+    out: &mut [f32],
+    uncertainty: &mut [f32],
+) {
+    let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK)).zip(uncertainty.chunks_mut(CHUNK));
+    for (index, ((columns, xyz), uncertainty)) in blocks.enumerate() {
+        let directions = triangulator.directions(row, index * CHUNK, columns.len());
+        let [depth, growth] = triangulator.projector.intersect(columns, &directions);
+        write_points(&depth, &directions, xyz);
+        carry(&growth, uncertainty);
     }
 }
 
@@ -219,37 +250,23 @@ impl ColumnSheets {
         })
     }
 
-    /// Points where rays `(x, y, 1)` meet the sheets of `columns`, written as X, Y, Z; NaN behind the camera.
+    /// Depths at which rays `(x, y, 1)` meet the sheets of `columns`, NaN behind the camera, and how they grow with the
+    /// column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times `dk / du`.
     #[inline(always)]
-    fn intersect(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], xyz: &mut [f32]) {
-        let [k, _] = self.ideal(columns, [x, y]);
-        let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
-        let mut depth = [0.0; CHUNK];
-        for i in 0..CHUNK {
-            let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
-            let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
-            let t = (k[i] * a2 - a0) / (b0 - k[i] * b2);
-            depth[i] = if (t > 0.0) & (t < f32::INFINITY) { t } else { f32::NAN };
-        }
-        write_points(&depth, x, y, xyz);
-    }
-
-    /// Standard deviations times the change of the depth with the column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times
-    /// `dk / du`.
-    #[inline(always)]
-    fn carry(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2], uncertainty: &mut [f32]) {
+    fn intersect(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2]) -> [[f32; CHUNK]; 2] {
         let [k, stretch] = self.ideal(columns, [x, y]);
         let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
-        let mut slope = [0.0; CHUNK];
+        let (mut depth, mut growth) = ([0.0; CHUNK], [0.0; CHUNK]);
         for i in 0..CHUNK {
             let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
             let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
             let inverse = 1.0 / (b0 - k[i] * b2);
             let t = (k[i] * a2 - a0) * inverse;
-            let grown = (a2 + t * b2) * inverse * stretch[i];
-            slope[i] = if (t > 0.0) & (t < f32::INFINITY) { grown } else { f32::NAN };
+            let seen = (t > 0.0) & (t < f32::INFINITY);
+            depth[i] = if seen { t } else { f32::NAN };
+            growth[i] = if seen { (a2 + t * b2) * inverse * stretch[i] } else { f32::NAN };
         }
-        uncertainty.iter_mut().zip(&slope).for_each(|(value, slope)| *value *= slope.abs());
+        [depth, growth]
     }
 
     /// Ideal normalised coordinates of `columns`, and how they change with the column.
@@ -295,9 +312,17 @@ impl ColumnSheets {
     }
 }
 
+/// Standard deviations of columns become those of depths.
+#[inline(always)]
+fn carry(growth: &[f32; CHUNK], uncertainty: &mut [f32]) {
+    for (value, growth) in uncertainty.iter_mut().zip(growth) {
+        *value *= growth.abs();
+    }
+}
+
 /// `t x, t y, t` pixel by pixel, in blocks that vectors can shuffle.
 #[inline(always)]
-fn write_points(depth: &[f32; CHUNK], x: &[f32; CHUNK], y: &[f32; CHUNK], xyz: &mut [f32]) {
+fn write_points(depth: &[f32; CHUNK], [x, y]: &[[f32; CHUNK]; 2], xyz: &mut [f32]) {
     const BLOCK: usize = 8;
     for (block, points) in xyz.chunks_mut(3 * BLOCK).enumerate() {
         let mut shuffled = [0.0; 3 * BLOCK];

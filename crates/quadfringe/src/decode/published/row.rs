@@ -6,7 +6,7 @@ use crate::angle::{atan2, coarse_atan2};
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::decode::uncertainty::{Sureness, two_step_deviation};
-use crate::demod::{Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, background_row};
+use crate::demod::{Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, remove_background};
 use multiversion::multiversion;
 
 /// What is the same for all rows of a shot.
@@ -43,6 +43,7 @@ impl RowPlan<'_> {
 pub(super) struct Rows {
     light: [Aligned<f32>; 4],
     wrapped: [Aligned<f32>; 3],
+    spare: Aligned<f32>,
     background: BackgroundScratch,
     fourier: RowScratch,
 }
@@ -67,6 +68,7 @@ impl Rows {
         Self {
             light: [row(), row(), row(), row()],
             wrapped: [row(), row(), row()],
+            spare: row(),
             background: BackgroundScratch::default(),
             fourier: filter.scratch(),
         }
@@ -107,7 +109,9 @@ impl Rows {
         }
         plan.trust(out);
         let odds = &plan.sureness.odds;
-        out.wrong.iter_mut().zip(&*out.quality).for_each(|(wrong, margin)| *wrong = odds.another(*margin));
+        for (wrong, margin) in out.wrong.iter_mut().zip(&*out.quality) {
+            *wrong = odds.another(*margin);
+        }
         for x in unseen {
             (out.phase[x], out.modulation[x], out.quality[x]) = (f32::NAN, f32::NAN, f32::NAN);
         }
@@ -118,8 +122,8 @@ impl Rows {
     fn remove_background(&mut self, channel: usize, period_px: f32) {
         let light = &mut self.light[channel];
         let kind = Background::MeanEnvelope;
-        let level = background_row(light, kind, period_px, &mut self.background);
-        light.iter_mut().zip(level).for_each(|(v, l)| *v -= l);
+        remove_background(light, kind, period_px, &mut self.background, &mut self.spare);
+        std::mem::swap(light, &mut self.spare);
     }
 
     /// Step 3: R and B, their modulations made equal, (S2). The square of the modulation stands in for it until all

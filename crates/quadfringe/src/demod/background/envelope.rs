@@ -22,7 +22,6 @@ pub(super) struct Scratch {
     knots: Knots,
     levels: Vec<f32>,
     lines: Vec<Line>,
-    drawn: Aligned<f32>,
 }
 
 /// Extrema of a row; maxima and minima alternate.
@@ -40,6 +39,13 @@ struct Line {
     end: u32,
 }
 
+/// Background of a row, drawn piece by piece.
+pub(super) struct Drawing<'a> {
+    lines: &'a [Line],
+    /// Beyond the last line.
+    last: f32,
+}
+
 /// Background of `row`; none when the row has no fringes to draw envelopes through.
 ///
 /// A row is split where it crosses its moving mean; each side of a crossing holds one extremum. They are looked for on
@@ -50,10 +56,10 @@ pub(super) fn mean_envelope<'a>(
     period_px: f32,
     sums: &mut Sums,
     scratch: &'a mut Scratch,
-) -> Option<&'a [f32]> {
+) -> Option<Drawing<'a>> {
     let step = coarseness(period_px);
     let period = period_px / step as f32;
-    let Scratch { coarse, smooth, middle, waves, knots, levels, lines, drawn } = scratch;
+    let Scratch { coarse, smooth, middle, waves, knots, levels, lines } = scratch;
     coarsen(row, step, coarse, smooth);
     let count = coarse.len();
     for buffer in [&mut *smooth, &mut *middle] {
@@ -68,8 +74,7 @@ pub(super) fn mean_envelope<'a>(
     }
     find_levels(knots, levels);
     find_lines(knots, levels, lines);
-    draw(lines, levels, row.len(), drawn);
-    Some(&drawn[..row.len()])
+    Some(Drawing { lines, last: levels[levels.len() - 1] })
 }
 
 fn coarseness(period_px: f32) -> usize {
@@ -117,23 +122,25 @@ impl Knots {
     /// wave cut by the end of the row has no extremum of its own.
     #[inline(always)]
     fn find(&mut self, waves: &Waves, smooth: &[f32], shortest: usize, step: f32) {
-        self.at_px.clear();
-        self.value.clear();
-        let mut last_upper = None;
+        let Self { at_px, value: values } = self;
+        for map in [&mut *at_px, &mut *values] {
+            map.resize(waves.count(), 0.0);
+        }
+        let (mut found, mut last_upper) = (0, None);
         for (wave, upper) in waves.whole().filter(|(wave, _)| wave.len() > shortest) {
-            let (at, value) = top(smooth, waves.extremum(smooth, wave, upper), upper);
+            let (at, value) = top(smooth, Waves::extremum(smooth, wave, upper), upper);
             if last_upper == Some(upper) {
-                if (value > self.value[self.value.len() - 1]) != upper {
+                if (value > values[found - 1]) != upper {
                     continue;
                 }
                 // A half wave between them was noise: of two extrema on one side the further one counts.
-                self.at_px.pop();
-                self.value.pop();
+                found -= 1;
             }
-            self.at_px.push((at + 0.5) * step - 0.5);
-            self.value.push(value);
-            last_upper = Some(upper);
+            (at_px[found], values[found]) = ((at + 0.5) * step - 0.5, value);
+            (found, last_upper) = (found + 1, Some(upper));
         }
+        at_px.truncate(found);
+        values.truncate(found);
     }
 }
 
@@ -145,7 +152,7 @@ fn top(smooth: &[f32], at: usize, upper: bool) -> (f32, f32) {
     let curvature = left - 2.0 * top + right;
     let bent = if upper { curvature < 0.0 } else { curvature > 0.0 };
     let shift = if bent { (0.5 * (left - right) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
-    (at as f32 + shift, top - 0.25 * (left - right) * shift)
+    (at as u32 as f32 + shift, top - 0.25 * (left - right) * shift)
 }
 
 /// The background at each knot: half its own envelope and half the other, which is straight between the neighbours.
@@ -177,20 +184,30 @@ fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>
     }
 }
 
-/// Lines one after the other in whole blocks, of which the next line overwrites what is too much; level beyond the last.
-#[inline(always)]
-fn draw(lines: &[Line], levels: &[f32], count: usize, out: &mut Aligned<f32>) {
-    out.resize(count + BLOCK);
-    let mut start = 0;
-    for line in lines {
-        let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * line.slope);
-        let end = (line.end as usize).min(count);
-        let mut level = line.level;
-        for from in (start..end).step_by(BLOCK) {
-            out[from..from + BLOCK].copy_from_slice(&steps.map(|step| level + step));
-            level += BLOCK as f32 * line.slope;
+impl Drawing<'_> {
+    /// `out` is `row` without the background. Lines are drawn in whole blocks, of which the next line overwrites what is
+    /// too much.
+    #[inline(always)]
+    pub fn subtract_from(&self, row: &[f32], out: &mut [f32]) {
+        let beyond = Line { level: self.last, slope: 0.0, end: u32::MAX };
+        let mut start = 0;
+        for line in self.lines.iter().chain([&beyond]) {
+            let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * line.slope);
+            let end = (line.end as usize).min(row.len());
+            let mut level = line.level;
+            for from in (start..end).step_by(BLOCK) {
+                let block = row[from..].first_chunk::<BLOCK>().zip(out[from..].first_chunk_mut::<BLOCK>());
+                match block {
+                    Some((row, out)) => *out = std::array::from_fn(|i| row[i] - (level + steps[i])),
+                    None => {
+                        for ((out, row), step) in out[from..].iter_mut().zip(&row[from..]).zip(&steps) {
+                            *out = row - (level + step);
+                        }
+                    }
+                }
+                level += BLOCK as f32 * line.slope;
+            }
+            start = end;
         }
-        start = end;
     }
-    out[start..].fill(levels[levels.len() - 1]);
 }

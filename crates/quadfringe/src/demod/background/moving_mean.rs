@@ -71,7 +71,9 @@ fn window_sums<'a>(row: &'a [f32], count: usize, sums: &'a mut Sums) -> &'a [f32
             if done == 1 {
                 add_shifted(row, now, 1, window);
             } else {
-                window.iter_mut().zip(&now[done..]).for_each(|(to, more)| *to += more);
+                for (to, more) in window.iter_mut().zip(&now[done..]) {
+                    *to += more;
+                }
             }
             done += span;
         }

@@ -5,14 +5,24 @@ use std::ops::Range;
 
 /// Samples in a word of bits.
 const WORD: usize = 64;
+/// Samples compared at once when an extremum is looked for: mostly all of a half wave.
+const BLOCK: usize = 8;
+/// Added to samples, from `BLOCK - n` on, it leaves the first `n` of a block and buries the others.
+const BURY: [f32; 2 * BLOCK] = {
+    let mut bury = [0.0; 2 * BLOCK];
+    let mut i = BLOCK;
+    while i < 2 * BLOCK {
+        bury[i] = f32::NEG_INFINITY;
+        i += 1;
+    }
+    bury
+};
 
 /// Half waves of one row.
 #[derive(Debug, Default)]
 pub(super) struct Waves {
     /// The sample is above the middle.
     above: Vec<u64>,
-    /// The sample lies further out than the one before, and the one after does not lie further out still.
-    turns: Vec<u64>,
     /// First samples of the half waves but the first.
     crossings: Vec<u32>,
 }
@@ -20,7 +30,7 @@ pub(super) struct Waves {
 impl Waves {
     /// Length of the buffers for a row of `count` samples.
     pub fn padded(count: usize) -> usize {
-        count.next_multiple_of(WORD) + 1
+        count.next_multiple_of(WORD) + BLOCK
     }
 
     /// Split the first `count` samples of a row where they cross the middle. Both buffers are padded.
@@ -32,20 +42,25 @@ impl Waves {
         }
         let words = count.div_ceil(WORD);
         self.above.resize(words, 0);
-        self.turns.resize(words, 0);
         self.crossings.clear();
-        let (mut above_before, mut outward_before) = (u64::from(row[0] > middle[0]), 0);
-        for index in 0..words {
-            let (above, outward) = compare(&row[WORD * index..], &middle[WORD * index..]);
-            self.above[index] = above;
-            self.turns[index] = (outward << 1 | outward_before) & !outward;
-            let mut crossed = above ^ (above << 1 | above_before);
+        let mut before = u64::from(row[0] > middle[0]);
+        for (index, (word, (row, middle))) in
+            (self.above.iter_mut()).zip(row.chunks_exact(WORD).zip(middle.chunks_exact(WORD))).enumerate()
+        {
+            let above = compare(row, middle);
+            let mut crossed = above ^ (above << 1 | before);
             while crossed != 0 {
                 self.crossings.push((WORD * index) as u32 + crossed.trailing_zeros());
                 crossed &= crossed - 1;
             }
-            (above_before, outward_before) = (above >> (WORD - 1), outward >> (WORD - 1));
+            (*word, before) = (above, above >> (WORD - 1));
         }
+    }
+
+    /// Most half waves that [`Self::whole`] can give.
+    #[inline(always)]
+    pub fn count(&self) -> usize {
+        self.crossings.len()
     }
 
     /// Half waves from one crossing to the next, and whether they lie above the middle.
@@ -59,58 +74,46 @@ impl Waves {
         })
     }
 
-    /// First of the greatest (`upper`) or least samples of a half wave: an end of it, or where it turns back.
+    /// First of the greatest (`upper`) or least samples of a half wave of a padded row.
     #[inline(always)]
-    pub fn extremum(&self, row: &[f32], wave: Range<usize>, upper: bool) -> usize {
+    pub fn extremum(row: &[f32], wave: Range<usize>, upper: bool) -> usize {
         let sign = if upper { 1.0 } else { -1.0 };
-        let (mut best, mut most) = (wave.start, sign * row[wave.start]);
-        let mut consider = |at: usize| {
-            let value = sign * row[at];
-            let better = value > most;
-            best = if better { at } else { best };
-            most = if better { value } else { most };
-        };
-        let last = wave.end - 1;
-        for start in (wave.start + 1..last).step_by(WORD) {
-            let mut turns = self.turns_from(start) & low_bits(last - start);
-            while turns != 0 {
-                consider(start + turns.trailing_zeros() as usize);
-                turns &= turns - 1;
+        let (mut best, mut most) = (wave.start, f32::NEG_INFINITY);
+        for start in wave.clone().step_by(BLOCK) {
+            let samples: &[f32; BLOCK] = row[start..].first_chunk().expect("padded");
+            let bury: &[f32; BLOCK] =
+                BURY[BLOCK - (wave.end - start).min(BLOCK)..].first_chunk().expect("a block");
+            let mut values = [0.0; BLOCK];
+            for ((value, sample), bury) in values.iter_mut().zip(samples).zip(bury) {
+                *value = sign * sample + bury;
             }
+            let [a, b, c, d, e, f, g, h] = values;
+            let here = larger(larger(larger(a, e), larger(b, f)), larger(larger(c, g), larger(d, h)));
+            let mut same = 0u32;
+            for (i, value) in values.iter().enumerate() {
+                same |= u32::from(*value == here) << i;
+            }
+            let better = here > most;
+            best = if better { start + same.trailing_zeros() as usize } else { best };
+            most = if better { here } else { most };
         }
-        consider(last);
         best
     }
-
-    /// The bits of `turns` from a sample on.
-    #[inline(always)]
-    fn turns_from(&self, at: usize) -> u64 {
-        let (index, shift) = (at / WORD, at % WORD);
-        let next = self.turns.get(index + 1).copied().unwrap_or(0);
-        (self.turns[index] >> shift) | (next << 1 << (WORD - 1 - shift))
-    }
 }
 
-/// As many ones as asked for, from 1 to a whole word.
 #[inline(always)]
-fn low_bits(count: usize) -> u64 {
-    u64::MAX >> (WORD - count.min(WORD))
+fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
 }
 
-/// For a word of samples: above the middle, and further out than this is the next.
+/// Which of a word of samples are above the middle.
 #[inline(always)]
-fn compare(row: &[f32], middle: &[f32]) -> (u64, u64) {
-    let row: &[f32; WORD + 1] = row.first_chunk().expect("padded");
-    let middle: &[f32; WORD] = middle.first_chunk().expect("padded");
-    let above = |i: usize| row[i] > middle[i];
-    let outward = |i: usize| (row[i + 1] - row[i]) * (row[i] - middle[i]) > 0.0;
-    (word(above), word(outward))
-}
-
-/// The answers for a word of samples.
-#[inline(always)]
-fn word(is_set: impl Fn(usize) -> bool) -> u64 {
-    let half = |from: usize| (0..WORD / 2).fold(0u32, |word, i| word | (u32::from(is_set(from + i)) << i));
+fn compare(row: &[f32], middle: &[f32]) -> u64 {
+    let row: &[f32; WORD] = row.first_chunk().expect("a word");
+    let middle: &[f32; WORD] = middle.first_chunk().expect("a word");
+    let half = |from: usize| {
+        (from..from + WORD / 2).fold(0u32, |word, i| word | (u32::from(row[i] > middle[i]) << (i - from)))
+    };
     u64::from(half(0)) | (u64::from(half(WORD / 2)) << (WORD / 2))
 }
 
@@ -149,7 +152,7 @@ mod tests {
             let mut waves = Waves::default();
             waves.find(&mut row, &mut middle, count);
             let found =
-                waves.whole().map(|(wave, upper)| (wave.clone(), upper, waves.extremum(&row, wave, upper)));
+                waves.whole().map(|(wave, upper)| (wave.clone(), upper, Waves::extremum(&row, wave, upper)));
             assert!(expected.len() > 2, "{count}");
             assert_eq!(found.collect::<Vec<_>>(), expected, "{count}");
         }

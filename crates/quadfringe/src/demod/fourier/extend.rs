@@ -37,7 +37,9 @@ pub(super) struct Scratch {
 #[inline(always)]
 fn reversed(source: &[f32], out: &mut [f32]) {
     let (known, beyond) = out.split_at_mut(source.len().min(out.len()));
-    known.iter_mut().zip(source.iter().rev()).for_each(|(to, from)| *to = *from);
+    for (to, from) in known.iter_mut().zip(source.iter().rev()) {
+        *to = *from;
+    }
     beyond.fill(source[0]);
 }
 
