@@ -9,6 +9,8 @@ const SAMPLES_PER_FRINGE: f32 = 8.0;
 /// Share of a fringe that is averaged over so that noise adds no extrema, and that a half wave must exceed.
 const SMOOTH: f32 = 0.2;
 
+/// Extrema refined at once.
+const LANES: usize = 8;
 /// Pixels drawn at once: mostly all from one extremum to the next.
 const BLOCK: usize = 16;
 
@@ -29,6 +31,8 @@ pub(super) struct Scratch {
 struct Knots {
     at_px: Vec<f32>,
     value: Vec<f32>,
+    /// Samples that they lie at; 1 for maxima and -1 for minima.
+    samples: Vec<(u32, f32)>,
 }
 
 /// `level + i slope` over the pixels before `end`, from the end of the line before on.
@@ -122,42 +126,57 @@ impl Knots {
     /// wave cut by the end of the row has no extremum of its own.
     #[inline(always)]
     fn find(&mut self, waves: &Waves, smooth: &[f32], shortest: usize, step: f32) {
-        let Self { at_px, value: values } = self;
-        for map in [&mut *at_px, &mut *values] {
-            map.resize(waves.count(), 0.0);
-        }
+        self.samples.resize(waves.count() + LANES, (1, 0.0));
         let (mut found, mut last_upper) = (0, None);
         for (wave, upper) in waves.whole().filter(|(wave, _)| wave.len() > shortest) {
-            let (at, value) = top(smooth, Waves::extremum(smooth, wave, upper), upper);
+            let (at, sign) = (Waves::extremum(smooth, wave, upper), if upper { 1.0 } else { -1.0 });
             if last_upper == Some(upper) {
-                if (value > values[found - 1]) != upper {
+                if sign * smooth[at] <= sign * smooth[self.samples[found - 1].0 as usize] {
                     continue;
                 }
                 // A half wave between them was noise: of two extrema on one side the further one counts.
                 found -= 1;
             }
-            (at_px[found], values[found]) = ((at + 0.5) * step - 0.5, value);
+            self.samples[found] = (at as u32, sign);
             (found, last_upper) = (found + 1, Some(upper));
         }
-        at_px.truncate(found);
-        values.truncate(found);
+        self.refine(smooth, found, step);
     }
-}
 
-/// Place and value of the top of the parabola through the greatest (`upper`) or least sample and its neighbours.
-#[inline(always)]
-fn top(smooth: &[f32], at: usize, upper: bool) -> (f32, f32) {
-    // A half wave between two crossings touches neither end of the row.
-    let [left, top, right] = smooth[at - 1..=at + 1] else { unreachable!("three samples") };
-    let curvature = left - 2.0 * top + right;
-    let bent = if upper { curvature < 0.0 } else { curvature > 0.0 };
-    let shift = if bent { (0.5 * (left - right) / curvature).clamp(-0.5, 0.5) } else { 0.0 };
-    (at as u32 as f32 + shift, top - 0.25 * (left - right) * shift)
+    /// Places and values of the first `count` extrema: tops of the parabolas through their samples and both neighbours.
+    #[inline(always)]
+    fn refine(&mut self, smooth: &[f32], count: usize, step: f32) {
+        let Self { at_px, value, samples } = self;
+        let whole = count.next_multiple_of(LANES);
+        // A half wave between two crossings touches neither end of the row, nor does what fills up the last block.
+        samples[count..whole].fill((1, 0.0));
+        at_px.resize(whole, 0.0);
+        value.resize(whole, 0.0);
+        let out = at_px.chunks_exact_mut(LANES).zip(value.chunks_exact_mut(LANES));
+        for (samples, (at_px, value)) in samples.chunks_exact(LANES).zip(out) {
+            let (mut left, mut top, mut right) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+            for (i, (at, _)) in samples.iter().enumerate() {
+                let near = &smooth[*at as usize - 1..][..3];
+                (left[i], top[i], right[i]) = (near[0], near[1], near[2]);
+            }
+            for (i, &(at, sign)) in samples.iter().enumerate() {
+                let curvature = left[i] - 2.0 * top[i] + right[i];
+                let bent = sign * curvature < 0.0;
+                let across = left[i] - right[i];
+                let shift = 0.5 * across / if bent { curvature } else { 1.0 };
+                let shift = if bent { shift.clamp(-0.5, 0.5) } else { 0.0 };
+                at_px[i] = (at as i32 as f32 + shift + 0.5) * step - 0.5;
+                value[i] = top[i] - 0.25 * across * shift;
+            }
+        }
+        at_px.truncate(count);
+        value.truncate(count);
+    }
 }
 
 /// The background at each knot: half its own envelope and half the other, which is straight between the neighbours.
 #[inline(always)]
-fn find_levels(Knots { at_px, value }: &Knots, levels: &mut Vec<f32>) {
+fn find_levels(Knots { at_px, value, .. }: &Knots, levels: &mut Vec<f32>) {
     let last = value.len() - 1;
     levels.resize(value.len(), 0.0);
     levels[0] = 0.5 * (value[0] + value[1]);
