@@ -68,6 +68,7 @@ impl Plan {
 
     /// Which pixels of a row are saturated in no channel, and which are glare: saturated in R and in B, which on a lit
     /// surface, a quarter period apart, are never both at the crest of their fringes.
+    #[inline(always)]
     pub fn saturation_row<T: Sample>(
         &self,
         shot: &Shot<'_, T>,
@@ -92,8 +93,9 @@ impl Plan {
             Some(registered) => registered.saturation_row(shot, y, limit, unsaturated),
             None => {
                 let row = row_of(shot.infrared(), y);
-                let pixels = unsaturated.iter_mut().zip(row.iter());
-                pixels.for_each(|(unsaturated, raw)| *unsaturated &= raw.intensity() < limit);
+                for (unsaturated, raw) in unsaturated.iter_mut().zip(row.iter()) {
+                    *unsaturated &= raw.intensity() < limit;
+                }
             }
         }
     }

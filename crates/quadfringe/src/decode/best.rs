@@ -15,6 +15,7 @@ use crate::demod::motion::{Instants, Motion};
 use crate::demod::scene::Scene;
 use crate::demod::window::Window;
 use crate::{FringeCode, Shot};
+use multiversion::multiversion;
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
@@ -196,18 +197,9 @@ impl Best {
         rows.for_each_init(
             || (vec![false; width], vec![false; width]),
             |(unsaturated, glare), (y, (((red, green), (blue, infrared)), (usable, lit)))| {
-                plan.saturation_row(shot, y, unsaturated, glare);
-                let mut rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
-                plan.row(shot, y, &mut rows);
-                for x in 0..width {
-                    // A pixel that the infrared chip does not see takes no part in any fit.
-                    let seen = rows[3][x].is_finite();
-                    if !seen {
-                        rows.iter_mut().for_each(|row| row[x] = 0.0);
-                    }
-                    usable[x] = f32::from(u8::from(seen && unsaturated[x]));
-                    lit[x] = f32::from(u8::from(seen && !glare[x]));
-                }
+                let rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
+                let masks = [&mut usable[..width], &mut lit[..width]];
+                condition_row(plan, shot, y, [unsaturated, glare], rows, masks);
             },
         );
     }
@@ -216,10 +208,7 @@ impl Best {
         let (grid, joint) = (scene.grid, &self.guide.joint);
         out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
-            let known = self.judge.sure[at.clone()].iter().zip(&self.phase[at.clone()]);
-            for (out, (sure, own)) in row.phase.iter_mut().zip(known) {
-                *out = if *sure != 0 { *own } else { f32::NAN };
-            }
+            sure_only(&self.judge.sure[at.clone()], &self.phase[at.clone()], row.phase);
             row.modulation.copy_from_slice(&joint.modulation[at.clone()]);
             row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
             let disagreement = self.agreement.row(scene, y, maps);
@@ -228,6 +217,42 @@ impl Best {
             row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);
         });
+    }
+}
+
+/// Light of one row, and which pixels may take part in a fit and may be lit.
+#[multiversion(targets("x86_64+avx2"))]
+fn condition_row<T: Sample>(
+    plan: &Plan,
+    shot: &Shot<'_, T>,
+    y: usize,
+    [unsaturated, glare]: [&mut [bool]; 2],
+    mut rows: [&mut [f32]; 4],
+    [usable, lit]: [&mut [f32]; 2],
+) {
+    plan.saturation_row(shot, y, unsaturated, glare);
+    plan.row(shot, y, &mut rows);
+    let [red, green, blue, infrared] = rows;
+    // A pixel that the infrared chip does not see takes no part in any fit.
+    for row in [red, green, blue] {
+        for (value, infrared) in row.iter_mut().zip(&*infrared) {
+            *value = if infrared.is_finite() { *value } else { 0.0 };
+        }
+    }
+    let masks = usable.iter_mut().zip(lit).zip(unsaturated.iter().zip(glare.iter()));
+    for (infrared, ((usable, lit), (unsaturated, glare))) in infrared.iter_mut().zip(masks) {
+        let seen = infrared.is_finite();
+        *infrared = if seen { *infrared } else { 0.0 };
+        *usable = if seen & *unsaturated { 1.0 } else { 0.0 };
+        *lit = if seen & !*glare { 1.0 } else { 0.0 };
+    }
+}
+
+/// The phase where it is sure.
+#[multiversion(targets("x86_64+avx2"))]
+fn sure_only(sure: &[u8], phase: &[f32], out: &mut [f32]) {
+    for (out, (sure, phase)) in out.iter_mut().zip(sure.iter().zip(phase)) {
+        *out = if *sure != 0 { *phase } else { f32::NAN };
     }
 }
 

@@ -61,12 +61,21 @@ pub(super) fn remove_slivers(grid: &Grid, least: u8, pixels: &[u8], out: &mut Ve
         let near = y.saturating_sub(2)..(y + 3).min(grid.height);
         let (rows, missing) = (near.len(), 5 * (5 - near.len()) as u8);
         count_near(pixels, grid.stride, grid.width, (near, 2), sums, out);
-        let own = &pixels[y * grid.stride..];
-        for x in 0..grid.width {
+        for x in (0..2).chain(grid.width - 2..grid.width) {
             let cut = (2usize.saturating_sub(x) + (x + 3).saturating_sub(grid.width)) * rows;
-            out[x] = u8::from(own[x] != 0 && out[x] + missing + cut as u8 >= least);
+            out[x] += cut as u8;
         }
+        let own = &pixels[y * grid.stride..][..grid.width];
+        keep(own, least - missing, &mut out[..grid.width]);
     });
+}
+
+/// Counts become 1 for pixels that were there and have so many neighbours, 0 for the others.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn keep(own: &[u8], least: u8, counts: &mut [u8]) {
+    for (count, own) in counts.iter_mut().zip(own) {
+        *count = u8::from((*own != 0) & (*count >= least));
+    }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
