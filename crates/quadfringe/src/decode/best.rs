@@ -12,7 +12,7 @@ use crate::demod::agreement::Agreement;
 use crate::demod::carrier;
 use crate::demod::cells::{Grid, LANES, RowMaps};
 use crate::demod::motion::{Instants, Motion};
-use crate::demod::scene::Scene;
+use crate::demod::scene::{Scene, hold};
 use crate::demod::window::Window;
 use crate::{FringeCode, Shot};
 use multiversion::multiversion;
@@ -36,7 +36,6 @@ pub(super) struct Best {
     shrunk: Level,
     guide: Guide,
     expander: Expander,
-    found: Vec<f32>,
     phase: Vec<f32>,
     modulation: Vec<f32>,
     agreement: Agreement,
@@ -62,7 +61,6 @@ impl Best {
             shrunk: Level::default(),
             guide: Guide::new(code),
             expander: Expander::default(),
-            found: Vec::new(),
             phase: Vec::new(),
             modulation: Vec::new(),
             agreement: Agreement::default(),
@@ -99,7 +97,7 @@ impl Best {
 
         // 5. What is not sure is no data.
         let scene = self.full.scene(&grid, period_px, 1);
-        let Guide { noise, backgrounds, orders, joint, .. } = &self.guide;
+        let Guide { noise, backgrounds, orders, joint, lent: [quality, _], .. } = &mut self.guide;
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
@@ -108,16 +106,17 @@ impl Best {
             orders,
             quality_min: options.quality_min,
         };
-        self.judge.run(&scene, &findings);
+        self.judge.run(&scene, &findings, quality);
         if let Some(instants) = instants {
             self.motion.rule_out(&scene, instants, &mut self.judge.sure);
         }
 
         // 6. How sure the rest is.
-        self.agreement.measure(&scene, (self.ratios, *noise), backgrounds, &self.phase, &self.modulation);
+        let noise = *noise;
+        self.agreement.measure(&scene, (self.ratios, noise), backgrounds, &self.phase, &self.modulation);
         orders.another(&scene, &mut self.another);
-        let window = Window::new(&scene, &self.guide.slopes, &self.modulation, *noise);
-        self.write(&scene, &PhaseNoise::new(*noise, window.share()), finish, out);
+        let window = Window::new(&scene, &self.guide.slopes, &self.modulation, noise);
+        self.write(&scene, &PhaseNoise::new(noise, window.share()), finish, out);
     }
 
     /// Absolute phase of every pixel. Where light falls, beats, fringe orders and backgrounds come from an image of `factor` times
@@ -136,9 +135,9 @@ impl Best {
         }
         // All four channels measure the same column.
         let scene = self.full.scene(grid, period_px, 1);
-        let Guide { slopes, noise, backgrounds, joint, .. } = &mut self.guide;
+        let Guide { slopes, noise, backgrounds, joint, lent, .. } = &mut self.guide;
         let window = Window::new(&scene, slopes, &self.modulation, *noise);
-        joint.step(&scene, backgrounds, &window, self.ratios, &mut self.phase);
+        joint.step(&scene, backgrounds, &window, self.ratios, &mut self.phase, lent);
     }
 
     /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.
@@ -172,14 +171,16 @@ impl Best {
 
     /// From the guide to every pixel.
     fn expand(&mut self, [coarse, grid]: [&Grid; 2], period_px: f64, blur_px: usize) {
-        for plane in [&mut self.found, &mut self.phase, &mut self.modulation] {
+        for plane in [&mut self.phase, &mut self.modulation] {
             plane.resize(grid.pixels(), 0.0);
         }
         let guide = &mut self.guide;
-        guide.finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), &mut self.found);
-        guide.noise = guide.finder.noise;
-        (0..blur_px).for_each(|_| guide.finder.shrink(grid, &mut self.found));
-        self.full.restrict(grid, &self.found);
+        let (finder, [lent, found]) = (&mut guide.finder, &mut guide.lent);
+        let found = hold(found, grid.pixels());
+        finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), lent, found);
+        guide.noise = finder.noise;
+        (0..blur_px).for_each(|_| finder.shrink(grid, lent, found));
+        self.full.restrict(grid, found);
         let factor = grid.step / coarse.step;
         let shrunk = self.shrunk.scene(coarse, period_px / factor as f64, factor);
         let scenes = [&shrunk, &self.full.scene(grid, period_px, 1)];
@@ -205,12 +206,12 @@ impl Best {
     }
 
     fn write(&self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let (grid, joint) = (scene.grid, &self.guide.joint);
+        let (grid, Guide { joint, lent: [quality, _], .. }) = (scene.grid, &self.guide);
         out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
             sure_only(&self.judge.sure[at.clone()], &self.phase[at.clone()], row.phase);
             row.modulation.copy_from_slice(&joint.modulation[at.clone()]);
-            row.quality.copy_from_slice(&self.judge.quality[at.clone()]);
+            row.quality.copy_from_slice(&quality[at.clone()]);
             let disagreement = self.agreement.row(scene, y, maps);
             noise.row(&joint.information[at], disagreement, row.sigma);
             let nodes = &self.another[y / grid.step * grid.columns..];

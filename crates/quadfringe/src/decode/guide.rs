@@ -37,6 +37,8 @@ pub(super) struct Guide {
     pub orders: Orders,
     pub backgrounds: Backgrounds,
     pub joint: Joint,
+    /// Working planes that steps use one after the other.
+    pub lent: [Vec<f32>; 2],
     wrapped: Vec<f32>,
     sound: Vec<f32>,
     fit: LocalFit,
@@ -54,6 +56,7 @@ impl Guide {
             orders: Orders::new(code),
             backgrounds: Backgrounds::new(),
             joint: Joint::default(),
+            lent: Default::default(),
             wrapped: Vec::new(),
             sound: Vec::new(),
             fit: LocalFit::default(),
@@ -75,8 +78,9 @@ impl Guide {
             plane.resize(grid.pixels(), 0.0);
         }
         let light = level.light.each_ref().map(Vec::as_slice);
-        self.finder.find(grid, light, period_px, 2.0 * options.modulation_min, &mut self.modulation);
-        (0..blur_px).for_each(|_| self.finder.shrink(grid, &mut self.modulation));
+        let (finder, [lent, _]) = (&mut self.finder, &mut self.lent);
+        finder.find(grid, light, (period_px, 2.0 * options.modulation_min), lent, &mut self.modulation);
+        (0..blur_px).for_each(|_| finder.shrink(grid, lent, &mut self.modulation));
         level.restrict(grid, &self.modulation);
         let scene = level.scene(grid, period_px, factor);
 
@@ -119,7 +123,7 @@ impl Guide {
             ROUGH_ROWS,
         );
         let window = Window::new(&scene, &self.slopes, &self.modulation, self.noise).near();
-        self.joint.step(&scene, &self.backgrounds, &window, ratios, &mut self.phase);
+        self.joint.step(&scene, &self.backgrounds, &window, ratios, &mut self.phase, &mut self.lent);
         self.find_tears(grid);
         for _ in 0..LAST_FITS {
             self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);

@@ -5,7 +5,7 @@ mod seams;
 
 use super::orders::Orders;
 use crate::demod::cells::{CellMaps, CellWork, RowMaps};
-use crate::demod::scene::{Scene, around};
+use crate::demod::scene::{Scene, around, hold};
 use crate::slots::Slots;
 use islands::Islands;
 use multiversion::multiversion;
@@ -43,8 +43,6 @@ pub(super) struct Findings<'a> {
 pub(super) struct Judge {
     /// 1 for what can be trusted, 0 elsewhere.
     pub sure: Vec<u8>,
-    /// Quality of the order of what is lit, NaN elsewhere.
-    pub quality: Vec<f32>,
     tears: Tears,
     seams: Vec<u8>,
     spare: Vec<u8>,
@@ -63,13 +61,14 @@ struct Rows {
 }
 
 impl Judge {
-    pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>) {
+    /// Judge every pixel; `quality` receives that of the order of what is lit, NaN elsewhere.
+    pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>, quality: &mut Vec<f32>) {
         let grid = scene.grid;
         self.tears.mark(grid, findings.phase, findings.modulation, &mut self.seams);
         self.back(scene, findings.orders);
-        self.quality.resize(grid.pixels(), 0.0);
+        let quality = hold(quality, grid.pixels());
         self.spare.resize(grid.pixels(), 0);
-        let Self { quality, spare, seams, backing, slots, .. } = self;
+        let Self { spare, seams, backing, slots, .. } = self;
         let rows = quality.par_chunks_mut(grid.stride).zip(spare.par_chunks_mut(grid.stride)).enumerate();
         rows.for_each_init(
             || slots.take(),

@@ -6,8 +6,8 @@
 use super::backgrounds::{Backgrounds, carriers};
 use super::cells::{LANES, RowMaps, lanes, lanes_mut, put, take};
 use super::local_fit::binomial;
-use super::scene::{Scene, around};
-use super::window::{Steps, Window, WindowRows};
+use super::scene::{Scene, around, hold};
+use super::window::{Average, Window, WindowRows};
 use crate::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -18,7 +18,6 @@ const BLOCK: usize = 32;
 /// Working maps of the joint fit.
 #[derive(Debug, Default)]
 pub(crate) struct Joint {
-    steps: Steps,
     slots: Slots<Rows>,
     /// Misfit of the four channels: mean square in linear light.
     pub misfit: Vec<f32>,
@@ -44,11 +43,13 @@ struct Rows {
     ring: [ModelRow; 3],
     albedo: Vec<f32>,
     smooth: Vec<f32>,
+    numerator: Vec<f32>,
     window: WindowRows,
 }
 
 impl Joint {
-    /// One round on an absolute phase in rad, in place. `ratios` are the fringe numbers over the first.
+    /// One round on an absolute phase in rad, in place. `ratios` are the fringe numbers over the first; what `lent` planes held
+    /// is lost.
     pub fn step(
         &mut self,
         scene: &Scene<'_>,
@@ -56,19 +57,17 @@ impl Joint {
         window: &Window<'_>,
         ratios: [f32; 3],
         phase: &mut [f32],
+        lent: &mut [Vec<f32>; 2],
     ) {
         let grid = scene.grid;
-        self.steps.resize(grid.pixels());
-        self.misfit.resize(grid.pixels(), 0.0);
-        self.modulation.resize(grid.pixels(), 0.0);
-        self.information.resize(grid.pixels(), 0.0);
-        let Self { steps, misfit, modulation, information, slots } = self;
+        let Self { misfit, modulation, information, slots } = self;
+        let [average, weight] = lent.each_mut().map(|plane| hold(plane, grid.pixels()));
+        let [misfit, modulation, information] =
+            [misfit, modulation, information].map(|plane| hold(plane, grid.pixels()));
         let before = &*phase;
-        let out = steps
-            .phase
+        let out = average
             .par_chunks_mut(grid.stride)
-            .zip(steps.numerator.par_chunks_mut(grid.stride))
-            .zip(steps.denominator.par_chunks_mut(grid.stride))
+            .zip(weight.par_chunks_mut(grid.stride))
             .zip(misfit.par_chunks_mut(grid.stride).zip(modulation.par_chunks_mut(grid.stride)))
             .chunks(BLOCK)
             .enumerate();
@@ -84,30 +83,24 @@ impl Joint {
                 };
                 model(rows, around(first, grid.height)[0], 0);
                 model(rows, first, 1);
-                for (i, (((phase, numerator), denominator), (misfit, modulation))) in
-                    out.into_iter().enumerate()
-                {
+                for (i, ((phase, weight), (misfit, modulation))) in out.into_iter().enumerate() {
                     let y = first + i;
                     model(rows, around(y, grid.height)[2], (i + 2) % 3);
-                    let Rows { ring, albedo, smooth, window: window_rows, .. } = rows;
+                    let Rows { ring, albedo, smooth, numerator, window: window_rows, .. } = rows;
                     let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[8].as_slice());
                     albedo.resize(grid.stride, 0.0);
+                    numerator.resize(grid.stride, 0.0);
                     binomial(near, grid.width, smooth, albedo);
                     let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
                     let lit = [window.modulation(y), scene.row(scene.usable, y)];
-                    linearise(
-                        model,
-                        albedo,
-                        scene.rows(y),
-                        lit,
-                        [numerator, denominator, misfit, modulation],
-                    );
+                    linearise(model, albedo, scene.rows(y), lit, [numerator, weight, misfit, modulation]);
                     phase.copy_from_slice(scene.row(before, y));
-                    window.along(y, window_rows, [phase, numerator, denominator]);
+                    window.along(y, window_rows, numerator, [phase, weight]);
                 }
             },
         );
-        window.down(steps, slots, |rows| &mut rows.window, phase, information);
+        let average = Average { phase: average, weight };
+        window.down(&average, slots, |rows| &mut rows.window, phase, information);
     }
 }
 

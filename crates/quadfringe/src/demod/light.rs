@@ -5,7 +5,7 @@
 //! are taken from the surroundings of each pixel, so that neither the ambient light nor the albedo has to be known.
 
 use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, lanes_mut, take};
-use super::scene::around;
+use super::scene::{around, hold};
 use crate::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -23,7 +23,6 @@ pub(crate) struct LightFinder {
     means: CellMaps,
     extremes: CellMaps,
     smoothed: CellMaps,
-    heights: Vec<f32>,
     sums: CellMaps,
     slots: Slots<(Rows, CellWork)>,
     /// Standard deviation of the intensities of the last image, in linear light.
@@ -39,34 +38,42 @@ struct Rows {
 }
 
 impl LightFinder {
-    /// Writes 1 for every pixel that is lit, 0 elsewhere. `range_min` is the least range of fringes, in linear light.
-    pub fn find(&mut self, grid: &Grid, light: [&[f32]; 4], period_px: f64, range_min: f32, lit: &mut [f32]) {
+    /// Writes 1 for every pixel that is lit, 0 elsewhere. `range_min` is the least range of fringes, in linear light; what a
+    /// `lent` plane held is lost.
+    pub fn find(
+        &mut self,
+        grid: &Grid,
+        light: [&[f32]; 4],
+        (period_px, range_min): (f64, f32),
+        lent: &mut Vec<f32>,
+        lit: &mut [f32],
+    ) {
         let reach = (SURROUNDINGS * period_px as f32 / grid.step as f32).ceil();
         self.surroundings(grid, light, reach, range_min);
-        self.refind(grid, light, lit);
+        self.refind(grid, light, lent, lit);
     }
 
     /// The same on a finer image of the same scene: its grid has the cells of the last [`Self::find`].
-    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lit: &mut [f32]) {
+    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lent: &mut Vec<f32>, lit: &mut [f32]) {
         let (stride, noise) = (grid.stride, noise(light[0], grid));
         self.noise = noise;
-        self.heights.resize(grid.pixels(), 0.0);
+        let above = hold(lent, grid.pixels());
         let (smoothed, slots) = (&self.smoothed, &self.slots);
-        self.heights.par_chunks_mut(stride).enumerate().for_each_init(
+        above.par_chunks_mut(stride).enumerate().for_each_init(
             || slots.take(),
             |slot, (y, out)| {
                 let maps = slot.0.maps.sample::<8>(grid, smoothed, 0, y);
                 heights(maps, light.map(|plane| &plane[y * stride..][..stride]), noise * noise, out);
             },
         );
-        let heights = &self.heights;
+        let above = &*above;
         lit.par_chunks_mut(stride).enumerate().for_each_init(
             || slots.take(),
             |slot, (y, lit)| {
                 // The mean reaches one pixel into a shadow: the least of the means does not.
                 let Rows { sums, means, .. } = &mut slot.0;
                 for (mean, centre) in means.iter_mut().zip(around(y, grid.height)) {
-                    let near = around(centre, grid.height).map(|row| &heights[row * stride..][..stride]);
+                    let near = around(centre, grid.height).map(|row| &above[row * stride..][..stride]);
                     mean_of_nine(near, grid.width, sums, mean);
                 }
                 least_of_nine(means.each_ref().map(Vec::as_slice), grid.width, 9.0 * LEAST, sums, lit);
@@ -75,14 +82,15 @@ impl LightFinder {
     }
 
     /// Takes the outermost pixels of what is lit.
-    pub fn shrink(&mut self, grid: &Grid, lit: &mut [f32]) {
-        let Self { heights, slots, .. } = self;
-        heights.copy_from_slice(lit);
+    pub fn shrink(&mut self, grid: &Grid, lent: &mut Vec<f32>, lit: &mut [f32]) {
+        let above = hold(lent, grid.pixels());
+        above.copy_from_slice(lit);
+        let (above, slots) = (&*above, &self.slots);
         let stride = grid.stride;
         lit.par_chunks_mut(stride).enumerate().for_each_init(
             || slots.take(),
             |slot, (y, lit)| {
-                let near = around(y, grid.height).map(|row| &heights[row * stride..][..stride]);
+                let near = around(y, grid.height).map(|row| &above[row * stride..][..stride]);
                 least_of_nine(near, grid.width, 0.5, &mut slot.0.sums, lit);
             },
         );
@@ -270,7 +278,8 @@ mod tests {
             };
             let planes = [plane(36.0, 0.0), plane(35.0, 0.0), plane(36.0, FRAC_PI_2), plane(30.0, 0.0)];
             let mut lit = vec![0.0; grid.pixels()];
-            LightFinder::default().find(&grid, planes.each_ref().map(Vec::as_slice), 25.3, 0.04, &mut lit);
+            let light = planes.each_ref().map(Vec::as_slice);
+            LightFinder::default().find(&grid, light, (25.3, 0.04), &mut Vec::new(), &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {

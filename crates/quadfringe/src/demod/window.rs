@@ -35,20 +35,11 @@ pub(crate) struct Window<'a> {
     noise: f32,
 }
 
-/// A phase and the normal equations of a step of it: `numerator / denominator`, 0 where there is nothing to measure by.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Steps {
-    pub phase: Vec<f32>,
-    pub numerator: Vec<f32>,
-    pub denominator: Vec<f32>,
-}
-
-impl Steps {
-    pub fn resize(&mut self, pixels: usize) {
-        for map in [&mut self.phase, &mut self.numerator, &mut self.denominator] {
-            map.resize(pixels, 0.0);
-        }
-    }
+/// A phase averaged along rows, and its weight.
+#[derive(Clone, Copy)]
+pub(crate) struct Average<'a> {
+    pub phase: &'a [f32],
+    pub weight: &'a [f32],
 }
 
 /// Rows of one task.
@@ -83,13 +74,20 @@ impl<'a> Window<'a> {
         Self { radius: self.radius.min(2), ..self }
     }
 
-    /// Average along row `y`: phase and normal equations of a step of it are replaced by phase plus mean step, and weight.
-    pub fn along(&self, y: usize, rows: &mut WindowRows, [phase, numerator, denominator]: [&mut [f32]; 3]) {
+    /// Average along row `y`: a phase and the normal equations of a step of it, `numerator / denominator` and 0 where there is
+    /// nothing to measure by, are replaced by phase plus mean step, and weight.
+    pub fn along(
+        &self,
+        y: usize,
+        rows: &mut WindowRows,
+        numerator: &[f32],
+        [phase, denominator]: [&mut [f32]; 2],
+    ) {
         let (grid, radius) = (self.scene.grid, self.radius);
         let WindowRows { maps, sharpness, padded, .. } = rows;
         let slope = self.slopes.along(self.scene, y, maps);
         self.sharpen(y, sharpness);
-        for (row, source) in padded.iter_mut().zip([&*phase, &*numerator, &*denominator, slope]) {
+        for (row, source) in padded.iter_mut().zip([&*phase, numerator, &*denominator, slope]) {
             row.clear();
             row.resize(radius, 0.0);
             row.extend_from_slice(&source[..grid.width]);
@@ -110,7 +108,7 @@ impl<'a> Window<'a> {
     /// Average along columns what [`Self::along`] left; `information` receives the weights that the window has added up.
     pub fn down<T: Send>(
         &self,
-        steps: &Steps,
+        average: &Average<'_>,
         slots: &Slots<T>,
         rows: impl Fn(&mut T) -> &mut WindowRows + Sync,
         phase: &mut [f32],
@@ -126,7 +124,7 @@ impl<'a> Window<'a> {
                 self.slopes_down(first, phase.len() / stride, rows);
                 let lines = phase.chunks_exact_mut(stride).zip(information.chunks_exact_mut(stride));
                 for (i, (phase, information)) in lines.enumerate() {
-                    self.row_down(steps, first + i, i, rows, [phase, information]);
+                    self.row_down(average, first + i, i, rows, [phase, information]);
                 }
             },
         );
@@ -151,7 +149,14 @@ impl<'a> Window<'a> {
     }
 
     /// Row `y`, number `index` of its block.
-    fn row_down(&self, steps: &Steps, y: usize, index: usize, rows: &mut WindowRows, out: [&mut [f32]; 2]) {
+    fn row_down(
+        &self,
+        average: &Average<'_>,
+        y: usize,
+        index: usize,
+        rows: &mut WindowRows,
+        out: [&mut [f32]; 2],
+    ) {
         let grid = self.scene.grid;
         self.sharpen(y, &mut rows.sharpness);
         let slope = |k: usize| &rows.slopes[(index + k) * grid.stride..][..grid.stride];
@@ -160,10 +165,10 @@ impl<'a> Window<'a> {
         let there: Vec<[&[f32]; 3]> = (inside.clone())
             .map(|k| {
                 let row = y + k - self.radius;
-                [self.scene.row(&steps.phase, row), self.scene.row(&steps.denominator, row), slope(k)]
+                [self.scene.row(average.phase, row), self.scene.row(average.weight, row), slope(k)]
             })
             .collect();
-        let here = [self.scene.row(&steps.phase, y), slope(self.radius), &rows.sharpness];
+        let here = [self.scene.row(average.phase, y), slope(self.radius), &rows.sharpness];
         average_down(&self.taps(inside), &there, here, out);
     }
 
@@ -292,18 +297,14 @@ mod tests {
         let mut slopes = Slopes::default();
         slopes.measure(&scene, &seen, &modulation);
         let window = Window::new(&scene, &slopes, &modulation, noise(&scene, &seen, &modulation));
-        let mut steps = Steps::default();
-        steps.resize(grid.pixels());
-        steps.phase.copy_from_slice(&seen);
-        steps.denominator.fill(1.0);
+        let (mut along, mut weight) = (seen.clone(), vec![1.0; grid.pixels()]);
         let mut rows = WindowRows::default();
-        let Steps { phase, numerator, denominator } = &mut steps;
-        let lines = phase.chunks_mut(128).zip(numerator.chunks_mut(128)).zip(denominator.chunks_mut(128));
-        for (y, ((phase, numerator), denominator)) in lines.enumerate() {
-            window.along(y, &mut rows, [phase, numerator, denominator]);
+        for (y, (phase, weight)) in along.chunks_mut(128).zip(weight.chunks_mut(128)).enumerate() {
+            window.along(y, &mut rows, &[0.0; 128], [phase, weight]);
         }
+        let average = Average { phase: &along, weight: &weight };
         let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
-        window.down(&steps, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut information);
+        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut information);
         let error = |i: usize| (phase[i] - truth(i)).abs();
         let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
         // Beside the step its rise leaks into the slopes.
