@@ -20,9 +20,6 @@ import quadfringe as qf
 from quadfringe.recording import Recorder, Recording
 from quadfringe.viewer import Viewer
 
-# The server of the page leaves sockets and loops of its threads to the garbage collector when it is stopped.
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
-
 SMALL_HAND = """
 capture = { kind = "virtual", frame_rate_hz = 8 }
 
