@@ -96,7 +96,7 @@ def still_shape_on(page: Any) -> np.ndarray | None:
         return None
     time.sleep(1.0)
     second = picture(page)
-    return second if np.abs(second - first).max() <= 2 else None
+    return second if np.abs(second - first)[painted(second)].mean() < 1 else None
 
 
 def figures(page: Any) -> dict[str, str]:
