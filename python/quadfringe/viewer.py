@@ -191,7 +191,7 @@ class Viewer:
         """Look at the first shape from where the camera stands, a little from the side."""
         middle_mm = np.median(points_mm[:: max(1, len(points_mm) // 5000)], axis=0)
         middle = M_PER_MM * middle_mm
-        eye = middle + float(middle[2]) * np.array([-0.21, -0.15, -0.43])
+        eye = middle + float(middle[2]) * np.array([-0.30, -0.22, -0.62])
         view = self._server.initial_camera
         view.position, view.look_at, view.up = tuple(eye), tuple(middle), (0.0, -1.0, 0.0)
         for client in self._server.get_clients().values():
