@@ -1,20 +1,29 @@
 """Batch: how much faster two worker processes decode a recording than one.
 
-    python benches/batch.py [--shots 200] [--turns 1] [--json FILE]
+    python benches/batch.py [--shots 200] [--turns 1] [--only speed|restart] [--folder DIR] [--json FILE]
 
 The default scene at 1024 x 768, the published steps, decoded with the best method into zarr and PLY, one kernel thread
 a worker; one worker and two in turns. The time is from the first result to the last, so that starting processes, which
 a long batch does once, is not weighed; with it the factor is given too. Busy cores are what the workers got of the
-processors: the machine must have two free ones for the figure to mean anything. The bar is 1.7; exit status 1 below it.
+processors: the machine must have two free ones for the figure to mean anything. Then a run is killed with SIGKILL in
+the middle, given again, and every file compared with those of the first. Bars: 1.7, and no file differs; exit status 1
+otherwise. DIR needs 40 MB a shot and is the system's temporary folder by default.
 """
 
 from __future__ import annotations
 
 import argparse
+import filecmp
 import os
+import shutil
+import signal
 import statistics
+import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
 
@@ -54,21 +63,42 @@ def decoded(take: Path, out: Path, workers: int) -> tuple[float, float, float]:
     return (len(moments) - workers) / (moments[-1] - moments[workers - 1]), spent_s, busy_s / spent_s
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--shots", type=int, default=200)
-    parser.add_argument("--turns", type=int, default=1)
-    parser.add_argument("--json", type=Path)
-    options = parser.parse_args()
+def killed_and_restarted(take: Path, out: Path, whole: Path) -> tuple[int, int]:
+    """Kill a batch in the middle, give it again; return how many shots were finished, and how many files differ."""
+    command = [sys.executable, "-m", "quadfringe", "batch", str(take), "--out", str(out)]
+    wanted = len(list((whole / take.stem).glob("*.ply"))) // 2
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True) as run:
+        while len(list((out / take.stem).glob("*.ply"))) < wanted:
+            assert run.poll() is None, "it ended before it could be killed"
+            time.sleep(0.05)
+        os.killpg(run.pid, signal.SIGKILL)
+    finished = len(list((out / take.stem).glob("*.ply")))
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+    files = {path.relative_to(folder) for folder in (out, whole) for path in folder.rglob("*") if path.is_file()}
+    return finished, sum(not same(out / file, whole / file) for file in files)
+
+
+def same(one: Path, other: Path) -> bool:
+    return one.is_file() and other.is_file() and filecmp.cmp(one, other, shallow=False)
+
+
+@contextmanager
+def stopped_like_an_error() -> Iterator[None]:
+    """Let SIGTERM unwind as Ctrl-C does, so that nothing is left on the disk."""
+    before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
+    yield
+    signal.signal(signal.SIGTERM, before)
+
+
+def speed(take: Path, folder: Path, turns: int) -> dict[str, float]:
     runs: dict[int, list[tuple[float, float, float]]] = {1: [], 2: []}
-    with tempfile.TemporaryDirectory(dir=Path()) as name:
-        take = Path(name) / "take.h5"
-        recording(take, options.shots)
-        for turn in range(options.turns):
-            for workers, done in runs.items():
-                done.append(decoded(take, Path(name) / f"out{turn}_{workers}", workers))
+    for turn in range(turns):
+        for workers, done in runs.items():
+            out = folder / f"out{turn}_{workers}"
+            done.append(decoded(take, out, workers))
+            shutil.rmtree(out)
     one, two = ([statistics.median(column) for column in zip(*done, strict=True)] for done in runs.values())
-    figures = {
+    return {
         "batch_shots_per_s_1_worker": one[0],
         "batch_shots_per_s_2_workers": two[0],
         "batch_two_workers_over_one": two[0] / one[0],
@@ -76,11 +106,36 @@ def main() -> int:
         "batch_busy_cores_1_worker": one[2],
         "batch_busy_cores_2_workers": two[2],
     }
+
+
+def restart(take: Path, folder: Path) -> dict[str, float]:
+    decoded(take, folder / "whole", 2)
+    finished, differing = killed_and_restarted(take, folder / "killed", folder / "whole")
+    return {"batch_shots_finished_when_killed": finished, "batch_files_that_differ": differing}
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--shots", type=int, default=200)
+    parser.add_argument("--turns", type=int, default=1)
+    parser.add_argument("--only", choices=["speed", "restart"])
+    parser.add_argument("--folder", type=Path)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    figures: dict[str, float] = {}
+    with stopped_like_an_error(), tempfile.TemporaryDirectory(dir=options.folder) as name:
+        folder = Path(name)
+        recording(folder / "take.h5", options.shots)
+        if options.only != "restart":
+            figures |= speed(folder / "take.h5", folder, options.turns)
+        if options.only != "speed":
+            figures |= restart(folder / "take.h5", folder)
     for key, value in figures.items():
         print(f"{key:40}{value:10.4g}")
     if options.json:
         options.json.write_text(figures_text(figures))
-    return int(figures["batch_two_workers_over_one"] < BAR)
+    slow = figures.get("batch_two_workers_over_one", BAR) < BAR
+    return int(slow or figures.get("batch_files_that_differ", 0) > 0)
 
 
 if __name__ == "__main__":

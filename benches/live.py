@@ -1,6 +1,6 @@
 """Live view: clouds a second to a websocket client and in a browser, beside decoding, and the memory it takes.
 
-    python benches/live.py [--seconds 30] [--browser] [--json FILE]
+    python benches/live.py [--seconds 30] [--browser [--screenshot FILE.png]] [--json FILE]
 
 A camera of 30 shots a second shows six shots of the moving hand, 1024 x 768, in turn; they are decoded with the
 published method and served. A client in another process takes the full-resolution clouds and draws nothing; memory is
@@ -19,16 +19,23 @@ import shutil
 import statistics
 import subprocess
 import sys
+import tempfile
 import threading
 import time
+from base64 import b64decode
 from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import replace
 from itertools import cycle
 from pathlib import Path
 from typing import Any
+from urllib.request import urlopen
+
+from websockets.sync.client import connect
 
 import quadfringe as qf
 from quadfringe.capture import VirtualConfig
-from quadfringe.data import AnyShot
+from quadfringe.data import AnyShot, Stamp
 from quadfringe.devices import CameraStatistics, Keep
 from quadfringe.files import figures_text
 from quadfringe.machine import resident_bytes
@@ -88,7 +95,7 @@ class Carousel:
             due += 1 / RATE_HZ
             time.sleep(max(0.0, due - time.monotonic()))
             self._given += 1
-            yield shot
+            yield replace(shot, stamp=Stamp(self._given, time.time_ns() // 1000, self.name))
 
     def statistics(self) -> CameraStatistics:
         return CameraStatistics(shots=self._given)
@@ -102,10 +109,11 @@ def hand_shots() -> tuple[list[AnyShot], qf.Scanner]:
     return list(scanner.camera.stream(SHOTS, keep="all")), scanner
 
 
-def served(seconds: float, *, browser: bool) -> dict[str, float]:
+def served(seconds: float, *, browser: bool, screenshot: Path | None = None) -> dict[str, float]:
     shots, scanner = hand_shots()
     memory: list[float] = []
-    command = [sys.executable, __file__, "--seconds", str(seconds), *(["--browser"] if browser else []), "--client"]
+    command = [sys.executable, __file__, "--seconds", str(seconds), *(["--browser"] if browser else [])]
+    command += [*(["--screenshot", str(screenshot)] if screenshot else []), "--client"]
     with (
         scanner,
         Viewer(port=8400, stride=4 if browser else 1, clouds_per_s=20.0) as viewer,
@@ -136,12 +144,12 @@ def served(seconds: float, *, browser: bool) -> dict[str, float]:
 def client(url: str, seconds: float) -> dict[str, float]:
     import msgspec
     import viser
-    from websockets.asyncio.client import connect
+    from websockets.asyncio.client import connect as connect_async
 
     async def count() -> float:
         protocol: Any = f"viser-v{viser.__version__}"
         address = url.replace("http", "ws")
-        async with connect(address, subprotocols=[protocol], max_size=None, compression=None) as socket:
+        async with connect_async(address, subprotocols=[protocol], max_size=None, compression=None) as socket:
             await socket.send(msgspec.msgpack.encode(CAMERA))  # as a page does; before, it counts as not there yet
             clouds, begin = 0, time.monotonic() + WARM_UP_S
             while (now := time.monotonic()) < begin + seconds:
@@ -152,19 +160,61 @@ def client(url: str, seconds: float) -> dict[str, float]:
     return {"clouds": asyncio.run(count())}
 
 
-def browser(url: str, seconds: float) -> dict[str, float]:
-    from playwright.sync_api import sync_playwright
+class Page:
+    """A page of Debian's chromium without a screen, over its own protocol.
 
-    with sync_playwright() as playwright:
-        chromium = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
-        page = chromium.new_page(viewport={"width": 1280, "height": 800})
-        page.add_init_script(COUNTERS)
-        page.goto(url)
-        page.wait_for_timeout(2e3 * WARM_UP_S)
-        before, begin = page.evaluate("({...window.counts})"), time.monotonic()
-        page.wait_for_timeout(1e3 * seconds)
-        after, spent_s = page.evaluate("({...window.counts})"), time.monotonic() - begin
-        chromium.close()
+    Test drivers listen to the network of the page, and copying every cloud to them takes more than drawing it.
+    """
+
+    def __init__(self, folder: str) -> None:
+        words = ["--headless=new", "--remote-debugging-port=0", f"--user-data-dir={folder}", "--window-size=1280,887"]
+        # It ends with this program, however that ends: a page that nobody looks at draws on.
+        alone = ["setpriv", "--pdeathsig", "KILL", shutil.which("chromium") or "chromium"]
+        self._chromium = subprocess.Popen([*alone, *FLAGS, *words, "about:blank"], stderr=subprocess.PIPE, text=True)
+        assert self._chromium.stderr is not None
+        said = next(line for line in self._chromium.stderr if "DevTools listening on" in line)
+        # What else it says must be read, or it waits for ever.
+        threading.Thread(target=self._chromium.stderr.read, daemon=True).start()
+        port = said.split("/")[2]
+        with urlopen(f"http://{port}/json/list") as answer:
+            target = next(target for target in json.load(answer) if target["type"] == "page")
+        self._wire = connect(target["webSocketDebuggerUrl"], max_size=None)
+        self._asked = 0
+
+    def ask(self, method: str, **parameters: object) -> dict[str, Any]:
+        """Send a command and wait for its answer."""
+        self._asked += 1
+        self._wire.send(json.dumps({"id": self._asked, "method": method, "params": parameters}))
+        while (answer := json.loads(self._wire.recv())).get("id") != self._asked:
+            pass
+        result: dict[str, Any] = answer["result"]
+        return result
+
+    def value(self, expression: str) -> Any:
+        """Evaluate an expression of the page."""
+        return self.ask("Runtime.evaluate", expression=expression, returnByValue=True)["result"]["value"]
+
+    def picture(self, path: Path) -> None:
+        """Write what the page shows, PNG."""
+        path.write_bytes(b64decode(self.ask("Page.captureScreenshot")["data"]))
+
+    def close(self) -> None:
+        self._wire.close()
+        self._chromium.kill()
+        self._chromium.communicate()
+
+
+def browser(url: str, seconds: float, screenshot: Path | None) -> dict[str, float]:
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, closing(Page(folder)) as page:
+        page.ask("Page.enable")
+        page.ask("Page.addScriptToEvaluateOnNewDocument", source=COUNTERS)
+        page.ask("Page.navigate", url=url)
+        time.sleep(2 * WARM_UP_S)
+        before, begin = page.value("({...window.counts})"), time.monotonic()
+        time.sleep(seconds)
+        after, spent_s = page.value("({...window.counts})"), time.monotonic() - begin
+        if screenshot is not None:
+            page.picture(screenshot)
     return {name: (after[name] - before[name]) / spent_s for name in after}
 
 
@@ -172,13 +222,16 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--browser", action="store_true")
+    parser.add_argument("--screenshot", type=Path, help="with --browser: the page at the end")
     parser.add_argument("--client", help=argparse.SUPPRESS)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     if options.client:
-        print(json.dumps((browser if options.browser else client)(options.client, options.seconds)))
+        seconds, url = options.seconds, options.client
+        counted = browser(url, seconds, options.screenshot) if options.browser else client(url, seconds)
+        print(json.dumps(counted))
         return 0
-    figures = served(options.seconds, browser=options.browser)
+    figures = served(options.seconds, browser=options.browser, screenshot=options.screenshot)
     for key, value in figures.items():
         print(f"{key:36}{value:10.4g}")
     if options.json:

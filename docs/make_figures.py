@@ -1,17 +1,23 @@
 """Draw the pictures of the README and measure its figures again; `make figures` runs this.
 
 Every row of the table names the command that gave its number. Rows on captures and renders need the test data
-(QUADFRINGE_DATA, or ../shared/data) and are left as they are without it.
+(QUADFRINGE_DATA, or ../shared/data), those on cameras Aravis and a network of their own (`make test-camera`), those on
+the browser, and its picture, chromium (`make test-live`); they are left as they are without.
 """
 
 from __future__ import annotations
 
 import json
 import os
+import shutil
 import subprocess
 import sys
 import tempfile
+import time
+from collections.abc import Callable
+from contextlib import closing
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -20,9 +26,13 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 import quadfringe as qf
+from quadfringe.film import hand_system
+from quadfringe.viewer import Viewer
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs" / "images"
+LOOPBACK = ROOT / "scripts" / "loopback"
+PAGE_S = 20.0  # until the page has drawn, without a graphics card
 BEGIN, END = "<!-- figures -->", "<!-- /figures -->"
 
 
@@ -32,7 +42,7 @@ class Source:
 
     command: tuple[str, ...]
     rows: tuple[tuple[str, str, str], ...]
-    needs_data: bool = False
+    there: Callable[[], bool] = lambda: True  # whether what it needs is there
 
 
 SURFACES = ("plane", "peaks", "steps", "sphere")
@@ -151,6 +161,50 @@ SPEED = (
     ("published_2_threads_times_numpy_float32", "published method: times as fast as NumPy in float32", "15"),
     ("best_2_threads_ms", "best method, 2 threads, same run, ms", ""),
 )
+CAMERA = (
+    ("wire_lost_shots", "two cameras on loopback GigE Vision at 30 fps, 60 s: shots lost of 1800", "0"),
+    ("wire_wrong_pixels", "the same: wrong pixels", "0"),
+    ("decode_lost_shots", "decoded by the published method and recorded: shots lost of 1800", "0"),
+    ("decode_wrong_pixels", "the same: shots with wrong pixels", "0"),
+    ("decode_latency_ms", "from the arrival of the second frame to the shape, median, ms", "40"),
+    ("rate_shapes_per_s", "cameras at 66 fps, recorded: shapes/s by the published method", "60"),
+    ("faults_slowest_error_s", "from a fault of a camera to its error, the slowest, s", "3"),
+)
+RECORDING = (
+    ("recording_mb_per_s", "recording, MB/s", "150, or the disk"),
+    ("plain_file_mb_per_s", "the same bytes into a plain file, MB/s", ""),
+    ("kills_shots_lost", "shots reported as written that 20 kill -9 took away", "0"),
+)
+LIVE = (
+    ("live_client_clouds_per_s", "live view beside decoding: full-resolution clouds/s to a client", "10"),
+    ("live_client_memory_growth_mb", "memory of the server, last third against the middle one, MB", "flat"),
+)
+BROWSER = tuple(
+    (f"live_browser_{name}_per_s", f"page in a browser without a graphics card: {words}/s", bar)
+    for name, words, bar in (
+        ("clouds", "clouds of every 4th point", "1"),
+        ("pictures", "pictures", "5"),
+        ("figures", "figures", "5"),
+    )
+)
+BATCH = (
+    ("batch_two_workers_over_one", "batch of 200 shots: two workers against one", "1.7"),
+    ("batch_files_that_differ", "files that differ after kill -9 and the same command again", "0"),
+)
+
+
+def has_data() -> bool:
+    return (data_folder() / "renders" / "rig.json").is_file()
+
+
+def has_cameras() -> bool:
+    return find_spec("gi") is not None and subprocess.run([LOOPBACK, "true"], capture_output=True).returncode == 0
+
+
+def has_browser() -> bool:
+    return shutil.which("chromium") is not None
+
+
 SOURCES = (
     Source(("benches/round_trip.py",), ROUND_TRIP),
     Source(("benches/bayer.py",), BAYER),
@@ -159,9 +213,14 @@ SOURCES = (
     Source(("quadfringe", "reproduce", "pair-tolerance"), PAIR_TOLERANCE),
     Source(("quadfringe", "reproduce", "pair-correction"), PAIR_CORRECTION),
     Source(("quadfringe", "reproduce", "pair-depth"), PAIR_DEPTH),
-    Source(("benches/captures_report.py",), CAPTURES, needs_data=True),
+    Source(("benches/captures_report.py",), CAPTURES, has_data),
     Source(("benches/bench_decode.py",), SPEED),
     Source(("benches/first_frame.py",), (("first_frame_s", "first frame from process start, s", "1.5"),)),
+    Source(("scripts/loopback", "benches/camera.py"), CAMERA, has_cameras),
+    Source(("benches/recording.py",), RECORDING),
+    Source(("benches/live.py",), LIVE),
+    Source(("benches/live.py", "--browser"), BROWSER, has_browser),
+    Source(("benches/batch.py",), BATCH),
 )
 
 
@@ -172,6 +231,8 @@ def main() -> None:
         shape = scanner.decode(shot)
     draw_fringes(PICTURES / "fringes.png", shot)
     draw_shape(PICTURES / "shape.png", shape)
+    if has_browser():
+        draw_page(PICTURES / "live.png")
     readme = ROOT / "README.md"
     before, _, rest = readme.read_text().partition(BEGIN)
     old, _, after = rest.partition(END)
@@ -214,12 +275,32 @@ def draw_shape(path: Path, shape: qf.Shape, stride: int = 3) -> None:
     figure.savefig(path)
 
 
+def draw_page(path: Path) -> None:
+    """Take a picture of the live page with the hand on it."""
+    sys.path.append(str(ROOT / "benches"))
+    from live import Page
+
+    with (
+        qf.open(hand_system()) as scanner,
+        scanner.stream(2, keep="all") as stream,
+        Viewer(port=8700, colouring="height") as viewer,
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
+        closing(Page(folder)) as page,
+    ):
+        page.ask("Page.navigate", url=viewer.url)
+        viewer.follow(stream, columns=scanner.calibration.projector.width_px)
+        time.sleep(PAGE_S)
+        page.value("document.querySelectorAll('.mantine-Notification-closeButton').forEach(cross => cross.click()); 0")
+        time.sleep(PAGE_S / 4)
+        page.picture(path)
+
+
 def measured_table(old: str) -> str:
-    """Give the table; rows that need data which is not there stay as they stood in the old one."""
+    """Give the table; rows that need what is not there stay as they stood in the old one."""
     lines = ["| figure | value | bar | command |", "|---|---|---|---|"]
     for source in SOURCES:
         command = words_of(source.command)
-        if source.needs_data and not (data_folder() / "renders" / "rig.json").is_file():
+        if not source.there():
             lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
             continue
         figures = run(source.command)
@@ -228,7 +309,10 @@ def measured_table(old: str) -> str:
 
 
 def words_of(command: tuple[str, ...]) -> str:
-    return " ".join(command if command[0] == "quadfringe" else ("python", *command))
+    if command[0] == "quadfringe":
+        return " ".join(command)
+    first = next(place for place, word in enumerate(command) if word.endswith(".py"))
+    return " ".join((*command[:first], "python", *command[first:]))
 
 
 def data_folder() -> Path:
@@ -241,8 +325,10 @@ def run(command: tuple[str, ...]) -> dict[str, float]:
         if command[0] == "quadfringe":
             full = [sys.executable, "-m", *command, "--out", folder, "--json", str(json_file)]
         else:
-            full = [sys.executable, str(ROOT / command[0]), *command[1:], "--json", str(json_file)]
-        subprocess.run(full, check=True, stdout=subprocess.DEVNULL)
+            full = words_of(command).replace("python", sys.executable, 1).split()
+            full += ["--json", str(json_file)]
+        # A bar that is missed ends with a status of its own, and is a row like the others.
+        subprocess.run(full, check=False, stdout=subprocess.DEVNULL, cwd=ROOT)
         figures: dict[str, float] = json.loads(json_file.read_text())["figures"]
     return figures
 

@@ -53,6 +53,21 @@ def test_cameras_that_are_not_meant() -> None:
         chosen(AravisConfig(device="Flir"), OTHER)
 
 
+def test_one_chip() -> None:
+    def one(config: AravisConfig, chip: str, *devices: _gi.Found) -> tuple[str, int]:
+        place = profiles.place(config, chip, lambda: devices)
+        return place.where, place.stream
+
+    everybody = (INFRARED, OTHER, VISIBLE)
+    assert one(AravisConfig(device="AD-080GE"), "visible", *everybody) == (VISIBLE.where, 0)
+    assert one(AravisConfig(device="AD-080GE"), "infrared", *everybody) == (INFRARED.where, 0)
+    assert one(AravisConfig(device="_#1"), "visible", *everybody) == (INFRARED.where, 0)
+    assert one(AravisConfig(device="Basler"), "visible", *everybody) == (OTHER.where, 0)
+    assert one(AravisConfig(device="Basler"), "infrared", *everybody) == (OTHER.where, 1)
+    with pytest.raises(CameraNotFoundError, match="fits several"):
+        one(AravisConfig(), "visible", *everybody)
+
+
 def test_exposures_of_a_jai_camera() -> None:
     assert [profiles.exposure_steps(us) for us in (20.0, 62.0, 33338.0)] == [0, 1, 792]
     for us in (19.0, 33400.0):

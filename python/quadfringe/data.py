@@ -24,6 +24,7 @@ __all__ = [
     "Calibration",
     "CalibrationRecord",
     "CalibrationStep",
+    "ChipImage",
     "FrameStamp",
     "ResponseCalibration",
     "Shape",
@@ -265,6 +266,20 @@ class BayerShot(Stamped):
 
 
 AnyShot = Shot | BayerShot
+
+
+@dataclass(frozen=True)
+class ChipImage(Stamped):
+    """One exposure of one chip: pixels (H, W), or (H, W, 3) in R, G, B order, uint8 or uint16, up to `full_scale`.
+
+    `pixel_format` is its name in GenICam; `bayer` the colours of a raw mosaic, None when it is none.
+    """
+
+    pixels: NDArray[Any]
+    pixel_format: str
+    full_scale: float
+    bayer: BayerPattern | None
+    stamp: Stamp
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 
 from quadfringe.data import FrameStamp
 
-__all__ = ["Clock", "FrameNumbers", "Pairer", "Stamped"]
+__all__ = ["Clock", "FrameNumbers", "Pairer", "Single", "Stamped"]
 
 WINDOW = 256  # frames that the running minimum looks back: 50 ppm make 0.4 ms of it at 30 Hz
 CALM = 8  # frames in a row that come evenly, within this share of a period: then nothing holds the host up
@@ -97,6 +97,35 @@ class Stamped(Generic[Item]):
     stamp: FrameStamp
     number: int
     item: Item
+
+
+class Single(Generic[Item]):
+    """The frames of one chip as they come, numbered and counted as `Pairer` does it; nothing waits."""
+
+    def __init__(self) -> None:
+        self.unpaired, self.missed = [0], [0]
+        self._clock = Clock()
+        self.begin()
+
+    def begin(self, *, sole: bool = False, pending: int = PENDING) -> None:  # noqa: ARG002 - there is nothing to match
+        """Start a run: ids may begin anew."""
+        self._numbers = FrameNumbers()
+
+    def end(self) -> None:
+        """Nothing waits."""
+
+    def push(self, chip: int, stamp: FrameStamp, item: Item) -> list[tuple[Stamped[Item], ...]]:
+        """Take a frame and give it back."""
+        before = self._numbers.missed
+        number = self._numbers(stamp.id)
+        self.missed[chip] += self._numbers.missed - before
+        self._clock.see(stamp)
+        return [(Stamped(stamp, number, item),)]
+
+    @property
+    def host_offset_ns(self) -> int:
+        """Host time minus device time."""
+        return self._clock.offset_ns
 
 
 class Pairer(Generic[Item]):

@@ -88,6 +88,9 @@ class Viewer:
         with gui.add_folder("Absolute phase"):
             self._phase = gui.add_image(blank, format="jpeg", jpeg_quality=80)
         self._server.scene.set_up_direction("-y")
+        # A cloud with new colours is a new material to the page, and the last one takes its compiled shader along.
+        # Two points that nobody sees keep it; without them a browser without a graphics card compiles for every cloud.
+        self._add_cloud("/shader", np.zeros((2, 3), np.float32), np.zeros((2, 3), np.uint8), point_size=1e-6)
 
     def follow(
         self,
@@ -146,17 +149,20 @@ class Viewer:
         points_mm, colours = self._points(shot, shape, stride)
         if not self._placed and len(points_mm):
             self._place_camera(points_mm)
+        self._add_cloud("/shape", points_mm, colours, M_PER_MM * stride * _pixel_mm(points_mm, shape))
+        self._clouds += 1
+
+    def _add_cloud(self, name: str, points_mm: Map, colours: Picture, point_size: float) -> None:
         self._server.scene.add_point_cloud(
-            "/shape",
+            name,
             points=points_mm,
             colors=colours,
-            point_size=M_PER_MM * stride * _pixel_mm(points_mm, shape),
+            point_size=point_size,
             point_shape="square",
             point_shading="flat",
             precision="float32",
             scale=M_PER_MM,
         )
-        self._clouds += 1
 
     def _points(self, shot: AnyShot, shape: Shape, stride: int) -> tuple[Map, Picture]:
         """Give the points with data, (N, 3) mm, and their colours, (N, 3)."""

@@ -2,13 +2,15 @@
 
     python tests/camera/aravis_fake.py WIDTH HEIGHT RATE_HZ ADDRESS ADDRESS
 
-"ready" on stdout, and the end of stdin ends them. Frames are made by a C
-callback: the one of the binding is freed at once and crashes, so that it is set through ctypes and kept here.
+"ready" on stdout; every line on stdin is answered by the exposures that each has sent, JSON; its end ends them. Frames
+are made by a C callback: the one of the binding is freed at once and crashes, so that it is set through ctypes and kept
+here. The two have no common clock but the period: one that is woken more than a period late skips an exposure.
 """
 
 from __future__ import annotations
 
 import ctypes
+import json
 import os
 import sys
 from typing import Any
@@ -19,6 +21,7 @@ import numpy as np
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis  # noqa: E402
 
+from quadfringe.emulator import keep_pace  # noqa: E402
 from quadfringe.emulator.frames import TestPattern, packed  # noqa: E402
 
 Fill = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
@@ -43,7 +46,7 @@ class Chip:
         assert self._camera.is_running(), f"{address} is taken"
         self._index, self._source = index, source
         self._period_ns = round(1e6 / rate_hz) * 1000
-        self._last = 0
+        self.sent: list[int] = []
         self._device = self._camera.get_fake_camera()
         height, width = source.shape
         self._size_px = width, height
@@ -62,19 +65,21 @@ class Chip:
     def _fill(self, buffer: int, _data: Any, _exposure: int, _gain: int, pixel_format: int) -> None:
         # Both cameras wake at multiples of the period; a late one keeps its place in the row.
         now = library.arv_buffer_get_timestamp(buffer) // self._period_ns
-        self._last = max(self._last + 1, now)
-        frame = np.frombuffer(packed(self._source, self._index, self._last, pixel_format, self._size_px), np.uint8)
+        exposure = max(self.sent[-1] + 1, now) if self.sent else now
+        frame = np.frombuffer(packed(self._source, self._index, exposure, pixel_format, self._size_px), np.uint8)
         ctypes.memmove(library.arv_buffer_get_data(buffer, None), frame.ctypes.data, frame.nbytes)
-        library.arv_buffer_set_timestamp(buffer, self._last * self._period_ns)
+        library.arv_buffer_set_timestamp(buffer, exposure * self._period_ns)
+        self.sent.append(exposure)
 
 
 def main() -> None:
     width, height, rate_hz = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     source = TestPattern((height, width))
+    keep_pace()
     chips = [Chip(index, address, source, rate_hz) for index, address in enumerate(sys.argv[4:6])]
     print("ready", flush=True)
-    sys.stdin.read()
-    del chips
+    for _ in sys.stdin:
+        print(json.dumps([[exposure % 65536 for exposure in chip.sent] for chip in chips]), flush=True)
     os._exit(0)
 
 

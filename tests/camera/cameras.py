@@ -56,7 +56,7 @@ def two_streams(_: Path) -> Iterator[Camera]:
 
 @contextmanager
 def aravis_fake(_: Path) -> Iterator[Camera]:
-    with fake_twin(SIZE_PX, 30.0) as capture, opened(SystemConfig(capture=capture)) as camera:
+    with fake_twin(SIZE_PX, 30.0) as fakes, opened(SystemConfig(capture=fakes.capture)) as camera:
         yield camera
 
 

@@ -5,16 +5,19 @@ from __future__ import annotations
 import gc
 import threading
 import time
+from typing import Literal
 
 import numpy as np
 import pytest
+from fake_twin import fake_twin
 from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, pattern, two_sources
 
-from quadfringe.capture import AravisConfig
+from quadfringe.capture import AravisConfig, ChipConfig
 from quadfringe.data import BayerShot, Shot
-from quadfringe.devices.aravis import AravisCamera, found
+from quadfringe.devices.aravis import AravisCamera, ChipCamera, found
 from quadfringe.emulator import MODEL, SERIAL, Emulator
-from quadfringe.errors import CameraError, CameraNotFoundError
+from quadfringe.emulator.frames import TestPattern
+from quadfringe.errors import CameraError, CameraNotFoundError, ShotTimeoutError, WrongFrameError
 
 FORMATS = [
     ("BayerRG8", "Mono8"),
@@ -36,6 +39,91 @@ def test_every_format_is_right_to_the_bit(emulator: Emulator, visible: str, infr
     assert all(image.flags.writeable for image in shots[0].images.values())
     assert camera.config.visible.pixel_format == visible
     assert camera.config.infrared.pixel_format == infrared
+
+
+@pytest.mark.parametrize("chip", ["visible", "infrared"])
+@pytest.mark.parametrize("bits", ["8", "12Packed"])
+def test_one_chip_alone(emulator: Emulator, chip: Literal["visible", "infrared"], bits: str) -> None:
+    config = emulated(emulator, f"BayerRG{bits}", f"Mono{bits}", exposure_us=10_000.0)
+    with ChipCamera(config, chip) as camera:
+        images = [camera.snap(), *camera.stream(5, keep="all")]
+    number = ("visible", "infrared").index(chip)
+    whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+    for image in images:
+        wanted = whole.frame(number, TestPattern.exposure(image.pixels), round(np.log2(image.full_scale + 1)))
+        np.testing.assert_array_equal(image.pixels, wanted)
+        assert image.pixel_format == getattr(camera.config, chip).pixel_format
+        assert image.bayer == ("rggb" if chip == "visible" else None)
+        assert set(image.stamp.frames) == {chip}
+    ids = [image.id for image in images]
+    assert ids == sorted(set(ids))
+    assert camera.statistics().shots >= 6
+    assert camera.statistics().unpaired == 0
+
+
+def test_one_chip_by_the_name_of_its_camera(emulator: Emulator) -> None:
+    for chip, address in zip(("visible", "infrared"), emulator.addresses, strict=True):
+        with ChipCamera(AravisConfig(device=SERIAL), chip) as camera:  # type: ignore[arg-type]
+            assert getattr(camera.config, chip).device == address
+            assert camera.name == f"JAI Ltd., Japan {MODEL} {SERIAL}"
+            camera.snap()
+
+
+def test_one_chip_that_fails(emulator: Emulator) -> None:
+    with ChipCamera(emulated(emulator), "infrared") as camera:
+        emulator.order("silent", 1)
+        with pytest.raises(ShotTimeoutError, match="sends nothing"):
+            camera.snap(1.0)
+        emulator.order("silent", 0)
+        camera.snap()
+        emulator.order("wrong_size", 1)
+        with pytest.raises(WrongFrameError, match="infrared chip are refused"):
+            list(camera.stream())
+        emulator.order("wrong_size", 0)
+        camera.snap()
+
+
+def test_one_chip_of_two_streams() -> None:
+    with Emulator(size_px=SIZE_PX, model="two-streams", addresses=TWO_STREAMS) as emulator:
+        whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+        for number, chip in enumerate(("visible", "infrared")):
+            with ChipCamera(two_sources(emulator), chip) as camera:  # type: ignore[arg-type]
+                pixels = camera.snap().pixels
+            np.testing.assert_array_equal(pixels, whole.frame(number, TestPattern.exposure(pixels), 8))
+
+
+def test_a_camera_of_one_chip() -> None:
+    """Aravis' own fake cameras: one device, one stream, features named otherwise than those of ours."""
+    with fake_twin(SIZE_PX, 30.0) as fakes:
+        device = fakes.capture.infrared.device
+        assert device is not None
+        config = AravisConfig(device=device, visible=ChipConfig(pixel_format="Mono8"), exposure_us=5000.0, timeout_s=10)
+        with ChipCamera(config) as camera:
+            pixels = camera.snap().pixels
+            whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+            np.testing.assert_array_equal(pixels, whole.frame(1, TestPattern.exposure(pixels), 8))
+            assert camera.config.visible.exposure_us == 5000
+        both = AravisConfig(
+            visible=ChipConfig(device=device, pixel_format="BayerRG8"),
+            infrared=ChipConfig(device=device, pixel_format="Mono8"),
+        )
+        with pytest.raises(CameraError, match=r"1 stream channel\(s\)(?s:.)*--chip visible"):
+            AravisCamera(both)
+
+
+def test_a_camera_that_is_not_on_a_network() -> None:
+    """The simulated device of Aravis stands for USB3 Vision: no packets, no addresses, no controller."""
+    from gi.repository import Aravis
+
+    Aravis.enable_interface("Fake")
+    try:
+        config = AravisConfig(device="Fake_1", features={"Width": 128, "Height": 64}, frame_rate_hz=50.0)
+        with ChipCamera(config) as camera:
+            images = list(camera.stream(5, keep="all"))
+    finally:
+        Aravis.disable_interface("Fake")
+    assert {image.pixels.shape for image in images} == {(64, 128)}
+    assert len({image.id for image in images}) == 5
 
 
 def test_one_device_with_two_streams() -> None:

@@ -20,9 +20,6 @@ import quadfringe as qf
 from quadfringe.recording import Recorder, Recording
 from quadfringe.viewer import Viewer
 
-# The server of the page leaves sockets and loops of its threads to the garbage collector when it is stopped.
-pytestmark = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning", "ignore::ResourceWarning")
-
 SMALL_HAND = """
 capture = { kind = "virtual", frame_rate_hz = 8 }
 
@@ -92,6 +89,16 @@ def shape_on(page: Any) -> np.ndarray | None:
     return image if painted(image).mean() > 0.05 else None
 
 
+def still_shape_on(page: Any) -> np.ndarray | None:
+    """The picture of a shape that stands still, once the page has faded in."""
+    first = shape_on(page)
+    if first is None:
+        return None
+    time.sleep(1.0)
+    second = picture(page)
+    return second if np.abs(second - first)[painted(second)].mean() < 1 else None
+
+
 def figures(page: Any) -> dict[str, str]:
     rows = page.locator("table tr").all_inner_texts()
     return dict(row.split("\t", 1) for row in rows if "\t" in row)
@@ -130,7 +137,7 @@ def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
             viewer.show(measured)  # nobody looks yet
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.goto(viewer.url)
-            image = until(lambda page=page: shape_on(page), "no shape")
+            image = until(lambda page=page: still_shape_on(page), "no shape")
             vivid = np.ptp(image, axis=2)
             seen[colouring] = image[vivid >= np.quantile(vivid[painted(image)], 0.8)].mean(axis=0)
             page.close()

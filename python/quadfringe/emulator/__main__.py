@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from quadfringe.emulator import ADDRESSES, MODEL, SERIAL
+from quadfringe.emulator import ADDRESSES, MODEL, SERIAL, keep_pace
 from quadfringe.emulator.camera import EmulatedCamera
 from quadfringe.emulator.control import Identity
 from quadfringe.emulator.frames import FileFrames, Source, TestPattern
@@ -37,6 +37,7 @@ def main() -> None:
     width, height = (int(part) for part in options.size.split("x"))
     source: Source = TestPattern((height, width)) if options.frames is None else FileFrames(options.frames)
     devices = _identities(options.model, options.serial, options.addresses)
+    keep_pace()
     try:
         camera = EmulatedCamera(devices, source, clocks=tuple(options.clock))
     except OSError as error:

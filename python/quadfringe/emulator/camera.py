@@ -136,13 +136,15 @@ class EmulatedCamera:
         return resend
 
     def order(self, words: list[str]) -> str:
-        """Do what a line says: a fault and its value, "line" (a pulse at the trigger input), "sent", or "reset"."""
+        """Do what a line says: a fault and its value, "line" (a trigger pulse), "sent", "busy", "reset"."""
         if words == ["line"]:
             self._asked.release()
         elif words == ["reset"]:
             self._reset()
         elif words == ["sent"]:
             return " ".join(str(chip.sent) for chip in self.chips)
+        elif words == ["busy"]:
+            return str(time.process_time())
         elif len(words) == 2 and hasattr(self.faults, words[0]):
             kind = type(getattr(self.faults, words[0]))
             setattr(self.faults, words[0], kind(float(words[1])))
@@ -151,7 +153,7 @@ class EmulatedCamera:
                 if self.faults.gone:
                     control.release()
         else:
-            raise ValueError(f"expected a fault and its value, line, sent or reset, got {' '.join(words)!r}")
+            raise ValueError(f"expected a fault and its value, line, sent, busy or reset, got {' '.join(words)!r}")
         return "ok"
 
     def _expose(self) -> None:
@@ -197,7 +199,7 @@ class EmulatedCamera:
     def _packets(self, chip: Chip, device_ns: int) -> list[tuple[bytes, bytes | memoryview[int]]]:
         width, height = (chip.control.feature(name) for name in ("Width", "Height"))
         pixel_format = chip.control[FEATURES["PixelFormat"] + 4 * chip.stream]
-        payload = memoryview(packed(self._source, chip.index, self._exposure, pixel_format, (width, height)))
+        payload = packed(self._source, chip.index, self._exposure, pixel_format, (width, height))
         if self.faults.wrong_size:
             height //= 2
             payload = payload[: len(payload) // 2]

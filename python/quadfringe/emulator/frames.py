@@ -38,12 +38,18 @@ class TestPattern:
     def __init__(self, shape: tuple[int, int]) -> None:
         self.shape = shape
         self._noise = [np.random.default_rng(chip).integers(0, 1 << 16, shape, dtype=np.uint16) for chip in (0, 1)]
+        self._bytes = [(noise >> np.uint16(8)).astype(np.uint8) for noise in self._noise]
 
     def frame(self, chip: int, exposure: int, bits: int) -> NDArray[Any]:
         """Give the pattern of a chip at an exposure."""
-        frame: NDArray[Any] = self._noise[chip] + np.uint16(exposure * 40503 & 0xFFFF) >> np.uint16(16 - bits)
+        step = exposure * 40503 & (1 << bits) - 1
+        frame: NDArray[Any]
+        if bits == 8:
+            frame = self._bytes[chip] + np.uint8(step)
+        else:
+            frame = (self._noise[chip] >> np.uint16(16 - bits)) + np.uint16(step) & np.uint16((1 << bits) - 1)
         frame[0, :2] = exposure & 255, exposure >> 8 & 255
-        return frame.astype(np.uint8) if bits == 8 else frame
+        return frame
 
     @staticmethod
     def exposure(frame: NDArray[Any]) -> int:
@@ -65,18 +71,22 @@ class FileFrames:
         return frame if bits == 8 or frame.dtype != np.uint8 else frame.astype(np.uint16) << (bits - 8)
 
 
-def packed(source: Source, chip: int, exposure: int, pixel_format: int, size_px: tuple[int, int]) -> bytes:
-    """Give the payload of a frame of `size_px` (width, height) in a pixel format of GigE Vision."""
+def packed(source: Source, chip: int, exposure: int, pixel_format: int, size_px: tuple[int, int]) -> memoryview[int]:
+    """Give the payload of a frame of `size_px` (width, height) in a pixel format of GigE Vision; not always a copy."""
     name = NAMES[pixel_format]
     bits = int("".join(letter for letter in name if letter.isdigit()))
     frame = source.frame(chip, exposure, bits)[: size_px[1], : size_px[0]]
     if name == "RGB8" and frame.ndim == 2:
         frame = np.repeat(frame[:, :, None], 3, axis=2)
     if not name.endswith("Packed"):
-        return frame.tobytes()
+        return _bytes(frame)
     pairs = frame.reshape(-1, 2)
     low = bits - 8
     out = np.empty((len(pairs), 3), np.uint8)
     out[:, 0], out[:, 2] = pairs[:, 0] >> low, pairs[:, 1] >> low
     out[:, 1] = (pairs[:, 0] & (1 << low) - 1) | (pairs[:, 1] & (1 << low) - 1) << 4
-    return out.tobytes()
+    return _bytes(out)
+
+
+def _bytes(frame: NDArray[Any]) -> memoryview[int]:
+    return np.ascontiguousarray(frame).view(np.uint8).reshape(-1).data

@@ -8,65 +8,57 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from itertools import count as numbers
-from typing import Self
+from typing import Generic, Literal, Self, TypeVar
 
 from quadfringe.capture import AravisConfig
 from quadfringe.config import SystemConfig
-from quadfringe.data import AnyShot, Calibration
+from quadfringe.data import AnyShot, Calibration, ChipImage
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
 from quadfringe.devices.aravis.link import Link
 from quadfringe.devices.aravis.profiles import CHIPS
 from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, UnpairedError, WrongFrameError
 from quadfringe.queues import DroppingQueue
 
-__all__ = ["AravisCamera", "open_devices"]
+__all__ = ["AravisCamera", "ChipCamera", "open_devices"]
 
 LENGTH = {"latest": 1, "all": 64}
 FIRST_PATIENCE_S, AGAIN_PATIENCE_S = 1.0, 5.0
 LOOK_S = 0.25  # how often a wait looks whether the camera is still there
 SILENT_S = 0.5  # a chip that says nothing for so long is asked
+Item = TypeVar("Item", bound=AnyShot | ChipImage)
 
 
-class AravisCamera:
-    """A GenICam camera with two chips; close it, or use it in a `with` block.
-
-    Shots own their pixels. With `borrow` (of `snap` and `stream`) unpacked ones are the memory that the wire filled,
-    read-only and without a copy; it goes back when the last array is dropped, and shots that are kept starve the wire.
-    Raises `CameraNotFoundError`, `CameraBusyError`, or another `CameraError` that says what the camera refused.
-    """
+class _Running(Generic[Item]):
+    """What a camera of two chips and one chip alone have in common: everything but what comes out."""
 
     paced = True
 
-    def __init__(self, config: AravisConfig | None = None) -> None:
+    def __init__(self, config: AravisConfig | None, chips: tuple[str, ...]) -> None:
         self._asked_for = config or AravisConfig()
-        self._link: Link | None = Link(self._asked_for, patience_s=FIRST_PATIENCE_S)
+        self._chip_names = chips
+        self._link: Link | None = Link(self._asked_for, chips, patience_s=FIRST_PATIENCE_S)
         self.config = self._link.config
         self.name = self._link.name
         self._in_use = threading.Lock()
         self._closed = False
         self._last_id = 0
-        self._queue: DroppingQueue[AnyShot] = DroppingQueue(1)
+        self._queue: DroppingQueue[Item] = DroppingQueue(1)
         self._earlier = (0, 0)  # shots and dropped ones of the runs before
-        self._before = {chip: ChipStatistics() for chip in CHIPS}  # of links that were lost
+        self._before = {chip: ChipStatistics() for chip in chips}  # of links that were lost
 
-    @property
-    def calibration(self) -> Calibration | None:
-        """A camera knows nothing of its bench."""
-        return None
-
-    def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> AnyShot:
+    def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> Item:
         """Take one shot that is exposed after this call; raises a `CameraError` when none comes in time."""
         with self._run("all", borrow) as (link, queue):  # the first shot, and no newer one
             return self._next(link, queue, timeout_s)
 
-    def stream(self, count: int | None = None, *, keep: Keep = "latest", borrow: bool = False) -> Iterator[AnyShot]:
+    def stream(self, count: int | None = None, *, keep: Keep = "latest", borrow: bool = False) -> Iterator[Item]:
         """Take shots until `count` or until the iterator is closed; raises a `CameraError` when they cease to come."""
         with self._run(keep, borrow) as (link, queue):
             for _ in numbers() if count is None else range(count):
                 yield self._next(link, queue, None)
 
     @contextmanager
-    def _run(self, keep: Keep, borrow: bool) -> Iterator[tuple[Link, DroppingQueue[AnyShot]]]:
+    def _run(self, keep: Keep, borrow: bool) -> Iterator[tuple[Link, DroppingQueue[Item]]]:
         if not self._in_use.acquire(blocking=False):
             raise ValueError(f"camera at {self.name}: a stream runs already; close it first")
         try:
@@ -94,7 +86,7 @@ class AravisCamera:
         if self._closed:
             raise ValueError(f"camera at {self.name} is closed")
         if self._link is None:
-            self._link = Link(self._asked_for, patience_s=AGAIN_PATIENCE_S)
+            self._link = Link(self._asked_for, self._chip_names, patience_s=AGAIN_PATIENCE_S)
         return self._link
 
     def _disconnect(self, *, lost: bool = False) -> None:
@@ -103,7 +95,7 @@ class AravisCamera:
             self._link.forget(lost=lost)
             self._link = None
 
-    def _next(self, link: Link, queue: DroppingQueue[AnyShot], timeout_s: float | None) -> AnyShot:
+    def _next(self, link: Link, queue: DroppingQueue[Item], timeout_s: float | None) -> Item:
         timeout_s = link.config.timeout_s if timeout_s is None else timeout_s
         before = self._chips()
         if link.config.trigger == "software":
@@ -127,15 +119,16 @@ class AravisCamera:
     def _diagnosis(self, link: Link, before: dict[str, ChipStatistics], timeout_s: float) -> CameraError:
         """Say why there was no shot in time."""
         now = self._chips()
-        came = {chip: now[chip].frames - before[chip].frames for chip in CHIPS}
+        chips = self._chip_names
+        came = {chip: now[chip].frames - before[chip].frames for chip in chips}
         head = f"camera at {self.name}: no shot within {timeout_s:g} s: "
-        for chip, reader in zip(CHIPS, link.readers, strict=True):
+        for chip, reader in zip(chips, link.readers, strict=True):
             if not came[chip] and now[chip].damaged > before[chip].damaged:
                 return WrongFrameError(f"{head}frames of the {chip} chip are refused, the last one: {reader.fault}")
         if all(came.values()):
             return UnpairedError(f"{head}frames of both chips came, none of the same instant; are the chips in sync?")
         if any(came.values()):
-            there, missing = sorted(CHIPS, key=lambda chip: -came[chip])
+            there, missing = sorted(chips, key=lambda chip: -came[chip])
             return UnpairedError(f"{head}frames of the {there} chip came, none of the {missing} chip")
         trigger = link.config.trigger
         cause = "it runs freely" if trigger == "free" else f"it waits for its trigger, {trigger}"
@@ -148,7 +141,7 @@ class AravisCamera:
         if link is None or not link.readers:
             return self._before
         chips = {}
-        for n, (chip, reader) in enumerate(zip(CHIPS, link.readers, strict=True)):
+        for n, (chip, reader) in enumerate(zip(self._chip_names, link.readers, strict=True)):
             so_far = self._before[chip]
             chips[chip] = ChipStatistics(
                 so_far.frames + reader.frames,
@@ -178,6 +171,40 @@ class AravisCamera:
 
     def __exit__(self, *_exception: object) -> None:
         self.close()
+
+
+class AravisCamera(_Running[AnyShot]):
+    """A GenICam camera with two chips; close it, or use it in a `with` block.
+
+    Shots own their pixels. With `borrow` (of `snap` and `stream`) unpacked ones are the memory that the wire filled,
+    read-only and without a copy; it goes back when the last array is dropped, and shots that are kept starve the wire.
+    Raises `CameraNotFoundError`, `CameraBusyError`, or another `CameraError` that says what the camera refused.
+    """
+
+    def __init__(self, config: AravisConfig | None = None) -> None:
+        super().__init__(config, CHIPS)
+
+    @property
+    def calibration(self) -> Calibration | None:
+        """A camera knows nothing of its bench."""
+        return None
+
+
+class ChipCamera(_Running[ChipImage]):
+    """One chip of a GenICam camera, or any GenICam camera that has but one; settings and errors as `AravisCamera`.
+
+    To focus, to look at one chip while the other is missing, or for an ordinary camera. `chip` says which of the
+    settings holds, and which device or stream channel is meant where a name fits both chips.
+
+    >>> from quadfringe.capture import AravisConfig
+    >>> from quadfringe.devices.aravis import ChipCamera
+    >>> with ChipCamera(AravisConfig(device="acA1300", exposure_us=5000)) as camera:  # doctest: +SKIP
+    ...     camera.snap().pixels.shape
+    (1024, 1280)
+    """
+
+    def __init__(self, config: AravisConfig | None = None, chip: Literal["visible", "infrared"] = "visible") -> None:
+        super().__init__(config, (chip,))
 
 
 def _check_there(link: Link, silent_s: float) -> None:

@@ -1,23 +1,24 @@
-"""An open camera: both devices set up, both streams ready, frames paired into shots while it runs."""
+"""An open camera: devices set up, streams ready, and while it runs frames made shots, or images of one chip."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
+from typing import Any
 
 import numpy as np
 
 from quadfringe.capture import AravisConfig
-from quadfringe.data import AnyShot, BayerShot, Shot, Stamp
+from quadfringe.data import AnyShot, BayerShot, ChipImage, Shot, Stamp
 from quadfringe.devices.aravis import profiles
 from quadfringe.devices.aravis._gi import Device, found
-from quadfringe.devices.aravis.formats import PixelFormat, format_named
+from quadfringe.devices.aravis.formats import format_named
 from quadfringe.devices.aravis.profiles import CHIPS, Place
 from quadfringe.devices.aravis.reader import Agreed, ChipReader, Frame
 from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError
-from quadfringe.pairing import Pairer, Stamped
+from quadfringe.pairing import Pairer, Single, Stamped
 
 __all__ = ["Link"]
 
@@ -25,13 +26,14 @@ RETRY_S = 0.2
 
 
 class Link:
-    """The connection to both chips of a camera. What is not right raises a `CameraError`, and leaves nothing open.
+    """The connection to both chips of a camera, or one. What is not right raises a `CameraError`; nothing stays open.
 
     `patience_s` is how long a camera that is busy or missing is asked again: one that was lost boots, or is still held
     by the connection before, for 3 s.
     """
 
-    def __init__(self, config: AravisConfig, *, patience_s: float) -> None:
+    def __init__(self, config: AravisConfig, chips: Sequence[str], *, patience_s: float) -> None:
+        self.chips = chips
         self.readers: list[ChipReader] = []
         self._devices: dict[str, Device] = {}
         self._running = False
@@ -39,22 +41,25 @@ class Link:
             undo.callback(self.forget)
             self.places = _patiently(lambda: self._open_devices(config), patience_s)
             self.config = self._set_up(config)
-            self.pairer: Pairer[Frame] = Pairer(1000 * config.pair_tolerance_us)
+            both = len(chips) == len(CHIPS)
+            self.pairer: Pairer[Frame] | Single[Frame] = Pairer(1000 * config.pair_tolerance_us) if both else Single()
             undo.pop_all()
         self._pairing = threading.Lock()
 
-    def _open_devices(self, config: AravisConfig) -> tuple[Place, Place]:
+    def _open_devices(self, config: AravisConfig) -> tuple[Place, ...]:
         self.forget()
-        first, second = profiles.places(config, found)
-        for where in dict.fromkeys(place.where for place in (first, second)):
+        if len(self.chips) == len(CHIPS):
+            found_at: tuple[Place, ...] = profiles.places(config, found)
+        else:
+            found_at = tuple(profiles.place(config, chip, found) for chip in self.chips)
+        for where in dict.fromkeys(place.where for place in found_at):
             self._devices[where] = Device(where)
             if not self._devices[where].controlled:
                 raise CameraBusyError(
                     f"camera at {where} is controlled by another program; close that one. A program that was killed "
                     "is let go of after 3 s"
                 )
-        names = [profiles.introduced(place, self._devices[place.where], config.profile) for place in (first, second)]
-        return names[0], names[1]
+        return tuple(profiles.introduced(place, self._devices[place.where], config.profile) for place in found_at)
 
     def device(self, chip: int) -> Device:
         """Give the device of a chip."""
@@ -69,49 +74,61 @@ class Link:
             for device in having:
                 device.set(name, value)
         taken, agreed = {}, []
-        for n, (chip, place) in enumerate(zip((config.visible, config.infrared), self.places, strict=True)):
-            taken[CHIPS[n]] = profiles.set_chip(self.device(n), place, chip, config.exposure_us)
+        settings = dict(zip(CHIPS, (config.visible, config.infrared), strict=True))
+        for n, (chip, place) in enumerate(zip(self.chips, self.places, strict=True)):
+            taken[chip] = profiles.set_chip(self.device(n), place, settings[chip], config.exposure_us)
             agreed.append(_agreed(self.device(n)))
-            taken[CHIPS[n]]["pixel_format"] = agreed[n].format.name
-        _check(*agreed)
+            taken[chip]["pixel_format"] = agreed[n].format.name
+        if len(agreed) == len(CHIPS):
+            _check(*agreed)
         for where, device in self._devices.items():
             profiles.set_trigger(device, next(place for place in self.places if place.where == where), config)
         exposures_us = [float(chip.get("exposure_us", 0.0)) for chip in taken.values()]
         self.period_us = max(profiles.period_us(device, exposures_us) for device in self._devices.values())
         for n, place in enumerate(self.places):
             device = self.device(n)
+            if place.stream >= device.channels():
+                raise CameraError(
+                    f"camera at {place.where} has {device.channels()} stream channel(s), and the {self.chips[n]} chip "
+                    f"is said to be number {place.stream}, counted from 0; a camera of one chip is a `ChipCamera`, "
+                    "`quadfringe camera snap --chip visible`"
+                )
             device.set_packets(place.stream, config.packet_size, config.packet_delay_ns)
             stream = device.stream(place.stream, agreed[n].payload, config.buffers, self.period_us)
             self.readers.append(ChipReader(stream, agreed[n]))
         return profiles.resolved(config, taken)
 
-    def start(self, deliver: Callable[[AnyShot], None], *, borrow: bool) -> None:
+    def start(self, deliver: Callable[[Any], None], *, borrow: bool) -> None:
         """Start a run: readers first, then the chips, the one that triggers the other last."""
         # What waits for its partner holds buffers only when they are borrowed.
         pending = {"pending": max(self.config.buffers // 3, 2)} if borrow else {}
         self.pairer.begin(sole=self.config.trigger == "software", **pending)
         self._running = True
         for n, reader in enumerate(self.readers):
-            reader.start(lambda frame, n=n: self._pair(n, frame, deliver), borrow=borrow)  # type: ignore[misc]
+            reader.start(lambda frame, n=n: self._match(n, frame, deliver), borrow=borrow)  # type: ignore[misc]
         for device in reversed(self._devices.values()):
             device.set("AcquisitionStart", 1)
 
-    def _pair(self, chip: int, frame: Frame, deliver: Callable[[AnyShot], None]) -> None:
+    def _match(self, chip: int, frame: Frame, deliver: Callable[[Any], None]) -> None:
         with self._pairing:
-            pairs = self.pairer.push(chip, frame.stamp, frame)
+            matches = self.pairer.push(chip, frame.stamp, frame)
             offset_ns = self.pairer.host_offset_ns
-            for visible, infrared in pairs:
-                deliver(self._shot(visible, infrared, offset_ns))
+            for frames in matches:
+                deliver(self._made(frames, offset_ns))
 
-    def _shot(self, visible: Stamped[Frame], infrared: Stamped[Frame], offset_ns: int) -> AnyShot:
-        frames = dict(zip(CHIPS, (visible.stamp, infrared.stamp), strict=True))
-        stamp = Stamp(visible.number, (visible.stamp.device_ns + offset_ns) // 1000, self.name, frames)
-        chip: PixelFormat = self.readers[0].agreed.format
-        pixels, ir = visible.item.pixels, infrared.item.pixels
-        if chip.bayer is not None:
-            return BayerShot(pixels, chip.bayer, ir, chip.full_scale, stamp=stamp)
+    def _made(self, frames: tuple[Stamped[Frame], ...], offset_ns: int) -> AnyShot | ChipImage:
+        first = frames[0]
+        stamps = {chip: frame.stamp for chip, frame in zip(self.chips, frames, strict=True)}
+        stamp = Stamp(first.number, (first.stamp.device_ns + offset_ns) // 1000, self.name, stamps)
+        kind = self.readers[0].agreed.format
+        pixels = first.item.pixels
+        if len(frames) == 1:
+            return ChipImage(pixels, kind.name, kind.full_scale, kind.bayer, stamp)
+        ir = frames[1].item.pixels
+        if kind.bayer is not None:
+            return BayerShot(pixels, kind.bayer, ir, kind.full_scale, stamp=stamp)
         red, green, blue = (np.ascontiguousarray(pixels[:, :, n]) for n in range(3))
-        return Shot(red, green, blue, ir, chip.full_scale, stamp=stamp)
+        return Shot(red, green, blue, ir, kind.full_scale, stamp=stamp)
 
     @property
     def name(self) -> str:
@@ -143,7 +160,7 @@ class Link:
             device = self.device(n)
             if now - reader.heard > silent_s and not (device.answers() and device.controlled):
                 return CameraLostError(
-                    f"camera at {device.where} ({CHIPS[n]} chip) no longer answers: power, cable or network, or "
+                    f"camera at {device.where} ({self.chips[n]} chip) no longer answers: power, cable or network, or "
                     "another program took it over; asked again, it is connected anew"
                 )
         return None
@@ -160,7 +177,7 @@ class Link:
             held.clear()  # from the end: streams before the devices that they use
 
 
-def _patiently(connect: Callable[[], tuple[Place, Place]], patience_s: float) -> tuple[Place, Place]:
+def _patiently(connect: Callable[[], tuple[Place, ...]], patience_s: float) -> tuple[Place, ...]:
     deadline = time.monotonic() + patience_s
     while True:
         try:

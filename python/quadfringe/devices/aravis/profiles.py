@@ -18,6 +18,7 @@ __all__ = [
     "introduced",
     "matching",
     "period_us",
+    "place",
     "places",
     "resolved",
     "set_chip",
@@ -75,6 +76,27 @@ def places(config: AravisConfig, look: Callable[[], Sequence[Found]]) -> tuple[P
         for device, stream, chip in zip(found, streams, chips, strict=True)
     )
     return first, second
+
+
+def place(config: AravisConfig, chip: str, look: Callable[[], Sequence[Found]]) -> Place:
+    """Find one chip; raises `CameraNotFoundError` that lists what answered.
+
+    Of a JAI camera it is the device with its suffix, of another one the stream channel that `places` would give it; a
+    chip with a `device` of its own is stream channel 0 of that.
+    """
+    index = CHIPS.index(chip)
+    settings = (config.visible, config.infrared)[index]
+    name = settings.device or config.device
+    devices = [] if IP.fullmatch(name) and settings.device else look()
+    fit = matching(name, devices)
+    if settings.device is None and len(fit) == 2 and _twins(*fit):
+        found, stream = sorted(fit, key=lambda device: device.model)[index], 0
+    else:
+        own = settings.device is not None and config.visible.device != config.infrared.device
+        found, stream = _one(name, devices), 0 if own else index
+    if settings.stream is not None:
+        stream = settings.stream
+    return Place(found.where, stream, settings.source, config.profile == "jai-ad-080ge", found.name)
 
 
 def introduced(place: Place, device: Device, profile: str | None) -> Place:
@@ -225,5 +247,5 @@ def _first(device: Device, names: Iterable[str]) -> str | None:
 
 def resolved(config: AravisConfig, taken: Mapping[str, Mapping[str, Any]]) -> AravisConfig:
     """Give the settings with what the camera made of them."""
-    chips = {chip: ChipConfig.model_validate(dict(taken[chip])) for chip in CHIPS}
+    chips = {chip: ChipConfig.model_validate(dict(values)) for chip, values in taken.items()}
     return config.model_copy(update={"exposure_us": None, **chips})
