@@ -45,7 +45,7 @@ prop_compose! {
             .and_then(|d| d.with_distortion(camera.distortion))
             .expect("valid camera");
         let projector = projector.with_pose(rotation, translation).expect("valid pose");
-        Bench { camera, visible: projector.clone(), infrared: projector, layout: DmdLayout::Regular }
+        Bench { camera, visible: projector.clone(), infrared: projector, ..Bench::reference() }
     }
 }
 

@@ -17,7 +17,7 @@ fn crossed_axes_bench(distance_mm: f64, baseline_mm: f64) -> Bench {
     let projector = Device::pinhole(912, 1140, [1570.0; 2], [455.5, 569.5])
         .and_then(|device| device.with_pose(rotation, translation))
         .expect("valid projector");
-    Bench { camera, visible: projector.clone(), infrared: projector, layout: DmdLayout::Regular }
+    Bench { camera, visible: projector.clone(), infrared: projector, ..Bench::reference() }
 }
 
 #[test]

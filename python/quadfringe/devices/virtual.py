@@ -24,6 +24,7 @@ from quadfringe.projection import eight_bit, predeformation
 __all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector", "open_devices"]
 
 EDGE_PX = 2.0  # pixels nearer to an edge than this belong to it: lens and pixel mix both sides
+NOT_LIGHT = {"surface", "height_map", "time_s", "infrared_from_visible"}
 CHANNELS = ("red", "green", "blue", "ir")
 
 
@@ -47,7 +48,9 @@ class VirtualBench:
     def __init__(self, config: SystemConfig) -> None:
         given = {"camera": config.camera, "visible": config.projector, "infrared": config.infrared}
         devices = {name: core_device(model) for name, model in given.items() if model is not None}
-        self._bench = _core.Bench(**devices, layout=config.fringes.layout)
+        self._bench = _core.Bench(
+            **devices, layout=config.fringes.layout, infrared_from_visible=config.scene.infrared_from_visible
+        )
         self._scene = config.scene
         self._cast: tuple[float, _core.Cast] | None = None
         self._placed: tuple[_core.Cast, NDArray[np.float32] | None] | None = None
@@ -166,7 +169,7 @@ class VirtualBench:
 
     def _light(self, seed: int | None, exposure: float = 1.0) -> dict[str, Any]:
         """Give the settings of light and camera that are present, as the kernel names them."""
-        light = self._scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+        light = self._scene.model_dump(exclude_none=True, exclude=NOT_LIGHT)
         if exposure != 1.0:
             light["gain"] = tuple(exposure * gain for gain in self._scene.gain or (1.0,) * 4)
         if self._placed is not None and self._placed[1] is not None:
