@@ -41,12 +41,8 @@ fn worst(a: &Array2<f32>, b: &Array2<f32>) -> f32 {
 fn identical_camera_and_projector_capture_the_projected_image() {
     let focal = 12.0 / 4.65e-3;
     let device = Device::pinhole(1024, 768, [focal; 2], [511.5, 383.5]).expect("valid device");
-    let bench = Bench {
-        camera: device.clone(),
-        visible: device.clone(),
-        infrared: device,
-        layout: DmdLayout::Regular,
-    };
+    let bench =
+        Bench { camera: device.clone(), visible: device.clone(), infrared: device, ..Bench::reference() };
     let code = FringeCode::optimum(36, 1024).expect("valid code");
     let cast = bench.cast(&Plane::at_z(800.0));
     let images = Channel::ALL.map(|channel| pattern(&code, channel, 768, DmdLayout::Regular));

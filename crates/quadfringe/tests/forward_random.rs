@@ -4,7 +4,6 @@ mod common;
 
 use ndarray::Array2;
 use proptest::prelude::*;
-use quadfringe::fringe::DmdLayout;
 use quadfringe::height::Triangulator;
 use quadfringe::optics::{Device, rotation_from_vector};
 use quadfringe::rig::{Beam, Bench};

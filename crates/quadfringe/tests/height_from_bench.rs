@@ -1,11 +1,11 @@
 //! Phase to millimetres against simulated benches.
 
 use ndarray::{Array2, Axis};
+use quadfringe::FringeCode;
 use quadfringe::height::{CrossedAxes, PolynomialHeight, Triangulator};
 use quadfringe::optics::{Device, rotation_from_vector};
 use quadfringe::rig::{Beam, Bench};
 use quadfringe::surface::Plane;
-use quadfringe::{DmdLayout, FringeCode};
 
 /// Camera straight down on the plane z = L0; projector `d` to its left at the same height, its axis through the foot of
 /// the camera axis, so that columns grow away from the projector.
