@@ -1,12 +1,17 @@
 """Calibration of the coaxial pair on the virtual bench, against its bars.
 
     python benches/calibration.py [--json FILE] [--layout regular|diamond] [--poses N] [--steps N]
+    python benches/calibration.py --camera-scale 0.25 --poses 6 --steps 4 --seeds 12
 
 A 9 x 12 ring board is captured in poses tilted to all sides, under N-step fringes over columns and rows of both
 projectors. The bench has lens distortion in all three devices, a response (gamma 2.2) of the projectors, crosstalk of
 15 % between neighbouring channels, blur of 0.8 px, shading, noise of 1 % and 8 bit; the infrared chip is shifted,
 turned and scaled. The infrared projector deviates from the visible one by 1 degree and 0.5 mm on every axis. Seeds
-are fixed. Exit status 1 when a bar is missed.
+are fixed. Responses and crosstalk are calibrated with even light, at 15 % from every channel to every other. Exit
+status 1 when a bar is missed.
+
+With several seeds the calibration is done that often with other noise and other poses: `outside_their_interval` is then
+the share of runs in which any number of the pair left its interval, of which one in twenty should.
 """
 
 from __future__ import annotations
@@ -21,15 +26,19 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.calibration.bundle import RigCalibration
+from quadfringe.calibration.channels import fit_channels
 from quadfringe.calibration.detect import View
+from quadfringe.calibration.levels import dark_level, mean_levels
 from quadfringe.calibration.projector import StepPlan
 from quadfringe.calibration.targets import Target, ring_board
 from quadfringe.config import DeviceModel, Fringes, SceneConfig, SystemConfig
 from quadfringe.decoding import core_device
 from quadfringe.files import figures_text
+from quadfringe.guide.bench import BenchCaptures
 from quadfringe.rehearsal import board_poses, rehearse
 
 DEVIATION_DEG, DEVIATION_MM = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
+SEEDS_APART = 100_003  # every exposure takes the next seed
 CROSSTALK = ((1.0, 0.15, 0.0, 0.02), (0.15, 1.0, 0.15, 0.0), (0.0, 0.15, 1.0, 0.02), (0.15, 0.0, 0.02, 1.0))
 BARS = {
     "ring_centre_rms_px": 0.05,
@@ -42,9 +51,10 @@ BARS = {
     "pair_translation_error_mm": 0.1,
     "outside_their_interval": 0.0,
 }
+LIGHT_BARS = {"stray_after_percent": 0.5, "level_rms_after_percent": 0.5}
 
 
-def bench_system(layout: str = "regular", camera_scale: float = 1.0) -> SystemConfig:
+def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int = 0) -> SystemConfig:
     """Give the bench; `camera_scale` 0.5 is a camera of half the size with the same field."""
     import cv2
 
@@ -86,7 +96,7 @@ def bench_system(layout: str = "regular", camera_scale: float = 1.0) -> SystemCo
         blur_px=0.8 * camera_scale,
         infrared_from_visible=((1.001, 0.002, 0.7), (-0.002, 0.999, -1.3)),
         noise=0.01,
-        seed=1,
+        seed=1 + SEEDS_APART * seed,
     )
     devices = {name: DeviceModel(**size, **values) for name, values in projectors.items()}
     return SystemConfig(camera=DeviceModel(**camera), **devices, fringes=Fringes(layout=layout), scene=scene)
@@ -125,19 +135,40 @@ def figures_of(found: RigCalibration, config: SystemConfig) -> dict[str, float]:
     figures["pair_translation_error_mm"] = float(np.linalg.norm(error[3:]))
     figures["pair_rotation_sd_deg"] = float(found.pair.sd[:3].max())
     figures["pair_translation_sd_mm"] = float(found.pair.sd[3:].max())
+    figures["pair_mean_square_in_sd"] = float(np.square(error / found.pair.sd).mean())
     figures["pair_largest_error_in_sd"] = float(np.abs(error / found.pair.sd).max())
     figures["outside_their_interval"] = float(outside)
     return figures
 
 
-def measured(config: SystemConfig, poses: int, steps: int) -> dict[str, float]:
+def measured(config: SystemConfig, poses: int, steps: int, seed: int = 0) -> dict[str, float]:
     """Rehearse the calibration and give its figures."""
     target = ring_board()
-    places = board_poses(target, poses)
+    places = board_poses(target, poses, seed=seed)
     done = rehearse(config, target, places, StepPlan(config.fringes, steps))
     missed = centre_errors_px(done.views, config, target, places)
     rms = float(np.sqrt(np.square(missed).sum(axis=1).mean()))
     return {"ring_centre_rms_px": rms} | figures_of(done.calibration, config)
+
+
+def light_figures() -> dict[str, float]:
+    """Calibrate responses and crosstalk of a bench with gamma 2.2 and 15 % each way, and give what is left."""
+    mixed = tuple(tuple(1.0 if i == j else 0.15 for j in range(4)) for i in range(4))
+    light = {"crosstalk": mixed, "projector_exponent": 2.2, "noise": 0.01, "gain": 0.6, "ambient": 0.01, "seed": 1}
+    captures = BenchCaptures(SystemConfig(scene=SceneConfig.model_validate(light | {"camera_offset": 0.02})))
+    dark = dark_level([captures.shot("dark", name) for name in captures.session.captures("dark")]).level
+    plan = captures.session.level_plan
+    seen = np.array([mean_levels(captures.shot("levels", name)) for name in plan.names])
+    return fit_channels(plan, seen, dark).figures
+
+
+def over_seeds(layout: str, scale: float, poses: int, steps: int, seeds: int) -> dict[str, float]:
+    """Give the worst figures of several calibrations, their mean square error of the pair, and how many were off."""
+    runs = [measured(bench_system(layout, scale, seed), poses, steps, seed) for seed in range(seeds)]
+    figures = {name: max(run[name] for run in runs) for name in runs[0]}
+    figures["pair_mean_square_in_sd"] = float(np.mean([run["pair_mean_square_in_sd"] for run in runs]))
+    figures["outside_their_interval"] = float(np.mean([run["outside_their_interval"] > 0 for run in runs]))
+    return figures
 
 
 def main() -> None:
@@ -147,14 +178,22 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=12)
     parser.add_argument("--steps", type=int, default=8)
     parser.add_argument("--camera-scale", type=float, default=1.0, help="0.5: a camera of half the size, quicker")
+    parser.add_argument("--seeds", type=int, default=1, help="calibrations, each with noise and poses of its own")
     given = parser.parse_args()
-    figures = measured(bench_system(given.layout, given.camera_scale), given.poses, given.steps)
+    settings = (given.layout, given.camera_scale, given.poses, given.steps)
+    figures = over_seeds(*settings, given.seeds) | light_figures()
+    # One run in twenty may be outside; of a dozen, three are one time in fifty.
+    bars = (
+        BARS
+        | LIGHT_BARS
+        | {"outside_their_interval": 0.05 + 2.1 * (0.05 * 0.95 / given.seeds) ** 0.5 if given.seeds > 1 else 0.0}
+    )
     if given.json is not None:
         given.json.write_text(figures_text(figures))
     for name, value in figures.items():
-        bar = f"   bar {BARS[name]:g}" if name in BARS else ""
+        bar = f"   bar {bars[name]:.3g}" if name in bars else ""
         print(f"{name:28} {value:.4g}{bar}")
-    sys.exit(int(any(not figures[name] <= bar for name, bar in BARS.items())))
+    sys.exit(int(any(not figures[name] <= bar for name, bar in bars.items())))
 
 
 if __name__ == "__main__":

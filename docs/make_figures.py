@@ -43,6 +43,7 @@ class Source:
     command: tuple[str, ...]
     rows: tuple[tuple[str, str, str], ...]
     there: Callable[[], bool] = lambda: True  # whether what it needs is there
+    out: str = ""
 
 
 SURFACES = ("plane", "peaks", "steps", "sphere")
@@ -153,6 +154,27 @@ BAYER = (
     ("steps_noise_3_percent_best_mosaic_wrong_pixels", "steps, 3 % noise, raw mosaic: wrong orders, lit pixels", ""),
     ("steps_noise_3_percent_best_mosaic_returned_percent", "the same: lit pixels returned, %", ""),
 )
+CALIBRATION = (
+    ("ring_centre_rms_px", "centres of rings, RMS, px", "0.05"),
+    ("camera_mean_px", "mean reprojection error, camera, px", "0.15"),
+    ("visible_mean_px", "the same, visible projector, px (published 0.269)", "0.15"),
+    ("infrared_mean_px", "the same, infrared projector, px (published 0.221)", "0.15"),
+    ("focal_error_percent", "worst focal length, %", "0.1"),
+    ("centre_error_px", "worst principal point, px", "1"),
+    ("pair_rotation_error_deg", "rotation between the projectors, deg", "0.02"),
+    ("pair_translation_error_mm", "translation between the projectors, mm", "0.1"),
+    ("outside_their_interval", "of the six, outside the joint interval of 95 %", "0"),
+)
+LIGHT = (
+    ("stray_after_percent", "gamma 2.2, crosstalk 15 % each way: stray light left, % of full scale", "0.5"),
+    ("level_rms_after_percent", "the same: RMS of the levels, % of full scale", "0.5"),
+)
+ACCEPTANCE = (
+    ("plane_1_form_mm", "acceptance, noise 1 %: form of a plane, mm", "0.10"),
+    ("sphere_1_form_6sigma_mm", "the same: form of a sphere, mm", "0.15"),
+    ("sphere_1_size_error_mm", "the same: diameter of a sphere, mm", "0.10"),
+    ("steps_1_50mm_error_mm", "the same: step of 50 mm, mm", "0.05"),
+)
 SPEED = (
     ("numpy_float64_ms", "published chain in plain NumPy, float64, 1024 x 768, u8 to X, Y, Z, ms", ""),
     ("numpy_float32_ms", "the same in float32, ms", ""),
@@ -208,6 +230,9 @@ def has_browser() -> bool:
 SOURCES = (
     Source(("benches/round_trip.py",), ROUND_TRIP),
     Source(("benches/bayer.py",), BAYER),
+    Source(("benches/calibration.py",), (*CALIBRATION, *LIGHT)),
+    Source(("benches/calibration.py", "--layout", "diamond"), CALIBRATION),
+    Source(("quadfringe", "accept"), ACCEPTANCE, out="acceptance.png"),
     Source(("quadfringe", "demo"), DEMO),
     Source(("quadfringe", "reproduce", "peaks"), PEAKS),
     Source(("quadfringe", "reproduce", "pair-tolerance"), PAIR_TOLERANCE),
@@ -303,7 +328,7 @@ def measured_table(old: str) -> str:
         if not source.there():
             lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
             continue
-        figures = run(source.command)
+        figures = run(source)
         lines += [f"| {words} | {figures[name]:.4g} | {bar} | `{command}` |" for name, words, bar in source.rows]
     return "\n".join(lines) + "\n"
 
@@ -319,11 +344,12 @@ def data_folder() -> Path:
     return Path(os.environ.get("QUADFRINGE_DATA", ROOT.parent / "shared" / "data"))
 
 
-def run(command: tuple[str, ...]) -> dict[str, float]:
+def run(source: Source) -> dict[str, float]:
+    command = source.command
     with tempfile.TemporaryDirectory() as folder:
         json_file = Path(folder) / "figures.json"
         if command[0] == "quadfringe":
-            full = [sys.executable, "-m", *command, "--out", folder, "--json", str(json_file)]
+            full = [sys.executable, "-m", *command, "--out", str(Path(folder) / source.out), "--json", str(json_file)]
         else:
             full = words_of(command).replace("python", sys.executable, 1).split()
             full += ["--json", str(json_file)]

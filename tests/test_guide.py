@@ -10,15 +10,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
+from quadfringe.capture import AravisConfig, ReplayConfig
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
 from quadfringe.data import Calibration
+from quadfringe.devices import Camera, ExternalLight
+from quadfringe.devices.virtual import VirtualCamera
 from quadfringe.doctor import examine_calibration
-from quadfringe.errors import InputError
-from quadfringe.guide import FolderCaptures, Guided, Session, guide
+from quadfringe.errors import CalibrationError, ConfigError, InputError
+from quadfringe.guide import FolderCaptures, Guided, Session, guide, take_captures
 from quadfringe.guide.bench import BenchCaptures
+from quadfringe.guide.live import exposed
 from quadfringe.guide.pictures import write_pictures
 from quadfringe.images import write_image
+from quadfringe.projection import Levels, Step, light_images
 
 CAMERA = DeviceModel(
     width_px=512,
@@ -177,3 +182,97 @@ def test_a_plan_is_written_once(tmp_path: Path) -> None:
     assert run("plan", tmp_path / "s", "--rig", "bench 1").exit_code == 2
     with pytest.raises(InputError, match="expected one of dark, levels"):
         Session(rig="r").captures("light")
+
+
+# Captures by camera and projectors
+
+
+def planned(folder: Path, **changes: object) -> tuple[Path, BenchCaptures]:
+    captures = BenchCaptures(CONFIG, SESSION.model_copy(update=changes))
+    folder.mkdir()
+    captures.session.save(folder / "session.json")
+    return folder, captures
+
+
+def test_camera_and_projectors_fill_a_session(tmp_path: Path, guided: Guided) -> None:
+    folder, bench = planned(tmp_path / "s")
+    taken = take_captures(CONFIG, folder, bench.hands, ("dark", "levels"))
+    assert len(taken) == SESSION.dark_shots + len(SESSION.level_plan.names)
+    assert take_captures(CONFIG, folder, bench.hands, ("dark", "levels")) == []
+    found, known = guide(FolderCaptures(folder)).outcome("levels"), guided.outcome("levels")
+    assert found is not None
+    assert known is not None
+    assert found.step.good, found.step.verdict
+    assert np.array(found.fields["crosstalk"]) == pytest.approx(np.array(known.fields["crosstalk"]), abs=5e-3)
+
+
+def test_a_pose_is_taken_until_the_board_is_seen_and_the_rest_later(tmp_path: Path) -> None:
+    folder, bench = planned(tmp_path / "s", poses=4)
+    said: list[str] = []
+    asked: list[str] = []
+
+    def person(step: str, name: str, camera: Camera) -> None:
+        asked.append(name)
+        if name == "02":
+            raise KeyboardInterrupt
+        bench.hands(step, name, camera)
+        if len(asked) == 1:  # the board was forgotten
+            assert isinstance(camera, VirtualCamera)
+            camera.bench.place_plane((0.0, 0.0, 800.0), (0.0, 0.0, -1.0))
+
+    with pytest.raises(KeyboardInterrupt):
+        take_captures(CONFIG, folder, person, ("poses",), said.append)
+    assert asked == ["01", "01", "02"]
+    assert "the board is not found" in said[1]
+    seen = FolderCaptures(folder)
+    assert seen.missing("poses") == ["02", "03", "04"]
+    for beam, expected in bench.pose("01").items():
+        off = np.abs(seen.pose("01")[beam].column_px - expected.column_px)
+        assert np.nanmedian(off) < 0.1, beam
+
+
+def test_a_board_that_is_never_seen_is_an_error(tmp_path: Path) -> None:
+    folder, bench = planned(tmp_path / "s", poses=4, phase_steps=4)
+    asked: list[str] = []
+
+    def nobody(_: str, name: str, camera: Camera) -> None:
+        asked.append(name)
+        bench.hands("dark", "01", camera)
+
+    with pytest.raises(CalibrationError, match="pose 01: the image is dark"):
+        take_captures(CONFIG, folder, nobody, ("poses",))
+    assert asked == ["01"] * 3
+    assert FolderCaptures(folder).missing("poses") == ["01", "02", "03", "04"]
+
+
+def test_what_a_system_cannot_show_or_expose_is_said() -> None:
+    camera = SystemConfig(capture=AravisConfig(exposure_us=8000))
+    shorter = exposed(camera, 0.25).capture
+    assert isinstance(shorter, AravisConfig)
+    assert shorter.exposure_us == 2000
+    assert exposed(SystemConfig(capture=AravisConfig()), 1.0).capture == AravisConfig()
+    with pytest.raises(ConfigError, match=r"capture\.exposure_us: state it"):
+        exposed(SystemConfig(capture=AravisConfig()), 0.25)
+    with pytest.raises(ConfigError, match="a recording cannot be put under other light"):
+        exposed(SystemConfig(capture=ReplayConfig(file=Path("take.h5"))), 1.0)
+    with pytest.raises(ConfigError, match="name them under"):
+        ExternalLight().show(Levels((0.0,) * 4))
+    with pytest.raises(ValueError, match="from 0 to 1"):
+        light_images(Levels((2.0, 0.0, 0.0, 0.0)), (912, 1140))
+    visible, infrared = light_images(Step(36, 0.0, "rows", "infrared"), (912, 1140))
+    assert (int(visible.max()), int(infrared[0, 0]), np.ptp(infrared, axis=1).max()) == (0, 255, 0)
+
+
+def test_capture_from_the_command_line(tmp_path: Path) -> None:
+    assert run("plan", tmp_path / "s", "--rig", "bench 1", "--poses", 4).exit_code == 0
+    system = tmp_path / "system.toml"
+    system.write_text(
+        "schema_version = 1\n[camera]\nwidth_px = 96\nheight_px = 72\nfocal_px = [240, 240]\ncentre_px = [47.5, 35.5]\n"
+    )
+    taken = run("capture", tmp_path / "s", "--system", system, "--step", "dark")
+    assert (taken.exit_code, "captures taken" in taken.stdout) == (0, True), taken.output
+    assert "dark: 4 of 4" in run("check", tmp_path / "s").stdout.replace("  ", " ")
+    assert run("capture", tmp_path / "s", "--system", system, "--step", "nothing").exit_code == 2
+    system.write_text('schema_version = 1\ncapture = "aravis:none"\n')
+    refused = run("run", "--system", system, "--out", tmp_path / "c.json")
+    assert (refused.exit_code, "quadfringe calibrate capture" in refused.stderr) == (2, True)

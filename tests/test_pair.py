@@ -19,7 +19,7 @@ from quadfringe.data import Calibration
 from quadfringe.decoding import Plan, ShotDecoder, device_model
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.images import read_image
-from quadfringe.reproduce import pair_correction, pair_depth, pair_deviation
+from quadfringe.reproduce import pair_calibration, pair_correction, pair_depth, pair_deviation
 from quadfringe.reproduce.pair_bench import ideal_pair, real_pair
 from quadfringe.reproduce.pair_tolerance import tolerances
 
@@ -133,6 +133,19 @@ def test_the_search_needs_no_coaxial_pair_at_any_depth(folder: Path) -> None:
     assert 0.03 < drift[0] < 0.2
     assert drift[1] > 5 * drift[0]
     assert figures["corrected_5mm_wrong_order_percent"] > 1
+    assert picture.stat().st_size > 10_000
+
+
+def test_a_calibrated_pair_is_as_good_as_a_known_one(folder: Path) -> None:
+    """A sixteenth of the pixels, six poses and four steps; `quadfringe reproduce pair-calibration` runs it in full."""
+    figures, picture = pair_calibration(folder, shrink=4, poses=6, steps=4)
+    assert all(figures[f"{name}_mean_px"] <= 0.15 for name in ("camera", "visible", "infrared"))
+    assert all(abs(figures[f"{axis}_error"]) <= figures[f"{axis}_interval"] for axis in AXES)
+    assert np.linalg.norm([figures[f"{axis}_error"] for axis in AXES[:3]]) <= 0.02
+    assert np.linalg.norm([figures[f"{axis}_error"] for axis in AXES[3:]]) <= 0.1
+    for where in ("corrected", "searched_700mm", "searched_900mm"):
+        assert figures[f"{where}_wrong_order_percent"] == 0
+        assert figures[f"{where}_infrared_rms_rad"] <= 1.5 * BAR_RAD  # with noise of 1 %, which the bar is without
     assert picture.stat().st_size > 10_000
 
 

@@ -105,8 +105,47 @@ def test_stated_uncertainties_are_those_of_repeated_calibrations(places: NDArray
 
 
 def test_projectors_share_the_errors_of_the_camera_and_that_is_known(found: RigCalibration) -> None:
-    assert found.point_sd_px == pytest.approx(dict.fromkeys(("camera", "visible", "infrared"), POINT_SD_PX), rel=0.1)
+    assert set(found.point_sd_px) == {"camera", "visible", "infrared"}
+    assert np.array(list(found.point_sd_px.values())) == pytest.approx(POINT_SD_PX, rel=0.1)
     assert found.visible.rms_px > 1.2 * POINT_SD_PX * np.sqrt(2)  # both errors are in what is seen
+
+
+def test_wrong_points_are_left_out_and_spoil_nothing(places: NDArray[np.float64], found: RigCalibration) -> None:
+    poses, random = simulated(places, seed=0), np.random.default_rng(5)
+    rings, lit = [3, 50, 90], [10, 77]
+    for i in (1, 4, 7):
+        centres, pixels = poses[i].view.points_px.copy(), poses[i].infrared.points_px.copy()
+        centres[rings] += np.array([[0.3], [5.0], [30.0]]) * (1, -1) + random.normal(0, 0.02, (3, 2))
+        pixels[lit] += np.array([[0.5], [60.0]])
+        infrared = replace(poses[i].infrared, points_px=pixels)
+        poses[i] = replace(poses[i], view=replace(poses[i].view, points_px=centres), infrared=infrared)
+    done = calibrate_rig(poses, BOARD)
+    assert (done.camera.left_out, done.visible.left_out, done.infrared.left_out) == (9, 9, 15)
+    for i, missed in enumerate(done.infrared.residuals_px):
+        out = sorted(rings + lit) if i in (1, 4, 7) else []
+        assert np.flatnonzero(np.isnan(missed).any(axis=1)).tolist() == out
+    assert np.abs((done.pair.values - found.pair.values) / found.pair.sd).max() < 0.5
+    assert done.infrared.max_px < 0.1
+    assert (found.camera.left_out, found.infrared.left_out) == (0, 0)
+
+
+def test_a_pose_that_moved_is_named(places: NDArray[np.float64]) -> None:
+    poses = simulated(places, seed=0)
+    moved = poses[3].infrared
+    poses[3] = replace(poses[3], infrared=replace(moved, points_px=moved.points_px + np.array((1.0, 0.4))))
+    with pytest.raises(CalibrationError, match="infrared: 108 of 108 points of pose 4 do not fit") as refused:
+        calibrate_rig(poses, BOARD)
+    assert refused.value.reason == "outlying"
+
+
+def test_coordinates_have_their_own_precision(places: NDArray[np.float64]) -> None:
+    """Rows of diamond mirrors lie half as far apart as columns, so that the same angle is twice as many of them."""
+    poses, random = simulated(places, seed=1), np.random.default_rng(6)
+    for i, pose in enumerate(poses):
+        worse = pose.visible.points_px + random.normal(0, 3 * POINT_SD_PX, (108, 2)) * (0, 1)
+        poses[i] = replace(pose, visible=replace(pose.visible, points_px=worse))
+    done = calibrate_rig(poses, BOARD)
+    assert done.point_sd_px["visible"] == pytest.approx(POINT_SD_PX * np.array((1, np.sqrt(10))), rel=0.1)
 
 
 def test_records_are_whole(found: RigCalibration, places: NDArray[np.float64]) -> None:
@@ -132,7 +171,8 @@ def test_derivatives_are_those_of_the_residuals(places: NDArray[np.float64], fou
     for name in ("visible", "infrared"):
         lit = getattr(pose, name)
         sights.append(Sight(name, 0, BOARD.points_mm[rows], lit.points_px[rows], lit.slope[rows], rows))
-    adjustment = Adjustment(sights, 1, radial3=True, sd_px=dict.fromkeys(("camera", "visible", "infrared"), 0.5))
+    sd_px = dict.fromkeys(("camera", "visible", "infrared"), np.array([0.5, 0.3]))
+    adjustment = Adjustment(sights, 1, radial3=True, sd_px=sd_px)
     by_name = dict(zip(found.names, found.values, strict=True))
     values = np.array([by_name.get(name, 0.01) for name in adjustment.names])
     exact = adjustment.jacobian(values).toarray()

@@ -133,6 +133,7 @@ class Bench:
         visible: Device | None = None,
         infrared: Device | None = None,
         layout: str = "regular",
+        infrared_from_visible: Sequence[Sequence[float]] | None = None,
     ) -> Bench: ...
     @property
     def camera(self) -> Device: ...
@@ -171,10 +172,11 @@ class Bench:
         rotation: _Matrix3,
         translation_mm: _Vector3,
     ) -> NDArray[np.float32]:
-        """Give the albedo (H, W, 4) that the camera sees of a print: the option `albedo` of `render`.
+        """Give the albedo that the camera sees of a print: the option `albedo` of `render`.
 
         `coverage` is (rows, columns) float32, 1 where there is ink; `origin_mm` is the centre of its first texel on
-        z = 0 of the board, in the pose of `cast_plate`; `paper` and `ink` are albedos of R, G, B, IR.
+        z = 0 of the board, in the pose of `cast_plate`; `paper` and `ink` are albedos of R, G, B, IR. It is (H, W, 4),
+        or (H, W, 8) with an infrared chip of its own, the last four as that sees them.
         """
 
     def render(

@@ -9,14 +9,38 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config import DeviceModel, Fringes
+from quadfringe.config import DeviceModel, Fringes, Row4
 from quadfringe.errors import InputError
 from quadfringe.optics import core_device
 
 if TYPE_CHECKING:
     from quadfringe.data import Calibration
 
-__all__ = ["Predeformation", "predeformation", "projector_images"]
+__all__ = ["Levels", "Light", "Predeformation", "Step", "light_images", "predeformation", "projector_images"]
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Even light: each channel (R, G, B, IR) at a level of its own from 0 to 1."""
+
+    levels: Row4
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an N-step capture: the same fringes in all channels of one projector, while the other is black.
+
+    Fringes count over "columns" or "rows"; the `beam` is "visible" or "infrared", the mirrors "regular" or "diamond".
+    """
+
+    number: float
+    shift_rad: float
+    axis: str
+    beam: str
+    layout: str = "regular"
+
+
+Light = Fringes | Levels | Step  # of a shot, or of a calibration
 
 
 @dataclass(frozen=True)
@@ -72,6 +96,32 @@ def projector_images(
                 )
         ir = deformed.light(fringes[2], layout)
     return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
+
+
+def light_images(
+    light: Light, size_px: tuple[int, int], deformed: Predeformation | None = None
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Give the colour image (H, W, 3) and the infrared image (H, W), uint8, of any light; `size_px` is (W, H).
+
+    Raises ValueError as `projector_images`, and for levels that are not from 0 to 1.
+
+    >>> from quadfringe.projection import Levels, light_images
+    >>> visible, infrared = light_images(Levels((1.0, 0.0, 0.0, 0.5)), (912, 1140))
+    >>> visible[0, 0].tolist(), int(infrared[0, 0])
+    ([255, 0, 0], 128)
+    """
+    if isinstance(light, Fringes):
+        return projector_images(light.numbers, size_px, light.layout, deformed)
+    shape = size_px[::-1]
+    if isinstance(light, Levels):
+        if not all(0 <= level <= 1 for level in light.levels):
+            raise ValueError(f"levels: expected numbers from 0 to 1, got {light.levels}")
+        red, green, blue, ir = (np.full(shape, level, np.float32) for level in light.levels)
+        return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
+    shown = eight_bit(_core.step_pattern(light.number, light.shift_rad, *size_px, axis=light.axis, layout=light.layout))
+    black = np.zeros(shape, np.uint8)
+    visible, infrared = (shown if light.beam == beam else black for beam in ("visible", "infrared"))
+    return np.repeat(visible[:, :, None], 3, axis=2), infrared
 
 
 def eight_bit(light: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 from quadfringe import stages
 from quadfringe.calibration.bundle import Pose, RigCalibration, calibrate_rig
 from quadfringe.calibration.detect import View, find_target
-from quadfringe.calibration.projector import AXES, ProjectorMap, StepPlan, joined, position_map, projector_points
+from quadfringe.calibration.projector import (
+    AXES,
+    ProjectorMap,
+    ProjectorPoints,
+    StepPlan,
+    joined,
+    position_map,
+    projector_points,
+)
+from quadfringe.calibration.registration import register_views
 from quadfringe.calibration.targets import Target, raster
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot, BayerShot
@@ -120,23 +129,24 @@ def rehearse(
 ) -> Rehearsal:
     """Capture the board in every pose (P, 4, 4), find it, and calibrate camera and both projectors.
 
-    Raises what detection and calibration raise.
+    The infrared chip is registered by the boards that both chips see. Raises what detection and calibration raise.
     """
     room = BoardRoom(config, target)
     poses = board_poses(target) if poses is None else poses
     plan = StepPlan(config.fringes) if plan is None else plan
-    seen: list[Pose] = []
+    views: list[View] = []
+    infrared_views: list[View] = []
+    lit: list[ProjectorPoints] = []
+    infrared_maps: list[ProjectorMap] = []
     for i in range(len(poses)) if progress is None else progress:
         visible, infrared = room.capture(poses[i], plan)
-        seen.append(pose_seen(visible, infrared, target, config))
-    return Rehearsal(calibrate_rig(seen, target), tuple(p.view for p in seen), poses)
-
-
-def pose_seen(visible: ProjectorMap, infrared: ProjectorMap, target: Target, config: SystemConfig) -> Pose:
-    """Give the points of one pose: found in the background of the visible fringes, lit by both projectors."""
-    view = find_target(visible.background, target)
-    return Pose(
-        view,
-        projector_points(visible, view),
-        projector_points(infrared, view, ir_registration=config.scene.infrared_from_visible),
-    )
+        views.append(find_target(visible.background, target))
+        infrared_views.append(find_target(infrared.background, target))
+        lit.append(projector_points(visible, views[-1]))
+        infrared_maps.append(infrared)
+    chips = register_views(views, infrared_views)
+    seen = [
+        Pose(view, points, projector_points(infrared, view, ir_registration=chips.ir_registration))
+        for view, points, infrared in zip(views, lit, infrared_maps, strict=True)
+    ]
+    return Rehearsal(calibrate_rig(seen, target), tuple(views), poses)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +49,10 @@ class Panel:
 
 @dataclass(frozen=True)
 class Graph:
-    """Lines over a common axis, or points: x and y by name; `limit` is a dashed line with a name of its own."""
+    """Lines over a common axis, or points: x and y by name; `limit` is a dashed line with a name of its own.
+
+    `spread` gives points of that name error bars, plus and minus; `ticks` are names of the places 0, 1, 2 and so on.
+    """
 
     title: str
     x_label: str
@@ -58,12 +61,21 @@ class Graph:
     limit: tuple[str, float] | None = None
     log: bool = False
     points: bool = False
+    spread: Mapping[str, NDArray[Any]] = field(default_factory=dict)
+    ticks: Sequence[str] = ()
 
     def draw(self, _figure: Any, axes: Any) -> None:
         """Draw the lines with their names."""
         for name, (x, y) in self.lines.items():
             marker = "." if self.points or len(x) < 50 else None
+            if name in self.spread:
+                axes.errorbar(x, y, yerr=self.spread[name], label=name, fmt="o", markersize=4, capsize=4)
+                continue
             axes.plot(x, y, label=name, linewidth=0 if self.points else 1.2, marker=marker, markersize=4)
+        if self.ticks:
+            axes.set_xticks(range(len(self.ticks)), self.ticks)
+            axes.set_xlim(-0.5, len(self.ticks) - 0.5)
+            axes.axhline(0, color="black", linewidth=0.5)
         if self.limit is not None:
             axes.axhline(self.limit[1], color="black", linestyle="--", linewidth=0.9, label=self.limit[0])
         if self.log:

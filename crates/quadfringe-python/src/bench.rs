@@ -20,21 +20,24 @@ pub struct Bench(rig::Bench);
 #[pymethods]
 impl Bench {
     #[new]
-    #[pyo3(signature = (*, camera = None, visible = None, infrared = None, layout = "regular"))]
+    #[pyo3(signature = (*, camera = None, visible = None, infrared = None, layout = "regular", infrared_from_visible = None))]
     fn new(
         camera: Option<Device>,
         visible: Option<Device>,
         infrared: Option<Device>,
         layout: &str,
+        infrared_from_visible: Option<[[f64; 3]; 2]>,
     ) -> PyResult<Self> {
         let reference = rig::Bench::reference_with(layout_named(layout)?);
         let visible = visible.map_or(reference.visible, |device| device.0);
-        Ok(Self(rig::Bench {
+        let bench = rig::Bench {
             camera: camera.map_or(reference.camera, |device| device.0),
             infrared: infrared.map_or_else(|| visible.clone(), |device| device.0),
             visible,
-            layout: reference.layout,
-        }))
+            ..reference
+        };
+        let Some(affine) = infrared_from_visible else { return Ok(Self(bench)) };
+        Ok(Self(bench.with_infrared_chip(affine).map_err(value_error)?))
     }
 
     #[getter]
@@ -102,7 +105,7 @@ impl Bench {
         Ok(self.cast_surface(py, &plate))
     }
 
-    /// Albedo that the camera sees of a print on the plane z = 0 of a posed board, (H, W, 4) float32.
+    /// Albedo that the camera sees of a print on the plane z = 0 of a posed board, (H, W, 4 or 8) float32.
     #[pyo3(signature = (coverage, *, pitch_mm, origin_mm, paper, ink, rotation, translation_mm))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn printed<'py>(
@@ -254,7 +257,6 @@ fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> 
             "crosstalk" => options.crosstalk = value.extract()?,
             "gain" => options.gain = value.extract()?,
             "blur_px" => options.blur_px = value.extract()?,
-            "infrared_from_visible" => options.infrared_from_visible = value.extract()?,
             "noise" => options.noise = value.extract()?,
             "camera_offset" => options.camera_offset = value.extract()?,
             "camera_exponent" => options.camera_exponent = value.extract()?,

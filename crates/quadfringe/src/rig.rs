@@ -4,6 +4,7 @@
 //! lit from: this is done once for a scene. [`Bench::render`] then takes any four patterns to a shot, with what a real
 //! bench adds. [`Bench::predeform`] gives the infrared pattern that makes up for a deviated infrared projector (S11).
 
+mod blur;
 mod cast;
 mod expose;
 mod light;
@@ -12,7 +13,6 @@ mod options;
 mod predeform;
 mod print;
 mod render;
-mod resample;
 mod truth;
 
 pub use cast::{Cast, Hit};
@@ -21,7 +21,7 @@ pub use options::{Albedo, BitDepth, Demosaic, RenderOptions};
 pub use print::Print;
 pub use render::Planes;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 pub use crate::fringe::Axis;
 use crate::fringe::{Channel, DmdLayout};
 use crate::optics::{Device, dot, rotation_from_vector};
@@ -84,6 +84,9 @@ pub struct Bench {
     pub infrared: Device,
     /// How the mirrors of both projectors lie, which decides where pattern images are sampled.
     pub layout: DmdLayout,
+    /// Where the point seen at the visible pixel (x, y) falls on the infrared chip: rows of an affine map of (x, y, 1) that
+    /// has an inverse. `None`: both chips see the same.
+    pub infrared_from_visible: Option<[[f64; 3]; 2]>,
 }
 
 /// Lens of the camera and of both projectors, mm.
@@ -122,7 +125,7 @@ impl Bench {
         let projector = centred(PROJECTOR_SIZE, layout.pitch_um())
             .and_then(|device| device.with_pose(rotation, translation_mm))
             .expect(reason);
-        Self { camera, visible: projector.clone(), infrared: projector, layout }
+        Self { camera, visible: projector.clone(), infrared: projector, layout, infrared_from_visible: None }
     }
 
     /// The same bench with an infrared projector that deviates from the visible one: `T_infrared_visible` is the rotation
@@ -147,6 +150,28 @@ impl Bench {
         Ok(Self { infrared, ..self })
     }
 
+    /// The same bench with an infrared chip that sees the point of the visible pixel (x, y) where the rows of this affine
+    /// map of (x, y, 1) say.
+    ///
+    /// # Errors
+    /// [`crate::Error::Value`] when the map has no inverse.
+    ///
+    /// ```
+    /// use quadfringe::rig::Bench;
+    /// let apart = [[1.001, 0.002, 0.7], [-0.002, 0.999, -1.3]];
+    /// assert!(Bench::reference().with_infrared_chip(apart).is_ok());
+    /// assert!(Bench::reference().with_infrared_chip([[0.0; 3]; 2]).is_err());
+    /// ```
+    pub fn with_infrared_chip(self, infrared_from_visible: [[f64; 3]; 2]) -> Result<Self> {
+        inverse(infrared_from_visible)?;
+        Ok(Self { infrared_from_visible: Some(infrared_from_visible), ..self })
+    }
+
+    /// Where a pixel of the infrared chip looks, in pixels of the visible one.
+    fn visible_from_infrared(&self) -> Option<[[f64; 3]; 2]> {
+        self.infrared_from_visible.and_then(|affine| inverse(affine).ok())
+    }
+
     /// The device behind a beam.
     #[must_use]
     pub const fn projector(&self, beam: Beam) -> &Device {
@@ -155,6 +180,18 @@ impl Bench {
             Beam::Infrared => &self.infrared,
         }
     }
+}
+
+/// Inverse of an affine map of the plane.
+fn inverse(affine: [[f64; 3]; 2]) -> Result<[[f64; 3]; 2]> {
+    let [[a, b, tx], [c, d, ty]] = affine;
+    let determinant = a * d - b * c;
+    if !(determinant.is_finite() && determinant.abs() > 1e-6 && tx.is_finite() && ty.is_finite()) {
+        let expected = "the two rows of an affine map with an inverse";
+        return Err(Error::value("infrared_from_visible", expected, format!("{affine:?}")));
+    }
+    let [ia, ib, ic, id] = [d, -b, -c, a].map(|v| v / determinant);
+    Ok([[ia, ib, -(ia * tx + ib * ty)], [ic, id, -(ic * tx + id * ty)]])
 }
 
 fn centred([width, height]: [usize; 2], pitch_um: [f64; 2]) -> Result<Device> {

@@ -90,7 +90,8 @@ fn a_noisy_mosaic_leaves_a_tenth_of_a_millimetre() {
 #[test]
 fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
     let bench = bench(1);
-    let cast = cast_scene(&bench, "peaks");
+    let apart = bench.clone().with_infrared_chip(MISALIGNED).expect("regular");
+    let [cast, cast_apart] = [&bench, &apart].map(|bench| cast_scene(bench, "peaks"));
     let mut crosstalk = Conditioner::default().crosstalk;
     (crosstalk[0][1], crosstalk[1][2], crosstalk[3][0]) = (0.08, 0.05, 0.03);
     let flawed = RenderOptions {
@@ -98,7 +99,6 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         gain: [0.8; 4],
         camera_offset: [0.03; 4],
         camera_exponent: [1.8; 4],
-        infrared_from_visible: Some(MISALIGNED),
         ..mosaic(&clean())
     };
     let conditioner = Conditioner {
@@ -110,7 +110,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
     };
     for method in [Method::Published, Method::Best] {
         let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), method);
-        let undone = there_and_back_by(&bench, &cast, &code(), &flawed, method, &conditioner);
+        let undone = there_and_back_by(&apart, &cast_apart, &code(), &flawed, method, &conditioner);
         let rms = [&plain, &undone].map(|decoded| inner_phase_rms_rad(decoded, &cast));
         let judged = score(&undone, &cast, &code(), FRINGE_PX);
         println!("{method:?} {rms:?} {judged:?}");
@@ -125,7 +125,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
 #[test]
 fn registration_costs_neither_phase_nor_orders() {
     let bench = bench(1);
-    let moved = |plain: RenderOptions| RenderOptions { infrared_from_visible: Some(MISALIGNED), ..plain };
+    let apart = bench.clone().with_infrared_chip(MISALIGNED).expect("regular");
     let conditioner = Conditioner { ir_registration: MISALIGNED, ..Conditioner::default() };
     let cases = [
         ("peaks", clean(), Method::Published),
@@ -134,9 +134,9 @@ fn registration_costs_neither_phase_nor_orders() {
         ("steps", noisy(5), Method::Best),
     ];
     for (name, render, method) in cases {
-        let cast = cast_scene(&bench, name);
+        let [cast, cast_apart] = [&bench, &apart].map(|bench| cast_scene(bench, name));
         let aligned = there_and_back(&bench, &cast, &code(), &render, method);
-        let registered = there_and_back_by(&bench, &cast, &code(), &moved(render), method, &conditioner);
+        let registered = there_and_back_by(&apart, &cast_apart, &code(), &render, method, &conditioner);
         let rms = [&aligned, &registered].map(|decoded| inner_phase_rms_rad(decoded, &cast));
         let [aligned, registered] = [aligned, registered].map(|d| score(&d, &cast, &code(), FRINGE_PX));
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");

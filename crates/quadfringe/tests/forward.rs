@@ -41,12 +41,8 @@ fn worst(a: &Array2<f32>, b: &Array2<f32>) -> f32 {
 fn identical_camera_and_projector_capture_the_projected_image() {
     let focal = 12.0 / 4.65e-3;
     let device = Device::pinhole(1024, 768, [focal; 2], [511.5, 383.5]).expect("valid device");
-    let bench = Bench {
-        camera: device.clone(),
-        visible: device.clone(),
-        infrared: device,
-        layout: DmdLayout::Regular,
-    };
+    let bench =
+        Bench { camera: device.clone(), visible: device.clone(), infrared: device, ..Bench::reference() };
     let code = FringeCode::optimum(36, 1024).expect("valid code");
     let cast = bench.cast(&Plane::at_z(800.0));
     let images = Channel::ALL.map(|channel| pattern(&code, channel, 768, DmdLayout::Regular));
@@ -127,6 +123,33 @@ fn options_do_what_they_say() {
     assert!(shaded[0] > 0.9 && shaded[0] < 0.99);
 }
 
+/// Seen through a shift by whole pixels, the infrared image is the same one elsewhere, and the others stay.
+#[test]
+fn the_infrared_chip_has_rays_of_its_own() {
+    let bench = small(Bench::reference(), 16);
+    let apart = bench.clone().with_infrared_chip([[1.0, 0.0, 2.0], [0.0, 1.0, -1.0]]).expect("regular");
+    let surface = scene("peaks", 0.0).expect("known scene");
+    let lights = Light::shot(&FringeCode::optimum(36, 912).expect("valid code"));
+    let mut crosstalk = RenderOptions::default().crosstalk;
+    crosstalk[3][0] = 0.2;
+    let options = RenderOptions { bit_depth: BitDepth::Float, crosstalk, ..clean() };
+    let [aligned, shifted] = [&bench, &apart].map(|bench| {
+        let cast = bench.cast(surface.as_ref());
+        let Planes::F32(planes) = bench.render(&cast, &lights, &options).expect("a shot") else {
+            panic!("floats were asked for")
+        };
+        planes
+    });
+    assert_eq!(aligned[..3], shifted[..3]);
+    let (rows, columns) = aligned[3].dim();
+    for row in 0..rows - 1 {
+        for column in 2..columns {
+            let (seen, expected) = (shifted[3][[row, column]], aligned[3][[row + 1, column - 2]]);
+            assert!((seen - expected).abs() < 1e-6, "{row} {column}: {seen} {expected}");
+        }
+    }
+}
+
 #[test]
 fn bad_input_is_refused() {
     let bench = small(Bench::reference(), 16);
@@ -137,7 +160,7 @@ fn bad_input_is_refused() {
     assert!(refused(RenderOptions { blur_px: f64::NAN, ..clean() }));
     assert!(refused(RenderOptions { camera_exponent: [0.0; 4], ..clean() }));
     assert!(refused(RenderOptions { albedo: Albedo::Image(Array3::zeros((2, 2, 4))), ..clean() }));
-    assert!(refused(RenderOptions { infrared_from_visible: Some([[0.0; 3]; 2]), ..clean() }));
+    assert!(bench.clone().with_infrared_chip([[0.0; 3]; 2]).is_err());
     let image = Array2::zeros((3, 3));
     let lights = [(); 4].map(|()| Light::Image(image.view()));
     assert!(bench.render(&cast, &lights, &clean()).is_err());

@@ -4,7 +4,6 @@ mod common;
 
 use ndarray::Array2;
 use proptest::prelude::*;
-use quadfringe::fringe::DmdLayout;
 use quadfringe::height::Triangulator;
 use quadfringe::optics::{Device, rotation_from_vector};
 use quadfringe::rig::{Beam, Bench};
@@ -45,7 +44,7 @@ prop_compose! {
             .and_then(|d| d.with_distortion(camera.distortion))
             .expect("valid camera");
         let projector = projector.with_pose(rotation, translation).expect("valid pose");
-        Bench { camera, visible: projector.clone(), infrared: projector, layout: DmdLayout::Regular }
+        Bench { camera, visible: projector.clone(), infrared: projector, ..Bench::reference() }
     }
 }
 

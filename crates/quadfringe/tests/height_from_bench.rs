@@ -1,11 +1,11 @@
 //! Phase to millimetres against simulated benches.
 
 use ndarray::{Array2, Axis};
+use quadfringe::FringeCode;
 use quadfringe::height::{CrossedAxes, PolynomialHeight, Triangulator};
 use quadfringe::optics::{Device, rotation_from_vector};
 use quadfringe::rig::{Beam, Bench};
 use quadfringe::surface::Plane;
-use quadfringe::{DmdLayout, FringeCode};
 
 /// Camera straight down on the plane z = L0; projector `d` to its left at the same height, its axis through the foot of
 /// the camera axis, so that columns grow away from the projector.
@@ -17,7 +17,7 @@ fn crossed_axes_bench(distance_mm: f64, baseline_mm: f64) -> Bench {
     let projector = Device::pinhole(912, 1140, [1570.0; 2], [455.5, 569.5])
         .and_then(|device| device.with_pose(rotation, translation))
         .expect("valid projector");
-    Bench { camera, visible: projector.clone(), infrared: projector, layout: DmdLayout::Regular }
+    Bench { camera, visible: projector.clone(), infrared: projector, ..Bench::reference() }
 }
 
 #[test]

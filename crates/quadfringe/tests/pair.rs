@@ -23,7 +23,7 @@ fn apart(shrink: usize, layout: DmdLayout) -> Bench {
         camera: lens(bench.camera, [-0.12, 0.08, 2e-4, -3e-4, 0.0]),
         visible: lens(bench.visible, [-0.05, 0.03, 3e-4, -2e-4, 0.0]),
         infrared: lens(bench.infrared, [-0.06, 0.04, -2e-4, 3e-4, 0.0]),
-        layout,
+        ..bench
     }
 }
 

@@ -148,7 +148,7 @@ prop_compose! {
             .and_then(|d| d.with_pose(rotation, translation))
             .expect("valid projector");
         let camera = Device::pinhole(480, 360, [1280.0; 2], [239.5, 179.5]).expect("valid camera");
-        Bench { camera, visible: projector.clone(), infrared: projector, layout: DmdLayout::Regular }
+        Bench { camera, visible: projector.clone(), infrared: projector, ..Bench::reference() }
     }
 }
 

@@ -29,7 +29,10 @@ __all__ = ["Pose", "RigCalibration", "calibrate_camera", "calibrate_rig"]
 Array = NDArray[np.float64]
 SIGHT_MIN = 8  # points of a board that a device must see to use a pose
 CONDITION_MAX = 1e12  # of the scaled normal equations
-FOUND_SD_PX = 0.02  # what points are taken to be good for until their residuals are known
+LEAST_SD_PX = 1e-4  # rounding: points without noise are no better than this
+OUTLIER = 5.0  # standard deviations: one good point in 270 000 is farther off
+OFF_MAX = 0.25  # share of a device's points of one pose that may be outliers before it is the pose that is wrong
+ROUNDS = 8  # in which the points that count settle
 
 
 @dataclass(frozen=True)
@@ -47,7 +50,8 @@ class RigCalibration:
 
     `T_camera_board` (P, 4, 4) are the poses of the board, mm. `names`, `values` (n,) and `covariance` (n, n) hold every
     parameter, such as "visible.focal_x_px" or "pose_3.rotation_y_rad" (a rotation vector). `point_sd_px` are the
-    standard deviations of the points by device, as their residuals show them. `pair` is None without two projectors.
+    standard deviations (2,) of the points along x and y by device, as their residuals show them. `pair` is None without
+    two projectors.
     """
 
     camera: DeviceFit
@@ -59,7 +63,7 @@ class RigCalibration:
     names: tuple[str, ...]
     values: Array
     covariance: Array
-    point_sd_px: dict[str, float]
+    point_sd_px: dict[str, Array]
 
 
 def calibrate_camera(
@@ -75,22 +79,17 @@ def calibrate_rig(
     """Calibrate camera and projectors from poses of a board, none, one or both projectors being in them.
 
     `radial3` adds the third radial coefficient. `distance_mm` is how far the board of the first pose stood from the
-    camera, roughly: it is the one thing that shows a wrong size of the board, which scales everything else.
+    camera, roughly: it is the one thing that shows a wrong size of the board, which scales everything else. Points
+    farther off than five standard deviations are left out.
 
-    Raises `DegeneratePosesError` for poses that cannot tell, `CalibrationError` when nothing fits or the distance is
-    wrong, `InputError` for mixed image sizes and for projectors that are missing in some poses.
+    Raises `DegeneratePosesError` for poses that cannot tell, `CalibrationError` when nothing fits, a pose does not fit
+    the others or the distance is wrong, `InputError` for mixed image sizes and for projectors that are missing in some
+    poses.
     """
     spread = check_poses([pose.view for pose in poses], target)
     sights = _sights(poses, target)
     sizes = _sizes(poses)
-    sd_px = dict.fromkeys(DEVICES, FOUND_SD_PX)
-    values = first_values(Adjustment(sights, len(poses), radial3, sd_px), sizes)
-    for _ in range(2):
-        adjustment = Adjustment(sights, len(poses), radial3, sd_px)
-        values, covariance = _adjusted(adjustment, values)
-        sd_px = _point_sd(adjustment, values, covariance)
-    adjustment = Adjustment(sights, len(poses), radial3, sd_px)
-    values, covariance = _adjusted(adjustment, values)
+    adjustment, values, covariance = _settled(sights, len(poses), radial3, sizes)
     check_distance(adjustment, values, target, distance_mm)
     fits = {name: device_fit(adjustment, values, covariance, name, sizes[name]) for name in adjustment.devices}
     both = "visible" in fits and "infrared" in fits
@@ -104,7 +103,7 @@ def calibrate_rig(
         names=adjustment.names,
         values=values,
         covariance=covariance,
-        point_sd_px=sd_px,
+        point_sd_px=adjustment.sd_px,
     )
 
 
@@ -153,7 +152,60 @@ def _not_mirrored(name: str, points: ProjectorPoints, lit: NDArray[np.intp]) -> 
         )
 
 
-def _adjusted(adjustment: Adjustment, values: Array) -> tuple[Array, Array]:
+def _settled(
+    sights: Sequence[Sight], poses: int, radial3: bool, sizes: dict[str, tuple[int, int]]
+) -> tuple[Adjustment, Array, Array]:
+    """Adjust with the points that count and what they are good for; both are known only from the adjustment.
+
+    The first time large residuals count by their size, not by their square, so that wrong points cannot hide.
+    """
+    sd_px = {name: np.ones(2) for name in DEVICES}
+    adjustment = Adjustment(sights, poses, radial3, sd_px)
+    values = first_values(adjustment, sizes)
+    for _ in range(2):
+        adjustment = Adjustment(sights, poses, radial3, _robust_sd(adjustment, values))
+        values, _ = _adjusted(adjustment, values, "soft_l1")
+    sd_px = _robust_sd(adjustment, values)
+    for _ in range(ROUNDS):
+        before = adjustment.kept
+        adjustment = Adjustment(sights, poses, radial3, sd_px, _without_outliers(adjustment, values, sd_px))
+        values, covariance = _adjusted(adjustment, values)
+        sd_px = _point_sd(adjustment, values, covariance)
+        if all(np.array_equal(a, b) for a, b in zip(before, adjustment.kept, strict=True)):
+            break
+    adjustment = Adjustment(sights, poses, radial3, sd_px, adjustment.kept)
+    return adjustment, *_adjusted(adjustment, values)
+
+
+def _robust_sd(adjustment: Adjustment, values: Array) -> dict[str, Array]:
+    """Give standard deviations (2,) by device that wrong points do not reach: from the median of the residuals."""
+    own, found = adjustment.independent(values), {}
+    for device in adjustment.devices:
+        mine = np.concatenate([r for r, s in zip(own, adjustment.sights, strict=True) if s.device == device])
+        found[device] = np.maximum(1.4826 * np.median(np.abs(mine), axis=0) * adjustment.sd_px[device], LEAST_SD_PX)
+    return found
+
+
+def _without_outliers(adjustment: Adjustment, values: Array, sd_px: dict[str, Array]) -> list[NDArray[np.bool_]]:
+    """Mark the points (n,) of each sight that count; what the camera found wrong is wrong for the projectors too."""
+    marks, camera = [], {}
+    for sight, own in zip(adjustment.sights, adjustment.independent(values), strict=True):
+        kept = np.hypot(*(own * adjustment.sd_px[sight.device] / sd_px[sight.device]).T) <= OUTLIER
+        if (~kept).sum() > OFF_MAX * len(kept):
+            raise CalibrationError(
+                "outlying",
+                f"{sight.device}: {(~kept).sum()} of {len(kept)} points of pose {sight.pose + 1} do not fit those of "
+                "the other poses; did the board move during its capture, or bend? take it again, or leave it out",
+            )
+        if sight.camera_rows is None:
+            camera[sight.pose] = kept
+        else:
+            kept = kept & camera[sight.pose][sight.camera_rows]
+        marks.append(kept)
+    return marks
+
+
+def _adjusted(adjustment: Adjustment, values: Array, loss: str = "linear") -> tuple[Array, Array]:
     """Minimise, and give parameters and covariance for points of the stated standard deviations.
 
     Focal lengths and distances, centres and turns nearly stand for each other, along which the iterative solver of the
@@ -168,6 +220,7 @@ def _adjusted(adjustment: Adjustment, values: Array) -> tuple[Array, Array]:
         lambda moved: adjustment.jacobian(start + spread @ moved) @ spread,
         method="trf",
         tr_solver="lsmr",
+        loss=loss,
         ftol=1e-10,
         xtol=1e-10,
         max_nfev=60,
@@ -190,21 +243,18 @@ def _covariance(jacobian: Any) -> Array:
     return np.asarray(0.5 * (inverse + inverse.T), np.float64)
 
 
-def _point_sd(adjustment: Adjustment, values: Array, covariance: Array) -> dict[str, float]:
-    """Give the standard deviation of a coordinate by device: its residuals over its share of the redundancy."""
+def _point_sd(adjustment: Adjustment, values: Array, covariance: Array) -> dict[str, Array]:
+    """Give the standard deviations (2,) of x and y by device: their residuals over their share of the redundancy."""
     residuals, jacobian = adjustment.residuals(values), adjustment.jacobian(values)
-    leverage = np.asarray((jacobian @ covariance * jacobian.toarray()).sum(axis=1)).ravel()
+    leverage = np.asarray((jacobian @ covariance * jacobian.toarray()).sum(axis=1)).reshape(-1, 2)
+    squared, counts = np.square(residuals).reshape(-1, 2), np.concatenate(adjustment.kept)
+    owner = np.concatenate([np.full(len(s.points_px), s.device) for s in adjustment.sights])
     found = {}
     for device in adjustment.devices:
-        rows = np.concatenate(
-            [
-                np.arange(r.start, r.stop)
-                for r, s in zip(adjustment.rows, adjustment.sights, strict=True)
-                if s.device == device
-            ]
-        )
-        redundancy = len(rows) - leverage[rows].sum()
-        found[device] = float(adjustment.sd_px[device] * np.sqrt(np.square(residuals[rows]).sum() / redundancy))
+        mine = counts & (owner == device)
+        redundancy = mine.sum() - leverage[mine].sum(axis=0)
+        scale = np.sqrt(squared[mine].sum(axis=0) / redundancy)
+        found[device] = np.maximum(adjustment.sd_px[device] * scale, LEAST_SD_PX)
     return found
 
 

@@ -32,8 +32,8 @@ class DeviceFit:
     """A calibrated device, what its parameters are good for, and what is left of each point.
 
     `device` holds T_device_camera, no motion for the camera. `residuals_px` are (n, 2) for each pose that the device
-    sees: predicted less found. `mean_px`, `rms_px` and `max_px` are of their lengths; the mean is the reprojection
-    error as published.
+    sees: predicted less found, NaN for the `left_out` points that were outliers. `mean_px`, `rms_px` and `max_px` are
+    of their lengths; the mean is the reprojection error as published.
     """
 
     device: DeviceModel
@@ -42,6 +42,7 @@ class DeviceFit:
     mean_px: float
     rms_px: float
     max_px: float
+    left_out: int
 
 
 def device_fit(
@@ -73,10 +74,20 @@ def device_fit(
         tuple(np.degrees(motion_sd[:3]).tolist()),
         tuple(motion_sd[3:].tolist()),
     )
-    raw = [r for r, s in zip(adjustment.raw(values), adjustment.sights, strict=True) if s.device == name]
+    seen = zip(adjustment.raw(values), adjustment.kept, adjustment.sights, strict=True)
+    raw = [np.where(kept[:, None], missed, np.nan) for missed, kept, sight in seen if sight.device == name]
     lengths = np.linalg.norm(np.concatenate(raw), axis=1)
-    rms = float(np.sqrt(np.square(lengths).mean()))
-    return DeviceFit(device, found, tuple(raw), float(lengths.mean()), rms, float(lengths.max()))
+    out = np.isnan(lengths)
+    lengths = lengths[~out]
+    return DeviceFit(
+        device,
+        found,
+        tuple(raw),
+        mean_px=float(lengths.mean()),
+        rms_px=float(np.sqrt(np.square(lengths).mean())),
+        max_px=float(lengths.max()),
+        left_out=int(out.sum()),
+    )
 
 
 def _padded(lens: Array) -> Array:

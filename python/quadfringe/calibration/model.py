@@ -50,12 +50,22 @@ class Sight:
 class Adjustment:
     """Residuals and Jacobian over all sights, for scipy's least squares; parameters are found by name.
 
-    With `radial3` false the third radial coefficient stays 0. `sd_px` are the standard deviations by device, by which
-    residuals are divided.
+    With `radial3` false the third radial coefficient stays 0. `sd_px` are the standard deviations (2,) along x and y by
+    device, by which residuals are divided: mirrors are not as far apart along columns as along rows, least of all in a
+    diamond, and fringes over both are not as fine. `kept` are the points (n,) of each sight that count; without it
+    all do.
     """
 
-    def __init__(self, sights: Sequence[Sight], poses: int, radial3: bool, sd_px: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        sights: Sequence[Sight],
+        poses: int,
+        radial3: bool,
+        sd_px: Mapping[str, Array],
+        kept: Sequence[NDArray[np.bool_]] | None = None,
+    ) -> None:
         self.sights, self.poses, self.sd_px = sights, poses, dict(sd_px)
+        self.kept = [np.ones(len(s.points_px), bool) for s in sights] if kept is None else list(kept)
         self.devices = [name for name in DEVICES if any(s.device == name for s in sights)]
         lens = LENS if radial3 else LENS[:-1]
         names: list[str] = []
@@ -85,11 +95,13 @@ class Adjustment:
         return [self._predicted(values, sight)[0] - sight.points_px for sight in self.sights]
 
     def residuals(self, values: Array) -> Array:
-        """Give independent residuals of unit variance, in one vector."""
-        raw = self.raw(values)
-        return np.concatenate([r.ravel() for r in self._decorrelated(raw)])
+        """Give independent residuals of unit variance, in one vector; 0 for points that do not count."""
+        own = self.independent(values)
+        return np.concatenate([(r * k[:, None]).ravel() for r, k in zip(own, self.kept, strict=True)])
 
-    def _decorrelated(self, raw: list[Array]) -> list[Array]:
+    def independent(self, values: Array) -> list[Array]:
+        """Give the residuals (n, 2) of each sight less the camera's share in them, in standard deviations."""
+        raw = self.raw(values)
         camera = {s.pose: r for s, r in zip(self.sights, raw, strict=True) if s.device == "camera"}
         out = []
         for sight, residual in zip(self.sights, raw, strict=True):
@@ -105,7 +117,7 @@ class Adjustment:
 
         blocks: list[tuple[slice, slice, Array]] = []
         camera: dict[int, list[tuple[slice, Array]]] = {}
-        for sight, rows in zip(self.sights, self.rows, strict=True):
+        for sight, rows, kept in zip(self.sights, self.rows, self.kept, strict=True):
             slopes = self._predicted(values, sight)[1]
             if sight.device == "camera":
                 camera[sight.pose] = slopes
@@ -113,8 +125,8 @@ class Adjustment:
                 slopes = slopes + [
                     (columns, -(sight.slope @ part[sight.camera_rows])) for columns, part in camera[sight.pose]
                 ]
-            sd = self.sd_px[sight.device]
-            blocks += [(rows, columns, part.reshape(-1, part.shape[2]) / sd) for columns, part in slopes]
+            weight = (kept[:, None] / self.sd_px[sight.device])[:, :, None]
+            blocks += [(rows, columns, (part * weight).reshape(-1, part.shape[2])) for columns, part in slopes]
         if self._at is None:  # where derivatives stand never changes
             index = [np.mgrid[r, c] for r, c, _ in blocks]
             self._at = tuple(np.concatenate([i[k].ravel() for i in index]) for k in (0, 1))

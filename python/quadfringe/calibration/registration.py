@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration.detect import View
 from quadfringe.config import Affine
 from quadfringe.errors import DecodeError, InputError
 
-__all__ = ["Registration", "register_infrared"]
+__all__ = ["Registration", "register_infrared", "register_views"]
 
 Array = NDArray[np.float64]
 POINTS_MIN = 12
@@ -82,6 +84,16 @@ def register_infrared(visible_px: Array, infrared_px: Array) -> Registration:
         rotation_deg=rotation,
         residuals_px=missed[kept],
     )
+
+
+def register_views(visible: Sequence[View], infrared: Sequence[View]) -> Registration:
+    """Register the chips by a board that both saw in the same poses; raises as `register_infrared`."""
+    seen = []
+    for views in zip(visible, infrared, strict=True):
+        shared = np.intersect1d(views[0].ids, views[1].ids)
+        seen.append(np.stack([view.points_px[np.searchsorted(view.ids, shared)] for view in views]))
+    points = np.concatenate(seen, axis=1)
+    return register_infrared(points[0], points[1])
 
 
 def _fit(visible: Array, infrared: Array) -> Array:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration.grid import through
 from quadfringe.calibration.model import Adjustment, Sight
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError
@@ -14,6 +15,7 @@ from quadfringe.errors import CalibrationError
 __all__ = ["check_distance", "first_values"]
 
 Array = NDArray[np.float64]
+GROSS = 20.0  # medians of what a homography misses: lenses bend the corners of a board by less
 SCALE_OFF = 0.1  # share by which a distance by tape may differ
 
 
@@ -40,8 +42,9 @@ def _alone(device: str, sights: list[Sight], size_px: tuple[int, int]) -> tuple[
     """Calibrate one device as a camera: lens parameters, and the motion (4, 4) of the board in each sight."""
     import cv2
 
-    boards = [s.board_mm.astype(np.float32) for s in sights]
-    points = [s.points_px.astype(np.float32) for s in sights]
+    whole = [_not_grossly_wrong(s) for s in sights]
+    boards = [s.board_mm[kept].astype(np.float32) for s, kept in zip(sights, whole, strict=True)]
+    points = [s.points_px[kept].astype(np.float32) for s, kept in zip(sights, whole, strict=True)]
     try:
         _, matrix, distortion, turns, moves = cv2.calibrateCamera(
             boards, points, size_px, None, None, flags=cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
@@ -59,6 +62,17 @@ def _alone(device: str, sights: list[Sight], size_px: tuple[int, int]) -> tuple[
         motion[:3, :3], motion[:3, 3] = cv2.Rodrigues(turn)[0], np.ravel(move)
         motions.append(motion)
     return lens, motions
+
+
+def _not_grossly_wrong(sight: Sight) -> NDArray[np.bool_]:
+    """Mark the points (n,) that a homography through most of them explains about as well as the others."""
+    import cv2
+
+    matrix, _ = cv2.findHomography(sight.board_mm[:, :2], sight.points_px, cv2.LMEDS)
+    if matrix is None:
+        return np.ones(len(sight.points_px), bool)
+    missed = np.linalg.norm(through(matrix, sight.board_mm[:, :2]) - sight.points_px, axis=1)
+    return np.asarray(missed <= GROSS * np.median(missed) + 1e-6)
 
 
 def _vector(motion: Array) -> Array:

@@ -72,6 +72,11 @@ def run(
         found = guide(FolderCaptures(captures, rig), lambda words: say(words, json))
     else:
         config = bench_config(system, noise=None if system else 0.01)
+        if config.capture.kind != "virtual":
+            raise InputError(
+                f"{system}: has a camera, not the virtual bench: take its captures with quadfringe calibrate capture "
+                "DIR --system FILE, then calibrate run --captures DIR"
+            )
         found = guide(BenchCaptures(config, bench_session(config, poses)), lambda words: say(words, json))
     if found.calibration is None:
         say("no calibration: take the missing captures and run this again", json)
@@ -135,6 +140,39 @@ def _list_captures(folder: Path) -> bool:
     if not lacking:
         say("nothing that is needed is missing: quadfringe calibrate run")
     return lacking
+
+
+@app.command()
+def capture(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder of captures, made by plan.")],
+    system: Annotated[Path, typer.Option(metavar="FILE", help="System with the camera and both projectors, .toml.")],
+    step: Annotated[list[str] | None, typer.Option(metavar="STEP", help="Only this step; may be repeated.")] = None,
+) -> None:
+    """Take the captures that are missing: says what to put where, waits for Enter, shows the light and takes the shot.
+
+    A pose in which the board is not seen is taken again at once. Interrupted, it goes on where it was. On the virtual
+    bench nobody is asked.
+    """
+    from quadfringe.capture import VirtualConfig
+    from quadfringe.config import load_system
+    from quadfringe.guide import FolderCaptures, take_captures
+    from quadfringe.guide.bench import BenchCaptures
+    from quadfringe.guide.session import STEP_NAMES, step_named
+
+    told: set[str] = set()
+
+    def person(step: str, name: str, _: object) -> None:
+        if step not in told:
+            say(step_named(step).how)
+        if step not in told or step not in ("dark", "levels", "flat"):
+            typer.prompt(f"{step}/{name}: Enter when it stands still", default="", show_default=False)
+        told.add(step)
+
+    config, session = load_system(system), FolderCaptures(folder).session
+    virtual = isinstance(config.capture, VirtualConfig)
+    hands = BenchCaptures(config, session).hands if virtual else person
+    taken = take_captures(config, folder, hands, step or STEP_NAMES, say)
+    say(f"{folder}: {len(taken)} captures taken; now quadfringe calibrate check {folder}")
 
 
 @app.command()

@@ -11,6 +11,8 @@ from typing import Literal, Protocol, Self
 from quadfringe.capture import capture_config
 from quadfringe.config import Fringes, SystemConfig
 from quadfringe.data import AnyShot, Calibration
+from quadfringe.errors import ConfigError
+from quadfringe.projection import Light
 
 __all__ = [
     "Camera",
@@ -29,10 +31,13 @@ Keep = Literal["latest", "all"]
 
 
 class Projector(Protocol):
-    """Shows the fringes of one shot: a composite colour image and an infrared one, at the same instant."""
+    """Shows a composite colour image and an infrared one, at one instant: the fringes of a shot, or other light."""
 
-    def show(self, fringes: Fringes) -> None:
-        """Project these fringes until told otherwise; ValueError when they cannot number the field."""
+    def show(self, light: Light) -> None:
+        """Project this light until told otherwise; ValueError for fringes that cannot number the field.
+
+        Levels and single steps are what a calibration asks for; ValueError when this projector cannot show them.
+        """
 
     def close(self) -> None:
         """Release the device; closing twice is allowed."""
@@ -123,8 +128,12 @@ class Camera(Protocol):
 class ExternalLight:
     """Fringes that somebody else shows, or that were shown when a recording was made."""
 
-    def show(self, fringes: Fringes) -> None:
-        """Trust that these fringes are there."""
+    def show(self, light: Light) -> None:
+        """Trust that these fringes are there; raises `ConfigError` for the changing light of a calibration."""
+        if not isinstance(light, Fringes):
+            raise ConfigError(
+                "no projector of this system can show the light of a calibration: name them under [projectors]"
+            )
 
     def close(self) -> None:
         """Nothing to release."""

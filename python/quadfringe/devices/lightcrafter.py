@@ -26,7 +26,7 @@ from quadfringe._core import (
 )
 from quadfringe.config import Fringes, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.data import Calibration
-from quadfringe.projection import predeformation, projector_images
+from quadfringe.projection import Light, light_images, predeformation
 
 __all__ = [
     "SIZE_PX",
@@ -65,26 +65,26 @@ class PatternProjector:
                 self._window = opened.enter_context(PatternWindow(config.hdmi.output))
             self._opened = opened.pop_all()
 
-    def show(self, fringes: Fringes, image: NDArray[np.uint8]) -> None:
-        """Show these fringes, whose image is (1140, 912) or (1140, 912, 3) uint8, until told otherwise.
+    def show(self, light: Light, image: NDArray[np.uint8]) -> None:
+        """Show this light, whose image is (1140, 912) or (1140, 912, 3) uint8, until told otherwise.
 
-        From flash they must be the fringes that are in it: ValueError otherwise.
+        From flash it must be the fringes that are in it: ValueError otherwise.
         """
         if self._window is not None:
             self._window.show(_as_colour(image))
         else:
-            self._check_flash(fringes)
+            self._check_flash(light)
         if not self._playing:
             self.device.play(self._sequence())
             self._playing = True
 
-    def _check_flash(self, fringes: Fringes) -> None:
+    def _check_flash(self, light: Light) -> None:
         flash = self.config.flash
         assert flash is not None  # one of the two routes is there
-        if flash.fringes != fringes:
+        if flash.fringes != light:
             raise ValueError(
                 f"projector at {self.device.port}: flash image {flash.image} has fringes "
-                f"{_named(flash.fringes)}, asked for {_named(fringes)}; write them to flash, or use hdmi"
+                f"{_named(flash.fringes)}, asked for {_named(light)}; write them to flash, or use hdmi"
             )
         self.device.check_flash(flash.image + 1, flash.firmware_tag)
 
@@ -157,16 +157,16 @@ class CoaxialPair:
             self.infrared = opened.enter_context(PatternProjector(config.infrared, colour=False))
             self._opened = opened.pop_all()
 
-    def show(self, fringes: Fringes) -> None:
-        """Show these fringes until told otherwise.
+    def show(self, light: Light) -> None:
+        """Show this light until told otherwise.
 
-        ValueError when they cannot number the field, are not in flash, or are pre-deformed and the calibration does not
-        know both projectors.
+        ValueError for fringes that cannot number the field, are not in flash, or are pre-deformed while the calibration
+        does not know both projectors. The light of a calibration needs HDMI.
         """
-        deformed = predeformation(fringes, self._calibration)
-        visible, infrared = projector_images(fringes.numbers, SIZE_PX, fringes.layout, deformed)
-        self.visible.show(fringes, visible)
-        self.infrared.show(fringes, infrared)
+        deformed = predeformation(light, self._calibration) if isinstance(light, Fringes) else None
+        visible, infrared = light_images(light, SIZE_PX, deformed)
+        self.visible.show(light, visible)
+        self.infrared.show(light, infrared)
 
     def start(self) -> None:
         """Go on after a pause or a stop."""
@@ -232,6 +232,8 @@ def _as_colour(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     return np.ascontiguousarray(image)
 
 
-def _named(fringes: Fringes) -> str:
+def _named(fringes: Light) -> str:
+    if not isinstance(fringes, Fringes):
+        return "the light of a calibration"
     plane = "" if fringes.predeformed_z_mm is None else f", pre-deformed for {fringes.predeformed_z_mm:g} mm"
     return " ".join(f"{number:g}" for number in fringes.numbers) + f" ({fringes.layout}{plane})"

@@ -19,11 +19,12 @@ from quadfringe.decoding import core_device, device_model
 from quadfringe.devices import CameraStatistics, Devices, Keep
 from quadfringe.errors import ConfigError, DecodeError, InputError
 from quadfringe.export import read_npy
-from quadfringe.projection import eight_bit, predeformation
+from quadfringe.projection import Levels, Light, Step, eight_bit, predeformation
 
 __all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector", "open_devices"]
 
 EDGE_PX = 2.0  # pixels nearer to an edge than this belong to it: lens and pixel mix both sides
+NOT_LIGHT = {"surface", "height_map", "time_s", "infrared_from_visible"}
 CHANNELS = ("red", "green", "blue", "ir")
 
 
@@ -47,12 +48,15 @@ class VirtualBench:
     def __init__(self, config: SystemConfig) -> None:
         given = {"camera": config.camera, "visible": config.projector, "infrared": config.infrared}
         devices = {name: core_device(model) for name, model in given.items() if model is not None}
-        self._bench = _core.Bench(**devices, layout=config.fringes.layout)
+        self._bench = _core.Bench(
+            **devices, layout=config.fringes.layout, infrared_from_visible=config.scene.infrared_from_visible
+        )
         self._scene = config.scene
         self._cast: tuple[float, _core.Cast] | None = None
         self._placed: tuple[_core.Cast, NDArray[np.float32] | None] | None = None
         self._exposures = 0
-        self.projected: Fringes | Row4 | None = None
+        self.projected: Light | None = None
+        self.capped = False  # whether the lens is covered
         self._infrared_image: NDArray[np.float32] | None = None
 
     def resolved(self, config: SystemConfig) -> SystemConfig:
@@ -93,7 +97,11 @@ class VirtualBench:
 
     def project_levels(self, levels: Row4) -> None:
         """Light the scene evenly from now on, each channel (R, G, B, IR) at a level of its own from 0 to 1."""
-        self.projected = levels
+        self.projected = Levels(levels)
+
+    def project_step(self, step: Step) -> None:
+        """Light the scene with one step of an N-step capture from now on."""
+        self.projected = step
 
     def place_plane(self, point_mm: Triple, normal: Triple) -> None:
         """Put a plane through a point before the camera, in place of the scene; its normal points to the camera."""
@@ -143,11 +151,15 @@ class VirtualBench:
         """
         if self.projected is None:
             raise DecodeError("the projector shows nothing: call show(fringes) before snap()")
-        cast, light = self._before_camera(after_s), self._light(seed, 0.0 if capped else exposure)
+        cast, light = self._before_camera(after_s), self._light(seed, 0.0 if capped or self.capped else exposure)
         if isinstance(self.projected, Fringes):
             light["infrared_image"] = self._infrared_image
             return self._shot(self._bench.render(cast, self.projected.numbers, **light), self._truth(cast))
-        return self._shot(self._bench.render_levels(cast, self.projected, **light), None)
+        if isinstance(self.projected, Levels):
+            return self._shot(self._bench.render_levels(cast, self.projected.levels, **light), None)
+        step = self.projected
+        images = self._bench.render_step(cast, step.number, step.shift_rad, axis=step.axis, beam=step.beam, **light)
+        return self._shot(images, None)
 
     def _before_camera(self, after_s: float = 0.0) -> _core.Cast:
         """Give what the camera looks at: what was placed there, else the scene."""
@@ -166,7 +178,7 @@ class VirtualBench:
 
     def _light(self, seed: int | None, exposure: float = 1.0) -> dict[str, Any]:
         """Give the settings of light and camera that are present, as the kernel names them."""
-        light = self._scene.model_dump(exclude_none=True, exclude={"surface", "height_map", "time_s"})
+        light = self._scene.model_dump(exclude_none=True, exclude=NOT_LIGHT)
         if exposure != 1.0:
             light["gain"] = tuple(exposure * gain for gain in self._scene.gain or (1.0,) * 4)
         if self._placed is not None and self._placed[1] is not None:
@@ -204,9 +216,14 @@ class VirtualProjector:
         self._bench = bench
         self._calibration = calibration
 
-    def show(self, fringes: Fringes) -> None:
-        """Light the bench with these fringes; ValueError when they cannot number the field."""
-        self._bench.project(fringes, self._calibration)
+    def show(self, light: Light) -> None:
+        """Light the bench; ValueError for fringes that cannot number the field."""
+        if isinstance(light, Fringes):
+            self._bench.project(light, self._calibration)
+        elif isinstance(light, Levels):
+            self._bench.project_levels(light.levels)
+        else:
+            self._bench.project_step(light)
 
     def close(self) -> None:
         """Switch the light off."""
@@ -228,6 +245,11 @@ class VirtualCamera:
         self._rate_hz = (settings or VirtualConfig()).frame_rate_hz
         self._exposures = 0
         self._closed = False
+
+    @property
+    def bench(self) -> VirtualBench:
+        """The world that this camera looks at."""
+        return self._bench
 
     @property
     def calibration(self) -> Calibration:

@@ -1,11 +1,13 @@
 """The guided calibration: what to capture, what is missing, what came of it, in plain words.
 
-A thin layer over `quadfringe.calibration`: captures come from a folder or from the virtual bench, every step calls the
+A thin layer over `quadfringe.calibration`: captures come from a folder, which camera and
+projectors fill, or from the virtual bench; every step calls the
 functions there, and one `Calibration` with the record of every step comes out.
 """
 
 from quadfringe.guide.captures import Captures, FolderCaptures
 from quadfringe.guide.flow import Guided, guide
+from quadfringe.guide.live import take_captures
 from quadfringe.guide.session import Session, step_named
 
-__all__ = ["Captures", "FolderCaptures", "Guided", "Session", "guide", "step_named"]
+__all__ = ["Captures", "FolderCaptures", "Guided", "Session", "guide", "step_named", "take_captures"]

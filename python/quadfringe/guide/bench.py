@@ -14,10 +14,11 @@ from quadfringe.calibration.projector import ProjectorMap
 from quadfringe.calibration.targets import raster
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot
-from quadfringe.devices.virtual import PrintedBoard, VirtualBench
+from quadfringe.devices import Camera
+from quadfringe.devices.virtual import PrintedBoard, VirtualBench, VirtualCamera, VirtualProjector
 from quadfringe.errors import InputError
 from quadfringe.files import folder_for
-from quadfringe.guide.captures import pose_maps
+from quadfringe.guide.captures import light_of, pose_light, pose_maps
 from quadfringe.guide.session import FILE, STEP_NAMES, Session
 from quadfringe.images import write_image
 from quadfringe.rehearsal import INK, PAPER, TEXEL_MM, board_poses
@@ -26,7 +27,7 @@ from quadfringe.shots import write_shot
 __all__ = ["BenchCaptures", "bench_session"]
 
 BOARD_MM = 800.0  # where the white board stands
-FLAT_LEVEL = 0.6
+LEVEL = (0.0, 0.0, -1.0)
 TILTED = (0.2588, 0.0, -0.9659)  # normal of the plane of the acceptance test
 
 
@@ -66,11 +67,11 @@ class BenchCaptures:
         """Render one shot."""
         exposure = self._arrange(step, name)
         seed = crc32(f"{self._config.scene.seed or 0}/{step}/{name}".encode())
-        return self._bench.expose(seed=seed, exposure=exposure, capped=step == "dark")
+        return self._bench.expose(seed=seed, exposure=exposure)
 
     def pose(self, name: str) -> dict[str, ProjectorMap]:
         """Render the fringes of one pose of the board, and decode them as those of a folder are."""
-        self._bench.place(self._board, self._poses[name])
+        self._place(self._bench, "poses", name)
         return pose_maps(self.session, lambda image: np.asarray(self._fringes(image) / self._full_scale, np.float32))
 
     def write(self, folder: Path, steps: Iterable[str] = STEP_NAMES) -> list[Path]:
@@ -88,7 +89,7 @@ class BenchCaptures:
         return written
 
     def _write_pose(self, folder: Path, name: str) -> None:
-        self._bench.place(self._board, self._poses[name])
+        self._place(self._bench, "poses", name)
         for beam in self.session.beams:
             folder_for(folder / beam)
         for image in self.session.pose_images():
@@ -96,9 +97,9 @@ class BenchCaptures:
 
     def _fringes(self, image: str) -> NDArray[Any]:
         """Render one fringe image of the pose that stands there; the green channel stands for the visible ones."""
-        beam, _, name = image.partition("/")
-        axis, number, step = name.split("_")
-        shot = self._bench.expose_step(float(number), self.session.step_plan.shift_rad(int(step)), axis, beam)
+        light = pose_light(self.session, image)
+        beam = light.beam
+        shot = self._bench.expose_step(light.number, light.shift_rad, light.axis, beam)
         return shot.channels["green" if beam == "visible" else "ir"]
 
     @property
@@ -107,22 +108,25 @@ class BenchCaptures:
 
     def _arrange(self, step: str, name: str) -> float:
         """Put the right thing under the right light, and give the relative exposure."""
-        board = ((0.0, 0.0, BOARD_MM), (0.0, 0.0, -1.0))
-        if step in ("dark", "levels", "flat"):
-            self._bench.place_plane(*board)
-            plan = self.session.level_plan
-            row = plan.names.index(name) if step == "levels" else 0
-            light = plan.levels[row] if step == "levels" else (FLAT_LEVEL if step == "flat" else 0.0,) * 4
-            self._bench.project_levels((float(light[0]), float(light[1]), float(light[2]), float(light[3])))
-            return float(plan.exposure[row]) if step == "levels" else 1.0
-        self._bench.project(self.session.fringes)
-        if step == "planes":
-            height = self.session.heights_mm[self.session.captures("planes").index(name)]
-            self._bench.place_plane((0.0, 0.0, BOARD_MM - height), board[1])
+        self._place(self._bench, step, name)
+        light, exposure = light_of(self.session, step, name)
+        VirtualProjector(self._bench).show(light)
+        return exposure
+
+    def _place(self, bench: VirtualBench, step: str, name: str) -> None:
+        """Put what a capture is of before a bench."""
+        bench.capped = step == "dark"
+        if step == "poses":
+            bench.place(self._board, self._poses[name])
         elif name == "plane_1":
-            self._bench.place_plane((0.0, 0.0, BOARD_MM), TILTED)
-        elif name == "sphere_1":
-            self._bench.place_scene("sphere")
+            bench.place_plane((0.0, 0.0, BOARD_MM), TILTED)
+        elif name in ("sphere_1", "steps_1"):
+            bench.place_scene(name.removesuffix("_1"))
         else:
-            self._bench.place_scene("steps")
-        return 1.0
+            height_mm = self.session.heights_mm[self.session.captures(step).index(name)] if step == "planes" else 0.0
+            bench.place_plane((0.0, 0.0, BOARD_MM - height_mm), LEVEL)
+
+    def hands(self, step: str, name: str, camera: Camera) -> None:
+        """Be the person of `take_captures` on a virtual bench."""
+        assert isinstance(camera, VirtualCamera)
+        self._place(camera.bench, step, name)

@@ -14,9 +14,12 @@ from quadfringe.data import AnyShot
 from quadfringe.errors import InputError
 from quadfringe.guide.session import FILE, Session
 from quadfringe.images import full_scale, read_grey
+from quadfringe.projection import Levels, Light, Step
 from quadfringe.shots import SUFFIXES, read_folder
 
-__all__ = ["Captures", "FolderCaptures", "pose_maps"]
+__all__ = ["Captures", "FolderCaptures", "light_of", "pose_light", "pose_maps"]
+
+FLAT_LEVEL = 0.6  # of full light, out of focus
 
 
 class Captures(Protocol):
@@ -56,10 +59,14 @@ class FolderCaptures:
             return [name for name in names if not _has_images(self.folder / step / name)]
         found = []
         for name in names:
-            lacks = [image for image in self.session.pose_images() if _file(self.folder / step / name, image) is None]
+            lacks = self.lacking_images(name)
             if lacks:
                 found.append(name if len(lacks) == len(self.session.pose_images()) else f"{name} ({_some(lacks)})")
         return found
+
+    def lacking_images(self, pose: str) -> list[str]:
+        """Give the fringe images that a pose lacks, such as visible/columns_36_0."""
+        return [image for image in self.session.pose_images() if _file(self.folder / "poses" / pose, image) is None]
 
     def shot(self, step: str, name: str) -> AnyShot:
         """Read one shot."""
@@ -88,6 +95,26 @@ class FolderCaptures:
                 f"{name}: {image.shape[1]} x {image.shape[0]} pixels, the captures before have {self._size[1]} x "
                 f"{self._size[0]}; all captures of a session must be of one camera and one size"
             )
+
+
+def light_of(session: Session, step: str, name: str) -> tuple[Light, float]:
+    """Give what the projectors show for a capture that is one shot, and its relative exposure."""
+    if step == "levels":
+        plan = session.level_plan
+        row = plan.names.index(name)
+        red, green, blue, ir = plan.levels[row].tolist()
+        return Levels((red, green, blue, ir)), float(plan.exposure[row])
+    if step in ("dark", "flat"):
+        return Levels((FLAT_LEVEL if step == "flat" else 0.0,) * 4), 1.0
+    return session.fringes, 1.0
+
+
+def pose_light(session: Session, image: str) -> Step:
+    """Give what the projectors show for an image of a pose, such as visible/columns_36_0."""
+    beam, _, name = image.partition("/")
+    axis, number, step = name.split("_")
+    shift_rad = session.step_plan.shift_rad(int(step))
+    return Step(float(number), shift_rad, axis, beam, session.fringes.layout)
 
 
 def pose_maps(session: Session, image: Callable[[str], NDArray[np.float32]]) -> dict[str, ProjectorMap]:

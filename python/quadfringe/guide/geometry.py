@@ -13,7 +13,7 @@ from quadfringe.calibration.bundle import Pose, RigCalibration, calibrate_rig
 from quadfringe.calibration.detect import View, find_target
 from quadfringe.calibration.height import HeightCalibration, compare_heights, fit_heights, heights_over
 from quadfringe.calibration.projector import ProjectorMap, projector_points
-from quadfringe.calibration.registration import Registration, register_infrared
+from quadfringe.calibration.registration import Registration, register_views
 from quadfringe.data import Calibration, Shape
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.errors import CalibrationError, DecodeError
@@ -34,13 +34,12 @@ REGISTERED_MAX_PX = 0.2
 def registration(captures: Captures, maps: Maps) -> Outcome:
     """Where the infrared chip sees what the visible chip sees, from the board of all poses."""
     target = captures.session.target
-    seen: list[Array] = []
-    for name, pose in maps.items():
-        views = [_view(pose[beam], target, f"pose {name}, {beam}") for beam in ("visible", "infrared")]
-        shared = np.intersect1d(views[0].ids, views[1].ids)
-        seen.append(np.stack([view.points_px[np.searchsorted(view.ids, shared)] for view in views]))
-    points = np.concatenate(seen, axis=1)
-    found = register_infrared(points[0], points[1])
+    found = register_views(
+        *(
+            [_view(pose[beam], target, f"pose {name}, {beam}") for name, pose in maps.items()]
+            for beam in ("visible", "infrared")
+        )
+    )
     problems = []
     if found.after_rms_px > REGISTERED_MAX_PX:
         problems.append(f"the chips still lie {found.after_rms_px:.2f} px apart; focus both, and keep the board still")
@@ -70,10 +69,13 @@ def poses(captures: Captures, maps: Maps, registered: Registration | None) -> Ou
     covered = coverage([pose.view for pose in observed])
     figures = {f"{name}_mean_px": fit.mean_px for name, fit in fits.items()}
     figures |= {f"{name}_worst_px": fit.max_px for name, fit in fits.items()}
+    figures |= {f"{name}_left_out": float(fit.left_out) for name, fit in fits.items()}
     figures["covered_percent"] = 100 * float((covered > 0).mean())
     problems = _pose_problems(figures, covered)
     means = ", ".join(f"{name} {fit.mean_px:.3f} px" for name, fit in fits.items())
     good = f"mean reprojection error: {means}; the board covered {figures['covered_percent']:.0f} % of the image"
+    lost = sum(fit.left_out for fit in fits.values())
+    good += f"; {lost} wrong points were left out" if lost else ""
     step = record("poses", tuple(maps), figures, problems, good, _observations(rig, observed))
     fields = {name: fit.device for name, fit in fits.items()}
     return Outcome(step, fields, {"rig": rig, "observed": observed, "covered": covered})

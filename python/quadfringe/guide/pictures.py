@@ -93,7 +93,7 @@ def _poses(figure: Any, outcome: Outcome) -> None:
         left.plot(*pose.view.points_px.T, ".", ms=2)
         left.text(*pose.view.points_px.mean(axis=0), str(i), fontsize=9)
     left.set(title="where the board was seen", xlabel="x, px", ylabel="y, px", xlim=(0, width), ylim=(height, 0))
-    longest = max(float(np.abs(missed).max()) for missed in rig.camera.residuals_px)
+    longest = max(float(np.nanmax(np.abs(missed))) for missed in rig.camera.residuals_px)
     times = 10.0 ** np.floor(np.log10(ARROW * width / max(longest, 1e-9)))
     for pose, missed in zip(observed, rig.camera.residuals_px, strict=True):
         middle.quiver(*pose.view.points_px.T, *missed.T, angles="xy", scale_units="xy", scale=1 / times, width=0.003)
@@ -102,7 +102,7 @@ def _poses(figure: Any, outcome: Outcome) -> None:
     fits = [("camera", rig.camera), ("projector", rig.visible), ("infrared", rig.infrared)]
     shown = [(name, fit) for name, fit in fits if fit is not None]
     for i, (name, fit) in enumerate(shown):
-        means = [float(np.linalg.norm(missed, axis=1).mean()) for missed in fit.residuals_px]
+        means = [float(np.nanmean(np.linalg.norm(missed, axis=1))) for missed in fit.residuals_px]
         right.bar(np.arange(1, len(means) + 1) + 0.27 * (i - 1), means, width=0.25, label=name)
     right.set(title="mean reprojection error of each pose", xlabel="pose", ylabel="px")
     right.legend(fontsize=8)

@@ -79,8 +79,8 @@ class Pair:
     @property
     def bench(self) -> _core.Bench:
         """The kernel's bench."""
-        devices = (core_device(device) for device in (self.camera, self.visible, self.infrared))
-        return _core.Bench(**dict(zip(("camera", "visible", "infrared"), devices, strict=True)), layout=self.layout)
+        camera, visible, infrared = (core_device(device) for device in (self.camera, self.visible, self.infrared))
+        return _core.Bench(camera=camera, visible=visible, infrared=infrared, layout=self.layout)
 
     @property
     def calibration(self) -> Calibration:

@@ -106,7 +106,8 @@ def _draw(path: Path, found: RigCalibration, figures: Mapping[str, float]) -> No
         x = np.arange(len(axes), dtype=float)
         error = np.array([figures[f"{axis}_error"] for axis in axes])
         reach = np.array([figures[f"{axis}_interval"] for axis in axes])
-        lines = {"error": (x, error), "joint 95 % interval": (np.tile(x, 2), np.concatenate([reach, -reach]))}
-        errors.append(Graph(f"pair: {words}", "axis: x, y, z", words.rsplit(" ", 1)[1], lines, points=True))
+        name = "error, joint 95 % interval"
+        lines, unit = {name: (x, error)}, words.rsplit(" ", 1)[1]
+        errors.append(Graph(f"pair: {words}", "axis", unit, lines, points=True, spread={name: reach}, ticks=axes))
     row = [residuals("visible", "visible projector"), residuals("infrared", "infrared projector"), *errors]
     draw_panels(path, "both projectors calibrated: residuals and the pair", [row])

@@ -61,16 +61,30 @@ impl Hit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cast {
     pub(super) hits: Array2<Hit>,
+    /// The same for the pixels of an infrared chip that sees something else.
+    pub(super) infrared_hits: Option<Array2<Hit>>,
     /// Depth difference of neighbouring pixels above which a step lies between them, in mm per mm of depth.
     pub(super) step_per_depth: f64,
 }
 
 impl Bench {
-    /// Traces the camera pixels to the surface and the surface to both projectors; rows in parallel.
+    /// Traces the pixels of both chips to the surface and the surface to both projectors; rows in parallel.
     ///
     /// A point is lit by a projector when it faces it, lies within the projected image and nothing stands between.
     #[must_use]
     pub fn cast(&self, surface: &dyn Surface) -> Cast {
+        let infrared = self.visible_from_infrared();
+        // Four pixels' footprint per pixel: a wall steeper than 76 degrees.
+        let step_per_depth = 4.0 / self.camera.focal_px[0].min(self.camera.focal_px[1]);
+        Cast {
+            hits: self.hits(surface, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
+            infrared_hits: infrared.map(|from_infrared| self.hits(surface, from_infrared)),
+            step_per_depth,
+        }
+    }
+
+    /// What the pixels (x, y) of a chip see, which look where `visible` takes (x, y, 1).
+    fn hits(&self, surface: &dyn Surface, visible: [[f64; 3]; 2]) -> Array2<Hit> {
         let size = (self.camera.height, self.camera.width);
         let mut hits = Array2::from_elem(size, Hit::NOTHING);
         let coaxial = self.visible == self.infrared;
@@ -80,7 +94,8 @@ impl Bench {
         });
         hits.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
             for (column, hit) in line.iter_mut().enumerate() {
-                let ray = self.camera.ray([column as f64, row as f64]);
+                let pixel = visible.map(|r| r[0] * column as f64 + r[1] * row as f64 + r[2]);
+                let ray = self.camera.ray(pixel);
                 let Some(t) = surface.hit(&ray, [0.0, f64::INFINITY]) else {
                     continue;
                 };
@@ -99,9 +114,7 @@ impl Bench {
                 }
             }
         });
-        // Four pixels' footprint per pixel: a wall steeper than 76 degrees.
-        let step_per_depth = 4.0 / self.camera.focal_px[0].min(self.camera.focal_px[1]);
-        Cast { hits, step_per_depth }
+        hits
     }
 }
 

@@ -5,6 +5,8 @@ use ndarray::Array3;
 use crate::error::{Error, Result};
 use crate::optics::BayerPattern;
 
+use super::Beam;
+
 /// Share of light that the surface gives back in each channel.
 ///
 /// ```
@@ -24,7 +26,8 @@ pub enum Albedo {
         /// Albedo of the lightest square: R, G, B, IR.
         albedo: [f32; 4],
     },
-    /// One albedo for each camera pixel and channel, `(rows, columns, 4)`.
+    /// One albedo for each camera pixel and channel, `(rows, columns, 4)`; or `(rows, columns, 8)`, the last four as the
+    /// infrared chip sees them.
     Image(Array3<f32>),
 }
 
@@ -39,8 +42,8 @@ const PATCH_COLOURS: [[f32; 4]; 6] = [
 ];
 
 impl Albedo {
-    /// Albedo of the surface point (mm) seen by the pixel (row, column).
-    pub(super) fn at(&self, pixel: [usize; 2], [x, y, _]: [f64; 3]) -> [f32; 4] {
+    /// Albedo of the surface point (mm) seen by the pixel (row, column) of the chip of a beam.
+    pub(super) fn at(&self, chip: Beam, pixel: [usize; 2], [x, y, _]: [f64; 3]) -> [f32; 4] {
         match self {
             Self::Uniform(albedo) => *albedo,
             Self::Patches { side_mm, albedo } => {
@@ -49,7 +52,10 @@ impl Albedo {
                 let colour = (square(x) + 2 * square(y)).rem_euclid(count) as usize;
                 std::array::from_fn(|c| albedo[c] * PATCH_COLOURS[colour][c])
             }
-            Self::Image(image) => std::array::from_fn(|c| image[[pixel[0], pixel[1], c]]),
+            Self::Image(image) => {
+                let first = chip.index() * (image.shape()[2] - 4);
+                std::array::from_fn(|c| image[[pixel[0], pixel[1], first + c]])
+            }
         }
     }
 
@@ -62,7 +68,7 @@ impl Albedo {
             }
             Self::Image(image) => {
                 let expected = [shape.0, shape.1, 4];
-                if image.shape() != expected {
+                if image.shape() != expected && image.shape() != [shape.0, shape.1, 8] {
                     return Err(Error::shape("albedo image", &expected, image.shape()));
                 }
                 image.iter().all(valid)
@@ -168,8 +174,6 @@ pub struct RenderOptions {
     pub gain: [f64; 4],
     /// Lens blur: standard deviation of a Gaussian, px.
     pub blur_px: f64,
-    /// Where the point seen at the visible pixel (x, y) falls on the infrared chip: rows of an affine map of (x, y, 1).
-    pub infrared_from_visible: Option<[[f64; 3]; 2]>,
     /// Sensor noise: standard deviation as a share of full scale.
     pub noise: f64,
     /// Dark level of the camera, as a share of full scale.
@@ -200,7 +204,6 @@ impl Default for RenderOptions {
             crosstalk: NO_CROSSTALK,
             gain: [1.0; 4],
             blur_px: 0.0,
-            infrared_from_visible: None,
             noise: 0.0,
             camera_offset: [0.0; 4],
             camera_exponent: [1.0; 4],
@@ -235,9 +238,6 @@ impl RenderOptions {
         }
         if self.demosaic.is_some() && self.bayer.is_none() {
             return Err(Error::value("demosaic", "a Bayer pattern to interpolate", "none"));
-        }
-        if let Some(affine) = self.infrared_from_visible {
-            super::resample::inverse(affine)?;
         }
         self.albedo.check(shape)
     }

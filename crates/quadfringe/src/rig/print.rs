@@ -114,29 +114,36 @@ impl Print {
 }
 
 impl Bench {
-    /// Albedo that the camera sees of a print, `(rows, columns, 4)` for [`super::Albedo::Image`]: the mean over each pixel,
-    /// so that edges lie where they are to a fraction of a pixel.
+    /// Albedo that the camera sees of a print, `(rows, columns, 4)` for [`super::Albedo::Image`], or `(rows, columns, 8)`
+    /// with an infrared chip that sees something else: the mean over each pixel, so that edges lie where they are to a
+    /// fraction of a pixel.
     ///
     /// # Errors
     /// [`Error::Value`] when the print is not one.
     pub fn printed(&self, print: &Print) -> Result<Array3<f32>> {
         print.check()?;
+        let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let chips: Vec<_> = [Some(straight), self.visible_from_infrared()].into_iter().flatten().collect();
         let (rows, columns) = (self.camera.height, self.camera.width);
-        let corner =
-            |row: usize, column: usize| print.texel(&self.camera, [column as f64 - 0.5, row as f64 - 0.5]);
-        let mut albedo = Array3::zeros((rows, columns, 4));
-        albedo.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
-            let [upper, lower] =
-                [row, row + 1].map(|row| (0..=columns).map(|column| corner(row, column)).collect::<Vec<_>>());
-            for column in 0..columns {
-                let corners = [upper[column], upper[column + 1], lower[column], lower[column + 1]];
-                let inked = print.mean(corners) as f32;
-                for channel in 0..4 {
-                    let (paper, ink) = (print.paper[channel], print.ink[channel]);
-                    line[[column, channel]] = paper + inked * (ink - paper);
+        let mut albedo = Array3::zeros((rows, columns, 4 * chips.len()));
+        for (first, visible) in (0..).step_by(4).zip(chips) {
+            let corner = |row: usize, column: usize| {
+                let (x, y) = (column as f64 - 0.5, row as f64 - 0.5);
+                print.texel(&self.camera, visible.map(|r| r[0] * x + r[1] * y + r[2]))
+            };
+            albedo.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
+                let [upper, lower] = [row, row + 1]
+                    .map(|row| (0..=columns).map(|column| corner(row, column)).collect::<Vec<_>>());
+                for column in 0..columns {
+                    let corners = [upper[column], upper[column + 1], lower[column], lower[column + 1]];
+                    let inked = print.mean(corners) as f32;
+                    for channel in 0..4 {
+                        let (paper, ink) = (print.paper[channel], print.ink[channel]);
+                        line[[column, first + channel]] = paper + inked * (ink - paper);
+                    }
                 }
-            }
-        });
+            });
+        }
         Ok(albedo)
     }
 }

@@ -3,7 +3,7 @@
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
-use super::{Beam, Bench, Cast, Hit, Light, RenderOptions, expose, mosaic, resample};
+use super::{Beam, Bench, Cast, Hit, Light, RenderOptions, blur, expose, mosaic};
 use crate::error::{Error, Result};
 use crate::fringe::Channel;
 
@@ -82,8 +82,8 @@ impl Depth {
 impl Bench {
     /// The shot of a scene at rest.
     ///
-    /// Light, projector response, albedo, shading and room light, crosstalk, exposure, blur, chip offset, noise, camera
-    /// response, saturation, rounding, Bayer chip: in this order. Bit-identical for any number of threads.
+    /// Light, projector response, albedo, shading and room light, crosstalk, exposure, blur, noise, camera response,
+    /// saturation, rounding, Bayer chip: in this order. Bit-identical for any number of threads.
     ///
     /// # Errors
     /// [`Error::Shape`] when the cast, a pattern image or an albedo image has the wrong size; [`Error::Value`] when an
@@ -127,10 +127,7 @@ impl Bench {
         options.check(shape)?;
         let mut planes = self.light_on_sensor(casts, lights, options);
         if options.blur_px > 0.0 {
-            planes = planes.map(|plane| resample::blur(&plane, options.blur_px));
-        }
-        if let Some(affine) = options.infrared_from_visible {
-            planes[3] = resample::warp(&planes[3], resample::inverse(affine)?);
+            planes = planes.map(|plane| blur::blur(&plane, options.blur_px));
         }
         for (channel, plane) in planes.iter_mut().enumerate() {
             expose::expose(plane, channel, options);
@@ -162,6 +159,7 @@ impl Bench {
         let [red, green, blue, infrared] = &mut planes;
         let moving = casts.iter().any(|cast| !std::ptr::eq(*cast, casts[0]));
         let painter = Painter { bench: self, lights, options };
+        let infrared_hits = casts[0].infrared_hits.is_some().then(|| casts.map(Cast::infrared_hits));
         red.axis_iter_mut(Axis(0))
             .into_par_iter()
             .zip(green.axis_iter_mut(Axis(0)))
@@ -172,11 +170,13 @@ impl Bench {
                 for column in 0..shape.1 {
                     let pixel = [row, column];
                     let hits = casts.map(|cast| &cast.hits[pixel]);
-                    let captured = painter.captured(pixel, hits, moving);
-                    red[column] = captured[0];
-                    green[column] = captured[1];
-                    blue[column] = captured[2];
-                    infrared[column] = captured[3];
+                    let light = painter.light(Beam::Visible, pixel, hits, moving);
+                    red[column] = painter.captured(Channel::R, light);
+                    green[column] = painter.captured(Channel::G, light);
+                    blue[column] = painter.captured(Channel::B, light);
+                    let own = infrared_hits.map(|all| all.map(|hits| &hits[pixel]));
+                    let light = own.map_or(light, |own| painter.light(Beam::Infrared, pixel, own, moving));
+                    infrared[column] = painter.captured(Channel::Ir, light);
                 }
             });
         planes
@@ -191,21 +191,25 @@ struct Painter<'a, 'image> {
 }
 
 impl Painter<'_, '_> {
-    /// Light of the four captured channels; R, G and B each have their own instant.
-    fn captured(&self, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f32; 4] {
+    /// Light of the four projected channels on a pixel of a chip; R, G and B each have their own instant.
+    fn light(&self, chip: Beam, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f64; 4] {
         let mut light = [0.0; 4];
         for (channel, hit) in Channel::ALL.into_iter().zip(hits) {
-            light[channel.index()] = self.reflected(channel, pixel, hit);
+            light[channel.index()] = self.reflected(channel, chip, pixel, hit);
         }
-        let infrared = |hit: &Hit| self.reflected(Channel::Ir, pixel, hit);
+        let infrared = |hit: &Hit| self.reflected(Channel::Ir, chip, pixel, hit);
         light[3] = if moving { hits.into_iter().map(infrared).sum::<f64>() / 3.0 } else { infrared(hits[0]) };
-        std::array::from_fn(|c| {
-            let mixed = (0..4).map(|p| self.options.crosstalk[c][p] * light[p]).sum::<f64>();
-            (self.options.gain[c] * mixed) as f32
-        })
+        light
     }
 
-    fn reflected(&self, channel: Channel, pixel: [usize; 2], hit: &Hit) -> f64 {
+    /// What a channel captures of the light of all.
+    fn captured(&self, channel: Channel, light: [f64; 4]) -> f32 {
+        let row = &self.options.crosstalk[channel.index()];
+        let mixed = row.iter().zip(light).map(|(share, light)| share * light).sum::<f64>();
+        (self.options.gain[channel.index()] * mixed) as f32
+    }
+
+    fn reflected(&self, channel: Channel, chip: Beam, pixel: [usize; 2], hit: &Hit) -> f64 {
         if !hit.is_surface() {
             return 0.0;
         }
@@ -219,6 +223,6 @@ impl Painter<'_, '_> {
             let sent = if exponent == 1.0 { level } else { level.max(0.0).powf(exponent) };
             light += if self.options.shading { sent * hit.facing[beam.index()] } else { sent };
         }
-        light * f64::from(self.options.albedo.at(pixel, hit.xyz_mm)[index])
+        light * f64::from(self.options.albedo.at(chip, pixel, hit.xyz_mm)[index])
     }
 }

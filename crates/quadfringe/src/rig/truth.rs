@@ -18,6 +18,11 @@ impl Cast {
         &self.hits
     }
 
+    /// What each pixel of the infrared chip sees.
+    pub(super) fn infrared_hits(&self) -> &Array2<Hit> {
+        self.infrared_hits.as_ref().unwrap_or(&self.hits)
+    }
+
     /// Depth z in mm, NaN where nothing is seen.
     #[must_use]
     pub fn depth_mm(&self) -> Array2<f32> {
