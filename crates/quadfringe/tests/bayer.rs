@@ -17,12 +17,14 @@ fn mosaic(plain: &RenderOptions) -> RenderOptions {
     RenderOptions { bayer: Some(BAYER), ..plain.clone() }
 }
 
-/// Phase RMS (rad) over right pixels a fringe away from edges and from the rim of the image, where the infrared chip sees
-/// another part of the scene than the visible one.
+/// Pixels at the rim of the image that the infrared chip of [`MISALIGNED`] does not see: five and a half at most.
+const UNSEEN_PX: usize = 6;
+
+/// Phase RMS (rad) over right pixels a fringe away from edges and from the rim of what both chips see.
 fn inner_phase_rms_rad(decoded: &Decoded, cast: &Cast) -> f64 {
     let (truth, edge) = (cast.phase_rad(&code()), cast.edge_distance_px());
     let (rows, columns) = truth.dim();
-    let rim = FRINGE_PX as usize;
+    let rim = FRINGE_PX as usize + UNSEEN_PX;
     let inside = |y: usize, x: usize| (rim..rows - rim).contains(&y) && (rim..columns - rim).contains(&x);
     let errors = decoded.phase_rad.indexed_iter().map(|(at, phase)| (at, phase - truth[at]));
     let counted = errors.filter(|&((y, x), e)| e.abs() < PI && edge[[y, x]] > FRINGE_PX && inside(y, x));
@@ -115,7 +117,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         let judged = score(&undone, &cast, &code(), FRINGE_PX);
         println!("{method:?} {rms:?} {judged:?}");
         // Or so little that noise of a thousandth of full scale would hide it.
-        assert!(rms[1] < (1.1 * rms[0]).max(3e-3), "{rms:?}");
+        assert!(rms[1] < (1.1 * rms[0]).max(2e-3), "{rms:?}");
         assert!(judged.wrong_share() < 5e-5, "{judged:?}");
         assert!(judged.returned_share() > 0.98, "{judged:?}");
     }
@@ -141,7 +143,7 @@ fn registration_costs_neither_phase_nor_orders() {
         let [aligned, registered] = [aligned, registered].map(|d| score(&d, &cast, &code(), FRINGE_PX));
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
         // Or so little that noise of a thousandth of full scale would hide it.
-        assert!(rms[1] < (1.1 * rms[0]).max(3e-3), "{rms:?}");
+        assert!(rms[1] < (1.1 * rms[0]).max(2e-3), "{rms:?}");
         // The published filter runs along whole rows, and errs beside what the infrared chip does not see.
         assert!(
             registered.wrong_orders() <= aligned.wrong_orders() + registered.lit / 20_000,

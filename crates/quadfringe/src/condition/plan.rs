@@ -66,6 +66,13 @@ impl Plan {
         }
     }
 
+    /// Infrared light beyond what its chip sees, for steps that look at neighbours: that of the nearest pixel.
+    pub fn continue_infrared(&self, y: usize, infrared: &mut [f32]) {
+        if let Some(registered) = &self.registered {
+            registered.continue_row(y, infrared);
+        }
+    }
+
     /// Which pixels of a row are saturated in no channel, and which are glare: saturated in R and in B, which on a lit
     /// surface, a quarter period apart, are never both at the crest of their fringes.
     #[inline(always)]

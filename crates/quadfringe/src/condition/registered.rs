@@ -91,6 +91,16 @@ impl Registered {
         }
     }
 
+    /// Gives the pixels that the infrared chip does not see the light of the nearest that it sees.
+    pub fn continue_row(&self, y: usize, out: &mut [f32]) {
+        let [rows, columns] = self.size;
+        for (x, value) in out.iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
+            let [u, v] = self.place(x, y);
+            let (column, row) = ((u.round() as usize).min(columns - 1), (v.round() as usize).min(rows - 1));
+            *value = self.light[(row + MARGIN) * self.stride() + column + MARGIN];
+        }
+    }
+
     /// First pixel after `x`, up to `end`, that does not lie between the same infrared pixels moved along with it. Over
     /// such a run all samples are read side by side.
     fn end_of_run(&self, x: usize, mut end: usize, y: usize) -> usize {

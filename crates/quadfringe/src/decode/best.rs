@@ -233,20 +233,15 @@ fn condition_row<T: Sample>(
 ) {
     plan.saturation_row(shot, y, unsaturated, glare);
     plan.row(shot, y, &mut rows);
-    let [red, green, blue, infrared] = rows;
+    let [.., infrared] = rows;
     // A pixel that the infrared chip does not see takes no part in any fit.
-    for row in [red, green, blue] {
-        for (value, infrared) in row.iter_mut().zip(&*infrared) {
-            *value = if infrared.is_finite() { *value } else { 0.0 };
-        }
-    }
     let masks = usable.iter_mut().zip(lit).zip(unsaturated.iter().zip(glare.iter()));
-    for (infrared, ((usable, lit), (unsaturated, glare))) in infrared.iter_mut().zip(masks) {
+    for (infrared, ((usable, lit), (unsaturated, glare))) in infrared.iter().zip(masks) {
         let seen = infrared.is_finite();
-        *infrared = if seen { *infrared } else { 0.0 };
         *usable = if seen & *unsaturated { 1.0 } else { 0.0 };
         *lit = if seen & !*glare { 1.0 } else { 0.0 };
     }
+    plan.continue_infrared(y, infrared);
 }
 
 /// The phase where it is sure.
