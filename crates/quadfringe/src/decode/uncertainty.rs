@@ -107,7 +107,8 @@ impl CostOdds {
 /// and 0 for a toss-up.
 #[derive(Debug, Clone)]
 pub(super) struct MarginOdds {
-    table: Box<[f32; STEPS]>,
+    /// NaN from `STEPS` on.
+    table: Box<[f32; 2 * STEPS]>,
 }
 
 impl MarginOdds {
@@ -128,14 +129,25 @@ impl MarginOdds {
             let toss = 1.0 / (1.0 + lead.min(80.0).exp());
             1.0 - (1.0 - random) * (1.0 - toss)
         };
-        Self { table: Box::new(std::array::from_fn(probability)) }
+        let known_or_not = |step| if step < STEPS { probability(step) } else { f32::NAN };
+        Self { table: Box::new(std::array::from_fn(known_or_not)) }
     }
 
-    /// Probability of another order; NaN for NaN.
+    /// Probabilities of another order of a row; NaN for NaN. Vectors find the places in the table, so that what is left
+    /// for single numbers is to fetch them.
     #[inline(always)]
-    pub fn another(&self, margin: f32) -> f32 {
-        let step = (margin.clamp(0.0, 1.0) * (STEPS - 1) as f32 + WHOLE).to_bits() as usize % STEPS;
-        if margin.is_nan() { f32::NAN } else { self.table[step] }
+    pub fn another(&self, margins: &[f32], out: &mut [f32]) {
+        const BLOCK: usize = 64;
+        let mut steps = [0u32; BLOCK];
+        for (out, margins) in out.chunks_mut(BLOCK).zip(margins.chunks(BLOCK)) {
+            for (step, margin) in steps.iter_mut().zip(margins) {
+                let known = (margin.clamp(0.0, 1.0) * (STEPS - 1) as f32 + WHOLE).to_bits() % STEPS as u32;
+                *step = if margin.is_nan() { STEPS as u32 } else { known };
+            }
+            for (out, step) in out.iter_mut().zip(&steps) {
+                *out = self.table[*step as usize % (2 * STEPS)];
+            }
+        }
     }
 }
 
@@ -150,7 +162,7 @@ pub(super) struct Sureness {
 impl Sureness {
     /// Before anything is known.
     pub fn none() -> Self {
-        Self { noise: 0.0, odds: MarginOdds { table: Box::new([0.0; STEPS]) } }
+        Self { noise: 0.0, odds: MarginOdds { table: Box::new([0.0; 2 * STEPS]) } }
     }
 
     /// From second differences of intensities down columns, which see little of the fringes, and from margins of orders.

@@ -149,14 +149,13 @@ impl Triangulator {
 
     /// Normalised `x, y` of the pixels of a row from `first` on.
     #[inline(always)]
-    fn directions(&self, row: usize, first: usize, count: usize) -> [[f32; CHUNK]; 2] {
-        let (mut x, mut y) = ([0.0; CHUNK], [0.0; CHUNK]);
+    fn directions(&self, row: usize, first: usize, count: usize, [x, y]: &mut [[f32; CHUNK]; 2]) {
         if let Some(table) = &self.directions {
             let table = table.row(row).to_slice().expect("the table is in standard layout");
-            for ((x, y), entry) in x.iter_mut().zip(&mut y).zip(&table[first..first + count]) {
+            for ((x, y), entry) in x.iter_mut().zip(y).zip(&table[first..first + count]) {
                 [*x, *y] = *entry;
             }
-            return [x, y];
+            return;
         }
         let [fx, fy] = self.camera.focal_px;
         let [cx, cy] = self.camera.centre_px;
@@ -165,29 +164,78 @@ impl Triangulator {
             *x = from + i as f32 * step;
         }
         y.fill(((row as f64 - cy) / fy) as f32);
-        [x, y]
+    }
+
+    /// Where the rays of a row, from pixel `first` on, meet the sheets of `columns_px`.
+    #[inline(always)]
+    fn meet(&self, row: usize, first: usize, columns_px: &[f32], block: &mut Block) {
+        self.directions(row, first, columns_px.len(), &mut block.directions);
+        self.projector.intersect(columns_px, block);
+    }
+}
+
+/// A block of pixels on its way from columns to points: only as much of it as there are columns means anything.
+struct Block {
+    directions: [[f32; CHUNK]; 2],
+    /// Ideal normalised coordinates of the columns, and how they change with the column.
+    ideal: [[f32; CHUNK]; 2],
+    depth: [f32; CHUNK],
+    /// Change of the depth with the column.
+    growth: [f32; CHUNK],
+}
+
+impl Block {
+    fn new() -> Self {
+        let (row, rows) = ([0.0; CHUNK], [[0.0; CHUNK]; 2]);
+        Self { directions: rows, ideal: rows, depth: row, growth: row }
+    }
+
+    /// `t x, t y, t` pixel by pixel, in groups that vectors can shuffle.
+    #[inline(always)]
+    fn write_points(&self, xyz: &mut [f32]) {
+        const GROUP: usize = 8;
+        let [x, y] = &self.directions;
+        let point = |i: usize| [self.depth[i] * x[i], self.depth[i] * y[i], self.depth[i]];
+        let groups = xyz.len() / (3 * GROUP);
+        let (whole, rest) = xyz.split_at_mut(3 * GROUP * groups);
+        for (group, points) in whole.chunks_exact_mut(3 * GROUP).enumerate() {
+            for i in 0..GROUP {
+                points[3 * i..][..3].copy_from_slice(&point(GROUP * group + i));
+            }
+        }
+        for (i, to) in rest.chunks_exact_mut(3).enumerate() {
+            to.copy_from_slice(&point(GROUP * groups + i));
+        }
+    }
+
+    /// Standard deviations of columns become those of depths.
+    #[inline(always)]
+    fn carry(&self, uncertainty: &mut [f32]) {
+        for (value, growth) in uncertainty.iter_mut().zip(&self.growth) {
+            *value *= growth.abs();
+        }
     }
 }
 
 /// A row of points, a block of pixels at a time.
 #[multiversion(targets("x86_64+avx2"))]
 fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut [f32]) {
+    let mut block = Block::new();
     let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
     for (index, (columns, xyz)) in blocks.enumerate() {
-        let directions = triangulator.directions(row, index * CHUNK, columns.len());
-        let [depth, _] = triangulator.projector.intersect(columns, &directions);
-        write_points(&depth, &directions, xyz);
+        triangulator.meet(row, index * CHUNK, columns, &mut block);
+        block.write_points(xyz);
     }
 }
 
 /// A row of standard deviations, a block of pixels at a time.
 #[multiversion(targets("x86_64+avx2"))]
 fn deviations(triangulator: &Triangulator, row: usize, columns_px: &[f32], uncertainty: &mut [f32]) {
+    let mut block = Block::new();
     let blocks = columns_px.chunks(CHUNK).zip(uncertainty.chunks_mut(CHUNK));
     for (index, (columns, uncertainty)) in blocks.enumerate() {
-        let directions = triangulator.directions(row, index * CHUNK, columns.len());
-        let [_, growth] = triangulator.projector.intersect(columns, &directions);
-        carry(&growth, uncertainty);
+        triangulator.meet(row, index * CHUNK, columns, &mut block);
+        block.carry(uncertainty);
     }
 }
 
@@ -200,12 +248,12 @@ fn points_and_deviations(
     out: &mut [f32],
     uncertainty: &mut [f32],
 ) {
+    let mut block = Block::new();
     let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK)).zip(uncertainty.chunks_mut(CHUNK));
     for (index, ((columns, xyz), uncertainty)) in blocks.enumerate() {
-        let directions = triangulator.directions(row, index * CHUNK, columns.len());
-        let [depth, growth] = triangulator.projector.intersect(columns, &directions);
-        write_points(&depth, &directions, xyz);
-        carry(&growth, uncertainty);
+        triangulator.meet(row, index * CHUNK, columns, &mut block);
+        block.write_points(xyz);
+        block.carry(uncertainty);
     }
 }
 
@@ -253,27 +301,27 @@ impl ColumnSheets {
     /// Depths at which rays `(x, y, 1)` meet the sheets of `columns`, NaN behind the camera, and how they grow with the
     /// column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times `dk / du`.
     #[inline(always)]
-    fn intersect(&self, columns: &[f32], [x, y]: &[[f32; CHUNK]; 2]) -> [[f32; CHUNK]; 2] {
-        let [k, stretch] = self.ideal(columns, [x, y]);
+    fn intersect(&self, columns: &[f32], block: &mut Block) {
+        let Block { directions: [x, y], ideal, depth, growth } = block;
+        self.ideal(columns, [x, y], ideal);
         let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
-        let (mut depth, mut growth) = ([0.0; CHUNK], [0.0; CHUNK]);
+        let [k, stretch] = ideal;
         for i in 0..CHUNK {
             let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
             let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
             let inverse = 1.0 / (b0 - k[i] * b2);
             let t = (k[i] * a2 - a0) * inverse;
-            let seen = (t > 0.0) & (t < f32::INFINITY);
+            let seen = (t > 0.0) & (t <= f32::MAX);
             depth[i] = if seen { t } else { f32::NAN };
             growth[i] = if seen { (a2 + t * b2) * inverse * stretch[i] } else { f32::NAN };
         }
-        [depth, growth]
     }
 
     /// Ideal normalised coordinates of `columns`, and how they change with the column.
     #[inline(always)]
-    fn ideal(&self, columns: &[f32], [x, y]: [&[f32; CHUNK]; 2]) -> [[f32; CHUNK]; 2] {
+    fn ideal(&self, columns: &[f32], [x, y]: [&[f32; CHUNK]; 2], [k, stretch]: &mut [[f32; CHUNK]; 2]) {
         let scale = 1.0 / self.focal_px;
-        let (mut k, mut stretch) = ([f32::NAN; CHUNK], [scale; CHUNK]);
+        stretch.fill(scale);
         for (k, u) in k.iter_mut().zip(columns) {
             *k = (u - self.centre_px) * scale;
         }
@@ -283,7 +331,6 @@ impl ColumnSheets {
                 (k[i], stretch[i]) = (ideal, scale / slope);
             }
         }
-        [k, stretch]
     }
 
     /// Ideal normalised column where the projector's image of the ray `(x, y, 1)` has the distorted column `measured`, and how
@@ -309,32 +356,5 @@ impl ColumnSheets {
             k -= (value - measured) / slope;
         }
         (k, slope)
-    }
-}
-
-/// Standard deviations of columns become those of depths.
-#[inline(always)]
-fn carry(growth: &[f32; CHUNK], uncertainty: &mut [f32]) {
-    for (value, growth) in uncertainty.iter_mut().zip(growth) {
-        *value *= growth.abs();
-    }
-}
-
-/// `t x, t y, t` pixel by pixel, in blocks that vectors can shuffle.
-#[inline(always)]
-fn write_points(depth: &[f32; CHUNK], [x, y]: &[[f32; CHUNK]; 2], xyz: &mut [f32]) {
-    const BLOCK: usize = 8;
-    for (block, points) in xyz.chunks_mut(3 * BLOCK).enumerate() {
-        let mut shuffled = [0.0; 3 * BLOCK];
-        for i in 0..BLOCK {
-            let at = BLOCK * block + i;
-            shuffled[3 * i] = depth[at] * x[at];
-            shuffled[3 * i + 1] = depth[at] * y[at];
-            shuffled[3 * i + 2] = depth[at];
-        }
-        match points.first_chunk_mut() {
-            Some(whole) => *whole = shuffled,
-            None => points.copy_from_slice(&shuffled[..points.len()]),
-        }
     }
 }

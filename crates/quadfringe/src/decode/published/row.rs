@@ -108,10 +108,7 @@ impl Rows {
             Unwrapping::AlongRay(table) => table.order_row(y, wrapped, out.phase, out.quality),
         }
         plan.trust(out);
-        let odds = &plan.sureness.odds;
-        for (wrong, margin) in out.wrong.iter_mut().zip(&*out.quality) {
-            *wrong = odds.another(*margin);
-        }
+        plan.sureness.odds.another(out.quality, out.wrong);
         for x in unseen {
             (out.phase[x], out.modulation[x], out.quality[x]) = (f32::NAN, f32::NAN, f32::NAN);
         }

@@ -122,34 +122,15 @@ fn pair_means(row: &[f32], out: &mut [f32]) {
 }
 
 impl Knots {
-    /// One extremum for each half wave longer than `shortest`; shorter ones are noise within their neighbours. A half
-    /// wave cut by the end of the row has no extremum of its own.
+    /// Places and values of the extrema: tops of the parabolas through their samples and both neighbours.
     #[inline(always)]
     fn find(&mut self, waves: &Waves, smooth: &[f32], shortest: usize, step: f32) {
-        self.samples.resize(waves.count() + LANES, (1, 0.0));
-        let (mut found, mut last_upper) = (0, None);
-        for (wave, upper) in waves.whole().filter(|(wave, _)| wave.len() > shortest) {
-            let (at, sign) = (Waves::extremum(smooth, wave, upper), if upper { 1.0 } else { -1.0 });
-            if last_upper == Some(upper) {
-                if sign * smooth[at] <= sign * smooth[self.samples[found - 1].0 as usize] {
-                    continue;
-                }
-                // A half wave between them was noise: of two extrema on one side the further one counts.
-                found -= 1;
-            }
-            self.samples[found] = (at as u32, sign);
-            (found, last_upper) = (found + 1, Some(upper));
-        }
-        self.refine(smooth, found, step);
-    }
-
-    /// Places and values of the first `count` extrema: tops of the parabolas through their samples and both neighbours.
-    #[inline(always)]
-    fn refine(&mut self, smooth: &[f32], count: usize, step: f32) {
         let Self { at_px, value, samples } = self;
+        waves.extrema(smooth, shortest, samples);
+        let count = samples.len();
         let whole = count.next_multiple_of(LANES);
         // A half wave between two crossings touches neither end of the row, nor does what fills up the last block.
-        samples[count..whole].fill((1, 0.0));
+        samples.resize(whole, (1, 0.0));
         at_px.resize(whole, 0.0);
         value.resize(whole, 0.0);
         let out = at_px.chunks_exact_mut(LANES).zip(value.chunks_exact_mut(LANES));

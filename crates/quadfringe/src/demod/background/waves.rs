@@ -1,36 +1,28 @@
-//! Half waves of a row about its middle and their extrema. Every sample is a bit: fringes cross too irregularly for a
+//! Extrema of the half waves of a row about its middle. Every sample is a bit: fringes cross too irregularly for a
 //! processor to guess, and bits need no guessing.
 
 use std::ops::Range;
 
 /// Samples in a word of bits.
 const WORD: usize = 64;
-/// Samples compared at once when an extremum is looked for: mostly all of a half wave.
-const BLOCK: usize = 8;
-/// Added to samples, from `BLOCK - n` on, it leaves the first `n` of a block and buries the others.
-const BURY: [f32; 2 * BLOCK] = {
-    let mut bury = [0.0; 2 * BLOCK];
-    let mut i = BLOCK;
-    while i < 2 * BLOCK {
-        bury[i] = f32::NEG_INFINITY;
-        i += 1;
-    }
-    bury
-};
+/// Longest half waves that [`Waves::extrema`] can leave out: half a word on each side of a word is looked at.
+const SHORTEST_MAX: usize = WORD / 2 - 1;
 
 /// Half waves of one row.
 #[derive(Debug, Default)]
 pub(super) struct Waves {
     /// The sample is above the middle.
     above: Vec<u64>,
-    /// First samples of the half waves but the first.
-    crossings: Vec<u32>,
+    /// The row turns at the sample: downwards where it is above the middle, upwards where it is below.
+    turns: Vec<u64>,
+    /// From the first crossing to the last one: half waves cut by an end of the row lie outside.
+    whole: Range<usize>,
 }
 
 impl Waves {
     /// Length of the buffers for a row of `count` samples.
     pub fn padded(count: usize) -> usize {
-        count.next_multiple_of(WORD) + BLOCK
+        count.next_multiple_of(WORD) + 1
     }
 
     /// Split the first `count` samples of a row where they cross the middle. Both buffers are padded.
@@ -42,96 +34,121 @@ impl Waves {
         }
         let words = count.div_ceil(WORD);
         self.above.resize(words, 0);
-        self.crossings.clear();
-        let mut before = u64::from(row[0] > middle[0]);
-        for (index, (word, (row, middle))) in
-            (self.above.iter_mut()).zip(row.chunks_exact(WORD).zip(middle.chunks_exact(WORD))).enumerate()
-        {
-            let above = compare(row, middle);
-            let mut crossed = above ^ (above << 1 | before);
-            while crossed != 0 {
-                self.crossings.push((WORD * index) as u32 + crossed.trailing_zeros());
-                crossed &= crossed - 1;
+        self.turns.resize(words, 0);
+        self.whole = 0..0;
+        let (mut before, mut rising, mut falling) = (u64::from(row[0] > middle[0]), 0, 0);
+        for index in 0..words {
+            let (here, next) = (&row[WORD * index..], &row[WORD * index + 1..]);
+            let above = compare(here, &middle[WORD * index..]);
+            let (up, down) = (compare(next, here), compare(here, next));
+            let tops = (up << 1 | rising) & !up;
+            let bottoms = (down << 1 | falling) & !down;
+            let crossed = above ^ (above << 1 | before);
+            if crossed != 0 {
+                if self.whole.end == 0 {
+                    self.whole.start = WORD * index + crossed.trailing_zeros() as usize;
+                }
+                self.whole.end = WORD * index + crossed.ilog2() as usize;
             }
-            (*word, before) = (above, above >> (WORD - 1));
+            (self.above[index], self.turns[index]) = (above, tops & above | bottoms & !above);
+            (before, rising, falling) = (above >> (WORD - 1), up >> (WORD - 1), down >> (WORD - 1));
         }
     }
 
-    /// Most half waves that [`Self::whole`] can give.
+    /// Samples at the extrema of the half waves longer than `shortest`, with 1 for maxima and -1 for minima, which take
+    /// turns: of two on one side, with a half wave between them that was noise, the further one counts.
     #[inline(always)]
-    pub fn count(&self) -> usize {
-        self.crossings.len()
-    }
-
-    /// Half waves from one crossing to the next, and whether they lie above the middle.
-    #[inline(always)]
-    pub fn whole(&self) -> impl Iterator<Item = (Range<usize>, bool)> {
-        let first = self.crossings.first().map_or(0, |&at| at as usize);
-        let mut upper = (self.above[first / WORD] >> (first % WORD)) & 1 == 0;
-        self.crossings.windows(2).map(move |pair| {
-            upper = !upper;
-            (pair[0] as usize..pair[1] as usize, upper)
-        })
-    }
-
-    /// First of the greatest (`upper`) or least samples of a half wave of a padded row.
-    #[inline(always)]
-    pub fn extremum(row: &[f32], wave: Range<usize>, upper: bool) -> usize {
-        let sign = if upper { 1.0 } else { -1.0 };
-        let (mut best, mut most) = (wave.start, f32::NEG_INFINITY);
-        for start in wave.clone().step_by(BLOCK) {
-            let samples: &[f32; BLOCK] = row[start..].first_chunk().expect("padded");
-            let bury: &[f32; BLOCK] =
-                BURY[BLOCK - (wave.end - start).min(BLOCK)..].first_chunk().expect("a block");
-            let mut values = [0.0; BLOCK];
-            for ((value, sample), bury) in values.iter_mut().zip(samples).zip(bury) {
-                *value = sign * sample + bury;
+    pub fn extrema(&self, row: &[f32], shortest: usize, out: &mut Vec<(u32, f32)>) {
+        let shortest = shortest.min(SHORTEST_MAX);
+        let turns: u32 = self.turns.iter().map(|word| word.count_ones()).sum();
+        // One more, for the last one that does not count.
+        out.resize(turns as usize + 1, (0, 0.0));
+        let (mut found, mut highest, mut last_side) = (0, 0.0, u64::MAX);
+        for (index, (&above, &turns)) in self.above.iter().zip(&self.turns).enumerate() {
+            let before = self.above[index.saturating_sub(1)];
+            let after = *self.above.get(index + 1).unwrap_or(&0);
+            let long = above & in_long_runs([before, above, after], shortest)
+                | !above & in_long_runs([!before, !above, !after], shortest);
+            let mut left = turns & long & ones_within(&self.whole, WORD * index);
+            while left != 0 {
+                let bit = left.trailing_zeros();
+                left &= left - 1;
+                let (at, side) = (WORD * index + bit as usize, above >> bit & 1);
+                let sign = side as i32 as f32 * 2.0 - 1.0;
+                let height = sign * row[at];
+                let again = side == last_side;
+                let lower = again & (height <= highest);
+                // Written in any case, where it counts or behind all that do: no branch to guess.
+                out[found - usize::from(again & !lower)] = (at as u32, sign);
+                found += usize::from(!again);
+                highest = if lower { highest } else { height };
+                last_side = side;
             }
-            let [a, b, c, d, e, f, g, h] = values;
-            let here = larger(larger(larger(a, e), larger(b, f)), larger(larger(c, g), larger(d, h)));
-            let mut same = 0u32;
-            for (i, value) in values.iter().enumerate() {
-                same |= u32::from(*value == here) << i;
-            }
-            let better = here > most;
-            best = if better { start + same.trailing_zeros() as usize } else { best };
-            most = if better { here } else { most };
         }
-        best
+        out.truncate(found);
     }
 }
 
+/// Ones of the middle word in runs of more than `shortest` ones.
 #[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
+fn in_long_runs([before, word, after]: [u64; 3], shortest: usize) -> u64 {
+    const HALF: usize = WORD / 2;
+    let bits = u128::from(before >> HALF) | u128::from(word) << HALF | u128::from(after) << (WORD + HALF);
+    let begins = (1..=shortest).fold(bits, |begins, shift| begins & bits >> shift);
+    let runs = (1..=shortest).fold(begins, |runs, shift| runs | begins << shift);
+    (runs >> HALF) as u64
 }
 
-/// Which of a word of samples are above the middle.
+/// Ones for the samples of a word, which begins with sample `first`, that lie in a range.
 #[inline(always)]
-fn compare(row: &[f32], middle: &[f32]) -> u64 {
-    let row: &[f32; WORD] = row.first_chunk().expect("a word");
-    let middle: &[f32; WORD] = middle.first_chunk().expect("a word");
-    let half = |from: usize| {
-        (from..from + WORD / 2).fold(0u32, |word, i| word | (u32::from(row[i] > middle[i]) << (i - from)))
-    };
-    u64::from(half(0)) | (u64::from(half(WORD / 2)) << (WORD / 2))
+fn ones_within(range: &Range<usize>, first: usize) -> u64 {
+    let from = |place: usize| u64::MAX.checked_shl(place.saturating_sub(first) as u32).unwrap_or(0);
+    from(range.start) & !from(range.end)
+}
+
+/// Which of a word of samples are above others: vectors make a byte of each comparison, and a multiplication gathers the
+/// last bits of eight bytes in the first one from above. Put together bit by bit, a compiler takes the vectors apart.
+#[inline(always)]
+fn compare(row: &[f32], others: &[f32]) -> u64 {
+    const GATHER: u64 = 0x0102_0408_1020_4080;
+    let mut bytes = [0u8; WORD];
+    for ((byte, row), others) in bytes.iter_mut().zip(&row[..WORD]).zip(&others[..WORD]) {
+        *byte = u8::from(row > others);
+    }
+    let mut word = 0;
+    for (place, eight) in bytes.as_chunks().0.iter().enumerate() {
+        word |= (u64::from_le_bytes(*eight).wrapping_mul(GATHER) >> 56) << (8 * place);
+    }
+    word
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Half waves and their extrema, sample by sample.
-    fn slow(row: &[f32], middle: &[f32]) -> Vec<(Range<usize>, bool, usize)> {
+    /// Extrema of the half waves longer than `shortest`, sample by sample.
+    fn slow(row: &[f32], middle: &[f32], shortest: usize) -> Vec<(u32, f32)> {
         let above = |i: usize| row[i] > middle[i];
         let crossings: Vec<usize> = (1..row.len()).filter(|&i| above(i) != above(i - 1)).collect();
-        let half_wave = |pair: &[usize]| {
-            let (wave, upper) = (pair[0]..pair[1], above(pair[0]));
-            let better = |best: usize, i: usize| if upper { row[i] > row[best] } else { row[i] < row[best] };
-            let extremum = wave.clone().fold(pair[0], |best, i| if better(best, i) { i } else { best });
-            (wave, upper, extremum)
-        };
-        crossings.windows(2).map(half_wave).collect()
+        let mut found: Vec<(u32, f32)> = Vec::new();
+        for wave in crossings.windows(2).filter(|wave| wave[1] - wave[0] > shortest) {
+            let sign = if above(wave[0]) { 1.0 } else { -1.0 };
+            for i in wave[0]..wave[1] {
+                let (before, here, after) = (sign * row[i - 1], sign * row[i], sign * row[i + 1]);
+                if !(before < here && here >= after) {
+                    continue;
+                }
+                match found.last() {
+                    Some(&(at, other)) if other == sign => {
+                        if here > sign * row[at as usize] {
+                            *found.last_mut().unwrap() = (i as u32, sign);
+                        }
+                    }
+                    _ => found.push((i as u32, sign)),
+                }
+            }
+        }
+        found
     }
 
     #[test]
@@ -146,15 +163,35 @@ mod tests {
             };
             let mut row: Vec<f32> = (0..count).map(at).collect();
             let mut middle: Vec<f32> = (0..count).map(|i| 0.1 + 1e-4 * i as f32).collect();
-            let expected = slow(&row, &middle);
+            let expected = [0, 1, 2, 3].map(|shortest| slow(&row, &middle, shortest));
             row.resize(Waves::padded(count), f32::NAN);
             middle.resize(Waves::padded(count), f32::NAN);
             let mut waves = Waves::default();
             waves.find(&mut row, &mut middle, count);
-            let found =
-                waves.whole().map(|(wave, upper)| (wave.clone(), upper, Waves::extremum(&row, wave, upper)));
-            assert!(expected.len() > 2, "{count}");
-            assert_eq!(found.collect::<Vec<_>>(), expected, "{count}");
+            for (shortest, expected) in expected.iter().enumerate() {
+                let mut found = Vec::new();
+                waves.extrema(&row, shortest, &mut found);
+                assert!(expected.len() > 2 || shortest == 3, "{count}");
+                assert_eq!(&found, expected, "{count} {shortest}");
+            }
         }
+    }
+
+    #[test]
+    fn short_runs_are_left_out_across_words() {
+        // A run of three over the border of two words, one of two inside.
+        let words = [1 << 63, 0b11 | 0b11 << 20, 0];
+        assert_eq!(in_long_runs(words, 1), words[1]);
+        assert_eq!(in_long_runs(words, 2), 0b11);
+        assert_eq!(in_long_runs(words, 3), 0);
+    }
+
+    #[test]
+    fn a_row_without_crossings_has_no_half_waves() {
+        let (mut row, mut middle) = (vec![1.0; Waves::padded(100)], vec![0.0; Waves::padded(100)]);
+        let (mut waves, mut found) = (Waves::default(), vec![(0, 0.0)]);
+        waves.find(&mut row, &mut middle, 100);
+        waves.extrema(&row, 0, &mut found);
+        assert!(found.is_empty());
     }
 }
