@@ -128,6 +128,10 @@ impl Guide {
         for _ in 0..LAST_FITS {
             self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);
         }
+        // What motion makes of the light is not to be explained by other backgrounds.
+        if options.channel_instants_us.is_none() {
+            self.backgrounds.choose(&scene, ratios, [&self.phase, &self.modulation], self.noise);
+        }
     }
 
     fn find_tears(&mut self, grid: &Grid) {

@@ -62,7 +62,8 @@ impl Agreement {
             sums,
             excess,
             |maps, y, sums| {
-                let model = backgrounds.sample(scene, y, maps);
+                // Among many a pixel finds backgrounds that agree; what it left says how much is to be doubted.
+                let model = backgrounds.sample_own(scene, y, maps);
                 let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
                 add_pairs(model, pixels, scene.rows(y), ratios, sums);
             },

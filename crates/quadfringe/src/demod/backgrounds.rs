@@ -5,13 +5,18 @@
 //! is projected out of its four intensities (variable projection; Golub and Pereyra, SIAM J. Numer. Anal. 10, 413 (1973)),
 //! so that neither noise of the phase nor texture reaches `a` and `b`, and one round does what alternating takes many for.
 
+mod choice;
+mod solve;
+
 use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, take};
 use super::local_fit::LocalFit;
 use super::scene::Scene;
 use super::slopes::Slopes;
 use crate::angle::sin_cos;
 use crate::slots::Slots;
+use choice::Choice;
 use multiversion::multiversion;
+use solve::improve;
 
 /// Width (sigma) of the window in fringe periods: the albedo takes what is faster.
 const WINDOW: f32 = 0.28;
@@ -26,8 +31,6 @@ const CELL: f64 = 0.35;
 /// Rows of pixels that stand for a row of cells: in the last fits, and on the way there.
 pub(crate) const ROWS: usize = 4;
 pub(crate) const ROUGH_ROWS: usize = 2;
-/// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
-const RIDGE: f32 = 5e-2;
 /// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
 const MATRIX: usize = 36;
 /// The same with the right hand side.
@@ -40,6 +43,7 @@ pub(crate) struct Backgrounds {
     maps: CellMaps,
     next: CellMaps,
     sums: CellMaps,
+    choice: Choice,
     slots: Slots<([RowMaps; 2], CellWork)>,
 }
 
@@ -50,6 +54,7 @@ impl Backgrounds {
             maps: CellMaps::new(8),
             next: CellMaps::new(8),
             sums: CellMaps::default(),
+            choice: Choice::default(),
             slots: Slots::default(),
         }
     }
@@ -61,6 +66,7 @@ impl Backgrounds {
         let side = (CELL * scene.period_px).max(fine.step as f64);
         self.grid = Grid::with_stride([fine.height, fine.width], fine.stride, side);
         let times = self.grid.step / fine.step;
+        self.choice.forget();
         self.next.fill::<8>(&self.grid, |row, mut lines| {
             for column in 0..lines[0].len() {
                 let inside = |at: usize, count: usize| (at * times + times / 2).min(count - 1);
@@ -78,9 +84,24 @@ impl Backgrounds {
         self.draw_together(scene, f32::INFINITY);
     }
 
-    /// Backgrounds and modulations at row `y` of a scene, that of the fit or a finer one: a, b of R, of G, of B, of IR.
+    /// Backgrounds and modulations that the pixels of row `y` have chosen, in a scene, that of the fit or a finer one: a, b of R, of
+    /// G, of B, of IR.
     pub fn sample<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 8] {
+        let grid = self.grid.over(scene.grid);
+        let mut rows = maps.sample_mut(&grid, &self.maps, 0, y);
+        self.choice.apply(&grid, &self.maps, y, &mut rows);
+        rows.map(|row| &*row)
+    }
+
+    /// The same at the places of the pixels themselves, whatever they have chosen.
+    pub fn sample_own<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 8] {
         maps.sample(&self.grid.over(scene.grid), &self.maps, 0, y)
+    }
+
+    /// Let every pixel choose among the backgrounds around it. The pixels' phase and modulation are those of the last fit, and the
+    /// intensities have the standard deviation `noise`.
+    pub fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3], pixels: [&[f32]; 2], noise: f32) {
+        self.choice.make((&self.grid, &self.maps), scene, ratios, pixels, noise);
     }
 
     /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.
@@ -100,7 +121,7 @@ impl Backgrounds {
         (misfit_max, relative_noise): (f32, f32),
         most: usize,
     ) {
-        let Self { grid, maps, next, sums, slots } = self;
+        let Self { grid, maps, next, sums, slots, .. } = self;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
         grid.window_sums::<SUMS, [RowMaps; 2]>(
             (sigma, most),
@@ -124,7 +145,7 @@ impl Backgrounds {
 
     /// Every cell drawn to its surroundings as far as the two are not further apart than `threshold`.
     fn draw_together(&mut self, scene: &Scene<'_>, threshold: f32) {
-        let Self { grid, maps, next, sums, slots } = self;
+        let Self { grid, maps, next, sums, slots, .. } = self;
         let sigma = SURROUNDINGS * scene.period_px as f32 / grid.step as f32;
         let own = &*next;
         grid.smooth::<8, [RowMaps; 2]>(
@@ -256,122 +277,6 @@ fn project(
         terms[MATRIX + 2 * c + 1] = first * rest[c] * cosines[c];
     }
     terms
-}
-
-/// Normal equations of a row of cells, solved for the change of the eight unknowns.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn improve(sums: [&[f32]; SUMS], before: [&[f32]; 8], out: &mut [f32]) {
-    let columns = before[0].len();
-    for first in (0..columns).step_by(LANES) {
-        let count = LANES.min(columns - first);
-        let part = |row: &[f32]| {
-            let mut lanes = [0.0; LANES];
-            lanes[..count].copy_from_slice(&row[first..first + count]);
-            lanes
-        };
-        let mut system = System::new(sums.map(part), before.map(part));
-        system.solve();
-        for (k, values) in system.unknowns.iter().enumerate() {
-            out[k * columns + first..][..count].copy_from_slice(&values[..count]);
-        }
-    }
-}
-
-/// Systems of [`LANES`] cells, side by side.
-struct System {
-    matrix: [[Lanes; 8]; 8],
-    right: [Lanes; 8],
-    unknowns: [Lanes; 8],
-}
-
-impl System {
-    #[inline(always)]
-    fn new(sums: [Lanes; SUMS], before: [Lanes; 8]) -> Self {
-        let mut matrix = [[[0.0; LANES]; 8]; 8];
-        let mut at = 0;
-        for c in 0..4 {
-            for k in c..4 {
-                let (u, v) = (2 * c, 2 * k);
-                matrix[u][v] = sums[at];
-                matrix[u][v + 1] = sums[at + 1];
-                if k > c {
-                    matrix[u + 1][v] = sums[at + 2];
-                    matrix[u + 1][v + 1] = sums[at + 3];
-                    at += 4;
-                } else {
-                    matrix[u + 1][v + 1] = sums[at + 2];
-                    at += 3;
-                }
-            }
-        }
-        let mut right: [Lanes; 8] = std::array::from_fn(|r| sums[MATRIX + r]);
-        let mut floor = [1e-9; LANES];
-        for r in 0..8 {
-            for c in 0..8 {
-                if c < r {
-                    matrix[r][c] = matrix[c][r];
-                }
-                for x in 0..LANES {
-                    right[r][x] -= matrix[r][c][x] * before[c][x];
-                }
-            }
-            for x in 0..LANES {
-                floor[x] += matrix[r][r][x] * (RIDGE / 8.0);
-            }
-        }
-        for r in 0..8 {
-            for x in 0..LANES {
-                matrix[r][r][x] += RIDGE * matrix[r][r][x] + floor[x];
-            }
-        }
-        Self { matrix, right, unknowns: before }
-    }
-
-    /// Adds the solution to the unknowns (Cholesky).
-    #[inline(always)]
-    fn solve(&mut self) {
-        let Self { matrix, right, unknowns } = self;
-        for k in 0..8 {
-            let mut inverse = [0.0; LANES];
-            for x in 0..LANES {
-                let pivot = matrix[k][k][x];
-                inverse[x] = 1.0 / (if pivot > 1e-12 { pivot } else { 1e-12 }).sqrt();
-            }
-            for r in k..8 {
-                for x in 0..LANES {
-                    matrix[r][k][x] *= inverse[x];
-                }
-            }
-            for r in k + 1..8 {
-                for c in k + 1..=r {
-                    for x in 0..LANES {
-                        matrix[r][c][x] -= matrix[r][k][x] * matrix[c][k][x];
-                    }
-                }
-            }
-        }
-        for k in 0..8 {
-            for x in 0..LANES {
-                right[k][x] /= matrix[k][k][x];
-            }
-            for r in k + 1..8 {
-                for x in 0..LANES {
-                    right[r][x] -= matrix[r][k][x] * right[k][x];
-                }
-            }
-        }
-        for k in (0..8).rev() {
-            for x in 0..LANES {
-                right[k][x] /= matrix[k][k][x];
-                unknowns[k][x] += right[k][x];
-            }
-            for r in 0..k {
-                for x in 0..LANES {
-                    right[r][x] -= matrix[k][r][x] * right[k][x];
-                }
-            }
-        }
-    }
 }
 
 #[cfg(test)]

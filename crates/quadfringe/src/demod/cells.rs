@@ -252,6 +252,20 @@ impl CellMaps {
         &self.data[(row * self.count + map) * self.columns..][..self.columns]
     }
 
+    /// The first `N` maps at one pixel of the image, between cells as [`Grid::expand`].
+    pub fn at<const N: usize>(&self, grid: &Grid, y: usize, x: usize) -> [f32; N] {
+        let (above, below, down) = grid.between(y);
+        let place = (x as f32 + 0.5) / grid.step as f32 - 0.5;
+        let left = place.floor();
+        let clamp = |column: f32| column.clamp(0.0, (self.columns - 1) as f32) as usize;
+        let (right, to_right, left) = (clamp(left + 1.0), place - left, clamp(left));
+        std::array::from_fn(|k| {
+            let (above, below) = (self.line(above, k), self.line(below, k));
+            let mix = |column: usize| above[column] + (below[column] - above[column]) * down;
+            mix(left) + (mix(right) - mix(left)) * to_right
+        })
+    }
+
     /// Fill every map, row of cells by row of cells.
     pub fn fill<const N: usize>(&mut self, grid: &Grid, fill: impl Fn(usize, [&mut [f32]; N]) + Sync) {
         self.shape(grid, N);

@@ -1,0 +1,384 @@
+//! Whose backgrounds a pixel takes. Beside an edge between two colours a window mixes both; some way off, on the side that the
+//! pixel belongs to, it does not. Where light does not fit the backgrounds of its own place, every pixel takes those of the place
+//! around it that explain it and its neighbours best.
+
+use super::carriers;
+use crate::demod::cells::{CellMaps, Grid, LANES, RowMaps, lanes, lanes_mut, put, take};
+use crate::demod::local_fit::binomial;
+use crate::demod::scene::Scene;
+use crate::slots::Slots;
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+/// How far off the nearer places are, in fringe periods: somewhat more than the window of the backgrounds is wide (sigma).
+const ASIDE: f32 = 0.35;
+/// Places to take backgrounds from, in units of that: rows down, columns right. The own one comes first, then row by row.
+const PLACES: [[isize; 2]; 17] = [
+    [0, 0],
+    [-2, -2],
+    [-2, 0],
+    [-2, 2],
+    [-1, -1],
+    [-1, 0],
+    [-1, 1],
+    [0, -2],
+    [0, -1],
+    [0, 1],
+    [0, 2],
+    [1, -1],
+    [1, 0],
+    [1, 1],
+    [2, -2],
+    [2, 0],
+    [2, 2],
+];
+/// Pixels look around where they miss more, on average over a vector in the rows of a task, than this many times what noise
+/// does: three standard deviations of that average.
+const NOISES: f32 = 1.2;
+/// Squared misfit in units of the variance of the noise: four intensities less albedo and phase.
+const MISSED_BY_NOISE: f32 = 2.0;
+/// Other backgrounds are taken when they miss less than this share of what a pixel's own do.
+const BETTER: f32 = 0.9;
+/// Rows of one task.
+const BLOCK: usize = 16;
+
+/// The place that every pixel takes its backgrounds from.
+#[derive(Debug, Default)]
+pub(super) struct Choice {
+    /// Numbers in [`PLACES`], in padded rows of the scene of the fit; none when all pixels take their own.
+    places: Vec<u8>,
+    stride: usize,
+    aside: usize,
+    slots: Slots<Rows>,
+}
+
+/// Rows of one task, of which one lies above and one below its pixels: misfits are averaged over neighbours.
+#[derive(Debug, Default)]
+struct Rows {
+    maps: RowMaps,
+    /// Backgrounds of one row, continued to both sides as far as the furthest place.
+    wide: [Vec<f32>; 8],
+    /// Cosines and derivatives of the four channels.
+    carriers: Vec<[Vec<f32>; 8]>,
+    /// Misfits with the backgrounds of places beside each other, place by place.
+    misfit: Vec<Vec<f32>>,
+    /// What another place has to undercut.
+    best: Vec<Vec<f32>>,
+    /// Vectors of pixels that look around.
+    asked: Vec<bool>,
+    smooth: Vec<f32>,
+    spare: Vec<f32>,
+}
+
+impl Choice {
+    /// Every pixel takes its own.
+    pub fn forget(&mut self) {
+        self.places.clear();
+    }
+
+    /// Choose among backgrounds on a grid of cells over a scene, by how well the four intensities fit, whatever the albedo and to
+    /// first order whatever the phase.
+    pub fn make(
+        &mut self,
+        (grid, maps): (&Grid, &CellMaps),
+        scene: &Scene<'_>,
+        ratios: [f32; 3],
+        [phase, modulation]: [&[f32]; 2],
+        noise: f32,
+    ) {
+        let Self { places, stride, aside, slots } = self;
+        (*stride, *aside) = (grid.stride, (ASIDE * scene.period_px as f32).round().max(1.0) as usize);
+        let aside = *aside as isize;
+        places.clear();
+        places.resize(grid.pixels(), 0);
+        let least = NOISES * MISSED_BY_NOISE * noise * noise;
+        places.par_chunks_mut(BLOCK * *stride).enumerate().for_each_init(
+            || slots.take(),
+            |rows, (block, places)| {
+                let inside = |y: isize| y.clamp(0, grid.height as isize - 1) as usize;
+                let (first, count) = ((block * BLOCK) as isize, places.len() / grid.stride);
+                let rows = &mut **rows;
+                let lines: Vec<usize> = (first - 1..=first + count as isize).map(inside).collect();
+                rows.prepare(scene, &lines, phase, ratios);
+                let from = |y: usize, down: isize| inside(y as isize + down * aside);
+                let planes = [modulation, scene.usable];
+                rows.miss((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
+                if !rows.ask(count, grid.width, least) {
+                    return;
+                }
+                let mut places_left = (1..PLACES.len()).peekable();
+                while let Some(&first) = places_left.peek() {
+                    let down = PLACES[first][0];
+                    let rights: Vec<isize> =
+                        std::iter::from_fn(|| places_left.next_if(|&place| PLACES[place][0] == down))
+                            .map(|place| PLACES[place][1] * aside)
+                            .collect();
+                    rows.miss((grid, maps), scene, planes, &lines, |y| from(y, down), &rights);
+                    for k in 0..rights.len() {
+                        rows.compare((first + k) as u8, k * lines.len(), grid, places);
+                    }
+                }
+            },
+        );
+    }
+
+    /// Put what the pixels of row `y` have chosen into the backgrounds of that row; the cells lie over the scene of the fit or over
+    /// a finer one.
+    pub fn apply(&self, grid: &Grid, maps: &CellMaps, y: usize, rows: &mut [&mut [f32]; 8]) {
+        if self.places.is_empty() {
+            return;
+        }
+        let factor = grid.stride / self.stride;
+        let aside = (self.aside * factor) as isize;
+        let places = &self.places[y / factor * self.stride..][..self.stride];
+        for (group, places) in places.chunks(LANES).enumerate() {
+            // Most vectors hold no other place; they are told apart at once.
+            if places.iter().fold(0, |any, place| any | place) == 0 {
+                continue;
+            }
+            for (i, &place) in places.iter().enumerate().filter(|(_, place)| **place != 0) {
+                let [down, right] = PLACES[usize::from(place)].map(|steps| steps * aside);
+                let from_row = (y as isize + down).clamp(0, grid.height as isize - 1) as usize;
+                let first = factor * (group * LANES + i);
+                for x in first..first + factor {
+                    let from = (x as isize + right).clamp(0, grid.width as isize - 1) as usize;
+                    let found: [f32; 8] = maps.at(grid, from_row, from);
+                    rows.iter_mut().zip(found).for_each(|(row, value)| row[x] = value);
+                }
+            }
+        }
+    }
+}
+
+impl Rows {
+    fn prepare(&mut self, scene: &Scene<'_>, lines: &[usize], phase: &[f32], ratios: [f32; 3]) {
+        let stride = scene.grid.stride;
+        let Self { carriers, best, asked, smooth, .. } = self;
+        carriers.resize_with(lines.len(), Default::default);
+        for (rows, &y) in carriers.iter_mut().zip(lines) {
+            rows.iter_mut().for_each(|row| row.resize(stride, 0.0));
+            carry(scene.row(phase, y), ratios, rows.each_mut().map(Vec::as_mut_slice));
+        }
+        best.resize_with(lines.len(), Vec::new);
+        best.iter_mut().for_each(|row| row.resize(stride, 0.0));
+        smooth.resize(stride, 0.0);
+        asked.clear();
+        asked.resize(stride / LANES, true);
+    }
+
+    /// Misfits of the rows `lines` with backgrounds of the rows `from`, so many columns to the right.
+    fn miss(
+        &mut self,
+        (grid, maps): (&Grid, &CellMaps),
+        scene: &Scene<'_>,
+        planes: [&[f32]; 2],
+        lines: &[usize],
+        from: impl Fn(usize) -> usize,
+        rights: &[isize],
+    ) {
+        let Self { maps: rows, wide, carriers, misfit, asked, .. } = self;
+        let reach = rights.iter().map(|right| right.unsigned_abs()).max().unwrap_or(0);
+        misfit.resize_with(misfit.len().max(rights.len() * lines.len()), Vec::new);
+        for (i, &y) in lines.iter().enumerate() {
+            let model: [&[f32]; 8] = rows.sample(grid, maps, 0, from(y));
+            wide.iter_mut()
+                .zip(model)
+                .for_each(|(wide, row)| widen(&row[..grid.width], reach, grid.stride, wide));
+            let carriers = carriers[i].each_ref().map(Vec::as_slice);
+            let lit = planes.map(|plane| scene.row(plane, y));
+            for (k, right) in rights.iter().enumerate() {
+                let first = reach.saturating_add_signed(*right);
+                let model = wide.each_ref().map(|row| &row[first..first + grid.stride]);
+                let out = &mut misfit[k * lines.len() + i];
+                out.resize(grid.stride, 0.0);
+                miss(model, carriers, scene.rows(y), lit, asked, out);
+            }
+        }
+    }
+
+    /// Which vectors look around, if any: those that miss more than `least` on average, and their neighbours. The others have
+    /// nothing to gain.
+    fn ask(&mut self, count: usize, width: usize, least: f32) -> bool {
+        let Self { misfit, best, asked, spare, smooth, .. } = self;
+        let misses = |group: usize| {
+            let own = misfit[1..=count].iter().flat_map(|row| &row[LANES * group..LANES * (group + 1)]);
+            let lit = own.filter(|own| **own > 0.0);
+            let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), own| (sum + own, count + 1.0));
+            sum > least * count
+        };
+        let much: Vec<bool> = (0..asked.len()).map(misses).collect();
+        for (i, asked) in asked.iter_mut().enumerate() {
+            *asked = much[i.saturating_sub(1)..(i + 2).min(much.len())].contains(&true);
+        }
+        for (i, best) in best[..count].iter_mut().enumerate() {
+            binomial([&misfit[i], &misfit[i + 1], &misfit[i + 2]], width, spare, smooth);
+            best.iter_mut().zip(&*smooth).for_each(|(best, own)| *best = BETTER * own);
+        }
+        much.contains(&true)
+    }
+
+    /// Take the backgrounds of `place`, whose misfits begin at number `first`, where they are better than any before.
+    fn compare(&mut self, place: u8, first: usize, grid: &Grid, places: &mut [u8]) {
+        let Self { misfit, best, spare, smooth, .. } = self;
+        for (i, (places, best)) in places.chunks_mut(grid.stride).zip(best).enumerate() {
+            let near = [0, 1, 2].map(|k| misfit[first + i + k].as_slice());
+            binomial(near, grid.width, spare, smooth);
+            take_better(place, &smooth[..grid.width], best, places);
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn take_better(place: u8, missed: &[f32], best: &mut [f32], places: &mut [u8]) {
+    for ((missed, best), chosen) in missed.iter().zip(best).zip(places) {
+        let better = *missed < *best;
+        *best = if better { *missed } else { *best };
+        *chosen = if better { place } else { *chosen };
+    }
+}
+
+/// A row with its ends repeated: `reach` times before, and behind as far as there are `stride + 2 reach` numbers.
+fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
+    out.clear();
+    out.resize(reach, row[0]);
+    out.extend_from_slice(row);
+    out.resize(stride + 2 * reach, row[row.len() - 1]);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn carry(phase: &[f32], ratios: [f32; 3], out: [&mut [f32]; 8]) {
+    let phase = lanes(phase);
+    let mut out = out.map(lanes_mut);
+    for (i, phase) in phase.iter().enumerate() {
+        let mut found = [[0.0; LANES]; 8];
+        for x in 0..LANES {
+            let (cosines, derivatives) = carriers(phase[x], ratios, 0.0);
+            for c in 0..4 {
+                (found[c][x], found[4 + c][x]) = (cosines[c], derivatives[c]);
+            }
+        }
+        put(&mut out, i, &found);
+    }
+}
+
+/// Sum of squares of what neither the albedo nor a small change of the phase explains; 0 where there is nothing to see, too much
+/// in vectors that nobody asked.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn miss(
+    model: [&[f32]; 8],
+    carriers: [&[f32]; 8],
+    light: [&[f32]; 4],
+    lit: [&[f32]; 2],
+    asked: &[bool],
+    out: &mut [f32],
+) {
+    let (model, carriers) = (model.map(lanes), carriers.map(lanes));
+    let (light, lit) = (light.map(lanes), lit.map(lanes));
+    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
+        if !asked[i] {
+            *out = [f32::MAX; LANES];
+            continue;
+        }
+        let (model, carriers) = (take(&model, i), take(&carriers, i));
+        let (light, lit) = (take(&light, i), take(&lit, i));
+        let mut found = [0.0; LANES];
+        for x in 0..LANES {
+            let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
+            let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
+            for c in 0..4 {
+                let (a, b) = (model[2 * c][x], model[2 * c + 1][x]);
+                let (m, d, s) = (a + b * carriers[c][x], b * carriers[4 + c][x], light[c][x]);
+                mm += m * m;
+                md += m * d;
+                dd += d * d;
+                ms += m * s;
+                ds += d * s;
+                ss += s * s;
+            }
+            let (own, across) = (dd - md * md / mm, ds - md * ms / mm);
+            let rest = ss - ms * ms / mm - across * across / if own > 1e-9 { own } else { 1e-9 };
+            let on = (lit[0][x] > 0.0) & (lit[1][x] > 0.0);
+            found[x] = if on & (rest > 0.0) { rest } else { 0.0 };
+        }
+        *out = found;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::TAU;
+
+    const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
+
+    /// Two colours that meet in column 128, and cells as a window leaves them that mixes both over ten pixels.
+    struct Edge {
+        grid: Grid,
+        colours: [[f32; 8]; 2],
+        maps: CellMaps,
+        phase: Vec<f32>,
+        light: [Vec<f32>; 4],
+    }
+
+    impl Edge {
+        fn new(colours: [[f32; 8]; 2]) -> Self {
+            let grid = Grid::new([64, 256], 4.0);
+            let phase: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
+            let light = std::array::from_fn(|c| {
+                let seen = |i: usize| {
+                    let [a, b] = [2 * c, 2 * c + 1].map(|k| colours[usize::from(i % 256 >= 128)][k]);
+                    0.6 * (a + b * carriers(phase[i], RATIOS, 0.0).0[c])
+                };
+                (0..grid.pixels()).map(seen).collect()
+            });
+            let mut maps = CellMaps::new(8);
+            maps.fill::<8>(&grid, |_, lines| {
+                for (k, line) in lines.into_iter().enumerate() {
+                    for (column, value) in line.iter_mut().enumerate() {
+                        let across = ((4.0 * column as f32 + 2.0 - 118.0) / 20.0).clamp(0.0, 1.0);
+                        *value = colours[0][k] + (colours[1][k] - colours[0][k]) * across;
+                    }
+                }
+            });
+            Self { grid, colours, maps, phase, light }
+        }
+
+        /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
+        /// neighbours.
+        fn errors(&self, noise: f32) -> [f32; 2] {
+            let (grid, lit) = (&self.grid, vec![1.0; self.grid.pixels()]);
+            let light = self.light.each_ref().map(Vec::as_slice);
+            let scene = Scene { light, usable: &lit, grid, period_px: 25.0, factor: 1 };
+            let mut choice = Choice::default();
+            choice.make((grid, &self.maps), &scene, RATIOS, [&self.phase, &lit], noise);
+            let mut rows = RowMaps::default();
+            let mut sampled = rows.sample_mut::<8>(grid, &self.maps, 0, 30);
+            let error = |rows: &[&mut [f32]; 8]| {
+                let off = |x: usize, k: usize| (rows[k][x] - self.colours[usize::from(x >= 128)][k]).abs();
+                (20..236)
+                    .filter(|x| !(127..130).contains(x))
+                    .flat_map(|x| (0..8).map(move |k| off(x, k)))
+                    .fold(0.0, f32::max)
+            };
+            let own = error(&sampled);
+            choice.apply(grid, &self.maps, 30, &mut sampled);
+            [own, error(&sampled)]
+        }
+    }
+
+    #[test]
+    fn pixels_beside_an_edge_take_the_backgrounds_of_their_side() {
+        let colours =
+            [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
+        let [own, chosen] = Edge::new(colours).errors(1e-3);
+        assert!(own > 0.1, "{own}");
+        assert!(chosen < 0.02, "{chosen}");
+    }
+
+    #[test]
+    fn what_noise_explains_stays_where_it_is() {
+        let colours = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
+        let [own, chosen] = Edge::new(colours).errors(0.03);
+        assert_eq!(own, chosen);
+    }
+}
