@@ -1,5 +1,10 @@
 """Draw the pictures of the README and measure its figures again; `make figures` runs this.
 
+    python docs/make_figures.py [--only WORD ...]
+
+With `--only`, figures are measured again by the commands that hold one of these words, and nothing is drawn. What was
+measured is written after every command: who interrupts it keeps what there is.
+
 Every row of the table names the command that gave its number. Rows on captures and renders need the test data
 (QUADFRINGE_DATA, or ../shared/data), those on cameras Aravis and a network of their own (`make test-camera`), those on
 the browser, and its picture, chromium (`make test-live`); they are left as they are without.
@@ -7,6 +12,7 @@ the browser, and its picture, chromium (`make test-live`); they are left as they
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import shutil
@@ -175,6 +181,14 @@ ACCEPTANCE = (
     ("sphere_1_size_error_mm", "the same: diameter of a sphere, mm", "0.10"),
     ("steps_1_50mm_error_mm", "the same: step of 50 mm, mm", "0.05"),
 )
+PRINTS = (
+    ("best_peaks_phase_rms_all_rad", "peaks, 3 % noise, white: phase RMS, rad", "0.006"),
+    ("best_peaks_shades_phase_rms_all_rad", "the same with coloured shades, rad", "0.03"),
+    ("best_peaks_patches_phase_rms_all_rad", "the same with coloured squares of 20 mm, rad", "0.03"),
+    ("best_peaks_patches_phase_median_rad", "the same, median, rad", ""),
+    ("best_peaks_printed_phase_rms_all_rad", "the same with shades and sharp random colours, rad", "0.03"),
+    ("best_peaks_printed_phase_median_rad", "the same, median, rad", ""),
+)
 SPEED = (
     ("numpy_float64_ms", "published chain in plain NumPy, float64, 1024 x 768, u8 to X, Y, Z, ms", ""),
     ("numpy_float32_ms", "the same in float32, ms", ""),
@@ -238,6 +252,7 @@ SOURCES = (
     Source(("quadfringe", "reproduce", "pair-tolerance"), PAIR_TOLERANCE),
     Source(("quadfringe", "reproduce", "pair-correction"), PAIR_CORRECTION),
     Source(("quadfringe", "reproduce", "pair-depth"), PAIR_DEPTH),
+    Source(("benches/accuracy.py",), PRINTS),
     Source(("benches/captures_report.py",), CAPTURES, has_data),
     Source(("benches/bench_decode.py",), SPEED),
     Source(("benches/first_frame.py",), (("first_frame_s", "first frame from process start, s", "1.5"),)),
@@ -250,6 +265,20 @@ SOURCES = (
 
 
 def main() -> None:
+    parser = argparse.ArgumentParser(description="Draw the pictures of the README and measure its figures again.")
+    parser.add_argument("--only", nargs="+", metavar="WORD", help="commands to run: those that hold one of these words")
+    only = parser.parse_args().only
+    chosen = [source for source in SOURCES if only is None or any(word in words_of(source.command) for word in only)]
+    if not chosen:
+        parser.error(f"no command holds one of {only}; the last column of the table in README.md names them")
+    if only is None:
+        draw()
+    for source in chosen:
+        if source.there():
+            write_table(source, run(source))
+
+
+def draw() -> None:
     PICTURES.mkdir(parents=True, exist_ok=True)
     with qf.open(qf.SystemConfig(scene=qf.SceneConfig(surface="face", noise=0.03))) as scanner:
         shot = scanner.grab()
@@ -258,10 +287,6 @@ def main() -> None:
     draw_shape(PICTURES / "shape.png", shape)
     if has_browser():
         draw_page(PICTURES / "live.png")
-    readme = ROOT / "README.md"
-    before, _, rest = readme.read_text().partition(BEGIN)
-    old, _, after = rest.partition(END)
-    readme.write_text(f"{before}{BEGIN}\n{measured_table(old)}{END}{after}")
 
 
 def draw_fringes(path: Path, shot: qf.Shot) -> None:
@@ -320,17 +345,20 @@ def draw_page(path: Path) -> None:
         page.picture(path)
 
 
-def measured_table(old: str) -> str:
-    """Give the table; rows that need what is not there stay as they stood in the old one."""
+def write_table(measured: Source, figures: dict[str, float]) -> None:
+    """Put the figures of one source into the README's table; all other rows stay as they stand there."""
+    readme = ROOT / "README.md"
+    before, _, rest = readme.read_text().partition(BEGIN)
+    old, _, after = rest.partition(END)
     lines = ["| figure | value | bar | command |", "|---|---|---|---|"]
     for source in SOURCES:
         command = words_of(source.command)
-        if not source.there():
+        if source is measured:
+            lines += [f"| {words} | {figures[name]:.4g} | {bar} | `{command}` |" for name, words, bar in source.rows]
+        else:
             lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
-            continue
-        figures = run(source)
-        lines += [f"| {words} | {figures[name]:.4g} | {bar} | `{command}` |" for name, words, bar in source.rows]
-    return "\n".join(lines) + "\n"
+    table = "\n".join(lines)
+    readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
 
 
 def words_of(command: tuple[str, ...]) -> str:

@@ -35,6 +35,9 @@ const PLACES: [[isize; 2]; 17] = [
 /// Pixels look around where they miss more, on average over a vector in the rows of a task, than this many times what noise
 /// does: three standard deviations of that average.
 const NOISES: f32 = 1.2;
+/// Root mean square, in units of the modulation, that has to be missed on top of that and gained by another place: what a curved or
+/// blurred surface misses without being another colour must not send its pixels elsewhere.
+const SHARE: f32 = 0.02;
 /// Squared misfit in units of the variance of the noise: four intensities less albedo and phase.
 const MISSED_BY_NOISE: f32 = 2.0;
 /// Other backgrounds are taken when they miss less than this share of what a pixel's own do.
@@ -103,7 +106,8 @@ impl Choice {
                 let from = |y: usize, down: isize| inside(y as isize + down * aside);
                 let planes = [modulation, scene.usable];
                 rows.miss((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
-                if !rows.ask(count, grid.width, least) {
+                let lights = lines[1..=count].iter().map(|&y| scene.row(modulation, y));
+                if !rows.ask(lights, grid.width, least) {
                     return;
                 }
                 let mut places_left = (1..PLACES.len()).peekable();
@@ -196,23 +200,27 @@ impl Rows {
         }
     }
 
-    /// Which vectors look around, if any: those that miss more than `least` on average, and their neighbours. The others have
-    /// nothing to gain.
-    fn ask(&mut self, count: usize, width: usize, least: f32) -> bool {
+    /// Which vectors look around, if any: those that miss more than `least` and a share of the modulation on average, and their
+    /// neighbours. The others have nothing to gain. `lights` are the rows of the modulation.
+    fn ask<'a>(&mut self, lights: impl Iterator<Item = &'a [f32]> + Clone, width: usize, least: f32) -> bool {
         let Self { misfit, best, asked, spare, smooth, .. } = self;
         let misses = |group: usize| {
-            let own = misfit[1..=count].iter().flat_map(|row| &row[LANES * group..LANES * (group + 1)]);
-            let lit = own.filter(|own| **own > 0.0);
-            let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), own| (sum + own, count + 1.0));
-            sum > least * count
+            let pixels = LANES * group..LANES * (group + 1);
+            let own = misfit[1..].iter().zip(lights.clone()).flat_map(|(row, light)| {
+                row[pixels.clone()].iter().zip(&light[pixels.clone()]).filter(|(own, _)| **own > 0.0)
+            });
+            let excess = own.map(|(own, light)| own - least - (SHARE * light).powi(2));
+            excess.sum::<f32>() > 0.0
         };
         let much: Vec<bool> = (0..asked.len()).map(misses).collect();
         for (i, asked) in asked.iter_mut().enumerate() {
             *asked = much[i.saturating_sub(1)..(i + 2).min(much.len())].contains(&true);
         }
-        for (i, best) in best[..count].iter_mut().enumerate() {
+        for (i, (best, light)) in best.iter_mut().zip(lights).enumerate() {
             binomial([&misfit[i], &misfit[i + 1], &misfit[i + 2]], width, spare, smooth);
-            best.iter_mut().zip(&*smooth).for_each(|(best, own)| *best = BETTER * own);
+            for (best, (own, light)) in best.iter_mut().zip(smooth.iter().zip(light)) {
+                *best = BETTER * own - (SHARE * light).powi(2);
+            }
         }
         much.contains(&true)
     }
@@ -350,7 +358,8 @@ mod tests {
             let light = self.light.each_ref().map(Vec::as_slice);
             let scene = Scene { light, usable: &lit, grid, period_px: 25.0, factor: 1 };
             let mut choice = Choice::default();
-            choice.make((grid, &self.maps), &scene, RATIOS, [&self.phase, &lit], noise);
+            let modulation = vec![0.2; grid.pixels()];
+            choice.make((grid, &self.maps), &scene, RATIOS, [&self.phase, &modulation], noise);
             let mut rows = RowMaps::default();
             let mut sampled = rows.sample_mut::<8>(grid, &self.maps, 0, 30);
             let error = |rows: &[&mut [f32]; 8]| {
