@@ -71,7 +71,7 @@ fn a_mosaic_loses_no_orders_at_edges() {
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
     assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
     // Two pixels beside every shadow are left out, into which light is interpolated: six in a thousand.
-    assert!(raw.returned_share() > 0.975, "{raw:?}");
+    assert!(raw.returned_share() > full.returned_share() - 6e-3, "{raw:?}");
 }
 
 #[test]

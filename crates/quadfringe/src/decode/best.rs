@@ -179,7 +179,7 @@ impl Best {
         let found = hold(found, grid.pixels());
         finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), lent, found);
         guide.noise = finder.noise;
-        (0..blur_px).for_each(|_| finder.shrink(grid, lent, found));
+        finder.shrink(grid, blur_px, lent, found);
         self.full.restrict(grid, found);
         let factor = grid.step / coarse.step;
         let shrunk = self.shrunk.scene(coarse, period_px / factor as f64, factor);

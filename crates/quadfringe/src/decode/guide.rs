@@ -80,7 +80,7 @@ impl Guide {
         let light = level.light.each_ref().map(Vec::as_slice);
         let (finder, [lent, _]) = (&mut self.finder, &mut self.lent);
         finder.find(grid, light, (period_px, 2.0 * options.modulation_min), lent, &mut self.modulation);
-        (0..blur_px).for_each(|_| finder.shrink(grid, lent, &mut self.modulation));
+        finder.shrink(grid, blur_px, lent, &mut self.modulation);
         level.restrict(grid, &self.modulation);
         let scene = level.scene(grid, period_px, factor);
 

@@ -81,19 +81,28 @@ impl LightFinder {
         );
     }
 
-    /// Takes the outermost pixels of what is lit.
-    pub fn shrink(&mut self, grid: &Grid, lent: &mut Vec<f32>, lit: &mut [f32]) {
-        let above = hold(lent, grid.pixels());
-        above.copy_from_slice(lit);
-        let (above, slots) = (&*above, &self.slots);
+    /// Takes what lies `reach_px` pixels and less from the dark: light interpolated from rows and columns reaches that far.
+    /// In the corner of the square around a pixel stands a product of two far samples, with a hundredth of the weight:
+    /// the corners of the last ring do not count.
+    pub fn shrink(&mut self, grid: &Grid, reach_px: usize, lent: &mut Vec<f32>, lit: &mut [f32]) {
         let stride = grid.stride;
-        lit.par_chunks_mut(stride).enumerate().for_each_init(
-            || slots.take(),
-            |slot, (y, lit)| {
-                let near = around(y, grid.height).map(|row| &above[row * stride..][..stride]);
-                least_of_nine(near, grid.width, 0.5, &mut slot.0.sums, lit);
-            },
-        );
+        for ring in 1..=reach_px {
+            let above = hold(lent, grid.pixels());
+            above.copy_from_slice(lit);
+            let (above, slots) = (&*above, &self.slots);
+            let corners = ring == 1 || ring < reach_px;
+            lit.par_chunks_mut(stride).enumerate().for_each_init(
+                || slots.take(),
+                |slot, (y, lit)| {
+                    let near = around(y, grid.height).map(|row| &above[row * stride..][..stride]);
+                    if corners {
+                        least_of_nine(near, grid.width, 0.5, &mut slot.0.sums, lit);
+                    } else {
+                        least_of_five(near, grid.width, 0.5, lit);
+                    }
+                },
+            );
+        }
     }
 
     /// Bottom of the light of each channel around every cell, and the inverse square of its range.
@@ -237,6 +246,21 @@ fn least_of_nine(rows: [&[f32]; 3], width: usize, limit: f32, spare: &mut Vec<f3
     }
 }
 
+/// The same of a pixel and its four neighbours in row and column.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn least_of_five(rows: [&[f32]; 3], width: usize, limit: f32, out: &mut [f32]) {
+    let least = |a: f32, b: f32| if a < b { a } else { b };
+    let [above, own, below] = rows.map(|row| &row[..width]);
+    let out = &mut out[..width];
+    for x in 0..width {
+        out[x] = least(least(above[x], below[x]), own[x]);
+    }
+    for x in 0..width {
+        let beside = least(own[x.saturating_sub(1)], own[(x + 1).min(width - 1)]);
+        out[x] = if least(out[x], beside) > limit { 1.0 } else { 0.0 };
+    }
+}
+
 /// Standard deviation of the noise of the red plane, from a mask that is blind to anything that varies along rows
 /// alone or along columns alone (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)).
 fn noise(red: &[f32], grid: &Grid) -> f32 {
@@ -261,6 +285,17 @@ fn noise(red: &[f32], grid: &Grid) -> f32 {
 mod tests {
     use super::*;
     use std::f32::consts::{FRAC_PI_2, TAU};
+
+    #[test]
+    fn the_dark_takes_what_interpolation_reaches() {
+        let grid = Grid::new([20, 32], 4.0);
+        let mut lit = vec![1.0; grid.pixels()];
+        lit[9 * grid.stride + 12] = 0.0;
+        LightFinder::default().shrink(&grid, 2, &mut Vec::new(), &mut lit);
+        let dark = |y: usize| (0..grid.width).filter(|x| lit[y * grid.stride + x] == 0.0).collect::<Vec<_>>();
+        assert_eq!((7..=11).map(dark).map(|row| row.len()).collect::<Vec<_>>(), [3, 5, 5, 5, 3]);
+        assert_eq!((dark(6), dark(7), dark(9)), (vec![], vec![11, 12, 13], vec![10, 11, 12, 13, 14]));
+    }
 
     #[test]
     fn a_shadow_is_told_from_dark_fringes_whatever_the_ambient_light() {
