@@ -1,9 +1,10 @@
 //! Memory of the maps that go to Python, used again once Python has dropped them: the system takes longer to find fresh
 //! memory than the kernel takes to fill it.
 
-use ndarray::{Array, ArrayView, Dimension};
+use ndarray::{Array, Array1, Dimension};
 use numpy::PyArray;
 use pyo3::prelude::*;
+use quadfringe::aligned_zeros;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Most maps that wait for a shot: those of two shots.
@@ -12,7 +13,7 @@ const WAITING: usize = 16;
 /// Maps that wait for the next shot.
 #[derive(Default)]
 pub struct Memory {
-    waiting: Mutex<Vec<Vec<f32>>>,
+    waiting: Mutex<Vec<Array1<f32>>>,
 }
 
 impl Memory {
@@ -21,8 +22,8 @@ impl Memory {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         let fitting = waiting.iter().position(|values| values.len() == shape.size());
         match fitting.map(|at| waiting.swap_remove(at)) {
-            Some(values) => Array::from_shape_vec(shape, values).expect("as many values as the shape has"),
-            None => Array::zeros(shape),
+            Some(values) => values.into_shape_with_order(shape).expect("as many values as the shape has"),
+            None => aligned_zeros(shape),
         }
     }
 
@@ -33,15 +34,17 @@ impl Memory {
         array: Array<f32, D>,
     ) -> PyResult<Bound<'py, PyArray<f32, D>>> {
         let shape = array.raw_dim();
-        let (values, _) = array.into_raw_vec_and_offset();
+        let count = array.len();
+        let values = array.into_shape_with_order(count).expect("maps are contiguous");
         let loan = Bound::new(py, Loan { values, owner: Arc::clone(self) })?;
-        let view = ArrayView::from_shape(shape, &loan.get().values).expect("as many values as the shape has");
+        let view =
+            loan.get().values.view().into_shape_with_order(shape).expect("as many values as the shape has");
         // SAFETY: the array keeps the loan alive, which neither moves, changes nor shows its values to anyone else.
         #[expect(unsafe_code, reason = "the only way to a NumPy array that tells when it is gone")]
         Ok(unsafe { PyArray::borrow_from_array(&view, loan.clone().into_any()) })
     }
 
-    fn give_back(&self, values: Vec<f32>) {
+    fn give_back(&self, values: Array1<f32>) {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         if waiting.len() < WAITING {
             waiting.push(values);
@@ -52,7 +55,7 @@ impl Memory {
 /// Memory lent to Python: the base of a NumPy array.
 #[pyclass(frozen, module = "quadfringe._core")]
 struct Loan {
-    values: Vec<f32>,
+    values: Array1<f32>,
     owner: Arc<Memory>,
 }
 

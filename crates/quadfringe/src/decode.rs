@@ -19,7 +19,7 @@ mod output;
 mod published;
 mod uncertainty;
 
-pub use output::Decoded;
+pub use output::{Decoded, aligned_zeros};
 
 use crate::condition::{Plan, Sample};
 use crate::height::{PairTable, Triangulator};

@@ -74,7 +74,7 @@ pub mod height;
 pub mod decode;
 
 pub use condition::{Conditioner, Response, Shot};
-pub use decode::{Decoded, Decoder, Method, Options};
+pub use decode::{Decoded, Decoder, Method, Options, aligned_zeros};
 pub use error::{Error, Result};
 pub use fringe::{Channel, DmdLayout, FringeCode};
 pub use optics::{BayerPattern, Device};

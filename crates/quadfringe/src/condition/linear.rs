@@ -51,8 +51,7 @@ impl Linear {
     pub fn row<T: Sample>(&self, c: usize, row: &[T], out: &mut [f32]) {
         let (table, scale) = (&self.tables[c][..T::LEVELS], 1.0 / self.full_scale);
         let pixels = out.iter_mut().zip(row);
-        if [self.response[c], self.projector_response[c]] == [Response::default(); 2] {
-            // Arithmetic runs on vectors, which a table does not.
+        if self.is_plain(c) {
             let dark = self.dark[c];
             for (value, raw) in pixels {
                 *value = raw.intensity() * scale - dark;
@@ -65,17 +64,32 @@ impl Linear {
     }
 
     /// A row of two channels that take turns: the even columns and the odd ones.
-    #[inline]
-    pub fn row_of_two<T: Sample>(&self, [a, b]: [usize; 2], row: &[T], [even, odd]: [&mut [f32]; 2]) {
-        let tables = [a, b].map(|c| &self.tables[c][..T::LEVELS]);
-        let pairs = row.chunks_exact(2);
-        if let [last] = pairs.remainder() {
-            even[row.len() / 2] = self.value(a, tables[0], *last);
+    #[inline(always)]
+    pub fn row_of_two<T: Sample>(&self, channels: [usize; 2], row: &[T], [even, odd]: [&mut [f32]; 2]) {
+        let (pairs, last) = row.as_chunks::<2>();
+        if let [last] = last {
+            even[row.len() / 2] = self.value(channels[0], &self.tables[channels[0]][..T::LEVELS], *last);
         }
-        for ((even, odd), pair) in even.iter_mut().zip(odd).zip(pairs) {
-            *even = self.value(a, tables[0], pair[0]);
-            *odd = self.value(b, tables[1], pair[1]);
+        let pixels = even.iter_mut().zip(odd).zip(pairs);
+        if channels.iter().all(|&c| self.is_plain(c)) {
+            let (scale, [a, b]) = (1.0 / self.full_scale, channels.map(|c| self.dark[c]));
+            for ((even, odd), pair) in pixels {
+                *even = pair[0].intensity() * scale - a;
+                *odd = pair[1].intensity() * scale - b;
+            }
+            return;
         }
+        let [a, b] = channels.map(|c| (c, &self.tables[c][..T::LEVELS]));
+        for ((even, odd), pair) in pixels {
+            *even = self.value(a.0, a.1, pair[0]);
+            *odd = self.value(b.0, b.1, pair[1]);
+        }
+    }
+
+    /// Arithmetic instead of a table: it runs on vectors.
+    #[inline(always)]
+    fn is_plain(&self, c: usize) -> bool {
+        [self.response[c], self.projector_response[c]] == [Response::default(); 2]
     }
 
     #[inline]

@@ -45,7 +45,7 @@ impl Mosaic {
             let (even, odd) = line.split_at_mut(half);
             let channels = [0, 1].map(|x| pattern.channel(y, x).index());
             let samples = [&mut even[MARGIN..], &mut odd[MARGIN..]];
-            linear.row_of_two(channels, &row_of(raw, y), samples);
+            split_row(linear, channels, &row_of(raw, y), samples);
             extend(even, MARGIN, columns.div_ceil(2));
             extend(odd, MARGIN, columns / 2);
         });
@@ -96,6 +96,12 @@ impl Mosaic {
         let far = [-3, 3].map(|offset| self.line(y, offset, 1 - column));
         green_row(self.line(y, 0, column), near, alike, far, column, green);
     }
+}
+
+/// The columns of a row of raw samples by their parity, as linear light.
+#[multiversion(targets("x86_64+avx2"))]
+fn split_row<T: Sample>(linear: &Linear, channels: [usize; 2], row: &[T], out: [&mut [f32]; 2]) {
+    linear.row_of_two(channels, row, out);
 }
 
 /// R or B in a row that has samples of it, in every other column from `column` on.

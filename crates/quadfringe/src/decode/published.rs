@@ -6,7 +6,7 @@ use super::output::Finish;
 use super::uncertainty::Sureness;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
-use crate::demod::{Band, LineSpectrum, RowFilter};
+use crate::demod::{Band, LineSpectrum, RowFilter, Sampling};
 use crate::height::PairTable;
 use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
@@ -73,7 +73,7 @@ impl Published {
             unwrapping: &self.unwrapping,
             filter: &self.filter,
             periods_px,
-            weights: [1, 2].map(|i: usize| self.filter.weights(Band::Improved, periods_px[i])),
+            bands: [1, 2].map(|i: usize| self.filter.filter(Band::Improved, periods_px[i], Sampling::Sparse)),
             modulation_min: options.modulation_min,
             quality_min: options.quality_min,
             sureness: Sureness::none(),

@@ -3,7 +3,7 @@
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vectors.
-const LINE: usize = 64;
+pub(crate) const LINE: usize = 64;
 
 /// A row of numbers that keeps its place and its numbers for as long as it need not grow.
 #[derive(Debug, Default)]

@@ -190,21 +190,13 @@ impl Block {
         Self { directions: rows, ideal: rows, depth: row, growth: row }
     }
 
-    /// `t x, t y, t` pixel by pixel, in groups that vectors can shuffle.
+    /// `t x, t y, t` pixel by pixel.
     #[inline(always)]
     fn write_points(&self, xyz: &mut [f32]) {
-        const GROUP: usize = 8;
         let [x, y] = &self.directions;
-        let point = |i: usize| [self.depth[i] * x[i], self.depth[i] * y[i], self.depth[i]];
-        let groups = xyz.len() / (3 * GROUP);
-        let (whole, rest) = xyz.split_at_mut(3 * GROUP * groups);
-        for (group, points) in whole.chunks_exact_mut(3 * GROUP).enumerate() {
-            for i in 0..GROUP {
-                points[3 * i..][..3].copy_from_slice(&point(GROUP * group + i));
-            }
-        }
-        for (i, to) in rest.chunks_exact_mut(3).enumerate() {
-            to.copy_from_slice(&point(GROUP * groups + i));
+        let (points, _) = xyz.as_chunks_mut::<3>();
+        for (((point, x), y), t) in points.iter_mut().zip(x).zip(y).zip(&self.depth) {
+            *point = [t * x, t * y, *t];
         }
     }
 

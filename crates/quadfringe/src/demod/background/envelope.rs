@@ -12,7 +12,7 @@ const SMOOTH: f32 = 0.2;
 /// Extrema refined at once.
 const LANES: usize = 8;
 /// Pixels drawn at once: mostly all from one extremum to the next.
-const BLOCK: usize = 16;
+const BLOCK: usize = 24;
 
 /// Working memory of [`mean_envelope`].
 #[derive(Debug, Default)]
@@ -195,7 +195,8 @@ impl Drawing<'_> {
             let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * line.slope);
             let end = (line.end as usize).min(row.len());
             let mut level = line.level;
-            for from in (start..end).step_by(BLOCK) {
+            let mut from = start;
+            while from < end {
                 let block = row[from..].first_chunk::<BLOCK>().zip(out[from..].first_chunk_mut::<BLOCK>());
                 match block {
                     Some((row, out)) => *out = std::array::from_fn(|i| row[i] - (level + steps[i])),
@@ -206,6 +207,7 @@ impl Drawing<'_> {
                     }
                 }
                 level += BLOCK as f32 * line.slope;
+                from += BLOCK;
             }
             start = end;
         }
