@@ -26,6 +26,7 @@ __all__ = [
     "background",
     "carrier",
     "check_code",
+    "crc32",
     "estimate_response",
     "exposure_in_frame_us",
     "fourier",
@@ -370,6 +371,9 @@ def linear_light_bayer(
 
     Images and errors as those of `Decoder.decode_bayer`.
     """
+
+def crc32(image: NDArray[np.uint8]) -> int:
+    """Give the CRC-32 of the bytes of an image, as zlib's but faster."""
 
 def background(image: NDArray[np.float32], period_px: float, *, kind: str | None = None) -> NDArray[np.float32]:
     """Give the background of every row; `kind` is mean_envelope (as published) or moving_mean."""

@@ -38,7 +38,7 @@ class Scanner:
         self.projector = projector
         self.camera = camera
         self._described = config.model_dump(mode="json", exclude_none=True)
-        self._decoder: ShotDecoder | None = None
+        self._idle: list[ShotDecoder] = []
         self._live: LiveStream | None = None
 
     @property
@@ -59,10 +59,18 @@ class Scanner:
         return self.camera.snap()
 
     def decode(self, shot: AnyShot) -> Shape:
-        """Give the shape of a shot of this system; raises `DecodeError` when none can be trusted."""
-        if self._decoder is None:
-            self._decoder = ShotDecoder(shot, self._plan())
-        shape = self._decoder.decode(shot)
+        """Give the shape of a shot of this system; raises `DecodeError` when none can be trusted.
+
+        Threads may call this at the same time: each then has a decoder of its own.
+        """
+        try:
+            decoder = self._idle.pop()
+        except IndexError:
+            decoder = ShotDecoder(shot, self._plan())
+        try:
+            shape = decoder.decode(shot)
+        finally:
+            self._idle.append(decoder)
         return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self._calibration)
 
     def measure(self) -> Shape:
@@ -92,7 +100,12 @@ class Scanner:
         """
         self._end_stream()
         self.projector.show(self.config.fringes)
-        self._live = LiveStream(self.camera, self.decode, count, keep=keep, taps=taps, resume=resume)
+        # The published method leaves processors idle between its rows and the next shot; the best one keeps them busy, and
+        # two shots at once would only be later.
+        at_once = 2 if self.config.decode.method == "published" else 1
+        self._live = LiveStream(
+            self.camera, self.decode, count, keep=keep, taps=taps, resume=resume, at_once=at_once
+        )
         return self._live
 
     def _end_stream(self) -> None:

@@ -83,6 +83,7 @@ class LiveStream:
 
     Every tap gets every shot that was captured, in a thread of its own behind a queue of its own. What a tap raises
     ends the stream. A camera that makes shots when asked (`paced` is False) waits for the others, and loses none.
+    `decode` is called from as many threads as shots are decoded `at_once`; results come in the order of the shots.
     """
 
     def __init__(
@@ -94,6 +95,7 @@ class LiveStream:
         keep: Keep = "latest",
         taps: Mapping[str, Tap] | None = None,
         resume: bool = False,
+        at_once: int = 1,
     ) -> None:
         self._camera, self._decode, self._count, self._resume = camera, decode, count, resume
         self._wait = not camera.paced
@@ -104,8 +106,11 @@ class LiveStream:
         self._shots: DroppingQueue[AnyShot] = DroppingQueue(LENGTH[keep])
         self._results: DroppingQueue[Measured] = DroppingQueue(LENGTH[keep])
         self._taps = {name: (tap, DroppingQueue[AnyShot](TAP_LENGTH)) for name, tap in (taps or {}).items()}
-        work: dict[str, Callable[[], None]] = {"capture": self._capture, "decode": self._decode_all}
-        self._threads = [threading.Thread(target=run, name=name, daemon=True) for name, run in work.items()]
+        self._taking, self._order = threading.Lock(), threading.Condition()
+        self._taken = self._given = 0
+        self._decoders = at_once
+        self._threads = [threading.Thread(target=self._capture, name="capture", daemon=True)]
+        self._threads += [threading.Thread(target=self._decode_all, name="decode", daemon=True) for _ in range(at_once)]
         self._threads += [
             threading.Thread(target=self._feed, args=pair, name=name, daemon=True) for name, pair in self._taps.items()
         ]
@@ -143,23 +148,41 @@ class LiveStream:
             queue.end(error)
 
     def _decode_all(self) -> None:
-        try:
-            while True:
-                self._results.put(self._measured(self._shots.get()), wait=self._wait)
-        except EndOfQueue:
-            self._results.end()
-        except BaseException as error:
-            self._fail(error)
+        """Decode shots as they come; others may do the same, and every result waits for those of earlier shots."""
+        while True:
+            try:
+                with self._taking:
+                    shot, turn = self._shots.get(), self._taken
+                    self._taken += 1
+            except BaseException as error:
+                self._leave(error)
+                return
+            try:
+                result = self._decoded_or_refused(shot)
+            except BaseException as error:
+                self._fail(error)
+                return
+            with self._order:
+                self._order.wait_for(lambda turn=turn: self._given == turn or self._stop.is_set())
+                self._refused += isinstance(result, DecodeError)
+                self._decoded.tick()
+                latency_ms = (time.time_ns() - _arrival_ns(shot)) / 1e6
+                self._results.put(Measured(shot, result, latency_ms), wait=self._wait)
+                self._given += 1
+                self._order.notify_all()
 
-    def _measured(self, shot: AnyShot) -> Measured:
-        result: Shape | DecodeError
+    def _decoded_or_refused(self, shot: AnyShot) -> Shape | DecodeError:
         try:
-            result = self._decode(shot)
+            return self._decode(shot)
         except DecodeError as error:
-            result = error
-            self._refused += 1
-        self._decoded.tick()
-        return Measured(shot, result, (time.time_ns() - _arrival_ns(shot)) / 1e6)
+            return error
+
+    def _leave(self, reason: BaseException) -> None:
+        """Nothing more is to decode: the last one to leave ends the results."""
+        with self._order:
+            self._decoders -= 1
+            if not self._decoders:
+                self._results.end(None if isinstance(reason, EndOfQueue) else reason)
 
     def _feed(self, tap: Tap, queue: DroppingQueue[AnyShot]) -> None:
         try:
@@ -178,6 +201,8 @@ class LiveStream:
         self._shots.end()
         for _, queue in self._taps.values():
             queue.end()
+        with self._order:
+            self._order.notify_all()
 
     def __iter__(self) -> Iterator[Measured]:
         return self

@@ -53,6 +53,23 @@ pub fn wrong_array(name: &str, expected: &str, object: &Bound<'_, PyAny>) -> PyE
     PyTypeError::new_err(format!("{name}: expected {expected}, got {actual}"))
 }
 
+/// CRC-32 (that of zlib) of the bytes of an image in the order of its rows, by instructions made for it.
+#[pyfunction]
+pub fn crc32(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<u32> {
+    let bytes = expected::<u8, 2>("image", image)?;
+    let rows = bytes.as_array();
+    Ok(py.detach(|| {
+        let mut sum = crc32fast::Hasher::new();
+        for row in rows.rows() {
+            match row.to_slice() {
+                Some(row) => sum.update(row),
+                None => sum.update(&row.to_vec()),
+            }
+        }
+        sum.finalize()
+    }))
+}
+
 /// Images of one type, borrowed from NumPy.
 pub enum Images<'py, const COUNT: usize> {
     /// 8 bit.

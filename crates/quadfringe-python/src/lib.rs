@@ -26,6 +26,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<projector::Pattern>()?;
     module.add_class::<projector::PatternSequence>()?;
     module.add_class::<projector::PatternWindow>()?;
+    module.add_function(wrap_pyfunction!(arrays::crc32, module)?)?;
     module.add_function(wrap_pyfunction!(device::optimum, module)?)?;
     module.add_function(wrap_pyfunction!(device::check_code, module)?)?;
     module.add_function(wrap_pyfunction!(device::pattern, module)?)?;

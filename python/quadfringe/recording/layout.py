@@ -16,7 +16,6 @@ Everything is made before HDF5's mode of one writer and many readers begins, bec
 from __future__ import annotations
 
 import json
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
@@ -177,4 +176,4 @@ def stamp_at(file: h5py.File, header: Header, index: int) -> Stamp:
 
 def crcs_of(images: Mapping[str, NDArray[Any]]) -> list[int]:
     """Give the CRC-32 of the bytes of each image (C order)."""
-    return [zlib.crc32(image.data) for image in images.values()]
+    return [_core.crc32(np.ascontiguousarray(image).view(np.uint8)) for image in images.values()]

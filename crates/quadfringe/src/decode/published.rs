@@ -83,17 +83,27 @@ impl Published {
         out.rows().enumerate().for_each_init(
             || Rows::new(&self.filter, self.shape[1]),
             |rows, (y, mut out)| {
-                decode_row(rows, &row_plan, shot, y, &mut out);
+                if self.is_looked_at(y) {
+                    row_plan.sureness.tell(&mut out);
+                } else {
+                    decode_row(rows, &row_plan, shot, y, &mut out);
+                }
                 finish.row(y, &mut out);
             },
         );
     }
 
-    /// Noise of the shot and of its orders, from a few rows.
+    /// Rows that tell what the others have in common: they have neighbours above and below.
+    fn is_looked_at(&self, y: usize) -> bool {
+        let height = self.shape[0];
+        y % height.div_ceil(CARRIER_ROWS) == 1 % height.div_ceil(CARRIER_ROWS) && (1..height - 1).contains(&y)
+    }
+
+    /// Noise of the shot and of its orders, from a few rows, which are decoded in units of the noise.
     fn look<T: Sample>(&self, plan: &RowPlan<'_>, shot: &Shot<'_, T>, out: &mut Decoded) -> Sureness {
-        let [height, width] = self.shape;
-        let looked_at = out.row_by_row().into_iter().enumerate().take(height - 1).skip(1);
-        let looked_at: Vec<_> = looked_at.step_by(height.div_ceil(CARRIER_ROWS)).collect();
+        let width = self.shape[1];
+        let rows = out.row_by_row().into_iter().enumerate();
+        let looked_at: Vec<_> = rows.filter(|(y, _)| self.is_looked_at(*y)).collect();
         let seen = looked_at.into_par_iter().map_init(
             || (Rows::new(&self.filter, width), [vec![0.0; width], vec![0.0; width]]),
             |(rows, bend), (y, mut out)| {

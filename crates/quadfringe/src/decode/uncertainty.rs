@@ -10,6 +10,7 @@
 //! Orders are judged by how far the next one is behind, as `exp(-lead / temperature)`. The temperature is what the evidence
 //! of the shot misses the chosen orders by: it holds the noise, the texture and the edges of this very shot.
 
+use super::output::OutputRow;
 use multiversion::multiversion;
 use std::f32::consts::PI;
 
@@ -160,14 +161,20 @@ pub(super) struct Sureness {
 }
 
 impl Sureness {
-    /// Before anything is known.
+    /// Before anything is known: uncertainties come in units of the noise.
     pub fn none() -> Self {
-        Self { noise: 0.0, odds: MarginOdds { table: Box::new([0.0; 2 * STEPS]) } }
+        Self { noise: 1.0, odds: MarginOdds { table: Box::new([0.0; 2 * STEPS]) } }
     }
 
     /// From second differences of intensities down columns, which see little of the fringes, and from margins of orders.
     pub fn new(bends: &mut [f32], margins: &mut [f32]) -> Self {
         Self { noise: deviation(bends) / 6f32.sqrt(), odds: MarginOdds::new(margins) }
+    }
+
+    /// Uncertainty and odds of a row that was decoded before they were known.
+    pub fn tell(&self, row: &mut OutputRow<'_>) {
+        row.sigma.iter_mut().for_each(|sigma| *sigma *= self.noise);
+        self.odds.another(row.quality, row.wrong);
     }
 }
 
