@@ -20,8 +20,9 @@ impl Memory {
     /// An array of numbers left over from another shot, or of zeros.
     pub fn take<D: Dimension>(&self, shape: D) -> Array<f32, D> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        let fitting = waiting.iter().position(|values| values.len() == shape.size());
-        match fitting.map(|at| waiting.swap_remove(at)) {
+        // The latest first: some of it may still be in a cache.
+        let fitting = waiting.iter().rposition(|values| values.len() == shape.size());
+        match fitting.map(|at| waiting.remove(at)) {
             Some(values) => values.into_shape_with_order(shape).expect("as many values as the shape has"),
             None => aligned_zeros(shape),
         }
