@@ -142,15 +142,42 @@ def test_a_lost_camera_is_asked_again() -> None:
         assert stream.statistics().fault is None
 
 
+def test_shots_decoded_at_once_come_out_in_their_order() -> None:
+    inside, most = 0, 0
+    lock = threading.Lock()
+
+    def uneven(shot: AnyShot) -> Shape:
+        nonlocal inside, most
+        assert shot.id is not None
+        with lock:
+            inside += 1
+            most = max(most, inside)
+        time.sleep(0.02 if shot.id % 3 == 0 else 0.001)
+        with lock:
+            inside -= 1
+        return numbered(shot)
+
+    script: list[int | Exception] = [*range(1, 30), CameraLostError("gone")]
+    came = []
+    with (
+        LiveStream(ScriptedCamera(script, paced=False), uneven, keep="all", at_once=2) as stream,
+        pytest.raises(CameraLostError, match="gone"),
+    ):
+        came.extend(measured.shape.config["id"] for measured in stream)
+    assert came == list(range(1, 30)), "also what was being decoded when the camera was lost"
+    assert most == 2
+
+
+@pytest.mark.parametrize("at_once", [1, 2])
 @pytest.mark.parametrize("where", ["decode", "tap"])
-def test_what_goes_wrong_in_a_thread_reaches_the_caller(where: str) -> None:
+def test_what_goes_wrong_in_a_thread_reaches_the_caller(where: str, at_once: int) -> None:
     def fails(_: AnyShot) -> Shape:
         raise OSError("disk full")
 
     camera = ScriptedCamera(list(range(1000)), paced=False)
     taps = {"record": fails} if where == "tap" else {}
     with (
-        LiveStream(camera, fails if where == "decode" else numbered, taps=taps) as stream,
+        LiveStream(camera, fails if where == "decode" else numbered, taps=taps, at_once=at_once) as stream,
         pytest.raises(OSError, match="disk full"),
     ):
         ids(stream)
@@ -158,7 +185,8 @@ def test_what_goes_wrong_in_a_thread_reaches_the_caller(where: str) -> None:
 
 def test_closing_ends_every_thread() -> None:
     before = threading.active_count()
-    stream = LiveStream(ScriptedCamera(list(range(10**6)), paced=False), numbered, taps={"x": lambda _: None})
+    camera = ScriptedCamera(list(range(10**6)), paced=False)
+    stream = LiveStream(camera, numbered, taps={"x": lambda _: None}, at_once=2)
     next(stream)
     stream.close()
     stream.close()

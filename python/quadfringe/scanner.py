@@ -100,12 +100,10 @@ class Scanner:
         """
         self._end_stream()
         self.projector.show(self.config.fringes)
-        # The published method leaves processors idle between its rows and the next shot; the best one keeps them busy, and
-        # two shots at once would only be later.
+        # The published method leaves processors idle between its rows and the next shot; the best one keeps them
+        # busy, and two shots at once would only be later.
         at_once = 2 if self.config.decode.method == "published" else 1
-        self._live = LiveStream(
-            self.camera, self.decode, count, keep=keep, taps=taps, resume=resume, at_once=at_once
-        )
+        self._live = LiveStream(self.camera, self.decode, count, keep=keep, taps=taps, resume=resume, at_once=at_once)
         return self._live
 
     def _end_stream(self) -> None:

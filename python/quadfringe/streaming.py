@@ -163,7 +163,8 @@ class LiveStream:
                 self._fail(error)
                 return
             with self._order:
-                self._order.wait_for(lambda turn=turn: self._given == turn or self._stop.is_set())
+                while self._given != turn and not self._stop.is_set():
+                    self._order.wait()
                 self._refused += isinstance(result, DecodeError)
                 self._decoded.tick()
                 latency_ms = (time.time_ns() - _arrival_ns(shot)) / 1e6

@@ -20,10 +20,10 @@ pub(crate) mod window;
 
 pub(crate) use aligned::{Aligned, LINE};
 pub use background::{Background, background};
-pub(crate) use background::{Scratch as BackgroundScratch, remove_background};
+pub(crate) use background::{Scratch as BackgroundScratch, coarsen, remove_background};
 pub(crate) use carrier::LineSpectrum;
 pub use carrier::{Carrier, carrier};
 pub use fourier::{Band, fourier};
-pub(crate) use fourier::{BandFilter, Half, RowFilter, RowScratch, Sampling};
+pub(crate) use fourier::{Half, RowFilter, RowScratch};
 pub use n_step::{NStep, n_step};
 pub use two_step::two_step;

@@ -1,12 +1,13 @@
 //! The published chain: every row on its own, from bytes to absolute phase.
 
+mod means;
 mod row;
 
 use super::output::Finish;
 use super::uncertainty::Sureness;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
-use crate::demod::{Band, LineSpectrum, RowFilter, Sampling};
+use crate::demod::{Band, LineSpectrum, RowFilter};
 use crate::height::PairTable;
 use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
@@ -19,6 +20,11 @@ const CARRIER_ROWS: usize = 16;
 /// One pixel in so many of those rows is asked for noise and margin.
 const LOOK_STRIDE: usize = 3;
 
+/// Fewest samples of a fringe of G or IR when means of two or four pixels take the place of pixels. The band ends at 2.3 times the
+/// carrier, where a turn has more than five of them: from one to the next the phase is far from half a turn, and nearly
+/// straight in between.
+const SAMPLES_PER_FRINGE: f32 = 13.0;
+
 /// How the order of a pixel is found.
 enum Unwrapping {
     /// By beats, taking both projectors as one.
@@ -29,7 +35,8 @@ enum Unwrapping {
 
 pub(super) struct Published {
     unwrapping: Unwrapping,
-    filter: RowFilter,
+    /// For rows of pixels, and of means of two and of four.
+    filters: [RowFilter; 3],
     spectrum: LineSpectrum,
     numbers: [f64; 3],
     shape: [usize; 2],
@@ -39,7 +46,7 @@ impl Published {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
         Self {
             unwrapping: Unwrapping::Ladder(Ladder::new(code)),
-            filter: RowFilter::new(shape[1]),
+            filters: [1, 2, 4].map(|pixels| RowFilter::new((shape[1] / pixels).max(1))),
             spectrum: LineSpectrum::new(shape[1]),
             numbers: code.numbers(),
             shape,
@@ -68,12 +75,18 @@ impl Published {
             None => self.period_px(plan, shot),
         };
         let periods_px = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
+        let finest = periods_px[1].min(periods_px[2]);
+        let sparse = |halvings: &usize| finest >= SAMPLES_PER_FRINGE * (1 << halvings) as f32;
+        let halvings = (1..self.filters.len()).take_while(sparse).last().unwrap_or(0);
+        let (filter, pixels) = (&self.filters[halvings], 1 << halvings);
+        let weights = |period_px: f32| filter.weights(Band::Improved, period_px / pixels as f32, pixels);
         let mut row_plan = RowPlan {
             conditioning: plan,
             unwrapping: &self.unwrapping,
-            filter: &self.filter,
+            filter,
+            pixels,
             periods_px,
-            bands: [1, 2].map(|i: usize| self.filter.filter(Band::Improved, periods_px[i], Sampling::Sparse)),
+            weights: [weights(periods_px[1]), weights(periods_px[2])],
             modulation_min: options.modulation_min,
             quality_min: options.quality_min,
             sureness: Sureness::none(),
@@ -81,7 +94,7 @@ impl Published {
         row_plan.sureness = self.look(&row_plan, shot, out);
         let row_plan = row_plan;
         out.rows().enumerate().for_each_init(
-            || Rows::new(&self.filter, self.shape[1]),
+            || Rows::new(filter, self.shape[1]),
             |rows, (y, mut out)| {
                 if self.is_looked_at(y) {
                     row_plan.sureness.tell(&mut out);
@@ -105,7 +118,7 @@ impl Published {
         let rows = out.row_by_row().into_iter().enumerate();
         let looked_at: Vec<_> = rows.filter(|(y, _)| self.is_looked_at(*y)).collect();
         let seen = looked_at.into_par_iter().map_init(
-            || (Rows::new(&self.filter, width), [vec![0.0; width], vec![0.0; width]]),
+            || (Rows::new(plan.filter, width), [vec![0.0; width], vec![0.0; width]]),
             |(rows, bend), (y, mut out)| {
                 for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
                     plan.conditioning.row(shot, other, &mut rows.light_mut());
@@ -129,7 +142,7 @@ impl Published {
     /// Fringe period along rows, from a few rows of red light; the whole row when there is none to see.
     fn period_px<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) -> f64 {
         let [height, width] = self.shape;
-        let mut rows = Rows::new(&self.filter, width);
+        let mut rows = Rows::new(&self.filters[0], width);
         for y in (0..height).step_by(height.div_ceil(CARRIER_ROWS)) {
             plan.row(shot, y, &mut rows.light_mut());
             self.spectrum.add(ArrayView1::from(rows.red()));

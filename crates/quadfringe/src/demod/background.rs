@@ -5,6 +5,7 @@ mod moving_mean;
 mod waves;
 
 use crate::{Error, Result};
+pub(crate) use envelope::coarsen;
 use envelope::mean_envelope;
 use moving_mean::{Sums, moving_mean};
 use ndarray::{Array2, ArrayView2, Axis};

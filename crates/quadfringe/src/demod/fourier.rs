@@ -71,7 +71,7 @@ pub fn fourier(
         Band::Traditional => row_means(image)?,
     };
     let plan = RowFilter::new(columns);
-    let filter = plan.filter(band, period_px as f32, Sampling::Every);
+    let weights = plan.weights(band, period_px as f32, 1);
     let mut out = Array2::zeros(image.raw_dim());
     out.axis_iter_mut(Axis(0))
         .into_par_iter()
@@ -84,7 +84,7 @@ pub fn fourier(
                     *f = r - l;
                 }
                 plan.transform([&*fringes, &*fringes], [period_px as f32; 2], scratch);
-                let found = plan.analytic(Half::Real, &filter, scratch);
+                let found = plan.analytic(Half::Real, &weights, scratch);
                 let found = target.iter_mut().zip(found);
                 found.for_each(|(t, z)| *t = atan2(z.im, z.re));
             },
@@ -106,39 +106,10 @@ fn row_means(image: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
 #[derive(Clone)]
 pub(crate) struct RowFilter {
     forward: Arc<dyn Fft<f32>>,
-    /// To every pixel, every second and every fourth.
-    inverse: [Arc<dyn Fft<f32>>; 3],
+    inverse: Arc<dyn Fft<f32>>,
     columns: usize,
     /// Weights of the passage from the end of a row to its beginning; with it a row has a length quick to transform.
     fade: Vec<f32>,
-}
-
-/// Where the signal of a band is wanted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Sampling {
-    /// At every pixel.
-    Every,
-    /// At every second or fourth pixel where that leaves a fringe [`SAMPLES_PER_FRINGE`].
-    Sparse,
-}
-
-/// Fewest samples of a fringe when not every pixel is one. The band ends at 2.3 times the carrier, where a turn has more than five
-/// of them: from one to the next the phase is far from half a turn, and in between nearly straight.
-const SAMPLES_PER_FRINGE: f32 = 13.0;
-
-/// The part of the spectrum that counts.
-#[derive(Debug, Clone)]
-pub(crate) struct BandFilter {
-    /// Of the frequencies from zero on, scaled so that the signal has the amplitude of the fringes.
-    weights: Vec<f32>,
-    halvings: usize,
-}
-
-impl BandFilter {
-    /// Pixels from one sample of the signal to the next.
-    pub fn every(&self) -> usize {
-        1 << self.halvings
-    }
 }
 
 /// Which of the two rows of a transform.
@@ -162,39 +133,38 @@ pub(crate) struct RowScratch {
 
 impl RowFilter {
     pub fn new(columns: usize) -> Self {
-        let length = quick_length(columns + columns / 10);
+        let length = quick_length(columns + (columns / 10).max(2));
         let mut planner = FftPlanner::new();
         let passage = (length - columns) as f32;
         let fade = |k: usize| soft((k as f32 + 0.5) / passage);
         Self {
             forward: planner.plan_fft_forward(length),
-            inverse: [1, 2, 4].map(|every| planner.plan_fft_inverse(length / every)),
+            inverse: planner.plan_fft_inverse(length),
             columns,
             fade: (0..length - columns).map(fade).collect(),
         }
     }
 
-    /// What a band keeps of fringes of this period.
-    pub fn filter(&self, band: Band, period_px: f32, sampling: Sampling) -> BandFilter {
+    /// Weight of the frequencies from zero on that count, scaled so that the signal has the amplitude of the fringes before
+    /// means of so many `pixels` became the samples of a row.
+    pub fn weights(&self, band: Band, period: f32, pixels: usize) -> Vec<f32> {
         let length = self.forward.len();
-        let carrier = length as f32 / period_px;
+        let carrier = length as f32 / period;
         // Separating the two rows gives twice the spectrum, and the negative frequencies held the other half of it.
         let scale = 1.0 / length as f32;
-        let weight = |bin: usize| scale * band.weight(bin as f32 / carrier);
+        let left = |bin: usize| {
+            let half_turn = std::f32::consts::PI * bin as f32 / length as f32;
+            if bin == 0 { 1.0 } else { half_turn.sin() / (pixels as f32 * (half_turn / pixels as f32).sin()) }
+        };
+        let weight = |bin: usize| scale * band.weight(bin as f32 / carrier) / left(bin);
         let mut weights: Vec<f32> = (0..length.div_ceil(2)).map(weight).collect();
         weights.truncate(weights.iter().rposition(|w| *w > 0.0).map_or(1, |last| last + 1));
-        let sparser = |halvings: &usize| period_px >= SAMPLES_PER_FRINGE * (1 << halvings) as f32;
-        let halvings = match sampling {
-            Sampling::Every => 0,
-            Sampling::Sparse => (1..self.inverse.len()).take_while(sparser).last().unwrap_or(0),
-        };
-        BandFilter { weights, halvings }
+        weights
     }
 
     pub fn scratch(&self) -> RowScratch {
         let length = self.forward.len();
-        let inverse = self.inverse.iter().map(|inverse| inverse.get_immutable_scratch_len());
-        let work = inverse.fold(self.forward.get_inplace_scratch_len(), usize::max);
+        let work = (self.forward.get_inplace_scratch_len()).max(self.inverse.get_immutable_scratch_len());
         RowScratch {
             tails: [Aligned::new(self.fade.len()), Aligned::new(self.fade.len())],
             extend: extend::Scratch::default(),
@@ -223,15 +193,10 @@ impl RowFilter {
         self.forward.process_with_scratch(spectrum, work);
     }
 
-    /// Analytic signal of one of the rows last transformed: its positive frequencies, weighted. It is given at every
-    /// [`BandFilter::every`]-th pixel, up to the first beyond the row.
+    /// Analytic signal of one of the rows last transformed: its positive frequencies, weighted. It goes on beyond the end of the
+    /// row, up to what leads to its beginning.
     #[inline(always)]
-    pub fn analytic<'a>(
-        &self,
-        half: Half,
-        BandFilter { weights, halvings }: &BandFilter,
-        scratch: &'a mut RowScratch,
-    ) -> &'a [Complex32] {
+    pub fn analytic<'a>(&self, half: Half, weights: &[f32], scratch: &'a mut RowScratch) -> &'a [Complex32] {
         let RowScratch { spectrum, positive, bins, output, work, .. } = scratch;
         let mirrored = spectrum.iter().rev();
         // The zero frequency is background.
@@ -247,11 +212,8 @@ impl RowFilter {
         }
         positive[weights.len()..(*bins).max(weights.len())].fill(Complex32::ZERO);
         *bins = weights.len();
-        // Frequencies beyond the band are zero: a shorter transform gives the same signal at fewer places.
-        let inverse = &self.inverse[*halvings];
-        let count = inverse.len();
-        inverse.process_immutable_with_scratch(&positive[..count], &mut output[..count], work);
-        &output[..(self.columns >> halvings) + usize::from(*halvings > 0)]
+        self.inverse.process_immutable_with_scratch(positive, output, work);
+        output
     }
 }
 
@@ -290,26 +252,6 @@ mod tests {
             let new = rms(&run(Band::Improved), &phase);
             assert!(old > 0.1, "{old}");
             assert!(new < bound && new < old / 5.0, "{new} against {old}");
-        }
-    }
-
-    #[test]
-    fn fewer_samples_are_the_same_signal() {
-        let (image, _) = swinging(0.5);
-        let rows = [image.row(0).to_vec(), image.row(0).iter().map(|v| v * v).collect()];
-        let plan = RowFilter::new(1024);
-        let mut scratch = plan.scratch();
-        plan.transform([&rows[0], &rows[1]], [32.0, 32.0], &mut scratch);
-        for half in [Half::Real, Half::Imaginary] {
-            let all = plan.filter(Band::Improved, 32.0, Sampling::Every);
-            let some = plan.filter(Band::Improved, 32.0, Sampling::Sparse);
-            assert_eq!((all.every(), some.every()), (1, 2));
-            let whole = plan.analytic(half, &all, &mut scratch).to_vec();
-            let sparse = plan.analytic(half, &some, &mut scratch);
-            assert_eq!((whole.len(), sparse.len()), (1024, 513));
-            for (at, z) in sparse.iter().take(512).enumerate() {
-                assert!((z - whole[2 * at]).norm() < 1e-5, "{half:?} {at}");
-            }
         }
     }
 

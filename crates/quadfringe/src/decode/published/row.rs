@@ -1,25 +1,27 @@
 //! Steps 2 to 6 of the published chain on one row, small enough to stay in the nearest cache.
 
 use super::Unwrapping;
+use super::means::Means;
 use crate::Shot;
-use crate::angle::{atan2, coarse_atan2, wrap};
+use crate::angle::atan2;
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::decode::uncertainty::{Sureness, two_step_deviation};
 use crate::demod::{
-    Aligned, Background, BackgroundScratch, BandFilter, Half, RowFilter, RowScratch, remove_background,
+    Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, coarsen, remove_background,
 };
 use multiversion::multiversion;
-use rustfft::num_complex::Complex32;
 
 /// What is the same for all rows of a shot.
 pub(super) struct RowPlan<'a> {
     pub conditioning: &'a Plan,
     pub unwrapping: &'a Unwrapping,
+    /// For rows of means of so many `pixels`.
     pub filter: &'a RowFilter,
+    pub pixels: usize,
     pub periods_px: [f32; 3],
     /// Filters of G and IR.
-    pub bands: [BandFilter; 2],
+    pub weights: [Vec<f32>; 2],
     pub modulation_min: f32,
     pub quality_min: f32,
     /// What the shot shows of its own noise.
@@ -46,10 +48,12 @@ impl RowPlan<'_> {
 pub(super) struct Rows {
     light: [Aligned<f32>; 4],
     wrapped: [Aligned<f32>; 3],
-    spare: Aligned<f32>,
+    /// G and IR without background, as means of pixels.
+    fringes: [Aligned<f32>; 2],
+    spare: [Aligned<f32>; 2],
     background: BackgroundScratch,
     fourier: RowScratch,
-    sparse: Sparse,
+    means: Means,
 }
 
 /// Row `y` of a shot from bytes to phase, modulation and quality. Without fused multiplication: every number comes out
@@ -72,10 +76,11 @@ impl Rows {
         Self {
             light: [row(), row(), row(), row()],
             wrapped: [row(), row(), row()],
-            spare: row(),
+            fringes: Default::default(),
+            spare: Default::default(),
             background: BackgroundScratch::default(),
             fourier: filter.scratch(),
-            sparse: Sparse::default(),
+            means: Means::default(),
         }
     }
 
@@ -99,12 +104,11 @@ impl Rows {
     fn decode(&mut self, plan: &RowPlan<'_>, y: usize, out: &mut OutputRow<'_>) {
         let unseen = fill_gaps(&mut self.light[3]);
         let [first, second, third] = plan.periods_px;
-        for (channel, period_px) in [first, second, first, third].into_iter().enumerate() {
-            self.remove_background(channel, period_px);
-        }
+        self.remove_backgrounds([first, second, third], plan.pixels);
         self.two_step(plan.sureness.noise, out.modulation, out.sigma);
-        let fringes = [&*self.light[1], &*self.light[3]];
-        plan.filter.transform(fringes, [second, third], &mut self.fourier);
+        let fringes = self.fringes.each_ref().map(|row| &**row);
+        let periods = [second, third].map(|period_px| period_px / plan.pixels as f32);
+        plan.filter.transform(fringes, periods, &mut self.fourier);
         self.fourier(plan, Half::Real, out.modulation);
         self.fourier(plan, Half::Imaginary, out.modulation);
         let wrapped = self.wrapped.each_ref().map(|row| &**row);
@@ -119,13 +123,22 @@ impl Rows {
         }
     }
 
-    /// Step 2: half the sum of the envelopes.
+    /// Step 2: half the sum of the envelopes. G and IR become means of so many `pixels`, a power of two.
     #[inline(always)]
-    fn remove_background(&mut self, channel: usize, period_px: f32) {
-        let light = &mut self.light[channel];
+    fn remove_backgrounds(&mut self, [first, second, third]: [f32; 3], pixels: usize) {
         let kind = Background::MeanEnvelope;
-        remove_background(light, kind, period_px, &mut self.background, &mut self.spare);
-        std::mem::swap(light, &mut self.spare);
+        let Self { light: [red, green, blue, infrared], fringes, spare: [means, spare], background, .. } =
+            self;
+        for light in [red, blue] {
+            means.resize(light.len());
+            remove_background(light, kind, first, background, means);
+            std::mem::swap(light, means);
+        }
+        for ((light, period_px), fringes) in [(green, second), (infrared, third)].into_iter().zip(fringes) {
+            coarsen(light, pixels, means, spare);
+            fringes.resize(means.len());
+            remove_background(means, kind, period_px / pixels as f32, background, fringes);
+        }
     }
 
     /// Step 3: R and B, their modulations made equal, (S2). The square of the modulation stands in for it until all
@@ -147,78 +160,12 @@ impl Rows {
     #[inline(always)]
     fn fourier(&mut self, plan: &RowPlan<'_>, half: Half, modulation: &mut [f32]) {
         let index = if half == Half::Real { 0 } else { 1 };
-        let band = &plan.bands[index];
-        let signal = plan.filter.analytic(half, band, &mut self.fourier);
+        let signal = plan.filter.analytic(half, &plan.weights[index], &mut self.fourier);
         let phase = &mut *self.wrapped[index + 1];
-        match band.every() {
-            1 => {
-                for (z, (phase, modulation)) in signal.iter().zip(phase.iter_mut().zip(modulation)) {
-                    *phase = coarse_atan2(z.im, z.re);
-                    *modulation = lesser(z.re * z.re + z.im * z.im, *modulation);
-                }
-            }
-            2 => self.sparse.spread::<2>(signal, phase, modulation),
-            _ => self.sparse.spread::<4>(signal, phase, modulation),
-        }
-    }
-}
-
-#[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// An analytic signal that is not known at every pixel.
-#[derive(Debug, Default)]
-struct Sparse {
-    phase: Vec<f32>,
-    /// Squares of the modulation.
-    power: Vec<f32>,
-    /// What is added to either up to the next sample.
-    steps: [Vec<f32>; 2],
-}
-
-impl Sparse {
-    /// Phases between the samples of a signal, on a straight line from one to the next, and the least squares of the
-    /// modulation. The phases are not wrapped.
-    #[inline(always)]
-    fn spread<const EVERY: usize>(
-        &mut self,
-        signal: &[Complex32],
-        phase: &mut [f32],
-        modulation: &mut [f32],
-    ) {
-        let Self { phase: sampled, power, steps } = self;
-        let [turns, growth] = steps;
-        for row in [&mut *sampled, &mut *power, &mut *turns, &mut *growth] {
-            row.resize(signal.len(), 0.0);
-        }
-        for ((z, sampled), power) in signal.iter().zip(sampled.iter_mut()).zip(power.iter_mut()) {
-            *sampled = coarse_atan2(z.im, z.re);
-            *power = z.re * z.re + z.im * z.im;
-        }
-        let part = 1.0 / EVERY as f32;
-        for ((step, here), next) in turns.iter_mut().zip(&*sampled).zip(&sampled[1..]) {
-            *step = part * wrap(next - here);
-        }
-        for ((step, here), next) in growth.iter_mut().zip(&*power).zip(&power[1..]) {
-            *step = part * (next - here);
-        }
-        let samples = sampled.iter().zip(&*turns).zip(power.iter().zip(&*growth));
-        let (phase, last_phase) = phase.as_chunks_mut::<EVERY>();
-        let (modulation, last_modulation) = modulation.as_chunks_mut::<EVERY>();
-        let whole = phase.len();
-        for (((start, turn), (power, growth)), (phase, modulation)) in
-            samples.zip(phase.iter_mut().zip(modulation))
-        {
-            for i in 0..EVERY {
-                phase[i] = *start + i as f32 * *turn;
-                modulation[i] = lesser(*power + i as f32 * *growth, modulation[i]);
-            }
-        }
-        for (i, (phase, modulation)) in last_phase.iter_mut().zip(last_modulation).enumerate() {
-            *phase = sampled[whole] + i as f32 * turns[whole];
-            *modulation = lesser(power[whole] + i as f32 * growth[whole], *modulation);
+        match plan.pixels {
+            1 => self.means.spread::<1>(signal, phase, modulation),
+            2 => self.means.spread::<2>(signal, phase, modulation),
+            _ => self.means.spread::<4>(signal, phase, modulation),
         }
     }
 }
@@ -259,35 +206,4 @@ fn fill_gaps(row: &mut [f32]) -> Vec<usize> {
         }
     }
     gaps
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use std::f32::consts::TAU;
-
-    #[test]
-    fn a_sparse_signal_is_known_at_every_pixel() {
-        // An odd length: the last pixels lie between the last samples.
-        const WIDTH: usize = 1021;
-        let at = |x: f32| TAU * x / 29.0 + 2.0 * (TAU * x / 300.0).sin();
-        let signal = |every: usize| -> Vec<Complex32> {
-            let samples = 0..=WIDTH / every;
-            samples.map(|i| Complex32::from_polar(0.25, at((every * i) as f32))).collect()
-        };
-        let mut sparse = Sparse::default();
-        for (every, bound) in [(2, 1e-3), (4, 4e-3)] {
-            let (mut phase, mut modulation) = (vec![0.0; WIDTH], vec![1.0; WIDTH]);
-            modulation[5] = 0.01;
-            match every {
-                2 => sparse.spread::<2>(&signal(2), &mut phase, &mut modulation),
-                _ => sparse.spread::<4>(&signal(4), &mut phase, &mut modulation),
-            }
-            for (x, phase) in phase.iter().enumerate() {
-                assert!(wrap(phase - at(x as f32)).abs() < bound, "{every} {x}");
-                let least = if x == 5 { 0.01 } else { 0.0625 };
-                assert!((modulation[x] - least).abs() < 1e-6, "{every} {x}");
-            }
-        }
-    }
 }

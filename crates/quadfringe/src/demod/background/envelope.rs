@@ -91,7 +91,7 @@ fn coarseness(period_px: f32) -> usize {
 
 /// Means of `step` (a power of two) pixels.
 #[inline(always)]
-fn coarsen(row: &[f32], step: usize, out: &mut Aligned<f32>, spare: &mut Aligned<f32>) {
+pub(crate) fn coarsen(row: &[f32], step: usize, out: &mut Aligned<f32>, spare: &mut Aligned<f32>) {
     out.resize(row.len() / step.min(2));
     if step == 1 {
         out.copy_from_slice(row);
@@ -105,19 +105,12 @@ fn coarsen(row: &[f32], step: usize, out: &mut Aligned<f32>, spare: &mut Aligned
     }
 }
 
-/// Means of two samples. Vectors add neighbours in blocks of eight; a plain loop over pairs shuffles every number.
+/// Means of two samples.
 #[inline(always)]
 fn pair_means(row: &[f32], out: &mut [f32]) {
-    const PAIRS: usize = 8;
-    let blocks = row.chunks_exact(2 * PAIRS);
-    let rest = blocks.remainder().chunks_exact(2);
-    let (whole, last) = out.split_at_mut(row.len() / (2 * PAIRS) * PAIRS);
-    for (to, from) in whole.chunks_exact_mut(PAIRS).zip(blocks) {
-        let means: [f32; PAIRS] = std::array::from_fn(|i| 0.5 * (from[2 * i] + from[2 * i + 1]));
-        to.copy_from_slice(&means);
-    }
-    for (to, from) in last.iter_mut().zip(rest) {
-        *to = 0.5 * (from[0] + from[1]);
+    let (pairs, _) = row.as_chunks::<2>();
+    for (to, [a, b]) in out.iter_mut().zip(pairs) {
+        *to = 0.5 * (a + b);
     }
 }
 

@@ -1,0 +1,118 @@
+//! Phase at every pixel of fringes that are known as means of pixels.
+
+use crate::angle::{coarse_atan2, wrap};
+use crate::demod::Aligned;
+use rustfft::num_complex::Complex32;
+
+/// Working rows of [`Means::spread`]: from the sample before the first to the one after the last.
+#[derive(Debug, Default)]
+pub(super) struct Means {
+    phase: Aligned<f32>,
+    /// Square of the modulation.
+    power: Aligned<f32>,
+    /// What both grow by from one sample to the next.
+    growth: [Aligned<f32>; 2],
+}
+
+impl Means {
+    /// Phases of an analytic signal whose samples are means of so many `PIXELS`, on straight lines between their middles and
+    /// not wrapped, and the lesser of `modulation` and the square of its own. The signal is a ring that goes on beyond the row.
+    #[inline(always)]
+    pub fn spread<const PIXELS: usize>(
+        &mut self,
+        ring: &[Complex32],
+        phase: &mut [f32],
+        modulation: &mut [f32],
+    ) {
+        let Self { phase: turns, power, growth: [turning, growing] } = self;
+        let samples = phase.len().div_ceil(PIXELS) + 2;
+        for row in [&mut *turns, &mut *power, &mut *turning, &mut *growing] {
+            row.resize(samples);
+        }
+        (turns[0], power[0]) = polar(ring[ring.len() - 1]);
+        for ((z, turns), power) in ring.iter().zip(&mut turns[1..]).zip(&mut power[1..]) {
+            (*turns, *power) = polar(*z);
+        }
+        for ((growth, here), next) in turning.iter_mut().zip(&**turns).zip(&turns[1..]) {
+            *growth = wrap(next - here);
+        }
+        for ((growth, here), next) in growing.iter_mut().zip(&**power).zip(&power[1..]) {
+            *growth = next - here;
+        }
+        // From the middle of one sample to that of the next lie as many pixels as in a sample, the first time half as many.
+        let cut = PIXELS / 2;
+        let along = |pixel: usize| if PIXELS == 1 { 1.0 } else { (pixel as f32 + 0.5) / PIXELS as f32 };
+        let on_line = |at: usize, pixel: usize, phase: &mut f32, modulation: &mut f32| {
+            let along = along(pixel);
+            *phase = turns[at] + along * turning[at];
+            *modulation = lesser(power[at] + along * growing[at], *modulation);
+        };
+        let (first_phase, phase) = phase.split_at_mut(cut);
+        let (first_modulation, modulation) = modulation.split_at_mut(cut);
+        for (i, (phase, modulation)) in first_phase.iter_mut().zip(first_modulation).enumerate() {
+            on_line(0, PIXELS - cut + i, phase, modulation);
+        }
+        let first = usize::from(cut > 0);
+        let (phase, last_phase) = phase.as_chunks_mut::<PIXELS>();
+        let (modulation, last_modulation) = modulation.as_chunks_mut::<PIXELS>();
+        let whole = phase.len();
+        for ((phase, turn), turning) in phase.iter_mut().zip(&turns[first..]).zip(&turning[first..]) {
+            for (pixel, phase) in phase.iter_mut().enumerate() {
+                *phase = turn + along(pixel) * turning;
+            }
+        }
+        for ((modulation, power), growing) in
+            modulation.iter_mut().zip(&power[first..]).zip(&growing[first..])
+        {
+            for (pixel, modulation) in modulation.iter_mut().enumerate() {
+                *modulation = lesser(power + along(pixel) * growing, *modulation);
+            }
+        }
+        for (i, (phase, modulation)) in last_phase.iter_mut().zip(last_modulation).enumerate() {
+            on_line(first + whole, i, phase, modulation);
+        }
+    }
+}
+
+/// Phase and square of the modulation.
+#[inline(always)]
+fn polar(z: Complex32) -> (f32, f32) {
+    (coarse_atan2(z.im, z.re), z.re * z.re + z.im * z.im)
+}
+
+#[inline(always)]
+fn lesser(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f32::consts::TAU;
+
+    fn check<const PIXELS: usize>(bound: f32) {
+        // An odd length: the last pixels lie beyond the last middle.
+        const WIDTH: usize = 1021;
+        let at = |x: f32| TAU * x / 29.0 + 2.0 * (TAU * x / 300.0).sin();
+        let middle = |sample: f32| PIXELS as f32 * sample + (PIXELS as f32 - 1.0) / 2.0;
+        let count = WIDTH.div_ceil(PIXELS) + 1;
+        let mut ring: Vec<_> =
+            (0..count).map(|m| Complex32::from_polar(0.25, at(middle(m as f32)))).collect();
+        ring.push(Complex32::from_polar(0.25, at(middle(-1.0))));
+        let (mut phase, mut modulation) = (vec![0.0; WIDTH], vec![1.0; WIDTH]);
+        modulation[5] = 0.01;
+        Means::default().spread::<PIXELS>(&ring, &mut phase, &mut modulation);
+        for (x, phase) in phase.iter().enumerate() {
+            assert!(wrap(phase - at(x as f32)).abs() < bound, "{PIXELS} {x}");
+            let least = if x == 5 { 0.01 } else { 0.0625 };
+            assert!((modulation[x] - least).abs() < 1e-6, "{PIXELS} {x}");
+        }
+    }
+
+    #[test]
+    fn the_phase_is_known_at_every_pixel() {
+        check::<1>(1e-4);
+        check::<2>(1e-3);
+        check::<4>(4e-3);
+    }
+}
