@@ -34,7 +34,7 @@ Map = NDArray[np.float32]
 COLOURINGS: tuple[Colouring, ...] = ("texture", "height", "quality")
 STRIDES = ("1", "2", "4", "8", "16")
 M_PER_MM = 1e-3  # the page is in metres: near and far plane of a browser's camera fit them
-FIGURES_PERIOD_S = 0.15
+FIGURES_PERIOD_S = 0.1
 PICTURES_PERIOD_S = 0.1
 LOCAL = "127.0.0.1"
 EVERYBODY = ("0.0.0.0", "::")
@@ -46,8 +46,9 @@ class Viewer:
 
     Only this machine can see the page unless another `host` is asked for ("0.0.0.0": everybody on the network; there is
     no password). A cloud goes out at most `clouds_per_s` times a second, every `stride`-th pixel of every `stride`-th
-    row; a browser that is slower than that leaves out clouds, and nobody else waits for it. When the port is taken
-    the next free one is used: `url` tells. Raises `MissingExtraError` without the extra `view`.
+    row; a browser that is slower than that leaves out clouds, and nobody else waits for it. One without a graphics card
+    has more time for pictures and figures with two clouds a second; the page has a slider for it. When the port is
+    taken the next free one is used: `url` tells. Raises `MissingExtraError` without the extra `view`.
     """
 
     def __init__(
@@ -61,17 +62,16 @@ class Viewer:
     ) -> None:
         self._server = _serve(host, port)
         self.url = f"http://{gethostname() if host in EVERYBODY else host}:{self._server.get_port()}"
-        self._cloud_period_s = 1.0 / clouds_per_s
         self._cloud_at = self._pictures_at = 0.0
         self._clouds = 0
         self._depth_mm: tuple[float, float] | None = None
         self._placed = False
         self._last: tuple[Measured, int] | None = None
         self._message = "waiting for the first shot"
-        self._build(str(stride), colouring)
+        self._build(str(stride), clouds_per_s, colouring)
         self._server.on_client_connect(self._show_again)
 
-    def _build(self, stride: str, colouring: Colouring) -> None:
+    def _build(self, stride: str, clouds_per_s: float, colouring: Colouring) -> None:
         gui = self._server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         gui.main_panel.dock_right()
@@ -79,6 +79,13 @@ class Viewer:
         strides = sorted({stride, *STRIDES}, key=int)
         self._colour = gui.add_dropdown("Colour", COLOURINGS, initial_value=colouring)
         self._stride = gui.add_dropdown("Every n-th point", strides, initial_value=stride)
+        self._clouds_per_s = gui.add_slider(
+            "Clouds a second",
+            min=min(1.0, clouds_per_s),
+            max=max(20.0, clouds_per_s),
+            step=0.5,
+            initial_value=clouds_per_s,
+        )
         self._quality = gui.add_slider("Least quality", min=0.0, max=1.0, step=0.05, initial_value=0.0)
         self._frozen = gui.add_checkbox("Hold still", initial_value=False)
         self._figures = gui.add_markdown(self._message)
@@ -133,8 +140,9 @@ class Viewer:
             self._channels.image = channels_picture(measured.shot)
             if shape is not None:
                 self._phase.image = phase_picture(shape, columns)
-        if shape is not None and shape.xyz_mm is not None and now - self._cloud_at >= self._cloud_period_s:
-            self._cloud_at = max(self._cloud_at + self._cloud_period_s, now - self._cloud_period_s)
+        period_s = 1.0 / self._clouds_per_s.value
+        if shape is not None and shape.xyz_mm is not None and now - self._cloud_at >= period_s:
+            self._cloud_at = max(self._cloud_at + period_s, now - period_s)
             self.show_shape(measured.shot, shape)
 
     def _show_again(self, _: object) -> None:

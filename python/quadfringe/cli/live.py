@@ -35,6 +35,9 @@ def live(
     ] = "127.0.0.1",
     port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the page; the next free one if taken.")] = 8080,
     view_stride: Annotated[int, typer.Option(min=1, max=64, help="Every n-th pixel of every n-th row is shown.")] = 2,
+    clouds_per_s: Annotated[
+        float, typer.Option(min=0.1, max=100.0, help="Most clouds a second; 2 for a browser without a graphics card.")
+    ] = 10.0,
     colour: Annotated[Colour, typer.Option(help="Colour of the points at first.")] = Colour.texture,
     shots: ShotsOption = None,
     file_gb: FileSize = None,
@@ -54,7 +57,9 @@ def live(
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.known_calibration, file_gb=file_gb))
-        viewer = stack.enter_context(Viewer(host, port, stride=view_stride, colouring=colour.value))
+        viewer = stack.enter_context(
+            Viewer(host, port, stride=view_stride, clouds_per_s=clouds_per_s, colouring=colour.value)
+        )
         say(f"live at {viewer.url}; Ctrl-C ends")
         with stoppable():
             _follow(scanner, viewer, recorder, shots)
