@@ -75,7 +75,7 @@ impl Published {
             None => self.period_px(plan, shot),
         };
         let periods_px = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
-        let finest = periods_px[1].min(periods_px[2]);
+        let finest = periods_px[1].min(periods_px[2]).min(self.shape[1] as f32);
         let sparse = |halvings: &usize| finest >= SAMPLES_PER_FRINGE * (1 << halvings) as f32;
         let halvings = (1..self.filters.len()).take_while(sparse).last().unwrap_or(0);
         let (filter, pixels) = (&self.filters[halvings], 1 << halvings);
