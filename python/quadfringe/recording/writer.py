@@ -122,7 +122,7 @@ def _create(path: Path, header: Header) -> h5py.File:
 
 
 def _append_row(dataset: h5py.h5d.DatasetID, n: int, row: NDArray[Any]) -> None:
-    """Write row `n` of a dataset that has `n`: what `dataset[n] = row` does, five times as fast."""
+    """Write row `n` of a dataset that has `n`: what `dataset[n] = row` does, with less around it."""
     dataset.set_extent((n + 1, *row.shape))
     place = dataset.get_space()
     place.select_hyperslab((n, *[0] * row.ndim), (1, *row.shape))
