@@ -1,14 +1,14 @@
 """Live view: clouds a second to a websocket client and in a browser, beside decoding, and the memory it takes.
 
-    python benches/live.py [--seconds 30] [--browser [--screenshot FILE.png]] [--json FILE]
+    python benches/live.py [--seconds 30] [--browser [--screenshot FILE.png]] [--clouds 2] [--json FILE]
 
 A camera of 30 shots a second shows six shots of the moving hand, 1024 x 768, in turn; they are decoded with the
 published method and served. A client in another process takes the full-resolution clouds and draws nothing; memory is
 what the serving process grows by from the second third of the time to the last. With --browser Debian's chromium draws
-every 4th point of every 4th row in software instead, two clouds a second (`quadfringe live --clouds-per-s 2`; with ten,
-it has less time for pictures and figures): clouds are counted where they go to OpenGL, pictures and figures where the
-page changes. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and 5 figures/s in the browser; exit status 1
-below them.
+every 4th point of every 4th row in software instead, two clouds a second as `quadfringe live --clouds-per-s 2` sends
+them; --clouds 10 shows how much less time the default leaves it for pictures and figures. Clouds are counted where they
+go to OpenGL, pictures and figures where the page changes. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and
+5 figures/s in the browser; exit status 1 below them.
 """
 
 from __future__ import annotations
@@ -111,14 +111,14 @@ def hand_shots() -> tuple[list[AnyShot], qf.Scanner]:
     return list(scanner.camera.stream(SHOTS, keep="all")), scanner
 
 
-def served(seconds: float, *, browser: bool, screenshot: Path | None = None) -> dict[str, float]:
+def served(seconds: float, clouds_per_s: float, *, browser: bool, screenshot: Path | None = None) -> dict[str, float]:
     shots, scanner = hand_shots()
     memory: list[float] = []
     command = [sys.executable, __file__, "--seconds", str(seconds), *(["--browser"] if browser else [])]
     command += [*(["--screenshot", str(screenshot)] if screenshot else []), "--client"]
     with (
         scanner,
-        Viewer(port=8400, stride=4 if browser else 1, clouds_per_s=DRAWN_PER_S if browser else SENT_PER_S) as viewer,
+        Viewer(port=8400, stride=4 if browser else 1, clouds_per_s=clouds_per_s) as viewer,
         LiveStream(Carousel(shots), scanner.decode) as stream,  # type: ignore[arg-type]
     ):
         follower = threading.Thread(target=viewer.follow, args=(stream,))
@@ -225,6 +225,7 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--browser", action="store_true")
     parser.add_argument("--screenshot", type=Path, help="with --browser: the page at the end")
+    parser.add_argument("--clouds", type=float, help="clouds a second that are asked for")
     parser.add_argument("--client", help=argparse.SUPPRESS)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
@@ -233,7 +234,8 @@ def main() -> int:
         counted = browser(url, seconds, options.screenshot) if options.browser else client(url, seconds)
         print(json.dumps(counted))
         return 0
-    figures = served(options.seconds, browser=options.browser, screenshot=options.screenshot)
+    clouds_per_s = options.clouds or (DRAWN_PER_S if options.browser else SENT_PER_S)
+    figures = served(options.seconds, clouds_per_s, browser=options.browser, screenshot=options.screenshot)
     for key, value in figures.items():
         print(f"{key:36}{value:10.4g}")
     if options.json:

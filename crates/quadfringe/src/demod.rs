@@ -8,6 +8,7 @@ mod carrier;
 pub(crate) mod cells;
 mod fourier;
 pub(crate) mod joint;
+pub(crate) mod lanes;
 pub(crate) mod light;
 pub(crate) mod local_fit;
 pub(crate) mod motion;
@@ -18,7 +19,7 @@ pub(crate) mod slopes;
 mod two_step;
 pub(crate) mod window;
 
-pub(crate) use aligned::{Aligned, LINE};
+pub(crate) use aligned::{Aligned, first_of_line, spare};
 pub use background::{Background, background};
 pub(crate) use background::{Scratch as BackgroundScratch, coarsen, remove_background};
 pub(crate) use carrier::LineSpectrum;

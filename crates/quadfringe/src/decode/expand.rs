@@ -5,7 +5,8 @@
 
 use super::guide::Guide;
 use crate::demod::backgrounds::carriers;
-use crate::demod::cells::{LANES, Lanes, blend, lanes, spread};
+use crate::demod::cells::{blend, spread};
+use crate::demod::lanes::{LANES, Lanes, lanes};
 use crate::demod::scene::{Scene, around};
 use crate::slots::Slots;
 use multiversion::multiversion;

@@ -1,6 +1,7 @@
 //! One shot at one resolution: four planes of linear light, and which pixels count.
 
-use crate::demod::cells::{Grid, LANES, lanes, lanes_mut};
+use crate::demod::cells::Grid;
+use crate::demod::lanes::{LANES, lanes, lanes_mut};
 use crate::demod::scene::Scene;
 use multiversion::multiversion;
 use rayon::prelude::*;

@@ -1,7 +1,7 @@
 //! What comes out of a shot.
 
 use crate::angle::floor;
-use crate::demod::LINE;
+use crate::demod::{first_of_line, spare};
 use crate::height::Triangulator;
 use crate::{Error, FringeCode, Result};
 use multiversion::multiversion;
@@ -43,11 +43,10 @@ pub struct Decoded {
 /// ```
 #[must_use]
 pub fn aligned_zeros<S: IntoDimension>(shape: S) -> Array<f32, S::Dim> {
-    const SPARE: usize = LINE / size_of::<f32>();
     let shape = shape.into_dimension();
     let count = shape.size();
-    let memory = vec![0.0; count + SPARE];
-    let start = memory.as_ptr().align_offset(LINE).min(SPARE);
+    let memory = vec![0.0; count + spare::<f32>()];
+    let start = first_of_line(&memory);
     let aligned = Array1::from_vec(memory).slice_move(s![start..start + count]);
     aligned.into_shape_with_order(shape).expect("as many numbers as the shape has")
 }

@@ -109,7 +109,8 @@ impl Published {
     /// Rows that tell what the others have in common: they have neighbours above and below.
     fn is_looked_at(&self, y: usize) -> bool {
         let height = self.shape[0];
-        y % height.div_ceil(CARRIER_ROWS) == 1 % height.div_ceil(CARRIER_ROWS) && (1..height - 1).contains(&y)
+        let every = height.div_ceil(CARRIER_ROWS);
+        y % every == 1 % every && (1..height - 1).contains(&y)
     }
 
     /// Noise of the shot and of its orders, from a few rows, which are decoded in units of the noise.

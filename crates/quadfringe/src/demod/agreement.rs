@@ -5,7 +5,8 @@
 //! about half of what they differ by.
 
 use super::backgrounds::{Backgrounds, carriers};
-use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, add, kernel, lanes, take};
+use super::cells::{CellMaps, CellWork, RowMaps, kernel};
+use super::lanes::{LANES, Lanes, add, lanes, take};
 use super::scene::Scene;
 use crate::slots::Slots;
 use multiversion::multiversion;

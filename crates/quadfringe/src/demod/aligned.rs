@@ -3,7 +3,17 @@
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vectors.
-pub(crate) const LINE: usize = 64;
+const LINE: usize = 64;
+
+/// How many numbers to have more than are wanted, so that [`first_of_line`] leaves enough of them.
+pub(crate) const fn spare<T>() -> usize {
+    LINE / size_of::<T>()
+}
+
+/// The first place of `memory` that begins a cache line.
+pub(crate) fn first_of_line<T>(memory: &[T]) -> usize {
+    memory.as_ptr().align_offset(LINE).min(spare::<T>())
+}
 
 /// A row of numbers that keeps its place and its numbers for as long as it need not grow.
 #[derive(Debug, Default)]
@@ -25,9 +35,8 @@ impl<T: Copy + Default> Aligned<T> {
     #[inline(always)]
     pub fn resize(&mut self, count: usize) {
         if self.start + count > self.memory.len() {
-            let spare = LINE / size_of::<T>();
-            self.memory = vec![T::default(); count + spare];
-            self.start = self.memory.as_ptr().align_offset(LINE).min(spare);
+            self.memory = vec![T::default(); count + spare::<T>()];
+            self.start = first_of_line(&self.memory);
         }
         self.count = count;
     }

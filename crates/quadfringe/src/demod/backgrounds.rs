@@ -8,7 +8,8 @@
 mod choice;
 mod solve;
 
-use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, take};
+use super::cells::{CellMaps, CellWork, Grid, RowMaps};
+use super::lanes::{LANES, Lanes, add, lanes, take};
 use super::local_fit::LocalFit;
 use super::scene::Scene;
 use super::slopes::Slopes;

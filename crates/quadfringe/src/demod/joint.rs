@@ -4,7 +4,8 @@
 //! pixel, its albedo eliminated, averaged over the window that follows the surface.
 
 use super::backgrounds::{Backgrounds, carriers};
-use super::cells::{LANES, RowMaps, lanes, lanes_mut, put, take};
+use super::cells::RowMaps;
+use super::lanes::{LANES, lanes, lanes_mut, put, take};
 use super::local_fit::binomial;
 use super::scene::{Scene, around, hold};
 use super::window::{Average, Window, WindowRows};

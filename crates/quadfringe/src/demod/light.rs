@@ -4,7 +4,8 @@
 //! they stand at least 0.15 of their range above it. In a shadow all four channels lie at the bottom. Bottom and range
 //! are taken from the surroundings of each pixel, so that neither the ambient light nor the albedo has to be known.
 
-use super::cells::{CellMaps, CellWork, Grid, LANES, Lanes, RowMaps, add, lanes, lanes_mut, take};
+use super::cells::{CellMaps, CellWork, Grid, RowMaps};
+use super::lanes::{LANES, Lanes, add, lanes, lanes_mut, take};
 use super::scene::{around, hold};
 use crate::slots::Slots;
 use multiversion::multiversion;

@@ -6,7 +6,8 @@
 //! No direction, no band and no slope is preferred, which a Fourier filter along rows must do. Sums are kept once per
 //! cell of a sixth of a fringe.
 
-use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, add, lanes, lanes_mut, put, take};
+use super::cells::{CellMaps, CellWork, RowMaps};
+use super::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use super::scene::{Scene, around};
 use crate::angle::atan2;
 use crate::slots::Slots;

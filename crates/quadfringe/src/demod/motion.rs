@@ -8,7 +8,8 @@
 //! brought to the instant 0 by what its model says that motion has changed.
 
 use super::backgrounds::{Backgrounds, carriers};
-use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, add, lanes, lanes_mut, put, take};
+use super::cells::{CellMaps, CellWork, RowMaps};
+use super::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use super::scene::Scene;
 use crate::angle::sin_cos;
 use crate::slots::Slots;

@@ -1,6 +1,7 @@
 //! Slopes of the phase on the cells, from a wrapped phase.
 
-use super::cells::{CellMaps, CellWork, LANES, Lanes, RowMaps, lanes, take};
+use super::cells::{CellMaps, CellWork, RowMaps};
+use super::lanes::{LANES, Lanes, lanes, take};
 use super::scene::Scene;
 use crate::angle::wrap;
 use crate::slots::Slots;

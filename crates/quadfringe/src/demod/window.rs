@@ -4,7 +4,8 @@
 //! Tukey's biweight), first along rows and then along columns; what is added up are the normal equations of a
 //! Gauss-Newton step, so that every neighbour counts by what it knows.
 
-use super::cells::{LANES, Lanes, RowMaps, lanes, lanes_mut, put, take};
+use super::cells::RowMaps;
+use super::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
 use super::scene::Scene;
 use super::slopes::Slopes;
 use crate::angle::wrap;

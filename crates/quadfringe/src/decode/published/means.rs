@@ -39,38 +39,35 @@ impl Means {
         for ((growth, here), next) in growing.iter_mut().zip(&**power).zip(&power[1..]) {
             *growth = next - here;
         }
-        // From the middle of one sample to that of the next lie as many pixels as in a sample, the first time half as many.
-        let cut = PIXELS / 2;
-        let along = |pixel: usize| if PIXELS == 1 { 1.0 } else { (pixel as f32 + 0.5) / PIXELS as f32 };
-        let on_line = |at: usize, pixel: usize, phase: &mut f32, modulation: &mut f32| {
-            let along = along(pixel);
-            *phase = turns[at] + along * turning[at];
-            *modulation = lesser(power[at] + along * growing[at], *modulation);
-        };
-        let (first_phase, phase) = phase.split_at_mut(cut);
-        let (first_modulation, modulation) = modulation.split_at_mut(cut);
-        for (i, (phase, modulation)) in first_phase.iter_mut().zip(first_modulation).enumerate() {
-            on_line(0, PIXELS - cut + i, phase, modulation);
+        draw::<PIXELS>([turns, turning], phase, |phase, _| phase);
+        draw::<PIXELS>([power, growing], modulation, lesser);
+    }
+}
+
+/// Straight lines from the middle of each sample to that of the next, joined with what the pixels hold. As many pixels lie between
+/// two middles as in a sample, and half as many before the first.
+#[inline(always)]
+fn draw<const PIXELS: usize>(
+    [starts, growth]: [&[f32]; 2],
+    pixels: &mut [f32],
+    join: impl Fn(f32, f32) -> f32,
+) {
+    let along = |i: usize| if PIXELS == 1 { 1.0 } else { (i as f32 + 0.5) / PIXELS as f32 };
+    let cut = PIXELS / 2;
+    let (head, rest) = pixels.split_at_mut(cut);
+    for (i, pixel) in head.iter_mut().enumerate() {
+        *pixel = join(starts[0] + along(PIXELS - cut + i) * growth[0], *pixel);
+    }
+    let first = usize::from(cut > 0);
+    let (whole, tail) = rest.as_chunks_mut::<PIXELS>();
+    let last = first + whole.len();
+    for ((pixels, start), growth) in whole.iter_mut().zip(&starts[first..]).zip(&growth[first..]) {
+        for (i, pixel) in pixels.iter_mut().enumerate() {
+            *pixel = join(start + along(i) * growth, *pixel);
         }
-        let first = usize::from(cut > 0);
-        let (phase, last_phase) = phase.as_chunks_mut::<PIXELS>();
-        let (modulation, last_modulation) = modulation.as_chunks_mut::<PIXELS>();
-        let whole = phase.len();
-        for ((phase, turn), turning) in phase.iter_mut().zip(&turns[first..]).zip(&turning[first..]) {
-            for (pixel, phase) in phase.iter_mut().enumerate() {
-                *phase = turn + along(pixel) * turning;
-            }
-        }
-        for ((modulation, power), growing) in
-            modulation.iter_mut().zip(&power[first..]).zip(&growing[first..])
-        {
-            for (pixel, modulation) in modulation.iter_mut().enumerate() {
-                *modulation = lesser(power + along(pixel) * growing, *modulation);
-            }
-        }
-        for (i, (phase, modulation)) in last_phase.iter_mut().zip(last_modulation).enumerate() {
-            on_line(first + whole, i, phase, modulation);
-        }
+    }
+    for (i, pixel) in tail.iter_mut().enumerate() {
+        *pixel = join(starts[last] + along(i) * growth[last], *pixel);
     }
 }
 

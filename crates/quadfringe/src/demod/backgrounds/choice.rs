@@ -3,7 +3,8 @@
 //! around it that explain it and its neighbours best.
 
 use super::carriers;
-use crate::demod::cells::{CellMaps, Grid, LANES, RowMaps, lanes, lanes_mut, put, take};
+use crate::demod::cells::{CellMaps, Grid, RowMaps};
+use crate::demod::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::demod::local_fit::binomial;
 use crate::demod::scene::Scene;
 use crate::slots::Slots;

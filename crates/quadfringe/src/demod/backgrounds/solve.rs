@@ -1,7 +1,7 @@
 //! Normal equations of cells, solved side by side.
 
 use super::{MATRIX, SUMS};
-use crate::demod::cells::{LANES, Lanes};
+use crate::demod::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
 /// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
