@@ -141,7 +141,7 @@ impl Decoded {
 }
 
 /// Fewest rows that a thread takes at once.
-const ROWS_AT_ONCE: usize = 8;
+pub(super) const ROWS_AT_ONCE: usize = 8;
 
 /// One row of every map.
 pub(super) struct OutputRow<'a> {

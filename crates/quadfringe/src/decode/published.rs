@@ -1,9 +1,9 @@
-//! The published chain: every row on its own, from bytes to absolute phase.
+//! The published chain: every strip of a few rows on its own, from bytes to absolute phase.
 
 mod means;
-mod row;
+mod strip;
 
-use super::output::Finish;
+use super::output::{Finish, OutputRow, ROWS_AT_ONCE};
 use super::uncertainty::Sureness;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
@@ -13,14 +13,14 @@ use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
 use ndarray::ArrayView1;
 use rayon::prelude::*;
-use row::{RowPlan, Rows, decode_row};
+use strip::{Strip, StripPlan, decode_strip};
 
 /// Rows of the red image that are looked at for the carrier.
 const CARRIER_ROWS: usize = 16;
 /// One pixel in so many of those rows is asked for noise and margin.
 const LOOK_STRIDE: usize = 3;
 
-/// Fewest samples of a fringe of G or IR when means of two or four pixels take the place of pixels. The band ends at 2.3 times the
+/// Fewest samples of a fringe of G or IR when means of squares of two or four pixels take the place of pixels. The band ends at 2.3 times the
 /// carrier, where a turn has more than five of them: from one to the next the phase is far from half a turn, and nearly
 /// straight in between.
 const SAMPLES_PER_FRINGE: f32 = 13.0;
@@ -80,7 +80,7 @@ impl Published {
         let halvings = (1..self.filters.len()).take_while(sparse).last().unwrap_or(0);
         let (filter, pixels) = (&self.filters[halvings], 1 << halvings);
         let weights = |period_px: f32| filter.weights(Band::Improved, period_px / pixels as f32, pixels);
-        let mut row_plan = RowPlan {
+        let mut strips = StripPlan {
             conditioning: plan,
             unwrapping: &self.unwrapping,
             filter,
@@ -91,49 +91,64 @@ impl Published {
             quality_min: options.quality_min,
             sureness: Sureness::none(),
         };
-        row_plan.sureness = self.look(&row_plan, shot, out);
-        let row_plan = row_plan;
-        out.rows().enumerate().for_each_init(
-            || Rows::new(filter, self.shape[1]),
-            |rows, (y, mut out)| {
-                if self.is_looked_at(y) {
-                    row_plan.sureness.tell(&mut out);
+        let mut rows = out.row_by_row();
+        strips.sureness = self.look(&strips, shot, &mut rows);
+        let strips = strips;
+        rows.par_chunks_mut(pixels).with_min_len(ROWS_AT_ONCE.div_ceil(pixels)).enumerate().for_each_init(
+            || Strip::new(filter, self.shape[1], pixels),
+            |strip, (index, rows)| {
+                let first = index * pixels;
+                if self.looked_at(first, rows.len()).next().is_some() {
+                    rows.iter_mut().for_each(|row| strips.sureness.tell(row));
                 } else {
-                    decode_row(rows, &row_plan, shot, y, &mut out);
+                    decode_strip(strip, &strips, shot, first, rows);
                 }
-                finish.row(y, &mut out);
+                rows.iter_mut().zip(first..).for_each(|(row, y)| finish.row(y, row));
             },
         );
     }
 
-    /// Rows that tell what the others have in common: they have neighbours above and below.
-    fn is_looked_at(&self, y: usize) -> bool {
+    /// Those of `count` rows from the `first` on that tell what all have in common: they have neighbours above and below.
+    fn looked_at(&self, first: usize, count: usize) -> impl Iterator<Item = usize> {
         let height = self.shape[0];
         let every = height.div_ceil(CARRIER_ROWS);
-        y % every == 1 % every && (1..height - 1).contains(&y)
+        let told = move |y: &usize| y % every == 1 % every && (1..height - 1).contains(y);
+        (first..first + count).filter(told)
     }
 
-    /// Noise of the shot and of its orders, from a few rows, which are decoded in units of the noise.
-    fn look<T: Sample>(&self, plan: &RowPlan<'_>, shot: &Shot<'_, T>, out: &mut Decoded) -> Sureness {
+    /// Noise of the shot and of its orders, from a few rows, whose strips are decoded in units of the noise.
+    fn look<T: Sample>(
+        &self,
+        plan: &StripPlan<'_>,
+        shot: &Shot<'_, T>,
+        rows: &mut [OutputRow<'_>],
+    ) -> Sureness {
         let width = self.shape[1];
-        let rows = out.row_by_row().into_iter().enumerate();
-        let looked_at: Vec<_> = rows.filter(|(y, _)| self.is_looked_at(*y)).collect();
-        let seen = looked_at.into_par_iter().map_init(
-            || (Rows::new(plan.filter, width), [vec![0.0; width], vec![0.0; width]]),
-            |(rows, bend), (y, mut out)| {
-                for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
-                    plan.conditioning.row(shot, other, &mut rows.light_mut());
-                    for (bend, light) in bend.iter_mut().zip([rows.red(), rows.blue()]) {
-                        let kept = if other < y { 0.0 } else { 1.0 };
-                        bend.iter_mut()
-                            .zip(light)
-                            .for_each(|(bend, light)| *bend = kept * *bend + weight * light);
+        let strips =
+            rows.chunks_mut(plan.pixels).enumerate().map(|(index, rows)| (index * plan.pixels, rows));
+        let strips: Vec<_> =
+            strips.filter(|(first, rows)| self.looked_at(*first, rows.len()).next().is_some()).collect();
+        let seen = strips.into_par_iter().map_init(
+            || (Strip::new(plan.filter, width, plan.pixels), [vec![0.0; width], vec![0.0; width]]),
+            |(strip, bend), (first, rows)| {
+                decode_strip(strip, plan, shot, first, rows);
+                let (mut bends, mut margins) = (Vec::new(), Vec::new());
+                for y in self.looked_at(first, rows.len()) {
+                    for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
+                        plan.conditioning.row(shot, other, &mut strip.light_mut());
+                        for (bend, light) in bend.iter_mut().zip([strip.red(), strip.blue()]) {
+                            let kept = if other < y { 0.0 } else { 1.0 };
+                            bend.iter_mut()
+                                .zip(light)
+                                .for_each(|(bend, light)| *bend = kept * *bend + weight * light);
+                        }
                     }
+                    let quality = &rows[y - first].quality;
+                    let trusted = || (0..width).step_by(LOOK_STRIDE).filter(|&x| quality[x].is_finite());
+                    bends.extend(trusted().flat_map(|x| [bend[0][x], bend[1][x]]));
+                    margins.extend(trusted().map(|x| quality[x]));
                 }
-                decode_row(rows, plan, shot, y, &mut out);
-                let trusted = || (0..width).step_by(LOOK_STRIDE).filter(|&x| out.quality[x].is_finite());
-                let bends: Vec<f32> = trusted().flat_map(|x| [bend[0][x], bend[1][x]]).collect();
-                (bends, trusted().map(|x| out.quality[x]).collect::<Vec<f32>>())
+                (bends, margins)
             },
         );
         let (bends, margins): (Vec<_>, Vec<_>) = seen.unzip();
@@ -143,10 +158,10 @@ impl Published {
     /// Fringe period along rows, from a few rows of red light; the whole row when there is none to see.
     fn period_px<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) -> f64 {
         let [height, width] = self.shape;
-        let mut rows = Rows::new(&self.filters[0], width);
+        let mut strip = Strip::new(&self.filters[0], width, 1);
         for y in (0..height).step_by(height.div_ceil(CARRIER_ROWS)) {
-            plan.row(shot, y, &mut rows.light_mut());
-            self.spectrum.add(ArrayView1::from(rows.red()));
+            plan.row(shot, y, &mut strip.light_mut());
+            self.spectrum.add(ArrayView1::from(strip.red()));
         }
         self.spectrum.take_period_px().clamp(3.0, width as f64)
     }

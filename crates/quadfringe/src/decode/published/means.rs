@@ -16,7 +16,7 @@ pub(super) struct Means {
 
 impl Means {
     /// Phases of an analytic signal whose samples are means of so many `PIXELS`, on straight lines between their middles and
-    /// not wrapped, and the lesser of `modulation` and the square of its own. The signal is a ring that goes on beyond the row.
+    /// not wrapped, and the lesser of `powers` and the square of the modulation. The signal is a ring that goes on beyond the row.
     #[inline(always)]
     pub fn spread<const PIXELS: usize>(
         &mut self,
@@ -78,7 +78,7 @@ fn polar(z: Complex32) -> (f32, f32) {
 }
 
 #[inline(always)]
-fn lesser(a: f32, b: f32) -> f32 {
+pub(super) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
