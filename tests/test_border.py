@@ -40,7 +40,7 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
     scaled = [image * full_scale for image in images]
     shot = [(np.round(s) if full_scale > 1 else s).astype(dtype) for s in scaled]
     maps = decoder(method=method, full_scale=full_scale).decode(*shot)
-    assert list(maps) == ["phase_rad", "column_px", "order", "modulation", "quality", *SURENESS]
+    assert list(maps) == ["phase_rad", "column_px", "modulation", "quality", *SURENESS]
     error = np.abs(maps["column_px"] - np.arange(912))[8:-8, 30:-30]
     assert np.isfinite(error).mean() > 0.98
     assert np.nanmedian(error) < 0.1

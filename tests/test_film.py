@@ -59,7 +59,7 @@ def test_a_solid_is_lit_by_its_slope_and_hides_what_lies_behind() -> None:
     assert middle[:40, :40].mean() > middle[40:, 40:].mean() + 3  # light comes from above left
     assert texture(shot, shape).shape == white.shape
     with pytest.raises(InputError, match="phase only"):
-        solid_picture(qf.Shape(*[shape.phase_rad] * 5), white)
+        solid_picture(qf.Shape(*[shape.phase_rad] * 4), white)
 
 
 def test_a_movie_is_whole_or_not_there(tmp_path: Path) -> None:

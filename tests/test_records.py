@@ -34,13 +34,13 @@ CALIBRATION = Calibration(
 @pytest.fixture
 def shape() -> Shape:
     rng = np.random.default_rng(7)
-    maps = rng.random((7, 6, 8), np.float32)
+    maps = rng.random((6, 6, 8), np.float32)
     maps[:, 2, 3] = np.nan
     names = ("wrong_order_probability", "uncertainty_mm")
-    sureness = dict(zip(names, maps[5:], strict=True))
+    sureness = dict(zip(names, maps[4:], strict=True))
     xyz = rng.random((6, 8, 3), np.float32) * 800
     xyz[2, 3] = np.nan
-    return Shape(*maps[:5], xyz_mm=xyz, **sureness, config={"fringes": [36, 35, 30]}, calibration=CALIBRATION)
+    return Shape(*maps[:4], xyz_mm=xyz, **sureness, config={"fringes": [36, 35, 30]}, calibration=CALIBRATION)
 
 
 def test_npz_gives_everything_back(tmp_path: Path, shape: Shape) -> None:

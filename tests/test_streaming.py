@@ -21,7 +21,7 @@ from quadfringe.scanner import Scanner, open_system
 from quadfringe.streaming import LiveStream
 
 BLANK = np.zeros((2, 2), np.uint8)
-FLAT = Shape(*[np.zeros((2, 2), np.float32)] * 5)
+FLAT = Shape(*[np.zeros((2, 2), np.float32)] * 4)
 
 
 class ScriptedCamera:

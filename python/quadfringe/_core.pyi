@@ -270,7 +270,7 @@ class Decoder:
     ) -> dict[str, NDArray[np.float32]]:
         """Give maps (H, W) by name.
 
-        phase_rad, column_px, order, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
+        phase_rad, column_px, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
         when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3).
 
         The images are (H, W) uint8, uint16 or float32, all of one type; strided views are welcome, nothing is

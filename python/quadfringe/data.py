@@ -35,7 +35,7 @@ __all__ = [
 ]
 
 Map = NDArray[np.float32]
-MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
+MAPS = ("phase_rad", "column_px", "modulation", "quality")
 MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm")
 SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
@@ -293,7 +293,6 @@ class Shape:
 
     phase_rad: Map
     column_px: Map
-    order: Map
     modulation: Map
     quality: Map
     xyz_mm: Map | None = None
@@ -306,8 +305,14 @@ class Shape:
     @property
     def maps(self) -> dict[str, Map]:
         """Every map by name; `uncertainty_mm` in place of `uncertainty_rad`, and `xyz_mm`, when calibrated."""
-        maps = {name: getattr(self, name) for name in (*MAPS, *MORE_MAPS)}
+        maps = {name: getattr(self, name) for name in (*MAPS, "order", *MORE_MAPS)}
         return {name: values for name, values in maps.items() if values is not None}
+
+    @property
+    def order(self) -> Map:
+        """Fringe order, (H, W): whole turns of the absolute phase, rounded down."""
+        order: Map = np.floor(self.phase_rad / np.float32(2 * np.pi))
+        return order
 
     @property
     def returned(self) -> NDArray[np.bool_]:

@@ -166,7 +166,6 @@ impl Decoder {
         Decoded {
             phase_rad: map(),
             column_px: map(),
-            order: map(),
             modulation: map(),
             quality: map(),
             wrong_order_probability: map(),
@@ -180,7 +179,6 @@ impl Decoder {
         let named = PyDict::new(py);
         named.set_item("phase_rad", self.memory.lend(py, decoded.phase_rad)?)?;
         named.set_item("column_px", self.memory.lend(py, decoded.column_px)?)?;
-        named.set_item("order", self.memory.lend(py, decoded.order)?)?;
         named.set_item("modulation", self.memory.lend(py, decoded.modulation)?)?;
         named.set_item("quality", self.memory.lend(py, decoded.quality)?)?;
         named.set_item("wrong_order_probability", self.memory.lend(py, decoded.wrong_order_probability)?)?;

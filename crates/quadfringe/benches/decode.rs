@@ -78,14 +78,14 @@ impl Floor {
 
     fn run(&self, planes: &[Array2<u8>; 4], out: &mut Decoded) {
         let width = planes[0].ncols();
-        let maps = [&mut out.phase_rad, &mut out.column_px, &mut out.order, &mut out.modulation];
+        let maps = [&mut out.phase_rad, &mut out.column_px, &mut out.quality, &mut out.modulation];
         let [green, infrared, red, blue] = maps.map(|map| rows_of(map.as_slice_mut(), width));
-        let quality = rows_of(out.quality.as_slice_mut(), width);
+        let wrong = rows_of(out.wrong_order_probability.as_slice_mut(), width);
         let xyz = rows_of(out.xyz_mm.as_mut().and_then(|xyz| xyz.as_slice_mut()), 3 * width);
-        let rows = green.zip(infrared).zip(red.zip(blue)).zip(quality.zip(xyz)).enumerate().with_min_len(8);
+        let rows = green.zip(infrared).zip(red.zip(blue)).zip(wrong.zip(xyz)).enumerate().with_min_len(8);
         rows.for_each_init(
             || (self.forward.make_input_vec(), self.forward.make_output_vec(), self.scratch()),
-            |(row, spectrum, scratch), (y, (((green, infrared), (red, blue)), (quality, xyz)))| {
+            |(row, spectrum, scratch), (y, (((green, infrared), (red, blue)), (wrong, xyz)))| {
                 let seen = planes.each_ref().map(|plane| plane.row(y).to_slice().expect("whole rows"));
                 for (raw, out) in [(seen[1], &mut *green), (seen[3], &mut *infrared)] {
                     copy(raw, row);
@@ -95,7 +95,7 @@ impl Floor {
                 }
                 copy(seen[0], red);
                 copy(seen[2], blue);
-                quality.copy_from_slice(red);
+                wrong.copy_from_slice(red);
                 xyz.chunks_exact_mut(width)
                     .zip([green, infrared, blue])
                     .for_each(|(x, y)| x.copy_from_slice(y));

@@ -91,13 +91,6 @@ pub(crate) fn wrap_positive(angle: f32) -> f32 {
     if lifted < TAU { lifted } else { 0.0 }
 }
 
-/// Greatest whole number that is not above, for |x| < 2^21; NaN stays NaN. Without a call, see [`round`].
-#[inline]
-pub(crate) fn floor(x: f32) -> f32 {
-    let near = round(x);
-    if near > x { near - 1.0 } else { near }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,15 +118,6 @@ mod tests {
             assert!((f64::from(s) - exact.0).abs() < 4e-7, "sin {angle}");
             assert!((f64::from(c) - exact.1).abs() < 4e-7, "cos {angle}");
         }
-    }
-
-    #[test]
-    fn floor_is_floor() {
-        for i in -100_000..100_000 {
-            let x = i as f32 * 0.01;
-            assert_eq!(floor(x), x.floor());
-        }
-        assert!(floor(f32::NAN).is_nan());
     }
 
     #[test]

@@ -9,10 +9,9 @@ use quadfringe::{Conditioner, Decoded, Decoder, Method, Options};
 use rayon::ThreadPoolBuilder;
 
 fn bits(decoded: &Decoded) -> Vec<u32> {
-    let maps: [&Array2<f32>; 6] = [
+    let maps: [&Array2<f32>; 5] = [
         &decoded.phase_rad,
         &decoded.column_px,
-        &decoded.order,
         &decoded.modulation,
         &decoded.quality,
         &decoded.wrong_order_probability,

@@ -60,9 +60,10 @@ fn maps_agree_with_one_another() {
     let cast = cast_scene(&bench, "steps");
     let decoded = there_and_back(&bench, &cast, &code(), &noisy(3), Method::Best);
     let xyz = decoded.xyz_mm.as_ref().expect("calibrated");
+    let orders = decoded.order();
     for (at, &phase) in decoded.phase_rad.indexed_iter() {
         let column = decoded.column_px[at];
-        let order = decoded.order[at];
+        let order = orders[at];
         let z = xyz[[at.0, at.1, 2]];
         if phase.is_nan() {
             assert!(column.is_nan() && order.is_nan() && z.is_nan(), "{at:?}");

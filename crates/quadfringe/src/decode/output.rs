@@ -1,6 +1,5 @@
 //! What comes out of a shot.
 
-use crate::angle::floor;
 use crate::demod::{first_of_line, spare};
 use crate::height::Triangulator;
 use crate::{Error, FringeCode, Result};
@@ -16,8 +15,6 @@ pub struct Decoded {
     pub phase_rad: Array2<f32>,
     /// Projector column.
     pub column_px: Array2<f32>,
-    /// Fringe order: whole turns of the absolute phase, rounded down.
-    pub order: Array2<f32>,
     /// Modulation of R and B in linear light, as a fraction of full scale; known wherever there is light.
     pub modulation: Array2<f32>,
     /// How far the order is from another one, in [0, 1]; known wherever there is light.
@@ -59,7 +56,6 @@ impl Decoded {
         Self {
             phase_rad: map(),
             column_px: map(),
-            order: map(),
             modulation: map(),
             quality: map(),
             wrong_order_probability: map(),
@@ -69,11 +65,23 @@ impl Decoded {
         }
     }
 
+    /// Fringe order: whole turns of the absolute phase, rounded down; NaN is no data.
+    ///
+    /// ```
+    /// use quadfringe::Decoded;
+    /// let mut decoded = Decoded::new([1, 2], false);
+    /// decoded.phase_rad[[0, 1]] = 20.0;
+    /// assert_eq!(decoded.order(), ndarray::array![[0.0, 3.0]]);
+    /// ```
+    #[must_use]
+    pub fn order(&self) -> Array2<f32> {
+        self.phase_rad.mapv(|phase| (phase / TAU).floor())
+    }
+
     pub(super) fn check(&self, shape: [usize; 2], calibrated: bool) -> Result<()> {
         let maps = [
             &self.phase_rad,
             &self.column_px,
-            &self.order,
             &self.modulation,
             &self.quality,
             &self.wrong_order_probability,
@@ -113,7 +121,6 @@ impl Decoded {
         let maps = [
             &mut self.phase_rad,
             &mut self.column_px,
-            &mut self.order,
             &mut self.modulation,
             &mut self.quality,
             &mut self.wrong_order_probability,
@@ -123,12 +130,10 @@ impl Decoded {
         let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("checked layout"));
         let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
         let mut next = || {
-            let [phase, column, order, modulation, quality, wrong, sigma] =
-                maps.each_mut().map(Iterator::next);
+            let [phase, column, modulation, quality, wrong, sigma] = maps.each_mut().map(Iterator::next);
             Some(OutputRow {
                 phase: phase?,
                 column: column?,
-                order: order?,
                 modulation: modulation?,
                 quality: quality?,
                 sigma: sigma?,
@@ -147,7 +152,6 @@ pub(super) const ROWS_AT_ONCE: usize = 8;
 pub(super) struct OutputRow<'a> {
     pub phase: &'a mut [f32],
     pub column: &'a mut [f32],
-    pub order: &'a mut [f32],
     pub modulation: &'a mut [f32],
     pub quality: &'a mut [f32],
     /// Probability of another order.
@@ -157,7 +161,7 @@ pub(super) struct OutputRow<'a> {
     pub xyz: Option<&'a mut [f32]>,
 }
 
-/// The last step of either method, row by row: columns, orders, points and their uncertainty from the phase and its own.
+/// The last step of either method, row by row: columns, points and their uncertainty from the phase and its own.
 pub(super) struct Finish<'a> {
     pub code: &'a FringeCode,
     pub triangulator: Option<&'a Triangulator>,
@@ -169,8 +173,8 @@ impl Finish<'_> {
         let per_rad = self.code.period_px(0) as f32 / TAU;
         let end = self.code.projector_width() as f32 + 0.5;
         let unit = if self.triangulator.is_some() { per_rad } else { 1.0 };
-        let OutputRow { phase, column, order, wrong, sigma, .. } = row;
-        columns_and_orders([per_rad, end, unit], [phase, column, order, wrong, sigma]);
+        let OutputRow { phase, column, wrong, sigma, .. } = row;
+        columns([per_rad, end, unit], [phase, column, wrong, sigma]);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
             triangulator.finish_row(y, row.column, xyz, row.sigma);
         }
@@ -180,15 +184,13 @@ impl Finish<'_> {
 /// No light comes from beside the projector's image, of which a column on each side is noise. Where there is no phase
 /// nothing is known of it either; uncertainty in rad is turned into another unit.
 #[multiversion(targets("x86_64+avx2"))]
-fn columns_and_orders([per_rad, end, unit]: [f32; 3], maps: [&mut [f32]; 5]) {
-    let [phase, column, order, wrong, sigma] = maps;
-    let found = phase.iter_mut().zip(column).zip(order);
-    for (((phase, column), order), (wrong, sigma)) in found.zip(wrong.iter_mut().zip(sigma)) {
+fn columns([per_rad, end, unit]: [f32; 3], [phase, column, wrong, sigma]: [&mut [f32]; 4]) {
+    let found = phase.iter_mut().zip(column);
+    for ((phase, column), (wrong, sigma)) in found.zip(wrong.iter_mut().zip(sigma)) {
         let found = *phase * per_rad;
         let inside = (found >= -1.5) & (found < end);
         *phase = if inside { *phase } else { f32::NAN };
         *column = if inside { found } else { f32::NAN };
-        *order = floor(*phase / TAU);
         *wrong = if inside { *wrong } else { f32::NAN };
         *sigma = if inside { *sigma * unit } else { f32::NAN };
     }
