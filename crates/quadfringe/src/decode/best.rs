@@ -11,13 +11,14 @@ use crate::condition::{Plan, Sample};
 use crate::demod::agreement::Agreement;
 use crate::demod::carrier;
 use crate::demod::cells::{Grid, RowMaps};
+use crate::demod::joint::Found;
 use crate::demod::lanes::LANES;
 use crate::demod::motion::{Instants, Motion};
-use crate::demod::scene::{Scene, hold};
+use crate::demod::scene::Scene;
 use crate::demod::window::Window;
 use crate::{FringeCode, Shot};
 use multiversion::multiversion;
-use ndarray::{ArrayView2, s};
+use ndarray::{Array2, ArrayView2, s};
 use rayon::prelude::*;
 
 /// Cells in a fringe period, at least.
@@ -46,6 +47,47 @@ pub(super) struct Best {
     /// Light as it was seen, when it has to be brought to one instant.
     seen: [Vec<f32>; 4],
     judge: Judge,
+    /// Two working planes, when the maps have none to lend.
+    own: Vec<f32>,
+}
+
+/// Memory of maps that have not been written yet.
+struct Unwritten<'a> {
+    /// Two working planes that steps use one after the other, in the map of points.
+    lent: [&'a mut [f32]; 2],
+    /// What the joint fit finds: modulation in its own map, misfit in that of probabilities, information in that of
+    /// uncertainty.
+    found: Found<'a>,
+}
+
+impl<'a> Unwritten<'a> {
+    fn new(out: &'a mut Decoded, own: &'a mut Vec<f32>, pixels: usize) -> Self {
+        let width = out.phase_rad.ncols();
+        let rows = |map: &'a mut Array2<f32>| {
+            map.as_slice_mut().expect("checked layout").chunks_exact_mut(width).collect::<Vec<_>>()
+        };
+        let uncertainty = out.uncertainty_mm.as_mut().or(out.uncertainty_rad.as_mut()).expect("checked");
+        let planes = match &mut out.xyz_mm {
+            Some(xyz) if xyz.len() >= 2 * pixels => {
+                &mut xyz.as_slice_mut().expect("checked layout")[..2 * pixels]
+            }
+            _ => {
+                own.resize(2 * pixels, 0.0);
+                own.as_mut_slice()
+            }
+        };
+        let (first, second) = planes.split_at_mut(pixels);
+        let found = Found {
+            misfit: rows(&mut out.wrong_order_probability),
+            modulation: rows(&mut out.modulation),
+            information: rows(uncertainty),
+        };
+        Self { lent: [first, second], found }
+    }
+
+    fn lent(&mut self) -> [&mut [f32]; 2] {
+        self.lent.each_mut().map(|plane| &mut **plane)
+    }
 }
 
 impl Best {
@@ -69,6 +111,7 @@ impl Best {
             motion: Motion::default(),
             seen: Default::default(),
             judge: Judge::default(),
+            own: Vec::new(),
         }
     }
 
@@ -88,26 +131,28 @@ impl Best {
 
         // 2. to 4. From light to the absolute phase of every pixel.
         let instants = options.channel_instants_us.map(|instants| instants.map(|t| 1e-6 * t));
+        let image = (&grid, period_px, factor(period_px, &grid));
+        let mut own = std::mem::take(&mut self.own);
+        let mut unwritten = Unwritten::new(out, &mut own, grid.pixels());
         match instants {
-            None => self.measure((&grid, period_px), factor(period_px, &grid), blur_px, options),
-            Some(instants) => {
-                let image = (&grid, period_px, factor(period_px, &grid));
-                self.measure_moving(image, instants, blur_px, options);
-            }
+            None => self.measure(image, blur_px, options, &mut unwritten),
+            Some(instants) => self.measure_moving(image, instants, blur_px, options, &mut unwritten),
         }
+        self.own = own;
 
         // 5. What is not sure is no data.
         let scene = self.full.scene(&grid, period_px, 1);
-        let Guide { noise, backgrounds, orders, joint, lent: [quality, _], .. } = &mut self.guide;
+        let Guide { noise, backgrounds, orders, .. } = &mut self.guide;
+        let misfit = out.wrong_order_probability.as_slice().expect("checked layout");
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
-            misfit: &joint.misfit,
+            misfit,
             noise: *noise,
             orders,
             quality_min: options.quality_min,
         };
-        self.judge.run(&scene, &findings, quality);
+        self.judge.run(&scene, &findings, out.quality.as_slice_mut().expect("checked layout"));
         if let Some(instants) = instants {
             self.motion.rule_out(&scene, instants, &mut self.judge.sure);
         }
@@ -122,37 +167,47 @@ impl Best {
 
     /// Absolute phase of every pixel. Where light falls, beats, fringe orders and backgrounds come from an image of `factor` times
     /// fewer pixels along a side.
-    fn measure(&mut self, (grid, period_px): (&Grid, f64), factor: usize, blur_px: usize, options: &Options) {
+    fn measure(
+        &mut self,
+        (grid, period_px, factor): (&Grid, f64, usize),
+        blur_px: usize,
+        options: &Options,
+        unwritten: &mut Unwritten<'_>,
+    ) {
+        let lent = unwritten.lent();
         if factor == 1 {
-            self.guide.run(&mut self.full, (grid, period_px, 1), blur_px, self.ratios, options);
+            self.guide.run(&mut self.full, (grid, period_px, 1), blur_px, self.ratios, options, lent);
             std::mem::swap(&mut self.phase, &mut self.guide.phase);
             std::mem::swap(&mut self.modulation, &mut self.guide.modulation);
         } else {
             let coarse = grid.shrunk(factor);
             self.shrunk.shrink(&self.full, [&coarse, grid], factor);
             let how = (&coarse, period_px / factor as f64, factor);
-            self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), self.ratios, options);
-            self.expand([&coarse, grid], period_px, blur_px);
+            self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), self.ratios, options, lent);
+            self.expand([&coarse, grid], period_px, blur_px, unwritten.lent());
         }
         // All four channels measure the same column.
         let scene = self.full.scene(grid, period_px, 1);
-        let Guide { slopes, noise, backgrounds, joint, lent, .. } = &mut self.guide;
+        let Guide { slopes, noise, backgrounds, joint, .. } = &mut self.guide;
         let window = Window::new(&scene, slopes, &self.modulation, *noise);
-        joint.step(&scene, backgrounds, &window, self.ratios, &mut self.phase, lent);
+        let Unwritten { lent: [first, second], found } = unwritten;
+        joint.step(&scene, (backgrounds, self.ratios), &window, &mut self.phase, [first, second], found);
     }
 
     /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.
     fn measure_moving(
         &mut self,
-        (grid, period_px, factor): (&Grid, f64, usize),
+        image: (&Grid, f64, usize),
         instants: Instants,
         blur_px: usize,
         options: &Options,
+        unwritten: &mut Unwritten<'_>,
     ) {
+        let (grid, period_px, _) = image;
         let how = (self.ratios, instants);
         self.seen.clone_from(&self.full.light);
         for round in 0..=MOTION_ROUNDS {
-            self.measure((grid, period_px), factor, blur_px, options);
+            self.measure(image, blur_px, options, unwritten);
             let scene = self.full.scene(grid, period_px, 1);
             if round == 0 {
                 self.motion.rest(&scene);
@@ -171,13 +226,18 @@ impl Best {
     }
 
     /// From the guide to every pixel.
-    fn expand(&mut self, [coarse, grid]: [&Grid; 2], period_px: f64, blur_px: usize) {
+    fn expand(
+        &mut self,
+        [coarse, grid]: [&Grid; 2],
+        period_px: f64,
+        blur_px: usize,
+        [lent, found]: [&mut [f32]; 2],
+    ) {
         for plane in [&mut self.phase, &mut self.modulation] {
             plane.resize(grid.pixels(), 0.0);
         }
         let guide = &mut self.guide;
-        let (finder, [lent, found]) = (&mut guide.finder, &mut guide.lent);
-        let found = hold(found, grid.pixels());
+        let finder = &mut guide.finder;
         finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), lent, found);
         guide.noise = finder.noise;
         finder.shrink(grid, blur_px, lent, found);
@@ -207,14 +267,12 @@ impl Best {
     }
 
     fn write(&self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let (grid, Guide { joint, lent: [quality, _], .. }) = (scene.grid, &self.guide);
+        let grid = scene.grid;
         out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
-            sure_only(&self.judge.sure[at.clone()], &self.phase[at.clone()], row.phase);
-            row.modulation.copy_from_slice(&joint.modulation[at.clone()]);
-            row.quality.copy_from_slice(&quality[at.clone()]);
+            sure_only(&self.judge.sure[at.clone()], &self.phase[at], row.phase);
             let disagreement = self.agreement.row(scene, y, maps);
-            noise.row(&joint.information[at], disagreement, row.sigma);
+            noise.row(disagreement, row.sigma);
             let nodes = &self.another[y / grid.step * grid.columns..];
             row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);

@@ -7,7 +7,7 @@ use super::{Level, Options};
 use crate::FringeCode;
 use crate::demod::backgrounds::{Backgrounds, ROUGH_ROWS, ROWS};
 use crate::demod::cells::Grid;
-use crate::demod::joint::Joint;
+use crate::demod::joint::{Found, Joint};
 use crate::demod::light::LightFinder;
 use crate::demod::local_fit::{LocalFit, PixelMaps};
 use crate::demod::scene::around;
@@ -37,8 +37,6 @@ pub(super) struct Guide {
     pub orders: Orders,
     pub backgrounds: Backgrounds,
     pub joint: Joint,
-    /// Working planes that steps use one after the other.
-    pub lent: [Vec<f32>; 2],
     wrapped: Vec<f32>,
     sound: Vec<f32>,
     fit: LocalFit,
@@ -56,14 +54,14 @@ impl Guide {
             orders: Orders::new(code),
             backgrounds: Backgrounds::new(),
             joint: Joint::default(),
-            lent: Default::default(),
             wrapped: Vec::new(),
             sound: Vec::new(),
             fit: LocalFit::default(),
         }
     }
 
-    /// Decode `level`, whose light may reach `blur_px` pixels into a shadow, up to the first round of the joint fit.
+    /// Decode `level`, whose light may reach `blur_px` pixels into a shadow, up to the first round of the joint fit. What two
+    /// `lent` planes held is lost.
     pub fn run(
         &mut self,
         level: &mut Level,
@@ -71,6 +69,7 @@ impl Guide {
         blur_px: usize,
         ratios: [f32; 3],
         options: &Options,
+        [lent, more]: [&mut [f32]; 2],
     ) {
         let planes =
             [&mut self.phase, &mut self.modulation, &mut self.wrapped, &mut self.torn, &mut self.sound];
@@ -78,7 +77,7 @@ impl Guide {
             plane.resize(grid.pixels(), 0.0);
         }
         let light = level.light.each_ref().map(Vec::as_slice);
-        let (finder, [lent, _]) = (&mut self.finder, &mut self.lent);
+        let finder = &mut self.finder;
         finder.find(grid, light, (period_px, 2.0 * options.modulation_min), lent, &mut self.modulation);
         finder.shrink(grid, blur_px, lent, &mut self.modulation);
         level.restrict(grid, &self.modulation);
@@ -123,7 +122,8 @@ impl Guide {
             ROUGH_ROWS,
         );
         let window = Window::new(&scene, &self.slopes, &self.modulation, self.noise).near();
-        self.joint.step(&scene, &self.backgrounds, &window, ratios, &mut self.phase, &mut self.lent);
+        let found = &mut Found::nothing(grid.height);
+        self.joint.step(&scene, (&self.backgrounds, ratios), &window, &mut self.phase, [lent, more], found);
         self.find_tears(grid);
         for _ in 0..LAST_FITS {
             self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);

@@ -5,7 +5,7 @@ mod seams;
 
 use super::orders::Orders;
 use crate::demod::cells::{CellMaps, CellWork, RowMaps};
-use crate::demod::scene::{Scene, around, hold};
+use crate::demod::scene::{Scene, around};
 use crate::slots::Slots;
 use islands::Islands;
 use multiversion::multiversion;
@@ -30,7 +30,7 @@ pub(super) struct Findings<'a> {
     pub phase: &'a [f32],
     /// 0 where there is no light.
     pub modulation: &'a [f32],
-    /// Mean square misfit of the four channels.
+    /// Mean square misfit of the four channels, row by row without padding.
     pub misfit: &'a [f32],
     /// Standard deviation of the intensities.
     pub noise: f32,
@@ -61,15 +61,14 @@ struct Rows {
 }
 
 impl Judge {
-    /// Judge every pixel; `quality` receives that of the order of what is lit, NaN elsewhere.
-    pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>, quality: &mut Vec<f32>) {
+    /// Judge every pixel; `quality`, without padding, receives that of the order of what is lit, NaN elsewhere.
+    pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>, quality: &mut [f32]) {
         let grid = scene.grid;
         self.tears.mark(grid, findings.phase, findings.modulation, &mut self.seams);
         self.back(scene, findings.orders);
-        let quality = hold(quality, grid.pixels());
         self.spare.resize(grid.pixels(), 0);
         let Self { spare, seams, backing, slots, .. } = self;
-        let rows = quality.par_chunks_mut(grid.stride).zip(spare.par_chunks_mut(grid.stride)).enumerate();
+        let rows = quality.par_chunks_mut(grid.width).zip(spare.par_chunks_mut(grid.stride)).enumerate();
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (quality, sure))| {
@@ -79,7 +78,8 @@ impl Judge {
                 for (lead, _, lit) in findings.orders.verdict(scene, y / grid.step) {
                     margin.extend(std::iter::repeat_n(if lit { lead } else { 0.0 }, grid.step));
                 }
-                let near = around(y, grid.height).map(|row| scene.row(findings.misfit, row));
+                let near =
+                    around(y, grid.height).map(|row| &findings.misfit[row * grid.width..][..grid.width]);
                 let known = [scene.row(findings.modulation, y), margin, backing];
                 let limits = [findings.noise, findings.quality_min];
                 verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, sure);

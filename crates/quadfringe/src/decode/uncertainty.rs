@@ -45,18 +45,18 @@ impl PhaseNoise {
         Self { variance: ALBEDO_LOSS * noise * noise * share }
     }
 
-    /// Standard deviation in rad of a row, from the weights that the window has added up and the variance by which the
-    /// channels disagree beyond noise.
-    pub fn row(&self, information: &[f32], disagreement: &[f32], out: &mut [f32]) {
-        deviations(self.variance, information, disagreement, out);
+    /// Standard deviation in rad of a row, in place of the weights that the window has added up; `disagreement` is the variance
+    /// by which the channels disagree beyond noise.
+    pub fn row(&self, disagreement: &[f32], row: &mut [f32]) {
+        deviations(self.variance, disagreement, row);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn deviations(variance: f32, information: &[f32], disagreement: &[f32], out: &mut [f32]) {
-    for (out, (&known, &more)) in out.iter_mut().zip(information.iter().zip(disagreement)) {
-        let by_noise = variance / if known > 1e-12 { known } else { 1e-12 };
-        *out = (by_noise + more + METHOD_RAD * METHOD_RAD).sqrt();
+fn deviations(variance: f32, disagreement: &[f32], row: &mut [f32]) {
+    for (value, more) in row.iter_mut().zip(disagreement) {
+        let by_noise = variance / if *value > 1e-12 { *value } else { 1e-12 };
+        *value = (by_noise + more + METHOD_RAD * METHOD_RAD).sqrt();
     }
 }
 

@@ -7,7 +7,7 @@ use super::backgrounds::{Backgrounds, carriers};
 use super::cells::RowMaps;
 use super::lanes::{LANES, lanes, lanes_mut, put, take};
 use super::local_fit::binomial;
-use super::scene::{Scene, around, hold};
+use super::scene::{Scene, around};
 use super::window::{Average, Window, WindowRows};
 use crate::slots::Slots;
 use multiversion::multiversion;
@@ -16,17 +16,29 @@ use rayon::prelude::*;
 /// Rows that one task works on: of each the model is computed once, but for the two rows beside a block.
 const BLOCK: usize = 32;
 
-/// Working maps of the joint fit.
+/// Working rows of the joint fit.
 #[derive(Debug, Default)]
 pub(crate) struct Joint {
     slots: Slots<Rows>,
+}
+
+/// Rows of the image to write what a round finds, each as long as what is wanted of it.
+pub(crate) struct Found<'a> {
     /// Misfit of the four channels: mean square in linear light.
-    pub misfit: Vec<f32>,
+    pub misfit: Vec<&'a mut [f32]>,
     /// Modulation of R and B in linear light.
-    pub modulation: Vec<f32>,
-    /// What the window of the last round knows of the phase of every pixel: sum of weighted squared derivatives, 1/rad^2 in
-    /// units of linear light. The uncertainty is made of it.
-    pub information: Vec<f32>,
+    pub modulation: Vec<&'a mut [f32]>,
+    /// What the window knows of the phase of every pixel: sum of weighted squared derivatives, 1/rad^2 in units of linear
+    /// light. The uncertainty is made of it.
+    pub information: Vec<&'a mut [f32]>,
+}
+
+impl Found<'_> {
+    /// When nothing is wanted but the phase.
+    pub fn nothing(height: usize) -> Self {
+        let rows = || (0..height).map(|_| <&mut [f32]>::default()).collect();
+        Self { misfit: rows(), modulation: rows(), information: rows() }
+    }
 }
 
 /// Model and derivative of the four channels for an albedo of 1, the albedo that fits best, and the mean modulation of R and B
@@ -45,31 +57,31 @@ struct Rows {
     albedo: Vec<f32>,
     smooth: Vec<f32>,
     numerator: Vec<f32>,
+    /// Misfit and modulation.
+    found: [Vec<f32>; 2],
     window: WindowRows,
 }
 
 impl Joint {
-    /// One round on an absolute phase in rad, in place. `ratios` are the fringe numbers over the first; what `lent` planes held
-    /// is lost.
+    /// One round on an absolute phase in rad, in place. `ratios` are the fringe numbers over the first; what two `lent` planes
+    /// held is lost.
     pub fn step(
         &mut self,
         scene: &Scene<'_>,
-        backgrounds: &Backgrounds,
+        (backgrounds, ratios): (&Backgrounds, [f32; 3]),
         window: &Window<'_>,
-        ratios: [f32; 3],
         phase: &mut [f32],
-        lent: &mut [Vec<f32>; 2],
+        [average, weight]: [&mut [f32]; 2],
+        found: &mut Found<'_>,
     ) {
-        let grid = scene.grid;
-        let Self { misfit, modulation, information, slots } = self;
-        let [average, weight] = lent.each_mut().map(|plane| hold(plane, grid.pixels()));
-        let [misfit, modulation, information] =
-            [misfit, modulation, information].map(|plane| hold(plane, grid.pixels()));
+        let (grid, slots) = (scene.grid, &self.slots);
+        let [average, weight] = [average, weight].map(|plane| &mut plane[..grid.pixels()]);
+        let Found { misfit, modulation, information } = found;
         let before = &*phase;
         let out = average
             .par_chunks_mut(grid.stride)
             .zip(weight.par_chunks_mut(grid.stride))
-            .zip(misfit.par_chunks_mut(grid.stride).zip(modulation.par_chunks_mut(grid.stride)))
+            .zip(misfit.par_iter_mut().zip(modulation.par_iter_mut()))
             .chunks(BLOCK)
             .enumerate();
         out.for_each_init(
@@ -87,14 +99,18 @@ impl Joint {
                 for (i, ((phase, weight), (misfit, modulation))) in out.into_iter().enumerate() {
                     let y = first + i;
                     model(rows, around(y, grid.height)[2], (i + 2) % 3);
-                    let Rows { ring, albedo, smooth, numerator, window: window_rows, .. } = rows;
+                    let Rows { ring, albedo, smooth, numerator, found, window: window_rows, .. } = rows;
                     let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[8].as_slice());
-                    albedo.resize(grid.stride, 0.0);
-                    numerator.resize(grid.stride, 0.0);
+                    for row in [&mut *albedo, &mut *numerator].into_iter().chain(&mut *found) {
+                        row.resize(grid.stride, 0.0);
+                    }
                     binomial(near, grid.width, smooth, albedo);
                     let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
                     let lit = [window.modulation(y), scene.row(scene.usable, y)];
-                    linearise(model, albedo, scene.rows(y), lit, [numerator, weight, misfit, modulation]);
+                    let [misfits, modulations] = found.each_mut().map(Vec::as_mut_slice);
+                    linearise(model, albedo, scene.rows(y), lit, [numerator, weight, misfits, modulations]);
+                    misfit.copy_from_slice(&misfits[..misfit.len()]);
+                    modulation.copy_from_slice(&modulations[..modulation.len()]);
                     phase.copy_from_slice(scene.row(before, y));
                     window.along(y, window_rows, numerator, [phase, weight]);
                 }

@@ -6,7 +6,7 @@
 
 use super::cells::{CellMaps, CellWork, Grid, RowMaps};
 use super::lanes::{LANES, Lanes, add, lanes, lanes_mut, take};
-use super::scene::{around, hold};
+use super::scene::around;
 use crate::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -46,7 +46,7 @@ impl LightFinder {
         grid: &Grid,
         light: [&[f32]; 4],
         (period_px, range_min): (f64, f32),
-        lent: &mut Vec<f32>,
+        lent: &mut [f32],
         lit: &mut [f32],
     ) {
         let reach = (SURROUNDINGS * period_px as f32 / grid.step as f32).ceil();
@@ -55,10 +55,10 @@ impl LightFinder {
     }
 
     /// The same on a finer image of the same scene: its grid has the cells of the last [`Self::find`].
-    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lent: &mut Vec<f32>, lit: &mut [f32]) {
+    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lent: &mut [f32], lit: &mut [f32]) {
         let (stride, noise) = (grid.stride, noise(light[0], grid));
         self.noise = noise;
-        let above = hold(lent, grid.pixels());
+        let above = &mut lent[..grid.pixels()];
         let (smoothed, slots) = (&self.smoothed, &self.slots);
         above.par_chunks_mut(stride).enumerate().for_each_init(
             || slots.take(),
@@ -85,10 +85,10 @@ impl LightFinder {
     /// Takes what lies `reach_px` pixels and less from the dark: light interpolated from rows and columns reaches that far.
     /// In the corner of the square around a pixel stands a product of two far samples, with a hundredth of the weight:
     /// the corners of the last ring do not count.
-    pub fn shrink(&mut self, grid: &Grid, reach_px: usize, lent: &mut Vec<f32>, lit: &mut [f32]) {
+    pub fn shrink(&mut self, grid: &Grid, reach_px: usize, lent: &mut [f32], lit: &mut [f32]) {
         let stride = grid.stride;
         for ring in 1..=reach_px {
-            let above = hold(lent, grid.pixels());
+            let above = &mut lent[..grid.pixels()];
             above.copy_from_slice(lit);
             let (above, slots) = (&*above, &self.slots);
             let corners = ring == 1 || ring < reach_px;

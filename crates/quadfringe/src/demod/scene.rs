@@ -36,11 +36,3 @@ impl<'a> Scene<'a> {
 pub(crate) fn around(y: usize, height: usize) -> [usize; 3] {
     [y.saturating_sub(1), y, (y + 1).min(height - 1)]
 }
-
-/// So many numbers of a plane that keeps its memory: it serves the coarse image and the full one, and one step after another.
-pub(crate) fn hold(plane: &mut Vec<f32>, pixels: usize) -> &mut [f32] {
-    if plane.len() < pixels {
-        plane.resize(pixels, 0.0);
-    }
-    &mut plane[..pixels]
-}

@@ -49,6 +49,7 @@ pub(crate) struct WindowRows {
     maps: RowMaps,
     slopes: Vec<f32>,
     sharpness: Vec<f32>,
+    weight: Vec<f32>,
     padded: [Vec<f32>; 4],
 }
 
@@ -106,27 +107,31 @@ impl<'a> Window<'a> {
         numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
     }
 
-    /// Average along columns what [`Self::along`] left; `information` receives the weights that the window has added up.
+    /// Average along columns what [`Self::along`] left; rows of `information` receive the weights that the window
+    /// has added up, each as many as it holds.
     pub fn down<T: Send>(
         &self,
         average: &Average<'_>,
         slots: &Slots<T>,
         rows: impl Fn(&mut T) -> &mut WindowRows + Sync,
         phase: &mut [f32],
-        information: &mut [f32],
+        information: &mut [&mut [f32]],
     ) {
         let stride = self.scene.grid.stride;
-        let out = phase.par_chunks_mut(BLOCK * stride).zip(information.par_chunks_mut(BLOCK * stride));
+        let out = phase.par_chunks_mut(BLOCK * stride).zip(information.par_chunks_mut(BLOCK));
         out.enumerate().for_each_init(
             || slots.take(),
             |slot, (block, (phase, information))| {
                 let first = block * BLOCK;
                 let rows = rows(slot);
                 self.slopes_down(first, phase.len() / stride, rows);
-                let lines = phase.chunks_exact_mut(stride).zip(information.chunks_exact_mut(stride));
-                for (i, (phase, information)) in lines.enumerate() {
-                    self.row_down(average, first + i, i, rows, [phase, information]);
+                let mut weight = std::mem::take(&mut rows.weight);
+                weight.resize(stride, 0.0);
+                for (i, (phase, information)) in phase.chunks_exact_mut(stride).zip(information).enumerate() {
+                    self.row_down(average, first + i, i, rows, [phase, &mut weight]);
+                    information.copy_from_slice(&weight[..information.len()]);
                 }
+                rows.weight = weight;
             },
         );
     }
@@ -305,7 +310,8 @@ mod tests {
         }
         let average = Average { phase: &along, weight: &weight };
         let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
-        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut information);
+        let mut lines: Vec<_> = information.chunks_mut(128).collect();
+        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut lines);
         let error = |i: usize| (phase[i] - truth(i)).abs();
         let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
         // Beside the step its rise leaks into the slopes.
