@@ -9,6 +9,7 @@ use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::{Band, LineSpectrum, RowFilter};
 use crate::height::PairTable;
+use crate::slots::Slots;
 use crate::unwrap::Ladder;
 use crate::{FringeCode, Shot};
 use ndarray::ArrayView1;
@@ -38,6 +39,7 @@ pub(super) struct Published {
     /// For rows of pixels, and of means of two and of four.
     filters: [RowFilter; 3],
     spectrum: LineSpectrum,
+    slots: Slots<Strip>,
     numbers: [f64; 3],
     shape: [usize; 2],
 }
@@ -48,6 +50,7 @@ impl Published {
             unwrapping: Unwrapping::Ladder(Ladder::new(code)),
             filters: [1, 2, 4].map(|pixels| RowFilter::new((shape[1] / pixels).max(1))),
             spectrum: LineSpectrum::new(shape[1]),
+            slots: Slots::default(),
             numbers: code.numbers(),
             shape,
         }
@@ -95,7 +98,7 @@ impl Published {
         strips.sureness = self.look(&strips, shot, &mut rows);
         let strips = strips;
         rows.par_chunks_mut(pixels).with_min_len(ROWS_AT_ONCE.div_ceil(pixels)).enumerate().for_each_init(
-            || Strip::new(filter, self.shape[1], pixels),
+            || self.slots.take(),
             |strip, (index, rows)| {
                 let first = index * pixels;
                 if self.looked_at(first, rows.len()).next().is_some() {
@@ -129,13 +132,13 @@ impl Published {
         let strips: Vec<_> =
             strips.filter(|(first, rows)| self.looked_at(*first, rows.len()).next().is_some()).collect();
         let seen = strips.into_par_iter().map_init(
-            || (Strip::new(plan.filter, width, plan.pixels), [vec![0.0; width], vec![0.0; width]]),
+            || (self.slots.take(), [vec![0.0; width], vec![0.0; width]]),
             |(strip, bend), (first, rows)| {
                 decode_strip(strip, plan, shot, first, rows);
                 let (mut bends, mut margins) = (Vec::new(), Vec::new());
                 for y in self.looked_at(first, rows.len()) {
                     for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
-                        plan.conditioning.row(shot, other, &mut strip.light_mut());
+                        plan.conditioning.row(shot, other, &mut strip.light_of(width));
                         for (bend, light) in bend.iter_mut().zip([strip.red(), strip.blue()]) {
                             let kept = if other < y { 0.0 } else { 1.0 };
                             bend.iter_mut()
@@ -158,9 +161,9 @@ impl Published {
     /// Fringe period along rows, from a few rows of red light; the whole row when there is none to see.
     fn period_px<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) -> f64 {
         let [height, width] = self.shape;
-        let mut strip = Strip::new(&self.filters[0], width, 1);
+        let mut strip = self.slots.take();
         for y in (0..height).step_by(height.div_ceil(CARRIER_ROWS)) {
-            plan.row(shot, y, &mut strip.light_mut());
+            plan.row(shot, y, &mut strip.light_of(width));
             self.spectrum.add(ArrayView1::from(strip.red()));
         }
         self.spectrum.take_period_px().clamp(3.0, width as f64)

@@ -120,6 +120,7 @@ pub(crate) enum Half {
 }
 
 /// Working memory of one thread.
+#[derive(Debug, Default)]
 pub(crate) struct RowScratch {
     tails: [Aligned<f32>; 2],
     extend: extend::Scratch,
@@ -173,6 +174,14 @@ impl RowFilter {
             bins: 0,
             output: Aligned::new(length),
             work: Aligned::new(work),
+        }
+    }
+
+    /// Make memory that may have served rows of another length fit for these.
+    #[inline(always)]
+    pub fn ready(&self, scratch: &mut RowScratch) {
+        if scratch.spectrum.len() != self.forward.len() || scratch.tails[0].len() != self.fade.len() {
+            *scratch = self.scratch();
         }
     }
 

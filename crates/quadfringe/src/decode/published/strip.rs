@@ -49,6 +49,7 @@ impl StripPlan<'_> {
 }
 
 /// Working rows of one thread.
+#[derive(Debug, Default)]
 pub(super) struct Strip {
     light: [Aligned<f32>; 4],
     /// R and B without background.
@@ -77,6 +78,7 @@ pub(super) fn decode_strip<T: Sample>(
     y: usize,
     out: &mut [OutputRow<'_>],
 ) {
+    strip.ready(plan, out[0].phase.len());
     for (i, row) in out.iter_mut().enumerate() {
         plan.conditioning.row(shot, y + i, &mut strip.light_mut());
         let gaps = fill_gaps(&mut strip.light[3]);
@@ -91,25 +93,27 @@ pub(super) fn decode_strip<T: Sample>(
 }
 
 impl Strip {
-    pub fn new(filter: &RowFilter, width: usize, rows: usize) -> Self {
-        let row = || Aligned::new(width);
-        Self {
-            light: [row(), row(), row(), row()],
-            pair: [row(), row()],
-            first: (0..rows).map(|_| row()).collect(),
-            sums: [row(), row()],
-            fringes: Default::default(),
-            others: [row(), row()],
-            power: row(),
-            spare: Default::default(),
-            background: BackgroundScratch::default(),
-            fourier: filter.scratch(),
-            means: Means::default(),
-        }
+    /// Make rows that may have served another image fit for this one.
+    #[inline(always)]
+    fn ready(&mut self, plan: &StripPlan<'_>, width: usize) {
+        self.light_of(width);
+        self.first.resize_with(plan.pixels, Aligned::default);
+        let Self { pair, first, sums, others, power, fourier, .. } = self;
+        let rows = pair.iter_mut().chain(first).chain(sums).chain(others).chain([power]);
+        rows.for_each(|row| row.resize(width));
+        plan.filter.ready(fourier);
     }
 
-    /// Linear light of R, G, B, IR of one row, to be filled.
-    pub fn light_mut(&mut self) -> [&mut [f32]; 4] {
+    /// Linear light of R, G, B, IR of one row, `width` pixels to be filled.
+    pub fn light_of(&mut self, width: usize) -> [&mut [f32]; 4] {
+        self.light.each_mut().map(|row| {
+            row.resize(width);
+            &mut **row
+        })
+    }
+
+    /// The same of the width that it has.
+    fn light_mut(&mut self) -> [&mut [f32]; 4] {
         self.light.each_mut().map(|row| &mut **row)
     }
 
