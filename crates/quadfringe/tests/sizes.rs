@@ -5,15 +5,29 @@ mod common;
 use common::decode_planes;
 use ndarray::{Array2, s};
 use quadfringe::rig::Planes;
-use quadfringe::{Channel, Conditioner, Decoder, DmdLayout, FringeCode, Options, fringe};
+use quadfringe::{Channel, Conditioner, Decoder, DmdLayout, FringeCode, Method, Options, fringe};
 use std::f64::consts::TAU;
 
 /// What a camera sees that sees the projector's columns one to one, but those from `step` on `shift` columns further.
-fn images(code: &FringeCode, [rows, columns]: [usize; 2], step: usize, shift: usize) -> [Array2<f32>; 4] {
-    let source = |x: usize| if x < step { x } else { x + shift };
+fn images(code: &FringeCode, shape: [usize; 2], step: usize, shift: usize) -> [Array2<f32>; 4] {
+    magnified(code, shape, 1, move |x| (if x < step { x } else { x + shift }) as f64)
+}
+
+/// What a camera of `times` pixels a column sees, when pixel `x` looks at column `source(x)`.
+fn magnified(
+    code: &FringeCode,
+    [rows, columns]: [usize; 2],
+    times: usize,
+    source: impl Fn(usize) -> f64,
+) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
-        let image = fringe::pattern(code, channel, rows, DmdLayout::Regular);
-        Array2::from_shape_fn((rows, columns), |(y, x)| 0.1 + 0.8 * image[[y, source(x)]])
+        let image = fringe::pattern(code, channel, rows.div_ceil(times), DmdLayout::Regular);
+        Array2::from_shape_fn((rows, columns), |(y, x)| {
+            let (row, column) = (y / times, source(x));
+            let (left, part) = (column as usize, column.fract() as f32);
+            let right = (left + 1).min(image.ncols() - 1);
+            0.1 + 0.8 * (image[[row, left]] * (1.0 - part) + image[[row, right]] * part)
+        })
     })
 }
 
@@ -40,6 +54,39 @@ fn every_size_and_period_gives_every_pixel_its_column() {
             println!("{numbers:?} {shape:?}: {share:.4} returned, worst {worst:.4} rad");
             assert!(share > 0.96, "{numbers:?} {shape:?}: {share}");
             assert!(worst < 0.1, "{numbers:?} {shape:?}: {worst}");
+        }
+    }
+}
+
+/// Cameras of many pixels see fringes of a hundred and more.
+#[test]
+fn wide_fringes_give_every_pixel_its_column() {
+    let numbers = [15.5, 14.5, 12.0];
+    let code = FringeCode::new(numbers, 912).expect("valid");
+    // Fringes of 118, 177, 235 and 353 pixels.
+    for (times, shape) in [(2, [401, 1501]), (3, [500, 1999]), (4, [510, 2101]), (6, [643, 3203])] {
+        let source = |x: usize| 20.0 + x as f64 / times as f64;
+        let images = magnified(&code, shape, times, source);
+        for method in [Method::Best, Method::Published] {
+            let options = Options { method, ..Options::default() };
+            let mut decoder =
+                Decoder::new(code.clone(), shape, &Conditioner::default(), options).expect("valid");
+            let phase =
+                decode_planes(&mut decoder, &Planes::F32(images.clone())).expect("valid shot").phase_rad;
+            let (mut returned, mut worst) = (0, [0.0f64; 2]);
+            for ((_, x), phase) in phase.indexed_iter().filter(|(_, phase)| phase.is_finite()) {
+                let error = f64::from(*phase) - TAU * numbers[0] * source(x) / 912.0;
+                // Beside the border there is less than a fringe to know the background by.
+                let inside = usize::from(x.min(shape[1] - 1 - x) > 59 * times);
+                worst[inside] = worst[inside].max(error.abs());
+                returned += 1;
+            }
+            let share = f64::from(returned) / phase.len() as f64;
+            println!(
+                "{method:?} x {times}: {share:.4} returned, worst {worst:.4?} rad at the border and inside"
+            );
+            assert!(share > 0.96, "{method:?} x {times}: {share}");
+            assert!(worst[0] < 0.3 && worst[1] < 0.05, "{method:?} x {times}: {worst:?}");
         }
     }
 }
