@@ -16,7 +16,7 @@ from quadfringe.errors import DecodeError
 __all__ = ["judge"]
 
 STRIDE = 4  # pixels whose light is looked at, along rows and columns: enough for quantiles, free of cost
-MARGIN_STRIDE = 8  # the same for the median of the margins, which every shot is asked for
+MARGIN_ROWS = 48  # rows and columns at least that the median of the margins is taken from, in every shot
 DARK = 0.02  # a channel whose brightest pixels stay below this fraction of full scale is black
 NEARLY_NONE = 5e-4  # share of pixels that may differ in a black or saturated channel
 RETURNED_MIN = 0.05  # share of lit pixels that must come back
@@ -60,9 +60,10 @@ def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
 
 def _margin(shape: Shape) -> tuple[float, int, int]:
     """Give the median order margin of the lit pixels, how many are lit, and how many come back."""
-    quality = shape.quality[::MARGIN_STRIDE, ::MARGIN_STRIDE]
+    stride = max(1, min(shape.quality.shape) // MARGIN_ROWS)
+    quality = shape.quality[::stride, ::stride]
     lit = quality[np.isfinite(quality)]
-    returned = np.count_nonzero(np.isfinite(shape.phase_rad[::MARGIN_STRIDE, ::MARGIN_STRIDE]))
+    returned = np.count_nonzero(np.isfinite(shape.phase_rad[::stride, ::stride]))
     return float(np.median(lit)) if lit.size else 0.0, lit.size, int(returned)
 
 
