@@ -38,35 +38,56 @@ fn sine(t: f32) -> f32 {
     let half = if t < 0.0 { -0.5 } else { 0.5 };
     let folded = if t.abs() > 0.25 { half - t } else { t };
     let square = folded * folded;
-    SINE.iter().rev().fold(0.0, |sum, c| sum * square + c) * folded
+    five_terms(SINE, square) * folded
 }
 
 /// Four-quadrant arctangent, greatest error 4e-7 rad; `atan2(0, 0)` is 0; NaN in, NaN out. Free of branches,
 /// so that loops vectorise.
 #[inline(always)]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {
-    atan2_by(&ATAN, y, x)
+    let a = ratio(y, x);
+    unfold(eight_terms(ATAN, a * a) * a, y, x)
 }
 
 /// As [`atan2`], greatest error 1.3e-5 rad.
 #[inline(always)]
 pub(crate) fn coarse_atan2(y: f32, x: f32) -> f32 {
-    atan2_by(&COARSE_ATAN, y, x)
+    let a = ratio(y, x);
+    unfold(five_terms(COARSE_ATAN, a * a) * a, y, x)
 }
 
+/// The lesser size over the greater one.
 #[inline(always)]
-fn atan2_by(series: &[f32], y: f32, x: f32) -> f32 {
+fn ratio(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
     // Of a NaN and a number, `low` takes y and `high` takes x: either NaN reaches the result.
     let low = if ax < ay { ax } else { ay };
     let high = if ay > ax { ay } else { ax };
     let tiny = high < f32::MIN_POSITIVE;
-    let a = low / if tiny { f32::MIN_POSITIVE } else { high };
-    let t = a * a;
-    let angle = series.iter().rev().fold(0.0, |sum, c| sum * t + c) * a;
-    let folded = if ay > ax { FRAC_PI_2 - angle } else { angle };
+    low / if tiny { f32::MIN_POSITIVE } else { high }
+}
+
+/// From the first half quadrant, where `angle` lies, to that of the point.
+#[inline(always)]
+fn unfold(angle: f32, y: f32, x: f32) -> f32 {
+    let folded = if y.abs() > x.abs() { FRAC_PI_2 - angle } else { angle };
     let half = if x < 0.0 { PI - folded } else { folded };
     if y < 0.0 { -half } else { half }
+}
+
+/// A polynomial in `t`. Pairs of terms first (Estrin): one after the other, each term would wait for the one before.
+#[inline(always)]
+fn eight_terms([a, b, c, d, e, f, g, h]: [f32; 8], t: f32) -> f32 {
+    let square = t * t;
+    let low = (a + b * t) + (c + d * t) * square;
+    let high = (e + f * t) + (g + h * t) * square;
+    low + high * (square * square)
+}
+
+#[inline(always)]
+fn five_terms([a, b, c, d, e]: [f32; 5], t: f32) -> f32 {
+    let square = t * t;
+    (a + b * t) + ((c + d * t) + e * square) * square
 }
 
 /// Round to the nearest whole number for |x| < 2^21 without a call: adding 1.5 * 2^23 leaves no room for a fraction.
