@@ -292,7 +292,7 @@ mod tests {
         let grid = Grid::new([20, 32], 4.0);
         let mut lit = vec![1.0; grid.pixels()];
         lit[9 * grid.stride + 12] = 0.0;
-        LightFinder::default().shrink(&grid, 2, &mut Vec::new(), &mut lit);
+        LightFinder::default().shrink(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
         let dark = |y: usize| (0..grid.width).filter(|x| lit[y * grid.stride + x] == 0.0).collect::<Vec<_>>();
         assert_eq!((7..=11).map(dark).map(|row| row.len()).collect::<Vec<_>>(), [3, 5, 5, 5, 3]);
         assert_eq!((dark(6), dark(7), dark(9)), (vec![], vec![11, 12, 13], vec![10, 11, 12, 13, 14]));
@@ -315,7 +315,7 @@ mod tests {
             let planes = [plane(36.0, 0.0), plane(35.0, 0.0), plane(36.0, FRAC_PI_2), plane(30.0, 0.0)];
             let mut lit = vec![0.0; grid.pixels()];
             let light = planes.each_ref().map(Vec::as_slice);
-            LightFinder::default().find(&grid, light, (25.3, 0.04), &mut Vec::new(), &mut lit);
+            LightFinder::default().find(&grid, light, (25.3, 0.04), &mut vec![0.0; grid.pixels()], &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {
