@@ -368,7 +368,7 @@ class Shape:
             points = self.points_mm
             valid = np.isfinite(points).all(axis=2)
             scalars = {name: values[valid] for name, values in self.maps.items() if name in SCALARS}
-            export.write_ply(path, points[valid], _grey(self.modulation)[valid], scalars)
+            export.write_ply(path, points[valid], export.grey(self.modulation)[valid], scalars)
         else:
             export.write_depth(path, self.depth_mm)
 
@@ -394,10 +394,3 @@ class Shape:
         config = json.loads(str(stored["config"])) if "config" in stored else {}
         maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
         return cls(**maps, config=config, calibration=calibration)
-
-
-def _grey(modulation: Map) -> NDArray[np.uint8]:
-    """Modulation as a grey picture, (H, W, 3): it follows the reflectance, and shows no fringes."""
-    top = np.nanquantile(modulation, 0.99) if np.isfinite(modulation).any() else 1.0
-    grey = np.nan_to_num(modulation / max(float(top), 1e-9)).clip(0, 1) * 255
-    return np.repeat(grey.astype(np.uint8)[:, :, None], 3, axis=2)

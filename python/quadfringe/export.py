@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from quadfringe.errors import InputError, require
 from quadfringe.files import atomic, read_bytes
 
-__all__ = ["read_npy", "read_npz", "write_depth", "write_npz", "write_ply"]
+__all__ = ["grey", "read_npy", "read_npz", "write_depth", "write_npz", "write_ply"]
+
+
+def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Modulation as a grey picture, (H, W, 3): it follows the reflectance, and shows no fringes."""
+    top = np.nanquantile(modulation, 0.99) if np.isfinite(modulation).any() else 1.0
+    shades = np.nan_to_num(modulation / max(float(top), 1e-9)).clip(0, 1) * 255
+    return np.repeat(shades.astype(np.uint8)[:, :, None], 3, axis=2)
 
 
 def write_ply(

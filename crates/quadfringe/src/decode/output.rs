@@ -15,7 +15,8 @@ pub struct Decoded {
     pub phase_rad: Array2<f32>,
     /// Projector column.
     pub column_px: Array2<f32>,
-    /// Modulation of R and B in linear light, as a fraction of full scale; known wherever there is light.
+    /// Modulation of R and B in linear light, as a fraction of full scale, by the published method the least of all channels;
+    /// known wherever there is light.
     pub modulation: Array2<f32>,
     /// How far the order is from another one, in [0, 1]; known wherever there is light.
     pub quality: Array2<f32>,

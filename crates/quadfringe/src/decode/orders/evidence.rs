@@ -49,7 +49,7 @@ pub(super) fn node_phases(scene: &Scene<'_>, known: &Wrapped<'_>, row: usize, ou
     }
 }
 
-/// Sums over the pixels of a row of nodes, into `rows.cells`; the last is the share of lit pixels.
+/// Sums over the pixels of a row of nodes, into `rows.cells`; the first is the number of lit pixels.
 #[inline(never)]
 pub(super) fn gather(
     scene: &Scene<'_>,
@@ -94,7 +94,7 @@ fn add_seen(
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
             let weight = if lit { usable[x] } else { 0.0 };
-            // Light counts a hundredth of a pixel, so that a node of saturated pixels is lit and knows nothing.
+            // Light counts a thousandth of a pixel, so that a node of saturated pixels is lit and knows nothing.
             terms[0][x] = if lit { weight + LIT } else { 0.0 };
             let own = node[x] + wrap(phase[x] - node[x]);
             let fringe = |c: usize| [fringes[2 * c][x], fringes[2 * c + 1][x]];
