@@ -21,7 +21,7 @@ pub(crate) mod window;
 
 pub(crate) use aligned::{Aligned, first_of_line, spare};
 pub use background::{Background, background};
-pub(crate) use background::{Scratch as BackgroundScratch, coarsen, remove_background};
+pub(crate) use background::{Scratch as BackgroundScratch, coarsen, draw_background};
 pub(crate) use carrier::LineSpectrum;
 pub use carrier::{Carrier, carrier};
 pub use fourier::{Band, fourier};

@@ -21,10 +21,13 @@ const CARRIER_ROWS: usize = 16;
 /// One pixel in so many of those rows is asked for noise and margin.
 const LOOK_STRIDE: usize = 3;
 
-/// Fewest samples of a fringe of G or IR when means of squares of two or four pixels take the place of pixels. The band ends at 2.3 times the
+/// Fewest samples of a fringe of G or IR when means of two or four pixels of a row take the place of pixels. The band ends at 2.3 times the
 /// carrier, where a turn has more than five of them: from one to the next the phase is far from half a turn, and nearly
 /// straight in between.
 const SAMPLES_PER_FRINGE: f32 = 13.0;
+
+/// Rows of a strip for each pixel of a row that goes into a mean.
+const ROWS_PER_PIXEL: usize = 2;
 
 /// How the order of a pixel is found.
 enum Unwrapping {
@@ -88,6 +91,7 @@ impl Published {
             unwrapping: &self.unwrapping,
             filter,
             pixels,
+            rows: ROWS_PER_PIXEL * pixels,
             periods_px,
             weights: [weights(periods_px[1]), weights(periods_px[2])],
             modulation_min: options.modulation_min,
@@ -97,18 +101,21 @@ impl Published {
         let mut rows = out.row_by_row();
         strips.sureness = self.look(&strips, shot, &mut rows);
         let strips = strips;
-        rows.par_chunks_mut(pixels).with_min_len(ROWS_AT_ONCE.div_ceil(pixels)).enumerate().for_each_init(
-            || self.slots.take(),
-            |strip, (index, rows)| {
-                let first = index * pixels;
-                if self.looked_at(first, rows.len()).next().is_some() {
-                    rows.iter_mut().for_each(|row| strips.sureness.tell(row));
-                } else {
-                    decode_strip(strip, &strips, shot, first, rows);
-                }
-                rows.iter_mut().zip(first..).for_each(|(row, y)| finish.row(y, row));
-            },
-        );
+        rows.par_chunks_mut(strips.rows)
+            .with_min_len(ROWS_AT_ONCE.div_ceil(strips.rows))
+            .enumerate()
+            .for_each_init(
+                || self.slots.take(),
+                |strip, (index, rows)| {
+                    let first = index * strips.rows;
+                    if self.looked_at(first, rows.len()).next().is_some() {
+                        rows.iter_mut().for_each(|row| strips.sureness.tell(row));
+                    } else {
+                        decode_strip(strip, &strips, shot, first, rows);
+                    }
+                    rows.iter_mut().zip(first..).for_each(|(row, y)| finish.row(y, row));
+                },
+            );
     }
 
     /// Those of `count` rows from the `first` on that tell what all have in common: they have neighbours above and below.
@@ -127,8 +134,7 @@ impl Published {
         rows: &mut [OutputRow<'_>],
     ) -> Sureness {
         let width = self.shape[1];
-        let strips =
-            rows.chunks_mut(plan.pixels).enumerate().map(|(index, rows)| (index * plan.pixels, rows));
+        let strips = rows.chunks_mut(plan.rows).enumerate().map(|(index, rows)| (index * plan.rows, rows));
         let strips: Vec<_> =
             strips.filter(|(first, rows)| self.looked_at(*first, rows.len()).next().is_some()).collect();
         let seen = strips.into_par_iter().map_init(
@@ -138,7 +144,7 @@ impl Published {
                 let (mut bends, mut margins) = (Vec::new(), Vec::new());
                 for y in self.looked_at(first, rows.len()) {
                     for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
-                        plan.conditioning.row(shot, other, &mut strip.light_of(width));
+                        plan.conditioning.row(shot, other, &mut strip.light(width));
                         for (bend, light) in bend.iter_mut().zip([strip.red(), strip.blue()]) {
                             let kept = if other < y { 0.0 } else { 1.0 };
                             bend.iter_mut()
@@ -163,7 +169,7 @@ impl Published {
         let [height, width] = self.shape;
         let mut strip = self.slots.take();
         for y in (0..height).step_by(height.div_ceil(CARRIER_ROWS)) {
-            plan.row(shot, y, &mut strip.light_of(width));
+            plan.row(shot, y, &mut strip.light(width));
             self.spectrum.add(ArrayView1::from(strip.red()));
         }
         self.spectrum.take_period_px().clamp(3.0, width as f64)

@@ -46,8 +46,7 @@ pub fn background(image: ArrayView2<'_, f32>, kind: Background, period_px: f64) 
         |scratch, (mut target, row)| {
             let row = row.to_vec();
             let target = target.as_slice_mut().expect("a fresh array is contiguous");
-            remove_background(&row, kind, period_px as f32, scratch, target);
-            target.iter_mut().zip(&row).for_each(|(level, value)| *level = value - *level);
+            draw_background(&row, kind, period_px as f32, scratch, target);
         },
     );
     Ok(out)
@@ -61,16 +60,16 @@ pub(crate) fn check_period(period_px: f64, columns: usize) -> Result<()> {
     Err(Error::value("period_px", expected, period_px))
 }
 
-/// Working memory of [`remove_background`].
+/// Working memory of [`draw_background`].
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     sums: Sums,
     envelope: envelope::Scratch,
 }
 
-/// One row without its background.
+/// Background of one row.
 #[inline(always)]
-pub(crate) fn remove_background(
+pub(crate) fn draw_background(
     row: &[f32],
     kind: Background,
     period_px: f32,
@@ -78,17 +77,12 @@ pub(crate) fn remove_background(
     out: &mut [f32],
 ) {
     let Scratch { sums, envelope } = scratch;
-    let drawing = match kind {
-        Background::MeanEnvelope => mean_envelope(row, period_px, sums, envelope),
-        Background::MovingMean => None,
+    let drawn = match kind {
+        Background::MeanEnvelope => mean_envelope(row, period_px, sums, envelope, out),
+        Background::MovingMean => false,
     };
-    if let Some(drawing) = drawing {
-        drawing.subtract_from(row, out);
-    } else {
+    if !drawn {
         moving_mean(row, period_px, sums, out);
-        for (level, value) in out.iter_mut().zip(row) {
-            *level = value - *level;
-        }
     }
 }
 

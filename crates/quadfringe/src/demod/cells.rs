@@ -116,7 +116,7 @@ impl Grid {
     }
 
     /// `N` maps averaged like the sums of [`Self::window_sums`]; a map without lines is 1 everywhere.
-    pub fn smooth<'a, const N: usize, S: Send>(
+    pub fn smooth<'a, const N: usize, S: Default + Send>(
         &self,
         sigma: f32,
         slots: &Slots<(S, CellWork)>,
@@ -145,7 +145,7 @@ impl Grid {
     }
 
     /// Sums of neighbouring rows of cells, handed to `finish` row by row.
-    fn sum_down<const N: usize, S: Send>(
+    fn sum_down<const N: usize, S: Default + Send>(
         &self,
         kernel: &[f32],
         slots: &Slots<(S, CellWork)>,

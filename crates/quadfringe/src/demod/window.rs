@@ -109,7 +109,7 @@ impl<'a> Window<'a> {
 
     /// Average along columns what [`Self::along`] left; rows of `information` receive the weights that the window
     /// has added up, each as many as it holds.
-    pub fn down<T: Send>(
+    pub fn down<T: Default + Send>(
         &self,
         average: &Average<'_>,
         slots: &Slots<T>,

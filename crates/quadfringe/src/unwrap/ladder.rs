@@ -70,34 +70,41 @@ impl Ladder {
     /// Order a row of pixels: absolute phase and margin as in [`Ordered`]; NaN in, NaN out.
     #[inline(always)]
     pub(crate) fn order_row(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
+        // Column 0 and the end of the field look alike when all phases repeat; the field starts half a column before 0.
+        let end = (self.width - 0.5) / self.columns_per_turn;
+        let repeat = self.cycle.map_or([f32::INFINITY, 0.0], |cycle| [end, cycle]);
         if self.climbs {
-            self.climb(wrapped, phase, margin);
+            self.climb(wrapped, repeat, phase, margin);
         } else {
             self.search(wrapped, phase, margin);
-        }
-        let Some(cycle) = self.cycle else { return };
-        // Column 0 and the end of the field look alike; the field starts half a column before 0.
-        let end = (self.width - 0.5) / self.columns_per_turn * TAU;
-        for phase in phase {
-            let below = *phase - cycle * TAU;
-            *phase = if *phase >= end { below } else { *phase };
+            let [end, cycle] = repeat.map(|turns| turns * TAU);
+            for phase in phase {
+                let below = *phase - cycle;
+                *phase = if *phase >= end { below } else { *phase };
+            }
         }
     }
 
+    /// In turns, of which whole ones are easily told. From `end` on there is one cycle less.
     #[inline(always)]
-    fn climb(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
+    fn climb(&self, wrapped: [&[f32]; 3], [end, cycle]: [f32; 2], phase: &mut [f32], margin: &mut [f32]) {
         let [n1, n2, n3] = self.numbers;
         let (coarse, middle) = (n1 - n2, n1 - n3);
         let sign = coarse.signum();
-        let (to_middle, to_first) = (middle / coarse, n1 / middle);
+        let (to_middle, to_first) = (middle / coarse.abs(), n1 / middle);
         let out = phase.iter_mut().zip(margin);
         let seen = wrapped[0].iter().zip(wrapped[1]).zip(wrapped[2]);
-        for (((first, second), third), (phase, margin)) in seen.zip(out) {
-            let start = wrap_positive((first - second) * sign) * sign;
-            let (beat, low) = nearest(first - third, start * to_middle);
-            let (found, high) = nearest(*first, beat * to_first);
-            *phase = found;
-            *margin = if low < high { low } else { high };
+        for (((&first_rad, second_rad), third_rad), (phase, margin)) in seen.zip(out) {
+            let [first, second, third] = [first_rad, *second_rad, *third_rad].map(|rad| rad * (1.0 / TAU));
+            let start = (first - second) * sign;
+            let start = start - round(start);
+            let start = if start < 0.0 { start + 1.0 } else { start };
+            let (more, low) = whole(start * to_middle - (first - third));
+            let beat = (first - third) + more;
+            let (more, high) = whole(beat * to_first - first);
+            let more = if first + more >= end { more - cycle } else { more };
+            *phase = first_rad + TAU * more;
+            *margin = 1.0 - 2.0 * if low > high { low } else { high };
         }
     }
 
@@ -136,12 +143,11 @@ impl Ladder {
     }
 }
 
-/// The angle nearest to `guess` that differs from `wrapped` by whole turns, and how far the choice was from a toss-up.
+/// Whole turns, and how far they are from the choice between two.
 #[inline(always)]
-fn nearest(wrapped: f32, guess: f32) -> (f32, f32) {
-    let turns = (guess - wrapped) * (1.0 / TAU);
+fn whole(turns: f32) -> (f32, f32) {
     let whole = round(turns);
-    (wrapped + TAU * whole, 1.0 - 2.0 * (turns - whole).abs())
+    (whole, (turns - whole).abs())
 }
 
 /// Absolute phase in rad and order margin in [0, 1], both `(rows, columns)`, from three wrapped phases in rad; NaN in,

@@ -3,12 +3,12 @@
 use super::Unwrapping;
 use super::means::{Means, lesser};
 use crate::Shot;
-use crate::angle::atan2;
+use crate::angle::{atan2, coarse_atan2, wrap};
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::decode::uncertainty::{Sureness, two_step_deviation};
 use crate::demod::{
-    Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, coarsen, remove_background,
+    Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, coarsen, draw_background,
 };
 use multiversion::multiversion;
 
@@ -21,8 +21,10 @@ pub(super) struct StripPlan<'a> {
     pub unwrapping: &'a Unwrapping,
     /// For rows of means of so many `pixels`.
     pub filter: &'a RowFilter,
-    /// G and IR are means of squares of so many pixels, a power of two; as many rows are a strip.
+    /// G and IR are means of so many pixels of a row, a power of two, and of all rows of a strip.
     pub pixels: usize,
+    /// Rows of a strip.
+    pub rows: usize,
     pub periods_px: [f32; 3],
     /// Filters of G and IR.
     pub weights: [Vec<f32>; 2],
@@ -51,16 +53,23 @@ impl StripPlan<'_> {
 /// Working rows of one thread.
 #[derive(Debug, Default)]
 pub(super) struct Strip {
-    light: [Aligned<f32>; 4],
-    /// R and B without background.
-    pair: [Aligned<f32>; 2],
-    /// Wrapped phase of R and B, row by row.
-    first: Vec<Aligned<f32>>,
+    /// R and B row by row: their light, then without background; in the end their wrapped phase takes the place of R.
+    pair: Vec<[Aligned<f32>; 2]>,
+    /// G and IR of the row last read.
+    others: [Aligned<f32>; 2],
+    /// Where IR sees nothing, row by row.
+    gaps: Vec<Vec<usize>>,
+    /// Sums over the rows of R and B, and their background.
+    pair_sums: [Aligned<f32>; 2],
+    level: Aligned<f32>,
     /// Sums over the rows of G and IR, then their means without background.
     sums: [Aligned<f32>; 2],
     fringes: [Aligned<f32>; 2],
     /// Wrapped phases of G and IR, for all rows, and the lesser square of their modulations.
-    others: [Aligned<f32>; 2],
+    phases: [Aligned<f32>; 2],
+    /// The same turned to where one row is, and the phase of R and B that they belong to.
+    turned: [Aligned<f32>; 2],
+    middle: Aligned<f32>,
     power: Aligned<f32>,
     spare: [Aligned<f32>; 2],
     background: BackgroundScratch,
@@ -79,15 +88,16 @@ pub(super) fn decode_strip<T: Sample>(
     out: &mut [OutputRow<'_>],
 ) {
     strip.ready(plan, out[0].phase.len());
-    for (i, row) in out.iter_mut().enumerate() {
-        plan.conditioning.row(shot, y + i, &mut strip.light_mut());
-        let gaps = fill_gaps(&mut strip.light[3]);
+    for i in 0..out.len() {
+        plan.conditioning.row(shot, y + i, &mut strip.light_of(i));
+        fill_gaps(&mut strip.others[1], &mut strip.gaps[i]);
         strip.sum(i);
-        strip.two_step(i, plan, row);
-        gaps.into_iter().for_each(|x| row.modulation[x] = f32::NAN);
     }
+    let equal = strip.two_step_fringes(plan, out.len());
     strip.fourier(plan, out.len());
     for (i, row) in out.iter_mut().enumerate() {
+        strip.two_step(i, equal, plan, row);
+        strip.turn(i, plan);
         strip.order(i, y + i, plan, row);
     }
 }
@@ -96,71 +106,101 @@ impl Strip {
     /// Make rows that may have served another image fit for this one.
     #[inline(always)]
     fn ready(&mut self, plan: &StripPlan<'_>, width: usize) {
-        self.light_of(width);
-        self.first.resize_with(plan.pixels, Aligned::default);
-        let Self { pair, first, sums, others, power, fourier, .. } = self;
-        let rows = pair.iter_mut().chain(first).chain(sums).chain(others).chain([power]);
-        rows.for_each(|row| row.resize(width));
+        self.pair.resize_with(plan.rows, Default::default);
+        self.gaps.resize_with(plan.rows, Default::default);
+        let Self { pair, others, pair_sums, level, sums, phases, turned, middle, power, fourier, .. } = self;
+        let rows = pair.iter_mut().flatten().chain(others).chain(pair_sums).chain([level]).chain(sums);
+        rows.chain(phases).chain(turned).chain([middle, power]).for_each(|row| row.resize(width));
         plan.filter.ready(fourier);
     }
 
-    /// Linear light of R, G, B, IR of one row, `width` pixels to be filled.
-    pub fn light_of(&mut self, width: usize) -> [&mut [f32]; 4] {
-        self.light.each_mut().map(|row| {
-            row.resize(width);
-            &mut **row
-        })
+    /// Linear light of R, G, B, IR of row `i`, to be filled.
+    #[inline(always)]
+    fn light_of(&mut self, i: usize) -> [&mut [f32]; 4] {
+        let [red, blue] = &mut self.pair[i];
+        let [green, infrared] = &mut self.others;
+        [red, green, blue, infrared].map(|row| &mut **row)
     }
 
-    /// The same of the width that it has.
-    fn light_mut(&mut self) -> [&mut [f32]; 4] {
-        self.light.each_mut().map(|row| &mut **row)
+    /// The same of a row of `width` pixels on its own.
+    pub fn light(&mut self, width: usize) -> [&mut [f32]; 4] {
+        if self.pair.is_empty() {
+            self.pair.resize_with(1, Default::default);
+        }
+        self.pair[0].iter_mut().chain(&mut self.others).for_each(|row| row.resize(width));
+        self.light_of(0)
     }
 
-    /// Linear red light.
+    /// Linear red light of the row on its own.
     pub fn red(&self) -> &[f32] {
-        &self.light[0]
+        &self.pair[0][0]
     }
 
-    /// Linear blue light.
+    /// Linear blue light of the row on its own.
     pub fn blue(&self) -> &[f32] {
-        &self.light[2]
+        &self.pair[0][1]
     }
 
-    /// G and IR of row `i` of the strip are taken in.
+    /// Row `i` of the strip is taken in.
     #[inline(always)]
     fn sum(&mut self, i: usize) {
-        let [_, green, _, infrared] = &mut self.light;
-        for (sum, light) in self.sums.iter_mut().zip([green, infrared]) {
+        let Self { pair, others, pair_sums, sums, .. } = self;
+        for (sum, light) in sums.iter_mut().zip(others) {
             if i == 0 {
                 std::mem::swap(sum, light);
             } else {
-                sum.iter_mut().zip(&**light).for_each(|(sum, light)| *sum += light);
+                add(light, sum);
+            }
+        }
+        for (sum, light) in pair_sums.iter_mut().zip(&pair[i]) {
+            if i == 0 {
+                sum.copy_from_slice(light);
+            } else {
+                add(light, sum);
             }
         }
     }
 
-    /// Steps 2 and 3: R and B of row `i` without background, their modulations made equal, (S2). The square of the modulation
-    /// stands in for it until all channels are known.
+    /// Step 2: R and B without background, which is that of their mean over so many `rows`; and the modulation of R over
+    /// that of B.
     #[inline(always)]
-    fn two_step(&mut self, i: usize, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
-        let Self { light: [red, _, blue, _], pair, background, first, .. } = self;
-        for (light, fringes) in [red, blue].into_iter().zip(pair.iter_mut()) {
-            remove_background(light, BACKGROUND, plan.periods_px[0], background, fringes);
+    fn two_step_fringes(&mut self, plan: &StripPlan<'_>, rows: usize) -> f32 {
+        let Self { pair, pair_sums, level, background, middle, .. } = self;
+        let mut powers = [0.0; 2];
+        for (channel, (sum, power)) in pair_sums.iter_mut().zip(&mut powers).enumerate() {
+            sum.iter_mut().for_each(|sum| *sum *= 1.0 / rows as f32);
+            draw_background(sum, BACKGROUND, plan.periods_px[0], background, level);
+            sum.iter_mut().zip(&**level).for_each(|(sum, level)| *sum -= level);
+            for row in &mut pair[..rows] {
+                *power += without(&mut row[channel], level);
+            }
         }
-        let [red, blue] = pair.each_ref().map(|row| &**row);
-        let equal = (power(red) / power(blue).max(f32::MIN_POSITIVE)).sqrt();
-        let noise = plan.sureness.noise;
-        let out = first[i].iter_mut().zip(out.modulation.iter_mut()).zip(out.sigma.iter_mut());
-        for ((&red, &blue), ((phase, modulation), sigma)) in red.iter().zip(blue).zip(out) {
-            let blue = blue * equal;
-            *phase = atan2(-blue, red);
-            *modulation = red * red + blue * blue;
-            *sigma = two_step_deviation([red, blue], equal, noise);
+        let [red, blue] = powers;
+        let equal = (red / blue.max(f32::MIN_POSITIVE)).sqrt();
+        for ((middle, red), blue) in middle.iter_mut().zip(&*pair_sums[0]).zip(&*pair_sums[1]) {
+            *middle = coarse_atan2(-blue * equal, *red);
         }
+        equal
     }
 
-    /// Steps 2 and 4: G and IR, as means of squares of pixels over so many `rows`, by the improved Fourier filter (S3). The
+    /// Step 3: phase of row `i` from R and B, their modulations made equal, (S2). The square of the modulation stands in for
+    /// it until all channels are known.
+    #[inline(always)]
+    fn two_step(&mut self, i: usize, equal: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
+        let [red, blue] = &mut self.pair[i];
+        let noise = plan.sureness.noise;
+        let maps = out.modulation.iter_mut().zip(out.sigma.iter_mut());
+        for ((red, &mut blue), (modulation, sigma)) in red.iter_mut().zip(&mut **blue).zip(maps) {
+            let blue = blue * equal;
+            let power = *red * *red + blue * blue;
+            *sigma = two_step_deviation([*red, blue], equal, noise);
+            *red = atan2(-blue, *red);
+            *modulation = power;
+        }
+        self.gaps[i].iter().for_each(|&x| out.modulation[x] = f32::NAN);
+    }
+
+    /// Steps 2 and 4: G and IR, as means over so many `rows` and some pixels of each, by the improved Fourier filter (S3). The
     /// lesser modulation counts.
     #[inline(always)]
     fn fourier(&mut self, plan: &StripPlan<'_>, rows: usize) {
@@ -171,13 +211,14 @@ impl Strip {
             coarsen(sum, pixels, means, spare);
             means.iter_mut().for_each(|mean| *mean *= 1.0 / rows as f32);
             fringes.resize(means.len());
-            remove_background(means, BACKGROUND, period, background, fringes);
+            draw_background(means, BACKGROUND, period, background, fringes);
+            fringes.iter_mut().zip(&**means).for_each(|(level, mean)| *level = mean - *level);
         }
         let fringes = self.fringes.each_ref().map(|row| &**row);
         plan.filter.transform(fringes, periods, &mut self.fourier);
         self.power.fill(f32::INFINITY);
         for (half, (weights, phase)) in
-            [Half::Real, Half::Imaginary].into_iter().zip(plan.weights.iter().zip(&mut self.others))
+            [Half::Real, Half::Imaginary].into_iter().zip(plan.weights.iter().zip(&mut self.phases))
         {
             let signal = plan.filter.analytic(half, weights, &mut self.fourier);
             match pixels {
@@ -188,11 +229,26 @@ impl Strip {
         }
     }
 
+    /// Phases of G and IR where row `i` is: along a surface they turn with that of R and B, which each row knows of itself.
+    #[inline(always)]
+    fn turn(&mut self, i: usize, plan: &StripPlan<'_>) {
+        let Self { pair, phases, turned: [green, infrared], middle, .. } = self;
+        let ratios = [1, 2].map(|channel| plan.periods_px[0] / plan.periods_px[channel]);
+        let seen = pair[i][0].iter().zip(&**middle).zip(phases[0].iter().zip(&*phases[1]));
+        for ((green, infrared), ((here, middle), (second, third))) in
+            green.iter_mut().zip(&mut **infrared).zip(seen)
+        {
+            let turn = wrap(here - middle);
+            *green = second + ratios[0] * turn;
+            *infrared = third + ratios[1] * turn;
+        }
+    }
+
     /// Steps 5 and 6 of row `i` of the strip, row `y` of the shot: orders, and what is known of them.
     #[inline(always)]
     fn order(&self, i: usize, y: usize, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
-        let [second, third] = self.others.each_ref().map(|row| &**row);
-        let wrapped = [&*self.first[i], second, third];
+        let [second, third] = self.turned.each_ref().map(|row| &**row);
+        let wrapped = [&*self.pair[i][0], second, third];
         match plan.unwrapping {
             Unwrapping::Ladder(ladder) => ladder.order_row(wrapped, out.phase, out.quality),
             Unwrapping::AlongRay(table) => table.order_row(y, wrapped, out.phase, out.quality),
@@ -202,19 +258,26 @@ impl Strip {
     }
 }
 
-/// Sum of squares, eight sums side by side.
+/// Every number more by that of another row.
 #[inline(always)]
-fn power(row: &[f32]) -> f32 {
+fn add(row: &[f32], sum: &mut [f32]) {
+    sum.iter_mut().zip(row).for_each(|(sum, light)| *sum += light);
+}
+
+/// Take a background away; sum of squares of what is left, eight sums side by side.
+#[inline(always)]
+fn without(row: &mut [f32], level: &[f32]) -> f32 {
     let mut sums = [0.0f32; 8];
-    let blocks = row.chunks_exact(8);
-    let rest = blocks.remainder();
-    for block in blocks {
-        for (sum, v) in sums.iter_mut().zip(block) {
-            *sum += v * v;
-        }
+    let (blocks, rest) = row.as_chunks_mut::<8>();
+    let (levels, last) = level.as_chunks::<8>();
+    for (row, level) in blocks.iter_mut().zip(levels) {
+        let fringes: [f32; 8] = std::array::from_fn(|i| row[i] - level[i]);
+        *row = fringes;
+        sums.iter_mut().zip(fringes).for_each(|(sum, value)| *sum += value * value);
     }
-    for (sum, v) in sums.iter_mut().zip(rest) {
-        *sum += v * v;
+    for ((value, level), sum) in rest.iter_mut().zip(last).zip(&mut sums) {
+        *value -= level;
+        *sum += *value * *value;
     }
     sums.iter().sum()
 }
@@ -222,13 +285,13 @@ fn power(row: &[f32]) -> f32 {
 /// Put the last number seen into gaps, where the infrared chip sees nothing, and say where they are: one NaN would
 /// spread over the whole row in the Fourier filter.
 #[inline(always)]
-fn fill_gaps(row: &mut [f32]) -> Vec<usize> {
+fn fill_gaps(row: &mut [f32], gaps: &mut Vec<usize>) {
+    gaps.clear();
     // A vector comparison of all pixels; there are gaps only with registration.
     if row.iter().fold(true, |whole, v| whole & v.is_finite()) {
-        return Vec::new();
+        return;
     }
     let mut seen = row.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
-    let mut gaps = Vec::new();
     for (x, value) in row.iter_mut().enumerate() {
         if value.is_finite() {
             seen = *value;
@@ -237,5 +300,4 @@ fn fill_gaps(row: &mut [f32]) -> Vec<usize> {
             *value = seen;
         }
     }
-    gaps
 }

@@ -43,24 +43,18 @@ struct Line {
     end: u32,
 }
 
-/// Background of a row, drawn piece by piece.
-pub(super) struct Drawing<'a> {
-    lines: &'a [Line],
-    /// Beyond the last line.
-    last: f32,
-}
-
-/// Background of `row`; none when the row has no fringes to draw envelopes through.
+/// Background of `row`; false when the row has no fringes to draw envelopes through.
 ///
 /// A row is split where it crosses its moving mean; each side of a crossing holds one extremum. They are looked for on
 /// sums of 1, 2, 4, ... pixels, as many as leave a fringe `SAMPLES_PER_FRINGE` samples.
 #[inline(always)]
-pub(super) fn mean_envelope<'a>(
+pub(super) fn mean_envelope(
     row: &[f32],
     period_px: f32,
     sums: &mut Sums,
-    scratch: &'a mut Scratch,
-) -> Option<Drawing<'a>> {
+    scratch: &mut Scratch,
+    out: &mut [f32],
+) -> bool {
     let step = coarseness(period_px);
     let period = period_px / step as f32;
     let Scratch { coarse, smooth, middle, waves, knots, levels, lines } = scratch;
@@ -74,11 +68,12 @@ pub(super) fn mean_envelope<'a>(
     waves.find(smooth, middle, count);
     knots.find(waves, smooth, (SMOOTH * period) as usize, step as f32);
     if knots.at_px.len() < 2 {
-        return None;
+        return false;
     }
     find_levels(knots, levels);
     find_lines(knots, levels, lines);
-    Some(Drawing { lines, last: levels[levels.len() - 1] })
+    draw(lines, out);
+    true
 }
 
 fn coarseness(period_px: f32) -> usize {
@@ -166,7 +161,7 @@ fn find_levels(Knots { at_px, value, .. }: &Knots, levels: &mut Vec<f32>) {
 /// Straight lines through the levels at the knots.
 #[inline(always)]
 fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>) {
-    lines.resize(levels.len(), Line::default());
+    lines.resize(levels.len() + 1, Line::default());
     // Up to the first knot the background is level.
     lines[0] = Line { level: levels[0], slope: 0.0, end: at_px[0] as u32 + 1 };
     let ends = at_px.iter().zip(&at_px[1..]).zip(levels.iter().zip(&levels[1..]));
@@ -175,34 +170,27 @@ fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>
         let first = x0 as u32 + 1;
         *line = Line { level: l0 + slope * (first as f32 - x0), slope, end: x1 as u32 + 1 };
     }
+    // And from the last one on.
+    lines[levels.len()] = Line { level: levels[levels.len() - 1], slope: 0.0, end: u32::MAX };
 }
 
-impl Drawing<'_> {
-    /// `out` is `row` without the background. Lines are drawn in whole blocks, of which the next line overwrites what is
-    /// too much.
-    #[inline(always)]
-    pub fn subtract_from(&self, row: &[f32], out: &mut [f32]) {
-        let beyond = Line { level: self.last, slope: 0.0, end: u32::MAX };
-        let mut start = 0;
-        for line in self.lines.iter().chain([&beyond]) {
-            let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * line.slope);
-            let end = (line.end as usize).min(row.len());
-            let mut level = line.level;
-            let mut from = start;
-            while from < end {
-                let block = row[from..].first_chunk::<BLOCK>().zip(out[from..].first_chunk_mut::<BLOCK>());
-                match block {
-                    Some((row, out)) => *out = std::array::from_fn(|i| row[i] - (level + steps[i])),
-                    None => {
-                        for ((out, row), step) in out[from..].iter_mut().zip(&row[from..]).zip(&steps) {
-                            *out = row - (level + step);
-                        }
-                    }
-                }
-                level += BLOCK as f32 * line.slope;
-                from += BLOCK;
+/// Each line up to the next. Lines are drawn in whole blocks, of which the next line overwrites what is too much.
+#[inline(always)]
+fn draw(lines: &[Line], out: &mut [f32]) {
+    let mut start = 0;
+    for line in lines {
+        let steps: [f32; BLOCK] = std::array::from_fn(|i| i as f32 * line.slope);
+        let end = (line.end as usize).min(out.len());
+        let mut level = line.level;
+        let mut from = start;
+        while from < end {
+            match out[from..].first_chunk_mut::<BLOCK>() {
+                Some(out) => *out = std::array::from_fn(|i| level + steps[i]),
+                None => out[from..].iter_mut().zip(&steps).for_each(|(out, step)| *out = level + step),
             }
-            start = end;
+            level += BLOCK as f32 * line.slope;
+            from += BLOCK;
         }
+        start = end;
     }
 }
