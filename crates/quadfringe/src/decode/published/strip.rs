@@ -3,7 +3,7 @@
 use super::Unwrapping;
 use super::means::{Means, lesser};
 use crate::Shot;
-use crate::angle::{atan2, coarse_atan2, wrap};
+use crate::angle::{atan2, coarse_atan2, round};
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::decode::uncertainty::{Sureness, two_step_deviation};
@@ -11,6 +11,7 @@ use crate::demod::{
     Aligned, Background, BackgroundScratch, Half, RowFilter, RowScratch, coarsen, draw_background,
 };
 use multiversion::multiversion;
+use std::f32::consts::TAU;
 
 /// The published background: half the sum of the envelopes.
 const BACKGROUND: Background = Background::MeanEnvelope;
@@ -34,42 +35,30 @@ pub(super) struct StripPlan<'a> {
     pub sureness: Sureness,
 }
 
-impl StripPlan<'_> {
-    /// Square roots of the lesser `powers` are modulations. What has too little light or too doubtful an order is no data.
-    #[inline(always)]
-    fn trust(&self, powers: &[f32], out: &mut OutputRow<'_>) {
-        let maps = out.phase.iter_mut().zip(out.quality.iter_mut()).zip(out.modulation.iter_mut());
-        for (((phase, quality), modulation), power) in maps.zip(powers) {
-            *modulation = lesser(*power, *modulation).sqrt();
-            let lit = *modulation >= self.modulation_min;
-            let sure = lit & (*quality >= self.quality_min);
-            *phase = if sure { *phase } else { f32::NAN };
-            let positive = if *quality > 0.0 { *quality } else { 0.0 };
-            *quality = if lit { positive } else { f32::NAN };
-        }
-    }
-}
-
 /// Working rows of one thread.
 #[derive(Debug, Default)]
 pub(super) struct Strip {
-    /// R and B row by row: their light, then without background; in the end their wrapped phase takes the place of R.
+    /// Light of R and B, row by row.
     pair: Vec<[Aligned<f32>; 2]>,
     /// G and IR of the row last read.
     others: [Aligned<f32>; 2],
     /// Where IR sees nothing, row by row.
     gaps: Vec<Vec<usize>>,
-    /// Sums over the rows of R and B, and their background.
+    /// Sums over the rows of R and B, then their means without background.
     pair_sums: [Aligned<f32>; 2],
-    level: Aligned<f32>,
+    /// Their background.
+    levels: [Aligned<f32>; 2],
     /// Sums over the rows of G and IR, then their means without background.
     sums: [Aligned<f32>; 2],
     fringes: [Aligned<f32>; 2],
     /// Wrapped phases of G and IR, for all rows, and the lesser square of their modulations.
     phases: [Aligned<f32>; 2],
-    /// The same turned to where one row is, and the phase of R and B that they belong to.
-    turned: [Aligned<f32>; 2],
+    /// Wrapped phase of the means of R and B, and what it is absolutely.
     middle: Aligned<f32>,
+    absolute: Aligned<f32>,
+    /// Margins of the orders, and what they are worth.
+    margin: Aligned<f32>,
+    wrong: Aligned<f32>,
     power: Aligned<f32>,
     spare: [Aligned<f32>; 2],
     background: BackgroundScratch,
@@ -93,12 +82,11 @@ pub(super) fn decode_strip<T: Sample>(
         fill_gaps(&mut strip.others[1], &mut strip.gaps[i]);
         strip.sum(i);
     }
-    let equal = strip.two_step_fringes(plan, out.len());
+    let equal = strip.two_step(plan, out.len());
     strip.fourier(plan, out.len());
+    strip.order(y + out.len() / 2, plan);
     for (i, row) in out.iter_mut().enumerate() {
-        strip.two_step(i, equal, plan, row);
-        strip.turn(i, plan);
-        strip.order(i, y + i, plan, row);
+        strip.row(i, equal, plan, row);
     }
 }
 
@@ -108,9 +96,23 @@ impl Strip {
     fn ready(&mut self, plan: &StripPlan<'_>, width: usize) {
         self.pair.resize_with(plan.rows, Default::default);
         self.gaps.resize_with(plan.rows, Default::default);
-        let Self { pair, others, pair_sums, level, sums, phases, turned, middle, power, fourier, .. } = self;
-        let rows = pair.iter_mut().flatten().chain(others).chain(pair_sums).chain([level]).chain(sums);
-        rows.chain(phases).chain(turned).chain([middle, power]).for_each(|row| row.resize(width));
+        let Self {
+            pair,
+            others,
+            pair_sums,
+            levels,
+            sums,
+            phases,
+            middle,
+            absolute,
+            margin,
+            wrong,
+            power,
+            fourier,
+            ..
+        } = self;
+        let rows = pair.iter_mut().flatten().chain(others).chain(pair_sums).chain(levels).chain(sums);
+        rows.chain(phases).chain([middle, absolute, margin, wrong, power]).for_each(|row| row.resize(width));
         plan.filter.ready(fourier);
     }
 
@@ -161,19 +163,17 @@ impl Strip {
         }
     }
 
-    /// Step 2: R and B without background, which is that of their mean over so many `rows`; and the modulation of R over
-    /// that of B.
+    /// Steps 2 and 3: background of R and B, which is that of their means over so many `rows`, and the phase of the means, (S2).
+    /// The modulation of R over that of B makes them equal.
     #[inline(always)]
-    fn two_step_fringes(&mut self, plan: &StripPlan<'_>, rows: usize) -> f32 {
-        let Self { pair, pair_sums, level, background, middle, .. } = self;
+    fn two_step(&mut self, plan: &StripPlan<'_>, rows: usize) -> f32 {
+        let Self { pair_sums, levels, background, middle, .. } = self;
         let mut powers = [0.0; 2];
-        for (channel, (sum, power)) in pair_sums.iter_mut().zip(&mut powers).enumerate() {
+        for ((sum, level), channel) in pair_sums.iter_mut().zip(levels).zip(&mut powers) {
             sum.iter_mut().for_each(|sum| *sum *= 1.0 / rows as f32);
             draw_background(sum, BACKGROUND, plan.periods_px[0], background, level);
             sum.iter_mut().zip(&**level).for_each(|(sum, level)| *sum -= level);
-            for row in &mut pair[..rows] {
-                *power += without(&mut row[channel], level);
-            }
+            *channel = power(sum);
         }
         let [red, blue] = powers;
         let equal = (red / blue.max(f32::MIN_POSITIVE)).sqrt();
@@ -181,23 +181,6 @@ impl Strip {
             *middle = coarse_atan2(-blue * equal, *red);
         }
         equal
-    }
-
-    /// Step 3: phase of row `i` from R and B, their modulations made equal, (S2). The square of the modulation stands in for
-    /// it until all channels are known.
-    #[inline(always)]
-    fn two_step(&mut self, i: usize, equal: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
-        let [red, blue] = &mut self.pair[i];
-        let noise = plan.sureness.noise;
-        let maps = out.modulation.iter_mut().zip(out.sigma.iter_mut());
-        for ((red, &mut blue), (modulation, sigma)) in red.iter_mut().zip(&mut **blue).zip(maps) {
-            let blue = blue * equal;
-            let power = *red * *red + blue * blue;
-            *sigma = two_step_deviation([*red, blue], equal, noise);
-            *red = atan2(-blue, *red);
-            *modulation = power;
-        }
-        self.gaps[i].iter().for_each(|&x| out.modulation[x] = f32::NAN);
     }
 
     /// Steps 2 and 4: G and IR, as means over so many `rows` and some pixels of each, by the improved Fourier filter (S3). The
@@ -229,32 +212,47 @@ impl Strip {
         }
     }
 
-    /// Phases of G and IR where row `i` is: along a surface they turn with that of R and B, which each row knows of itself.
+    /// Step 5: orders of the phases of the means; rows from `y` on are meant.
     #[inline(always)]
-    fn turn(&mut self, i: usize, plan: &StripPlan<'_>) {
-        let Self { pair, phases, turned: [green, infrared], middle, .. } = self;
-        let ratios = [1, 2].map(|channel| plan.periods_px[0] / plan.periods_px[channel]);
-        let seen = pair[i][0].iter().zip(&**middle).zip(phases[0].iter().zip(&*phases[1]));
-        for ((green, infrared), ((here, middle), (second, third))) in
-            green.iter_mut().zip(&mut **infrared).zip(seen)
-        {
-            let turn = wrap(here - middle);
-            *green = second + ratios[0] * turn;
-            *infrared = third + ratios[1] * turn;
+    fn order(&mut self, y: usize, plan: &StripPlan<'_>) {
+        let Self { middle, phases: [second, third], absolute, margin, wrong, .. } = self;
+        let wrapped = [&**middle, second, third];
+        match plan.unwrapping {
+            Unwrapping::Ladder(ladder) => ladder.order_row(wrapped, absolute, margin),
+            Unwrapping::AlongRay(table) => table.order_row(y, wrapped, absolute, margin),
         }
+        plan.sureness.odds.another(margin, wrong);
     }
 
-    /// Steps 5 and 6 of row `i` of the strip, row `y` of the shot: orders, and what is known of them.
+    /// Steps 3 and 6: absolute phase of row `i`, (S2) with the turn nearest to that of the means, and what is known of it. What has
+    /// too little light or too doubtful an order is no data.
     #[inline(always)]
-    fn order(&self, i: usize, y: usize, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
-        let [second, third] = self.turned.each_ref().map(|row| &**row);
-        let wrapped = [&*self.pair[i][0], second, third];
-        match plan.unwrapping {
-            Unwrapping::Ladder(ladder) => ladder.order_row(wrapped, out.phase, out.quality),
-            Unwrapping::AlongRay(table) => table.order_row(y, wrapped, out.phase, out.quality),
+    fn row(&self, i: usize, equal: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
+        let noise = plan.sureness.noise;
+        let light = self.pair[i].each_ref().map(|row| row.iter());
+        let [red, blue] = light;
+        let [red_level, blue_level] = self.levels.each_ref().map(|row| row.iter());
+        let fringes = red.zip(red_level).zip(blue.zip(blue_level));
+        let known = self.absolute.iter().zip(&*self.margin).zip(&*self.power);
+        let maps = out.phase.iter_mut().zip(out.quality.iter_mut());
+        let maps = maps.zip(out.modulation.iter_mut().zip(out.sigma.iter_mut()));
+        for ((fringes, known), ((phase, quality), (modulation, sigma))) in fringes.zip(known).zip(maps) {
+            let (((red, red_level), (blue, blue_level)), ((absolute, margin), power)) = (fringes, known);
+            let (red, blue) = (red - red_level, (blue - blue_level) * equal);
+            *sigma = two_step_deviation([red, blue], equal, noise);
+            *modulation = lesser(*power, red * red + blue * blue).sqrt();
+            let lit = *modulation >= plan.modulation_min;
+            let sure = lit & (*margin >= plan.quality_min);
+            let wrapped = atan2(-blue, red);
+            let found = wrapped + TAU * round((absolute - wrapped) * (1.0 / TAU));
+            *phase = if sure { found } else { f32::NAN };
+            let positive = if *margin > 0.0 { *margin } else { 0.0 };
+            *quality = if lit { positive } else { f32::NAN };
         }
-        plan.trust(&self.power, out);
-        plan.sureness.odds.another(out.quality, out.wrong);
+        out.wrong.copy_from_slice(&self.wrong);
+        for &x in &self.gaps[i] {
+            [out.phase[x], out.quality[x], out.modulation[x]] = [f32::NAN; 3];
+        }
     }
 }
 
@@ -264,21 +262,15 @@ fn add(row: &[f32], sum: &mut [f32]) {
     sum.iter_mut().zip(row).for_each(|(sum, light)| *sum += light);
 }
 
-/// Take a background away; sum of squares of what is left, eight sums side by side.
+/// Sum of squares, eight sums side by side.
 #[inline(always)]
-fn without(row: &mut [f32], level: &[f32]) -> f32 {
+fn power(row: &[f32]) -> f32 {
     let mut sums = [0.0f32; 8];
-    let (blocks, rest) = row.as_chunks_mut::<8>();
-    let (levels, last) = level.as_chunks::<8>();
-    for (row, level) in blocks.iter_mut().zip(levels) {
-        let fringes: [f32; 8] = std::array::from_fn(|i| row[i] - level[i]);
-        *row = fringes;
-        sums.iter_mut().zip(fringes).for_each(|(sum, value)| *sum += value * value);
+    let (blocks, rest) = row.as_chunks::<8>();
+    for block in blocks {
+        sums.iter_mut().zip(block).for_each(|(sum, value)| *sum += value * value);
     }
-    for ((value, level), sum) in rest.iter_mut().zip(last).zip(&mut sums) {
-        *value -= level;
-        *sum += *value * *value;
-    }
+    sums.iter_mut().zip(rest).for_each(|(sum, value)| *sum += value * value);
     sums.iter().sum()
 }
 
