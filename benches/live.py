@@ -5,10 +5,10 @@
 A camera of 30 shots a second shows six shots of the moving hand, 1024 x 768, in turn; they are decoded with the
 published method and served. A client in another process takes the full-resolution clouds and draws nothing; memory is
 what the serving process grows by from the second third of the time to the last. With --browser Debian's chromium draws
-every 4th point of every 4th row in software instead, two clouds a second as `quadfringe live --clouds-per-s 2` sends
-them; --clouds 10 shows how much less time the default leaves it for pictures and figures. Clouds are counted where they
-go to OpenGL, pictures and figures where the page changes. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and
-5 figures/s in the browser; exit status 1 below them.
+every 4th point of every 4th row in software instead, as often as `quadfringe live` sends them by default; --clouds asks
+for another rate: the more clouds, the less time for pictures and figures. Clouds are counted where they go to OpenGL,
+pictures and figures where the page changes. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and 5 figures/s in
+the browser; exit status 1 below them.
 """
 
 from __future__ import annotations
@@ -41,11 +41,11 @@ from quadfringe.devices import CameraStatistics, Keep
 from quadfringe.files import figures_text
 from quadfringe.machine import resident_bytes
 from quadfringe.streaming import LiveStream
-from quadfringe.viewer import Viewer
+from quadfringe.viewer import CLOUDS_PER_S, Viewer
 
 SHOTS, RATE_HZ = 6, 30.0
 WARM_UP_S = 8.0
-SENT_PER_S, DRAWN_PER_S = 20.0, 2.0  # clouds asked for: as many as go, and what leaves a page time for the rest
+SENT_PER_S = 20.0  # clouds asked for: as many as go
 CLOUD_BYTES = 5_000_000
 BARS = {"clouds": 10.0}
 BROWSER_BARS = {"clouds": 1.0, "pictures": 5.0, "figures": 5.0}
@@ -234,7 +234,7 @@ def main() -> int:
         counted = browser(url, seconds, options.screenshot) if options.browser else client(url, seconds)
         print(json.dumps(counted))
         return 0
-    clouds_per_s = options.clouds or (DRAWN_PER_S if options.browser else SENT_PER_S)
+    clouds_per_s = options.clouds or (CLOUDS_PER_S if options.browser else SENT_PER_S)
     figures = served(options.seconds, clouds_per_s, browser=options.browser, screenshot=options.screenshot)
     for key, value in figures.items():
         print(f"{key:36}{value:10.4g}")

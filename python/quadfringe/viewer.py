@@ -27,11 +27,12 @@ from quadfringe.streaming import LiveStream, Measured, StreamStatistics
 if TYPE_CHECKING:
     import viser
 
-__all__ = ["Colouring", "Viewer"]
+__all__ = ["CLOUDS_PER_S", "Colouring", "Viewer"]
 
 Colouring = Literal["texture", "height", "quality"]
 Map = NDArray[np.float32]
 COLOURINGS: tuple[Colouring, ...] = ("texture", "height", "quality")
+CLOUDS_PER_S = 5.0
 STRIDES = ("1", "2", "4", "8", "16")
 M_PER_MM = 1e-3  # the page is in metres: near and far plane of a browser's camera fit them
 FIGURES_PERIOD_S = 0.1
@@ -46,9 +47,10 @@ class Viewer:
 
     Only this machine can see the page unless another `host` is asked for ("0.0.0.0": everybody on the network; there is
     no password). A cloud goes out at most `clouds_per_s` times a second, every `stride`-th pixel of every `stride`-th
-    row; a browser that is slower than that leaves out clouds, and nobody else waits for it. One without a graphics card
-    has more time for pictures and figures with two clouds a second; the page has a slider for it. When the port is
-    taken the next free one is used: `url` tells. Raises `MissingExtraError` without the extra `view`.
+    row; a browser that is slower than that leaves out clouds, and nobody else waits for it. With a graphics card 10 and
+    more go; without one a page has most time for pictures and figures with a `stride` of 4 and few clouds. The page has
+    controls for both. When the port is taken the next free one is used: `url` tells. Raises `MissingExtraError` without
+    the extra `view`.
     """
 
     def __init__(
@@ -57,7 +59,7 @@ class Viewer:
         port: int = 8080,
         *,
         stride: int = 2,
-        clouds_per_s: float = 10.0,
+        clouds_per_s: float = CLOUDS_PER_S,
         colouring: Colouring = "texture",
     ) -> None:
         self._server = _serve(host, port)
@@ -95,6 +97,8 @@ class Viewer:
         with gui.add_folder("Absolute phase"):
             self._phase = gui.add_image(blank, format="jpeg", jpeg_quality=80)
         self._server.scene.set_up_direction("-y")
+        # Points are drawn in their own colours: lights and their shadows cost a page time and change nothing.
+        self._server.scene.configure_default_lights(enabled=False, cast_shadow=False)
         # A cloud with new colours is a new material to the page, and the last one takes its compiled shader along.
         # Two points that nobody sees keep it; without them a browser without a graphics card compiles for every cloud.
         self._add_cloud("/shader", np.zeros((2, 3), np.float32), np.zeros((2, 3), np.uint8), point_size=1e-6)
