@@ -37,7 +37,7 @@ def live(
     view_stride: Annotated[int, typer.Option(min=1, max=64, help="Every n-th pixel of every n-th row is shown.")] = 2,
     clouds_per_s: Annotated[
         float, typer.Option(min=0.1, max=100.0, help="Most clouds a second; with a graphics card 10 and more go.")
-    ] = 5.0,
+    ] = 4.0,
     colour: Annotated[Colour, typer.Option(help="Colour of the points at first.")] = Colour.texture,
     shots: ShotsOption = None,
     file_gb: FileSize = None,

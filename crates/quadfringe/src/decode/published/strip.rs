@@ -35,7 +35,7 @@ pub(super) struct StripPlan<'a> {
     pub sureness: Sureness,
 }
 
-/// Working rows of one thread.
+/// Working rows of one task.
 #[derive(Debug, Default)]
 pub(super) struct Strip {
     /// Light of R and B, row by row.
@@ -48,18 +48,18 @@ pub(super) struct Strip {
     pair_sums: [Aligned<f32>; 2],
     /// Their background.
     levels: [Aligned<f32>; 2],
-    /// Sums over the rows of G and IR, then their means without background.
+    /// Sums over the rows of G and IR, and their means without background.
     sums: [Aligned<f32>; 2],
     fringes: [Aligned<f32>; 2],
-    /// Wrapped phases of G and IR, for all rows, and the lesser square of their modulations.
+    /// Wrapped phases of G and IR at every pixel, and the lesser square of their modulations.
     phases: [Aligned<f32>; 2],
+    power: Aligned<f32>,
     /// Wrapped phase of the means of R and B, and what it is absolutely.
     middle: Aligned<f32>,
     absolute: Aligned<f32>,
-    /// Margins of the orders, and what they are worth.
+    /// Margins of the orders, and how likely these are wrong.
     margin: Aligned<f32>,
     wrong: Aligned<f32>,
-    power: Aligned<f32>,
     spare: [Aligned<f32>; 2],
     background: BackgroundScratch,
     fourier: RowScratch,
@@ -103,16 +103,16 @@ impl Strip {
             levels,
             sums,
             phases,
+            power,
             middle,
             absolute,
             margin,
             wrong,
-            power,
             fourier,
             ..
         } = self;
         let rows = pair.iter_mut().flatten().chain(others).chain(pair_sums).chain(levels).chain(sums);
-        rows.chain(phases).chain([middle, absolute, margin, wrong, power]).for_each(|row| row.resize(width));
+        rows.chain(phases).chain([power, middle, absolute, margin, wrong]).for_each(|row| row.resize(width));
         plan.filter.ready(fourier);
     }
 
@@ -229,8 +229,7 @@ impl Strip {
     #[inline(always)]
     fn row(&self, i: usize, equal: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
         let noise = plan.sureness.noise;
-        let light = self.pair[i].each_ref().map(|row| row.iter());
-        let [red, blue] = light;
+        let [red, blue] = self.pair[i].each_ref().map(|row| row.iter());
         let [red_level, blue_level] = self.levels.each_ref().map(|row| row.iter());
         let fringes = red.zip(red_level).zip(blue.zip(blue_level));
         let known = self.absolute.iter().zip(&*self.margin).zip(&*self.power);
