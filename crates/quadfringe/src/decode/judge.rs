@@ -1,5 +1,6 @@
 //! Which pixels can be trusted: a hole is better than a lie.
 
+mod growth;
 mod islands;
 mod seams;
 
@@ -7,6 +8,7 @@ use super::orders::Orders;
 use crate::demod::cells::{CellMaps, CellWork, RowMaps};
 use crate::demod::scene::{Scene, around};
 use crate::slots::Slots;
+use growth::Growth;
 use islands::Islands;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -49,6 +51,9 @@ pub(super) struct Judge {
     backing: CellMaps,
     sums: CellMaps,
     islands: Islands,
+    /// 1 for pixels whose own light agrees with their order.
+    agreeing: Vec<u8>,
+    growth: Growth,
     slots: Slots<(Rows, CellWork)>,
 }
 
@@ -67,11 +72,13 @@ impl Judge {
         self.tears.mark(grid, findings.phase, findings.modulation, &mut self.seams);
         self.back(scene, findings.orders);
         self.spare.resize(grid.pixels(), 0);
-        let Self { spare, seams, backing, slots, .. } = self;
-        let rows = quality.par_chunks_mut(grid.width).zip(spare.par_chunks_mut(grid.stride)).enumerate();
+        self.agreeing.resize(grid.pixels(), 0);
+        let Self { spare, agreeing, seams, backing, slots, .. } = self;
+        let masks = spare.par_chunks_mut(grid.stride).zip(agreeing.par_chunks_mut(grid.stride));
+        let rows = quality.par_chunks_mut(grid.width).zip(masks).enumerate();
         rows.for_each_init(
             || slots.take(),
-            |slot, (y, (quality, sure))| {
+            |slot, (y, (quality, (sure, agreeing)))| {
                 let Rows { maps, sums, margin } = &mut slot.0;
                 let [backing] = maps.sample(grid, backing, 1, y);
                 margin.clear();
@@ -82,12 +89,14 @@ impl Judge {
                     around(y, grid.height).map(|row| &findings.misfit[row * grid.width..][..grid.width]);
                 let known = [scene.row(findings.modulation, y), margin, backing];
                 let limits = [findings.noise, findings.quality_min];
-                verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, sure);
+                let out = [sure, agreeing];
+                verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, out);
             },
         );
         seams::remove_slivers(grid, NEIGHBOURS_MIN, &self.spare, &mut self.sure);
         let least = (ISLAND_SIDE * scene.period_px).powi(2) as usize;
         self.islands.remove(grid, findings.phase, least, &mut self.sure);
+        self.growth.run(grid, findings.phase, [&self.agreeing, self.tears.torn()], &mut self.sure);
     }
 
     /// Share of the surroundings whose own light speaks for the order chosen there.
@@ -118,8 +127,8 @@ impl Judge {
     }
 }
 
-/// Quality of the pixels of a row, and which of them agree, with their neighbours, with the model of the chosen order; a
-/// wrong order has G and IR wrong.
+/// Quality of the pixels of a row; which of them are sure, because they agree, with their neighbours, with the model of the
+/// chosen order and lie at no seam; and which agree themselves. A wrong order has G and IR wrong.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 #[expect(clippy::too_many_arguments, reason = "one row of everything")]
 fn verdict(
@@ -130,7 +139,7 @@ fn verdict(
     [noise, quality_min]: [f32; 2],
     sums: &mut Vec<f32>,
     quality: &mut [f32],
-    sure: &mut [u8],
+    [sure, agreeing]: [&mut [u8]; 2],
 ) {
     sums.resize(width + 2, 0.0);
     let [above, own, below] = misfit.map(|row| &row[..width]);
@@ -141,7 +150,8 @@ fn verdict(
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
     let (modulation, margin, backing) = (&modulation[..width], &margin[..width], &backing[..width]);
-    let (seams, quality, sure) = (&seams[..width], &mut quality[..width], &mut sure[..width]);
+    let (seams, quality) = (&seams[..width], &mut quality[..width]);
+    let (sure, agreeing) = (&mut sure[..width], &mut agreeing[..width]);
     let floor = (NOISE_MAX * noise) * (NOISE_MAX * noise);
     for x in 0..width {
         let lit = modulation[x] > 0.0;
@@ -150,6 +160,8 @@ fn verdict(
         let most = floor + share * share;
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
         quality[x] = if lit { own_quality } else { f32::NAN };
-        sure[x] = u8::from(lit & agrees & (own_quality >= quality_min) & (seams[x] == 0));
+        let clear = lit & (own_quality >= quality_min);
+        sure[x] = u8::from(clear & agrees & (seams[x] == 0));
+        agreeing[x] = u8::from(clear & (own[x] <= most));
     }
 }

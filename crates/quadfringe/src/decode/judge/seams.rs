@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 /// Wrapped phases nearer than this are the same to R and B.
 const BLIND_RAD: f32 = 0.3;
 /// Pixels beside such a seam that may lie on its other side.
-const BLIND_REACH: usize = 2;
+pub(super) const BLIND_REACH: usize = 2;
 
 /// Tears of the phase: whether a pixel is torn from a neighbour, and whether R and B could not see it.
 #[derive(Debug, Default)]
@@ -19,6 +19,11 @@ pub(super) struct Tears {
 }
 
 impl Tears {
+    /// 1 for every pixel that is torn from a neighbour.
+    pub fn torn(&self) -> &[u8] {
+        &self.torn
+    }
+
     /// Marks in `seams` every lit pixel whose absolute phase (rad) differs by half a turn or more from that of a lit
     /// neighbour - there one of the two has the wrong order, or sees two surfaces at once - and the pixels around it.
     /// Where the two wrapped phases agree only G and IR know on which side a pixel lies, and those are blurred: there
