@@ -23,6 +23,8 @@ const OWN_MISFIT_MAX: f32 = 4.0;
 const NEIGHBOURS_MIN: u8 = 10;
 /// Least side of a region that is a surface, in fringe periods.
 const ISLAND_SIDE: f64 = 0.25;
+/// The same of one that is trusted to grow.
+const GROWING_SIDE: f64 = 1.0;
 /// Width (sigma) in fringe periods of the surroundings that back an order.
 const BACKING: f32 = 1.0;
 
@@ -94,9 +96,10 @@ impl Judge {
             },
         );
         seams::remove_slivers(grid, NEIGHBOURS_MIN, &self.spare, &mut self.sure);
-        let least = (ISLAND_SIDE * scene.period_px).powi(2) as usize;
-        self.islands.remove(grid, findings.phase, least, &mut self.sure);
-        self.growth.run(grid, findings.phase, [&self.agreeing, self.tears.torn()], &mut self.sure);
+        let sizes = [ISLAND_SIDE, GROWING_SIDE].map(|side| (side * scene.period_px).powi(2) as usize);
+        let growing = &mut self.spare;
+        self.islands.remove(grid, findings.phase, sizes, &mut self.sure, growing);
+        self.growth.run(grid, findings.phase, [&self.agreeing, self.tears.torn()], [&mut self.sure, growing]);
     }
 
     /// Share of the surroundings whose own light speaks for the order chosen there.

@@ -106,9 +106,9 @@ impl Orders {
             let nodes = &phase[row * grid.columns..][..grid.columns];
             gather(scene, known, ratios, row, nodes, &mut rows);
             let beats = known.fit.beats(row);
-            out.extend((0..grid.columns).map(|x| {
-                evidence((nodes[x], known.slopes.at(row, x)), beats.map(|beat| beat[x]), &rows.cells, x)
-            }));
+            out.extend(
+                (0..grid.columns).map(|x| evidence(nodes[x], beats.map(|beat| beat[x]), &rows.cells, x)),
+            );
         });
         let this = &*self;
         absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
@@ -166,14 +166,12 @@ impl Orders {
         if candidates.count > 1 {
             block.decide(self, scene, known, [row, column], &candidates);
         }
-        let rise = Rise::new(grid.step, known.slopes.at(row, column));
         for (dy, line) in absolute.chunks_exact_mut(grid.stride).enumerate() {
             let wrapped = &known.phase[first + dy * grid.stride..][..grid.step];
             let line = &mut line[column * grid.step..][..grid.step];
             for (x, (out, &own)) in line.iter_mut().zip(wrapped).enumerate() {
                 let turns = if candidates.count > 1 { block.turns[dy * grid.step + x] } else { 0.0 };
-                let rise = rise.at(dy as f32, x as f32);
-                *out = whole + rise + wrap(own - phase - rise) + TAU * turns;
+                *out = whole + wrap(own - phase) + TAU * turns;
             }
         }
     }
@@ -205,25 +203,6 @@ impl Orders {
             }
         }
         found
-    }
-}
-
-/// By how much the phase of the pixels of a cell is above that of its middle.
-#[derive(Clone, Copy)]
-struct Rise {
-    middle: f32,
-    along: f32,
-    down: f32,
-}
-
-impl Rise {
-    fn new(step: usize, slopes: [f32; 2]) -> Self {
-        let [along, down] = slopes.map(|slope| slope / step as f32);
-        Self { middle: (step / 2) as f32, along, down }
-    }
-
-    fn at(self, y: f32, x: f32) -> f32 {
-        self.along * (x - self.middle) + self.down * (y - self.middle)
     }
 }
 
@@ -269,7 +248,6 @@ impl Block {
         let node = row * grid.columns + column;
         let (phase, whole) = (orders.phase[node], orders.absolute(node));
         let fringes = known.cell(scene, row, column);
-        let rise = Rise::new(step, known.slopes.at(row, column));
         self.misses.clear();
         for i in 0..side * side {
             let y = (row * step + i / side).saturating_sub(1).min(grid.height - 1);
@@ -277,8 +255,7 @@ impl Block {
             let at = y * grid.stride + x;
             let mut misses = [0.0; CANDIDATES];
             if known.modulation[at] > 0.0 {
-                let rise = rise.at((i / side) as f32 - 1.0, (i % side) as f32 - 1.0);
-                let own = whole + rise + wrap(known.phase[at] - phase - rise);
+                let own = whole + wrap(known.phase[at] - phase);
                 let light = scene.light.map(|plane| plane[at]);
                 let albedo = albedo(known.phase[at], [light[0], light[2]], [fringes[0], fringes[2]]);
                 for (c, ratio) in [1, 3].into_iter().zip(orders.ratios) {

@@ -30,9 +30,6 @@ const BLOCK: usize = 16;
 pub(crate) struct Node {
     /// Wrapped phase of the first fringe number, 65536 to a turn.
     pub phase: u16,
-    /// By how much the phase rises from node to node along the row and down the column, in the same unit: a surface may be so
-    /// steep that half a turn and more lies between two nodes.
-    pub slopes: [i32; 2],
     /// Whether there is light to judge by; a dark node stops all support.
     pub lit: bool,
 }
@@ -121,14 +118,14 @@ impl Support {
             let first = block * BLOCK;
             let width = BLOCK.min(columns - first);
             let mut paths: Vec<Path> = (0..width).map(|_| Path::new(labels, jump)).collect();
-            let mut visit = |row: usize, way: i32, paths: &mut [Path]| {
+            let mut visit = |row: usize, paths: &mut [Path]| {
                 let at = row * columns + first;
                 let costs = &costs[at * labels..][..width * labels];
-                across(paths, &nodes[at..at + width], costs, part[row], way);
+                across(paths, &nodes[at..at + width], costs, part[row]);
             };
-            (0..rows).for_each(|row| visit(row, 1, &mut paths));
+            (0..rows).for_each(|row| visit(row, &mut paths));
             paths.iter_mut().for_each(Path::restart);
-            (0..rows).rev().for_each(|row| visit(row, -1, &mut paths));
+            (0..rows).rev().for_each(|row| visit(row, &mut paths));
         });
     }
 
@@ -196,7 +193,6 @@ mod tests {
         };
         Evidence {
             phase: turns(n1),
-            slopes: [0; 2],
             beats: [turns(n2 - n1), turns(n3 - n1)],
             seen: [seen(n2), seen(n3)],
             pixels: 1.0,
@@ -257,31 +253,6 @@ mod tests {
             assert!(!lit || right(&code, column(i % COLUMNS), found.order[i]), "{i}");
             assert!(lit || found.margin[i] == 0.0);
         }
-    }
-
-    #[test]
-    fn a_surface_may_rise_by_more_than_half_a_turn_from_node_to_node() {
-        let code = FringeCode::optimum(36, 912).unwrap();
-        let (along, down) = (0.413, 13.607);
-        let column = |x: usize, y: usize| 5.37 + along * x as f64 + down * y as f64;
-        let slopes = [along, down].map(|rise| (rise / code.period_px(0) * 65536.0) as i32);
-        assert!(slopes[1] > 32768);
-        // In a band of nodes the light says nothing; the orders come from the surface on both sides.
-        let wrong = |slopes: [i32; 2]| {
-            let found = choose(&code, |x, y| {
-                let node = Evidence { slopes, ..node(&code, column(x, y)) };
-                let blank = (30..33).contains(&y);
-                if blank {
-                    Evidence { beats: node.beats.map(|b| b.wrapping_add(20000)), pixels: 0.0, ..node }
-                } else {
-                    node
-                }
-            });
-            let at = |i: usize| column(i % COLUMNS, i / COLUMNS);
-            (0..ROWS * COLUMNS).filter(|&i| !right(&code, at(i), found.order[i])).count()
-        };
-        assert_eq!(wrong(slopes), 0);
-        assert!(wrong([0; 2]) > 0, "the slopes make no difference here");
     }
 
     #[test]

@@ -20,9 +20,15 @@ pub(super) struct Growth {
 }
 
 impl Growth {
-    /// Adds to `sure` those of the `agreeing` pixels that are not `torn`, no more than the reach of the marks away, into which the
-    /// `phase` (rad) of two sure pixels in a line goes on straight.
-    pub fn run(&mut self, grid: &Grid, phase: &[f32], [agreeing, torn]: [&[u8]; 2], sure: &mut [u8]) {
+    /// Adds to `sure` and to the `surfaces`, which are part of it, those of the `agreeing` pixels that are not `torn`, no more than
+    /// the reach of the marks away, into which the `phase` (rad) of two pixels of a surface in a line goes on straight.
+    pub fn run(
+        &mut self,
+        grid: &Grid,
+        phase: &[f32],
+        [agreeing, torn]: [&[u8]; 2],
+        [sure, surfaces]: [&mut [u8]; 2],
+    ) {
         let stride = grid.stride;
         self.open.clear();
         for y in 0..grid.height {
@@ -34,22 +40,24 @@ impl Growth {
             let Self { open, taken } = self;
             taken.clear();
             open.retain(|&at| {
-                let goes_on = goes_on(grid, phase, sure, at as usize);
+                let goes_on = goes_on(grid, phase, surfaces, at as usize);
                 if goes_on {
                     taken.push(at);
                 }
                 !goes_on
             });
-            taken.iter().for_each(|&at| sure[at as usize] = 1);
+            for at in taken.iter().map(|&at| at as usize) {
+                (sure[at], surfaces[at]) = (1, 1);
+            }
         }
     }
 }
 
-/// Whether two sure pixels side by side lead straight to the pixel, in one of four directions.
-fn goes_on(grid: &Grid, phase: &[f32], sure: &[u8], at: usize) -> bool {
+/// Whether two pixels of a surface side by side lead straight to the pixel, in one of four directions.
+fn goes_on(grid: &Grid, phase: &[f32], surfaces: &[u8], at: usize) -> bool {
     let (y, x) = (at / grid.stride, at % grid.stride);
     let leads = |near: usize, far: usize| {
-        sure[near] & sure[far] != 0 && (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX
+        surfaces[near] & surfaces[far] != 0 && (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX
     };
     (x >= 2 && leads(at - 1, at - 2))
         || (x + 2 < grid.width && leads(at + 1, at + 2))
@@ -79,7 +87,8 @@ mod tests {
 
     fn grown(grid: &Grid, phase: &[f32], agreeing: &[u8], [torn, sure]: &[Vec<u8>; 2]) -> Vec<u8> {
         let mut sure = sure.clone();
-        Growth::default().run(grid, phase, [agreeing, torn], &mut sure);
+        let mut surfaces = sure.clone();
+        Growth::default().run(grid, phase, [agreeing, torn], [&mut sure, &mut surfaces]);
         sure
     }
 

@@ -22,9 +22,16 @@ struct Run {
 }
 
 impl Islands {
-    /// Takes from `sure` every connected region of fewer than `least` pixels; neighbours whose `phase` (rad) is half a
-    /// turn or more apart are not connected.
-    pub fn remove(&mut self, grid: &Grid, phase: &[f32], least: usize, sure: &mut [u8]) {
+    /// Takes from `sure` every connected region of fewer than `least` pixels, and keeps those of `many` and more in `large`;
+    /// neighbours whose `phase` (rad) is half a turn or more apart are not connected.
+    pub fn remove(
+        &mut self,
+        grid: &Grid,
+        phase: &[f32],
+        [least, many]: [usize; 2],
+        sure: &mut [u8],
+        large: &mut [u8],
+    ) {
         let stride = grid.stride;
         self.rows.resize_with(grid.height, Vec::new);
         let source = sure.par_chunks(stride).zip(phase.par_chunks(stride));
@@ -43,11 +50,16 @@ impl Islands {
             let root = root(&mut self.parents, run.number);
             self.sizes[root as usize] += run.to - run.from;
         }
-        for (runs, sure) in self.rows.iter().zip(sure.chunks_mut(stride)) {
+        let rows = sure.chunks_mut(stride).zip(large.chunks_mut(stride));
+        for (runs, (sure, large)) in self.rows.iter().zip(rows) {
+            large.fill(0);
             for run in runs {
                 let root = root(&mut self.parents, run.number);
-                if (self.sizes[root as usize] as usize) < least {
-                    sure[run.from as usize..run.to as usize].fill(0);
+                let (size, at) = (self.sizes[root as usize] as usize, run.from as usize..run.to as usize);
+                if size < least {
+                    sure[at].fill(0);
+                } else if size >= many {
+                    large[at].fill(1);
                 }
             }
         }
@@ -131,10 +143,10 @@ mod tests {
             (15..20).for_each(|x| phase[place(x, y)] = 30.0);
         }
         let mut sure = vec![1u8; grid.pixels()];
-        Islands::default().remove(&grid, &phase, 10, &mut sure);
-        assert_eq!((sure[place(5, 5)], sure[place(2, 3)], sure[place(17, 2)]), (0, 1, 1));
-        Islands::default().remove(&grid, &phase, 101, &mut sure);
-        assert_eq!((sure[place(2, 3)], sure[place(17, 2)], sure[place(25, 2)]), (1, 0, 1));
+        let mut large = vec![1u8; grid.pixels()];
+        Islands::default().remove(&grid, &phase, [10, 101], &mut sure, &mut large);
+        let at = |map: &[u8]| [place(5, 5), place(2, 3), place(17, 2), place(25, 2)].map(|at| map[at]);
+        assert_eq!((at(&sure), at(&large)), ([0, 1, 1, 1], [0, 1, 0, 1]));
     }
 
     #[test]
@@ -147,10 +159,10 @@ mod tests {
             sure[y * 16 + 6] = 1;
         }
         (3..=6).for_each(|x| sure[15 * 16 + x] = 1);
-        let before = sure.clone();
-        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], 34, &mut sure);
+        let (before, mut large) = (sure.clone(), sure.clone());
+        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], [34, 99], &mut sure, &mut large);
         assert_eq!(sure, before);
-        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], 35, &mut sure);
+        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], [35, 99], &mut sure, &mut large);
         assert!(sure.iter().all(|&v| v == 0));
     }
 }

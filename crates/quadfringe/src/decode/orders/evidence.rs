@@ -6,7 +6,6 @@ use crate::demod::lanes::{LANES, Lanes, add, lanes, take};
 use crate::demod::scene::Scene;
 use crate::unwrap::{Evidence, Seen};
 use multiversion::multiversion;
-use std::f32::consts::TAU;
 
 /// What a pixel sees of a cosine, cut where noise or glare has taken over.
 #[inline(always)]
@@ -117,7 +116,7 @@ fn add_seen(
 const LIT: f32 = 1.0 / 1024.0;
 
 pub(super) fn evidence(
-    (phase, slopes): (f32, [f32; 2]),
+    phase: f32,
     [g_p, g_q, ir_p, ir_q]: [f32; 4],
     cells: &[Vec<f32>; SUMS],
     x: usize,
@@ -129,7 +128,6 @@ pub(super) fn evidence(
     };
     Evidence {
         phase: Evidence::turns(phase),
-        slopes: slopes.map(|slope| (slope * (65536.0 / TAU)) as i32),
         beats: [Evidence::turns(-atan2(g_q, g_p)), Evidence::turns(-atan2(ir_q, ir_p))],
         seen: [seen(1), seen(6)],
         pixels: cells[0][x].floor(),

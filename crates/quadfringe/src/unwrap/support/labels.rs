@@ -13,8 +13,6 @@ const COSINE_UNIT: f32 = 2048.0;
 pub(crate) struct Evidence {
     /// Wrapped phase of the first fringe number.
     pub phase: u16,
-    /// Rise of the phase to the next node along the row and down the column.
-    pub slopes: [i32; 2],
     /// Beats of G and IR against it, from a window: little noise, blurred at edges.
     pub beats: [u16; 2],
     /// What the pixels of the node itself see in G and in IR: noisy, sharp.
@@ -42,7 +40,7 @@ impl Evidence {
     }
 
     pub fn node(&self) -> Node {
-        Node { phase: self.phase, slopes: self.slopes, lit: self.lit }
+        Node { phase: self.phase, lit: self.lit }
     }
 }
 

@@ -5,15 +5,13 @@ use multiversion::multiversion;
 
 /// Room beside the labels, so that shifted reads stay inside.
 const PAD: usize = 8;
-/// Orders between two nodes, at most.
-const SHIFT_MAX: i32 = 4;
 
 /// Aggregated costs of the last node of one path.
 pub(super) struct Path {
     previous: Vec<i16>,
     current: Vec<i16>,
     least: i16,
-    from: Node,
+    phase: u16,
     /// Nothing before it counts.
     fresh: bool,
     labels: usize,
@@ -28,7 +26,7 @@ impl Path {
             previous: vec![NEVER; labels + 2 * PAD],
             current: vec![NEVER; labels + 2 * PAD],
             least: 0,
-            from: Node::default(),
+            phase: 0,
             fresh: true,
             labels,
             jump,
@@ -46,7 +44,7 @@ impl Path {
 
     /// One node further; its aggregated costs replace or join `sums`.
     #[inline(always)]
-    fn advance(&mut self, node: Node, own: &[i16], sums: &mut [u16], first: bool, (axis, way): (usize, i32)) {
+    fn advance(&mut self, node: Node, own: &[i16], sums: &mut [u16], first: bool) {
         if !node.lit {
             if !self.fresh {
                 self.restart();
@@ -57,10 +55,12 @@ impl Path {
             return;
         }
         // A wrapped phase that jumps up by more than half a turn has come from the order above.
-        let expected = way * (self.from.slopes[axis] + node.slopes[axis]) / 2;
-        let beyond = i32::from(node.phase) - i32::from(self.from.phase) - expected;
-        let shift =
-            if self.fresh { 0 } else { ((beyond + 32768) >> 16).clamp(-SHIFT_MAX, SHIFT_MAX) as isize };
+        let shift = match i32::from(node.phase) - i32::from(self.phase) {
+            _ if self.fresh => 0,
+            32769.. => 1,
+            ..-32768 => -1isize,
+            _ => 0,
+        };
         let at = (PAD as isize + shift) as usize;
         let blocks = self.labels / LANES;
         let own = &own.as_chunks::<LANES>().0[..blocks];
@@ -83,7 +83,7 @@ impl Path {
             }
         }
         self.least = least.iter().copied().fold(i16::MAX, i16::min);
-        (self.from, self.fresh) = (node, false);
+        (self.phase, self.fresh) = (node.phase, false);
         std::mem::swap(&mut self.previous, &mut self.current);
     }
 }
@@ -94,7 +94,7 @@ pub(super) fn sweep_on(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &mu
     let labels = path.labels;
     for (x, &node) in nodes.iter().enumerate() {
         let at = x * labels..(x + 1) * labels;
-        path.advance(node, &costs[at.clone()], &mut sums[at], true, (0, 1));
+        path.advance(node, &costs[at.clone()], &mut sums[at], true);
     }
 }
 
@@ -104,15 +104,15 @@ pub(super) fn sweep_back(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &
     let labels = path.labels;
     for (x, &node) in nodes.iter().enumerate().rev() {
         let at = x * labels..(x + 1) * labels;
-        path.advance(node, &costs[at.clone()], &mut sums[at], false, (0, -1));
+        path.advance(node, &costs[at.clone()], &mut sums[at], false);
     }
 }
 
 /// One row further for as many paths side by side.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn across(paths: &mut [Path], nodes: &[Node], costs: &[i16], sums: &mut [u16], way: i32) {
+pub(super) fn across(paths: &mut [Path], nodes: &[Node], costs: &[i16], sums: &mut [u16]) {
     for (x, (path, &node)) in paths.iter_mut().zip(nodes).enumerate() {
         let at = x * path.labels..(x + 1) * path.labels;
-        path.advance(node, &costs[at.clone()], &mut sums[at], false, (1, way));
+        path.advance(node, &costs[at.clone()], &mut sums[at], false);
     }
 }
