@@ -14,8 +14,8 @@ import scoring
 
 from quadfringe import ResponseCalibration
 
-RIGHT_PERCENT = 90.0  # of all object pixels; a missing pixel counts as wrong
-RIGHT_OF_RETURNED_PERCENT = 97.0
+RIGHT_PERCENT = 94.0  # of all object pixels; a missing pixel counts as wrong
+RIGHT_OF_RETURNED_PERCENT = 99.7
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
 
 

@@ -25,6 +25,8 @@ const NEIGHBOURS_MIN: u8 = 10;
 const ISLAND_SIDE: f64 = 0.25;
 /// The same of one that is trusted to grow.
 const GROWING_SIDE: f64 = 1.0;
+/// Least quality of a pixel that it grows into, however little is asked of the others: what is asked by default.
+const GROWN_QUALITY_MIN: f32 = 0.15;
 /// Width (sigma) in fringe periods of the surroundings that back an order.
 const BACKING: f32 = 1.0;
 
@@ -165,6 +167,6 @@ fn verdict(
         quality[x] = if lit { own_quality } else { f32::NAN };
         let clear = lit & (own_quality >= quality_min);
         sure[x] = u8::from(clear & agrees & (seams[x] == 0));
-        agreeing[x] = u8::from(clear & (own[x] <= most));
+        agreeing[x] = u8::from(clear & (own_quality >= GROWN_QUALITY_MIN) & (own[x] <= most));
     }
 }

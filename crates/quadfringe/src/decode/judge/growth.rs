@@ -7,8 +7,8 @@
 use super::seams::BLIND_REACH;
 use crate::demod::cells::Grid;
 
-/// Pixels that marks reach from a seam into a surface.
-const REACH: usize = BLIND_REACH + 1;
+/// Pixels that marks reach into a surface beyond those at the tear.
+const REACH: usize = BLIND_REACH;
 /// Greatest distance of a pixel from the straight line through two of the surface, in rad.
 const BEND_MAX: f32 = 0.5;
 
