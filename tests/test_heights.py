@@ -129,6 +129,17 @@ def test_fits_find_what_was_there() -> None:
     assert Sphere(np.zeros(3), 1.0).distances_mm([0.0, 0.0, 3.0]) == 2.0
 
 
+def test_the_base_of_a_staircase_is_found_whatever_the_draw() -> None:
+    # Eight treads of 5 mm; the base has a quarter of the points, the next tread a fifth.
+    shares = np.cumsum([0.25, 0.2, 0.15, 0.1, 0.1, 0.08, 0.07])
+    x, y = np.meshgrid(np.linspace(-60.0, 60.0, 200), np.linspace(-45.0, 45.0, 150))
+    tread = np.searchsorted(shares, (x + 60.0) / 120.0)
+    noise_mm = 0.1 * np.random.default_rng(4).standard_normal(x.shape)
+    xyz = np.stack([x, y, 800.0 - 5.0 * tread + noise_mm], axis=-1)
+    for seed in range(20):
+        assert dominant_plane(xyz, seed=seed).offset_mm == pytest.approx(-800.0, abs=0.1), seed
+
+
 def test_form_leaves_out_three_in_a_thousand() -> None:
     values = np.linspace(-0.05, 0.05, 10_000)
     values[:20] = 5.0

@@ -129,8 +129,11 @@ def fit_sphere(xyz_mm: Points, guess: Sphere | None = None) -> Sphere:
     return Sphere(centre + shift, radius)
 
 
-def dominant_plane(xyz_mm: Points, band_mm: float = 0.5, trials: int = 200, seed: int = 0) -> Plane:
-    """Give the plane that most points (..., 3) lie within `band_mm` of, fitted to these points."""
+def dominant_plane(xyz_mm: Points, band_mm: float = 0.5, trials: int = 2000, seed: int = 0) -> Plane:
+    """Give the plane that most points (..., 3) lie within `band_mm` of, fitted to these points.
+
+    Of so many `trials` one has its three points on a plane that holds a fifth of all (chance of none: 1e-7).
+    """
     points = _points(xyz_mm, "plane")
     random = np.random.default_rng(seed)
     sample = points[random.choice(len(points), min(len(points), 5000), replace=False)]
