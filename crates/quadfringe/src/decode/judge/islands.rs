@@ -147,6 +147,8 @@ mod tests {
         Islands::default().remove(&grid, &phase, [10, 101], &mut sure, &mut large);
         let at = |map: &[u8]| [place(5, 5), place(2, 3), place(17, 2), place(25, 2)].map(|at| map[at]);
         assert_eq!((at(&sure), at(&large)), ([0, 1, 1, 1], [0, 1, 0, 1]));
+        Islands::default().remove(&grid, &phase, [101, 101], &mut sure, &mut large);
+        assert_eq!(at(&sure), [0, 1, 0, 1]);
     }
 
     #[test]
