@@ -119,11 +119,11 @@ CAPTURES = (
         row
         for name in ("plate", "bottle")
         for row in (
-            (f"{name}_with_response_right_percent", f"real capture, {name}: right order, object pixels, %", "90"),
+            (f"{name}_with_response_right_percent", f"real capture, {name}: right order, object pixels, %", "95"),
             (
                 f"{name}_with_response_right_of_returned_percent",
                 f"real capture, {name}: right order, returned pixels, %",
-                "97",
+                "99",
             ),
         )
     ),
