@@ -4,7 +4,7 @@ use super::expand::{Expander, FACTOR_MAX};
 use super::guide::Guide;
 use super::judge::{Findings, Judge};
 use super::level::Level;
-use super::output::Finish;
+use super::output::{Finish, hole_unless};
 use super::uncertainty::PhaseNoise;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
@@ -307,7 +307,7 @@ fn condition_row<T: Sample>(
 #[multiversion(targets("x86_64+avx2"))]
 fn sure_only(sure: &[u8], phase: &[f32], out: &mut [f32]) {
     for (out, (sure, phase)) in out.iter_mut().zip(sure.iter().zip(phase)) {
-        *out = if *sure != 0 { *phase } else { f32::NAN };
+        *out = *phase + hole_unless(*sure != 0);
     }
 }
 

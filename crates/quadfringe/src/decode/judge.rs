@@ -5,6 +5,7 @@ mod islands;
 mod seams;
 
 use super::orders::Orders;
+use super::output::hole_unless;
 use crate::demod::cells::{CellMaps, CellWork, RowMaps};
 use crate::demod::scene::{Scene, around};
 use crate::slots::Slots;
@@ -164,7 +165,7 @@ fn verdict(
         let share = MISFIT_MAX * modulation[x];
         let most = floor + share * share;
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
-        quality[x] = if lit { own_quality } else { f32::NAN };
+        quality[x] = own_quality + hole_unless(lit);
         let clear = lit & (own_quality >= quality_min);
         sure[x] = u8::from(clear & agrees & (seams[x] == 0));
         agreeing[x] = u8::from(clear & (own_quality >= GROWN_QUALITY_MIN) & (own[x] <= most));

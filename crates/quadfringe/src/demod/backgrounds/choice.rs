@@ -241,7 +241,7 @@ impl Rows {
 fn take_better(place: u8, missed: &[f32], best: &mut [f32], places: &mut [u8]) {
     for ((missed, best), chosen) in missed.iter().zip(best).zip(places) {
         let better = *missed < *best;
-        *best = if better { *missed } else { *best };
+        *best = best.min(*missed);
         *chosen = if better { place } else { *chosen };
     }
 }
