@@ -65,10 +65,11 @@ impl Near {
     }
 }
 
-/// What is known of the candidates of a block of pixels so far.
+/// The least and the second least cost of the candidates of a block of pixels so far, as bits, which grow with a number that
+/// is not negative: of a choice between two of them a compiler makes no masked stores, as it does with floating-point numbers.
 struct Best {
-    least: [f32; BLOCK],
-    next: [f32; BLOCK],
+    least: [u32; BLOCK],
+    next: [u32; BLOCK],
 }
 
 impl AlongRay {
@@ -91,7 +92,7 @@ impl AlongRay {
                 infrared: rays.infrared.map(|row| &row[at.clone()]),
                 range_rad: rays.range_rad.map(|row| &row[at.clone()]),
             };
-            let mut best = Best { least: [f32::INFINITY; BLOCK], next: [self.apart; BLOCK] };
+            let mut best = Best::beyond(self.apart);
             match self.near {
                 Some(near) => self.ask_near(near, wrapped, &rays, &mut best, phase),
                 None => self.ask_all(wrapped, &rays, &mut best, phase),
@@ -160,22 +161,29 @@ impl AlongRay {
             let cost = miss(guess * self.ratio, second[i]) + miss(infrared, third[i]);
             let on_the_ray = (guess >= low[i]) & (guess <= high[i]);
             let cost = if on_the_ray { cost } else { f32::INFINITY };
-            let better = cost < best.least[i];
-            let behind = if better { best.least[i] } else { cost };
-            best.next[i] = if behind < best.next[i] { behind } else { best.next[i] };
-            best.least[i] = if better { cost } else { best.least[i] };
-            phase[i] = if better { guess } else { phase[i] };
+            let cost = cost.to_bits();
+            let least = best.least[i];
+            best.next[i] = best.next[i].min(cost.max(least));
+            best.least[i] = least.min(cost);
+            phase[i] = if cost < least { guess } else { phase[i] };
         }
     }
 }
 
 impl Best {
+    /// Before the first candidate, for pixels of which a second one is no farther than `apart`.
+    #[inline(always)]
+    fn beyond(apart: f32) -> Self {
+        Self { least: [f32::INFINITY.to_bits(); BLOCK], next: [apart.to_bits(); BLOCK] }
+    }
+
     /// Margins, and no data where there was no candidate.
     #[inline(always)]
     fn settle(&self, phase: &mut [f32], margin: &mut [f32]) {
         for (i, (phase, margin)) in phase.iter_mut().zip(margin).enumerate() {
-            let found = self.least[i].is_finite();
-            let lead = 1.0 - (self.least[i] / self.next[i].max(f32::MIN_POSITIVE)).sqrt();
+            let [least, next] = [&self.least, &self.next].map(|costs| f32::from_bits(costs[i]));
+            let found = least.is_finite();
+            let lead = 1.0 - (least / next.max(f32::MIN_POSITIVE)).sqrt();
             *phase = if found { *phase } else { f32::NAN };
             *margin = if found { lead.max(0.0) } else { f32::NAN };
         }
