@@ -163,6 +163,9 @@ impl Best {
         orders.another(&scene, &mut self.another);
         let window = Window::new(&scene, &self.guide.slopes, &self.modulation, noise);
         self.write(&scene, &PhaseNoise::new(noise, window.share()), finish, out);
+        let maps = [&mut out.wrong_order_probability, &mut out.quality];
+        let maps = maps.map(|map| map.as_slice_mut().expect("checked layout"));
+        self.judge.settle(&grid, &self.phase, maps);
     }
 
     /// Absolute phase of every pixel. Where light falls, beats, fringe orders and backgrounds come from an image of `factor` times

@@ -2,16 +2,18 @@
 
 mod growth;
 mod islands;
+mod odds;
 mod seams;
 
 use super::orders::Orders;
 use super::output::hole_unless;
-use crate::demod::cells::{CellMaps, CellWork, RowMaps};
+use crate::demod::cells::{CellMaps, CellWork, Grid, RowMaps};
 use crate::demod::scene::{Scene, around};
 use crate::slots::Slots;
 use growth::Growth;
 use islands::Islands;
 use multiversion::multiversion;
+use odds::Odds;
 use rayon::prelude::*;
 use seams::Tears;
 
@@ -26,8 +28,6 @@ const NEIGHBOURS_MIN: u8 = 10;
 const ISLAND_SIDE: f64 = 0.25;
 /// The same of one that is trusted to grow.
 const GROWING_SIDE: f64 = 1.0;
-/// Least quality of a pixel that it grows into, however little is asked of the others: what is asked by default.
-const GROWN_QUALITY_MIN: f32 = 0.15;
 /// Width (sigma) in fringe periods of the surroundings that back an order.
 const BACKING: f32 = 1.0;
 
@@ -52,7 +52,9 @@ pub(super) struct Judge {
     pub sure: Vec<u8>,
     tears: Tears,
     seams: Vec<u8>,
-    spare: Vec<u8>,
+    /// 1 for pixels of regions that are trusted to grow, [`growth::GROWN`] for what they grew into.
+    surfaces: Vec<u8>,
+    odds: Odds,
     backing: CellMaps,
     sums: CellMaps,
     islands: Islands,
@@ -76,10 +78,10 @@ impl Judge {
         let grid = scene.grid;
         self.tears.mark(grid, findings.phase, findings.modulation, &mut self.seams);
         self.back(scene, findings.orders);
-        self.spare.resize(grid.pixels(), 0);
+        self.surfaces.resize(grid.pixels(), 0);
         self.agreeing.resize(grid.pixels(), 0);
-        let Self { spare, agreeing, seams, backing, slots, .. } = self;
-        let masks = spare.par_chunks_mut(grid.stride).zip(agreeing.par_chunks_mut(grid.stride));
+        let Self { surfaces, agreeing, seams, backing, slots, .. } = self;
+        let masks = surfaces.par_chunks_mut(grid.stride).zip(agreeing.par_chunks_mut(grid.stride));
         let rows = quality.par_chunks_mut(grid.width).zip(masks).enumerate();
         rows.for_each_init(
             || slots.take(),
@@ -98,11 +100,22 @@ impl Judge {
                 verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, out);
             },
         );
-        seams::remove_slivers(grid, NEIGHBOURS_MIN, &self.spare, &mut self.sure);
+        seams::remove_slivers(grid, NEIGHBOURS_MIN, &self.surfaces, &mut self.sure);
         let sizes = [ISLAND_SIDE, GROWING_SIDE].map(|side| (side * scene.period_px).powi(2) as usize);
-        let growing = &mut self.spare;
-        self.islands.remove(grid, findings.phase, sizes, &mut self.sure, growing);
-        self.growth.run(grid, findings.phase, [&self.agreeing, self.tears.torn()], [&mut self.sure, growing]);
+        let surfaces = &mut self.surfaces;
+        self.islands.remove(grid, findings.phase, sizes, &mut self.sure, surfaces);
+        self.growth.run(
+            grid,
+            findings.phase,
+            [&self.agreeing, self.tears.torn()],
+            [&mut self.sure, surfaces],
+        );
+    }
+
+    /// What is known of the orders of whole surfaces settles the doubts of windows that see more than one of them, in the maps of
+    /// the probability of another order and of quality, without padding.
+    pub fn settle(&mut self, grid: &Grid, phase: &[f32], [wrong, quality]: [&mut [f32]; 2]) {
+        self.odds.settle(grid, phase, &self.surfaces, [wrong, quality]);
     }
 
     /// Share of the surroundings whose own light speaks for the order chosen there.
@@ -168,6 +181,6 @@ fn verdict(
         quality[x] = own_quality + hole_unless(lit);
         let clear = lit & (own_quality >= quality_min);
         sure[x] = u8::from(clear & agrees & (seams[x] == 0));
-        agreeing[x] = u8::from(clear & (own_quality >= GROWN_QUALITY_MIN) & (own[x] <= most));
+        agreeing[x] = u8::from(lit & (own[x] <= most));
     }
 }

@@ -11,6 +11,8 @@ use crate::demod::cells::Grid;
 const REACH: usize = BLIND_REACH;
 /// Greatest distance of a pixel from the straight line through two of the surface, in rad.
 const BEND_MAX: f32 = 0.5;
+/// What marks a pixel of a surface that it grew into; 1 marks the others.
+pub(super) const GROWN: u8 = 2;
 
 /// Working lists of the growth: places of pixels.
 #[derive(Debug, Default)]
@@ -47,7 +49,7 @@ impl Growth {
                 !goes_on
             });
             for at in taken.iter().map(|&at| at as usize) {
-                (sure[at], surfaces[at]) = (1, 1);
+                (sure[at], surfaces[at]) = (1, GROWN);
             }
         }
     }
@@ -57,7 +59,8 @@ impl Growth {
 fn goes_on(grid: &Grid, phase: &[f32], surfaces: &[u8], at: usize) -> bool {
     let (y, x) = (at / grid.stride, at % grid.stride);
     let leads = |near: usize, far: usize| {
-        surfaces[near] & surfaces[far] != 0 && (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX
+        let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX;
+        (surfaces[near] != 0) & (surfaces[far] != 0) & straight
     };
     (x >= 2 && leads(at - 1, at - 2))
         || (x + 2 < grid.width && leads(at + 1, at + 2))
