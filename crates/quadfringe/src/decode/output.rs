@@ -183,7 +183,7 @@ impl Finish<'_> {
 }
 
 /// 0, or NaN to turn what it is added to into no data: of a choice between a number in memory and NaN a compiler makes masked
-/// stores, which take some processors tens of cycles each.
+/// stores, which some processors are slow at.
 #[inline(always)]
 pub(super) fn hole_unless(known: bool) -> f32 {
     if known { 0.0 } else { f32::NAN }
