@@ -154,8 +154,10 @@ def test_only_this_machine_is_served_unless_asked() -> None:
         ]
         assert f"0100007F:{port:04X}" in listening
         assert f"00000000:{port:04X}" not in listening
-        with socket.create_connection(("127.0.0.1", port), timeout=5):
-            pass
+        with socket.create_connection(("127.0.0.1", port), timeout=5) as guest:
+            guest.shutdown(socket.SHUT_WR)
+            while guest.recv(4096):  # until the server, too, has closed: its event loop ends with the viewer
+                pass
     with pytest.raises(OSError, match=r".*"), socket.create_connection(("127.0.0.1", port), timeout=1):
         pass
 
