@@ -70,8 +70,8 @@ fn a_mosaic_loses_no_orders_at_edges() {
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
     assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
-    // Two pixels beside every shadow are left out, into which light is interpolated: six in a thousand.
-    assert!(raw.returned_share() > full.returned_share() - 6e-3, "{raw:?}");
+    // A pixel beside every shadow is left out, into which light is interpolated: five in a thousand.
+    assert!(raw.returned_share() > full.returned_share() - 5e-3, "{raw:?}");
 }
 
 #[test]

@@ -14,7 +14,7 @@ const WRONG_MAX: f64 = 2e-5;
 #[test]
 fn without_noise_the_surface_comes_back() {
     let bench = bench(1);
-    for name in ["plane", "peaks", "steps", "sphere"] {
+    for name in ["plane", "peaks", "steps", "sphere", "face"] {
         let cast = cast_scene(&bench, name);
         let decoded = there_and_back(&bench, &cast, &code(), &clean(), Method::Best);
         let found = score(&decoded, &cast, &code(), FRINGE_PX);

@@ -26,7 +26,7 @@ const CELLS: f64 = 3.4;
 /// Pixels in a fringe period of the image that guides, at least.
 const GUIDE_PERIOD_PX: f64 = 12.0;
 /// Pixels that interpolated light reaches into a shadow.
-const MOSAIC_BLUR_PX: usize = 2;
+const MOSAIC_BLUR_PX: usize = 1;
 /// Times that the light of a moving surface is brought to one instant and decoded again.
 const MOTION_ROUNDS: usize = 3;
 
@@ -143,11 +143,11 @@ impl Best {
         // 5. What is not sure is no data.
         let scene = self.full.scene(&grid, period_px, 1);
         let Guide { noise, backgrounds, orders, .. } = &mut self.guide;
-        let misfit = out.wrong_order_probability.as_slice().expect("checked layout");
+        let own = [&out.wrong_order_probability, &out.modulation];
         let findings = Findings {
             phase: &self.phase,
             modulation: &self.modulation,
-            misfit,
+            own: own.map(|map| map.as_slice().expect("checked layout")),
             noise: *noise,
             orders,
             quality_min: options.quality_min,

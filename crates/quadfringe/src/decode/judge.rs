@@ -20,8 +20,10 @@ use seams::Tears;
 /// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
 const NOISE_MAX: f32 = 1.5;
 pub(super) const MISFIT_MAX: f32 = 0.28;
-/// Greatest square of a pixel's own misfit, in units of what its neighbours may have on average.
-const OWN_MISFIT_MAX: f32 = 4.0;
+/// The same of a pixel by itself: in units of the noise and of its own modulation. A pixel in a narrow shadow is dim, and its
+/// misfit small beside the light of its surroundings.
+const OWN_NOISE_MAX: f32 = 3.0;
+const OWN_MISFIT_MAX: f32 = 0.5;
 /// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
 const NEIGHBOURS_MIN: u8 = 10;
 /// Least side of a region that is a surface, in fringe periods.
@@ -37,8 +39,8 @@ pub(super) struct Findings<'a> {
     pub phase: &'a [f32],
     /// 0 where there is no light.
     pub modulation: &'a [f32],
-    /// Mean square misfit of the four channels, row by row without padding.
-    pub misfit: &'a [f32],
+    /// Mean square misfit of the four channels, and modulation, of every pixel by itself, row by row without padding.
+    pub own: [&'a [f32]; 2],
     /// Standard deviation of the intensities.
     pub noise: f32,
     pub orders: &'a Orders,
@@ -92,9 +94,10 @@ impl Judge {
                 for (lead, _, lit) in findings.orders.verdict(scene, y / grid.step) {
                     margin.extend(std::iter::repeat_n(if lit { lead } else { 0.0 }, grid.step));
                 }
-                let near =
-                    around(y, grid.height).map(|row| &findings.misfit[row * grid.width..][..grid.width]);
-                let known = [scene.row(findings.modulation, y), margin, backing];
+                let [misfit, light] = findings.own;
+                let near = around(y, grid.height).map(|row| &misfit[row * grid.width..][..grid.width]);
+                let light = &light[y * grid.width..][..grid.width];
+                let known = [scene.row(findings.modulation, y), light, margin, backing];
                 let limits = [findings.noise, findings.quality_min];
                 let out = [sure, agreeing];
                 verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, out);
@@ -152,7 +155,7 @@ impl Judge {
 #[expect(clippy::too_many_arguments, reason = "one row of everything")]
 fn verdict(
     misfit: [&[f32]; 3],
-    [modulation, margin, backing]: [&[f32]; 3],
+    [modulation, light, margin, backing]: [&[f32]; 4],
     seams: &[u8],
     width: usize,
     [noise, quality_min]: [f32; 2],
@@ -168,19 +171,21 @@ fn verdict(
     }
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
-    let (modulation, margin, backing) = (&modulation[..width], &margin[..width], &backing[..width]);
+    let (modulation, light) = (&modulation[..width], &light[..width]);
+    let (margin, backing) = (&margin[..width], &backing[..width]);
     let (seams, quality) = (&seams[..width], &mut quality[..width]);
     let (sure, agreeing) = (&mut sure[..width], &mut agreeing[..width]);
-    let floor = (NOISE_MAX * noise) * (NOISE_MAX * noise);
+    let floors = [NOISE_MAX, OWN_NOISE_MAX].map(|most| (most * noise) * (most * noise));
     for x in 0..width {
         let lit = modulation[x] > 0.0;
         let own_quality = margin[x] * backing[x];
         let share = MISFIT_MAX * modulation[x];
-        let most = floor + share * share;
-        let agrees = left[x] + middle[x] + right[x] <= 9.0 * most && own[x] <= OWN_MISFIT_MAX * most;
+        let own_share = OWN_MISFIT_MAX * light[x];
+        let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] + share * share)
+            && own[x] <= floors[1] + own_share * own_share;
         quality[x] = own_quality + hole_unless(lit);
         let clear = lit & (own_quality >= quality_min);
         sure[x] = u8::from(clear & agrees & (seams[x] == 0));
-        agreeing[x] = u8::from(lit & (own[x] <= most));
+        agreeing[x] = u8::from(lit & (own[x] <= floors[0] + own_share * own_share));
     }
 }
