@@ -19,9 +19,6 @@ use rayon::prelude::*;
 /// Greatest second difference of the phase, in rad, of a surface without tears.
 const BEND_MAX: f32 = 0.3;
 
-/// Fits of the backgrounds once the phase is good: where it hardly changes within their window they converge slowly.
-const LAST_FITS: usize = 2;
-
 /// What is known of a shot with the help of surroundings.
 pub(super) struct Guide {
     /// Absolute phase of every pixel in rad.
@@ -113,21 +110,11 @@ impl Guide {
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
-        self.backgrounds.fit(
-            &scene,
-            ratios,
-            [&self.phase, &self.modulation],
-            &self.slopes,
-            limits,
-            ROUGH_ROWS,
-        );
         let window = Window::new(&scene, &self.slopes, &self.modulation, self.noise).near();
         let found = &mut Found::nothing(grid.height);
         self.joint.step(&scene, (&self.backgrounds, ratios), &window, &mut self.phase, [lent, more], found);
         self.find_tears(grid);
-        for _ in 0..LAST_FITS {
-            self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);
-        }
+        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);
         // What motion makes of the light is not to be explained by other backgrounds.
         if options.channel_instants_us.is_none() {
             self.backgrounds.choose(&scene, ratios, [&self.phase, &self.modulation], self.noise);

@@ -29,7 +29,7 @@ const OWN_COLOUR_NOISES: f32 = 0.2;
 const OWN_COLOUR_MIN: f32 = 0.01;
 /// Sides of the cells in fringe periods.
 const CELL: f64 = 0.35;
-/// Rows of pixels that stand for a row of cells: in the last fits, and on the way there.
+/// Rows of pixels that stand for a row of cells: in the last fit, and on the way there.
 pub(crate) const ROWS: usize = 4;
 pub(crate) const ROUGH_ROWS: usize = 2;
 /// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
@@ -111,8 +111,8 @@ impl Backgrounds {
         [0, 2, 4, 6].map(|c| [c, c + 1].map(|k| self.maps.line(row / times, k)[column / times]))
     }
 
-    /// Fit them to an absolute phase in rad by `most` rows of pixels for a row of cells. Pixels that are further from any such model than `misfit_max` times their
-    /// modulation (root mean square) take no part. `relative_noise` is the noise over the modulation.
+    /// Fit them to an absolute phase in rad by `most` rows of pixels for a row of cells. Pixels that are further from any such model
+    /// than `misfit_max` times their modulation (root mean square) take no part. `relative_noise` is the noise over the modulation.
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
