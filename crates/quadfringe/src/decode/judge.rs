@@ -189,3 +189,29 @@ fn verdict(
         agreeing[x] = u8::from(lit & (own[x] <= floors[0] + own_share * own_share));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_dim_pixel_is_measured_by_its_own_light() {
+        // The same misfit, a quarter of the modulation, of a pixel as bright as its surroundings and of one in a narrow shadow.
+        let (mut misfit, mut light) = ([0.0; 16], [0.4; 16]);
+        (misfit[4], misfit[12], light[12]) = (0.01, 0.01, 0.1);
+        let (mut quality, mut sure, mut agreeing) = ([0.0; 16], [0; 16], [0; 16]);
+        verdict(
+            [&[0.0; 16], &misfit, &[0.0; 16]],
+            [&[0.4; 16], &light, &[1.0; 16], &[1.0; 16]],
+            &[0; 16],
+            16,
+            [0.01, 0.1],
+            &mut Vec::new(),
+            &mut quality,
+            [&mut sure, &mut agreeing],
+        );
+        for marks in [sure, agreeing] {
+            assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
+        }
+    }
+}
