@@ -24,6 +24,8 @@ pub(super) const MISFIT_MAX: f32 = 0.28;
 /// misfit small beside the light of its surroundings.
 const OWN_NOISE_MAX: f32 = 3.0;
 const OWN_MISFIT_MAX: f32 = 0.5;
+/// Greatest misfit, in the same units, of what a surface may grow into: there less vouches for a pixel.
+const GROWN_MISFIT_MAX: f32 = 0.35;
 /// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
 const NEIGHBOURS_MIN: u8 = 10;
 /// Least side of a region that is a surface, in fringe periods.
@@ -180,13 +182,13 @@ fn verdict(
         let lit = modulation[x] > 0.0;
         let own_quality = margin[x] * backing[x];
         let share = MISFIT_MAX * modulation[x];
-        let own_share = OWN_MISFIT_MAX * light[x];
+        let [own_share, grown_share] = [OWN_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * light[x]);
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] + share * share)
             && own[x] <= floors[1] + own_share * own_share;
         quality[x] = own_quality + hole_unless(lit);
         let clear = lit & (own_quality >= quality_min);
         sure[x] = u8::from(clear & agrees & (seams[x] == 0));
-        agreeing[x] = u8::from(lit & (own[x] <= floors[0] + own_share * own_share));
+        agreeing[x] = u8::from(lit & (own[x] <= floors[0] + grown_share * grown_share));
     }
 }
 

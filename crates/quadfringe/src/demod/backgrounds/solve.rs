@@ -5,7 +5,7 @@ use crate::demod::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
 /// Ridge relative to the diagonal: the common factor of albedo, `a` and `b` is free and stays as it is.
-const RIDGE: f32 = 1.5e-2;
+const RIDGE: f32 = 1.7e-2;
 
 /// Normal equations of a row of cells, solved for the change of the eight unknowns.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
