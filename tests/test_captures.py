@@ -14,7 +14,7 @@ import scoring
 
 from quadfringe import ResponseCalibration
 
-RIGHT_PERCENT = 94.8  # of all object pixels; a missing pixel counts as wrong
+RIGHT_PERCENT = 95.5  # of all object pixels; a missing pixel counts as wrong
 RIGHT_OF_RETURNED_PERCENT = 99.7
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
 
@@ -76,17 +76,17 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
         wrong = np.abs(shape.phase_rad - scene.phase_rad)[seen] >= np.pi
         probability = shape.wrong_order_probability[seen]
         assert wrong.sum() <= probability.sum()
-        # A bound that says something: few pixels are doubtful, and hardly any of the others is wrong.
+        # A bound that says something: of the whole object only few pixels are not surely known, and hardly any of those is wrong.
         sure = probability < 0.01
-        assert sure.mean() > 0.97
+        assert np.count_nonzero(sure) > 0.895 * np.count_nonzero(scene.scored)
         assert wrong[sure].mean() < 1e-3
 
 
 def test_a_capture_without_its_response_is_still_ordered(scene: scoring.Scene) -> None:
     shape = scoring.shape_of(scene)
     score = scoring.score(scene, shape.phase_rad)
-    assert score.right_of_returned_percent >= 90.0
-    assert score.right_percent >= 60.0
+    assert score.right_of_returned_percent >= 99.5
+    assert score.right_percent >= 92.0
 
 
 def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file: Path) -> None:

@@ -17,7 +17,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Greatest second difference of the phase, in rad, of a surface without tears.
-const BEND_MAX: f32 = 0.3;
+pub(super) const BEND_MAX: f32 = 0.3;
 
 /// What is known of a shot with the help of surroundings.
 pub(super) struct Guide {
