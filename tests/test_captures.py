@@ -76,7 +76,7 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
         wrong = np.abs(shape.phase_rad - scene.phase_rad)[seen] >= np.pi
         probability = shape.wrong_order_probability[seen]
         assert wrong.sum() <= probability.sum()
-        # A bound that says something: of the whole object only few pixels are not surely known, and hardly any of those is wrong.
+        # A bound that says something: most of the object is surely known, and hardly any of that is wrong.
         sure = probability < 0.01
         assert np.count_nonzero(sure) > 0.895 * np.count_nonzero(scene.scored)
         assert wrong[sure].mean() < 1e-3
