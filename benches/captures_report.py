@@ -2,8 +2,9 @@
 
     python benches/captures_report.py [--data FOLDER] [--json FILE] [--method best]
 
-Captures are decoded as they are and with the response estimated from the 12 images of their first
-frequency; renders at 16 bit without noise and at 8 bit with 3 % noise, with their rig as calibration.
+Captures are decoded as if their light was linear, with the response that the shot shows by itself (what `decode`
+does), and with the one estimated from the 12 images of their first frequency; renders at 16 bit without noise and at
+8 bit with 3 % noise, with their rig as calibration.
 Right order: |phase - truth| < pi; a missing pixel counts as wrong in `right`. The first fringe inside
 the border is left out of the figures marked `inside`.
 """
@@ -39,7 +40,7 @@ def capture_scores(data: Path, settings: dict[str, Any]) -> dict[str, scoring.Sc
     for name in scoring.CAPTURES:
         scene = scoring.capture(data, name)
         response = estimate_from_files(scoring.step_files(data, name), scoring.STEPS).calibration
-        for label, known in (("as_captured", None), ("with_response", response)):
+        for label, known in (("as_linear", qf.Response()), ("own_response", None), ("with_response", response)):
             shape = scoring.shape_of(scene, response=known, **settings)
             scores[f"{name}_{label}"] = scoring.score(scene, shape.phase_rad)
     return scores

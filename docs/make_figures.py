@@ -118,11 +118,12 @@ CAPTURES = (
     *(
         row
         for name in ("plate", "bottle")
+        for key, words in (("own_response", "as it came"), ("with_response", "with its response"))
         for row in (
-            (f"{name}_with_response_right_percent", f"real capture, {name}: right order, object pixels, %", "95"),
+            (f"{name}_{key}_right_percent", f"real capture, {name}, {words}: right order, object pixels, %", "95"),
             (
-                f"{name}_with_response_right_of_returned_percent",
-                f"real capture, {name}: right order, returned pixels, %",
+                f"{name}_{key}_right_of_returned_percent",
+                f"real capture, {name}, {words}: right order, returned pixels, %",
                 "99",
             ),
         )

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 import scoring
 
-from quadfringe import ResponseCalibration
+from quadfringe import Response, ResponseCalibration
 
 RIGHT_PERCENT = 95.5  # of all object pixels; a missing pixel counts as wrong
 RIGHT_OF_RETURNED_PERCENT = 99.7
+OWN_RIGHT_PERCENT = 95.0  # with the response that the shot shows by itself
 MAPS = ("phase_rad", "column_px", "order", "modulation", "quality")
 
 
@@ -38,8 +39,8 @@ def response_file(scene: scoring.Scene, data_dir: Path, tmp_path_factory: pytest
     return out
 
 
-def assert_bars(score: scoring.Score) -> None:
-    assert score.right_percent >= RIGHT_PERCENT
+def assert_bars(score: scoring.Score, right_percent: float = RIGHT_PERCENT) -> None:
+    assert score.right_percent >= right_percent
     assert score.right_of_returned_percent >= RIGHT_OF_RETURNED_PERCENT
 
 
@@ -69,7 +70,7 @@ def test_package_decodes_a_capture(scene: scoring.Scene, response_file: Path) ->
 
 
 def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scene, response_file: Path) -> None:
-    for response in (None, ResponseCalibration.load(response_file)):
+    for response in (Response(), None, ResponseCalibration.load(response_file)):
         shape = scoring.shape_of(scene, response=response)
         assert shape.wrong_order_probability is not None
         seen = scene.scored & shape.returned
@@ -79,12 +80,24 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
         # A bound that says something: most of the object is surely known, and hardly any of that is wrong.
         sure = probability < 0.01
         assert np.count_nonzero(sure) > 0.895 * np.count_nonzero(scene.scored)
-        assert sure.mean() > (0.96 if response is None else 0.97)
+        assert sure.mean() > (0.97 if isinstance(response, ResponseCalibration) else 0.96)
         assert wrong[sure].mean() < 1e-3
 
 
-def test_a_capture_without_its_response_is_still_ordered(scene: scoring.Scene) -> None:
-    shape = scoring.shape_of(scene)
+def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: Path) -> None:
+    known = ResponseCalibration.load(response_file)
+    own, straight = scoring.shape_of(scene), scoring.shape_of(scene, response=known)
+    assert own.config["response_of_shot"]
+    scores = [scoring.score(scene, shape.phase_rad) for shape in (own, straight)]
+    assert_bars(scores[0], OWN_RIGHT_PERCENT)
+    # As good as twelve images of each channel tell, on both captures.
+    assert scores[0].right_phase_rms_rad < 1.05 * scores[1].right_phase_rms_rad
+    exponents = np.array([list(channel.values()) for channel in own.config["response"].values()])[:, 1]
+    assert (np.abs(exponents - known.red.exponent) < 0.08).all()
+
+
+def test_a_capture_whose_response_is_not_undone_is_still_ordered(scene: scoring.Scene) -> None:
+    shape = scoring.shape_of(scene, response=Response())
     score = scoring.score(scene, shape.phase_rad)
     assert score.right_of_returned_percent >= 99.5
     assert score.right_percent >= 92.0
@@ -92,7 +105,7 @@ def test_a_capture_without_its_response_is_still_ordered(scene: scoring.Scene) -
 
 def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file: Path) -> None:
     response = ResponseCalibration.load(response_file)
-    raw = scoring.score(scene, scoring.shape_of(scene).phase_rad)
+    raw = scoring.score(scene, scoring.shape_of(scene, response=Response()).phase_rad)
     linear = scoring.score(scene, scoring.shape_of(scene, response=response).phase_rad)
     assert linear.right_phase_rms_rad < 0.8 * raw.right_phase_rms_rad
 

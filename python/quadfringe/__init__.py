@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from quadfringe._core import Decoder, Device, __version__, check_code, optimum, pattern
     from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response, SceneConfig, SystemConfig
     from quadfringe.data import BayerShot, Calibration, ResponseCalibration, Shape, Shot, Stamp, Truth
-    from quadfringe.decoding import Plan, ShotDecoder, decode
+    from quadfringe.decoding import Plan, ShotDecoder, decode, own_response
     from quadfringe.devices import open_camera, open_projector
     from quadfringe.errors import CameraError, ConfigError, DecodeError, InputError, MissingExtraError
     from quadfringe.scanner import Scanner
@@ -27,7 +27,7 @@ _HOME = {
     "_core": ("Decoder", "Device", "__version__", "check_code", "optimum", "pattern"),
     "config": ("DecodeConfig", "DeviceModel", "Fringes", "Response", "SceneConfig", "SystemConfig"),
     "data": ("BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Stamp", "Truth"),
-    "decoding": ("Plan", "ShotDecoder", "decode"),
+    "decoding": ("Plan", "ShotDecoder", "decode", "own_response"),
     "devices": ("open_camera", "open_projector"),
     "errors": ("CameraError", "ConfigError", "DecodeError", "InputError", "MissingExtraError"),
     "scanner": ("Scanner", "open_system"),
@@ -66,6 +66,7 @@ __all__ = [
     "open_camera",
     "open_projector",
     "optimum",
+    "own_response",
     "pattern",
     "read_bayer_shot",
     "read_shot",

@@ -28,6 +28,7 @@ __all__ = [
     "check_code",
     "crc32",
     "estimate_response",
+    "estimate_response_of_shot",
     "exposure_in_frame_us",
     "fourier",
     "lightcrafters",
@@ -408,6 +409,20 @@ def estimate_response(stacks: Sequence[NDArray[np.float32]]) -> dict[str, float]
 
     Each stack is (steps, H, W) in fractions of full scale. ValueError when a stack is out of order, too dark,
     saturated or without fringes.
+    """
+
+def estimate_response_of_shot(
+    red: NDArray[np.float32],
+    green: NDArray[np.float32],
+    blue: NDArray[np.float32],
+    ir: NDArray[np.float32],
+    phase_rad: NDArray[np.float32],
+    fringe_numbers: tuple[float, float, float],
+    projector_width: int,
+) -> dict[str, dict[str, float]]:
+    """Give the figures of `estimate_response` by channel, from one shot as captured and the phase it was decoded to.
+
+    A channel that is linear as far as the shot can tell, or shows too little, is left out; `pixels` counts tiles.
     """
 
 @final

@@ -2,24 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from quadfringe import _core
 from quadfringe.config import DecodeConfig, Fringes, Response
-from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, conditioning
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, conditioning, response_known
 from quadfringe.errors import InputError
 from quadfringe.optics import core_device, device_model
-from quadfringe.verdict import judge
+from quadfringe.stages import response_of_shot
+from quadfringe.verdict import judge, order_margin
 
-__all__ = ["Plan", "ShotDecoder", "core_device", "decode", "device_model", "kernel_decoder"]
+__all__ = ["Plan", "ShotDecoder", "core_device", "decode", "device_model", "kernel_decoder", "own_response"]
+
+# Rounds of decoding and estimating: each halves what is left of the bend, a gamma of 2.2 needs seven.
+ROUNDS_MAX = 8
+SETTLED = 0.02  # change of the exponents, as a share, at which the rounds end
 
 
 @dataclass(frozen=True)
 class Plan:
     """What a decoder is made from: the fringes, the calibration, and settings of the method.
 
-    `response` stands in for the calibration's own when both are given.
+    `response` stands in for the calibration's own when both are given. Where neither says a word of it, `decode`
+    estimates it from the shot; `Response()` says that the light is linear.
     """
 
     projector_width_px: int
@@ -54,12 +60,16 @@ class ShotDecoder:
 
     def decode(self, shot: AnyShot) -> Shape:
         """Give the shape; raises `DecodeError` when the orders cannot be trusted, naming the likely cause."""
-        shape = self._shape(shot)
-        judge(shape, shot, None if self._channels_known else self._shape)
+        return self.judged(self.shape(shot), shot)
+
+    def judged(self, shape: Shape, shot: AnyShot) -> Shape:
+        """Give the shape of this shot back; raises `DecodeError` as `decode` does."""
+        judge(shape, shot, None if self._channels_known else self.shape)
         self._channels_known = True
         return shape
 
-    def _shape(self, shot: AnyShot) -> Shape:
+    def shape(self, shot: AnyShot) -> Shape:
+        """Give the shape without a verdict."""
         if isinstance(shot, BayerShot):
             maps = self._core.decode_bayer(shot.raw, shot.bayer, shot.ir)
         else:
@@ -82,8 +92,63 @@ def kernel_decoder(like: AnyShot, plan: Plan) -> _core.Decoder:
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:
-    """Decode one shot: plan, decode, judge. For many shots make one `ShotDecoder`."""
-    return ShotDecoder(shot, plan).decode(shot)
+    """Decode one shot: plan, decode, judge. For many shots make one `ShotDecoder`.
+
+    Where neither plan nor calibration know a response, the one that the shot itself shows is undone (`own_response`);
+    `config` of the shape then has it, and "response_of_shot" true. Errors as `ShotDecoder`.
+    """
+    if response_known(plan.calibration, plan.response):
+        return ShotDecoder(shot, plan).decode(shot)
+    decoder, shape = _straightened(shot, plan)
+    own = {"response_of_shot": decoder.plan.response is not None}
+    return decoder.judged(shape, shot).with_settings({**shape.config, **own}, plan.calibration)
+
+
+def own_response(shot: AnyShot, plan: Plan) -> Response | None:
+    """Give the response (gamma) of the channels that one shot shows, None when it is linear as far as can be told.
+
+    Any object does that fills a good part of the image: pixels of a tile sorted by their phase are what a stack of
+    phase steps is to `quadfringe calibrate response`. The shot is decoded and the response estimated in turn until it
+    stays. For many shots of one bench put it into the plan of a `ShotDecoder`. Raises `InputError` when the plan knows
+    a response already, otherwise as `ShotDecoder`.
+
+    >>> import quadfringe as qf
+    >>> from dataclasses import replace
+    >>> bent = qf.SystemConfig(scene=qf.SceneConfig(projector_exponent=1.8))
+    >>> with qf.open(bent) as scanner:
+    ...     shot = scanner.grab()
+    >>> plan = qf.Plan(projector_width_px=912)
+    >>> response = qf.own_response(shot, plan)
+    >>> print(f"{response.red.exponent:.1f}")
+    0.6
+    >>> decoder = qf.ShotDecoder(shot, replace(plan, response=response))
+    """
+    if response_known(plan.calibration, plan.response):
+        raise InputError("this plan knows the response already, from its `response` or its calibration; leave both out")
+    return _straightened(shot, plan)[0].plan.response
+
+
+def _straightened(shot: AnyShot, plan: Plan) -> tuple[ShotDecoder, Shape]:
+    """Decode, with the response that the shot shows if the orders are the surer for it."""
+    first = ShotDecoder(shot, plan)
+    as_captured = first.shape(shot)
+    decoder, shape = first, as_captured
+    for _ in range(ROUNDS_MAX):
+        found = response_of_shot(shot, shape.phase_rad, plan.fringes.numbers, plan.projector_width_px, plan.calibration)
+        if found is None:
+            break
+        settled = _close(found, decoder.plan.response or Response())
+        decoder = ShotDecoder(shot, replace(plan, response=found))
+        shape = decoder.shape(shot)
+        if settled:
+            break
+    better = order_margin(shape) > order_margin(as_captured)
+    return (decoder, shape) if better else (first, as_captured)
+
+
+def _close(one: Response, other: Response) -> bool:
+    pairs = zip(one.rows(), other.rows(), strict=True)
+    return all(abs(a[1] - b[1]) <= SETTLED * b[1] for a, b in pairs)
 
 
 def _check_sizes(shot: AnyShot, plan: Plan) -> None:

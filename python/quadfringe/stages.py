@@ -15,11 +15,21 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe._core import background, carrier, fourier, n_step, two_step, unwrap
-from quadfringe.config import Response
+from quadfringe.config import ChannelResponse, Response
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.errors import DecodeError
 
-__all__ = ["background", "carrier", "fourier", "linear_light", "n_step", "two_step", "unwrap", "wrapped_phases"]
+__all__ = [
+    "background",
+    "carrier",
+    "fourier",
+    "linear_light",
+    "n_step",
+    "response_of_shot",
+    "two_step",
+    "unwrap",
+    "wrapped_phases",
+]
 
 Map = NDArray[np.float32]
 
@@ -37,6 +47,28 @@ def linear_light(
     if isinstance(shot, BayerShot):
         return _core.linear_light_bayer(shot.raw, shot.bayer, shot.ir, full_scale=shot.full_scale_value, **known)
     return _core.linear_light(shot.red, shot.green, shot.blue, shot.ir, full_scale=shot.full_scale_value, **known)
+
+
+def response_of_shot(
+    shot: AnyShot,
+    phase_rad: Map,
+    fringe_numbers: tuple[float, float, float],
+    projector_width_px: int,
+    calibration: Calibration | None = None,
+) -> Response | None:
+    """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; None for linear light.
+
+    The phase of a shot whose response was not undone is bent itself: decode again with what was found, and repeat;
+    `quadfringe.own_response` does. A channel that shows nothing stays linear. Dark level and registration are those of
+    the `calibration`. ValueError when the sizes differ.
+    """
+    light = linear_light(shot, calibration)
+    found = _core.estimate_response_of_shot(
+        light["red"], light["green"], light["blue"], light["ir"], phase_rad, fringe_numbers, projector_width_px
+    )
+    numbers = ChannelResponse.model_fields
+    channels = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
+    return Response(**channels) if channels else None
 
 
 def wrapped_phases(shot: AnyShot, fringe_numbers: tuple[float, float, float]) -> tuple[Map, Map, Map]:

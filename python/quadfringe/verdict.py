@@ -13,7 +13,7 @@ from quadfringe.config import BayerPattern
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot
 from quadfringe.errors import DecodeError
 
-__all__ = ["judge"]
+__all__ = ["judge", "order_margin"]
 
 STRIDE = 4  # pixels whose light is looked at, along rows and columns: enough for quantiles, free of cost
 MARGIN_ROWS = 48  # rows and columns at least that the median of the margins is taken from, in every shot
@@ -56,6 +56,11 @@ def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
             "pixels; the channels may be swapped (red, green, blue, ir), or the fringe numbers, the projector "
             "width or the response are not those of this shot"
         )
+
+
+def order_margin(shape: Shape) -> float:
+    """Give the median order margin of the lit pixels, in [0, 1]; 0 without any."""
+    return _margin(shape)[0]
 
 
 def _margin(shape: Shape) -> tuple[float, int, int]:

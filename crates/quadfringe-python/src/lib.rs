@@ -41,6 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::n_step, module)?)?;
     module.add_function(wrap_pyfunction!(stages::unwrap, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
+    module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
     module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
     module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
     module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;

@@ -7,7 +7,7 @@ use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use quadfringe::condition::Sample;
+use quadfringe::condition::{self, ResponseEstimate, Sample};
 use quadfringe::demod::{self, Background, Band};
 use quadfringe::{BayerPattern, Conditioner, FringeCode, Shot};
 
@@ -77,7 +77,7 @@ fn linearise<'a, T: Sample, I: Send>(
     shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
     (full_scale, conditioner): &(Option<f32>, Conditioner),
 ) -> PyResult<[Array2<f32>; 4]> {
-    let work = || quadfringe::condition::linearise(&scaled(shot(images)?, *full_scale)?, conditioner);
+    let work = || condition::linearise(&scaled(shot(images)?, *full_scale)?, conditioner);
     py.detach(work).map_err(value_error)
 }
 
@@ -179,7 +179,39 @@ pub fn estimate_response<'py>(
     let stacks: PyResult<Vec<_>> = stacks.iter().map(|stack| expected::<f32, 3>("stack", stack)).collect();
     let stacks = stacks?;
     let views: Vec<_> = stacks.iter().map(PyReadonlyArray3::as_array).collect();
-    let found = py.detach(|| quadfringe::condition::estimate_response(&views)).map_err(value_error)?;
+    let found = py.detach(|| condition::estimate_response(&views)).map_err(value_error)?;
+    figures_of(py, &found)
+}
+
+/// Response of each channel from one shot and its phase, by name; a channel that shows none is left out.
+#[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "four channels, their phase and their fringes")]
+pub fn estimate_response_of_shot<'py>(
+    py: Python<'py>,
+    red: &Bound<'py, PyAny>,
+    green: &Bound<'py, PyAny>,
+    blue: &Bound<'py, PyAny>,
+    ir: &Bound<'py, PyAny>,
+    phase_rad: &Bound<'py, PyAny>,
+    fringe_numbers: [f64; 3],
+    projector_width: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+    let light = [map("red", red)?, map("green", green)?, map("blue", blue)?, map("ir", ir)?];
+    let phase = map("phase_rad", phase_rad)?;
+    let (views, phase) = (light.each_ref().map(PyReadonlyArray2::as_array), phase.as_array());
+    let work = || condition::estimate_response_of_shot(views, phase, &code);
+    let found = py.detach(work).map_err(value_error)?;
+    let named = PyDict::new(py);
+    for (name, estimate) in CHANNELS.into_iter().zip(found) {
+        if let Some(estimate) = estimate {
+            named.set_item(name, figures_of(py, &estimate)?)?;
+        }
+    }
+    Ok(named)
+}
+
+fn figures_of<'py>(py: Python<'py>, found: &ResponseEstimate) -> PyResult<Bound<'py, PyDict>> {
     let named = PyDict::new(py);
     named.set_item("offset", found.response.offset)?;
     named.set_item("exponent", found.response.exponent)?;

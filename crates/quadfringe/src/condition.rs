@@ -14,7 +14,7 @@ mod sample;
 mod shot;
 mod unmix;
 
-pub use estimate::{ResponseEstimate, estimate_response};
+pub use estimate::{ResponseEstimate, estimate_response, estimate_response_of_shot};
 pub(crate) use plan::Plan;
 pub use response::Response;
 pub use sample::Sample;

@@ -12,7 +12,7 @@ import typer
 from quadfringe.cli.output import Bayer, Fringes3, JsonOption, PredeformedOption, say, write_figures
 
 if TYPE_CHECKING:
-    from quadfringe.config import BayerPattern
+    from quadfringe.config import BayerPattern, Response
 
 __all__ = ["Bits", "Method", "Unwrapping", "decode"]
 
@@ -54,6 +54,9 @@ def decode(
     raw: Annotated[Path | None, typer.Option(metavar="FILE", help="Raw mosaic for all three, with --bayer.")] = None,
     bayer: Annotated[Bayer | None, typer.Option(help="Colours of the first 2 x 2 pixels of --raw.")] = None,
     response: Annotated[Path | None, typer.Option(metavar="FILE", help="Response of the channels, JSON.")] = None,
+    linear: Annotated[
+        bool, typer.Option("--linear", help="The light is linear; else its response is estimated from the shot.")
+    ] = False,
     calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Calibration, JSON.")] = None,
     method: Annotated[Method | None, typer.Option(help="How to demodulate and unwrap.")] = None,
     unwrapping: Annotated[
@@ -73,7 +76,7 @@ def decode(
 ) -> None:
     """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
     from quadfringe.config import DecodeConfig, Fringes, checked
-    from quadfringe.data import SUFFIXES, AnyShot, Calibration, ResponseCalibration
+    from quadfringe.data import SUFFIXES, AnyShot, Calibration
     from quadfringe.decoding import Plan
     from quadfringe.decoding import decode as decode_shot
     from quadfringe.errors import InputError
@@ -92,7 +95,7 @@ def decode(
         projector_width_px=projector_width,
         fringes=Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
         calibration=None if calibration is None else Calibration.load(calibration),
-        response=None if response is None else ResponseCalibration.load(response),
+        response=_response(response, linear),
         settings=checked(DecodeConfig, settings, "options"),
     )
     bits_in_use = None if bits is None else int(bits)
@@ -106,7 +109,25 @@ def decode(
     figures = shape.figures()
     percent = figures["returned_percent"]
     say(f"{out}: {percent:.1f} % of {shape.phase_rad.size} pixels returned{_sureness(figures)}", json)
+    if shape.config.get("response_of_shot"):
+        exponents = {name: channel["exponent"] for name, channel in shape.config["response"].items()}
+        listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
+        say(f"response estimated from the shot, exponents: {listed} (--linear leaves it as it is)", json)
+        figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
     write_figures(figures, json)
+
+
+def _response(file: Path | None, linear: bool) -> Response | None:
+    """Give what the options say of the response; None leaves it to the shot."""
+    from quadfringe.config import Response
+    from quadfringe.data import ResponseCalibration
+    from quadfringe.errors import InputError
+
+    if file is not None and linear:
+        raise InputError("--response and --linear contradict each other; give one of them")
+    if file is not None:
+        return ResponseCalibration.load(file)
+    return Response() if linear else None
 
 
 def _sureness(figures: Mapping[str, float]) -> str:

@@ -9,6 +9,7 @@
 mod order;
 mod samples;
 mod select;
+mod shot;
 mod simplex;
 
 use super::{Response, Sample};
@@ -17,6 +18,7 @@ use ndarray::ArrayView3;
 use order::{check_order, root_mean_square};
 use samples::Samples;
 use select::select;
+pub use shot::estimate_response_of_shot;
 use simplex::minimise;
 
 /// Fewest steps that show a second harmonic.

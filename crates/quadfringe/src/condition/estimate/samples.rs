@@ -14,6 +14,7 @@ const BLOCK: usize = 256;
 const HUBER_RAD: f32 = 0.1;
 
 /// One pixel over all steps, with its first harmonic.
+#[derive(Clone, Copy)]
 pub(super) struct Trace<'a> {
     /// Intensities, fractions of full scale.
     pub steps: ArrayView1<'a, f32>,

@@ -10,11 +10,9 @@ use std::f64::consts::TAU;
 /// Least amplitude of the fringes, fraction of full scale: below, noise decides.
 const MODULATION_MIN: f32 = 0.05;
 /// Brightest step from here on counts as saturated.
-const BRIGHT_MAX: f32 = 250.0 / 255.0;
+pub(super) const BRIGHT_MAX: f32 = 250.0 / 255.0;
 /// Reach of the light that a saturated pixel spills, pixels.
 const SPILL_PX: usize = 2;
-/// A pixel whose brightest step is below this is dark, whatever its fringes.
-const DARK: f32 = 2.0 * MODULATION_MIN;
 /// Share of the variance outside the first harmonic that even a gamma of 4 (0.21) does not reach.
 const DISORDER: f32 = 0.3;
 /// One disordered pixel to this many usable ones is too many; edges and moving shadows are one in 10 000.
@@ -26,7 +24,7 @@ const PIXELS_MAX: usize = 20_000;
 
 /// What a pixel is good for.
 #[derive(Clone, Copy)]
-enum Mark {
+pub(super) enum Mark {
     Usable([f32; 2]),
     Saturated,
     Dark,
@@ -56,16 +54,13 @@ pub(super) fn select<'a>(stacks: &'a [ArrayView3<'a, f32>]) -> Result<Vec<Trace<
 
 fn marks_of(stack: &ArrayView3<'_, f32>) -> Array2<Mark> {
     let (steps, rows, columns) = stack.dim();
-    let waves: Vec<[f32; 2]> = (0..steps)
-        .map(|s| (TAU * s as f64 / steps as f64).sin_cos())
-        .map(|(sin, cos)| [2.0 * cos / steps as f64, -2.0 * sin / steps as f64].map(|w| w as f32))
-        .collect();
+    let waves = waves(steps);
     let peak = stack.fold_axis(Axis(0), 0.0f32, |&a, &b| a.max(b));
     let mut marks = Array2::from_elem((rows, columns), Mark::Flat);
     let mut lines: Vec<_> = marks.outer_iter_mut().collect();
     lines.par_iter_mut().enumerate().for_each(|(y, line)| {
         for (x, mark) in line.iter_mut().enumerate() {
-            *mark = match mark_of(stack.slice(s![.., y, x]), &waves, peak[[y, x]]) {
+            *mark = match mark_of(stack.slice(s![.., y, x]), &waves, peak[[y, x]], MODULATION_MIN) {
                 Mark::Usable(_) if spilled(&peak.view(), y, x) => Mark::Saturated,
                 own => own,
             };
@@ -74,7 +69,20 @@ fn marks_of(stack: &ArrayView3<'_, f32>) -> Array2<Mark> {
     marks
 }
 
-fn mark_of(steps: ArrayView1<'_, f32>, waves: &[[f32; 2]], peak: f32) -> Mark {
+/// Weights of the steps in cosine and sine of the first harmonic.
+pub(super) fn waves(steps: usize) -> Vec<[f32; 2]> {
+    (0..steps)
+        .map(|s| (TAU * s as f64 / steps as f64).sin_cos())
+        .map(|(sin, cos)| [2.0 * cos / steps as f64, -2.0 * sin / steps as f64].map(|w| w as f32))
+        .collect()
+}
+
+pub(super) fn mark_of(
+    steps: ArrayView1<'_, f32>,
+    waves: &[[f32; 2]],
+    peak: f32,
+    modulation_min: f32,
+) -> Mark {
     if peak >= BRIGHT_MAX {
         return Mark::Saturated;
     }
@@ -88,12 +96,13 @@ fn mark_of(steps: ArrayView1<'_, f32>, waves: &[[f32; 2]], peak: f32) -> Mark {
     }
     let power = harmonic[0] * harmonic[0] + harmonic[1] * harmonic[1];
     // Twice the amplitude that fringes need: noise on faint fringes is no disorder.
-    let strong = variance > 2.0 * MODULATION_MIN * MODULATION_MIN;
+    let strong = variance > 2.0 * modulation_min * modulation_min;
     if strong && variance - power / 2.0 > DISORDER * variance {
         Mark::Disordered
-    } else if power > MODULATION_MIN * MODULATION_MIN {
+    } else if power > modulation_min * modulation_min {
         Mark::Usable(harmonic)
-    } else if peak < DARK {
+    } else if peak < 2.0 * modulation_min {
+        // Dark, whatever its fringes.
         Mark::Dark
     } else {
         Mark::Flat

@@ -1,0 +1,84 @@
+"""What a shot tells of its own response (gamma), and what undoing it is worth, as one table.
+
+    python benches/own_response.py [--json FILE]
+
+Scenes of the virtual bench, 8 bit, seed 1: taken as linear light, and with the response that the shot shows by itself.
+Phase: RMS over right orders of lit pixels; wrong: lit pixels with another order and pixels of shadows, of those
+returned. `settled` is the exponent of red times the projector's gamma, 1 when both undo each other. A shot whose orders
+no verdict would let pass is scored all the same.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+import quadfringe as qf
+
+WIDTH_PX = 912
+SCENES: tuple[tuple[str, dict[str, object]], ...] = (
+    ("face", {"surface": "face", "noise": 0.01}),
+    ("steps", {"surface": "steps", "noise": 0.01}),
+    ("printed plane", {"surface": "plane", "noise": 0.01, "patch_mm": 20.0}),
+    ("noisy steps", {"surface": "steps", "noise": 0.03}),
+    ("mosaic", {"surface": "face", "noise": 0.01, "bayer": "rggb"}),
+)
+GAMMAS = (1.0, 1.2, 1.5, 2.2)
+HEAD = f"{'':24}{'phase rad':>18}{'returned %':>18}{'wrong %':>18}{'settled':>10}"
+
+
+class Found(NamedTuple):
+    """Figures of one decoded shot."""
+
+    phase_rms_rad: float
+    returned_percent: float
+    wrong_percent: float
+
+
+def scored(shot: qf.Shot, response: qf.Response | None) -> Found:
+    """Decode with `response`, without a verdict, and compare with the truth of the bench."""
+    assert shot.truth is not None
+    plan = qf.Plan(WIDTH_PX, response=response or qf.Response())
+    phase_rad = qf.ShotDecoder(shot, plan).shape(shot).phase_rad
+    truth_rad = 2 * np.pi * qf.Fringes().numbers[0] * shot.truth.column_px / WIDTH_PX
+    lit = np.isfinite(truth_rad) & ~shot.truth.shadow
+    error = np.abs(phase_rad - truth_rad)
+    right = lit & (error < np.pi)
+    returned = np.isfinite(phase_rad)
+    return Found(
+        float(np.sqrt(np.mean(np.square(error[right], dtype=np.float64)))),
+        100 * float(np.count_nonzero(returned & lit) / np.count_nonzero(lit)),
+        100 * float(np.count_nonzero(returned & ~right) / np.count_nonzero(returned)),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    options = parser.parse_args()
+    figures: dict[str, float] = {}
+    print(HEAD)
+    for name, scene in SCENES:
+        for gamma in GAMMAS:
+            config = qf.SceneConfig.model_validate({**scene, "projector_exponent": gamma, "seed": 1})
+            with qf.open(qf.SystemConfig(scene=config)) as scanner:
+                shot = scanner.grab()
+            response = qf.own_response(shot, qf.Plan(WIDTH_PX))
+            linear, own = scored(shot, None), scored(shot, response)
+            settled = gamma * (1.0 if response is None else response.red.exponent)
+            pairs = "".join(f"{a:10.4f}{b:8.4f}" for a, b in zip(linear, own, strict=True))
+            print(f"{name + f', gamma {gamma:g}':24}{pairs}{settled:10.3f}")
+            key = f"{name.replace(' ', '_')}_gamma_{gamma:g}"
+            for label, found in (("linear", linear), ("own", own)):
+                figures |= {f"{key}_{label}_{k}": v for k, v in found._asdict().items()}
+            figures[f"{key}_settled"] = settled
+    if options.json:
+        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+//! The response that a shot shows by itself: found for any object, and nothing found where there is none.
+
+mod common;
+
+use common::{bench, cast_scene, code, decode_planes, noisy, score};
+use ndarray::Array2;
+use quadfringe::condition::{estimate_response_of_shot, linearise};
+use quadfringe::height::Triangulator;
+use quadfringe::rig::{Albedo, Bench, Cast, Light, Planes, RenderOptions};
+use quadfringe::{Conditioner, Decoded, Decoder, Error, Options, Response, Shot};
+
+const FRINGE_PX: f32 = 14.0;
+
+fn decode(bench: &Bench, planes: &Planes, response: [Response; 4]) -> Decoded {
+    let work = || -> Result<Decoded, Error> {
+        let (rows, columns) = planes.shape();
+        let conditioner = Conditioner { response, ..Conditioner::default() };
+        let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
+        let mut decoder = Decoder::new(code(), [rows, columns], &conditioner, Options::default())?
+            .triangulate_with(triangulator)?;
+        decode_planes(&mut decoder, planes)
+    };
+    work().expect("a valid scene")
+}
+
+fn captured(planes: &Planes) -> [Array2<f32>; 4] {
+    let Planes::U8(images) = planes else { panic!("8 bit") };
+    let shot = Shot::new(images.each_ref().map(|image| image.view())).expect("one size");
+    linearise(&shot, &Conditioner::default()).expect("a valid shot")
+}
+
+/// Decode and estimate in turn, `rounds` times: the decoded shot of the last round, and what it was decoded with.
+fn straightened(bench: &Bench, planes: &Planes, rounds: usize) -> (Decoded, [Response; 4]) {
+    let light = captured(planes);
+    let mut response = [Response::default(); 4];
+    let mut decoded = decode(bench, planes, response);
+    for _ in 0..rounds {
+        let found = estimate_response_of_shot(
+            light.each_ref().map(|plane| plane.view()),
+            decoded.phase_rad.view(),
+            &code(),
+        );
+        response =
+            found.expect("one size").map(|estimate| estimate.map_or_else(Response::default, |e| e.response));
+        decoded = decode(bench, planes, response);
+    }
+    (decoded, response)
+}
+
+fn render(bench: &Bench, cast: &Cast, options: &RenderOptions) -> Planes {
+    bench.render(cast, &Light::shot(&code()), options).expect("a valid scene")
+}
+
+/// Nearly all of the phase error goes and no pixels are lost, with steps, curves and 3 % noise.
+#[test]
+fn a_gamma_is_found_and_undone() {
+    let bench = bench(2);
+    for (name, gamma, seed) in [("face", 2.2, 1), ("steps", 2.2, 2), ("sphere", 1.5, 3), ("peaks", 0.6, 4)] {
+        let cast = cast_scene(&bench, name);
+        let planes = render(&bench, &cast, &RenderOptions { projector_exponent: [gamma; 4], ..noisy(seed) });
+        let bent = score(&decode(&bench, &planes, [Response::default(); 4]), &cast, &code(), FRINGE_PX);
+        let (decoded, response) = straightened(&bench, &planes, 7);
+        let straight = score(&decoded, &cast, &code(), FRINGE_PX);
+        println!("{name} {gamma}: {response:?}\n{bent:?}\n{straight:?}");
+        assert!(straight.phase_rms_rad < 0.25 * bent.phase_rms_rad, "{name}: {bent:?} {straight:?}");
+        assert!(straight.returned_share() > bent.returned_share() - 1e-3, "{name}: {bent:?} {straight:?}");
+        for exponent in response.map(|channel| f64::from(channel.exponent)) {
+            // A lower offset makes up for a lower exponent.
+            assert!((exponent * gamma - 1.0).abs() < 0.2, "{name}: {exponent}");
+        }
+    }
+}
+
+/// A camera with a gamma bends ambient light too: nothing but an exponent is left to find.
+#[test]
+fn the_gamma_of_a_camera_is_found_exactly() {
+    let bench = bench(2);
+    let cast = cast_scene(&bench, "face");
+    let options = RenderOptions { camera_exponent: [2.0; 4], noise: 0.01, ..noisy(5) };
+    let (_, response) = straightened(&bench, &render(&bench, &cast, &options), 4);
+    for channel in response {
+        assert!(
+            (channel.exponent - 2.0).abs() < 0.04 && channel.offset < 0.01 && channel.knee == 0.0,
+            "{channel:?}"
+        );
+    }
+}
+
+/// Channels with a response of their own are told apart from those that share one.
+#[test]
+fn channels_may_differ() {
+    let bench = bench(2);
+    let cast = cast_scene(&bench, "face");
+    let gammas = [2.2, 1.8, 2.2, 1.0];
+    let options = RenderOptions { projector_exponent: gammas, noise: 0.01, ..noisy(6) };
+    let (_, response) = straightened(&bench, &render(&bench, &cast, &options), 7);
+    println!("{response:?}");
+    assert_eq!(response[3], Response::default());
+    for (channel, gamma) in response.iter().zip(gammas) {
+        assert!((f64::from(channel.exponent) * gamma - 1.0).abs() < 0.12, "{response:?}");
+    }
+}
+
+/// Linear light stays as it is: whatever the surface, its print, its shadows, its noise, and light of other channels.
+#[test]
+fn nothing_is_found_in_linear_light() {
+    let bench = bench(2);
+    let mut crosstalk = Conditioner::default().crosstalk;
+    (crosstalk[0][1], crosstalk[1][2], crosstalk[3][0]) = (0.08, 0.05, 0.03);
+    let printed = |side_mm, seed| RenderOptions {
+        albedo: Albedo::Patches { side_mm, albedo: [0.8, 0.8, 0.8, 0.8] },
+        ..noisy(seed)
+    };
+    let cases = [
+        ("face", noisy(7)),
+        ("face", printed(20.0, 8)),
+        ("plane", printed(10.0, 9)),
+        ("steps", RenderOptions { crosstalk, ..noisy(10) }),
+        ("sphere", RenderOptions { albedo: Albedo::Uniform([0.25; 4]), ..noisy(11) }),
+    ];
+    for (name, options) in cases {
+        let cast = cast_scene(&bench, name);
+        let (_, response) = straightened(&bench, &render(&bench, &cast, &options), 1);
+        assert_eq!(response, [Response::default(); 4], "{name}");
+    }
+}
+
+#[test]
+fn too_little_tells_nothing_and_other_sizes_are_refused() {
+    let bent = Array2::from_shape_fn((100, 200), |(_, x)| (0.5 + 0.4 * (0.3 * x as f32).cos()).powf(2.2));
+    let phase = Array2::from_shape_fn((100, 200), |(_, x)| 0.3 * x as f32);
+    let of = |bent: &Array2<f32>| estimate_response_of_shot([bent.view(); 4], phase.view(), &code());
+    assert_eq!(of(&bent).unwrap(), [None; 4]);
+    let nowhere = Array2::from_elem((100, 200), f32::NAN);
+    assert_eq!(estimate_response_of_shot([bent.view(); 4], nowhere.view(), &code()).unwrap(), [None; 4]);
+    let message = of(&Array2::zeros((100, 199))).unwrap_err().to_string();
+    assert!(message.contains("199") && message.contains("200"), "{message}");
+}
