@@ -6,8 +6,11 @@
 
 use super::growth::GROWN;
 use crate::demod::cells::Grid;
+use crate::slots::Slots;
+use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::ops::Range;
 
 /// Probability of another order from which on an order is doubted.
 const DOUBT: f32 = 0.01;
@@ -20,62 +23,136 @@ const GROWN_DOUBT: f32 = 0.1;
 /// Rows that one task works on.
 const BLOCK: usize = 32;
 
-/// Working lists, one for each task: places without padding, with the probability and the quality that they take.
+/// Working memory of the tasks.
 #[derive(Debug, Default)]
 pub(super) struct Odds {
+    /// Places without padding, with the probability and the quality that they take, by task.
     settled: Vec<Vec<(usize, [f32; 2])>>,
+    slots: Slots<Reach>,
 }
 
 impl Odds {
     /// Doubtful pixels of the `surfaces` take the probability of another order, and the quality, of the surest of the four pixels
     /// some cells along their row and column, as far as the surface goes on to there. Both maps are without padding.
     pub fn settle(&mut self, grid: &Grid, phase: &[f32], surfaces: &[u8], [wrong, quality]: [&mut [f32]; 2]) {
-        self.settled.resize_with(grid.height.div_ceil(BLOCK), Vec::new);
-        let known = [&*wrong, &*quality];
-        let blocks = self.settled.par_iter_mut().zip(known[0].par_chunks(BLOCK * grid.width)).enumerate();
-        blocks.for_each(|(block, (settled, doubts))| {
-            settled.clear();
-            let first = block * BLOCK * grid.width;
-            for (at, _) in doubts.iter().enumerate().filter(|(_, wrong)| **wrong > DOUBT) {
-                let at = first + at;
-                settled.extend(surest(grid, phase, surfaces, known, at).map(|odds| (at, odds)));
-            }
-        });
-        for &(at, odds) in self.settled.iter().flatten() {
+        let Self { settled, slots } = self;
+        let scene = Scene { grid, phase, surfaces, known: [&*wrong, &*quality] };
+        settled.resize_with(grid.height.div_ceil(BLOCK), Vec::new);
+        settled.par_iter_mut().enumerate().for_each_init(
+            || slots.take(),
+            |reach, (block, settled)| {
+                settled.clear();
+                let rows = block * BLOCK..((block + 1) * BLOCK).min(grid.height);
+                if rows.clone().any(|y| scene.doubted(y)) {
+                    reach.settle(&scene, rows, settled);
+                }
+            },
+        );
+        for &(at, odds) in settled.iter().flatten() {
             [wrong[at], quality[at]] = odds;
         }
     }
 }
 
-/// Probability of another order and quality at the pixel `at` of maps without padding, with the help of its surface.
-fn surest(
-    grid: &Grid,
-    phase: &[f32],
-    surfaces: &[u8],
-    [wrong, quality]: [&[f32]; 2],
-    at: usize,
-) -> Option<[f32; 2]> {
-    let [y, x] = [at / grid.width, at % grid.width];
-    let own = y * grid.stride + x;
-    if surfaces[own] == 0 {
-        return None;
+/// The absolute phase (rad) and the surfaces of an image; the probability of another order and the quality, without padding.
+struct Scene<'a> {
+    grid: &'a Grid,
+    phase: &'a [f32],
+    surfaces: &'a [u8],
+    known: [&'a [f32]; 2],
+}
+
+impl Scene<'_> {
+    fn doubted(&self, y: usize) -> bool {
+        self.known[0][y * self.grid.width..][..self.grid.width].iter().any(|&wrong| wrong > DOUBT)
     }
-    let down = grid.stride as isize;
-    let lines = [(x, -1), (grid.width - 1 - x, 1), (y, -down), (grid.height - 1 - y, down)];
-    let ends = lines.map(|(room, step)| {
-        let place = |times: usize| own.wrapping_add_signed(times as isize * step);
-        let ends = |times: usize| {
-            let (here, next) = (place(times), place(times + 1));
-            (surfaces[next] == 0) | ((phase[here] - phase[next]).abs() >= PI)
-        };
-        let reach = room.min(REACH_CELLS * grid.step);
-        let end = place((0..reach).find(|&times| ends(times)).unwrap_or(reach));
-        end / grid.stride * grid.width + end % grid.stride
-    });
+
+    fn row(&self, y: usize) -> (&[f32], &[u8]) {
+        let row = y * self.grid.stride..y * self.grid.stride + self.grid.width;
+        (&self.phase[row.clone()], &self.surfaces[row])
+    }
+}
+
+/// How many pixels the surface of a pixel goes on, as far as is asked for: to both sides and up, in one row, and down, in the last
+/// row looked at and in those of a task.
+#[derive(Debug, Default)]
+struct Reach {
+    sides: [Vec<u16>; 2],
+    up: Vec<u16>,
+    below: Vec<u16>,
+    down: Vec<u16>,
+}
+
+impl Reach {
+    fn settle(&mut self, scene: &Scene<'_>, rows: Range<usize>, settled: &mut Vec<(usize, [f32; 2])>) {
+        let Self { sides: [left, right], up, below, down } = self;
+        let Grid { width, height, .. } = *scene.grid;
+        let most = REACH_CELLS * scene.grid.step;
+        for counts in [&mut *left, &mut *right, &mut *up, &mut *below] {
+            counts.clear();
+            counts.resize(width, 0);
+        }
+        down.resize(rows.len() * width, 0);
+        for y in (rows.start..(rows.end + most).min(height)).rev() {
+            if y + 1 < height {
+                go_on(scene.row(y), scene.row(y + 1), most as u16, below);
+            }
+            if y < rows.end {
+                down[(y - rows.start) * width..][..width].copy_from_slice(below);
+            }
+        }
+        for y in rows.start.saturating_sub(most)..rows.end {
+            if y > 0 {
+                go_on(scene.row(y), scene.row(y - 1), most as u16, up);
+            }
+            if y < rows.start || !scene.doubted(y) {
+                continue;
+            }
+            let (phase, surfaces) = scene.row(y);
+            let joined = |x: usize| joined((phase[x - 1], surfaces[x - 1]), (phase[x], surfaces[x]));
+            for x in 1..width {
+                left[x] = if joined(x) { (left[x - 1] + 1).min(most as u16) } else { 0 };
+            }
+            for x in (1..width).rev() {
+                right[x - 1] = if joined(x) { (right[x] + 1).min(most as u16) } else { 0 };
+            }
+            let down = &down[(y - rows.start) * width..][..width];
+            for x in 0..width {
+                let at = y * width + x;
+                if scene.known[0][at] > DOUBT && surfaces[x] != 0 {
+                    let [left, right, up, down] = [left[x], right[x], up[x], down[x]].map(usize::from);
+                    let ends = [at - left, at + right, at - up * width, at + down * width];
+                    settled.extend(surest(scene.known, ends, surfaces[x], at).map(|odds| (at, odds)));
+                }
+            }
+        }
+    }
+}
+
+/// Whether one surface goes on between two pixels.
+#[inline(always)]
+fn joined((phase, surface): (f32, u8), (other, other_surface): (f32, u8)) -> bool {
+    (surface != 0) & (other_surface != 0) & ((phase - other).abs() < PI)
+}
+
+/// Counts of the pixels that a surface goes on, from those of the row it goes on to.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn go_on(here: (&[f32], &[u8]), there: (&[f32], &[u8]), most: u16, counts: &mut [u16]) {
+    let n = counts.len();
+    let [(phase, surfaces), (other, other_surfaces)] = [here, there].map(|row| (&row.0[..n], &row.1[..n]));
+    for x in 0..n {
+        let on = joined((phase[x], surfaces[x]), (other[x], other_surfaces[x]));
+        let longer = if counts[x] < most { counts[x] + 1 } else { most };
+        counts[x] = if on { longer } else { 0 };
+    }
+}
+
+/// Probability of another order and quality at a doubted pixel, with the help of the ends of its surface.
+fn surest([wrong, quality]: [&[f32]; 2], ends: [usize; 4], surface: u8, at: usize) -> Option<[f32; 2]> {
     // NaN beside the field of the projector says nothing.
     let known = ends.into_iter().filter(|&end| wrong[end] < wrong[at]);
     let surest = known.min_by(|&a, &b| wrong[a].total_cmp(&wrong[b]))?;
-    let doubt = if surfaces[own] == GROWN { GROWN_DOUBT } else { SETTLED_DOUBT };
+    let doubt = if surface == GROWN { GROWN_DOUBT } else { SETTLED_DOUBT };
     Some([wrong[at].min(wrong[surest].max(doubt)), quality[at].max(quality[surest])])
 }
 
