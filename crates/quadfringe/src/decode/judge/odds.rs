@@ -21,7 +21,7 @@ const REACH_CELLS: usize = 3;
 const SETTLED_DOUBT: f32 = 0.005;
 const GROWN_DOUBT: f32 = 0.1;
 /// Rows that one task works on.
-const BLOCK: usize = 32;
+const BLOCK: usize = 64;
 
 /// Working memory of the tasks.
 #[derive(Debug, Default)]
@@ -73,54 +73,59 @@ impl Scene<'_> {
     }
 }
 
-/// How many pixels the surface of a pixel goes on, as far as is asked for: to both sides and up, in one row, and down, in the last
+/// How many pixels the surface of a pixel goes on, as far as is asked for: to the right and up, in one row, and down, in the last
 /// row looked at and in those of a task.
 #[derive(Debug, Default)]
 struct Reach {
-    sides: [Vec<u16>; 2],
-    up: Vec<u16>,
-    below: Vec<u16>,
-    down: Vec<u16>,
+    /// 0 where a pixel and the one on its left are of one surface.
+    apart: Vec<u8>,
+    right: Vec<u32>,
+    up: Vec<u32>,
+    below: Vec<u32>,
+    down: Vec<u32>,
 }
 
 impl Reach {
     fn settle(&mut self, scene: &Scene<'_>, rows: Range<usize>, settled: &mut Vec<(usize, [f32; 2])>) {
-        let Self { sides: [left, right], up, below, down } = self;
+        let Self { apart, right, up, below, down } = self;
         let Grid { width, height, .. } = *scene.grid;
-        let most = REACH_CELLS * scene.grid.step;
-        for counts in [&mut *left, &mut *right, &mut *up, &mut *below] {
+        let most = (REACH_CELLS * scene.grid.step) as u32;
+        for counts in [&mut *right, &mut *up, &mut *below] {
             counts.clear();
             counts.resize(width, 0);
         }
+        apart.resize(width, 1);
         down.resize(rows.len() * width, 0);
-        for y in (rows.start..(rows.end + most).min(height)).rev() {
+        for y in (rows.start..(rows.end + most as usize).min(height)).rev() {
             if y + 1 < height {
-                go_on(scene.row(y), scene.row(y + 1), most as u16, below);
+                go_on(scene.row(y), scene.row(y + 1), most, below);
             }
             if y < rows.end {
                 down[(y - rows.start) * width..][..width].copy_from_slice(below);
             }
         }
-        for y in rows.start.saturating_sub(most)..rows.end {
+        for y in rows.start.saturating_sub(most as usize)..rows.end {
             if y > 0 {
-                go_on(scene.row(y), scene.row(y - 1), most as u16, up);
+                go_on(scene.row(y), scene.row(y - 1), most, up);
             }
             if y < rows.start || !scene.doubted(y) {
                 continue;
             }
             let (phase, surfaces) = scene.row(y);
-            let joined = |x: usize| joined((phase[x - 1], surfaces[x - 1]), (phase[x], surfaces[x]));
-            for x in 1..width {
-                left[x] = if joined(x) { (left[x - 1] + 1).min(most as u16) } else { 0 };
-            }
-            for x in (1..width).rev() {
-                right[x - 1] = if joined(x) { (right[x] + 1).min(most as u16) } else { 0 };
+            side_by_side(phase, surfaces, apart);
+            let mut run = 0;
+            for (run_out, &apart) in right.iter_mut().zip(&*apart).rev() {
+                *run_out = run;
+                run = if apart == 0 { (run + 1).min(most) } else { 0 };
             }
             let down = &down[(y - rows.start) * width..][..width];
-            for x in 0..width {
-                let at = y * width + x;
-                if scene.known[0][at] > DOUBT && surfaces[x] != 0 {
-                    let [left, right, up, down] = [left[x], right[x], up[x], down[x]].map(usize::from);
+            let (doubts, mut left) = (&scene.known[0][y * width..][..width], 0);
+            for (x, &apart) in apart.iter().enumerate() {
+                left = if apart == 0 { (left + 1).min(most) } else { 0 };
+                if doubts[x] > DOUBT && surfaces[x] != 0 {
+                    let at = y * width + x;
+                    let [left, right, up, down] =
+                        [left, right[x], up[x], down[x]].map(|count| count as usize);
                     let ends = [at - left, at + right, at - up * width, at + down * width];
                     settled.extend(surest(scene.known, ends, surfaces[x], at).map(|odds| (at, odds)));
                 }
@@ -135,9 +140,19 @@ fn joined((phase, surface): (f32, u8), (other, other_surface): (f32, u8)) -> boo
     (surface != 0) & (other_surface != 0) & ((phase - other).abs() < PI)
 }
 
+/// 0 for pixels that are of one surface with the one on their left, 1 for others and for the first.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn side_by_side(phase: &[f32], surfaces: &[u8], apart: &mut [u8]) {
+    let n = apart.len() - 1;
+    let [left, right] = [0, 1].map(|from| (&phase[from..from + n], &surfaces[from..from + n]));
+    for (x, apart) in apart[1..].iter_mut().enumerate() {
+        *apart = u8::from(!joined((left.0[x], left.1[x]), (right.0[x], right.1[x])));
+    }
+}
+
 /// Counts of the pixels that a surface goes on, from those of the row it goes on to.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn go_on(here: (&[f32], &[u8]), there: (&[f32], &[u8]), most: u16, counts: &mut [u16]) {
+fn go_on(here: (&[f32], &[u8]), there: (&[f32], &[u8]), most: u32, counts: &mut [u32]) {
     let n = counts.len();
     let [(phase, surfaces), (other, other_surfaces)] = [here, there].map(|row| (&row.0[..n], &row.1[..n]));
     for x in 0..n {
