@@ -63,6 +63,16 @@ def test_a_shot_is_saved_that_was_refused(tmp_path: Path) -> None:
     qf.decode(shot, PLAN).save(tmp_path / "saved.npz")
 
 
+def test_a_part_of_the_image_will_do(bent: qf.Shot) -> None:
+    middle = np.s_[256:512, 384:640]
+    printed = taken(surface="plane", patch_mm=10.0, noise=0.03)
+    parts = [qf.Shot(*(image[middle].copy() for image in shot.channels.values())) for shot in (bent, printed)]
+    found = qf.own_response(parts[0], PLAN)
+    assert found is not None
+    assert found.red.exponent == pytest.approx(1 / 1.8, rel=0.1)
+    assert qf.own_response(parts[1], PLAN) is None
+
+
 @pytest.mark.parametrize("scene", [{"surface": "face"}, {"surface": "plane", "patch_mm": 10.0, "noise": 0.03}])
 def test_linear_light_is_left_alone(scene: dict[str, object]) -> None:
     shot = taken(**scene)

@@ -1,8 +1,8 @@
 //! The response from one shot whose phase is known: sorted by their phase, the pixels of a tile are a stack of steps.
 //!
 //! What an albedo or a shadow does to one tile is no wave of its fringes, so that over many tiles only what the response
-//! does remains. The phase itself is the worse for a response that was not undone; decoding and estimating again, two to
-//! five times, ends where both agree.
+//! does remains. The phase itself is the worse for a response that was not undone; decoding and estimating again, a few
+//! times, ends where both agree.
 
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
@@ -25,8 +25,13 @@ const EVEN: f32 = 0.25;
 const SATURATED: f32 = 0.02;
 /// Least amplitude of a tile, fraction of full scale; the mean of a hundred pixels has little noise.
 const MODULATION_MIN: f32 = 0.02;
-/// Tiles that an estimate needs; fewer let the print of a single object decide.
-const TILES_MIN: usize = 24;
+/// Tiles that an estimate for all channels needs, for one that leaves the others alone, and of a channel that takes part; fewer
+/// let the print of a single object decide.
+const TILES_MIN: usize = 48;
+const OWN_TILES_MIN: usize = 60;
+const CHANNEL_TILES_MIN: usize = 6;
+/// Tiles that fit into an image from which on they need not overlap.
+const MANY_TILES: usize = 100;
 /// What undoing the response has to take from the square of the two-step error.
 const GAIN_RAD: f64 = 0.02;
 /// Neighbours whose difference is taken for the slope of the phase: every fourth along rows and columns.
@@ -35,9 +40,9 @@ const STRIDE: usize = 4;
 /// Inverse responses of R, G, B and IR from one shot, `light` as captured, in fractions of full scale, and the phase it
 /// was decoded to, rad, of the first fringe number, NaN where there is none; all `(rows, columns)`.
 ///
-/// `None` for a channel that is linear as far as the shot can tell (to a gamma of about 1.1), or whose fringes fill fewer
-/// than 24 tiles of two and a half fringes. The shot has to be decoded again with what was found, and the estimate
-/// repeated, until it stays: a phase from light that is bent is bent itself.
+/// `None` for a channel that is linear as far as the shot can tell (to a gamma of about 1.1), and where fringes fill too
+/// little of the image; ten fringes by ten are enough. The shot has to be decoded again with what was found, and the
+/// estimate repeated, until it stays: a phase from light that is bent is bent itself.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size.
@@ -76,10 +81,16 @@ pub fn estimate_response_of_shot(
     });
     let traces = means.each_ref().map(traces_of);
     let together: Vec<Trace<'_>> = traces.iter().flatten().copied().collect();
-    if together.len() < TILES_MIN || !pays(0.0, rms_rad(&Samples::new(&together), &Response::default())) {
+    if together.len() < TILES_MIN {
         return Ok([None; 4]);
     }
-    let shared = fit(&Samples::new(&together), offset_bound(&together));
+    let all = Samples::new(&together);
+    let before = rms_rad(&all, &Response::default());
+    if !pays(0.0, before) {
+        return Ok([None; 4]);
+    }
+    let shared = fit(&all, offset_bound(&together));
+    let shared = if pays(rms_rad(&all, &shared), before) { shared } else { Response::default() };
     Ok(traces.each_ref().map(|traces| of_channel(traces, shared)))
 }
 
@@ -87,13 +98,13 @@ pub fn estimate_response_of_shot(
 ///
 /// One projector and one camera bend all channels alike as a rule, and four times the tiles make a steadier estimate.
 fn of_channel(traces: &[Trace<'_>], shared: Response) -> Option<ResponseEstimate> {
-    if traces.len() < TILES_MIN {
+    if traces.len() < CHANNEL_TILES_MIN {
         return None;
     }
     let samples = Samples::new(traces);
     let before = rms_rad(&samples, &Response::default());
     let mut best = (shared, rms_rad(&samples, &shared));
-    if pays(0.0, best.1) {
+    if traces.len() >= OWN_TILES_MIN && pays(0.0, best.1) {
         let own = fit(&samples, offset_bound(traces));
         let after = rms_rad(&samples, &own);
         best = if pays(after, best.1) { (own, after) } else { best };
@@ -128,10 +139,13 @@ fn traces_of(means: &Array2<f32>) -> Vec<Trace<'_>> {
 
 /// Mean light by step of phase, `(tiles, steps)`, of the tiles that show every step and are not saturated.
 fn tiles(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32, side: usize) -> Array2<f32> {
+    // A small image is made the most of: its tiles overlap by half.
     let [rows, columns] = [light.nrows() / side, light.ncols() / side];
-    let mut means = Vec::with_capacity(rows * columns * STEPS);
-    for at in (0..rows * columns).map(|i| [i / columns * side, i % columns * side]) {
-        let tile = s![at[0]..at[0] + side, at[1]..at[1] + side];
+    let step = if rows * columns < MANY_TILES { side / 2 } else { side };
+    let starts = |length: usize| (0..(length + 1).saturating_sub(side)).step_by(step);
+    let mut means = Vec::new();
+    for (y, x) in starts(light.nrows()).flat_map(|y| starts(light.ncols()).map(move |x| (y, x))) {
+        let tile = s![y..y + side, x..x + side];
         means.extend(steps_of(light.slice(tile), phase.slice(tile), scale).into_iter().flatten());
     }
     Array2::from_shape_vec((means.len() / STEPS, STEPS), means).expect("whole tiles")
