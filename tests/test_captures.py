@@ -96,6 +96,15 @@ def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: P
     assert (np.abs(exponents - known.red.exponent) < 0.08).all()
 
 
+def test_the_published_way_takes_the_response_of_the_shot_too(scene: scoring.Scene) -> None:
+    own, linear = (
+        scoring.score(scene, scoring.shape_of(scene, response=response, method="published").phase_rad)
+        for response in (None, Response())
+    )
+    assert own.right_percent > linear.right_percent + 3
+    assert own.right_of_returned_percent > linear.right_of_returned_percent + 3
+
+
 def test_a_capture_whose_response_is_not_undone_is_still_ordered(scene: scoring.Scene) -> None:
     shape = scoring.shape_of(scene, response=Response())
     score = scoring.score(scene, shape.phase_rad)

@@ -132,18 +132,24 @@ def _straightened(shot: AnyShot, plan: Plan) -> tuple[ShotDecoder, Shape]:
     """Decode, with the response that the shot shows if the orders are the surer for it."""
     first = ShotDecoder(shot, plan)
     as_captured = first.shape(shot)
-    decoder, shape = first, as_captured
+    found = _response_of(shot, as_captured, plan)
+    if found is None:
+        return first, as_captured
+    # The published method needs a response more than it can help to find one.
+    best = replace(plan, settings=plan.settings.model_copy(update={"method": "best"}))
     for _ in range(ROUNDS_MAX):
-        found = response_of_shot(shot, shape.phase_rad, plan.fringes.numbers, plan.projector_width_px, plan.calibration)
-        if found is None:
+        shape = ShotDecoder(shot, replace(best, response=found)).shape(shot)
+        before, found = found, _response_of(shot, shape, plan) or found
+        if _close(found, before):
             break
-        settled = _close(found, decoder.plan.response or Response())
-        decoder = ShotDecoder(shot, replace(plan, response=found))
-        shape = decoder.shape(shot)
-        if settled:
-            break
+    decoder = ShotDecoder(shot, replace(plan, response=found))
+    shape = decoder.shape(shot)
     better = order_margin(shape) > order_margin(as_captured)
     return (decoder, shape) if better else (first, as_captured)
+
+
+def _response_of(shot: AnyShot, shape: Shape, plan: Plan) -> Response | None:
+    return response_of_shot(shot, shape.phase_rad, plan.fringes.numbers, plan.projector_width_px, plan.calibration)
 
 
 def _close(one: Response, other: Response) -> bool:
