@@ -15,8 +15,7 @@ from quadfringe.verdict import judge, order_margin
 
 __all__ = ["Plan", "ShotDecoder", "core_device", "decode", "device_model", "kernel_decoder", "own_response"]
 
-# Rounds of decoding and estimating: each halves what is left of the bend, a gamma of 2.2 needs seven.
-ROUNDS_MAX = 8
+ROUNDS_MAX = 8  # of decoding and estimating: each takes a part of the bend out of the phase
 SETTLED = 0.02  # change of the exponents, as a share, at which the rounds end
 
 

@@ -42,7 +42,7 @@ const STRIDE: usize = 4;
 ///
 /// `None` for a channel that is linear as far as the shot can tell (to a gamma of about 1.1), and where fringes fill too
 /// little of the image; ten fringes by ten are enough. The shot has to be decoded again with what was found, and the
-/// estimate repeated, until it stays: a phase from light that is bent is bent itself.
+/// estimate repeated, until it stays: a phase from light that is bent is bent itself. The `pixels` of an estimate are tiles.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size.
