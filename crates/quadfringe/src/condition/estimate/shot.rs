@@ -50,7 +50,7 @@ const STRIDE: usize = 4;
 /// ```
 /// use ndarray::Array2;
 /// use quadfringe::{FringeCode, condition::estimate_response_of_shot};
-/// let code = FringeCode::optimum(6, 912)?;
+/// let code = FringeCode::optimum(36, 912)?;
 /// let phase = Array2::from_shape_fn((300, 400), |(y, x)| 0.3 * x as f32 + 0.05 * y as f32);
 /// let light = code.numbers().map(|n| {
 ///     phase.mapv(|first| (0.5 + 0.4 * (first * (n / code.numbers()[0]) as f32).cos()).powf(2.2))
