@@ -119,12 +119,6 @@ class Calibration(Stored):
     record: CalibrationRecord | None = None
 
 
-def response_known(calibration: Calibration | None, response: Response | None) -> bool:
-    """Tell whether anything is said of how intensities follow the light; linear is something too."""
-    known = calibration and (calibration.response or calibration.crosstalk or calibration.projector_response)
-    return response is not None or bool(known)
-
-
 def conditioning(calibration: Calibration | None, response: Response | None) -> dict[str, Any]:
     """Give what is known about the intensities as the kernel's keywords; `response` stands in for the calibration's."""
     response = response or (calibration.response if calibration else None)

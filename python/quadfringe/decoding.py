@@ -7,7 +7,7 @@ from typing import Any
 
 from quadfringe import _core
 from quadfringe.config import DecodeConfig, Fringes, Response
-from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, conditioning, response_known
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, conditioning
 from quadfringe.errors import InputError
 from quadfringe.optics import core_device, device_model
 from quadfringe.stages import response_of_shot
@@ -96,7 +96,7 @@ def decode(shot: AnyShot, plan: Plan) -> Shape:
     Where neither plan nor calibration know a response, the one that the shot itself shows is undone (`own_response`);
     `config` of the shape then has it, and "response_of_shot" true. Errors as `ShotDecoder`.
     """
-    if response_known(plan.calibration, plan.response):
+    if _response_known(plan):
         return ShotDecoder(shot, plan).decode(shot)
     decoder, shape = _straightened(shot, plan)
     own = {"response_of_shot": decoder.plan.response is not None}
@@ -122,7 +122,7 @@ def own_response(shot: AnyShot, plan: Plan) -> Response | None:
     0.6
     >>> decoder = qf.ShotDecoder(shot, replace(plan, response=response))
     """
-    if response_known(plan.calibration, plan.response):
+    if _response_known(plan):
         raise InputError("this plan knows the response already, from its `response` or its calibration; leave both out")
     return _straightened(shot, plan)[0].plan.response
 
@@ -145,6 +145,12 @@ def _straightened(shot: AnyShot, plan: Plan) -> tuple[ShotDecoder, Shape]:
     shape = decoder.shape(shot)
     better = order_margin(shape) > order_margin(as_captured)
     return (decoder, shape) if better else (first, as_captured)
+
+
+def _response_known(plan: Plan) -> bool:
+    """Tell whether anything is said of how intensities follow the light; that they are linear is something too."""
+    said = conditioning(plan.calibration, plan.response)
+    return not said.keys().isdisjoint(("response", "crosstalk", "projector_response"))
 
 
 def _response_of(shot: AnyShot, shape: Shape, plan: Plan) -> Response | None:
