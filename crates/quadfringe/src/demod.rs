@@ -13,6 +13,7 @@ pub(crate) mod light;
 pub(crate) mod local_fit;
 pub(crate) mod motion;
 mod n_step;
+pub(crate) mod residuals;
 pub(crate) mod scene;
 pub(crate) mod slopes;
 

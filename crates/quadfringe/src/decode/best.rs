@@ -191,8 +191,12 @@ impl Best {
         }
         // All four channels measure the same column.
         let scene = self.full.scene(grid, period_px, 1);
-        let Guide { slopes, noise, backgrounds, joint, .. } = &mut self.guide;
-        let window = Window::new(&scene, slopes, &self.modulation, *noise);
+        let Guide { slopes, noise, backgrounds, joint, residuals, printed, .. } = &mut self.guide;
+        let mut window = Window::new(&scene, slopes, &self.modulation, *noise);
+        // Without colours it is shape that the model misses, and that is not to be averaged away.
+        if *printed {
+            window = window.loosened(residuals);
+        }
         let Unwritten { lent: [first, second], found } = unwritten;
         joint.step(&scene, (backgrounds, self.ratios), &window, &mut self.phase, [first, second], found);
     }

@@ -5,12 +5,13 @@ use super::judge::MISFIT_MAX;
 use super::orders::{Orders, Wrapped};
 use super::{Level, Options};
 use crate::FringeCode;
-use crate::demod::backgrounds::{Backgrounds, ROUGH_ROWS, ROWS};
+use crate::demod::backgrounds::{Backgrounds, Fit};
 use crate::demod::cells::Grid;
 use crate::demod::joint::{Found, Joint};
 use crate::demod::light::LightFinder;
 use crate::demod::local_fit::{LocalFit, PixelMaps};
-use crate::demod::scene::around;
+use crate::demod::residuals::Residuals;
+use crate::demod::scene::{Scene, around};
 use crate::demod::slopes::Slopes;
 use crate::demod::window::{Window, noise};
 use multiversion::multiversion;
@@ -18,6 +19,15 @@ use rayon::prelude::*;
 
 /// Greatest second difference of the phase, in rad, of a surface without tears.
 pub(super) const BEND_MAX: f32 = 0.3;
+/// Further rounds of backgrounds and phase on a print, where windows see several colours.
+const ROUNDS: usize = 3;
+/// Share of the lit pixels beside edges of colours that makes a print.
+const PRINTED: f32 = 0.03;
+/// How much backgrounds believe the phase of a wide window, next to what the light says of it.
+const TRUST: f32 = 0.08;
+/// The same where channels were seen one after another: with more, the ripple of slow motion goes sooner, but what moves too fast
+/// to be told passes for something slower.
+const MOVING_TRUST: f32 = 0.01;
 
 /// What is known of a shot with the help of surroundings.
 pub(super) struct Guide {
@@ -34,6 +44,9 @@ pub(super) struct Guide {
     pub orders: Orders,
     pub backgrounds: Backgrounds,
     pub joint: Joint,
+    pub residuals: Residuals,
+    /// Whether there are edges of colours.
+    pub printed: bool,
     wrapped: Vec<f32>,
     sound: Vec<f32>,
     fit: LocalFit,
@@ -51,6 +64,8 @@ impl Guide {
             orders: Orders::new(code),
             backgrounds: Backgrounds::new(),
             joint: Joint::default(),
+            residuals: Residuals::default(),
+            printed: false,
             wrapped: Vec::new(),
             sound: Vec::new(),
             fit: LocalFit::default(),
@@ -97,28 +112,60 @@ impl Guide {
         };
         self.orders.choose(&scene, &known, &mut self.phase);
         self.backgrounds.start(&scene, &self.fit, &self.slopes, ratios);
-        let limits = (MISFIT_MAX, relative_noise);
-        self.backgrounds.fit(
-            &scene,
-            ratios,
-            [&self.phase, &self.modulation],
-            &self.slopes,
-            limits,
-            ROUGH_ROWS,
-        );
+        let fit = Fit { misfit_max: MISFIT_MAX, relative_noise, rows: 2, trust: 0.0 };
+        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.modulation], &self.slopes, &fit);
         let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
-        let window = Window::new(&scene, &self.slopes, &self.modulation, self.noise).near();
-        let found = &mut Found::nothing(grid.height);
-        self.joint.step(&scene, (&self.backgrounds, ratios), &window, &mut self.phase, [lent, more], found);
-        self.find_tears(grid);
-        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, limits, ROWS);
+        let fit = Fit { rows: 4, ..fit };
+        let trusting = |trust| Fit { trust, ..fit };
+        self.printed = false;
+        self.measure(&scene, ratios, [&mut *lent, &mut *more]);
+        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, &fit);
         // What motion makes of the light is not to be explained by other backgrounds.
-        if options.channel_instants_us.is_none() {
-            self.backgrounds.choose(&scene, ratios, [&self.phase, &self.modulation], self.noise);
+        if options.channel_instants_us.is_some() {
+            self.refit(&scene, ratios, &trusting(MOVING_TRUST), [lent, more]);
+            return;
         }
+        self.choose(&scene, ratios);
+        for _ in 0..ROUNDS {
+            if !self.printed {
+                break;
+            }
+            self.refit(&scene, ratios, &trusting(TRUST), [&mut *lent, &mut *more]);
+            self.choose(&scene, ratios);
+            self.measure(&scene, ratios, [&mut *lent, &mut *more]);
+        }
+    }
+
+    /// Phase by the backgrounds as they are, and its tears; what is missed goes where the wrapped phase was.
+    fn measure(&mut self, scene: &Scene<'_>, ratios: [f32; 3], lent: [&mut [f32]; 2]) {
+        let mut window = Window::new(scene, &self.slopes, &self.modulation, self.noise).near();
+        if self.printed {
+            window = window.loosened(&self.residuals);
+        }
+        let misfit = self.wrapped.chunks_exact_mut(scene.grid.stride).collect();
+        let mut found = Found { misfit, ..Found::nothing(scene.grid.height) };
+        self.joint.step(scene, (&self.backgrounds, ratios), &window, &mut self.phase, lent, &mut found);
+        self.find_tears(scene.grid);
+    }
+
+    /// Backgrounds by the phase of a wide window, which follows the surface and not what wrong backgrounds make of it.
+    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 3], fit: &Fit, lent: [&mut [f32]; 2]) {
+        self.residuals.measure(scene, &self.wrapped, &self.modulation);
+        self.slopes.measure(scene, &self.phase, &self.sound);
+        let window = Window::new(scene, &self.slopes, &self.modulation, self.noise).wide();
+        let window = window.loosened(&self.residuals);
+        self.wrapped.copy_from_slice(&self.phase);
+        let found = &mut Found::nothing(scene.grid.height);
+        self.joint.step(scene, (&self.backgrounds, ratios), &window, &mut self.wrapped, lent, found);
+        self.backgrounds.fit(scene, ratios, [&self.wrapped, &self.sound], &self.slopes, fit);
+    }
+
+    fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
+        let pixels = [self.phase.as_slice(), &self.modulation];
+        self.printed = self.backgrounds.choose(scene, ratios, pixels, self.noise) > PRINTED;
     }
 
     fn find_tears(&mut self, grid: &Grid) {

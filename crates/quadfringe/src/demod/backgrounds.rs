@@ -29,9 +29,6 @@ const OWN_COLOUR_NOISES: f32 = 0.2;
 const OWN_COLOUR_MIN: f32 = 0.01;
 /// Sides of the cells in fringe periods.
 const CELL: f64 = 0.35;
-/// Rows of pixels that stand for a row of cells: in the last fit, and on the way there.
-pub(crate) const ROWS: usize = 4;
-pub(crate) const ROUGH_ROWS: usize = 2;
 /// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
 const MATRIX: usize = 36;
 /// The same with the right hand side.
@@ -45,7 +42,27 @@ pub(crate) struct Backgrounds {
     next: CellMaps,
     sums: CellMaps,
     choice: Choice,
-    slots: Slots<([RowMaps; 2], CellWork)>,
+    slots: Slots<(Rows, CellWork)>,
+}
+
+/// Working rows.
+#[derive(Debug, Default)]
+struct Rows {
+    maps: RowMaps,
+    losses: RowMaps,
+    usable: Vec<f32>,
+}
+
+/// How backgrounds are fitted.
+pub(crate) struct Fit {
+    /// Pixels that are further from any model than this many times their modulation (root mean square) take no part.
+    pub misfit_max: f32,
+    /// Noise over modulation.
+    pub relative_noise: f32,
+    /// Rows of pixels that stand for a row of cells.
+    pub rows: usize,
+    /// How much the given phase counts, next to what the light says of it.
+    pub trust: f32,
 }
 
 impl Backgrounds {
@@ -100,9 +117,9 @@ impl Backgrounds {
     }
 
     /// Let every pixel choose among the backgrounds around it. The pixels' phase and modulation are those of the last fit, and the
-    /// intensities have the standard deviation `noise`.
-    pub fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3], pixels: [&[f32]; 2], noise: f32) {
-        self.choice.make((&self.grid, &self.maps), scene, ratios, pixels, noise);
+    /// intensities have the standard deviation `noise`. Returns the share of the lit pixels that take those of another place.
+    pub fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3], pixels: [&[f32]; 2], noise: f32) -> f32 {
+        self.choice.make((&self.grid, &self.maps), scene, ratios, pixels, noise)
     }
 
     /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.
@@ -111,30 +128,33 @@ impl Backgrounds {
         [0, 2, 4, 6].map(|c| [c, c + 1].map(|k| self.maps.line(row / times, k)[column / times]))
     }
 
-    /// Fit them to an absolute phase in rad by `most` rows of pixels for a row of cells. Pixels that are further from any such model
-    /// than `misfit_max` times their modulation (root mean square) take no part. `relative_noise` is the noise over the modulation.
+    /// Fit them to an absolute phase in rad. Pixels that have chosen another place say nothing of their own.
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
         ratios: [f32; 3],
         [phase, modulation]: [&[f32]; 2],
         slopes: &Slopes,
-        (misfit_max, relative_noise): (f32, f32),
-        most: usize,
+        fit: &Fit,
     ) {
-        let Self { grid, maps, next, sums, slots, .. } = self;
+        let Self { grid, maps, next, sums, slots, choice } = self;
+        let &Fit { misfit_max, relative_noise, rows: most, trust } = fit;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
-        grid.window_sums::<SUMS, [RowMaps; 2]>(
+        grid.window_sums::<SUMS, Rows>(
             (sigma, most),
             slots,
             sums,
             next,
-            |[rows, losses], y, sums| {
-                let model = rows.sample::<8>(grid, maps, 0, y);
-                let [phase, modulation, usable] =
-                    [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
+            |rows, y, sums| {
+                let Rows { maps: model, losses, usable } = rows;
+                let model = model.sample::<8>(grid, maps, 0, y);
+                usable.clear();
+                usable.extend_from_slice(scene.row(scene.usable, y));
+                choice.leave_out(y, usable);
+                let [phase, modulation] = [phase, modulation].map(|plane| scene.row(plane, y));
                 let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
-                add_projected(model, pixels, scene.rows(y), ratios, 4.0 * misfit_max * misfit_max, sums);
+                let limits = [4.0 * misfit_max * misfit_max, trust];
+                add_projected(model, pixels, scene.rows(y), ratios, limits, sums);
             },
             |row, sums, out| {
                 let before: [&[f32]; 8] = std::array::from_fn(|k| maps.line(row, k));
@@ -149,7 +169,7 @@ impl Backgrounds {
         let Self { grid, maps, next, sums, slots, .. } = self;
         let sigma = SURROUNDINGS * scene.period_px as f32 / grid.step as f32;
         let own = &*next;
-        grid.smooth::<8, [RowMaps; 2]>(
+        grid.smooth::<8, Rows>(
             sigma,
             slots,
             sums,
@@ -196,7 +216,7 @@ fn add_projected(
     pixels: [&[f32]; 4],
     light: [&[f32]; 4],
     ratios: [f32; 3],
-    misfit_max: f32,
+    limits: [f32; 2],
     sums: &mut [[Lanes; SUMS]],
 ) {
     let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
@@ -208,7 +228,7 @@ fn add_projected(
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
             let pixel = [phase[x], modulation[x], usable[x], loss[x]];
-            let own = project(model, pixel, seen, ratios, misfit_max);
+            let own = project(model, pixel, seen, ratios, limits);
             for k in 0..SUMS {
                 terms[k][x] = own[k];
             }
@@ -217,14 +237,14 @@ fn add_projected(
     }
 }
 
-/// Terms of one pixel.
+/// Terms of one pixel. An error of its phase is projected out as far as its light knows better than the one given.
 #[inline(always)]
 fn project(
     model: [f32; 8],
     [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
     ratios: [f32; 3],
-    misfit_max: f32,
+    [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
     let (cosines, derivatives) = carriers(phase, ratios, loss);
     let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
@@ -237,6 +257,7 @@ fn project(
         dd += d[c] * d[c];
         ms += m[c] * seen[c];
     }
+    dd += trust * mm;
     // Projector onto what neither m (albedo) nor d (phase) can explain.
     let determinant = mm * dd - md * md;
     let inverse = 1.0 / if determinant > 1e-12 { determinant } else { 1e-12 };
@@ -285,16 +306,54 @@ mod tests {
     use super::*;
     use std::f32::consts::TAU;
 
+    const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
+
+    #[test]
+    fn a_window_on_two_colours_keeps_its_size() {
+        let grid = Grid::new([96, 256], 4.0);
+        let phase: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
+        let colours = [
+            [[0.5, 0.4], [0.2, 0.15], [0.6, 0.45], [0.4, 0.35]],
+            [[0.3, 0.25], [0.5, 0.4], [0.2, 0.15], [0.4, 0.3]],
+        ];
+        let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
+            let seen = |i: usize| {
+                let [a, b] = colours[usize::from(i % 256 >= 128)][c];
+                a + b * carriers(phase[i], RATIOS, 0.0).0[c]
+            };
+            (0..grid.pixels()).map(seen).collect()
+        });
+        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
+        let light = planes.each_ref().map(Vec::as_slice);
+        let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+        let (mut fit, mut found, slopes) = (LocalFit::default(), Backgrounds::new(), Slopes::flat(&grid));
+        let (mut wrapped, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
+        let maps = super::super::local_fit::PixelMaps { phase: &mut wrapped, modulation: &mut spare };
+        fit.run(&scene, &usable, 0.02, maps);
+        found.start(&scene, &fit, &slopes, RATIOS);
+        let size_at = |found: &Backgrounds| {
+            let mut maps = RowMaps::default();
+            let rows = found.sample_own(&scene, 48, &mut maps);
+            rows.map(|row| row[128].powi(2)).iter().sum::<f32>().sqrt()
+        };
+        let before = size_at(&found);
+        for _ in 0..6 {
+            let fit = Fit { misfit_max: 1.0, relative_noise: 0.0, rows: 4, trust: 0.0 };
+            found.fit(&scene, RATIOS, [&phase, &modulation], &slopes, &fit);
+        }
+        let after = size_at(&found);
+        assert!((after / before - 1.0).abs() < 0.15, "{before} {after}");
+    }
+
     #[test]
     fn backgrounds_are_found_whatever_the_texture_and_an_error_of_the_phase() {
         let grid = Grid::new([96, 256], 4.0);
-        let ratios = [1.0, 35.0 / 36.0, 30.0 / 36.0];
         let truth: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
         let texture = |i: usize| 0.7 + 0.2 * ((i / 256) as f32 * 0.9).sin() * ((i % 256) as f32 * 0.7).cos();
         let fringes = [[0.5, 0.4], [0.45, 0.38], [0.55, 0.42], [0.4, 0.37]];
         let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
             let [a, b] = fringes[c];
-            (0..grid.pixels()).map(|i| texture(i) * (a + b * carriers(truth[i], ratios, 0.0).0[c])).collect()
+            (0..grid.pixels()).map(|i| texture(i) * (a + b * carriers(truth[i], RATIOS, 0.0).0[c])).collect()
         });
         let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
         let light = planes.each_ref().map(Vec::as_slice);
@@ -303,16 +362,17 @@ mod tests {
         let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
         let maps = super::super::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
         fit.run(&scene, &usable, 0.02, maps);
-        found.start(&scene, &fit, &slopes, ratios);
+        found.start(&scene, &fit, &slopes, RATIOS);
         // The phase given is 0.05 rad off, as a two-step phase with wrong backgrounds is.
         let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
         for _ in 0..3 {
-            found.fit(&scene, ratios, [&phase, &modulation], &slopes, (0.3, 0.0), ROWS);
+            let fit = Fit { misfit_max: 0.3, relative_noise: 0.0, rows: 4, trust: 0.0 };
+            found.fit(&scene, RATIOS, [&phase, &modulation], &slopes, &fit);
         }
         let mut maps = RowMaps::default();
         let rows = found.sample(&scene, 48, &mut maps);
         for x in 40..216 {
-            // Only ratios are defined.
+            // Only RATIOS are defined.
             let scale = rows[0][x] / fringes[0][0];
             for c in 0..4 {
                 let (a, b) = (rows[2 * c][x] / scale, rows[2 * c + 1][x] / scale);

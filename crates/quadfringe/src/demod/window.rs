@@ -6,6 +6,7 @@
 
 use super::cells::RowMaps;
 use super::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
+use super::residuals::Residuals;
 use super::scene::Scene;
 use super::slopes::Slopes;
 use crate::angle::wrap;
@@ -16,6 +17,8 @@ use std::f32::consts::TAU;
 
 /// Width (sigma) of the window in fringe periods.
 const WIDTH: f32 = 0.125;
+/// Width (sigma) of a window that averages over what wrong backgrounds do to the phase, in fringe periods.
+const WIDE: f32 = 0.5;
 /// Neighbours further off than this many noise widths belong to another surface.
 const REACH_SIGMAS: f32 = 7.0;
 /// The same for a capture without noise.
@@ -31,9 +34,12 @@ pub(crate) struct Window<'a> {
     scene: &'a Scene<'a>,
     slopes: &'a Slopes,
     modulation: &'a [f32],
+    /// Neighbours to each side, and their distance from one to the next in pixels.
     radius: usize,
+    spacing: usize,
     sigma: f32,
     noise: f32,
+    residuals: Option<&'a Residuals>,
 }
 
 /// A phase averaged along rows, and its weight.
@@ -49,6 +55,7 @@ pub(crate) struct WindowRows {
     maps: RowMaps,
     slopes: Vec<f32>,
     sharpness: Vec<f32>,
+    residuals: RowMaps,
     weight: Vec<f32>,
     padded: [Vec<f32>; 4],
 }
@@ -58,7 +65,8 @@ impl<'a> Window<'a> {
     /// where there is no light.
     pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
         let sigma = (WIDTH * scene.period_px as f32).clamp(0.8, 6.0);
-        Self { scene, slopes, modulation, radius: (2.0 * sigma).ceil() as usize, sigma, noise }
+        let radius = (2.0 * sigma).ceil() as usize;
+        Self { scene, slopes, modulation, radius, spacing: 1, sigma, noise, residuals: None }
     }
 
     /// Modulation of row `y`, 0 where there is no light.
@@ -76,6 +84,19 @@ impl<'a> Window<'a> {
         Self { radius: self.radius.min(2), ..self }
     }
 
+    /// The same with a reach of a whole fringe: what wrong backgrounds do to the phase changes its sign along a fringe.
+    pub fn wide(self) -> Self {
+        let sigma = WIDE * self.scene.period_px as f32;
+        // A third of sigma apart neighbours still add up to a smooth window.
+        let spacing = (sigma / 3.0).max(1.0) as usize;
+        Self { sigma, spacing, radius: (2.0 * sigma / spacing as f32).ceil() as usize, ..self }
+    }
+
+    /// The same where the model leaves `residuals` above the noise: phases of one surface differ by as much there.
+    pub fn loosened(self, residuals: &'a Residuals) -> Self {
+        Self { residuals: Some(residuals), ..self }
+    }
+
     /// Average along row `y`: a phase and the normal equations of a step of it, `numerator / denominator` and 0 where there is
     /// nothing to measure by, are replaced by phase plus mean step, and weight.
     pub fn along(
@@ -85,24 +106,29 @@ impl<'a> Window<'a> {
         numerator: &[f32],
         [phase, denominator]: [&mut [f32]; 2],
     ) {
-        let (grid, radius) = (self.scene.grid, self.radius);
-        let WindowRows { maps, sharpness, padded, .. } = rows;
+        let (grid, reach) = (self.scene.grid, self.reach());
+        let WindowRows { maps, sharpness, residuals, padded, .. } = rows;
         let slope = self.slopes.along(self.scene, y, maps);
-        self.sharpen(y, sharpness);
+        self.sharpen(y, residuals, sharpness);
         for (row, source) in padded.iter_mut().zip([&*phase, numerator, &*denominator, slope]) {
             row.clear();
-            row.resize(radius, 0.0);
+            row.resize(reach, 0.0);
             row.extend_from_slice(&source[..grid.width]);
-            row.resize(2 * radius + grid.stride, 0.0);
+            row.resize(2 * reach + grid.stride, 0.0);
         }
-        let taps = self.taps(0..2 * radius + 1);
+        let taps = self.taps(0..2 * self.radius + 1);
         let padded = padded.each_ref().map(Vec::as_slice);
-        average_along(&taps, padded, [slope, sharpness], [phase, denominator]);
+        average_along((&taps, self.spacing), padded, [slope, sharpness], [phase, denominator]);
+    }
+
+    /// Furthest neighbour in pixels.
+    fn reach(&self) -> usize {
+        self.spacing * self.radius
     }
 
     /// Half distances in cells and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
     fn taps(&self, numbers: std::ops::Range<usize>) -> Vec<[f32; 2]> {
-        let distance = |k: usize| k as f32 - self.radius as f32;
+        let distance = |k: usize| self.spacing as f32 * (k as f32 - self.radius as f32);
         let half = 0.5 / self.scene.grid.step as f32;
         numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
     }
@@ -146,10 +172,10 @@ impl<'a> Window<'a> {
 
     /// Slopes of the rows that `count` rows from `first` on need.
     fn slopes_down(&self, first: usize, count: usize, rows: &mut WindowRows) {
-        let stride = self.scene.grid.stride;
-        rows.slopes.resize((BLOCK + 2 * self.radius) * stride, 0.0);
-        for (k, line) in rows.slopes.chunks_exact_mut(stride).take(count + 2 * self.radius).enumerate() {
-            let y = (first + k).saturating_sub(self.radius).min(self.scene.grid.height - 1);
+        let (stride, reach) = (self.scene.grid.stride, self.reach());
+        rows.slopes.resize((BLOCK + 2 * reach) * stride, 0.0);
+        for (k, line) in rows.slopes.chunks_exact_mut(stride).take(count + 2 * reach).enumerate() {
+            let y = (first + k).saturating_sub(reach).min(self.scene.grid.height - 1);
             line.copy_from_slice(self.slopes.down(self.scene, y, &mut rows.maps));
         }
     }
@@ -164,13 +190,14 @@ impl<'a> Window<'a> {
         out: [&mut [f32]; 2],
     ) {
         let grid = self.scene.grid;
-        self.sharpen(y, &mut rows.sharpness);
-        let slope = |k: usize| &rows.slopes[(index + k) * grid.stride..][..grid.stride];
+        self.sharpen(y, &mut rows.residuals, &mut rows.sharpness);
+        let slope = |k: usize| &rows.slopes[(index + self.spacing * k) * grid.stride..][..grid.stride];
         // Neighbours inside the image.
-        let inside = self.radius.saturating_sub(y)..(grid.height + self.radius - y).min(2 * self.radius + 1);
+        let [above, below] = [y, grid.height - 1 - y].map(|rows| (rows / self.spacing).min(self.radius));
+        let inside = self.radius - above..self.radius + below + 1;
         let there: Vec<[&[f32]; 3]> = (inside.clone())
             .map(|k| {
-                let row = y + k - self.radius;
+                let row = y + self.spacing * k - self.reach();
                 [self.scene.row(average.phase, row), self.scene.row(average.weight, row), slope(k)]
             })
             .collect();
@@ -179,19 +206,25 @@ impl<'a> Window<'a> {
     }
 
     /// How sharply a misfit counts at every pixel of a row: one over the square of what still belongs to the surface.
-    fn sharpen(&self, y: usize, sharpness: &mut Vec<f32>) {
-        sharpness.resize(self.scene.grid.stride, 0.0);
-        sharpen(self.modulation(y), REACH_SIGMAS * self.noise, sharpness);
+    fn sharpen(&self, y: usize, maps: &mut RowMaps, sharpness: &mut Vec<f32>) {
+        sharpness.clear();
+        match self.residuals {
+            None => sharpness.resize(self.scene.grid.stride, 0.0),
+            Some(residuals) => sharpness.extend_from_slice(residuals.row(self.scene, y, maps)),
+        }
+        sharpen(self.modulation(y), self.noise, sharpness);
     }
 }
 
+/// Mean square residuals become what [`Window::sharpen`] says.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn sharpen(modulation: &[f32], reach: f32, sharpness: &mut [f32]) {
-    for (sharp, &modulation) in sharpness.iter_mut().zip(modulation) {
-        let reach = reach / if modulation > 1e-6 { modulation } else { 1e-6 };
-        let reach = if reach > REACH_RAD { reach } else { REACH_RAD };
-        let reach = if reach < TAU { reach } else { TAU };
-        *sharp = 1.0 / (reach * reach);
+fn sharpen(modulation: &[f32], noise: f32, squares: &mut [f32]) {
+    for (square, &modulation) in squares.iter_mut().zip(modulation) {
+        let light = if modulation > 1e-6 { modulation } else { 1e-6 };
+        let missed = if *square > noise * noise { *square } else { noise * noise };
+        let reach = REACH_SIGMAS * REACH_SIGMAS * missed / (light * light);
+        let reach = if reach > REACH_RAD * REACH_RAD { reach } else { REACH_RAD * REACH_RAD };
+        *square = 1.0 / if reach < TAU * TAU { reach } else { TAU * TAU };
     }
 }
 
@@ -206,14 +239,19 @@ fn fit(d: f32, sharpness: f32) -> f32 {
 /// Average over neighbours along a row, as far as they fit: the phase between two pixels is the mean of their slopes
 /// times their distance, which is exact for a surface of constant curvature.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average_along(taps: &[[f32; 2]], there: [&[f32]; 4], here: [&[f32]; 2], out: [&mut [f32]; 2]) {
+fn average_along(
+    (taps, spacing): (&[[f32; 2]], usize),
+    there: [&[f32]; 4],
+    here: [&[f32]; 2],
+    out: [&mut [f32]; 2],
+) {
     let here = here.map(lanes);
     let mut out = out.map(lanes_mut);
     for i in 0..here[0].len() {
         let ([slope, sharpness], phase) = (take(&here, i), out[0][i]);
         let mut sums = [[0.0; LANES]; 2];
         for (k, &[half, near]) in taps.iter().enumerate() {
-            let from = i * LANES + k;
+            let from = i * LANES + k * spacing;
             let [other, numerator, denominator, other_slope]: [&Lanes; 4] =
                 there.map(|row| row[from..].first_chunk().expect("rows are padded"));
             for x in 0..LANES {
@@ -282,6 +320,52 @@ mod tests {
     use super::super::cells::Grid;
     use super::*;
 
+    /// A phase averaged by a window that counts every pixel alike.
+    fn averaged(window: &Window<'_>, seen: &[f32]) -> Vec<f32> {
+        let grid = window.scene.grid;
+        let (mut along, mut weight) = (seen.to_vec(), vec![1.0; grid.pixels()]);
+        let mut rows = WindowRows::default();
+        let lines = along.chunks_mut(grid.stride).zip(weight.chunks_mut(grid.stride));
+        for (y, (phase, weight)) in lines.enumerate() {
+            window.along(y, &mut rows, &vec![0.0; grid.stride], [phase, weight]);
+        }
+        let average = Average { phase: &along, weight: &weight };
+        let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
+        let mut lines: Vec<_> = information.chunks_mut(grid.stride).collect();
+        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut lines);
+        phase
+    }
+
+    #[test]
+    fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
+        let grid = Grid::new([96, 256], 4.0);
+        // What wrong backgrounds do to a two-step phase, beside a step of 1.3 rad.
+        let truth = |i: usize| 0.25 * (i % 256) as f32 + if i % 256 >= 128 { 1.3 } else { 0.0 };
+        let ripple = |i: usize| 0.05 * (2.0 * truth(i)).sin();
+        let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + ripple(i)).collect();
+        let light = vec![0.5; grid.pixels()];
+        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
+        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+        let mut slopes = Slopes::default();
+        slopes.measure(&scene, &seen, &modulation);
+        let mut residuals = Residuals::default();
+        residuals.measure(&scene, &vec![(0.04f32 * 0.4).powi(2); grid.pixels()], &modulation);
+        let window = || Window::new(&scene, &slopes, &modulation, 1e-4);
+        let worst = |phase: &[f32], columns: std::ops::Range<usize>| {
+            let inside = |i: &usize| (32..64).contains(&(i / 256)) && columns.contains(&(i % 256));
+            let errors = (0..grid.pixels()).filter(inside).map(|i| (phase[i] - truth(i)).abs());
+            errors.fold(0.0, f32::max)
+        };
+        let flat = 40..88;
+        let [narrow, strict, wide] =
+            [window().loosened(&residuals), window().wide(), window().wide().loosened(&residuals)]
+                .map(|window| averaged(&window, &seen));
+        let [narrow, strict, loose] = [&narrow, &strict, &wide].map(|phase| worst(phase, flat.clone()));
+        assert!(loose < 0.012 && strict > 0.04 && narrow > 0.015, "{narrow} {strict} {loose}");
+        // The step is none of it.
+        assert!(worst(&wide, 112..144) < 0.15, "{}", worst(&wide, 112..144));
+    }
+
     #[test]
     fn noise_goes_edges_and_curvature_stay() {
         let grid = Grid::new([64, 128], 4.0);
@@ -303,15 +387,7 @@ mod tests {
         let mut slopes = Slopes::default();
         slopes.measure(&scene, &seen, &modulation);
         let window = Window::new(&scene, &slopes, &modulation, noise(&scene, &seen, &modulation));
-        let (mut along, mut weight) = (seen.clone(), vec![1.0; grid.pixels()]);
-        let mut rows = WindowRows::default();
-        for (y, (phase, weight)) in along.chunks_mut(128).zip(weight.chunks_mut(128)).enumerate() {
-            window.along(y, &mut rows, &[0.0; 128], [phase, weight]);
-        }
-        let average = Average { phase: &along, weight: &weight };
-        let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
-        let mut lines: Vec<_> = information.chunks_mut(128).collect();
-        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut lines);
+        let phase = averaged(&window, &seen);
         let error = |i: usize| (phase[i] - truth(i)).abs();
         let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
         // Beside the step its rise leaks into the slopes.

@@ -80,8 +80,18 @@ impl Choice {
         self.places.clear();
     }
 
+    /// Put 0 where the pixels of row `y` have chosen another place.
+    pub fn leave_out(&self, y: usize, usable: &mut [f32]) {
+        if self.places.is_empty() {
+            return;
+        }
+        for (usable, &place) in usable.iter_mut().zip(&self.places[y * self.stride..][..self.stride]) {
+            *usable = if place == 0 { *usable } else { 0.0 };
+        }
+    }
+
     /// Choose among backgrounds on a grid of cells over a scene, by how well the four intensities fit, whatever the albedo and to
-    /// first order whatever the phase.
+    /// first order whatever the phase. Returns the share of the lit pixels that do not take their own.
     pub fn make(
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
@@ -89,7 +99,7 @@ impl Choice {
         ratios: [f32; 3],
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
-    ) {
+    ) -> f32 {
         let Self { places, stride, aside, slots } = self;
         (*stride, *aside) = (grid.stride, (ASIDE * scene.period_px as f32).round().max(1.0) as usize);
         let aside = *aside as isize;
@@ -125,6 +135,8 @@ impl Choice {
                 }
             },
         );
+        let chosen = count(places, |place| *place != 0);
+        chosen as f32 / count(modulation, |light| *light > 0.0).max(1) as f32
     }
 
     /// Put what the pixels of row `y` have chosen into the backgrounds of that row; the cells lie over the scene of the fit or over
@@ -246,6 +258,10 @@ fn take_better(place: u8, missed: &[f32], best: &mut [f32], places: &mut [u8]) {
     }
 }
 
+fn count<T: Sync>(values: &[T], which: impl Fn(&T) -> bool + Sync) -> usize {
+    values.par_chunks(1 << 14).map(|values| values.iter().filter(|value| which(value)).count()).sum()
+}
+
 /// A row with its ends repeated: `reach` times before, and behind as far as there are `stride + 2 reach` numbers.
 fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
     out.clear();
@@ -352,15 +368,21 @@ mod tests {
             Self { grid, colours, maps, phase, light }
         }
 
-        /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
-        /// neighbours.
-        fn errors(&self, noise: f32) -> [f32; 2] {
+        /// What the pixels choose, and the share of them that take another place.
+        fn choose(&self, noise: f32) -> (Choice, f32) {
             let (grid, lit) = (&self.grid, vec![1.0; self.grid.pixels()]);
             let light = self.light.each_ref().map(Vec::as_slice);
             let scene = Scene { light, usable: &lit, grid, period_px: 25.0, factor: 1 };
             let mut choice = Choice::default();
             let modulation = vec![0.2; grid.pixels()];
-            choice.make((grid, &self.maps), &scene, RATIOS, [&self.phase, &modulation], noise);
+            let share = choice.make((grid, &self.maps), &scene, RATIOS, [&self.phase, &modulation], noise);
+            (choice, share)
+        }
+
+        /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
+        /// neighbours.
+        fn errors(&self, choice: &Choice) -> [f32; 2] {
+            let grid = &self.grid;
             let mut rows = RowMaps::default();
             let mut sampled = rows.sample_mut::<8>(grid, &self.maps, 0, 30);
             let error = |rows: &[&mut [f32]; 8]| {
@@ -380,15 +402,30 @@ mod tests {
     fn pixels_beside_an_edge_take_the_backgrounds_of_their_side() {
         let colours =
             [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
-        let [own, chosen] = Edge::new(colours).errors(1e-3);
+        let edge = Edge::new(colours);
+        let (choice, share) = edge.choose(1e-3);
+        let [own, chosen] = edge.errors(&choice);
         assert!(own > 0.1, "{own}");
         assert!(chosen < 0.02, "{chosen}");
+        // Those are the pixels that see a mixture in their own place, and they are left out of the next fit.
+        let mut usable = vec![1.0; 256];
+        choice.leave_out(30, &mut usable);
+        let left_out: Vec<usize> = (0..256).filter(|&x| usable[x] == 0.0).collect();
+        assert!(left_out.iter().all(|x| (112..144).contains(x)), "{left_out:?}");
+        assert!(
+            (118..138).filter(|x| !(127..130).contains(x)).all(|x| left_out.contains(&x)),
+            "{left_out:?}"
+        );
+        assert!((0.04..0.13).contains(&share), "{share}");
     }
 
     #[test]
     fn what_noise_explains_stays_where_it_is() {
         let colours = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
-        let [own, chosen] = Edge::new(colours).errors(0.03);
+        let edge = Edge::new(colours);
+        let (choice, share) = edge.choose(0.03);
+        let [own, chosen] = edge.errors(&choice);
         assert_eq!(own, chosen);
+        assert_eq!(share, 0.0);
     }
 }
