@@ -139,7 +139,13 @@ def test_the_command_line_says_it(tmp_path: Path) -> None:
     assert "quadfringe calibrate response" in run.stdout
     told = {one["name"]: one for one in json.loads((tmp_path / "d.json").read_text())["findings"]}
     assert told["response"]["grade"] == "fault"
-    known = CliRunner().invoke(app, ["doctor", str(tmp_path), str(tmp_path / "c.json")])
+    # Under room light the exponent alone does not make the light linear, however well it is known.
+    lit = CliRunner().invoke(app, ["doctor", str(tmp_path), str(tmp_path / "c.json")])
+    assert (lit.exit_code, "estimate it again" in lit.stdout) == (1, True)
+    dark, _ = shot_of(projector_exponent=2.0, ambient=(0.0,) * 4)
+    (tmp_path / "dark").mkdir()
+    write_shot(tmp_path / "dark", dark)
+    known = CliRunner().invoke(app, ["doctor", str(tmp_path / "dark"), str(tmp_path / "c.json")])
     assert known.exit_code == 0, known.output
     assert CliRunner().invoke(app, ["doctor", str(tmp_path / "none")]).exit_code == 2
     empty = tmp_path / "empty"

@@ -163,6 +163,8 @@ impl Guide {
         self.backgrounds.fit(scene, ratios, [&self.wrapped, &self.sound], &self.slopes, fit);
     }
 
+    /// Lets every pixel of an object of several colours take the backgrounds of the side that explains it, and notes
+    /// whether enough of them moved for a print.
     fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
         let pixels = [self.phase.as_slice(), &self.modulation];
         self.printed = self.backgrounds.choose(scene, ratios, pixels, self.noise) > PRINTED;

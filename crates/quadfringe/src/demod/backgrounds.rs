@@ -372,7 +372,7 @@ mod tests {
         let mut maps = RowMaps::default();
         let rows = found.sample(&scene, 48, &mut maps);
         for x in 40..216 {
-            // Only RATIOS are defined.
+            // Only ratios are defined.
             let scale = rows[0][x] / fringes[0][0];
             for c in 0..4 {
                 let (a, b) = (rows[2 * c][x] / scale, rows[2 * c + 1][x] / scale);
