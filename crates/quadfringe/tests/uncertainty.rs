@@ -80,13 +80,13 @@ fn hold_shares(method: Method, surfaces: &[&str], below: [f64; 3], above: [f64; 
 fn errors_of_the_best_method_are_as_large_as_it_says() {
     // With little noise it is the method that is off: by less than is said on a plane, by more beside the shadows of the steps.
     let surfaces = ["plane", "peaks", "steps", "sphere"];
-    hold_shares(Method::Best, &surfaces, [0.04, 0.04, 0.03], [0.13, 0.04, 0.003]);
+    hold_shares(Method::Best, &surfaces, [0.04, 0.04, 0.03], [0.11, 0.035, 0.003]);
 }
 
 /// Features smaller than the window are smoothed away by all four channels alike, which none of them can tell.
 #[test]
 fn errors_on_small_features_are_little_larger_than_it_says() {
-    hold_shares(Method::Best, &["face"], [0.1, 0.12, 0.09], [0.06, 0.025, 0.003]);
+    hold_shares(Method::Best, &["face"], [0.06, 0.1, 0.08], [0.04, 0.02, 0.003]);
 }
 
 #[test]

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 /// Cells in a fringe period, at least.
 const CELLS: f64 = 3.4;
 /// Pixels in a fringe period of the image that guides, at least.
-const GUIDE_PERIOD_PX: f64 = 12.0;
+const GUIDE_PERIOD_PX: f64 = 6.0;
 /// Pixels that interpolated light reaches into a shadow.
 const MOSAIC_BLUR_PX: usize = 1;
 /// Times that the light of a moving surface is brought to one instant and decoded again.
@@ -196,6 +196,8 @@ impl Best {
         // Without colours it is shape that the model misses, and that is not to be averaged away.
         if *printed {
             window = window.loosened(residuals);
+            // Edges of colours are as sharp as the image.
+            backgrounds.choose(&scene, self.ratios, [&self.phase, &self.modulation], slopes, *noise);
         }
         let Unwritten { lent: [first, second], found } = unwritten;
         joint.step(&scene, (backgrounds, self.ratios), &window, &mut self.phase, [first, second], found);

@@ -126,6 +126,7 @@ impl Guide {
         // What motion makes of the light is not to be explained by other backgrounds.
         if options.channel_instants_us.is_some() {
             self.refit(&scene, ratios, &trusting(MOVING_TRUST), [lent, more]);
+            self.slopes.refine(&scene, &self.phase, &self.sound);
             return;
         }
         self.choose(&scene, ratios);
@@ -136,6 +137,10 @@ impl Guide {
             self.refit(&scene, ratios, &trusting(TRUST), [&mut *lent, &mut *more]);
             self.choose(&scene, ratios);
             self.measure(&scene, ratios, [&mut *lent, &mut *more]);
+        }
+        // The phase of a print still follows its colours, and its slopes would too.
+        if !self.printed {
+            self.slopes.refine(&scene, &self.phase, &self.sound);
         }
     }
 
@@ -167,7 +172,7 @@ impl Guide {
     /// whether enough of them moved for a print.
     fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
         let pixels = [self.phase.as_slice(), &self.modulation];
-        self.printed = self.backgrounds.choose(scene, ratios, pixels, self.noise) > PRINTED;
+        self.printed = self.backgrounds.choose(scene, ratios, pixels, &self.slopes, self.noise) > PRINTED;
     }
 
     fn find_tears(&mut self, grid: &Grid) {

@@ -39,8 +39,9 @@ impl Level {
         });
     }
 
-    /// The image with the mean of every `factor` x `factor` pixels of `fine`; of the masks the least counts. Beyond the last
-    /// row it repeats; beyond the last column pixels count as far as they exist.
+    /// The image with the mean of every `factor` x `factor` pixels of `fine`, lit where all of them are and usable where half of
+    /// them are; so what lies in part beyond the last row or column is dark. Light repeats beyond the last row; beyond the last
+    /// column pixels count as far as they exist.
     pub fn shrink(&mut self, fine: &Self, [grid, fine_grid]: [&Grid; 2], factor: usize) {
         self.resize(grid.pixels());
         let planes = self.light.each_mut().map(|plane| plane.par_chunks_mut(grid.stride));
@@ -48,26 +49,37 @@ impl Level {
         let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
         let rows = red.zip(green).zip(blue.zip(infrared)).zip(masks).enumerate();
         rows.for_each(|(row, (((red, green), (blue, infrared)), (lit, usable)))| {
-            let sources = |plane: &'_ [f32]| -> Vec<usize> {
-                debug_assert_eq!(plane.len(), fine_grid.pixels());
-                (0..factor).map(|i| (row * factor + i).min(fine_grid.height - 1) * fine_grid.stride).collect()
-            };
             let light = [red, green, blue, infrared].into_iter().zip(&fine.light);
             for (out, plane) in light {
-                let rows: Vec<&[f32]> =
-                    sources(plane).iter().map(|&at| &plane[at..][..fine_grid.stride]).collect();
-                mean(factor, &rows, out);
+                mean(factor, &rows_of(plane, fine_grid, row, factor), out);
                 if !fine_grid.width.is_multiple_of(factor) {
                     // The padding is dark.
                     out[grid.width - 1] *= factor as f32 / (fine_grid.width % factor) as f32;
                 }
             }
-            for (out, plane) in [(lit, &fine.lit), (usable, &fine.usable)] {
-                let rows: Vec<&[f32]> =
-                    sources(plane).iter().map(|&at| &plane[at..][..fine_grid.stride]).collect();
-                least(factor, &rows, out);
+            least(factor, &rows_of(&fine.lit, fine_grid, row, factor), lit);
+            if (row + 1) * factor > fine_grid.height {
+                // Its phase would be that of another place than its middle.
+                lit.fill(0.0);
             }
+            // Noise takes single pixels of a crest beyond full scale; without the crest nothing of the fringe would fit.
+            mean(factor, &rows_of(&fine.usable, fine_grid, row, factor), usable);
+            at_least_half(lit, usable);
         });
+    }
+}
+
+/// The rows of `plane` that make up row `row` of an image with `factor` times fewer.
+fn rows_of<'a>(plane: &'a [f32], grid: &Grid, row: usize, factor: usize) -> Vec<&'a [f32]> {
+    debug_assert_eq!(plane.len(), grid.pixels());
+    let place = |i: usize| (row * factor + i).min(grid.height - 1) * grid.stride;
+    (0..factor).map(|i| &plane[place(i)..][..grid.stride]).collect()
+}
+
+/// `lit` where a share is half or more, else 0.
+fn at_least_half(lit: &[f32], shares: &mut [f32]) {
+    for (share, lit) in shares.iter_mut().zip(lit) {
+        *share = if *share >= 0.5 { *lit } else { 0.0 };
     }
 }
 
@@ -119,6 +131,8 @@ mod tests {
     #[test]
     fn a_shrunk_image_has_means_of_light_and_the_least_of_masks_at_odd_borders_too() {
         let (height, width) = (5, 7);
+        // One pixel of a square, two of another, three of a third.
+        let saturated = [(0, 0), (2, 0), (3, 1), (2, 2), (2, 3), (3, 2)];
         for factor in [2, 4] {
             let fine_grid = Grid::with_stride([height, width], LANES * factor, 4.0);
             let grid = fine_grid.shrunk(factor);
@@ -128,7 +142,7 @@ mod tests {
             for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
                 let at = y * fine_grid.stride + x;
                 fine.light.iter_mut().for_each(|plane| plane[at] = (10 * y + x) as f32);
-                fine.usable[at] = 1.0;
+                fine.usable[at] = f32::from(u8::from(!saturated.contains(&(y, x))));
                 fine.lit[at] = f32::from(u8::from((y, x) != (1, 2)));
             }
             out.shrink(&fine, [&grid, &fine_grid], factor);
@@ -144,7 +158,11 @@ mod tests {
                     out.light[2][at]
                 );
                 let dark = pixels.contains(&(1, 2));
-                assert_eq!(out.lit[at] == 0.0, dark || (column + 1) * factor > width, "{row} {column}");
+                let beyond = (row + 1) * factor > height || (column + 1) * factor > width;
+                assert_eq!(out.lit[at] == 0.0, dark || beyond, "{row} {column}");
+                let unusable = pixels.iter().filter(|pixel| saturated.contains(pixel)).count();
+                let usable = out.lit[at] > 0.0 && 2 * unusable <= pixels.len();
+                assert_eq!(out.usable[at] > 0.0, usable, "{row} {column}");
             }
         }
     }

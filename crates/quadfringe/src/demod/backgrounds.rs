@@ -92,7 +92,7 @@ impl Backgrounds {
                 let mut channels = fit.cell(cell[0], cell[1]);
                 let loss = slopes.loss_at(scene, cell);
                 for ([_, b], ratio) in channels.iter_mut().zip([ratios[0], ratios[1], ratios[0], ratios[2]]) {
-                    *b /= 1.0 - loss * ratio * ratio;
+                    *b /= contrast(loss * ratio * ratio);
                 }
                 for (line, value) in lines.iter_mut().zip(channels.as_flattened()) {
                     line[column] = *value;
@@ -118,8 +118,16 @@ impl Backgrounds {
 
     /// Let every pixel choose among the backgrounds around it. The pixels' phase and modulation are those of the last fit, and the
     /// intensities have the standard deviation `noise`. Returns the share of the lit pixels that take those of another place.
-    pub fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3], pixels: [&[f32]; 2], noise: f32) -> f32 {
-        self.choice.make((&self.grid, &self.maps), scene, ratios, pixels, noise)
+    pub fn choose(
+        &mut self,
+        scene: &Scene<'_>,
+        ratios: [f32; 3],
+        pixels: [&[f32]; 2],
+        slopes: &Slopes,
+        noise: f32,
+    ) -> f32 {
+        let grid = self.grid.over(scene.grid);
+        self.choice.make((&grid, &self.maps), scene, (ratios, slopes), pixels, noise)
     }
 
     /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.
@@ -198,6 +206,12 @@ fn blend(threshold: f32, own: [&[f32]; 8], wide: [&[f32]; 8], out: &mut [f32]) {
     }
 }
 
+/// What is left of a contrast, by [`Slopes::loss`] in the first order and by the mean over a step of the phase in the second.
+#[inline(always)]
+fn contrast(loss: f32) -> f32 {
+    1.0 - loss + 0.3 * loss * loss
+}
+
 /// Cosines of the four channels and the derivative of each by the phase of the first; `loss` is the share of the contrast
 /// of the first that is lost, see [`Slopes::loss`].
 #[inline(always)]
@@ -205,7 +219,7 @@ pub(crate) fn carriers(phase: f32, [_, second, third]: [f32; 3], loss: f32) -> (
     let (s, c) = sin_cos(phase);
     let (s_g, c_g) = sin_cos(second * phase);
     let (s_ir, c_ir) = sin_cos(third * phase);
-    let kept = [1.0, second * second, 1.0, third * third].map(|square| 1.0 - loss * square);
+    let kept = [1.0, second * second, 1.0, third * third].map(|square| contrast(loss * square));
     let scale = |values: [f32; 4]| [0, 1, 2, 3].map(|k| kept[k] * values[k]);
     (scale([c, c_g, -s, c_ir]), scale([-s, -second * s_g, -c, -third * s_ir]))
 }

@@ -322,16 +322,24 @@ pub(crate) fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
 
 #[inline(always)]
 fn spread_by<const S: usize>(mix: &[f32], out: &mut [f32]) {
-    let place = |x: usize| (x as f32 + 0.5) / S as f32 - 0.5;
-    let to_left: [f32; S] = std::array::from_fn(|x| (-place(x)).max(0.0));
-    let to_right: [f32; S] = std::array::from_fn(|x| place(x).max(0.0));
-    // Beside the value of its own cell a pixel takes a part of the way to the cell on its left or on its right.
-    for (i, pixels) in out.as_chunks_mut::<S>().0.iter_mut().enumerate() {
-        let (left, own, right) = (mix[i], mix[i + 1], mix[i + 2]);
-        for x in 0..S {
-            pixels[x] = own + (left - own) * to_left[x] + (right - own) * to_right[x];
+    // The pixels from the centre of a cell to that of the next; the first half lies before the image.
+    let part: [f32; S] = std::array::from_fn(|x| (x as f32 + 0.5) / S as f32);
+    let between = |left: usize| -> [f32; S] {
+        let (from, way) = (mix[left], mix[left + 1] - mix[left]);
+        part.map(|part| from + way * part)
+    };
+    let (first, rest) = out.split_at_mut(S / 2);
+    first.copy_from_slice(&between(0)[S / 2..]);
+    let (whole, last) = rest.as_chunks_mut::<S>();
+    let cells = whole.len();
+    for (i, pixels) in whole.iter_mut().enumerate() {
+        *pixels = between(i + 1);
+        // A cell that fills vectors is one; otherwise the compiler makes vectors of cells and takes them apart again.
+        if S >= 8 {
+            std::hint::black_box(());
         }
     }
+    last.copy_from_slice(&between(cells + 1)[..S / 2]);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]

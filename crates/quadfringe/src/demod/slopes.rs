@@ -10,6 +10,10 @@ use std::f32::consts::PI;
 
 /// Width (sigma) in fringe periods over which slopes are averaged.
 const WIDTH: f32 = 0.43;
+/// The same for the slopes of a phase that is sure, which follow the surface closer.
+const FINE_WIDTH: f32 = 0.2;
+/// What the slopes of the wide window count among them, as a share of the pixels of a whole fine one.
+const BACKING: f32 = 0.1;
 /// Rows of pixels that stand for a row of cells.
 const SAMPLED_ROWS: usize = 2;
 
@@ -17,25 +21,41 @@ const SAMPLED_ROWS: usize = 2;
 #[derive(Debug)]
 pub(crate) struct Slopes {
     maps: CellMaps,
+    /// Slopes that back finer ones.
+    wide: CellMaps,
     sums: CellMaps,
     slots: Slots<([Vec<f32>; 2], CellWork)>,
 }
 
 impl Default for Slopes {
     fn default() -> Self {
-        Self { maps: CellMaps::new(3), sums: CellMaps::default(), slots: Slots::default() }
+        let [maps, wide] = [3, 3].map(CellMaps::new);
+        Self { maps, wide, sums: CellMaps::default(), slots: Slots::default() }
     }
 }
 
 impl Slopes {
     /// Measure a phase (rad, wrapped or not); `modulation` is 0 where there is no light.
     pub fn measure(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
+        self.take(scene, [phase, modulation], WIDTH, 0.0);
+    }
+
+    /// Measure a phase that is sure once more, in a smaller window; where that holds little the slopes stay as they were.
+    pub fn refine(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
+        std::mem::swap(&mut self.maps, &mut self.wide);
+        self.take(scene, [phase, modulation], FINE_WIDTH, BACKING);
+    }
+
+    fn take(&mut self, scene: &Scene<'_>, [phase, modulation]: [&[f32]; 2], width: f32, backing: f32) {
         let grid = scene.grid;
+        let Self { maps, wide, sums, slots } = self;
+        let whole = grid.step * SAMPLED_ROWS.min(grid.step);
+        let backing = backing * whole as f32;
         grid.window_sums::<4, [Vec<f32>; 2]>(
-            (scene.cells(WIDTH), SAMPLED_ROWS),
-            &self.slots,
-            &mut self.sums,
-            &mut self.maps,
+            (scene.cells(width), SAMPLED_ROWS),
+            slots,
+            sums,
+            maps,
             |right, y, sums| {
                 let below = (y + 1).min(grid.height - 1);
                 for (shifted, plane) in right.iter_mut().zip([phase, modulation]) {
@@ -47,11 +67,15 @@ impl Slopes {
                 add_steps(here, [&right[0], &right[1]], [0, 1], sums);
                 add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
             },
-            |_, [w, along, v, down], out| {
+            |row, [w, along, v, down], out| {
                 let (columns, step) = (w.len(), grid.step as f32);
+                let slope = |i: usize, sum: &[f32], weight: &[f32], map: usize| {
+                    let backed = if backing > 0.0 { backing * wide.line(row, map)[i] } else { 0.0 };
+                    (step * sum[i] + backed) / (weight[i] + backing).max(1e-6)
+                };
                 for i in 0..columns {
-                    out[i] = step * along[i] / w[i].max(1e-6);
-                    out[columns + i] = step * down[i] / v[i].max(1e-6);
+                    out[i] = slope(i, along, w, 0);
+                    out[columns + i] = slope(i, down, v, 1);
                     out[2 * columns + i] = (out[i] * out[i] + out[columns + i] * out[columns + i]) / 24.0;
                 }
             },
@@ -122,5 +146,40 @@ fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [
             sums[to[0]][x] += terms[0][x];
             sums[to[1]][x] += terms[1][x];
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::Grid;
+    use super::*;
+
+    #[test]
+    fn refined_slopes_follow_the_surface_and_stay_where_little_is_seen() {
+        let grid = Grid::new([96, 256], 4.0);
+        let wave = std::f32::consts::TAU / 50.0;
+        let phase: Vec<f32> = (0..grid.pixels())
+            .map(|i| {
+                let x = (i % 256) as f32;
+                0.25 * x + (wave * x).sin()
+            })
+            .collect();
+        // Beyond column 160 the surface is lost but for what only the wide window reaches.
+        let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % 256 < 160))).collect();
+        let light = vec![0.5; grid.pixels()];
+        let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
+        let mut slopes = Slopes::default();
+        slopes.measure(&scene, &phase, &lit);
+        let (before, beyond) = (slopes.maps.line(12, 0).to_vec(), slopes.at(12, 44));
+        slopes.refine(&scene, &phase, &lit);
+        let after = slopes.maps.line(12, 0);
+        let truth = |column: usize| 4.0 * (0.25 + wave * (wave * (4.0 * column as f32 + 2.0)).cos());
+        let worst =
+            |line: &[f32]| (8..32).map(|column| (line[column] - truth(column)).abs()).fold(0.0, f32::max);
+        assert!(worst(after) < 0.45 * worst(&before), "{} {}", worst(after), worst(&before));
+        for k in 0..2 {
+            assert!((slopes.at(12, 44)[k] - beyond[k]).abs() < 0.02, "{:?} {beyond:?}", slopes.at(12, 44));
+        }
+        assert!(beyond[0] > 0.5, "{beyond:?}");
     }
 }

@@ -7,6 +7,7 @@ use crate::demod::cells::{CellMaps, Grid, RowMaps};
 use crate::demod::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::demod::local_fit::binomial;
 use crate::demod::scene::Scene;
+use crate::demod::slopes::Slopes;
 use crate::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -96,7 +97,7 @@ impl Choice {
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
         scene: &Scene<'_>,
-        ratios: [f32; 3],
+        how: ([f32; 3], &Slopes),
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
     ) -> f32 {
@@ -113,7 +114,7 @@ impl Choice {
                 let (first, count) = ((block * BLOCK) as isize, places.len() / grid.stride);
                 let rows = &mut **rows;
                 let lines: Vec<usize> = (first - 1..=first + count as isize).map(inside).collect();
-                rows.prepare(scene, &lines, phase, ratios);
+                rows.prepare(scene, &lines, phase, how);
                 let from = |y: usize, down: isize| inside(y as isize + down * aside);
                 let planes = [modulation, scene.usable];
                 rows.miss((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
@@ -168,13 +169,23 @@ impl Choice {
 }
 
 impl Rows {
-    fn prepare(&mut self, scene: &Scene<'_>, lines: &[usize], phase: &[f32], ratios: [f32; 3]) {
+    fn prepare(
+        &mut self,
+        scene: &Scene<'_>,
+        lines: &[usize],
+        phase: &[f32],
+        (ratios, slopes): ([f32; 3], &Slopes),
+    ) {
         let stride = scene.grid.stride;
-        let Self { carriers, best, asked, smooth, .. } = self;
+        let Self { maps, carriers, best, asked, smooth, .. } = self;
         carriers.resize_with(lines.len(), Default::default);
         for (rows, &y) in carriers.iter_mut().zip(lines) {
             rows.iter_mut().for_each(|row| row.resize(stride, 0.0));
-            carry(scene.row(phase, y), ratios, rows.each_mut().map(Vec::as_mut_slice));
+            carry(
+                [scene.row(phase, y), slopes.loss(scene, y, maps)],
+                ratios,
+                rows.each_mut().map(Vec::as_mut_slice),
+            );
         }
         best.resize_with(lines.len(), Vec::new);
         best.iter_mut().for_each(|row| row.resize(stride, 0.0));
@@ -271,13 +282,14 @@ fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn carry(phase: &[f32], ratios: [f32; 3], out: [&mut [f32]; 8]) {
-    let phase = lanes(phase);
+fn carry(pixels: [&[f32]; 2], ratios: [f32; 3], out: [&mut [f32]; 8]) {
+    let pixels = pixels.map(lanes);
     let mut out = out.map(lanes_mut);
-    for (i, phase) in phase.iter().enumerate() {
+    for i in 0..pixels[0].len() {
+        let [phase, loss] = take(&pixels, i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios, 0.0);
+            let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
             for c in 0..4 {
                 (found[c][x], found[4 + c][x]) = (cosines[c], derivatives[c]);
             }
@@ -375,7 +387,8 @@ mod tests {
             let scene = Scene { light, usable: &lit, grid, period_px: 25.0, factor: 1 };
             let mut choice = Choice::default();
             let modulation = vec![0.2; grid.pixels()];
-            let share = choice.make((grid, &self.maps), &scene, RATIOS, [&self.phase, &modulation], noise);
+            let how = (RATIOS, &Slopes::flat(grid));
+            let share = choice.make((grid, &self.maps), &scene, how, [&self.phase, &modulation], noise);
             (choice, share)
         }
 
