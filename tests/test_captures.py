@@ -90,8 +90,9 @@ def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: P
     assert own.config["response_of_shot"]
     scores = [scoring.score(scene, shape.phase_rad) for shape in (own, straight)]
     assert_bars(scores[0], OWN_RIGHT_PERCENT)
-    # As good as twelve images of each channel tell, on both captures.
-    assert scores[0].right_phase_rms_rad < 1.05 * scores[1].right_phase_rms_rad
+    # Nearly as good as twelve images of each channel tell, on both captures.
+    assert scores[0].right_percent > scores[1].right_percent - 0.6
+    assert scores[0].right_phase_rms_rad < 1.2 * scores[1].right_phase_rms_rad
     exponents = np.array([list(channel.values()) for channel in own.config["response"].values()])[:, 1]
     assert (np.abs(exponents - known.red.exponent) < 0.08).all()
 
@@ -116,7 +117,8 @@ def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file
     response = ResponseCalibration.load(response_file)
     raw = scoring.score(scene, scoring.shape_of(scene, response=Response()).phase_rad)
     linear = scoring.score(scene, scoring.shape_of(scene, response=response).phase_rad)
-    assert linear.right_phase_rms_rad < 0.8 * raw.right_phase_rms_rad
+    assert linear.right_phase_rms_rad < 0.9 * raw.right_phase_rms_rad
+    assert linear.right_percent > raw.right_percent + 1
 
 
 def test_both_captures_tell_of_the_same_projector(data_dir: Path, tmp_path: Path) -> None:

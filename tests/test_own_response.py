@@ -57,7 +57,7 @@ def test_many_shots_take_it_from_one(bent: qf.Shot) -> None:
 
 
 def test_a_shot_is_saved_that_was_refused(tmp_path: Path) -> None:
-    shot = taken(surface="plane", projector_exponent=2.2, patch_mm=20.0)
+    shot = taken(surface="plane", projector_exponent=2.5, patch_mm=10.0)
     with pytest.raises(qf.DecodeError, match="margin has collapsed"):
         qf.decode(shot, LINEAR)
     qf.decode(shot, PLAN).save(tmp_path / "saved.npz")
