@@ -146,15 +146,21 @@ def test_the_gil_is_free_while_the_kernel_works(images: Four) -> None:
     assert len(ticks) > 10
 
 
-def test_one_decoder_serves_several_threads(images: Four) -> None:
-    shot, plan = eight_bit(images), decoder()
+@pytest.mark.parametrize("threads", [None, 1, 2])
+def test_one_decoder_serves_several_threads(images: Four, threads: int | None) -> None:
+    shot, plan = eight_bit(images), decoder(threads=threads)
     expected, found = plan.decode(*shot), []
-    workers = [threading.Thread(target=lambda: found.append(plan.decode(*shot))) for _ in range(4)]
+
+    def decode() -> None:
+        found.extend(plan.decode(*shot) for _ in range(10))
+
+    # A thread of the decoder that waited for the shot it is working on would wait for ever.
+    workers = [threading.Thread(target=decode, daemon=True) for _ in range(4)]
     for worker in workers:
         worker.start()
     for worker in workers:
-        worker.join()
-    assert len(found) == 4
+        worker.join(timeout=60)
+    assert len(found) == 40
     for maps in found:
         np.testing.assert_array_equal(maps["phase_rad"], expected["phase_rad"])
 

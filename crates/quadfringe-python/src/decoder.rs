@@ -145,16 +145,19 @@ impl Decoder {
         images: I,
         shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
     ) -> PyResult<Decoded> {
-        let work = || {
-            let shot = scaled(shot(images)?, self.full_scale)?;
-            let mut maps = self.maps();
-            // A panic in an earlier shot leaves nothing behind that the next one does not write again.
-            let mut kernel = self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
-            kernel.decode_into(&shot, &mut maps).map(|()| maps)
-        };
-        let decoded = py.detach(|| match &self.pool {
-            Some(pool) => pool.install(work),
-            None => work(),
+        let decoded = py.detach(|| {
+            // A panic in an earlier shot leaves nothing behind that the next one does not write again. A thread of the pool must
+            // not wait for the lock: while a shot is decoded it may take up the next one.
+            let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
+            let work = || {
+                let shot = scaled(shot(images)?, self.full_scale)?;
+                let mut maps = self.maps();
+                kernel.decode_into(&shot, &mut maps).map(|()| maps)
+            };
+            match &self.pool {
+                Some(pool) => pool.install(work),
+                None => work(),
+            }
         });
         decoded.map_err(value_error)
     }

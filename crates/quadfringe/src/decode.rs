@@ -222,10 +222,12 @@ impl Decoder {
         out.check(self.shape, self.triangulator.is_some())?;
         self.plan.prepare(shot);
         let finish = Finish { code: &self.code, triangulator: self.triangulator.as_ref() };
-        match &mut self.engine {
-            Engine::Published(engine) => engine.run(&self.plan, shot, &self.options, &finish, out),
-            Engine::Best(engine) => engine.run(&self.plan, shot, &self.options, &finish, out),
-        }
+        let Self { plan, options, engine, .. } = self;
+        // One way into the pool of threads; from outside every stage would have to wake them.
+        rayon::scope(|_| match engine {
+            Engine::Published(engine) => engine.run(plan, shot, options, &finish, out),
+            Engine::Best(engine) => engine.run(plan, shot, options, &finish, out),
+        });
         Ok(())
     }
 }
