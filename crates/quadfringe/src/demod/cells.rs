@@ -105,7 +105,6 @@ impl Grid {
                 for y in self.samples(cell_row, most) {
                     add(state, y, columns);
                 }
-                spare.resize(self.columns + kernel.len(), 0.0);
                 for (k, line) in out.chunks_exact_mut(self.columns).enumerate() {
                     self.fold(k, columns, line);
                     smooth_line(&kernel, line, spare);
@@ -131,7 +130,6 @@ impl Grid {
             || slots.take(),
             |slot, (row, out)| {
                 let spare = &mut slot.1.spare;
-                spare.resize(self.columns + kernel.len(), 0.0);
                 for (k, target) in out.chunks_exact_mut(self.columns).enumerate() {
                     match line(row, k) {
                         Some(source) => target.copy_from_slice(source),
@@ -356,13 +354,21 @@ fn add_scaled(weight: f32, from: &[f32], to: &mut [f32]) {
 
 /// `line` averaged by `kernel`, nothing beyond its ends.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn smooth_line(kernel: &[f32], line: &mut [f32], spare: &mut [f32]) {
+fn smooth_line(kernel: &[f32], line: &mut [f32], spare: &mut Vec<f32>) {
     let (length, reach) = (line.len(), kernel.len() / 2);
-    spare.fill(0.0);
-    spare[reach..reach + length].copy_from_slice(line);
-    line.fill(0.0);
-    for (k, weight) in kernel.iter().enumerate() {
-        line.iter_mut().zip(&spare[k..]).for_each(|(t, s)| *t += weight * s);
+    spare.clear();
+    spare.resize(reach, 0.0);
+    spare.extend_from_slice(line);
+    spare.resize(length.next_multiple_of(LANES) + kernel.len(), 0.0);
+    for (i, out) in line.chunks_mut(LANES).enumerate() {
+        let mut sum = [0.0; LANES];
+        for (k, weight) in kernel.iter().enumerate() {
+            let part: &Lanes = spare[i * LANES + k..].first_chunk().expect("the spare line is padded");
+            for x in 0..LANES {
+                sum[x] += weight * part[x];
+            }
+        }
+        out.copy_from_slice(&sum[..out.len()]);
     }
 }
 

@@ -41,11 +41,11 @@ impl Found<'_> {
     }
 }
 
-/// Model and derivative of the four channels for an albedo of 1, the albedo that fits best, and the mean modulation of R and B
-/// for an albedo of 1, on one row.
+/// Sums over the four channels on one row: products of the model `m` for an albedo of 1, of its derivative `d` by the phase and
+/// of the light `s`, as mm, md, dd, ms, ds, ss; the albedo that fits best; the mean modulation of R and B for an albedo of 1.
 #[derive(Debug, Default)]
 struct ModelRow {
-    rows: [Vec<f32>; 10],
+    rows: [Vec<f32>; 8],
 }
 
 /// Rows of one task.
@@ -56,7 +56,6 @@ struct Rows {
     ring: [ModelRow; 3],
     albedo: Vec<f32>,
     smooth: Vec<f32>,
-    numerator: Vec<f32>,
     /// Misfit and modulation.
     found: [Vec<f32>; 2],
     window: WindowRows,
@@ -99,20 +98,22 @@ impl Joint {
                 for (i, ((phase, weight), (misfit, modulation))) in out.into_iter().enumerate() {
                     let y = first + i;
                     model(rows, around(y, grid.height)[2], (i + 2) % 3);
-                    let Rows { ring, albedo, smooth, numerator, found, window: window_rows, .. } = rows;
-                    let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[8].as_slice());
-                    for row in [&mut *albedo, &mut *numerator].into_iter().chain(&mut *found) {
+                    let Rows { ring, albedo, smooth, found, window: window_rows, .. } = rows;
+                    let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[6].as_slice());
+                    for row in std::iter::once(&mut *albedo).chain(&mut *found) {
                         row.resize(grid.stride, 0.0);
                     }
                     binomial(near, grid.width, smooth, albedo);
                     let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
                     let lit = [window.modulation(y), scene.row(scene.usable, y)];
                     let [misfits, modulations] = found.each_mut().map(Vec::as_mut_slice);
-                    linearise(model, albedo, scene.rows(y), lit, [numerator, weight, misfits, modulations]);
+                    let measure = |[numerator, denominator]: [&mut [f32]; 2]| {
+                        linearise(model, albedo, lit, [numerator, denominator, misfits, modulations]);
+                    };
+                    window.along(y, window_rows, scene.row(before, y), measure, [phase, weight]);
+                    let [misfits, modulations] = found;
                     misfit.copy_from_slice(&misfits[..misfit.len()]);
                     modulation.copy_from_slice(&modulations[..modulation.len()]);
-                    phase.copy_from_slice(scene.row(before, y));
-                    window.along(y, window_rows, numerator, [phase, weight]);
                 }
             },
         );
@@ -134,28 +135,34 @@ fn predict(
     pixels: [&[f32]; 2],
     light: [&[f32]; 4],
     ratios: [f32; 3],
-    out: [&mut [f32]; 10],
+    out: [&mut [f32]; 8],
 ) {
     let (maps, pixels, light) = (maps.map(lanes), pixels.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
     for i in 0..pixels[0].len() {
         let (maps, [phase, loss], light) = (take(&maps, i), take(&pixels, i), take(&light, i));
-        let mut found = [[0.0; LANES]; 10];
+        let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
             let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
-            let (mut top, mut bottom) = (0.0f32, 1e-9f32);
+            let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
+            let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {
-                let (a, b) = (maps[2 * c][x], maps[2 * c + 1][x]);
-                let model = a + b * cosines[c];
-                let model = if model > 0.0 { model } else { 0.0 };
-                top += model * light[c][x];
-                bottom += model * model;
-                found[c][x] = model;
-                found[4 + c][x] = b * derivatives[c];
+                let (a, b, s) = (maps[2 * c][x], maps[2 * c + 1][x], light[c][x]);
+                let m = a + b * cosines[c];
+                let (m, d) = (if m > 0.0 { m } else { 0.0 }, b * derivatives[c]);
+                mm += m * m;
+                md += m * d;
+                dd += d * d;
+                ms += m * s;
+                ds += d * s;
+                ss += s * s;
             }
-            let albedo = top / bottom;
-            found[8][x] = if albedo > 1e-4 { albedo } else { 1e-4 };
-            found[9][x] = 0.5 * (maps[1][x] + maps[5][x]);
+            let albedo = ms / mm;
+            let albedo = if albedo > 1e-4 { albedo } else { 1e-4 };
+            let modulation = 0.5 * (maps[1][x] + maps[5][x]);
+            for (row, value) in [mm, md, dd, ms, ds, ss, albedo, modulation].into_iter().enumerate() {
+                found[row][x] = value;
+            }
         }
         put(&mut out, i, &found);
     }
@@ -163,40 +170,24 @@ fn predict(
 
 /// Gauss-Newton terms of every pixel with the albedo eliminated, and how far the channels are from their model.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn linearise(
-    model: [&[f32]; 10],
-    albedo: &[f32],
-    light: [&[f32]; 4],
-    lit: [&[f32]; 2],
-    out: [&mut [f32]; 4],
-) {
-    let (model, albedo, light, lit) = (model.map(lanes), lanes(albedo), light.map(lanes), lit.map(lanes));
+fn linearise(model: [&[f32]; 8], albedo: &[f32], lit: [&[f32]; 2], out: [&mut [f32]; 4]) {
+    let (model, albedo, lit) = (model.map(lanes), lanes(albedo), lit.map(lanes));
     let mut out = out.map(lanes_mut);
     for (i, albedo) in albedo.iter().enumerate() {
-        let (model, light, lit) = (take(&model, i), take(&light, i), take(&lit, i));
+        let ([mm, md, dd, ms, ds, ss, _, modulation], lit) = (take(&model, i), take(&lit, i));
         let mut found = [[0.0; LANES]; 4];
         for x in 0..LANES {
             let albedo = albedo[x];
-            let (mut top, mut bottom, mut square) = (0.0f32, 0.0f32, 0.0f32);
-            let (mut mixed, mut power) = (0.0f32, 1e-9f32);
-            for c in 0..4 {
-                let (model, slope) = (albedo * model[c][x], albedo * model[4 + c][x]);
-                let error = light[c][x] - model;
-                top += slope * error;
-                bottom += slope * slope;
-                square += 0.25 * error * error;
-                mixed += slope * model;
-                power += model * model;
-            }
+            let top = albedo * (ds[x] - albedo * md[x]);
+            let square = ss[x] - albedo * (2.0 * ms[x] - albedo * mm[x]);
             // What a change of albedo would explain as well says nothing about the phase.
-            let own = bottom - mixed * mixed / power;
-            let least = 0.25 * bottom;
-            let kept = if own > least { own } else { least };
+            let (own, least) = (dd[x] - md[x] * md[x] / mm[x], 0.25 * dd[x]);
+            let kept = albedo * albedo * if own > least { own } else { least };
             let on = (lit[0][x] > 0.0) & (lit[1][x] > 0.0);
             found[0][x] = if on { top } else { 0.0 };
             found[1][x] = if on { kept } else { 0.0 };
-            found[2][x] = square;
-            found[3][x] = if lit[0][x] > 0.0 { albedo * model[9][x] } else { 0.0 };
+            found[2][x] = if square > 0.0 { 0.25 * square } else { 0.0 };
+            found[3][x] = if lit[0][x] > 0.0 { albedo * modulation[x] } else { 0.0 };
         }
         put(&mut out, i, &found);
     }

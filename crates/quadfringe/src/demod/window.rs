@@ -97,28 +97,32 @@ impl<'a> Window<'a> {
         Self { residuals: Some(residuals), ..self }
     }
 
-    /// Average along row `y`: a phase and the normal equations of a step of it, `numerator / denominator` and 0 where there is
-    /// nothing to measure by, are replaced by phase plus mean step, and weight.
+    /// Average along row `y` of a phase. `measure` writes the normal equations of a step of it, `numerator / denominator` and 0
+    /// where there is nothing to measure by; `out` receives phase plus mean step, and weight.
     pub fn along(
         &self,
         y: usize,
         rows: &mut WindowRows,
-        numerator: &[f32],
-        [phase, denominator]: [&mut [f32]; 2],
+        phase: &[f32],
+        measure: impl FnOnce([&mut [f32]; 2]),
+        out: [&mut [f32]; 2],
     ) {
         let (grid, reach) = (self.scene.grid, self.reach());
         let WindowRows { maps, sharpness, residuals, padded, .. } = rows;
         let slope = self.slopes.along(self.scene, y, maps);
         self.sharpen(y, residuals, sharpness);
-        for (row, source) in padded.iter_mut().zip([&*phase, numerator, &*denominator, slope]) {
+        for row in &mut *padded {
             row.clear();
-            row.resize(reach, 0.0);
-            row.extend_from_slice(&source[..grid.width]);
             row.resize(2 * reach + grid.stride, 0.0);
         }
-        let taps = self.taps(0..2 * self.radius + 1);
+        let inner = padded.each_mut().map(|row| &mut row[reach..reach + grid.stride]);
+        let [phases, slopes, numerator, denominator] = inner;
+        phases.copy_from_slice(phase);
+        slopes.copy_from_slice(slope);
+        measure([numerator, denominator]);
         let padded = padded.each_ref().map(Vec::as_slice);
-        average_along((&taps, self.spacing), padded, [slope, sharpness], [phase, denominator]);
+        let taps = self.taps(0..2 * self.radius + 1);
+        average_along((&taps, self.spacing), padded, [phase, slope, sharpness], out);
     }
 
     /// Furthest neighbour in pixels.
@@ -242,17 +246,17 @@ fn fit(d: f32, sharpness: f32) -> f32 {
 fn average_along(
     (taps, spacing): (&[[f32; 2]], usize),
     there: [&[f32]; 4],
-    here: [&[f32]; 2],
+    here: [&[f32]; 3],
     out: [&mut [f32]; 2],
 ) {
     let here = here.map(lanes);
     let mut out = out.map(lanes_mut);
     for i in 0..here[0].len() {
-        let ([slope, sharpness], phase) = (take(&here, i), out[0][i]);
+        let [phase, slope, sharpness] = take(&here, i);
         let mut sums = [[0.0; LANES]; 2];
         for (k, &[half, near]) in taps.iter().enumerate() {
             let from = i * LANES + k * spacing;
-            let [other, numerator, denominator, other_slope]: [&Lanes; 4] =
+            let [other, other_slope, numerator, denominator]: [&Lanes; 4] =
                 there.map(|row| row[from..].first_chunk().expect("rows are padded"));
             for x in 0..LANES {
                 let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
@@ -327,7 +331,11 @@ mod tests {
         let mut rows = WindowRows::default();
         let lines = along.chunks_mut(grid.stride).zip(weight.chunks_mut(grid.stride));
         for (y, (phase, weight)) in lines.enumerate() {
-            window.along(y, &mut rows, &vec![0.0; grid.stride], [phase, weight]);
+            let level = |[numerator, denominator]: [&mut [f32]; 2]| {
+                numerator.fill(0.0);
+                denominator[..grid.width].fill(1.0);
+            };
+            window.along(y, &mut rows, &seen[y * grid.stride..][..grid.stride], level, [phase, weight]);
         }
         let average = Average { phase: &along, weight: &weight };
         let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
