@@ -247,7 +247,7 @@ impl Best {
         }
         let guide = &mut self.guide;
         let finder = &mut guide.finder;
-        finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), lent, found);
+        finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), found);
         guide.noise = finder.noise;
         finder.shrink(grid, blur_px, lent, found);
         self.full.restrict(grid, found);

@@ -90,7 +90,7 @@ impl Guide {
         }
         let light = level.light.each_ref().map(Vec::as_slice);
         let finder = &mut self.finder;
-        finder.find(grid, light, (period_px, 2.0 * options.modulation_min), lent, &mut self.modulation);
+        finder.find(grid, light, (period_px, 2.0 * options.modulation_min), &mut self.modulation);
         finder.shrink(grid, blur_px, lent, &mut self.modulation);
         level.restrict(grid, &self.modulation);
         let scene = level.scene(grid, period_px, factor);

@@ -360,16 +360,21 @@ fn smooth_line(kernel: &[f32], line: &mut [f32], spare: &mut Vec<f32>) {
     spare.resize(reach, 0.0);
     spare.extend_from_slice(line);
     spare.resize(length.next_multiple_of(LANES) + kernel.len(), 0.0);
-    for (i, out) in line.chunks_mut(LANES).enumerate() {
+    let smooth = |from: usize| {
         let mut sum = [0.0; LANES];
-        for (k, weight) in kernel.iter().enumerate() {
-            let part: &Lanes = spare[i * LANES + k..].first_chunk().expect("the spare line is padded");
+        for (weight, part) in kernel.iter().zip(spare[from..].windows(LANES)) {
             for x in 0..LANES {
                 sum[x] += weight * part[x];
             }
         }
-        out.copy_from_slice(&sum[..out.len()]);
+        sum
+    };
+    let (whole, rest) = line.as_chunks_mut();
+    for (i, out) in whole.iter_mut().enumerate() {
+        *out = smooth(i * LANES);
     }
+    let smoothed = smooth(length - rest.len());
+    rest.copy_from_slice(&smoothed[..rest.len()]);
 }
 
 /// A Gaussian cut at three sigma; one tap for a sigma of 0.

@@ -15,8 +15,10 @@ use rayon::prelude::*;
 const SURROUNDINGS: f32 = 0.75;
 /// Least sum of squared heights above the bottom, in units of the range. R and B alone reach 2 x 0.146^2 = 0.043.
 const LEAST: f32 = 0.02;
-/// One pixel in so many is asked for the noise.
-const NOISE_STRIDE: usize = 11;
+/// Pixels that are asked for the noise, at most twice as many.
+const NOISE_SAMPLES: usize = 1 << 14;
+/// Rows that one task works on.
+const BLOCK: usize = 32;
 
 /// Working maps of the search for light.
 #[derive(Debug, Default)]
@@ -35,49 +37,56 @@ pub(crate) struct LightFinder {
 struct Rows {
     maps: RowMaps,
     sums: Vec<f32>,
-    means: [Vec<f32>; 3],
+    /// Heights above the bottom, and their means, of the rows that a task needs.
+    heights: Vec<f32>,
+    means: Vec<f32>,
 }
 
 impl LightFinder {
-    /// Writes 1 for every pixel that is lit, 0 elsewhere. `range_min` is the least range of fringes, in linear light; what a
-    /// `lent` plane held is lost.
+    /// Writes 1 for every pixel that is lit, 0 elsewhere. `range_min` is the least range of fringes, in linear light.
     pub fn find(
         &mut self,
         grid: &Grid,
         light: [&[f32]; 4],
         (period_px, range_min): (f64, f32),
-        lent: &mut [f32],
         lit: &mut [f32],
     ) {
         let reach = (SURROUNDINGS * period_px as f32 / grid.step as f32).ceil();
         self.surroundings(grid, light, reach, range_min);
-        self.refind(grid, light, lent, lit);
+        self.refind(grid, light, lit);
     }
 
     /// The same on a finer image of the same scene: its grid has the cells of the last [`Self::find`].
-    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lent: &mut [f32], lit: &mut [f32]) {
+    pub fn refind(&mut self, grid: &Grid, light: [&[f32]; 4], lit: &mut [f32]) {
         let (stride, noise) = (grid.stride, noise(light[0], grid));
         self.noise = noise;
-        let above = &mut lent[..grid.pixels()];
         let (smoothed, slots) = (&self.smoothed, &self.slots);
-        above.par_chunks_mut(stride).enumerate().for_each_init(
+        lit.par_chunks_mut(BLOCK * stride).enumerate().for_each_init(
             || slots.take(),
-            |slot, (y, out)| {
-                let maps = slot.0.maps.sample::<8>(grid, smoothed, 0, y);
-                heights(maps, light.map(|plane| &plane[y * stride..][..stride]), noise * noise, out);
-            },
-        );
-        let above = &*above;
-        lit.par_chunks_mut(stride).enumerate().for_each_init(
-            || slots.take(),
-            |slot, (y, lit)| {
-                // The mean reaches one pixel into a shadow: the least of the means does not.
-                let Rows { sums, means, .. } = &mut slot.0;
-                for (mean, centre) in means.iter_mut().zip(around(y, grid.height)) {
-                    let near = around(centre, grid.height).map(|row| &above[row * stride..][..stride]);
-                    mean_of_nine(near, grid.width, sums, mean);
+            |slot, (block, lit)| {
+                let Rows { maps, sums, heights, means } = &mut slot.0;
+                let first = block * BLOCK;
+                let last = first + lit.len() / stride - 1;
+                // Rows that repeat at the border of the image are those at the border.
+                let [high, mean] =
+                    [2, 1].map(|reach| first.saturating_sub(reach)..=(last + reach).min(grid.height - 1));
+                heights.resize((BLOCK + 4) * stride, 0.0);
+                means.resize((BLOCK + 2) * stride, 0.0);
+                for (y, out) in high.clone().zip(heights.chunks_exact_mut(stride)) {
+                    let maps = maps.sample::<8>(grid, smoothed, 0, y);
+                    let light = light.map(|plane| &plane[y * stride..][..stride]);
+                    self::heights(maps, light, noise * noise, out);
                 }
-                least_of_nine(means.each_ref().map(Vec::as_slice), grid.width, 9.0 * LEAST, sums, lit);
+                let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
+                for (y, out) in mean.clone().zip(means.chunks_exact_mut(stride)) {
+                    let near = near(y, *high.start()).map(|at| &heights[at..at + stride]);
+                    sum_of_nine(near, grid.width, sums, out);
+                }
+                for (y, lit) in (first..=last).zip(lit.chunks_exact_mut(stride)) {
+                    // The mean reaches one pixel into a shadow: the least of the means does not.
+                    let near = near(y, *mean.start()).map(|at| &means[at..at + stride]);
+                    least_of_nine(near, grid.width, 9.0 * LEAST, sums, lit);
+                }
             },
         );
     }
@@ -215,9 +224,8 @@ fn heights(maps: [&[f32]; 8], light: [&[f32]; 4], noise: f32, out: &mut [f32]) {
 
 /// Sum over a pixel and its eight neighbours; borders repeat.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn mean_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut Vec<f32>) {
+fn sum_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut [f32]) {
     spare.resize(width + 2, 0.0);
-    out.resize(width, 0.0);
     let [a, b, c] = rows.map(|row| &row[..width]);
     let middle = &mut spare[1..=width];
     for x in 0..width {
@@ -266,8 +274,10 @@ fn least_of_five(rows: [&[f32]; 3], width: usize, limit: f32, out: &mut [f32]) {
 /// alone or along columns alone (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)).
 fn noise(red: &[f32], grid: &Grid) -> f32 {
     let stride = grid.stride;
+    // An odd step is no part of a row, which is whole vectors long.
+    let step = (red.len() / NOISE_SAMPLES) | 1;
     let mut seen: Vec<f32> = (stride + 1..red.len().saturating_sub(stride + 1))
-        .step_by(NOISE_STRIDE)
+        .step_by(step)
         .filter(|i| i % stride + 1 < grid.width)
         .map(|i| {
             let bend = |at: usize| red[at - 1] - 2.0 * red[at] + red[at + 1];
@@ -315,7 +325,7 @@ mod tests {
             let planes = [plane(36.0, 0.0), plane(35.0, 0.0), plane(36.0, FRAC_PI_2), plane(30.0, 0.0)];
             let mut lit = vec![0.0; grid.pixels()];
             let light = planes.each_ref().map(Vec::as_slice);
-            LightFinder::default().find(&grid, light, (25.3, 0.04), &mut vec![0.0; grid.pixels()], &mut lit);
+            LightFinder::default().find(&grid, light, (25.3, 0.04), &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {

@@ -111,11 +111,15 @@ impl<'a> Window<'a> {
         let WindowRows { maps, sharpness, residuals, padded, .. } = rows;
         let slope = self.slopes.along(self.scene, y, maps);
         self.sharpen(y, residuals, sharpness);
-        for row in &mut *padded {
-            row.clear();
+        let inner = padded.each_mut().map(|row| {
             row.resize(2 * reach + grid.stride, 0.0);
-        }
-        let inner = padded.each_mut().map(|row| &mut row[reach..reach + grid.stride]);
+            // What another window has left beside the row is nothing to measure by.
+            let (before, rest) = row.split_at_mut(reach);
+            let (inner, behind) = rest.split_at_mut(grid.stride);
+            before.fill(0.0);
+            behind.fill(0.0);
+            inner
+        });
         let [phases, slopes, numerator, denominator] = inner;
         phases.copy_from_slice(phase);
         slopes.copy_from_slice(slope);

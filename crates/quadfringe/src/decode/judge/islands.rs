@@ -1,8 +1,12 @@
 //! Islands too small to be trusted.
 
 use crate::demod::cells::Grid;
+use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::PI;
+
+/// Pixels of a row that are looked through at once.
+const GROUP: usize = 64;
 
 /// Connected regions by their runs along rows.
 #[derive(Debug, Clone, Default)]
@@ -35,8 +39,8 @@ impl Islands {
         let stride = grid.stride;
         self.rows.resize_with(grid.height, Vec::new);
         let source = sure.par_chunks(stride).zip(phase.par_chunks(stride));
-        self.rows.par_iter_mut().zip(source).for_each(|(runs, (sure, phase))| {
-            find_runs(&sure[..grid.width], phase, runs);
+        self.rows.par_iter_mut().zip(source).for_each_init(Vec::new, |ends, (runs, (sure, phase))| {
+            find_runs(&sure[..grid.width], phase, ends, runs);
         });
         self.number();
         for y in 1..grid.height {
@@ -76,20 +80,33 @@ impl Islands {
     }
 }
 
-fn find_runs(sure: &[u8], phase: &[f32], runs: &mut Vec<Run>) {
+/// Runs of a row; `ends` is working memory.
+fn find_runs(sure: &[u8], phase: &[f32], ends: &mut Vec<u8>, runs: &mut Vec<Run>) {
     runs.clear();
-    let mut open = None;
-    for (x, &on) in sure.iter().enumerate() {
-        if let Some(from) = open.filter(|_| on == 0 || !joined(phase[x - 1], phase[x])) {
-            runs.push(Run { from, to: x as u32, number: 0 });
-            open = None;
+    ends.resize(sure.len(), 0);
+    mark_ends(sure, &phase[..sure.len()], ends);
+    let mut open = (sure[0] != 0).then_some(0);
+    for (i, group) in ends.chunks(GROUP).enumerate() {
+        if group.iter().fold(0, |any, end| any | end) == 0 {
+            continue;
         }
-        if on != 0 && open.is_none() {
-            open = Some(x as u32);
+        for x in (0..group.len()).filter(|&x| group[x] != 0).map(|x| (i * GROUP + x) as u32) {
+            runs.extend(open.map(|from| Run { from, to: x, number: 0 }));
+            open = (sure[x as usize] != 0).then_some(x);
         }
     }
-    if let Some(from) = open {
-        runs.push(Run { from, to: sure.len() as u32, number: 0 });
+    runs.extend(open.map(|from| Run { from, to: sure.len() as u32, number: 0 }));
+}
+
+/// 1 for every pixel but the first where a run begins or has ended.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn mark_ends(sure: &[u8], phase: &[f32], ends: &mut [u8]) {
+    ends[0] = 0;
+    let n = ends.len() - 1;
+    let [before, own] = [0, 1].map(|from| (&sure[from..from + n], &phase[from..from + n]));
+    for (x, end) in ends[1..].iter_mut().enumerate() {
+        let changes = before.0[x] != own.0[x];
+        *end = u8::from(changes | ((own.0[x] != 0) & !joined(before.1[x], own.1[x])));
     }
 }
 

@@ -20,8 +20,9 @@ const REACH_CELLS: usize = 3;
 /// belong to what lies behind: bounds, about twice of what the captures show (`tests/test_captures.py`).
 const SETTLED_DOUBT: f32 = 0.005;
 const GROWN_DOUBT: f32 = 0.1;
-/// Rows that one task works on.
+/// Rows that one task works on, and pixels of a row that are looked through at once.
 const BLOCK: usize = 64;
+const GROUP: usize = 64;
 
 /// Working memory of the tasks.
 #[derive(Debug, Default)]
@@ -43,7 +44,7 @@ impl Odds {
             |reach, (block, settled)| {
                 settled.clear();
                 let rows = block * BLOCK..((block + 1) * BLOCK).min(grid.height);
-                if rows.clone().any(|y| scene.doubted(y)) {
+                if rows.clone().any(|y| scene.doubted(y).next().is_some()) {
                     reach.settle(&scene, rows, settled);
                 }
             },
@@ -63,8 +64,15 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    fn doubted(&self, y: usize) -> bool {
-        self.known[0][y * self.grid.width..][..self.grid.width].iter().any(|&wrong| wrong > DOUBT)
+    /// Groups of pixels of row `y` with a doubt among them.
+    fn doubted(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
+        let wrong = &self.known[0][y * self.grid.width..][..self.grid.width];
+        let groups = wrong.chunks(GROUP).enumerate();
+        // Without a way out in the middle a group takes a few instructions.
+        let doubted = |group: &[f32]| group.iter().fold(false, |any, &wrong| any | (wrong > DOUBT));
+        groups
+            .filter(move |(_, group)| doubted(group))
+            .map(|(i, group)| i * GROUP..i * GROUP + group.len())
     }
 
     fn row(&self, y: usize) -> (&[f32], &[u8]) {
@@ -79,24 +87,25 @@ impl Scene<'_> {
 struct Reach {
     /// 0 where a pixel and the one on its left are of one surface.
     apart: Vec<u8>,
-    right: Vec<u32>,
-    up: Vec<u32>,
-    below: Vec<u32>,
-    down: Vec<u32>,
+    right: Vec<u8>,
+    up: Vec<u8>,
+    below: Vec<u8>,
+    down: Vec<u8>,
 }
 
 impl Reach {
     fn settle(&mut self, scene: &Scene<'_>, rows: Range<usize>, settled: &mut Vec<(usize, [f32; 2])>) {
         let Self { apart, right, up, below, down } = self;
         let Grid { width, height, .. } = *scene.grid;
-        let most = (REACH_CELLS * scene.grid.step) as u32;
+        let reach = REACH_CELLS * scene.grid.step;
+        let most = u8::try_from(reach).expect("cells are at most sixteen pixels wide");
         for counts in [&mut *right, &mut *up, &mut *below] {
             counts.clear();
             counts.resize(width, 0);
         }
         apart.resize(width, 1);
         down.resize(rows.len() * width, 0);
-        for y in (rows.start..(rows.end + most as usize).min(height)).rev() {
+        for y in (rows.start..(rows.end + reach).min(height)).rev() {
             if y + 1 < height {
                 go_on(scene.row(y), scene.row(y + 1), most, below);
             }
@@ -104,30 +113,34 @@ impl Reach {
                 down[(y - rows.start) * width..][..width].copy_from_slice(below);
             }
         }
-        for y in rows.start.saturating_sub(most as usize)..rows.end {
+        for y in rows.start.saturating_sub(reach)..rows.end {
             if y > 0 {
                 go_on(scene.row(y), scene.row(y - 1), most, up);
             }
-            if y < rows.start || !scene.doubted(y) {
+            let mut groups = scene.doubted(y).peekable();
+            if y < rows.start || groups.peek().is_none() {
                 continue;
             }
             let (phase, surfaces) = scene.row(y);
             side_by_side(phase, surfaces, apart);
-            let mut run = 0;
-            for (run_out, &apart) in right.iter_mut().zip(&*apart).rev() {
-                *run_out = run;
-                run = if apart == 0 { (run + 1).min(most) } else { 0 };
-            }
             let down = &down[(y - rows.start) * width..][..width];
-            let (doubts, mut left) = (&scene.known[0][y * width..][..width], 0);
-            for (x, &apart) in apart.iter().enumerate() {
-                left = if apart == 0 { (left + 1).min(most) } else { 0 };
-                if doubts[x] > DOUBT && surfaces[x] != 0 {
-                    let at = y * width + x;
-                    let [left, right, up, down] =
-                        [left, right[x], up[x], down[x]].map(|count| count as usize);
-                    let ends = [at - left, at + right, at - up * width, at + down * width];
-                    settled.extend(surest(scene.known, ends, surfaces[x], at).map(|odds| (at, odds)));
+            let doubts = &scene.known[0][y * width..][..width];
+            for group in groups {
+                let seen = group.start.saturating_sub(reach)..(group.end + reach).min(width);
+                let mut run = 0;
+                for x in seen.clone().rev() {
+                    right[x] = run;
+                    run = if apart[x] == 0 { (run + 1).min(most) } else { 0 };
+                }
+                let mut left = 0;
+                for x in seen.start..group.end {
+                    left = if apart[x] == 0 { (left + 1).min(most) } else { 0 };
+                    if group.contains(&x) && doubts[x] > DOUBT && surfaces[x] != 0 {
+                        let at = y * width + x;
+                        let [left, right, up, down] = [left, right[x], up[x], down[x]].map(usize::from);
+                        let ends = [at - left, at + right, at - up * width, at + down * width];
+                        settled.extend(surest(scene.known, ends, surfaces[x], at).map(|odds| (at, odds)));
+                    }
                 }
             }
         }
@@ -152,7 +165,7 @@ fn side_by_side(phase: &[f32], surfaces: &[u8], apart: &mut [u8]) {
 
 /// Counts of the pixels that a surface goes on, from those of the row it goes on to.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn go_on(here: (&[f32], &[u8]), there: (&[f32], &[u8]), most: u32, counts: &mut [u32]) {
+fn go_on(here: (&[f32], &[u8]), there: (&[f32], &[u8]), most: u8, counts: &mut [u8]) {
     let n = counts.len();
     let [(phase, surfaces), (other, other_surfaces)] = [here, there].map(|row| (&row.0[..n], &row.1[..n]));
     for x in 0..n {
