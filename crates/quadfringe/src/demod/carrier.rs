@@ -43,7 +43,9 @@ impl Carrier {
 /// ```
 #[must_use]
 pub fn carrier(image: ArrayView2<'_, f32>) -> Carrier {
-    Carrier { row_px: line_period(image), column_px: line_period(image.reversed_axes()) }
+    let (row_px, column_px) =
+        rayon::join(|| line_period(image), || line_period(image.reversed_axes()));
+    Carrier { row_px, column_px }
 }
 
 fn line_period(image: ArrayView2<'_, f32>) -> f64 {

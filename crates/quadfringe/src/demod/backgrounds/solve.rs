@@ -14,9 +14,12 @@ pub(super) fn improve(sums: [&[f32]; SUMS], before: [&[f32]; 8], out: &mut [f32]
     for first in (0..columns).step_by(LANES) {
         let count = LANES.min(columns - first);
         let part = |row: &[f32]| {
-            let mut lanes = [0.0; LANES];
-            lanes[..count].copy_from_slice(&row[first..first + count]);
-            lanes
+            let rest = &row[first..];
+            rest.first_chunk().copied().unwrap_or_else(|| {
+                let mut lanes = [0.0; LANES];
+                lanes[..count].copy_from_slice(rest);
+                lanes
+            })
         };
         let mut system = System::new(sums.map(part), before.map(part));
         system.solve();
@@ -26,7 +29,7 @@ pub(super) fn improve(sums: [&[f32]; SUMS], before: [&[f32]; 8], out: &mut [f32]
     }
 }
 
-/// Systems of [`LANES`] cells, side by side.
+/// Systems of [`LANES`] cells, side by side; of a matrix only the lower triangle.
 struct System {
     matrix: [[Lanes; 8]; 8],
     right: [Lanes; 8],
@@ -41,46 +44,44 @@ impl System {
         for c in 0..4 {
             for k in c..4 {
                 let (u, v) = (2 * c, 2 * k);
-                matrix[u][v] = sums[at];
-                matrix[u][v + 1] = sums[at + 1];
+                matrix[v][u] = sums[at];
+                matrix[v + 1][u] = sums[at + 1];
                 if k > c {
-                    matrix[u + 1][v] = sums[at + 2];
-                    matrix[u + 1][v + 1] = sums[at + 3];
+                    matrix[v][u + 1] = sums[at + 2];
+                    matrix[v + 1][u + 1] = sums[at + 3];
                     at += 4;
                 } else {
-                    matrix[u + 1][v + 1] = sums[at + 2];
+                    matrix[v + 1][u + 1] = sums[at + 2];
                     at += 3;
                 }
             }
         }
         let mut right: [Lanes; 8] = std::array::from_fn(|r| sums[MATRIX + r]);
-        let mut floor = [1e-9; LANES];
+        let (mut floor, mut trace, mut size) = ([1e-9; LANES], [0.0; LANES], [1e-12; LANES]);
         for r in 0..8 {
-            for c in 0..8 {
-                if c < r {
-                    matrix[r][c] = matrix[c][r];
-                }
+            for c in 0..=r {
                 for x in 0..LANES {
                     right[r][x] -= matrix[r][c][x] * before[c][x];
+                    if c < r {
+                        right[c][x] -= matrix[r][c][x] * before[r][x];
+                    }
                 }
             }
             for x in 0..LANES {
                 floor[x] += matrix[r][r][x] * (RIDGE / 8.0);
+                trace[x] += matrix[r][r][x] * (1.0 + RIDGE);
+                size[x] += before[r][x] * before[r][x];
             }
         }
+        // Light of another colour is missed least by a model of next to nothing. Only ratios have a meaning, so the size stays.
+        let scale: Lanes = std::array::from_fn(|x| (trace[x] + 8.0 * floor[x]) / size[x]);
         for r in 0..8 {
             for x in 0..LANES {
                 matrix[r][r][x] += RIDGE * matrix[r][r][x] + floor[x];
             }
-        }
-        // Light of another colour is missed least by a model of next to nothing. Only ratios have a meaning, so the size stays.
-        for x in 0..LANES {
-            let size = (0..8).map(|r| before[r][x] * before[r][x]).sum::<f32>();
-            let trace = (0..8).map(|r| matrix[r][r][x]).sum::<f32>();
-            let scale = trace / if size > 1e-12 { size } else { 1e-12 };
-            for r in 0..8 {
-                for c in 0..8 {
-                    matrix[r][c][x] += scale * before[r][x] * before[c][x];
+            for c in 0..=r {
+                for x in 0..LANES {
+                    matrix[r][c][x] += scale[x] * before[r][x] * before[c][x];
                 }
             }
         }
@@ -97,7 +98,9 @@ impl System {
                 let pivot = matrix[k][k][x];
                 inverse[x] = 1.0 / (if pivot > 1e-12 { pivot } else { 1e-12 }).sqrt();
             }
-            for r in k..8 {
+            // On the diagonal the inverse is what is needed.
+            matrix[k][k] = inverse;
+            for r in k + 1..8 {
                 for x in 0..LANES {
                     matrix[r][k][x] *= inverse[x];
                 }
@@ -112,7 +115,7 @@ impl System {
         }
         for k in 0..8 {
             for x in 0..LANES {
-                right[k][x] /= matrix[k][k][x];
+                right[k][x] *= matrix[k][k][x];
             }
             for r in k + 1..8 {
                 for x in 0..LANES {
@@ -122,7 +125,7 @@ impl System {
         }
         for k in (0..8).rev() {
             for x in 0..LANES {
-                right[k][x] /= matrix[k][k][x];
+                right[k][x] *= matrix[k][k][x];
                 unknowns[k][x] += right[k][x];
             }
             for r in 0..k {
