@@ -19,12 +19,16 @@ use rayon::prelude::*;
 
 /// Greatest second difference of the phase, in rad, of a surface without tears.
 pub(super) const BEND_MAX: f32 = 0.3;
-/// Further rounds of backgrounds and phase on a print, where windows see several colours.
-const ROUNDS: usize = 3;
+/// Further rounds of backgrounds and phase: on a print, where windows see several colours, and elsewhere.
+const PRINT_ROUNDS: usize = 3;
+const ROUNDS: usize = 1;
 /// Share of the lit pixels beside edges of colours that makes a print.
 const PRINTED: f32 = 0.03;
 /// How much backgrounds believe the phase of a wide window, next to what the light says of it.
 const TRUST: f32 = 0.08;
+/// Share of such a window that has to be lit: where an edge cuts it the mean lies aside. On a print, whose colours tear the phase
+/// everywhere, it would leave too little.
+const LIT_MIN: f32 = 0.9;
 /// The same where channels were seen one after another: with more, the ripple of slow motion goes sooner, but what moves too fast
 /// to be told passes for something slower.
 const MOVING_TRUST: f32 = 0.01;
@@ -112,30 +116,32 @@ impl Guide {
         };
         self.orders.choose(&scene, &known, &mut self.phase);
         self.backgrounds.start(&scene, &self.fit, &self.slopes, ratios);
-        let fit = Fit { misfit_max: MISFIT_MAX, relative_noise, rows: 2, trust: 0.0 };
+        let fit = Fit { misfit_max: MISFIT_MAX, relative_noise, rows: 2, trust: 0.0, lit_min: 0.0 };
         self.backgrounds.fit(&scene, ratios, [&self.phase, &self.modulation], &self.slopes, &fit);
         let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
         self.orders.choose(&scene, &known, &mut self.phase);
 
         // 4. All four channels measure the same column.
         let fit = Fit { rows: 4, ..fit };
-        let trusting = |trust| Fit { trust, ..fit };
         self.printed = false;
         self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, &fit);
         // What motion makes of the light is not to be explained by other backgrounds.
         if options.channel_instants_us.is_some() {
-            self.refit(&scene, ratios, &trusting(MOVING_TRUST), [lent, more]);
+            self.refit(&scene, ratios, &Fit { trust: MOVING_TRUST, ..fit }, [lent, more]);
             self.slopes.refine(&scene, &self.phase, &self.sound);
             return;
         }
         self.choose(&scene, ratios);
-        for _ in 0..ROUNDS {
-            if !self.printed {
+        for round in 0..PRINT_ROUNDS {
+            if !self.printed && round >= ROUNDS {
                 break;
             }
-            self.refit(&scene, ratios, &trusting(TRUST), [&mut *lent, &mut *more]);
-            self.choose(&scene, ratios);
+            let lit_min = if self.printed { 0.0 } else { LIT_MIN };
+            self.refit(&scene, ratios, &Fit { trust: TRUST, lit_min, ..fit }, [&mut *lent, &mut *more]);
+            if self.printed {
+                self.choose(&scene, ratios);
+            }
             self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         }
         // The phase of a print still follows its colours, and its slopes would too.

@@ -63,6 +63,8 @@ pub(crate) struct Fit {
     pub rows: usize,
     /// How much the given phase counts, next to what the light says of it.
     pub trust: f32,
+    /// Least share of the window of the slopes that is lit around a pixel that takes part.
+    pub lit_min: f32,
 }
 
 impl Backgrounds {
@@ -146,7 +148,7 @@ impl Backgrounds {
         fit: &Fit,
     ) {
         let Self { grid, maps, next, sums, slots, choice } = self;
-        let &Fit { misfit_max, relative_noise, rows: most, trust } = fit;
+        let &Fit { misfit_max, relative_noise, rows: most, trust, lit_min } = fit;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
         grid.window_sums::<SUMS, Rows>(
             (sigma, most),
@@ -159,6 +161,12 @@ impl Backgrounds {
                 usable.clear();
                 usable.extend_from_slice(scene.row(scene.usable, y));
                 choice.leave_out(y, usable);
+                if lit_min > 0.0 {
+                    let shares = slopes.lit(scene, y, losses).iter();
+                    usable.iter_mut().zip(shares).for_each(|(usable, &lit)| {
+                        *usable = if lit >= lit_min { *usable } else { 0.0 };
+                    });
+                }
                 let [phase, modulation] = [phase, modulation].map(|plane| scene.row(plane, y));
                 let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
                 let limits = [4.0 * misfit_max * misfit_max, trust];
@@ -352,7 +360,7 @@ mod tests {
         };
         let before = size_at(&found);
         for _ in 0..6 {
-            let fit = Fit { misfit_max: 1.0, relative_noise: 0.0, rows: 4, trust: 0.0 };
+            let fit = Fit { misfit_max: 1.0, relative_noise: 0.0, rows: 4, trust: 0.0, lit_min: 0.0 };
             found.fit(&scene, RATIOS, [&phase, &modulation], &slopes, &fit);
         }
         let after = size_at(&found);
@@ -380,7 +388,7 @@ mod tests {
         // The phase given is 0.05 rad off, as a two-step phase with wrong backgrounds is.
         let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
         for _ in 0..3 {
-            let fit = Fit { misfit_max: 0.3, relative_noise: 0.0, rows: 4, trust: 0.0 };
+            let fit = Fit { misfit_max: 0.3, relative_noise: 0.0, rows: 4, trust: 0.0, lit_min: 0.0 };
             found.fit(&scene, RATIOS, [&phase, &modulation], &slopes, &fit);
         }
         let mut maps = RowMaps::default();

@@ -17,6 +17,9 @@ const BACKING: f32 = 0.1;
 /// Rows of pixels that stand for a row of cells.
 const SAMPLED_ROWS: usize = 2;
 
+/// Weights and weighted steps along and down, and lit pixels.
+const TERMS: usize = 5;
+
 /// Slopes of the phase in rad per cell, which stays right when the cells are laid over another image.
 #[derive(Debug)]
 pub(crate) struct Slopes {
@@ -29,7 +32,7 @@ pub(crate) struct Slopes {
 
 impl Default for Slopes {
     fn default() -> Self {
-        let [maps, wide] = [3, 3].map(CellMaps::new);
+        let [maps, wide] = [4, 4].map(CellMaps::new);
         Self { maps, wide, sums: CellMaps::default(), slots: Slots::default() }
     }
 }
@@ -49,9 +52,9 @@ impl Slopes {
     fn take(&mut self, scene: &Scene<'_>, [phase, modulation]: [&[f32]; 2], width: f32, backing: f32) {
         let grid = scene.grid;
         let Self { maps, wide, sums, slots } = self;
-        let whole = grid.step * SAMPLED_ROWS.min(grid.step);
-        let backing = backing * whole as f32;
-        grid.window_sums::<4, [Vec<f32>; 2]>(
+        let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
+        let backing = backing * whole;
+        grid.window_sums::<TERMS, [Vec<f32>; 2]>(
             (scene.cells(width), SAMPLED_ROWS),
             slots,
             sums,
@@ -66,8 +69,9 @@ impl Slopes {
                 let here = [scene.row(phase, y), scene.row(modulation, y)];
                 add_steps(here, [&right[0], &right[1]], [0, 1], sums);
                 add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
+                add_lit(scene.row(modulation, y), sums);
             },
-            |row, [w, along, v, down], out| {
+            |row, [w, along, v, down, lit], out| {
                 let (columns, step) = (w.len(), grid.step as f32);
                 let slope = |i: usize, sum: &[f32], weight: &[f32], map: usize| {
                     let backed = if backing > 0.0 { backing * wide.line(row, map)[i] } else { 0.0 };
@@ -76,6 +80,7 @@ impl Slopes {
                 for i in 0..columns {
                     out[i] = slope(i, along, w, 0);
                     out[columns + i] = slope(i, down, v, 1);
+                    out[3 * columns + i] = lit[i] / whole;
                     out[2 * columns + i] = (out[i] * out[i] + out[columns + i] * out[columns + i]) / 24.0;
                 }
             },
@@ -86,7 +91,7 @@ impl Slopes {
     #[cfg(test)]
     pub fn flat(grid: &super::cells::Grid) -> Self {
         let mut flat = Self::default();
-        flat.maps.fill::<3>(grid, |_, lines| lines.into_iter().for_each(|line| line.fill(0.0)));
+        flat.maps.fill::<4>(grid, |_, lines| lines.into_iter().for_each(|line| line.fill(0.0)));
         flat
     }
 
@@ -110,6 +115,12 @@ impl Slopes {
         self.maps.line(row, 2)[column] * loss_scale(scene)
     }
 
+    /// Share of the window around the pixels of row `y` that is lit; nothing is lit beyond the borders.
+    pub fn lit<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample(scene.grid, &self.maps, 3, y);
+        row
+    }
+
     /// Slopes along row `y`.
     pub fn along<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
         let [row] = maps.sample(scene.grid, &self.maps, 0, y);
@@ -129,7 +140,7 @@ fn loss_scale(scene: &Scene<'_>) -> f32 {
 
 /// Adds weights and weighted differences between lit pixels; a difference near half a turn belongs to an edge.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [[Lanes; 4]]) {
+fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [[Lanes; TERMS]]) {
     let (here, there) = (here.map(lanes), there.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
         let ([phase, lit], [other, other_lit]) = (take(&here, i), take(&there, i));
@@ -145,6 +156,15 @@ fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [
         for x in 0..LANES {
             sums[to[0]][x] += terms[0][x];
             sums[to[1]][x] += terms[1][x];
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_lit(modulation: &[f32], sums: &mut [[Lanes; TERMS]]) {
+    for (sums, modulation) in sums.iter_mut().zip(lanes(modulation)) {
+        for x in 0..LANES {
+            sums[TERMS - 1][x] += if modulation[x] > 0.0 { 1.0 } else { 0.0 };
         }
     }
 }
