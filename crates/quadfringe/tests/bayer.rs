@@ -50,7 +50,7 @@ fn three_ways(bench: &Bench, cast: &Cast, plain: &RenderOptions, method: Method)
 fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
     let bench = bench(1);
     let cast = cast_scene(&bench, "peaks");
-    for (method, times_better) in [(Method::Published, 4.0), (Method::Best, 0.95)] {
+    for (method, times_better) in [(Method::Published, 4.0), (Method::Best, 1.05)] {
         let [full, raw, bilinear] = three_ways(&bench, &cast, &clean(), method);
         println!("{method:?}\n{full:?}\n{raw:?}\n{bilinear:?}");
         assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
