@@ -128,7 +128,8 @@ impl Guide {
         self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, &fit);
         // What motion makes of the light is not to be explained by other backgrounds.
         if options.channel_instants_us.is_some() {
-            self.refit(&scene, ratios, &Fit { trust: MOVING_TRUST, ..fit }, [lent, more]);
+            self.refit(&scene, ratios, &Fit { trust: MOVING_TRUST, ..fit }, [&mut *lent, &mut *more]);
+            self.measure(&scene, ratios, [lent, more]);
             self.slopes.refine(&scene, &self.phase, &self.sound);
             return;
         }
@@ -144,6 +145,8 @@ impl Guide {
             }
             self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         }
+        // One step leaves a fifth of an error that neighbours share, two leave little.
+        self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         // The phase of a print still follows its colours, and its slopes would too.
         if !self.printed {
             self.slopes.refine(&scene, &self.phase, &self.sound);

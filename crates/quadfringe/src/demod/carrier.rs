@@ -43,8 +43,7 @@ impl Carrier {
 /// ```
 #[must_use]
 pub fn carrier(image: ArrayView2<'_, f32>) -> Carrier {
-    let (row_px, column_px) =
-        rayon::join(|| line_period(image), || line_period(image.reversed_axes()));
+    let (row_px, column_px) = rayon::join(|| line_period(image), || line_period(image.reversed_axes()));
     Carrier { row_px, column_px }
 }
 

@@ -20,6 +20,9 @@ const BLOCK: usize = 32;
 /// four times longer and, where neighbours err to different sides, lead beyond the solution.
 const OWN_ALBEDO: f32 = 0.25;
 
+/// What a dark pixel counts in the albedo of its neighbours: its phase is anything, and with it its albedo.
+const UNKNOWN: f32 = 1e-3;
+
 /// Working rows of the joint fit.
 #[derive(Debug, Default)]
 pub(crate) struct Joint {
@@ -46,10 +49,11 @@ impl Found<'_> {
 }
 
 /// Sums over the four channels on one row: products of the model `m` for an albedo of 1, of its derivative `d` by the phase and
-/// of the light `s`, as mm, md, dd, ms, ds, ss; the albedo that fits best; the mean modulation of R and B for an albedo of 1.
+/// of the light `s`, as mm, md, dd, ms, ds, ss; the mean modulation of R and B for an albedo of 1; the albedo that fits best times
+/// its weight, and that weight.
 #[derive(Debug, Default)]
 struct ModelRow {
-    rows: [Vec<f32>; 8],
+    rows: [Vec<f32>; 9],
 }
 
 /// Rows of one task.
@@ -58,7 +62,8 @@ struct Rows {
     maps: RowMaps,
     losses: RowMaps,
     ring: [ModelRow; 3],
-    albedo: Vec<f32>,
+    /// Means of albedo and weight over neighbours.
+    means: [Vec<f32>; 2],
     smooth: Vec<f32>,
     /// Misfit and modulation.
     found: [Vec<f32>; 2],
@@ -95,24 +100,26 @@ impl Joint {
                 let model = |rows: &mut Rows, y: usize, at: usize| {
                     let maps = backgrounds.sample(scene, y, &mut rows.maps);
                     let loss = window.loss(y, &mut rows.losses);
-                    rows.ring[at].fill(maps, [scene.row(before, y), loss], scene.rows(y), ratios);
+                    let pixels = [scene.row(before, y), loss, window.modulation(y)];
+                    rows.ring[at].fill(maps, pixels, scene.rows(y), ratios);
                 };
                 model(rows, around(first, grid.height)[0], 0);
                 model(rows, first, 1);
                 for (i, ((phase, weight), (misfit, modulation))) in out.into_iter().enumerate() {
                     let y = first + i;
                     model(rows, around(y, grid.height)[2], (i + 2) % 3);
-                    let Rows { ring, albedo, smooth, found, window: window_rows, .. } = rows;
-                    let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[6].as_slice());
-                    for row in std::iter::once(&mut *albedo).chain(&mut *found) {
-                        row.resize(grid.stride, 0.0);
+                    let Rows { ring, means, smooth, found, window: window_rows, .. } = rows;
+                    means.iter_mut().chain(&mut *found).for_each(|row| row.resize(grid.stride, 0.0));
+                    for (mean, from) in means.iter_mut().zip([7, 8]) {
+                        let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[from].as_slice());
+                        binomial(near, grid.width, smooth, mean);
                     }
-                    binomial(near, grid.width, smooth, albedo);
                     let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
+                    let means = means.each_ref().map(Vec::as_slice);
                     let lit = [window.modulation(y), scene.row(scene.usable, y)];
                     let [misfits, modulations] = found.each_mut().map(Vec::as_mut_slice);
                     let measure = |[numerator, denominator]: [&mut [f32]; 2]| {
-                        linearise(model, albedo, lit, [numerator, denominator, misfits, modulations]);
+                        linearise(model, means, lit, [numerator, denominator, misfits, modulations]);
                     };
                     window.along(y, window_rows, scene.row(before, y), measure, [phase, weight]);
                     let [misfits, modulations] = found;
@@ -127,7 +134,7 @@ impl Joint {
 }
 
 impl ModelRow {
-    fn fill(&mut self, maps: [&[f32]; 8], pixels: [&[f32]; 2], light: [&[f32]; 4], ratios: [f32; 3]) {
+    fn fill(&mut self, maps: [&[f32]; 8], pixels: [&[f32]; 3], light: [&[f32]; 4], ratios: [f32; 3]) {
         self.rows.iter_mut().for_each(|row| row.resize(pixels[0].len(), 0.0));
         predict(maps, pixels, light, ratios, self.rows.each_mut().map(Vec::as_mut_slice));
     }
@@ -136,16 +143,17 @@ impl ModelRow {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn predict(
     maps: [&[f32]; 8],
-    pixels: [&[f32]; 2],
+    pixels: [&[f32]; 3],
     light: [&[f32]; 4],
     ratios: [f32; 3],
-    out: [&mut [f32]; 8],
+    out: [&mut [f32]; 9],
 ) {
     let (maps, pixels, light) = (maps.map(lanes), pixels.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
     for i in 0..pixels[0].len() {
-        let (maps, [phase, loss], light) = (take(&maps, i), take(&pixels, i), take(&light, i));
-        let mut found = [[0.0; LANES]; 8];
+        let (maps, light) = (take(&maps, i), take(&light, i));
+        let [phase, loss, lit] = take(&pixels, i);
+        let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
             let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
@@ -163,10 +171,10 @@ fn predict(
             }
             let albedo = ms / mm;
             let albedo = if albedo > 1e-4 { albedo } else { 1e-4 };
-            let modulation = 0.5 * (maps[1][x] + maps[5][x]);
-            for (row, value) in [mm, md, dd, ms, ds, ss, albedo, modulation].into_iter().enumerate() {
-                found[row][x] = value;
-            }
+            let weight = if lit[x] > 0.0 { 1.0 } else { UNKNOWN };
+            let mean = 0.5 * (maps[1][x] + maps[5][x]);
+            let own = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];
+            (0..9).for_each(|row| found[row][x] = own[row]);
         }
         put(&mut out, i, &found);
     }
@@ -174,14 +182,15 @@ fn predict(
 
 /// Gauss-Newton terms of every pixel with the albedo eliminated, and how far the channels are from their model.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn linearise(model: [&[f32]; 8], albedo: &[f32], lit: [&[f32]; 2], out: [&mut [f32]; 4]) {
-    let (model, albedo, lit) = (model.map(lanes), lanes(albedo), lit.map(lanes));
+fn linearise(model: [&[f32]; 9], means: [&[f32]; 2], lit: [&[f32]; 2], out: [&mut [f32]; 4]) {
+    let (model, means, lit) = (model.map(lanes), means.map(lanes), lit.map(lanes));
     let mut out = out.map(lanes_mut);
-    for (i, albedo) in albedo.iter().enumerate() {
-        let ([mm, md, dd, ms, ds, ss, _, modulation], lit) = (take(&model, i), take(&lit, i));
+    for i in 0..means[0].len() {
+        let [mm, md, dd, ms, ds, ss, modulation, _, _] = take(&model, i);
+        let ([albedo, weight], lit) = (take(&means, i), take(&lit, i));
         let mut found = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let albedo = albedo[x];
+            let albedo = albedo[x] / weight[x];
             let top = albedo * (ds[x] - albedo * md[x]);
             let square = ss[x] - albedo * (2.0 * ms[x] - albedo * mm[x]);
             // What a change of albedo would explain as well says nothing about the phase.

@@ -70,9 +70,7 @@ impl Scene<'_> {
         let groups = wrong.chunks(GROUP).enumerate();
         // Without a way out in the middle a group takes a few instructions.
         let doubted = |group: &[f32]| group.iter().fold(false, |any, &wrong| any | (wrong > DOUBT));
-        groups
-            .filter(move |(_, group)| doubted(group))
-            .map(|(i, group)| i * GROUP..i * GROUP + group.len())
+        groups.filter(move |(_, group)| doubted(group)).map(|(i, group)| i * GROUP..i * GROUP + group.len())
     }
 
     fn row(&self, y: usize) -> (&[f32], &[u8]) {
