@@ -21,7 +21,7 @@ use rayon::prelude::*;
 pub(super) const BEND_MAX: f32 = 0.3;
 /// Further rounds of backgrounds and phase: on a print, where windows see several colours, and elsewhere.
 const PRINT_ROUNDS: usize = 3;
-const ROUNDS: usize = 1;
+const ROUNDS: usize = 2;
 /// Share of the lit pixels beside edges of colours that makes a print.
 const PRINTED: f32 = 0.03;
 /// How much backgrounds believe the phase of a wide window, next to what the light says of it.
@@ -145,8 +145,6 @@ impl Guide {
             }
             self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         }
-        // One step leaves a fifth of an error that neighbours share, two leave little.
-        self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         // The phase of a print still follows its colours, and its slopes would too.
         if !self.printed {
             self.slopes.refine(&scene, &self.phase, &self.sound);
