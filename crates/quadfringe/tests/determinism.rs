@@ -4,8 +4,9 @@ mod common;
 
 use common::{bench, cast_scene, code, decode_planes, noisy, there_and_back};
 use ndarray::Array2;
-use quadfringe::rig::Light;
-use quadfringe::{Conditioner, Decoded, Decoder, Method, Options};
+use quadfringe::height::Triangulator;
+use quadfringe::rig::{Bench, Light, Planes};
+use quadfringe::{Conditioner, Decoded, Decoder, Device, Method, Options, Shot};
 use rayon::ThreadPoolBuilder;
 
 fn bits(decoded: &Decoded) -> Vec<u32> {
@@ -57,4 +58,47 @@ fn a_shot_leaves_nothing_behind() {
             shots.each_ref().map(|planes| bits(&decode_planes(&mut decoder, planes).expect("a valid shot")));
         assert!(first == again, "{method:?}");
     }
+}
+
+/// Decoders work in the memory of the maps that they are given, and rows of planes are longer than those of images.
+#[test]
+fn maps_may_hold_anything() {
+    for (width, height) in [(333, 250), (500, 375), (810, 300)] {
+        let whole = Bench::reference();
+        let focal = whole.camera.focal_px.map(|f| f * width as f64 / whole.camera.width as f64);
+        let centre = [width, height].map(|n| 0.5 * (n as f64 - 1.0));
+        let camera = Device::pinhole(width, height, focal, centre).expect("valid camera");
+        let bench = Bench { camera, ..whole };
+        let cast = cast_scene(&bench, "steps");
+        let planes = bench.render(&cast, &Light::shot(&code()), &noisy(5)).expect("a valid scene");
+        let Planes::U8(images) = &planes else { panic!("noisy images have 8 bit") };
+        let shot = Shot::new(images.each_ref().map(|image| image.view())).expect("equal images");
+        for method in [Method::Best, Method::Published] {
+            let options = Options { method, ..Options::default() };
+            let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("valid devices");
+            let mut decoder = Decoder::new(code(), [height, width], &Conditioner::default(), options)
+                .and_then(|decoder| decoder.triangulate_with(triangulator))
+                .expect("valid options");
+            let mut decoded = decoder.decode(&shot).expect("a valid shot");
+            let first = bits(&decoded);
+            for round in 0..2 {
+                poison(&mut decoded);
+                decoder.decode_into(&shot, &mut decoded).expect("maps of the right size");
+                assert!(first == bits(&decoded), "{method:?}, {width} x {height}, round {round}");
+            }
+        }
+    }
+}
+
+fn poison(decoded: &mut Decoded) {
+    let maps = [
+        &mut decoded.phase_rad,
+        &mut decoded.column_px,
+        &mut decoded.modulation,
+        &mut decoded.quality,
+        &mut decoded.wrong_order_probability,
+    ];
+    let deviations = decoded.uncertainty_rad.iter_mut().chain(&mut decoded.uncertainty_mm);
+    maps.into_iter().chain(deviations).for_each(|map| map.fill(f32::NAN));
+    decoded.xyz_mm.iter_mut().for_each(|xyz| xyz.fill(f32::NAN));
 }

@@ -238,7 +238,7 @@ fn sum_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut 
     }
 }
 
-/// 1 where the least of nine sums is above `limit`.
+/// 1 where the least of nine sums is above `limit`, 0 in the padding.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn least_of_nine(rows: [&[f32]; 3], width: usize, limit: f32, spare: &mut Vec<f32>, out: &mut [f32]) {
     let least = |a: f32, b: f32| if a < b { a } else { b };
@@ -250,7 +250,9 @@ fn least_of_nine(rows: [&[f32]; 3], width: usize, limit: f32, spare: &mut Vec<f3
     }
     (spare[0], spare[width + 1]) = (spare[1], spare[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &spare[k..k + width]);
-    for (x, out) in out[..width].iter_mut().enumerate() {
+    let (out, padding) = out.split_at_mut(width);
+    padding.fill(0.0);
+    for (x, out) in out.iter_mut().enumerate() {
         *out = if least(least(left[x], middle[x]), right[x]) > limit { 1.0 } else { 0.0 };
     }
 }
@@ -260,7 +262,8 @@ fn least_of_nine(rows: [&[f32]; 3], width: usize, limit: f32, spare: &mut Vec<f3
 fn least_of_five(rows: [&[f32]; 3], width: usize, limit: f32, out: &mut [f32]) {
     let least = |a: f32, b: f32| if a < b { a } else { b };
     let [above, own, below] = rows.map(|row| &row[..width]);
-    let out = &mut out[..width];
+    let (out, padding) = out.split_at_mut(width);
+    padding.fill(0.0);
     for x in 0..width {
         out[x] = least(least(above[x], below[x]), own[x]);
     }
