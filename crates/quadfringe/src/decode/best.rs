@@ -9,6 +9,7 @@ use super::uncertainty::PhaseNoise;
 use super::{Decoded, Options};
 use crate::condition::{Plan, Sample};
 use crate::demod::agreement::Agreement;
+use crate::demod::backgrounds::Backgrounds;
 use crate::demod::carrier;
 use crate::demod::cells::{Grid, RowMaps};
 use crate::demod::joint::Found;
@@ -192,15 +193,30 @@ impl Best {
         // All four channels measure the same column.
         let scene = self.full.scene(grid, period_px, 1);
         let Guide { slopes, noise, backgrounds, joint, residuals, printed, .. } = &mut self.guide;
-        let mut window = Window::new(&scene, slopes, &self.modulation, *noise);
-        // Without colours it is shape that the model misses, and that is not to be averaged away.
-        if *printed {
-            window = window.loosened(residuals);
-            // Edges of colours are as sharp as the image.
-            backgrounds.choose(&scene, self.ratios, [&self.phase, &self.modulation], slopes, *noise);
-        }
+        let window = Window::new(&scene, slopes, &self.modulation, *noise);
         let Unwritten { lent: [first, second], found } = unwritten;
-        joint.step(&scene, (backgrounds, self.ratios), &window, &mut self.phase, [first, second], found);
+        let mut step =
+            |backgrounds: &Backgrounds, window: Window<'_>, phase: &mut [f32], found: &mut Found<'_>| {
+                joint.step(
+                    &scene,
+                    (backgrounds, self.ratios),
+                    &window,
+                    phase,
+                    [&mut *first, &mut *second],
+                    found,
+                );
+            };
+        if !*printed {
+            step(backgrounds, window, &mut self.phase, found);
+            return;
+        }
+        // What is missed is judged by backgrounds that windows agree on: a colour of its own explains a pixel whatever its order.
+        let mut missed = Found { misfit: std::mem::take(&mut found.misfit), ..Found::nothing(grid.height) };
+        step(backgrounds, window.wide(), &mut self.phase, &mut missed);
+        backgrounds.colour(&scene, self.ratios, [&self.phase, &self.modulation], slopes, *noise);
+        found.misfit = Found::nothing(grid.height).misfit;
+        // Without colours it is shape that the model misses, and that is not to be averaged away.
+        step(backgrounds, window.loosened(residuals), &mut self.phase, found);
     }
 
     /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.

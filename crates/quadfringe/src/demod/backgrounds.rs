@@ -6,6 +6,7 @@
 //! so that neither noise of the phase nor texture reaches `a` and `b`, and one round does what alternating takes many for.
 
 mod choice;
+mod colours;
 mod solve;
 
 use super::cells::{CellMaps, CellWork, Grid, RowMaps};
@@ -16,6 +17,7 @@ use super::slopes::Slopes;
 use crate::angle::sin_cos;
 use crate::slots::Slots;
 use choice::Choice;
+use colours::Colours;
 use multiversion::multiversion;
 use solve::improve;
 
@@ -42,6 +44,7 @@ pub(crate) struct Backgrounds {
     next: CellMaps,
     sums: CellMaps,
     choice: Choice,
+    colours: Colours,
     slots: Slots<(Rows, CellWork)>,
 }
 
@@ -75,6 +78,7 @@ impl Backgrounds {
             next: CellMaps::new(8),
             sums: CellMaps::default(),
             choice: Choice::default(),
+            colours: Colours::default(),
             slots: Slots::default(),
         }
     }
@@ -87,6 +91,7 @@ impl Backgrounds {
         self.grid = Grid::with_stride([fine.height, fine.width], fine.stride, side);
         let times = self.grid.step / fine.step;
         self.choice.forget();
+        self.colours.forget();
         self.next.fill::<8>(&self.grid, |row, mut lines| {
             for column in 0..lines[0].len() {
                 let inside = |at: usize, count: usize| (at * times + times / 2).min(count - 1);
@@ -108,6 +113,9 @@ impl Backgrounds {
     /// G, of B, of IR.
     pub fn sample<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 8] {
         let grid = self.grid.over(scene.grid);
+        if self.colours.known(scene) {
+            return self.colours.sample(&grid, y, maps).map(|row| &*row);
+        }
         let mut rows = maps.sample_mut(&grid, &self.maps, 0, y);
         self.choice.apply(&grid, &self.maps, y, &mut rows);
         rows.map(|row| &*row)
@@ -132,6 +140,19 @@ impl Backgrounds {
         self.choice.make((&grid, &self.maps), scene, (ratios, slopes), pixels, noise)
     }
 
+    /// Give every pixel a colour of its own.
+    pub fn colour(
+        &mut self,
+        scene: &Scene<'_>,
+        ratios: [f32; 3],
+        pixels: [&[f32]; 2],
+        slopes: &Slopes,
+        noise: f32,
+    ) {
+        let grid = self.grid.over(scene.grid);
+        self.colours.measure((&grid, &self.maps), scene, (ratios, slopes), pixels, noise);
+    }
+
     /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.
     pub fn cell(&self, scene: &Scene<'_>, row: usize, column: usize) -> [[f32; 2]; 4] {
         let times = self.grid.over(scene.grid).step / scene.grid.step;
@@ -147,7 +168,7 @@ impl Backgrounds {
         slopes: &Slopes,
         fit: &Fit,
     ) {
-        let Self { grid, maps, next, sums, slots, choice } = self;
+        let Self { grid, maps, next, sums, slots, choice, .. } = self;
         let &Fit { misfit_max, relative_noise, rows: most, trust, lit_min } = fit;
         let sigma = WINDOW * scene.period_px as f32 / grid.step as f32;
         grid.window_sums::<SUMS, Rows>(

@@ -212,13 +212,15 @@ impl CellMaps {
         &self.data[(row * self.count + map) * self.columns..][..self.columns]
     }
 
-    /// The first `N` maps at one pixel of the image, between cells as [`Grid::expand`].
-    pub fn at<const N: usize>(&self, grid: &Grid, y: usize, x: usize) -> [f32; N] {
+    /// The first `N` maps in row `y` of the image at column `x`, between cells as [`Grid::expand`].
+    #[inline(always)]
+    pub fn at<const N: usize>(&self, grid: &Grid, y: usize, x: f32) -> [f32; N] {
         let (above, below, down) = grid.between(y);
-        let place = (x as f32 + 0.5) / grid.step as f32 - 0.5;
-        let left = place.floor();
-        let clamp = |column: f32| column.clamp(0.0, (self.columns - 1) as f32) as usize;
-        let (right, to_right, left) = (clamp(left + 1.0), place - left, clamp(left));
+        // One more, so that what is cut off rounds down.
+        let place = (x + 0.5) / grid.step as f32 + 0.5;
+        let next = place.max(0.0) as usize;
+        let to_right = place - next as f32;
+        let (left, right) = (next.saturating_sub(1), next.min(self.columns - 1));
         std::array::from_fn(|k| {
             let (above, below) = (self.line(above, k), self.line(below, k));
             let mix = |column: usize| above[column] + (below[column] - above[column]) * down;

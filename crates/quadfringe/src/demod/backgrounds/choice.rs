@@ -146,23 +146,35 @@ impl Choice {
         if self.places.is_empty() {
             return;
         }
-        let factor = grid.stride / self.stride;
-        let aside = (self.aside * factor) as isize;
-        let places = &self.places[y / factor * self.stride..][..self.stride];
-        for (group, places) in places.chunks(LANES).enumerate() {
-            // Most vectors hold no other place; they are told apart at once.
-            if places.iter().fold(0, |any, place| any | place) == 0 {
-                continue;
-            }
-            for (i, &place) in places.iter().enumerate().filter(|(_, place)| **place != 0) {
-                let [down, right] = PLACES[usize::from(place)].map(|steps| steps * aside);
-                let from_row = (y as isize + down).clamp(0, grid.height as isize - 1) as usize;
-                let first = factor * (group * LANES + i);
-                for x in first..first + factor {
-                    let from = (x as isize + right).clamp(0, grid.width as isize - 1) as usize;
-                    let found: [f32; 8] = maps.at(grid, from_row, from);
-                    rows.iter_mut().zip(found).for_each(|(row, value)| row[x] = value);
-                }
+        let places = &self.places[y * self.stride / grid.stride * self.stride..][..self.stride];
+        apply(places, self.aside, (grid, maps), y, rows);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn apply(
+    places: &[u8],
+    aside: usize,
+    (grid, maps): (&Grid, &CellMaps),
+    y: usize,
+    rows: &mut [&mut [f32]; 8],
+) {
+    let factor = grid.stride / places.len();
+    let aside = (aside * factor) as isize;
+    let last = [grid.height - 1, grid.width - 1].map(|last| last as isize);
+    for (group, places) in places.chunks(LANES).enumerate() {
+        // Most vectors hold no other place; they are told apart at once.
+        if places.iter().fold(0, |any, place| any | place) == 0 {
+            continue;
+        }
+        for (i, &place) in places.iter().enumerate().filter(|(_, place)| **place != 0) {
+            let [down, right] = PLACES[usize::from(place)].map(|steps| steps * aside);
+            let first = factor * (group * LANES + i);
+            let from_row = (y as isize + down).clamp(0, last[0]) as usize;
+            let from = (first as isize + right).clamp(0, last[1]) as f32 + 0.5 * (factor - 1) as f32;
+            let found: [f32; 8] = maps.at(grid, from_row, from);
+            for (row, value) in rows.iter_mut().zip(found) {
+                row[first..first + factor].fill(value);
             }
         }
     }
