@@ -150,7 +150,8 @@ impl Backgrounds {
         noise: f32,
     ) {
         let grid = self.grid.over(scene.grid);
-        self.colours.measure((&grid, &self.maps), scene, (ratios, slopes), pixels, noise);
+        let Self { maps, colours, sums, .. } = self;
+        colours.measure((&grid, maps), scene, (ratios, slopes), pixels, noise, sums);
     }
 
     /// Backgrounds and modulations of the four channels near the middle of a cell of the scene's grid.

@@ -27,12 +27,12 @@ const ERROR: f32 = 0.015;
 /// excess at which it counts no more.
 const EXPECTED: f32 = 4.0;
 const EXCESS: f32 = 16.0;
-/// Steps of an albedo of 1; twice that is the greatest. What noise leaves of a mean is coarser by far.
+/// Steps of an albedo of 1, the greatest is twice that; what noise leaves of a mean is coarser by far.
 const LEVELS: f32 = 32768.0;
 /// Rows of one task.
 const BLOCK: usize = 32;
 
-/// Albedo of every pixel, and working maps.
+/// Albedos of every pixel, and working maps.
 #[derive(Debug)]
 pub(super) struct Colours {
     /// Albedos of R, G, B, IR in padded rows, in units of 1/[`LEVELS`].
@@ -41,19 +41,12 @@ pub(super) struct Colours {
     stride: usize,
     /// 1 and the contrast of every channel.
     contrasts: CellMaps,
-    sums: CellMaps,
     slots: Slots<(Rows, CellWork)>,
 }
 
 impl Default for Colours {
     fn default() -> Self {
-        Self {
-            planes: Default::default(),
-            stride: 0,
-            contrasts: CellMaps::new(8),
-            sums: CellMaps::default(),
-            slots: Slots::default(),
-        }
+        Self { planes: Default::default(), stride: 0, contrasts: CellMaps::new(8), slots: Slots::default() }
     }
 }
 
@@ -63,10 +56,12 @@ struct Rows {
     maps: RowMaps,
     losses: RowMaps,
     /// Light times its model, and the square of the model, of three rows.
-    ring: [[Vec<f32>; 8]; 3],
+    models: [[Vec<f32>; 8]; 3],
     spare: Vec<f32>,
-    /// Albedo and precision of four channels, row by row, with room to both sides.
-    known: Vec<f32>,
+    /// Albedo and precision of four channels, with room to both sides, of as many rows as the mean reaches over.
+    ring: Vec<f32>,
+    /// Where in it the pixels of the mean begin, and their weights.
+    places: Vec<(usize, f32)>,
 }
 
 /// Another pixel of the mean: rows down, columns right, both from the first, and weight.
@@ -86,11 +81,8 @@ impl Colours {
     /// Backgrounds and modulations of row `y`, with contrasts on `grid`.
     pub fn sample<'a>(&self, grid: &Grid, y: usize, maps: &'a mut RowMaps) -> [&'a mut [f32]; 8] {
         let mut rows = maps.sample_mut::<8>(grid, &self.contrasts, 0, y);
-        for c in 0..4 {
-            let (backgrounds, modulations) = rows[2 * c..].split_at_mut(1);
-            let albedo = &self.planes[c][y * grid.stride..][..grid.stride];
-            colour(albedo, backgrounds[0], modulations[0]);
-        }
+        let albedos = self.planes.each_ref().map(|plane| &plane[y * grid.stride..][..grid.stride]);
+        colour(albedos, rows.each_mut().map(|row| &mut **row));
         rows
     }
 
@@ -103,26 +95,26 @@ impl Colours {
         (ratios, slopes): ([f32; 3], &Slopes),
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
+        sums: &mut CellMaps,
     ) {
-        self.contrast(grid, backgrounds, scene);
-        let Self { planes, stride, contrasts, slots, .. } = self;
+        self.contrast(grid, backgrounds, scene, sums);
+        let Self { planes, stride, contrasts, slots } = self;
         *stride = grid.stride;
         let (taps, reach) = taps(scene.period_px as f32);
-        let wide = grid.stride + 2 * reach;
+        let (wide, kept) = (grid.stride + 2 * reach, 2 * reach + 1);
         planes.iter_mut().for_each(|plane| plane.resize(grid.pixels(), 0));
         let [red, green, blue, infrared] =
             planes.each_mut().map(|plane| plane.par_chunks_mut(BLOCK * grid.stride));
         red.zip(green).zip(blue.zip(infrared)).enumerate().for_each_init(
             || slots.take(),
             |slot, (block, ((red, green), (blue, infrared)))| {
-                let Rows { maps, losses, ring, spare, known } = &mut slot.0;
-                let (first, count) = (block * BLOCK, red.len() / grid.stride);
-                // Rows from `first - reach` on; those beyond the border stay 0, and count nothing.
-                let rows = first.saturating_sub(reach)..(first + count + reach).min(grid.height);
-                let below = rows.start + reach - first;
-                known.clear();
-                known.resize(8 * wide * (count + 2 * reach), 0.0);
-                let mut model = |y: usize, out: &mut [Vec<f32>; 8]| {
+                let Rows { maps, losses, models, spare, ring, places } = &mut slot.0;
+                let mut out = [red, green, blue, infrared].map(|rows| rows.chunks_mut(grid.stride));
+                let (first, count) = ((block * BLOCK) as isize, out[0].len());
+                ring.clear();
+                ring.resize(8 * wide * kept, 0.0);
+                let mut model = |y: isize, out: &mut [Vec<f32>; 8]| {
+                    let y = y.clamp(0, grid.height as isize - 1) as usize;
                     out.iter_mut().for_each(|row| row.resize(grid.stride, 0.0));
                     let model = maps.sample::<8>(grid, contrasts, 0, y);
                     let contrasts = [1, 3, 5, 7].map(|k| model[k]);
@@ -131,36 +123,37 @@ impl Colours {
                         [phase, modulation, scene.row(scene.usable, y), slopes.loss(scene, y, losses)];
                     project(contrasts, pixels, scene.rows(y), ratios, out.each_mut().map(Vec::as_mut_slice));
                 };
-                model(rows.start.saturating_sub(1), &mut ring[0]);
-                model(rows.start, &mut ring[1]);
-                for (i, y) in rows.enumerate() {
-                    model((y + 1).min(grid.height - 1), &mut ring[(i + 2) % 3]);
-                    let out = &mut known[8 * wide * (below + i)..][..8 * wide];
+                let from = first - reach as isize;
+                model(from - 1, &mut models[0]);
+                model(from, &mut models[1]);
+                for i in 0..count + 2 * reach {
+                    let y = from + i as isize;
+                    model(y + 1, &mut models[(i + 2) % 3]);
+                    let known = &mut ring[8 * wide * (i % kept)..][..8 * wide];
+                    // Beyond the border nothing is known.
+                    let on = if (0..grid.height as isize).contains(&y) { 1.0 } else { 0.0 };
                     for c in 0..4 {
-                        let (albedo, precision) = out[2 * c * wide..][..2 * wide].split_at_mut(wide);
+                        let (albedo, precision) = known[2 * c * wide..][..2 * wide].split_at_mut(wide);
                         let inner = [albedo, precision].map(|row| &mut row[reach..reach + grid.stride]);
                         let [products, squares] =
-                            [c, 4 + c].map(|k| [0, 1, 2].map(|j| ring[(i + j) % 3][k].as_slice()));
-                        divide([products, squares], grid.width, noise, spare, inner);
+                            [c, 4 + c].map(|k| [0, 1, 2].map(|j| models[(i + j) % 3][k].as_slice()));
+                        divide([products, squares], grid.width, (on, noise), spare, inner);
                     }
-                }
-                for i in 0..count {
-                    let at = i * grid.stride..(i + 1) * grid.stride;
-                    let out = [
-                        &mut red[at.clone()],
-                        &mut green[at.clone()],
-                        &mut blue[at.clone()],
-                        &mut infrared[at],
-                    ];
-                    average(&taps, (&known[8 * wide * i..], wide, reach), out);
+                    if i >= 2 * reach {
+                        let rows = out.each_mut().map(|rows| rows.next().expect("as many as were counted"));
+                        let place = |[down, right]: [usize; 2]| 8 * wide * ((i + 1 + down) % kept) + right;
+                        places.clear();
+                        places.extend(taps.iter().map(|&(steps, near)| (place(steps), near)));
+                        average(places, place([reach, reach]), (ring, wide), rows);
+                    }
                 }
             },
         );
     }
 
     /// Contrasts of the light, from backgrounds that colours have as well.
-    fn contrast(&mut self, grid: &Grid, backgrounds: &CellMaps, scene: &Scene<'_>) {
-        let Self { contrasts, sums, slots, .. } = self;
+    fn contrast(&mut self, grid: &Grid, backgrounds: &CellMaps, scene: &Scene<'_>, sums: &mut CellMaps) {
+        let Self { contrasts, slots, .. } = self;
         grid.smooth::<8, Rows>(
             CONTRAST * scene.period_px as f32 / grid.step as f32,
             slots,
@@ -228,7 +221,7 @@ fn project(
 fn divide(
     rows: [[&[f32]; 3]; 2],
     width: usize,
-    noise: f32,
+    (on, noise): (f32, f32),
     spare: &mut Vec<f32>,
     [albedo, precision]: [&mut [f32]; 2],
 ) {
@@ -239,7 +232,7 @@ fn divide(
         let square = *precision;
         let known = *albedo / if square > 1e-3 { square } else { 1e-3 };
         *albedo = known;
-        *precision = square / (variance + square * (ERROR * ERROR * known * known + 1e-8));
+        *precision = on * square / (variance + square * (ERROR * ERROR * known * known + 1e-8));
     }
 }
 
@@ -258,37 +251,46 @@ fn sum_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut 
     }
 }
 
-/// Background, and modulation in the place of the contrast, by an albedo.
+/// Backgrounds, and modulations in the places of the contrasts.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn colour(albedo: &[u16], background: &mut [f32], contrast: &mut [f32]) {
-    for (albedo, (a, b)) in albedo.iter().zip(background.iter_mut().zip(contrast)) {
-        *a = f32::from(*albedo) * (1.0 / LEVELS);
-        *b *= *a;
+fn colour(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
+    let albedos = albedos.map(|row| row.as_chunks::<LANES>().0);
+    let rows = rows.map(lanes_mut);
+    for c in 0..4 {
+        for (i, albedo) in albedos[c].iter().enumerate() {
+            let albedo = albedo.map(|albedo| f32::from(albedo) * (1.0 / LEVELS));
+            let mut modulation = rows[2 * c + 1][i];
+            for x in 0..LANES {
+                modulation[x] *= albedo[x];
+            }
+            (rows[2 * c][i], rows[2 * c + 1][i]) = (albedo, modulation);
+        }
     }
 }
 
 /// Pixels that are averaged side by side: with more the sums would not stay in registers.
 const SIDE: usize = LANES / 2;
 
-/// Mean albedo over the pixels around that have the same in all channels.
+/// Mean albedos over the pixels around that have the same in all channels. `taps` give where in the `ring` another pixel
+/// begins, `own` the pixel itself.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average(taps: &[Tap], (known, wide, reach): (&[f32], usize, usize), out: [&mut [u16]; 4]) {
+fn average(taps: &[(usize, f32)], own: usize, (ring, wide): (&[f32], usize), out: [&mut [u16]; 4]) {
     let out = out.map(|row| row.as_chunks_mut::<SIDE>().0);
-    let at = |row: usize, column: usize| -> [[f32; SIDE]; 8] {
-        let rows = &known[8 * row * wide + column..];
+    let at = |first: usize| -> [[f32; SIDE]; 8] {
+        let rows = &ring[first..];
         std::array::from_fn(|k| *rows[k * wide..].first_chunk().expect("rows are padded"))
     };
     for i in 0..out[0].len() {
-        let own = at(reach, reach + i * SIDE);
+        let own = at(own + i * SIDE);
         let mut sums = [[0.0; SIDE]; 8];
-        for &([down, right], near) in taps {
-            sums = join(sums, near, own, at(down, i * SIDE + right));
+        for &(first, near) in taps {
+            sums = join(sums, near, own, at(first + i * SIDE));
         }
         for c in 0..4 {
             for x in 0..SIDE {
                 let weight = sums[2 * c + 1][x];
-                let albedo = LEVELS * sums[2 * c][x] / if weight > 1e-20 { weight } else { 1e-20 };
-                out[c][i][x] = albedo as u16;
+                let albedo = sums[2 * c][x] / if weight > 1e-20 { weight } else { 1e-20 };
+                out[c][i][x] = (LEVELS * albedo + 0.5) as u16;
             }
         }
     }
@@ -372,7 +374,8 @@ mod tests {
             let scene = Scene { light: planes, usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
             let mut colours = Colours::default();
             let how = (RATIOS, &Slopes::flat(&grid));
-            colours.measure((&grid, &maps), &scene, how, [&phase, &modulation], noise);
+            let mut sums = CellMaps::default();
+            colours.measure((&grid, &maps), &scene, how, [&phase, &modulation], noise, &mut sums);
             Self { grid, colours }
         }
 
