@@ -68,7 +68,14 @@ def times(bench: Record, first_frame: Record) -> str:
     spent = {"median_ms": "median ms", "minimum_ms": "minimum ms"}
     rest = {"verdict_ms": "of it verdict ms", "shots_per_s": "shots/s", "busy_cores": "busy cores"}
     grown = {"ns_per_pixel": "ns/pixel", "busy_cores": "busy cores", "repeats": "repeats"}
-    weight = {"held_mb": "held between shots, MB", "while_decoding_mb": "a decode adds, results included, MB"}
+    line = {
+        "method": "method",
+        "fixed_ms": "every shot, ms",
+        "ns_per_pixel": "a pixel, ns",
+        "off_percent": "furthest from the line, %",
+        "spread_percent": "dearest pixel over cheapest, all included, %",
+    }
+    weight = {"held_mb": "held, results included, MB"}
     return "\n".join(
         [
             "## Time of a decode\n",
@@ -80,13 +87,9 @@ def times(bench: Record, first_frame: Record) -> str:
             "## Memory of a decoder\n",
             columns(bench["memory"], case | weight),
             "## Cost against pixels\n",
-            "The same field of view at every size. "
-            + " ".join(
-                f"{method}: the dearest pixel costs {bench['figures'][key]:.0f} % more than the cheapest."
-                for method in METHODS
-                if (key := f"{method}_cost_spread_percent") in bench["figures"]
-            )
-            + "\n",
+            "The same field of view at every size, and the straight line through the times: what every shot costs "
+            "whatever its size, what a pixel costs on top of it, and how far the furthest time is from that.\n",
+            columns(bench["cost"], line),
             columns(bench["scaling"], case | spent | grown),
         ]
     )

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 
 from quadfringe import machine, timing
 from quadfringe.cli import app
-from quadfringe.errors import DecodeError
+from quadfringe.errors import DecodeError, InputError
 
 SIZE = (320, 240)
 CASE_KEYS = {"width_px", "height_px", "method", "threads"}
@@ -41,9 +41,19 @@ def measured() -> dict[str, Any]:
 
 
 def test_the_record_has_its_keys(measured: dict[str, Any]) -> None:
-    assert set(measured) == {"schema_version", "machine", "surface", "noise", "timings", "memory", "scaling", "figures"}
+    assert set(measured) == {
+        "schema_version",
+        "machine",
+        "surface",
+        "noise",
+        "timings",
+        "memory",
+        "scaling",
+        "cost",
+        "figures",
+    }
     assert set(measured["machine"]) == {"cpu", "cores", "os", "python", "quadfringe", "commit"}
-    assert measured["scaling"] == []
+    assert measured["scaling"] == measured["cost"] == []
     assert [(t["method"], t["threads"], t["repeats"]) for t in measured["timings"]] == [
         ("published", 1, 3),
         ("published", 2, 3),
@@ -63,13 +73,32 @@ def test_times_are_consistent(measured: dict[str, Any]) -> None:
         assert found["returned_percent"] > 80
 
 
-def test_cost_is_linear_when_every_pixel_costs_the_same() -> None:
-    def timed(width_px: int, median_ms: float) -> timing.Timing:
-        case = timing.Case(width_px, 100, "best", 1)
-        return timing.Timing(case, 3, median_ms, median_ms, 0.0, 1.0, 100.0)
+def timed(width_px: int, median_ms: float, method: str = "best") -> timing.Timing:
+    case = timing.Case(width_px, 100, method, 1)
+    return timing.Timing(case, 3, median_ms, median_ms, 0.0, 1.0, 100.0)
 
-    assert timing.cost_spread_percent([timed(100, 1.0), timed(400, 4.0)]) == pytest.approx(0.0)
-    assert timing.cost_spread_percent([timed(100, 1.0), timed(400, 5.0), timed(200, 2.0)]) == pytest.approx(25.0)
+
+def test_cost_is_a_line_with_what_every_shot_costs() -> None:
+    cost = timing.cost_of([timed(width, 0.5 + 0.01 * width) for width in (100, 200, 400)])
+    assert cost.method == "best"
+    assert cost.fixed_ms == pytest.approx(0.5)
+    assert cost.ns_per_pixel == pytest.approx(100.0)
+    assert cost.off_percent == pytest.approx(0.0, abs=1e-6)
+    assert cost.spread_percent == pytest.approx(100 * (1.5 / 100) / (4.5 / 400) - 100)
+
+
+def test_a_time_off_the_line_shows() -> None:
+    cost = timing.cost_of([timed(100, 1.0), timed(400, 5.0), timed(200, 2.0)])
+    assert cost.spread_percent == pytest.approx(25.0)
+    assert 5.0 < cost.off_percent < 25.0
+
+
+@pytest.mark.parametrize(
+    "timings", [[], [timed(100, 1.0)], [timed(100, 1.0)] * 2, [timed(100, 1.0), timed(200, 2.0, "published")]]
+)
+def test_a_line_needs_two_sizes_of_one_method(timings: list[timing.Timing]) -> None:
+    with pytest.raises(InputError, match="two sizes or more"):
+        timing.cost_of(timings)
 
 
 def test_a_process_keeps_to_its_threads(measured: dict[str, Any]) -> None:
@@ -78,13 +107,12 @@ def test_a_process_keeps_to_its_threads(measured: dict[str, Any]) -> None:
 
 
 @pytest.mark.skipif(machine.resident_bytes() is None, reason="this system does not tell what is resident")
-def test_a_decoder_weighs_less_than_its_results_and_some_maps() -> None:
+def test_a_decoder_weighs_its_results_and_some_maps() -> None:
     published, best = timing.memory(SIZE, timing.METHODS, 1, surface="plane")
     map_mb = 4 * SIZE[0] * SIZE[1] / 2**20
     for found in (published, best):
-        assert found.while_decoding_mb > 8 * map_mb  # the results alone are eight maps
-        assert -map_mb < found.held_mb < 100 * map_mb
-    assert set(published.record()) == CASE_KEYS | {"held_mb", "while_decoding_mb"}
+        assert 8 * map_mb < found.held_mb < 100 * map_mb  # the results alone are eight maps
+    assert set(published.record()) == CASE_KEYS | {"held_mb"}
 
 
 def test_a_shot_that_cannot_be_decoded_is_told() -> None:

@@ -36,9 +36,10 @@ __all__ = [
     "METHODS",
     "SCALING_SIZES",
     "Case",
+    "Cost",
     "Memory",
     "Timing",
-    "cost_spread_percent",
+    "cost_of",
     "memory",
     "scaling",
     "time_decoding",
@@ -103,15 +104,33 @@ class Timing:
 
 @dataclass(frozen=True)
 class Memory:
-    """Resident memory of one decoder: what it holds between shots, and what a decode adds to that, results included."""
+    """Resident memory of one decoder, that of its last results included: the next shot takes it again."""
 
     case: Case
     held_mb: float
-    while_decoding_mb: float
 
     def record(self) -> dict[str, Any]:
         """Give everything by name with unit, as plain data."""
-        return vars(self.case) | {"held_mb": self.held_mb, "while_decoding_mb": self.while_decoding_mb}
+        return vars(self.case) | {"held_mb": self.held_mb}
+
+
+@dataclass(frozen=True)
+class Cost:
+    """How the time of a decode by one method grows with the pixels: what every shot costs, and what a pixel does.
+
+    `off_percent` is the furthest that a time lies from this line; `spread_percent` how much more a pixel costs at the
+    dearest size than at the cheapest, the part that every shot costs included.
+    """
+
+    method: str
+    fixed_ms: float
+    ns_per_pixel: float
+    off_percent: float
+    spread_percent: float
+
+    def record(self) -> dict[str, Any]:
+        """Give everything by name with unit, as plain data."""
+        return dict(vars(self))
 
 
 def time_decoding(
@@ -138,10 +157,26 @@ def scaling(methods: Sequence[str], threads: int, *, repeats: int, surface: str)
                 yield from _time_in_turns(folder, [Case(*size, method, threads)], fewer)
 
 
-def cost_spread_percent(timings: Sequence[Timing]) -> float:
-    """Give how much more a pixel costs at the dearest size than at the cheapest, in percent; 0 where cost is linear."""
-    costs = [timing.ns_per_pixel for timing in timings]
-    return 100.0 * (max(costs) / min(costs) - 1.0)
+def cost_of(timings: Sequence[Timing]) -> Cost:
+    """Draw the line through the times of one method at two sizes or more; least squares of what it is off, in parts.
+
+    Raises `InputError` for less than two sizes, or several methods.
+    """
+    methods = {timing.case.method for timing in timings}
+    pixels = np.array([timing.case.pixels for timing in timings], dtype=np.float64)
+    if len(methods) != 1 or len(set(pixels)) < 2:
+        raise InputError(f"expected times of one method at two sizes or more, got {len(timings)} of {sorted(methods)}")
+    taken_ms = np.array([timing.median_ms for timing in timings])
+    parts = np.stack([np.ones_like(pixels), pixels], axis=1) / taken_ms[:, None]
+    line, *_ = np.linalg.lstsq(parts, np.ones_like(pixels), rcond=None)
+    costs = taken_ms / pixels
+    return Cost(
+        method=methods.pop(),
+        fixed_ms=float(line[0]),
+        ns_per_pixel=float(1e6 * line[1]),
+        off_percent=float(100.0 * np.abs(parts @ line - 1.0).max()),
+        spread_percent=float(100.0 * (costs.max() / costs.min() - 1.0)),
+    )
 
 
 def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, surface: str) -> list[Memory]:
@@ -272,8 +307,6 @@ def _timed(decoder: ShotDecoder, shot: Shot) -> dict[str, float]:
 
 
 def _weighed(first: ShotDecoder, shot: Shot) -> dict[str, float]:
-    import resource
-
     decoders = [first]
     first.decode(shot)
     before = _resident_mb()
@@ -281,9 +314,7 @@ def _weighed(first: ShotDecoder, shot: Shot) -> dict[str, float]:
         decoders.append(ShotDecoder(shot, first.plan))
         for _ in range(2):
             decoders[-1].decode(shot)
-    after = _resident_mb()
-    peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-    return {"held_mb": (after - before) / (DECODERS - 1), "while_decoding_mb": peak_mb - after}
+    return {"held_mb": (_resident_mb() - before) / (DECODERS - 1)}
 
 
 def _resident_mb() -> float:

@@ -41,12 +41,16 @@ def bench(
     _show(f"{surface}, 3 % noise, 8 bit to X, Y, Z and verdict, {repeats} times; ms and busy cores", timings, json)
     memories = [m for wh in sizes for m in timing.memory(wh, methods, counts[-1], surface=surface)]
     if memories:
-        title = "resident memory of one decoder; what a decode adds includes its results"
-        cells = [(m.case.method, _words(m.case), m.held_mb, m.while_decoding_mb) for m in memories]
-        rows(title, ("method", "size", "held MB", "a decode adds MB"), cells, json)
+        held = [(m.case.method, _words(m.case), m.held_mb) for m in memories]
+        rows("resident memory of one decoder, results included", ("method", "size", "held MB"), held, json)
     grown = list(timing.scaling(methods, counts[-1], repeats=repeats, surface=surface)) if scaling else []
     if scaling:
         _show("cost against pixels, the same field of view; ms, ns and busy cores", grown, json, "ns_per_pixel")
+    costs = [timing.cost_of([t for t in grown if t.case.method == method]) for method in methods if grown]
+    if costs:
+        heads = ("method", "every shot ms", "a pixel ns", "furthest from the line %", "spread of a pixel %")
+        lines = [(c.method, c.fixed_ms, c.ns_per_pixel, c.off_percent, c.spread_percent) for c in costs]
+        rows("the line through these times", heads, lines, json)
     record = {
         "schema_version": 1,
         "machine": machine,
@@ -55,6 +59,7 @@ def bench(
         "timings": [t.record() for t in timings],
         "memory": [m.record() for m in memories],
         "scaling": [t.record() for t in grown],
+        "cost": [cost.record() for cost in costs],
         "figures": dict(_figure(t, usable_cores()) for t in timings),
     }
     write_record(record, json)
