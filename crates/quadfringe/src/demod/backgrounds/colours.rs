@@ -8,6 +8,7 @@
 use super::carriers;
 use crate::demod::cells::{CellMaps, CellWork, Grid, RowMaps};
 use crate::demod::lanes::{LANES, lanes, lanes_mut, put, take};
+use crate::demod::local_fit::binomial;
 use crate::demod::scene::Scene;
 use crate::demod::slopes::Slopes;
 use crate::slots::Slots;
@@ -21,6 +22,8 @@ const REACH: f32 = 0.6;
 const WIDTH: f32 = 0.3;
 /// Steps to the furthest pixel of the mean, at most.
 const STEPS: usize = 3;
+/// What a mean of nine by [`binomial`] keeps of the variance of noise.
+const MEAN_OF_NINE: f32 = 9.0 / 64.0;
 /// Relative error of an albedo by those of phase and contrast.
 const ERROR: f32 = 0.015;
 /// What the sum of squared differences of four channels, in units of what is expected, may be before a pixel counts less, and the
@@ -134,10 +137,12 @@ impl Colours {
                     let on = if (0..grid.height as isize).contains(&y) { 1.0 } else { 0.0 };
                     for c in 0..4 {
                         let (albedo, precision) = known[2 * c * wide..][..2 * wide].split_at_mut(wide);
-                        let inner = [albedo, precision].map(|row| &mut row[reach..reach + grid.stride]);
-                        let [products, squares] =
-                            [c, 4 + c].map(|k| [0, 1, 2].map(|j| models[(i + j) % 3][k].as_slice()));
-                        divide([products, squares], grid.width, (on, noise), spare, inner);
+                        let mut inner = [albedo, precision].map(|row| &mut row[reach..reach + grid.width]);
+                        for (k, mean) in [c, 4 + c].into_iter().zip(&mut inner) {
+                            let near = [0, 1, 2].map(|j| models[(i + j) % 3][k].as_slice());
+                            binomial(near, grid.width, spare, mean);
+                        }
+                        divide((on, noise), inner);
                     }
                     if i >= 2 * reach {
                         let rows = out.each_mut().map(|rows| rows.next().expect("as many as were counted"));
@@ -216,38 +221,14 @@ fn project(
     }
 }
 
-/// Albedo and its precision from products and squares of three rows, over a pixel and its eight neighbours.
+/// Albedo in the place of a mean product, and its precision in that of a mean square.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn divide(
-    rows: [[&[f32]; 3]; 2],
-    width: usize,
-    (on, noise): (f32, f32),
-    spare: &mut Vec<f32>,
-    [albedo, precision]: [&mut [f32]; 2],
-) {
-    sum_of_nine(rows[0], width, spare, albedo);
-    sum_of_nine(rows[1], width, spare, precision);
-    let variance = noise * noise;
-    for (albedo, precision) in albedo[..width].iter_mut().zip(&mut precision[..width]) {
+fn divide((on, noise): (f32, f32), [product, square]: [&mut [f32]; 2]) {
+    let variance = MEAN_OF_NINE * noise * noise;
+    for (albedo, precision) in product.iter_mut().zip(square) {
         let square = *precision;
-        let known = *albedo / if square > 1e-3 { square } else { 1e-3 };
-        *albedo = known;
-        *precision = on * square / (variance + square * (ERROR * ERROR * known * known + 1e-8));
-    }
-}
-
-#[inline(always)]
-fn sum_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut [f32]) {
-    spare.resize(width + 2, 0.0);
-    let [a, b, c] = rows.map(|row| &row[..width]);
-    let middle = &mut spare[1..=width];
-    for x in 0..width {
-        middle[x] = a[x] + b[x] + c[x];
-    }
-    (spare[0], spare[width + 1]) = (0.0, 0.0);
-    let [left, middle, right] = [0, 1, 2].map(|k| &spare[k..k + width]);
-    for (x, out) in out[..width].iter_mut().enumerate() {
-        *out = left[x] + middle[x] + right[x];
+        *albedo /= if square > 1e-4 { square } else { 1e-4 };
+        *precision = on * square / (variance + square * (ERROR * ERROR * *albedo * *albedo + 1e-8));
     }
 }
 
