@@ -22,6 +22,7 @@ import numpy_chain
 from numpy.typing import NDArray
 
 import quadfringe as qf
+from quadfringe.timing import warm
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 import scoring
@@ -78,12 +79,12 @@ def product_contender(
 def timed(contenders: dict[str, Contender], repeats: int) -> dict[str, float]:
     """Median milliseconds of each contender; one round to warm up, then `repeats` rounds in turn.
 
-    A turn is a call off the clock and one on it: nobody pays for the caches that another has filled.
+    A turn is some calls off the clock and one on it: nobody pays for the caches that another has filled.
     """
     spent: dict[str, list[float]] = {name: [] for name in contenders}
     for turn in range(repeats + 1):
         for name, run in contenders.items():
-            run()
+            warm(run)
             start = time.perf_counter()
             run()
             if turn > 0:

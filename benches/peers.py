@@ -2,8 +2,8 @@
 
     python benches/peers.py [--json FILE] [--repeats 11] [--skip NAME ...]
 
-Scene: peaks on the virtual bench, 1024 x 768, 8 bit, 3 % noise. All take turns, and in every turn a run off the clock
-goes before the one on it. Not all do the same job, and the table says what each needs and gives:
+Scene: peaks on the virtual bench, 1024 x 768, 8 bit, 3 % noise. All take turns, and in every turn some runs off the
+clock go before the one on it. Not all do the same job, and the table says what each needs and gives:
 
 - quadfringe and the published chain in plain NumPy: one shot of four images to absolute phase and X, Y, Z; quadfringe
   through Python, with new maps and a verdict on every shot.
@@ -43,6 +43,7 @@ import quadfringe as qf
 from quadfringe import _core
 from quadfringe.machine import described, usable_cores
 from quadfringe.stages import wrapped_phases
+from quadfringe.timing import warm
 
 import scoring  # isort: skip  (bench_decode makes it known)
 
@@ -100,7 +101,7 @@ def bench_shot() -> Bench:
 
 def timed(run: Callable[[], object]) -> Callable[[], float]:
     def turn() -> float:
-        run()
+        warm(run)
         start = time.perf_counter()
         run()
         return 1e3 * (time.perf_counter() - start)

@@ -2,8 +2,8 @@
 
 Every case, one method at one number of threads, runs in a process of its own that was started with
 RAYON_NUM_THREADS: the pool of threads is made once for each process, so that no other way is sound. The processes
-take turns, and in every turn a decode off the clock goes before the one on it: a busy moment of the machine hits
-all of them, and nobody pays for the caches that another has filled.
+take turns, and in every turn some decodes off the clock go before the one on it (`warm`): a busy moment of the machine
+hits all of them, and nobody pays for the caches that another has filled, or for threads that slept.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,6 +43,7 @@ __all__ = [
     "memory",
     "scaling",
     "time_decoding",
+    "warm",
     "work",
 ]
 
@@ -50,6 +51,7 @@ METHODS = ("published", "best")
 NOISE = 0.03
 SCALING_SIZES = ((576, 432), (800, 600), (1152, 864), (1600, 1200), (2304, 1728), (3200, 2400), (4608, 3456))
 REPEATS_MIN = 3
+WARM_S = 0.1
 DECODERS = 4  # one that warms up and three that are weighed
 # glibc then gives every freed map back at once, so that what stays is what a decoder holds.
 GIVE_BACK = {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "65536"}
@@ -191,6 +193,15 @@ def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, surfa
     return found
 
 
+def warm(run: Callable[[], object]) -> None:
+    """Run off the clock for a tenth of a second at least: systems take time to give threads that slept a core each."""
+    start = perf_counter()
+    while True:
+        run()
+        if perf_counter() - start > WARM_S:
+            return
+
+
 def _time_in_turns(folder: Path, cases: Sequence[Case], repeats: int) -> list[Timing]:
     """Time the cases on the shot of a folder; the first turn of all is not counted."""
     with ExitStack() as stack:
@@ -292,7 +303,7 @@ def work() -> None:
 
 
 def _timed(decoder: ShotDecoder, shot: Shot) -> dict[str, float]:
-    decoder.decode(shot)
+    warm(lambda: decoder.decode(shot))
     start, processor_start = perf_counter(), process_time()
     shape = decoder.decode(shot)
     decoded, processor_decoded = perf_counter(), process_time()

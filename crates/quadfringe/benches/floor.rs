@@ -22,11 +22,13 @@ use std::error::Error;
 use std::hint::black_box;
 use std::io::{BufRead, Write};
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 type Outcome<T> = std::result::Result<T, Box<dyn Error>>;
 
 const ROUNDS: usize = 30;
+/// Systems take some time to give threads that slept a core each.
+const WARM: Duration = Duration::from_millis(100);
 const FLOATS_PER_PIXEL: usize = 8;
 const NAMES: [&str; 3] = ["floor", "published", "best"];
 
@@ -130,9 +132,12 @@ impl Contenders {
         Ok(Self { floor: Floor::new(rows, columns), planes, methods })
     }
 
-    /// Time of one run in ms, after one that is not timed.
+    /// Time of one run in ms, after some that are not timed.
     fn time_ms(&mut self, name: &str) -> Outcome<f64> {
-        self.run(name)?;
+        let start = Instant::now();
+        while start.elapsed() < WARM {
+            self.run(name)?;
+        }
         let start = Instant::now();
         self.run(name)?;
         Ok(1e3 * start.elapsed().as_secs_f64())
