@@ -5,7 +5,7 @@ mod common;
 use common::{bench, cast_scene, code, decode_planes, noisy, there_and_back};
 use ndarray::Array2;
 use quadfringe::height::Triangulator;
-use quadfringe::rig::{Bench, Light, Planes};
+use quadfringe::rig::{Albedo, Bench, Light, Planes, RenderOptions};
 use quadfringe::{Conditioner, Decoded, Decoder, Device, Method, Options, Shot};
 use rayon::ThreadPoolBuilder;
 
@@ -23,15 +23,21 @@ fn bits(decoded: &Decoded) -> Vec<u32> {
     values.map(|v| v.to_bits()).collect()
 }
 
+/// Coloured squares, on which `best` gives every pixel a colour of its own.
+fn printed() -> RenderOptions {
+    RenderOptions { albedo: Albedo::Patches { side_mm: 20.0, albedo: [0.9; 4] }, ..noisy(5) }
+}
+
 #[test]
 fn threads_change_no_bit() {
     let bench = bench(2);
-    for method in [Method::Best, Method::Published] {
+    let cases = [(Method::Best, noisy(5)), (Method::Best, printed()), (Method::Published, noisy(5))];
+    for (method, options) in cases {
         let run = |threads: usize| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("threads").install(|| {
                 let cast = cast_scene(&bench, "face");
-                bits(&there_and_back(&bench, &cast, &code(), &noisy(5), method))
+                bits(&there_and_back(&bench, &cast, &code(), &options, method))
             })
         };
         let one = run(1);
@@ -44,9 +50,9 @@ fn threads_change_no_bit() {
 #[test]
 fn a_shot_leaves_nothing_behind() {
     let bench = bench(2);
-    let shots = ["steps", "peaks", "steps"].map(|name| {
+    let shots = [("steps", noisy(5)), ("peaks", printed()), ("steps", noisy(5))].map(|(name, options)| {
         let cast = cast_scene(&bench, name);
-        let planes = bench.render(&cast, &Light::shot(&code()), &noisy(5));
+        let planes = bench.render(&cast, &Light::shot(&code()), &options);
         planes.expect("a valid scene")
     });
     for method in [Method::Best, Method::Published] {
@@ -63,14 +69,14 @@ fn a_shot_leaves_nothing_behind() {
 /// Decoders work in the memory of the maps that they are given, and rows of planes are longer than those of images.
 #[test]
 fn maps_may_hold_anything() {
-    for (width, height) in [(333, 250), (500, 375), (810, 300)] {
+    for (width, height, options) in [(333, 250, noisy(5)), (500, 375, printed()), (810, 300, noisy(5))] {
         let whole = Bench::reference();
         let focal = whole.camera.focal_px.map(|f| f * width as f64 / whole.camera.width as f64);
         let centre = [width, height].map(|n| 0.5 * (n as f64 - 1.0));
         let camera = Device::pinhole(width, height, focal, centre).expect("valid camera");
         let bench = Bench { camera, ..whole };
         let cast = cast_scene(&bench, "steps");
-        let planes = bench.render(&cast, &Light::shot(&code()), &noisy(5)).expect("a valid scene");
+        let planes = bench.render(&cast, &Light::shot(&code()), &options).expect("a valid scene");
         let Planes::U8(images) = &planes else { panic!("noisy images have 8 bit") };
         let shot = Shot::new(images.each_ref().map(|image| image.view())).expect("equal images");
         for method in [Method::Best, Method::Published] {

@@ -32,7 +32,7 @@ const EXPECTED: f32 = 4.0;
 const EXCESS: f32 = 16.0;
 /// Steps of an albedo of 1, the greatest is twice that; what noise leaves of a mean is coarser by far.
 const LEVELS: f32 = 32768.0;
-/// Rows of one task.
+/// Rows of one task, at least; as many as a mean spans when that is more, because each task computes a span on top of them.
 const BLOCK: usize = 32;
 
 /// Albedos of every pixel, and working maps.
@@ -104,16 +104,16 @@ impl Colours {
         let Self { planes, stride, contrasts, slots } = self;
         *stride = grid.stride;
         let (taps, reach) = taps(scene.period_px as f32);
-        let (wide, kept) = (grid.stride + 2 * reach, 2 * reach + 1);
+        let (wide, kept, rows) = (grid.stride + 2 * reach, 2 * reach + 1, BLOCK.max(2 * reach));
         planes.iter_mut().for_each(|plane| plane.resize(grid.pixels(), 0));
         let [red, green, blue, infrared] =
-            planes.each_mut().map(|plane| plane.par_chunks_mut(BLOCK * grid.stride));
+            planes.each_mut().map(|plane| plane.par_chunks_mut(rows * grid.stride));
         red.zip(green).zip(blue.zip(infrared)).enumerate().for_each_init(
             || slots.take(),
             |slot, (block, ((red, green), (blue, infrared)))| {
                 let Rows { maps, losses, models, spare, ring, places } = &mut slot.0;
                 let mut out = [red, green, blue, infrared].map(|rows| rows.chunks_mut(grid.stride));
-                let (first, count) = ((block * BLOCK) as isize, out[0].len());
+                let (first, count) = ((block * rows) as isize, out[0].len());
                 ring.clear();
                 ring.resize(8 * wide * kept, 0.0);
                 let mut model = |y: isize, out: &mut [Vec<f32>; 8]| {
