@@ -63,7 +63,7 @@ def head_of(machine: Record) -> str:
     )
 
 
-def times(bench: Record, first_frame: Record) -> str:
+def times(bench: Record, on_print: Record, first_frame: Record) -> str:
     case = {"method": "method", "threads": "threads", "width_px": "width", "height_px": "height"}
     spent = {"median_ms": "median ms", "minimum_ms": "minimum ms"}
     rest = {"verdict_ms": "of it verdict ms", "shots_per_s": "shots/s", "busy_cores": "busy cores"}
@@ -84,8 +84,13 @@ def times(bench: Record, first_frame: Record) -> str:
             columns(bench["timings"], case | spent | rest),
             f"First frame, from process start to X, Y, Z: {first_frame['figures']['first_frame_s']:.3g} s "
             "(`python benches/first_frame.py`).\n",
+            f"The same with coloured squares of {on_print['patch_mm']:.0f} mm on it "
+            f"(`quadfringe bench --patch-mm {on_print['patch_mm']:.0f}`):\n",
+            columns(on_print["timings"], case | spent | rest),
             "## Memory of a decoder\n",
             columns(bench["memory"], case | weight),
+            "The same with the coloured squares:\n",
+            columns(on_print["memory"], case | weight),
             "## Cost against pixels\n",
             "The same field of view at every size, and the straight line through the times: what every shot costs "
             "whatever its size, what a pixel costs on top of it, and how far the furthest time is from that.\n",
@@ -146,7 +151,9 @@ def main() -> None:
     repeats = ("--repeats", str(options.repeats))
     # Those that a wrong option or a missing peer can stop come first.
     beside = peers(measured(str(HERE / "peers.py"), *skip, *repeats))
-    own = times(measured("-m", "quadfringe", "bench", "--scaling", *repeats), measured(str(HERE / "first_frame.py")))
+    bench = ("-m", "quadfringe", "bench", *repeats)
+    on_print = measured(*bench, "--patch-mm", "20")
+    own = times(measured(*bench, "--scaling"), on_print, measured(str(HERE / "first_frame.py")))
     exact = accuracy(measured(str(HERE / "accuracy.py")))
     with atomic(options.out) as temporary:
         temporary.write_text("\n".join([head, own, beside, exact]))

@@ -14,9 +14,12 @@ from typer.testing import CliRunner
 
 from quadfringe import machine, timing
 from quadfringe.cli import app
+from quadfringe.config import SceneConfig
 from quadfringe.errors import DecodeError, InputError
 
 SIZE = (320, 240)
+PRINT = ["--patch-mm", "20"]
+PLANE = SceneConfig(surface="plane", noise=timing.NOISE)
 CASE_KEYS = {"width_px", "height_px", "method", "threads"}
 TIMING_KEYS = CASE_KEYS | {
     "repeats",
@@ -45,6 +48,7 @@ def test_the_record_has_its_keys(measured: dict[str, Any]) -> None:
         "schema_version",
         "machine",
         "surface",
+        "patch_mm",
         "noise",
         "timings",
         "memory",
@@ -108,7 +112,7 @@ def test_a_process_keeps_to_its_threads(measured: dict[str, Any]) -> None:
 
 @pytest.mark.skipif(machine.resident_bytes() is None, reason="this system does not tell what is resident")
 def test_a_decoder_weighs_its_results_and_some_maps() -> None:
-    published, best = timing.memory(SIZE, timing.METHODS, 1, surface="plane")
+    published, best = timing.memory(SIZE, timing.METHODS, 1, scene=PLANE)
     map_mb = 4 * SIZE[0] * SIZE[1] / 2**20
     for found in (published, best):
         assert 8 * map_mb < found.held_mb < 100 * map_mb  # the results alone are eight maps
@@ -117,7 +121,22 @@ def test_a_decoder_weighs_its_results_and_some_maps() -> None:
 
 def test_a_shot_that_cannot_be_decoded_is_told() -> None:
     with pytest.raises(DecodeError, match="published at 16 x 16 pixels: "):
-        timing.time_decoding((16, 16), ["published"], [1], repeats=3, surface="plane")
+        timing.time_decoding((16, 16), ["published"], [1], repeats=3, scene=PLANE)
+
+
+@pytest.mark.skipif(machine.resident_bytes() is None, reason="this system does not tell what is resident")
+def test_colours_of_a_print_take_memory() -> None:
+    options = ["--size", "320x240", "--method", "best", "--threads", "1", "--repeats", "3", "--json", "-"]
+    records = [json.loads(CliRunner().invoke(app, ["bench", *options, *more]).stdout) for more in ([], PRINT)]
+    assert [record["patch_mm"] for record in records] == [None, 20.0]
+    white, print_ = (record["memory"][0]["held_mb"] for record in records)
+    assert print_ > white + 4 * 2 * SIZE[0] * SIZE[1] / 2**20  # four albedos of 16 bit
+
+
+def test_squares_have_a_side() -> None:
+    result = CliRunner().invoke(app, ["bench", "--patch-mm", "0"])
+    assert result.exit_code == 2
+    assert "patch-mm" in result.stderr
 
 
 def test_a_surface_that_nobody_knows_is_named() -> None:

@@ -136,25 +136,25 @@ class Cost:
 
 
 def time_decoding(
-    size: tuple[int, int], methods: Sequence[str], threads: Sequence[int], *, repeats: int, surface: str
+    size: tuple[int, int], methods: Sequence[str], threads: Sequence[int], *, repeats: int, scene: SceneConfig
 ) -> list[Timing]:
-    """Time every method at every number of threads on one shot of `size` (width, height) pixels, in turns.
+    """Time every method at every number of threads on one shot of a scene, `size` (width, height) pixels, in turns.
 
     Raises `DecodeError` when a shot of this size cannot be decoded.
     """
     cases = [Case(*size, method, count) for method in methods for count in threads]
-    with _shot_folder(size, surface) as folder:
+    with _shot_folder(size, scene) as folder:
         return _time_in_turns(folder, cases, repeats)
 
 
-def scaling(methods: Sequence[str], threads: int, *, repeats: int, surface: str) -> Iterator[Timing]:
+def scaling(methods: Sequence[str], threads: int, *, repeats: int, scene: SceneConfig) -> Iterator[Timing]:
     """Time every method at each of `SCALING_SIZES`, 0.25 to 16 million pixels of the same field of view.
 
     Fewer repeats for large images, but never less than three.
     """
     for size in SCALING_SIZES:
         fewer = max(REPEATS_MIN, min(repeats, round(repeats * 1e6 / (size[0] * size[1]))))
-        with _shot_folder(size, surface) as folder:
+        with _shot_folder(size, scene) as folder:
             for method in methods:  # one after the other: two decoders of 16 million pixels need some GB
                 yield from _time_in_turns(folder, [Case(*size, method, threads)], fewer)
 
@@ -181,12 +181,12 @@ def cost_of(timings: Sequence[Timing]) -> Cost:
     )
 
 
-def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, surface: str) -> list[Memory]:
+def memory(size: tuple[int, int], methods: Sequence[str], threads: int, *, scene: SceneConfig) -> list[Memory]:
     """Weigh the decoders of each method; empty where the system does not tell what is resident."""
     if resident_bytes() is None:
         return []
     found = []
-    with _shot_folder(size, surface) as folder:
+    with _shot_folder(size, scene) as folder:
         for case in (Case(*size, method, threads) for method in methods):
             with _Worker(folder, case, **GIVE_BACK) as worker:
                 found.append(Memory(case, **worker.ask("weigh")))
@@ -224,18 +224,17 @@ def _timing(case: Case, turns: list[dict[str, float]]) -> Timing:
 
 
 @contextmanager
-def _shot_folder(size: tuple[int, int], surface: str) -> Iterator[Path]:
+def _shot_folder(size: tuple[int, int], scene: SceneConfig) -> Iterator[Path]:
     """Give a folder with shot.npy, (4, H, W) uint8, and calibration.json."""
-    with open_system(_bench(size, surface)) as scanner, tempfile.TemporaryDirectory() as name:
+    with open_system(_bench(size, scene)) as scanner, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         np.save(folder / "shot.npy", np.stack(list(scanner.grab().channels.values())))
         scanner.calibration.save(folder / "calibration.json")
         yield folder
 
 
-def _bench(size: tuple[int, int], surface: str) -> SystemConfig:
+def _bench(size: tuple[int, int], scene: SceneConfig) -> SystemConfig:
     """Give the published bench with a camera of another size that sees the same field."""
-    scene = SceneConfig(surface=surface, noise=NOISE)
     with open_system(SystemConfig(scene=scene)) as scanner:
         camera = scanner.calibration.camera
     width, height = size

@@ -25,25 +25,28 @@ def bench(
     threads: Annotated[list[int] | None, typer.Option(min=1, help="Default: 1, and all cores.")] = None,
     repeats: Annotated[int, typer.Option(min=3, help="Timed decodes of each case.")] = 20,
     surface: Annotated[str, typer.Option(help="What stands on the bench.")] = "face",
+    patch_mm: Annotated[float | None, typer.Option(min=0.1, help="Print coloured squares of this side, mm.")] = None,
     scaling: Annotated[bool, typer.Option("--scaling", help="Time 0.25 to 16 million pixels too.")] = False,
     json: JsonOption = None,
 ) -> None:
     """Time decoding of a bench shot, four 8-bit images to X, Y, Z, and weigh the decoders."""
     from quadfringe import timing
+    from quadfringe.config import SceneConfig
     from quadfringe.machine import described, usable_cores
 
     sizes = [_size(text) for text in dict.fromkeys(size)]
     methods = list(dict.fromkeys(m.value for m in method)) if method else list(timing.METHODS)
+    scene = SceneConfig.model_validate({"surface": surface, "patch_mm": patch_mm, "noise": timing.NOISE})
     counts = sorted(set(threads or (1, usable_cores())))
     machine = described()
     say("\n".join(f"{name}: {value}" for name, value in machine.items() if value is not None), json)
-    timings = [t for wh in sizes for t in timing.time_decoding(wh, methods, counts, repeats=repeats, surface=surface)]
+    timings = [t for wh in sizes for t in timing.time_decoding(wh, methods, counts, repeats=repeats, scene=scene)]
     _show(f"{surface}, 3 % noise, 8 bit to X, Y, Z and verdict, {repeats} times; ms and busy cores", timings, json)
-    memories = [m for wh in sizes for m in timing.memory(wh, methods, counts[-1], surface=surface)]
+    memories = [m for wh in sizes for m in timing.memory(wh, methods, counts[-1], scene=scene)]
     if memories:
         held = [(m.case.method, _words(m.case), m.held_mb) for m in memories]
         rows("resident memory of one decoder, results included", ("method", "size", "held MB"), held, json)
-    grown = list(timing.scaling(methods, counts[-1], repeats=repeats, surface=surface)) if scaling else []
+    grown = list(timing.scaling(methods, counts[-1], repeats=repeats, scene=scene)) if scaling else []
     if scaling:
         _show("cost against pixels, the same field of view; ms, ns and busy cores", grown, json, "ns_per_pixel")
     costs = [timing.cost_of([t for t in grown if t.case.method == method]) for method in methods if grown]
@@ -55,6 +58,7 @@ def bench(
         "schema_version": 1,
         "machine": machine,
         "surface": surface,
+        "patch_mm": patch_mm,
         "noise": timing.NOISE,
         "timings": [t.record() for t in timings],
         "memory": [m.record() for m in memories],

@@ -7,6 +7,8 @@
 
 mod choice;
 mod colours;
+#[cfg(test)]
+mod edge;
 mod solve;
 
 use super::cells::{CellMaps, CellWork, Grid, RowMaps};
@@ -347,43 +349,32 @@ fn project(
 
 #[cfg(test)]
 mod tests {
+    use super::edge::{EDGE, Edge, RATIOS};
     use super::*;
     use std::f32::consts::TAU;
 
-    const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
-
     #[test]
     fn a_window_on_two_colours_keeps_its_size() {
-        let grid = Grid::new([96, 256], 4.0);
-        let phase: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
-        let colours = [
-            [[0.5, 0.4], [0.2, 0.15], [0.6, 0.45], [0.4, 0.35]],
-            [[0.3, 0.25], [0.5, 0.4], [0.2, 0.15], [0.4, 0.3]],
-        ];
-        let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
-            let seen = |i: usize| {
-                let [a, b] = colours[usize::from(i % 256 >= 128)][c];
-                a + b * carriers(phase[i], RATIOS, 0.0).0[c]
-            };
-            (0..grid.pixels()).map(seen).collect()
-        });
-        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
-        let light = planes.each_ref().map(Vec::as_slice);
-        let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
-        let (mut fit, mut found, slopes) = (LocalFit::default(), Backgrounds::new(), Slopes::flat(&grid));
+        let colours =
+            [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
+        let edge = Edge::new(colours, 0.0);
+        let (grid, phase) = (&edge.grid, &edge.phase);
+        let (usable, modulation) = (edge.plane(1.0), edge.plane(0.3));
+        let scene = edge.scene(&usable);
+        let (mut fit, mut found, slopes) = (LocalFit::default(), Backgrounds::new(), Slopes::flat(grid));
         let (mut wrapped, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
         let maps = super::super::local_fit::PixelMaps { phase: &mut wrapped, modulation: &mut spare };
         fit.run(&scene, &usable, 0.02, maps);
         found.start(&scene, &fit, &slopes, RATIOS);
         let size_at = |found: &Backgrounds| {
             let mut maps = RowMaps::default();
-            let rows = found.sample_own(&scene, 48, &mut maps);
-            rows.map(|row| row[128].powi(2)).iter().sum::<f32>().sqrt()
+            let rows = found.sample_own(&scene, 30, &mut maps);
+            rows.map(|row| row[EDGE].powi(2)).iter().sum::<f32>().sqrt()
         };
         let before = size_at(&found);
         for _ in 0..6 {
             let fit = Fit { misfit_max: 1.0, relative_noise: 0.0, rows: 4, trust: 0.0, lit_min: 0.0 };
-            found.fit(&scene, RATIOS, [&phase, &modulation], &slopes, &fit);
+            found.fit(&scene, RATIOS, [phase, &modulation], &slopes, &fit);
         }
         let after = size_at(&found);
         assert!((after / before - 1.0).abs() < 0.15, "{before} {after}");

@@ -355,81 +355,43 @@ fn miss(
 
 #[cfg(test)]
 mod tests {
+    use super::super::edge::{Edge, RATIOS};
     use super::*;
-    use std::f32::consts::TAU;
 
-    const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
-
-    /// Two colours that meet in column 128, and cells as a window leaves them that mixes both over ten pixels.
-    struct Edge {
-        grid: Grid,
-        colours: [[f32; 8]; 2],
-        maps: CellMaps,
-        phase: Vec<f32>,
-        light: [Vec<f32>; 4],
+    /// What the pixels choose, and the share of them that take another place.
+    fn choose(edge: &Edge, noise: f32) -> (Choice, f32) {
+        let (lit, modulation) = (edge.plane(1.0), edge.plane(0.2));
+        let how = (RATIOS, &Slopes::flat(&edge.grid));
+        let mut choice = Choice::default();
+        let share =
+            choice.make((&edge.grid, &edge.maps), &edge.scene(&lit), how, [&edge.phase, &modulation], noise);
+        (choice, share)
     }
 
-    impl Edge {
-        fn new(colours: [[f32; 8]; 2]) -> Self {
-            let grid = Grid::new([64, 256], 4.0);
-            let phase: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
-            let light = std::array::from_fn(|c| {
-                let seen = |i: usize| {
-                    let [a, b] = [2 * c, 2 * c + 1].map(|k| colours[usize::from(i % 256 >= 128)][k]);
-                    0.6 * (a + b * carriers(phase[i], RATIOS, 0.0).0[c])
-                };
-                (0..grid.pixels()).map(seen).collect()
-            });
-            let mut maps = CellMaps::new(8);
-            maps.fill::<8>(&grid, |_, lines| {
-                for (k, line) in lines.into_iter().enumerate() {
-                    for (column, value) in line.iter_mut().enumerate() {
-                        let across = ((4.0 * column as f32 + 2.0 - 118.0) / 20.0).clamp(0.0, 1.0);
-                        *value = colours[0][k] + (colours[1][k] - colours[0][k]) * across;
-                    }
-                }
-            });
-            Self { grid, colours, maps, phase, light }
-        }
-
-        /// What the pixels choose, and the share of them that take another place.
-        fn choose(&self, noise: f32) -> (Choice, f32) {
-            let (grid, lit) = (&self.grid, vec![1.0; self.grid.pixels()]);
-            let light = self.light.each_ref().map(Vec::as_slice);
-            let scene = Scene { light, usable: &lit, grid, period_px: 25.0, factor: 1 };
-            let mut choice = Choice::default();
-            let modulation = vec![0.2; grid.pixels()];
-            let how = (RATIOS, &Slopes::flat(grid));
-            let share = choice.make((grid, &self.maps), &scene, how, [&self.phase, &modulation], noise);
-            (choice, share)
-        }
-
-        /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
-        /// neighbours.
-        fn errors(&self, choice: &Choice) -> [f32; 2] {
-            let grid = &self.grid;
-            let mut rows = RowMaps::default();
-            let mut sampled = rows.sample_mut::<8>(grid, &self.maps, 0, 30);
-            let error = |rows: &[&mut [f32]; 8]| {
-                let off = |x: usize, k: usize| (rows[k][x] - self.colours[usize::from(x >= 128)][k]).abs();
-                (20..236)
-                    .filter(|x| !(127..130).contains(x))
-                    .flat_map(|x| (0..8).map(move |k| off(x, k)))
-                    .fold(0.0, f32::max)
-            };
-            let own = error(&sampled);
-            choice.apply(grid, &self.maps, 30, &mut sampled);
-            [own, error(&sampled)]
-        }
+    /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
+    /// neighbours.
+    fn errors(edge: &Edge, choice: &Choice) -> [f32; 2] {
+        let mut rows = RowMaps::default();
+        let mut sampled = rows.sample_mut::<8>(&edge.grid, &edge.maps, 0, 30);
+        let error = |rows: &[&mut [f32]; 8]| {
+            let off = |x: usize, k: usize| (rows[k][x] - edge.colour(x)[k]).abs();
+            (20..236)
+                .filter(|x| !(127..130).contains(x))
+                .flat_map(|x| (0..8).map(move |k| off(x, k)))
+                .fold(0.0, f32::max)
+        };
+        let own = error(&sampled);
+        choice.apply(&edge.grid, &edge.maps, 30, &mut sampled);
+        [own, error(&sampled)]
     }
 
     #[test]
     fn pixels_beside_an_edge_take_the_backgrounds_of_their_side() {
         let colours =
             [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
-        let edge = Edge::new(colours);
-        let (choice, share) = edge.choose(1e-3);
-        let [own, chosen] = edge.errors(&choice);
+        let edge = Edge::new(colours, 0.0);
+        let (choice, share) = choose(&edge, 1e-3);
+        let [own, chosen] = errors(&edge, &choice);
         assert!(own > 0.1, "{own}");
         assert!(chosen < 0.02, "{chosen}");
         // Those are the pixels that see a mixture in their own place, and they are left out of the next fit.
@@ -447,9 +409,9 @@ mod tests {
     #[test]
     fn what_noise_explains_stays_where_it_is() {
         let colours = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
-        let edge = Edge::new(colours);
-        let (choice, share) = edge.choose(0.03);
-        let [own, chosen] = edge.errors(&choice);
+        let edge = Edge::new(colours, 0.0);
+        let (choice, share) = choose(&edge, 0.03);
+        let [own, chosen] = errors(&edge, &choice);
         assert_eq!(own, chosen);
         assert_eq!(share, 0.0);
     }

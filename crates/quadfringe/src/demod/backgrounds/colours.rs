@@ -311,63 +311,40 @@ fn join(
 
 #[cfg(test)]
 mod tests {
+    use super::super::edge::{ALBEDO, EDGE, Edge, RATIOS};
     use super::*;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_pcg::{Pcg64Mcg, rand_core::SeedableRng};
-    use std::f32::consts::TAU;
 
-    const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
     const CONTRASTS: [f32; 4] = [0.8, 0.7, 0.9, 0.6];
     const INKS: [[f32; 4]; 2] = [[0.5, 0.2, 0.6, 0.4], [0.3, 0.5, 0.2, 0.4]];
-    const EDGE: usize = 128;
 
-    /// Colours found of two inks that meet in a column, under noise; cells mix both inks over ten pixels.
+    /// Colours found of two inks that meet.
     struct Print {
-        grid: Grid,
+        edge: Edge,
         colours: Colours,
     }
 
     impl Print {
         fn new(noise: f32, usable: impl Fn(usize) -> f32) -> Self {
-            let grid = Grid::new([64, 256], 4.0);
-            let mut random = Pcg64Mcg::seed_from_u64(3);
-            let ink = |x: usize| INKS[usize::from(x >= EDGE)];
-            let phase: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / 25.0).collect();
-            let light: [Vec<f32>; 4] = std::array::from_fn(|c| {
-                let clean =
-                    |i: usize| ink(i % 256)[c] * (1.0 + CONTRASTS[c] * carriers(phase[i], RATIOS, 0.0).0[c]);
-                let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
-                (0..grid.pixels()).map(|i| clean(i) + noise * draw()).collect()
-            });
-            let mut maps = CellMaps::new(8);
-            maps.fill::<8>(&grid, |_, lines| {
-                for (k, line) in lines.into_iter().enumerate() {
-                    for (column, value) in line.iter_mut().enumerate() {
-                        let across = ((4.0 * column as f32 + 2.0 - 118.0) / 20.0).clamp(0.0, 1.0);
-                        let mixed = INKS[0][k / 2] + (INKS[1][k / 2] - INKS[0][k / 2]) * across;
-                        *value = mixed * if k % 2 == 0 { 1.0 } else { CONTRASTS[k / 2] };
-                    }
-                }
-            });
-            let usable: Vec<f32> = (0..grid.pixels()).map(usable).collect();
-            let modulation = vec![0.2; grid.pixels()];
-            let planes = light.each_ref().map(Vec::as_slice);
-            let scene = Scene { light: planes, usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+            let colour = |ink: [f32; 4]| {
+                std::array::from_fn(|k| ink[k / 2] * if k % 2 == 0 { 1.0 } else { CONTRASTS[k / 2] })
+            };
+            let edge = Edge::new(INKS.map(colour), noise);
+            let usable: Vec<f32> = (0..edge.grid.pixels()).map(usable).collect();
+            let (modulation, mut sums) = (edge.plane(0.2), CellMaps::default());
             let mut colours = Colours::default();
-            let how = (RATIOS, &Slopes::flat(&grid));
-            let mut sums = CellMaps::default();
-            colours.measure((&grid, &maps), &scene, how, [&phase, &modulation], noise, &mut sums);
-            Self { grid, colours }
+            let how = (RATIOS, &Slopes::flat(&edge.grid));
+            let pixels = [edge.phase.as_slice(), &modulation];
+            let cells = (&edge.grid, &edge.maps);
+            colours.measure(cells, &edge.scene(&usable), how, pixels, noise, &mut sums);
+            Self { edge, colours }
         }
 
         /// Background and modulation of a channel in row 30 over what they ought to be.
         fn ratios(&self, c: usize, columns: impl Iterator<Item = usize>) -> Vec<[f32; 2]> {
             let mut maps = RowMaps::default();
-            let rows = self.colours.sample(&self.grid, 30, &mut maps);
-            let truth = |x: usize| INKS[usize::from(x >= EDGE)][c];
-            columns
-                .map(|x| [rows[2 * c][x] / truth(x), rows[2 * c + 1][x] / (truth(x) * CONTRASTS[c])])
-                .collect()
+            let rows = self.colours.sample(&self.edge.grid, 30, &mut maps);
+            let ratio = |x: usize, k: usize| rows[k][x] / (ALBEDO * self.edge.colour(x)[k]);
+            columns.map(|x| [ratio(x, 2 * c), ratio(x, 2 * c + 1)]).collect()
         }
     }
 
@@ -391,7 +368,7 @@ mod tests {
             let errors = print.ratios(c, 24..108).into_iter().map(|[a, _]| (a - 1.0).powi(2));
             let rms = (errors.sum::<f32>() / 84.0).sqrt();
             // One pixel knows its albedo as well as noise over light; hundreds stand together.
-            assert!(rms < 0.25 * noise / INKS[0][c], "{c} {rms}");
+            assert!(rms < 0.25 * noise / (ALBEDO * INKS[0][c]), "{c} {rms}");
         }
     }
 
