@@ -32,8 +32,8 @@ from scipy import spatial
 
 import quadfringe as qf
 from quadfringe import _core
-from quadfringe.machine import described
-from quadfringe.reproduce import WIDTH_PX, inside, peaks_shot
+from quadfringe.evaluation.machine import described
+from quadfringe.evaluation.reproduce import WIDTH_PX, inside, peaks_shot
 
 import scoring  # isort: skip  (bench_decode makes it known)
 

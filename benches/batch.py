@@ -30,10 +30,10 @@ from time import perf_counter
 import numpy as np
 
 import quadfringe as qf
-from quadfringe.batch import decode_recordings
 from quadfringe.data import Shot
 from quadfringe.files import figures_text
 from quadfringe.recording import Recorder
+from quadfringe.recording.batch import decode_recordings
 
 BAR = 1.7
 

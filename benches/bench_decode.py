@@ -22,7 +22,7 @@ import numpy_chain
 from numpy.typing import NDArray
 
 import quadfringe as qf
-from quadfringe.timing import warm
+from quadfringe.evaluation.timing import warm
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 import scoring

@@ -30,12 +30,12 @@ from quadfringe.calibration.channels import fit_channels
 from quadfringe.calibration.detect import View
 from quadfringe.calibration.levels import dark_level, mean_levels
 from quadfringe.calibration.projector import StepPlan
+from quadfringe.calibration.rehearsal import board_poses, rehearse
+from quadfringe.calibration.session.virtual import BenchCaptures
 from quadfringe.calibration.targets import Target, ring_board
 from quadfringe.config import DeviceModel, Fringes, SceneConfig, SystemConfig
-from quadfringe.decoding import core_device
+from quadfringe.data import core_device
 from quadfringe.files import figures_text
-from quadfringe.guide.bench import BenchCaptures
-from quadfringe.rehearsal import board_poses, rehearse
 
 DEVIATION_DEG, DEVIATION_MM = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
 SEEDS_APART = 100_003  # every exposure takes the next seed

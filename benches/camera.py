@@ -29,12 +29,12 @@ from statistics import median
 
 import numpy as np
 
-from quadfringe.capture import AravisConfig, ChipConfig
 from quadfringe.config import DecodeConfig, SceneConfig, SystemConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig
 from quadfringe.data import AnyShot, BayerShot
 from quadfringe.devices.aravis import AravisCamera
-from quadfringe.emulator import ADDRESSES, Emulator
-from quadfringe.emulator.frames import TestPattern
+from quadfringe.devices.emulator import ADDRESSES, Emulator
+from quadfringe.devices.emulator.frames import TestPattern
 from quadfringe.errors import CameraError
 from quadfringe.files import figures_text
 from quadfringe.recording import Recorder, Recording

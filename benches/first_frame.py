@@ -14,8 +14,8 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
+from quadfringe.evaluation.simulate import bench_config, write_simulation
 from quadfringe.files import figures_text
-from quadfringe.simulate import bench_config, write_simulation
 
 BAR_S = 1.5
 REPEATS = 5

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 import quadfringe as qf
-from quadfringe.truth import compare
+from quadfringe.decoding.compare import compare
 
 SURFACES = ("peaks", "face", "steps")
 NOISE = 0.01

@@ -35,13 +35,13 @@ from urllib.request import urlopen
 from websockets.sync.client import connect
 
 import quadfringe as qf
-from quadfringe.capture import VirtualConfig
+from quadfringe.config.cameras import VirtualConfig
 from quadfringe.data import AnyShot, Stamp
 from quadfringe.devices import CameraStatistics, Keep
+from quadfringe.evaluation.machine import resident_bytes
 from quadfringe.files import figures_text
-from quadfringe.machine import resident_bytes
-from quadfringe.streaming import LiveStream
-from quadfringe.viewer import CLOUDS_PER_S, Viewer
+from quadfringe.scanner.streaming import LiveStream
+from quadfringe.view.viewer import CLOUDS_PER_S, Viewer
 
 SHOTS, RATE_HZ = 6, 30.0
 WARM_UP_S = 8.0

@@ -41,9 +41,9 @@ from numpy.typing import NDArray
 
 import quadfringe as qf
 from quadfringe import _core
-from quadfringe.machine import described, usable_cores
-from quadfringe.stages import wrapped_phases
-from quadfringe.timing import warm
+from quadfringe.decoding.stages import wrapped_phases
+from quadfringe.evaluation.machine import described, usable_cores
+from quadfringe.evaluation.timing import warm
 
 import scoring  # isort: skip  (bench_decode makes it known)
 

@@ -19,8 +19,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from quadfringe.evaluation.machine import described
 from quadfringe.files import atomic
-from quadfringe.machine import described
 
 HERE = Path(__file__).resolve().parent
 Record = dict[str, Any]

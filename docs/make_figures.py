@@ -32,8 +32,8 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 import quadfringe as qf
-from quadfringe.film import hand_system
-from quadfringe.viewer import Viewer
+from quadfringe.evaluation.film import hand_system
+from quadfringe.view.viewer import Viewer
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs" / "images"

@@ -37,7 +37,7 @@ noise = 0.01
 @pytest.fixture(scope="session")
 def small_bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one simulated shot of 512 x 384 pixels as files, its system file, calibration and truth."""
-    from quadfringe.simulate import bench_config, write_simulation
+    from quadfringe.evaluation.simulate import bench_config, write_simulation
 
     folder = tmp_path_factory.mktemp("bench")
     (folder / "system.toml").write_text(SMALL_SYSTEM)

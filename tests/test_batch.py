@@ -15,10 +15,10 @@ import pytest
 import zarr
 
 import quadfringe as qf
-from quadfringe.batch import decode_recordings, executor_for, prepare, run
 from quadfringe.data import Shot, Stamp
 from quadfringe.errors import InputError
 from quadfringe.recording import Recorder, Recording
+from quadfringe.recording.batch import decode_recordings, executor_for, prepare, run
 
 CAMERA = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 SYSTEM = qf.SystemConfig(

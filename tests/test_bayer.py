@@ -12,11 +12,12 @@ import pytest
 from typer.testing import CliRunner, Result
 
 import quadfringe as qf
-from quadfringe import _core, stages
+from quadfringe import _core
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel
+from quadfringe.decoding import stages
 from quadfringe.errors import DecodeError, InputError
-from quadfringe.images import write_image
+from quadfringe.io.images import write_image
 
 PATTERNS = ("rggb", "grbg", "gbrg", "bggr")
 METHODS = ("best", "published")

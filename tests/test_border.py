@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import quadfringe as qf
-from quadfringe import _core, stages
+from quadfringe import _core
 from quadfringe.config import DecodeConfig
+from quadfringe.decoding import stages
 
 CODE = ((36.0, 35.0, 30.0), 912)
 CHANNELS = ("R", "G", "B", "IR")

@@ -13,7 +13,7 @@ from typer.testing import CliRunner, Result
 from quadfringe import _core
 from quadfringe.cli import app
 from quadfringe.data import ResponseCalibration
-from quadfringe.images import write_image
+from quadfringe.io.images import write_image
 
 STEPS = 12
 GAMMA = 2.0

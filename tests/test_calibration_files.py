@@ -15,8 +15,7 @@ from quadfringe.calibration.opencv_files import devices_from_opencv, read_opencv
 from quadfringe.calibration.registration import register_infrared
 from quadfringe.cli import app
 from quadfringe.config import Response
-from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
-from quadfringe.decoding import core_device
+from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep, core_device
 from quadfringe.errors import ConfigError, DecodeError, InputError
 
 SUFFIXES = (".yml", ".yaml", ".xml", ".json")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from quadfringe.capture import AravisConfig, ReplayConfig, VirtualConfig, capture_config
 from quadfringe.cli.app import app
 from quadfringe.config import SystemConfig, checked
+from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig, capture_config
 from quadfringe.devices.aravis import _gi, profiles
 from quadfringe.devices.aravis.formats import FORMATS, format_named
-from quadfringe.emulator.frames import TestPattern, packed
+from quadfringe.devices.emulator.frames import TestPattern, packed
 from quadfringe.errors import CameraError, CameraNotFoundError, ConfigError, MissingExtraError
 
 VISIBLE = _gi.Found("192.168.1.10", "JAI Ltd., Japan", "AD-080GE_#0", "4711")

@@ -14,7 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from quadfringe.cli import app
-from quadfringe.images import read_image, write_image
+from quadfringe.io.images import read_image, write_image
 
 FRINGES = ["--fringes", "36", "35", "30", "--projector-width", "912"]
 KEYS = {"phase_rad", "column_px", "order", "modulation", "quality", "uncertainty_rad", "wrong_order_probability"}

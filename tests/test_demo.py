@@ -11,7 +11,7 @@ import trimesh
 from typer.testing import CliRunner
 
 from quadfringe.cli import app
-from quadfringe.demo import SCENES
+from quadfringe.evaluation.demo import SCENES
 
 Figures = dict[str, float]
 

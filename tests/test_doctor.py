@@ -14,9 +14,9 @@ import quadfringe as qf
 from quadfringe.cli import app
 from quadfringe.config import IDENTITY, DeviceModel, SceneConfig, SystemConfig
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
+from quadfringe.data.shot_files import write_shot
 from quadfringe.doctor import Finding, examine_calibration, examine_installation, examine_shot
 from quadfringe.doctor import installation as installed
-from quadfringe.shots import write_shot
 
 SMALL = DeviceModel(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
 PLAN = qf.Plan(912)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import quadfringe as qf
-from quadfringe import film
-from quadfringe.colours import texture
 from quadfringe.errors import InputError
-from quadfringe.movie import movie, solid_picture
+from quadfringe.evaluation import film
 from quadfringe.recording import Recording
+from quadfringe.view.colours import texture
+from quadfringe.view.movie import movie, solid_picture
 
 SMALL = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 

@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
 
-from quadfringe.capture import AravisConfig, ReplayConfig
+from quadfringe.calibration.session import FolderCaptures, Guided, Session, guide, take_captures
+from quadfringe.calibration.session.live import exposed
+from quadfringe.calibration.session.pictures import write_pictures
+from quadfringe.calibration.session.virtual import BenchCaptures
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config.cameras import AravisConfig, ReplayConfig
 from quadfringe.data import Calibration
 from quadfringe.devices import Camera, ExternalLight
+from quadfringe.devices.light import Levels, Step, light_images
 from quadfringe.devices.virtual import VirtualCamera
 from quadfringe.doctor import examine_calibration
 from quadfringe.errors import CalibrationError, ConfigError, InputError
-from quadfringe.guide import FolderCaptures, Guided, Session, guide, take_captures
-from quadfringe.guide.bench import BenchCaptures
-from quadfringe.guide.live import exposed
-from quadfringe.guide.pictures import write_pictures
-from quadfringe.images import write_image
-from quadfringe.projection import Levels, Step, light_images
+from quadfringe.io.images import write_image
 
 CAMERA = DeviceModel(
     width_px=512,

@@ -10,13 +10,21 @@ import pytest
 from typer.testing import CliRunner
 
 import quadfringe as qf
-from quadfringe.acceptance import Acceptance, Artefacts, Limits, accept, measure_artefacts, write_acceptance
+from quadfringe.calibration.acceptance import Acceptance, Artefacts, Limits, accept, measure_artefacts, write_acceptance
+from quadfringe.calibration.fitting import (
+    Sphere,
+    dominant_plane,
+    dominant_sphere,
+    fit_plane,
+    fit_sphere,
+    form_of,
+    measure_steps,
+)
 from quadfringe.calibration.height import HeightCalibration, compare_heights, fit_heights, heights_over
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.errors import InputError
-from quadfringe.shapes import Sphere, dominant_plane, dominant_sphere, fit_plane, fit_sphere, form_of, measure_steps
 
 SMALL = DeviceModel(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
 HEIGHTS_MM = (-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0)

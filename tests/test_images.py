@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from quadfringe.data.shot_files import read_shot
 from quadfringe.errors import InputError
-from quadfringe.images import read_grey, read_image, read_rgb, write_image
-from quadfringe.shots import read_shot
+from quadfringe.io.images import read_grey, read_image, read_rgb, write_image
 
 RNG = np.random.default_rng(3)
 

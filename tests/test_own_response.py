@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 import quadfringe as qf
 from quadfringe.cli.app import app
 from quadfringe.data import AnyShot, Shape
-from quadfringe.images import write_image
+from quadfringe.io.images import write_image
 
 WIDTH_PX = 912
 PLAN = qf.Plan(WIDTH_PX)

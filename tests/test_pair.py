@@ -15,13 +15,13 @@ import quadfringe as qf
 from quadfringe.calibration.pair import AXES, deviated, pair_pose
 from quadfringe.cli import app
 from quadfringe.config import DecodeConfig, DeviceModel
-from quadfringe.data import Calibration
-from quadfringe.decoding import Plan, ShotDecoder, device_model
+from quadfringe.data import Calibration, device_model
+from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.errors import ConfigError, InputError
-from quadfringe.images import read_image
-from quadfringe.reproduce import pair_calibration, pair_correction, pair_depth, pair_deviation
-from quadfringe.reproduce.pair_bench import ideal_pair, real_pair
-from quadfringe.reproduce.pair_tolerance import tolerances
+from quadfringe.evaluation.reproduce import pair_calibration, pair_correction, pair_depth, pair_deviation
+from quadfringe.evaluation.reproduce.pair_bench import ideal_pair, real_pair
+from quadfringe.evaluation.reproduce.pair_tolerance import tolerances
+from quadfringe.io.images import read_image
 
 BAR_RAD = 0.02
 APART = ((1.0, 1.0, 1.0), (0.5, 0.5, 0.5))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quadfringe.data import FrameStamp
-from quadfringe.pairing import SHORT_IDS, FrameNumbers, Pairer
+from quadfringe.devices.aravis.pairing import SHORT_IDS, FrameNumbers, Pairer
 
 PERIOD_NS = 33_333_333
 TOLERANCE_NS = 2e6

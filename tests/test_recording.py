@@ -13,13 +13,13 @@ import pytest
 from takes import kill_writer, numbered_shot, run_with_file_limit, whole
 
 import quadfringe as qf
-from quadfringe.capture import ReplayConfig
+from quadfringe.config.cameras import ReplayConfig
 from quadfringe.data import AnyShot, BayerShot, FrameStamp, Stamp
 from quadfringe.devices import open_camera
-from quadfringe.devices.replay import ReplayCamera
 from quadfringe.errors import InputError, RecordingError, ShotTimeoutError
 from quadfringe.recording import Recorder, Recording, RecordingWriter, recover
 from quadfringe.recording.layout import Header
+from quadfringe.recording.replay import ReplayCamera
 
 
 def stamped(shot: AnyShot, number: int, period_us: int = 20_000) -> AnyShot:
@@ -242,7 +242,7 @@ def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(
 ) -> None:
     path = record(tmp_path / "a.h5", [stamped(numbered_shot(k), k, period_us=30_000) for k in range(10)])
     clock = Clock()
-    monkeypatch.setattr("quadfringe.devices.replay.time", clock)
+    monkeypatch.setattr("quadfringe.recording.replay.time", clock)
     for keep, ids, dropped in (("latest", [0, 3, 4, 5, 6, 7, 8, 9], 2), ("all", list(range(10)), 0)):
         camera = ReplayCamera(Recording(path))
         camera._closed = clock  # type: ignore[assignment]

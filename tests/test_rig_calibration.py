@@ -29,11 +29,11 @@ from quadfringe.calibration.projector import (
     projector_points,
     step_image,
 )
+from quadfringe.calibration.rehearsal import board_poses
 from quadfringe.calibration.targets import ring_board
 from quadfringe.config import Fringes
-from quadfringe.decoding import core_device
+from quadfringe.data import core_device
 from quadfringe.errors import CalibrationError, InputError
-from quadfringe.rehearsal import board_poses
 
 BOARD = ring_board()
 SYSTEM = bench.bench_system()

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 import quadfringe as qf
 from quadfringe.config import DeviceModel
-from quadfringe.decoding import core_device
-from quadfringe.truth import compare
+from quadfringe.data import core_device
+from quadfringe.decoding.compare import compare
 
 WIDTH, HEIGHT = 480, 360
 DEPTH_MM = 800.0

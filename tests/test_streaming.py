@@ -15,10 +15,10 @@ import pytest
 from quadfringe.config import SystemConfig, load_system
 from quadfringe.data import AnyShot, Shape, Shot, Stamp
 from quadfringe.devices import CameraStatistics, ExternalLight, Keep, open_camera
+from quadfringe.devices._queue import DroppingQueue, EndOfQueue
 from quadfringe.errors import CameraLostError, DecodeError, InputError
-from quadfringe.queues import DroppingQueue, EndOfQueue
 from quadfringe.scanner import Scanner, open_system
-from quadfringe.streaming import LiveStream
+from quadfringe.scanner.streaming import LiveStream
 
 BLANK = np.zeros((2, 2), np.uint8)
 FLAT = Shape(*[np.zeros((2, 2), np.float32)] * 4)

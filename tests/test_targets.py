@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from quadfringe.calibration.centres import refined_centres
 from quadfringe.calibration.detect import TargetNotFoundError, View, find_target
 from quadfringe.calibration.grid import blobs, homography, symmetries, through
+from quadfringe.calibration.rehearsal import BoardRoom
 from quadfringe.calibration.targets import (
     Target,
     asymmetric_grid,
@@ -27,9 +28,8 @@ from quadfringe.calibration.targets import (
 )
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
-from quadfringe.decoding import core_device
+from quadfringe.data import core_device
 from quadfringe.errors import ConfigError, InputError
-from quadfringe.rehearsal import BoardRoom
 
 BOARDS = {
     "rings": ring_board(),

@@ -12,10 +12,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from quadfringe import machine, timing
 from quadfringe.cli import app
 from quadfringe.config import SceneConfig
 from quadfringe.errors import DecodeError, InputError
+from quadfringe.evaluation import machine, timing
 
 SIZE = (320, 240)
 PRINT = ["--patch-mm", "20"]
@@ -147,7 +147,7 @@ def test_a_surface_that_nobody_knows_is_named() -> None:
 
 def test_resident_memory_follows_what_is_held() -> None:
     code = (
-        "import numpy as np; from quadfringe.machine import resident_bytes as r\n"
+        "import numpy as np; from quadfringe.evaluation.machine import resident_bytes as r\n"
         "before = r(); held = np.ones(2**25, np.uint8); assert before is None or 2**24 < r() - before < 2**26"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

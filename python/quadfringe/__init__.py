@@ -15,13 +15,22 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from quadfringe._core import Decoder, Device, __version__, check_code, optimum, pattern
     from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response, SceneConfig, SystemConfig
-    from quadfringe.data import BayerShot, Calibration, ResponseCalibration, Shape, Shot, Stamp, Truth
+    from quadfringe.data import (
+        BayerShot,
+        Calibration,
+        ResponseCalibration,
+        Shape,
+        Shot,
+        Stamp,
+        Truth,
+        read_bayer_shot,
+        read_shot,
+    )
     from quadfringe.decoding import Plan, ShotDecoder, decode, own_response
     from quadfringe.devices import open_camera, open_projector
     from quadfringe.errors import CameraError, ConfigError, DecodeError, InputError, MissingExtraError
     from quadfringe.scanner import Scanner
     from quadfringe.scanner import open_system as open  # noqa: A004 - read as quadfringe.open
-    from quadfringe.shots import read_bayer_shot, read_shot
 
 _HOME = {
     "_core": ("Decoder", "Device", "__version__", "check_code", "optimum", "pattern"),
@@ -31,7 +40,7 @@ _HOME = {
     "devices": ("open_camera", "open_projector"),
     "errors": ("CameraError", "ConfigError", "DecodeError", "InputError", "MissingExtraError"),
     "scanner": ("Scanner", "open_system"),
-    "shots": ("read_bayer_shot", "read_shot"),
+    "data.shot_files": ("read_bayer_shot", "read_shot"),
 }
 _MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
 

@@ -21,8 +21,8 @@ import numpy as np
 gi.require_version("Aravis", "0.8")
 from gi.repository import Aravis  # noqa: E402
 
-from quadfringe.emulator import keep_pace  # noqa: E402
-from quadfringe.emulator.frames import TestPattern, packed  # noqa: E402
+from quadfringe.devices.emulator import keep_pace  # noqa: E402
+from quadfringe.devices.emulator.frames import TestPattern, packed  # noqa: E402
 
 Fill = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_uint32, ctypes.c_uint32)
 WIDTH, HEIGHT, SENSOR_WIDTH, SENSOR_HEIGHT, PERIOD_US = 0x100, 0x104, 0x11C, 0x118, 0x138

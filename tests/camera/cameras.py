@@ -10,11 +10,11 @@ from pathlib import Path
 from fake_twin import fake_twin
 from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
-from quadfringe.capture import ReplayConfig, VirtualConfig
 from quadfringe.config import DeviceModel, SystemConfig
+from quadfringe.config.cameras import ReplayConfig, VirtualConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
-from quadfringe.emulator import Emulator
+from quadfringe.devices.emulator import Emulator
 from quadfringe.recording import Recorder
 
 SMALL = DeviceModel(width_px=128, height_px=96, focal_px=(322.5, 322.5), centre_px=(63.5, 47.5))

@@ -9,7 +9,7 @@ import pytest
 from wire import emulated, shared_emulator
 
 from quadfringe.devices.aravis import AravisCamera
-from quadfringe.emulator import Emulator
+from quadfringe.devices.emulator import Emulator
 
 if "QUADFRINGE_LOOPBACK" not in os.environ:
     collect_ignore_glob = ["test_*.py"]

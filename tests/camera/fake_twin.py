@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from quadfringe.capture import AravisConfig, ChipConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig
 
 FAKES = ("127.0.0.5", "127.0.0.6")
 

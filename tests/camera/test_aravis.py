@@ -12,11 +12,11 @@ import pytest
 from fake_twin import fake_twin
 from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, pattern, two_sources
 
-from quadfringe.capture import AravisConfig, ChipConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig
 from quadfringe.data import BayerShot, Shot
 from quadfringe.devices.aravis import AravisCamera, ChipCamera, found
-from quadfringe.emulator import MODEL, SERIAL, Emulator
-from quadfringe.emulator.frames import TestPattern
+from quadfringe.devices.emulator import MODEL, SERIAL, Emulator
+from quadfringe.devices.emulator.frames import TestPattern
 from quadfringe.errors import CameraError, CameraNotFoundError, ShotTimeoutError, WrongFrameError
 
 FORMATS = [

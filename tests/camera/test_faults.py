@@ -10,7 +10,7 @@ from wire import OWN, SIZE_PX, checked_exposure, emulated
 
 from quadfringe.data import AnyShot
 from quadfringe.devices.aravis import AravisCamera
-from quadfringe.emulator import Emulator
+from quadfringe.devices.emulator import Emulator
 from quadfringe.errors import (
     CameraBusyError,
     CameraError,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import quadfringe as qf
-from quadfringe import film
+from quadfringe.evaluation import film
 from quadfringe.recording import Recording
 
 SMALL = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))

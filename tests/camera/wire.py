@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from quadfringe.capture import AravisConfig, ChipConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig
 from quadfringe.data import AnyShot, BayerShot, Shot
-from quadfringe.emulator import Emulator
-from quadfringe.emulator.frames import TestPattern
+from quadfringe.devices.emulator import Emulator
+from quadfringe.devices.emulator.frames import TestPattern
 
 SIZE_PX = (128, 96)
 SECOND, TWO_STREAMS, OWN = ((f"127.0.0.{n}", f"127.0.0.{n + 1}") for n in (3, 7, 9))

@@ -18,7 +18,7 @@ from PIL import Image
 
 import quadfringe as qf
 from quadfringe.recording import Recorder, Recording
-from quadfringe.viewer import Viewer
+from quadfringe.view.viewer import Viewer
 
 SMALL_HAND = """
 capture = { kind = "virtual", frame_rate_hz = 8 }
@@ -164,7 +164,7 @@ def test_only_this_machine_is_served_unless_asked() -> None:
 
 def test_a_shot_without_a_shape_says_why(system: Path) -> None:
     from quadfringe.errors import DecodeError
-    from quadfringe.streaming import Measured
+    from quadfringe.scanner.streaming import Measured
 
     with qf.open(system) as scanner, Viewer(port=8250) as viewer:
         viewer.show(Measured(scanner.grab(), DecodeError("channel ir is black"), 7.0))

@@ -17,8 +17,8 @@ from usb_bench import Order, Screen
 from quadfringe.cli import app
 from quadfringe.config import Fringes, SystemConfig, load_system
 from quadfringe.devices import Projector, open_projector
+from quadfringe.devices.light import projector_images
 from quadfringe.devices.lightcrafter import CoaxialPair, LightCrafter, outputs, udev_rule
-from quadfringe.projection import projector_images
 
 
 def run(*arguments: object) -> Result:

@@ -12,7 +12,7 @@ from quadfringe.calibration.centres import refined_centres
 from quadfringe.calibration.grid import blobs, homography, in_grid_order, jacobians, symmetries, through
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError, InputError
-from quadfringe.images import full_scale as full_scale_of
+from quadfringe.io.images import full_scale as full_scale_of
 
 __all__ = ["TargetNotFoundError", "View", "find_target"]
 

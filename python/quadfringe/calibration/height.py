@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
+from quadfringe.calibration.fitting import fit_plane
 from quadfringe.errors import InputError
-from quadfringe.export import read_npz, write_npz
 from quadfringe.files import require_suffix
-from quadfringe.shapes import fit_plane
+from quadfringe.io.export import read_npz, write_npz
 
 __all__ = ["Agreement", "HeightCalibration", "compare_heights", "fit_heights", "heights_over"]
 

@@ -13,7 +13,7 @@ from quadfringe import _core
 from quadfringe.config import ChannelResponse, Response
 from quadfringe.data import ResponseCalibration
 from quadfringe.errors import InputError
-from quadfringe.images import full_scale, read_grey
+from quadfringe.io.images import full_scale, read_grey
 
 __all__ = ["EstimatedResponse", "estimate_from_files"]
 

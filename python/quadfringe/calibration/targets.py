@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from quadfringe.config import Model, checked
-from quadfringe.models import Positive
+from quadfringe.config._base import Positive
 
 __all__ = [
     "Disc",

@@ -42,11 +42,11 @@ def accept(
 
     The status is 1 when a limit is not kept.
     """
-    from quadfringe import acceptance
+    from quadfringe.calibration import acceptance
     from quadfringe.data import Calibration
     from quadfringe.errors import InputError
+    from quadfringe.evaluation.simulate import bench_config
     from quadfringe.files import require_suffix
-    from quadfringe.simulate import bench_config
 
     if out is not None:
         require_suffix(out, (".png",))

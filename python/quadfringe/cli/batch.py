@@ -10,7 +10,7 @@ import typer
 from quadfringe.cli.output import JsonOption, rows, say, steps, write_figures
 
 if TYPE_CHECKING:
-    from quadfringe.batch import Outcome
+    from quadfringe.recording.batch import Outcome
 
 __all__ = ["batch"]
 
@@ -31,10 +31,10 @@ def batch(
     Finished shots are not done again: a run that was stopped or killed goes on with the same command, and ends with the
     same files. Shots without a shape are listed in OUT/NAME/errors.json and make the exit status 1.
     """
-    from quadfringe.batch import decode_recordings
     from quadfringe.config import load_system
     from quadfringe.errors import BatchError, InputError
     from quadfringe.recording import Recording
+    from quadfringe.recording.batch import decode_recordings
 
     if workers is not None and scheduler is not None:
         raise InputError("--workers is for this machine, --scheduler for a cluster; give one of them")

@@ -39,9 +39,9 @@ def pattern(
     """
     from quadfringe.config import Fringes
     from quadfringe.data import Calibration
+    from quadfringe.devices.light import predeformation
+    from quadfringe.devices.patterns import write_patterns
     from quadfringe.errors import InputError
-    from quadfringe.patterns import write_patterns
-    from quadfringe.projection import predeformation
 
     if calibration is not None and predeformed_z_mm is None:
         raise InputError("--calibration changes nothing without --predeformed-z-mm, the depth of the reference plane")
@@ -60,7 +60,7 @@ def simulate(
     bayer: Annotated[Bayer | None, typer.Option(help="A Bayer chip: raw.png in place of three images.")] = None,
 ) -> None:
     """Render one shot of the virtual bench: its images, calibration.json, truth.npz."""
-    from quadfringe.simulate import bench_config, write_simulation
+    from quadfringe.evaluation.simulate import bench_config, write_simulation
 
     config = bench_config(system, surface=surface, noise=noise, seed=seed, bayer=None if bayer is None else bayer.value)
     for path in write_simulation(out, config):

@@ -54,12 +54,12 @@ def run(
 
     The status is 1 when a needed step is missing, in which case nothing is written, or when a step is not good.
     """
+    from quadfringe.calibration.session import FolderCaptures, guide
+    from quadfringe.calibration.session.geometry import height_calibration
+    from quadfringe.calibration.session.virtual import BenchCaptures, bench_session
     from quadfringe.errors import InputError
+    from quadfringe.evaluation.simulate import bench_config
     from quadfringe.files import require_suffix
-    from quadfringe.guide import FolderCaptures, guide
-    from quadfringe.guide.bench import BenchCaptures, bench_session
-    from quadfringe.guide.geometry import height_calibration
-    from quadfringe.simulate import bench_config
 
     require_suffix(out, (".json",))
     if heights is not None:
@@ -82,7 +82,7 @@ def run(
         say("no calibration: take the missing captures and run this again", json)
         raise typer.Exit(NOT_GOOD)
     if pictures is not None:
-        from quadfringe.guide.pictures import write_pictures
+        from quadfringe.calibration.session.pictures import write_pictures
 
         say("\n".join(str(path) for path in write_pictures(pictures, found)), json)
     planes = found.outcome("planes")
@@ -103,9 +103,9 @@ def plan(
     poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
 ) -> None:
     """Write session.json, whose settings may then be edited, and list every capture to take."""
+    from quadfringe.calibration.session.session import FILE, Session
     from quadfringe.errors import InputError
     from quadfringe.files import folder_for
-    from quadfringe.guide.session import FILE, Session
 
     if (folder / FILE).exists():
         raise InputError(f"{folder / FILE}: is there already; edit it, or take another folder")
@@ -125,8 +125,8 @@ def check(
 
 def _list_captures(folder: Path) -> bool:
     """Say what is there and what is not; tell whether a needed step is incomplete."""
-    from quadfringe.guide import FolderCaptures
-    from quadfringe.guide.session import STEPS
+    from quadfringe.calibration.session import FolderCaptures
+    from quadfringe.calibration.session.session import STEPS
 
     captures, lacking = FolderCaptures(folder), False
     for step in STEPS:
@@ -153,11 +153,11 @@ def capture(
     A pose in which the board is not seen is taken again at once. Interrupted, it goes on where it was. On the virtual
     bench nobody is asked.
     """
-    from quadfringe.capture import VirtualConfig
+    from quadfringe.calibration.session import FolderCaptures, take_captures
+    from quadfringe.calibration.session.session import STEP_NAMES, step_named
+    from quadfringe.calibration.session.virtual import BenchCaptures
     from quadfringe.config import load_system
-    from quadfringe.guide import FolderCaptures, take_captures
-    from quadfringe.guide.bench import BenchCaptures
-    from quadfringe.guide.session import STEP_NAMES, step_named
+    from quadfringe.config.cameras import VirtualConfig
 
     told: set[str] = set()
 
@@ -182,8 +182,8 @@ def rehearse(
     poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
 ) -> None:
     """Write every capture of a calibration of the virtual bench as images, to see what a session looks like."""
-    from quadfringe.guide.bench import BenchCaptures, bench_session
-    from quadfringe.simulate import bench_config
+    from quadfringe.calibration.session.virtual import BenchCaptures, bench_session
+    from quadfringe.evaluation.simulate import bench_config
 
     config = bench_config(system, noise=None if system else 0.01)
     written = BenchCaptures(config, bench_session(config, poses)).write(folder)

@@ -43,8 +43,8 @@ OneChip = Annotated[
 
 def _system(camera: str) -> SystemConfig:
     """Give the system of a word such as aravis:NAME, or of a system file."""
-    from quadfringe.capture import capture_config
     from quadfringe.config import SystemConfig, load_system
+    from quadfringe.config.cameras import capture_config
 
     if camera.endswith(".toml"):
         return load_system(Path(camera))
@@ -58,7 +58,7 @@ def _opened(camera: str) -> Devices:
 
 
 def _one_chip(camera: str, chip: Chip) -> ChipCamera:
-    from quadfringe.capture import AravisConfig
+    from quadfringe.config.cameras import AravisConfig
     from quadfringe.devices.aravis import ChipCamera
     from quadfringe.errors import InputError
 
@@ -116,9 +116,9 @@ def snap(
 
     Of one chip alone: visible.png or infrared.png, a mosaic as it was read out.
     """
+    from quadfringe.data.shot_files import write_shot
     from quadfringe.files import folder_for
-    from quadfringe.images import write_image
-    from quadfringe.shots import write_shot
+    from quadfringe.io.images import write_image
 
     if chip is not None:
         with _one_chip(camera, chip) as opened:

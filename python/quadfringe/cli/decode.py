@@ -77,11 +77,11 @@ def decode(
     """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
     from quadfringe.config import DecodeConfig, Fringes, checked
     from quadfringe.data import SUFFIXES, AnyShot, Calibration
+    from quadfringe.data.shot_files import read_bayer_shot, read_shot
     from quadfringe.decoding import Plan
     from quadfringe.decoding import decode as decode_shot
     from quadfringe.errors import InputError
     from quadfringe.files import require_suffix
-    from quadfringe.shots import read_bayer_shot, read_shot
 
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without it write .npz")

@@ -17,7 +17,7 @@ def demo(
     json: JsonOption = None,
 ) -> None:
     """Measure steps and a face on the virtual bench; write PLY, a PNG report and the figures."""
-    from quadfringe.demo import SCENES, run_scene
+    from quadfringe.evaluation.demo import SCENES, run_scene
     from quadfringe.files import folder_for
 
     folder_for(out)

@@ -70,8 +70,8 @@ def doctor(
 
 
 def _shot_in(folder: Path, bayer: Bayer | None) -> AnyShot:
+    from quadfringe.data.shot_files import read_folder
     from quadfringe.errors import InputError
-    from quadfringe.shots import read_folder
 
     if bayer is None and (folder / "raw.png").exists():
         raise InputError(f"{folder}: holds a raw mosaic; say its pattern with --bayer")

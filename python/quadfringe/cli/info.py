@@ -16,7 +16,7 @@ def info(
     file: Annotated[Path, typer.Argument(help="A shape, calibration, response, system file, recording or image.")],
 ) -> None:
     """Say what a file holds: maps and their ranges, settings, calibration."""
-    from quadfringe.inspection import lines_about
+    from quadfringe.recording.inspection import lines_about
 
     for line in lines_about(file):
         say(line)

@@ -14,7 +14,7 @@ from quadfringe.cli.record import FileSize, ShotsOption, SystemFile
 if TYPE_CHECKING:
     from quadfringe.recording import Recorder
     from quadfringe.scanner import Scanner
-    from quadfringe.viewer import Viewer
+    from quadfringe.view.viewer import Viewer
 
 __all__ = ["live"]
 
@@ -50,7 +50,7 @@ def live(
 
     from quadfringe.recording import Recorder
     from quadfringe.scanner import open_system
-    from quadfringe.viewer import Viewer
+    from quadfringe.view.viewer import Viewer
 
     with ExitStack() as stack:
         scanner = stack.enter_context(open_system(system))

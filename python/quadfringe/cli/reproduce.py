@@ -31,8 +31,8 @@ def reproduce(
     json: JsonOption = None,
 ) -> None:
     """Compute a published result again: its figure as PNG, its numbers as JSON."""
+    from quadfringe.evaluation.reproduce import REPRODUCTIONS
     from quadfringe.files import folder_for
-    from quadfringe.reproduce import REPRODUCTIONS
 
     figures, picture = REPRODUCTIONS[name.value](folder_for(out))
     table(f"reproduce {name.value}", figures, json)

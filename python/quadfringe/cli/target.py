@@ -48,9 +48,9 @@ def target(
 ) -> None:
     """Draw a calibration board to scale. Print it at 100 %, glue it to something flat, measure its bar and pitch."""
     from quadfringe.calibration import targets
+    from quadfringe.calibration.printing import write_target
     from quadfringe.errors import InputError
     from quadfringe.files import atomic, require_suffix
-    from quadfringe.printing import write_target
 
     suffix = require_suffix(out, (".pdf", ".svg", ".png"))
     given = {"rows": rows, "columns": columns, "pitch_mm": pitch, "diameter_mm": diameter, "hole_mm": hole}

@@ -12,7 +12,7 @@ from quadfringe.cli.decode import Method
 from quadfringe.cli.output import JsonOption, rows, say, write_record
 
 if TYPE_CHECKING:
-    from quadfringe.timing import Case, Timing
+    from quadfringe.evaluation.timing import Case, Timing
 
 __all__ = ["bench"]
 
@@ -30,9 +30,9 @@ def bench(
     json: JsonOption = None,
 ) -> None:
     """Time decoding of a bench shot, four 8-bit images to X, Y, Z, and weigh the decoders."""
-    from quadfringe import timing
     from quadfringe.config import SceneConfig
-    from quadfringe.machine import described, usable_cores
+    from quadfringe.evaluation import timing
+    from quadfringe.evaluation.machine import described, usable_cores
 
     sizes = [_size(text) for text in dict.fromkeys(size)]
     methods = list(dict.fromkeys(m.value for m in method)) if method else list(timing.METHODS)

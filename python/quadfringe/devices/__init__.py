@@ -8,11 +8,11 @@ from importlib import import_module
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
-from quadfringe.capture import capture_config
 from quadfringe.config import Fringes, SystemConfig
+from quadfringe.config.cameras import capture_config
 from quadfringe.data import AnyShot, Calibration
+from quadfringe.devices.light import Light
 from quadfringe.errors import ConfigError
-from quadfringe.projection import Light
 
 __all__ = [
     "Camera",
@@ -28,6 +28,14 @@ __all__ = [
 ]
 
 Keep = Literal["latest", "all"]
+
+# Where each kind of `[capture]` is implemented: a module with `open_devices`. A recording that is played back stands
+# above the devices and is loaded by name.
+CAMERAS = {
+    "virtual": "quadfringe.devices.virtual",
+    "aravis": "quadfringe.devices.aravis",
+    "replay": "quadfringe.recording.replay",
+}
 
 
 class Projector(Protocol):
@@ -153,7 +161,7 @@ def open_devices(config: SystemConfig) -> Devices:
 
     Raises `ConfigError` for devices that do not go together, OSError when one cannot be opened.
     """
-    devices: Devices = import_module(f"{__name__}.{config.capture.kind}").open_devices(config)
+    devices: Devices = import_module(CAMERAS[config.capture.kind]).open_devices(config)
     return devices
 
 

@@ -26,7 +26,7 @@ from quadfringe._core import (
 )
 from quadfringe.config import Fringes, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.data import Calibration
-from quadfringe.projection import Light, light_images, predeformation
+from quadfringe.devices.light import Light, light_images, predeformation
 
 __all__ = [
     "SIZE_PX",

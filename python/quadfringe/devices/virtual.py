@@ -12,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.capture import VirtualConfig
 from quadfringe.config import ChannelResponse, Fringes, Response, Row4, SystemConfig, Triple
-from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Stamp, Truth
-from quadfringe.decoding import core_device, device_model
+from quadfringe.config.cameras import VirtualConfig
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Stamp, Truth, core_device, device_model
 from quadfringe.devices import CameraStatistics, Devices, Keep
+from quadfringe.devices.light import Levels, Light, Step, eight_bit, predeformation
 from quadfringe.errors import ConfigError, DecodeError, InputError
-from quadfringe.export import read_npy
-from quadfringe.projection import Levels, Light, Step, eight_bit, predeformation
+from quadfringe.io.export import read_npy
 
 __all__ = ["PrintedBoard", "VirtualBench", "VirtualCamera", "VirtualProjector", "open_devices"]
 

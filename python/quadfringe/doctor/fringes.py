@@ -16,7 +16,7 @@ from quadfringe.calibration.levels import CHANNELS
 from quadfringe.config import DeviceModel
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Plan
-from quadfringe.stages import carrier, linear_light
+from quadfringe.decoding.stages import carrier, linear_light
 
 __all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift"]
 

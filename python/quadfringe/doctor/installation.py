@@ -7,7 +7,7 @@ from importlib.util import find_spec
 
 from quadfringe import _core
 from quadfringe.doctor.finding import Finding
-from quadfringe.machine import described
+from quadfringe.evaluation.machine import described
 
 __all__ = ["examine_installation"]
 

@@ -27,9 +27,9 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config import BayerPattern, SystemConfig
+from quadfringe.config._base import checked
 from quadfringe.data import AnyShot, BayerShot, Calibration, FrameStamp, Shot, Stamp
 from quadfringe.errors import InputError
-from quadfringe.models import checked
 
 __all__ = ["Header", "crcs_of", "make_datasets", "stamp_at", "stamp_values"]
 

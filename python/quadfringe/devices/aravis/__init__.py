@@ -4,7 +4,7 @@
 >>> with open_camera("aravis:AD-080GE") as camera:      # doctest: +SKIP
 ...     shot = camera.snap()
 
-Needs the extra `aravis` and the Debian packages that the error without them names. `quadfringe.emulator`
+Needs the extra `aravis` and the Debian packages that the error without them names. `quadfringe.devices.emulator`
 is a camera on the wire for those who have none.
 """
 

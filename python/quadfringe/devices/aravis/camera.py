@@ -10,14 +10,14 @@ from dataclasses import replace
 from itertools import count as numbers
 from typing import Generic, Literal, Self, TypeVar
 
-from quadfringe.capture import AravisConfig
 from quadfringe.config import SystemConfig
+from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, Calibration, ChipImage
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
+from quadfringe.devices._queue import DroppingQueue
 from quadfringe.devices.aravis.link import Link
 from quadfringe.devices.aravis.profiles import CHIPS
 from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, UnpairedError, WrongFrameError
-from quadfringe.queues import DroppingQueue
 
 __all__ = ["AravisCamera", "ChipCamera", "open_devices"]
 
@@ -196,7 +196,7 @@ class ChipCamera(_Running[ChipImage]):
     To focus, to look at one chip while the other is missing, or for an ordinary camera. `chip` says which of the
     settings holds, and which device or stream channel is meant where a name fits both chips.
 
-    >>> from quadfringe.capture import AravisConfig
+    >>> from quadfringe.config.cameras import AravisConfig
     >>> from quadfringe.devices.aravis import ChipCamera
     >>> with ChipCamera(AravisConfig(device="acA1300", exposure_us=5000)) as camera:  # doctest: +SKIP
     ...     camera.snap().pixels.shape

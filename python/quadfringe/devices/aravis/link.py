@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from quadfringe.capture import AravisConfig
+from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, BayerShot, ChipImage, Shot, Stamp
 from quadfringe.devices.aravis import profiles
 from quadfringe.devices.aravis._gi import Device, found
 from quadfringe.devices.aravis.formats import format_named
+from quadfringe.devices.aravis.pairing import Pairer, Single, Stamped
 from quadfringe.devices.aravis.profiles import CHIPS, Place
 from quadfringe.devices.aravis.reader import Agreed, ChipReader, Frame
 from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError
-from quadfringe.pairing import Pairer, Single, Stamped
 
 __all__ = ["Link"]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from quadfringe.capture import AravisConfig, ChipConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig
 from quadfringe.devices.aravis._gi import Device, Found
 from quadfringe.errors import CameraError, CameraNotFoundError
 

@@ -1,0 +1,218 @@
+"""Whether the instrument is good: a plane, a sphere and steps, judged in the spirit of VDI/VDE 2634, part 2."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.calibration.fitting import (
+    Form,
+    cap_towards_camera,
+    dominant_plane,
+    dominant_sphere,
+    fit_plane,
+    fit_sphere,
+    form_of,
+    measure_steps,
+)
+from quadfringe.config import SystemConfig
+from quadfringe.data import AnyShot, Calibration, Shape
+from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.devices.virtual import VirtualBench
+from quadfringe.view.report import Panel, draw_panels
+
+__all__ = [
+    "SPHERE_DIAMETER_MM",
+    "STEP_HEIGHTS_MM",
+    "Acceptance",
+    "Artefacts",
+    "Limits",
+    "Line",
+    "accept",
+    "measure_artefacts",
+    "read_artefacts",
+    "write_acceptance",
+]
+
+Map = NDArray[np.float32]
+BORDER_PX = 30  # about a fringe: windows that reach beyond the image know less
+CAP_DEG = 60.0  # of a sphere, what is seen more steeply than this is left out
+BAND_MM = 1.0  # points farther from the artefact than this belong to something else
+# Of the ready scenes of the virtual bench.
+SPHERE_DIAMETER_MM = 68.0
+STEP_HEIGHTS_MM = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 45.0, 50.0)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What is accepted, mm."""
+
+    plane_form_mm: float = 0.10
+    sphere_form_mm: float = 0.15
+    sphere_size_mm: float = 0.10
+    step_mm: float = 0.05
+
+
+@dataclass(frozen=True)
+class Artefacts:
+    """Measured points (H, W, 3), mm, of each artefact, and its calibrated sizes; any may be absent."""
+
+    planes: tuple[Map, ...] = ()
+    spheres: tuple[Map, ...] = ()
+    sphere_diameter_mm: float = 0.0
+    steps: tuple[Map, ...] = ()
+    step_heights_mm: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Line:
+    """One figure against its limit, mm."""
+
+    name: str
+    value_mm: float
+    limit_mm: float
+
+    @property
+    def accepted(self) -> bool:
+        """Whether the figure keeps its limit, whatever its sign."""
+        return abs(self.value_mm) <= self.limit_mm
+
+
+@dataclass(frozen=True)
+class Acceptance:
+    """The judged figures, others that explain them, and the deviations (H, W) mm of every measurement by name."""
+
+    lines: tuple[Line, ...]
+    figures: Mapping[str, float]
+    deviations_mm: Mapping[str, NDArray[np.float64]]
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every line keeps its limit."""
+        return all(line.accepted for line in self.lines)
+
+
+def accept(artefacts: Artefacts, limits: Limits | None = None) -> Acceptance:
+    """Judge measured artefacts; raises `InputError` when one cannot be found in its points.
+
+    Form is the range of distances from the fitted surface with the worst 3 of 1000 points left out, by which planes
+    are judged; the figure with `6sigma` in its name is that inside +-3 standard deviations, by which spheres are.
+    Points within 30 px of the image border are left out, and those of a sphere seen more steeply than 60 degrees.
+    """
+    limits = limits or Limits()
+    found = [
+        *(_plane(f"plane_{i}", xyz, limits) for i, xyz in enumerate(artefacts.planes, 1)),
+        *(_sphere(f"sphere_{i}", xyz, artefacts, limits) for i, xyz in enumerate(artefacts.spheres, 1)),
+        *(_steps(f"steps_{i}", xyz, artefacts, limits) for i, xyz in enumerate(artefacts.steps, 1)),
+    ]
+    return Acceptance(
+        lines=tuple(line for one in found for line in one.lines),
+        figures={name: value for one in found for name, value in one.figures.items()},
+        deviations_mm={name: image for one in found for name, image in one.deviations_mm.items()},
+    )
+
+
+def _plane(name: str, xyz_mm: Map, limits: Limits) -> Acceptance:
+    inner = _without_border(xyz_mm)
+    first = dominant_plane(inner)
+    mine = np.where((np.abs(first.distances_mm(inner)) < BAND_MM)[..., None], inner, np.nan)
+    away = fit_plane(mine).distances_mm(mine)
+    form = form_of(away)
+    lines = (Line(f"{name}_form_mm", form.form_mm, limits.plane_form_mm),)
+    return Acceptance(lines, _form_figures(name, form), {name: away})
+
+
+def _sphere(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acceptance:
+    inner = _without_border(xyz_mm)
+    sphere = dominant_sphere(inner, artefacts.sphere_diameter_mm)
+    for _ in range(2):
+        near = np.abs(sphere.distances_mm(inner)) < BAND_MM
+        mine = np.where((near & cap_towards_camera(inner, sphere, CAP_DEG))[..., None], inner, np.nan)
+        sphere = fit_sphere(mine, sphere)
+    away = sphere.distances_mm(mine)
+    form = form_of(away)
+    size = 2 * sphere.radius_mm - artefacts.sphere_diameter_mm
+    lines = (
+        Line(f"{name}_form_6sigma_mm", form.form_6sigma_mm, limits.sphere_form_mm),
+        Line(f"{name}_size_error_mm", size, limits.sphere_size_mm),
+    )
+    x, y, z = (float(c) for c in sphere.centre_mm)
+    place = {f"{name}_x_mm": x, f"{name}_y_mm": y, f"{name}_z_mm": z}
+    return Acceptance(lines, _form_figures(name, form) | place, {name: away})
+
+
+def _steps(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acceptance:
+    found = measure_steps(_without_border(xyz_mm), artefacts.step_heights_mm)
+    pairs = zip(found.nominal_mm, found.errors_mm, strict=True)
+    lines = tuple(Line(f"{name}_{nominal:g}mm_error_mm", error, limits.step_mm) for nominal, error in pairs)
+    return Acceptance(lines, _form_figures(f"{name}_base", found.base), {name: found.height_mm})
+
+
+def _without_border(xyz_mm: Map) -> Map:
+    return xyz_mm[BORDER_PX:-BORDER_PX, BORDER_PX:-BORDER_PX]
+
+
+def _form_figures(name: str, form: Form) -> dict[str, float]:
+    return {
+        f"{name}_points": float(form.points),
+        f"{name}_sigma_mm": form.sigma_mm,
+        f"{name}_form_mm": form.form_mm,
+        f"{name}_form_6sigma_mm": form.form_6sigma_mm,
+        f"{name}_cut_6sigma_percent": form.cut_percent,
+    }
+
+
+def measure_artefacts(config: SystemConfig, calibration: Calibration | None = None) -> Artefacts:
+    """Measure planes, spheres and the steps of the virtual bench of `config` about 800 mm away.
+
+    Light and camera are those of its scene; without a calibration that of the bench itself is taken. The plane stands
+    level, and tilted by 15 degrees; sphere and steps are the ready scenes; every shot has its own noise.
+    """
+    bench = VirtualBench(config)
+    known = calibration or bench.calibration()
+    bench.project(config.fringes)
+    tilt = np.radians(15.0)
+    shots: list[AnyShot] = []
+    for normal in ((0.0, 0.0, -1.0), (float(np.sin(tilt)), 0.0, -float(np.cos(tilt)))):
+        bench.place_plane((0.0, 0.0, 800.0), normal)
+        shots.append(bench.expose(seed=_seed(config, len(shots))))
+    for surface in ("sphere", "steps"):
+        bench.place_scene(surface)
+        shots.append(bench.expose(seed=_seed(config, len(shots))))
+    plan = Plan(known.projector.width_px, config.fringes, known, settings=config.decode)
+    decoder = ShotDecoder(shots[0], plan)
+    points = [decoder.decode(shot).points_mm for shot in shots]
+    return Artefacts(tuple(points[:2]), (points[2],), SPHERE_DIAMETER_MM, (points[3],), STEP_HEIGHTS_MM)
+
+
+def _seed(config: SystemConfig, number: int) -> int:
+    return 1000 * (1 + (config.scene.seed or 0)) + number
+
+
+def read_artefacts(
+    planes: Sequence[Path],
+    spheres: Sequence[Path],
+    steps: Sequence[Path],
+    sphere_diameter_mm: float,
+    step_heights_mm: Sequence[float],
+) -> Artefacts:
+    """Read measured artefacts from shapes saved as NPZ; raises `InputError` for a shape without millimetres."""
+    read = [tuple(Shape.load(path).points_mm for path in paths) for paths in (planes, spheres, steps)]
+    return Artefacts(read[0], read[1], sphere_diameter_mm, read[2], tuple(step_heights_mm))
+
+
+def write_acceptance(path: Path, found: Acceptance) -> None:
+    """Write the deviations of every measurement as one PNG; needs matplotlib (extra `plot`)."""
+    panels = [_panel(name, image) for name, image in found.deviations_mm.items()]
+    word = "accepted" if found.accepted else "not accepted"
+    draw_panels(path, f"acceptance: {word}", [panels[i : i + 3] for i in range(0, len(panels), 3)])
+
+
+def _panel(name: str, image: NDArray[np.float64]) -> Panel:
+    if name.startswith("steps"):
+        return Panel(name, image, "mm")
+    return Panel(name, image, "mm", "coolwarm", (-0.1, 0.1))

@@ -1,0 +1,146 @@
+"""Where the captures of a session come from: a folder of images, or anything else that gives shots by name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.calibration.projector import AXES, ProjectorMap, projector_map
+from quadfringe.calibration.session.session import FILE, Session
+from quadfringe.data import AnyShot
+from quadfringe.data.shot_files import SUFFIXES, read_folder
+from quadfringe.devices.light import Levels, Light, Step
+from quadfringe.errors import InputError
+from quadfringe.io.images import full_scale, read_grey
+
+__all__ = ["Captures", "FolderCaptures", "light_of", "pose_light", "pose_maps"]
+
+FLAT_LEVEL = 0.6  # of full light, out of focus
+
+
+class Captures(Protocol):
+    """Gives the captures of a session by step and name; a capture that is not there is an `InputError`."""
+
+    session: Session
+
+    def missing(self, step: str) -> list[str]:
+        """Give the names of the captures of a step that are not there."""
+
+    def shot(self, step: str, name: str) -> AnyShot:
+        """Give one shot."""
+
+    def pose(self, name: str) -> dict[str, ProjectorMap]:
+        """Give the projector maps of one pose of the board, by projector."""
+
+
+class FolderCaptures:
+    """The captures in a folder with `session.json`; raises `InputError` when there is none.
+
+    `rig` is the bench that is to be calibrated; a session of another one is refused.
+    """
+
+    def __init__(self, folder: Path, rig: str | None = None) -> None:
+        if not (folder / FILE).is_file():
+            raise InputError(f"{folder}: no {FILE}; make it with quadfringe calibrate plan {folder}")
+        self.folder = folder
+        self.session = Session.load(folder / FILE)
+        if rig is not None and rig != self.session.rig:
+            raise InputError(f"{folder}: captures of {self.session.rig!r}, not of {rig!r}; one rig, one session")
+        self._size: tuple[int, ...] | None = None
+
+    def missing(self, step: str) -> list[str]:
+        """Give the captures whose folder, or whose images, are not there; a pose says which images it lacks."""
+        names = self.session.captures(step)
+        if step != "poses":
+            return [name for name in names if not _has_images(self.folder / step / name)]
+        found = []
+        for name in names:
+            lacks = self.lacking_images(name)
+            if lacks:
+                found.append(name if len(lacks) == len(self.session.pose_images()) else f"{name} ({_some(lacks)})")
+        return found
+
+    def lacking_images(self, pose: str) -> list[str]:
+        """Give the fringe images that a pose lacks, such as visible/columns_36_0."""
+        return [image for image in self.session.pose_images() if _file(self.folder / "poses" / pose, image) is None]
+
+    def shot(self, step: str, name: str) -> AnyShot:
+        """Read one shot."""
+        shot = read_folder(self.folder / step / name, self.session.bayer, self.session.bits)
+        self._check_size(next(iter(shot.images.values())), f"{step}/{name}")
+        return shot
+
+    def pose(self, name: str) -> dict[str, ProjectorMap]:
+        """Read the fringe images of a pose."""
+        return pose_maps(self.session, lambda image: self._fringes(name, image))
+
+    def _fringes(self, pose: str, image: str) -> NDArray[np.float32]:
+        folder = self.folder / "poses" / pose
+        path = _file(folder, image)
+        if path is None:
+            raise InputError(f"{folder}: no {image}.png")
+        grey = read_grey(path)
+        self._check_size(grey, str(path))
+        top = 2**self.session.bits - 1 if self.session.bits and grey.dtype == np.uint16 else full_scale(grey)
+        return (grey / np.float32(top)).astype(np.float32)
+
+    def _check_size(self, image: NDArray[Any], name: str) -> None:
+        self._size = self._size or image.shape
+        if image.shape != self._size:
+            raise InputError(
+                f"{name}: {image.shape[1]} x {image.shape[0]} pixels, the captures before have {self._size[1]} x "
+                f"{self._size[0]}; all captures of a session must be of one camera and one size"
+            )
+
+
+def light_of(session: Session, step: str, name: str) -> tuple[Light, float]:
+    """Give what the projectors show for a capture that is one shot, and its relative exposure."""
+    if step == "levels":
+        plan = session.level_plan
+        row = plan.names.index(name)
+        red, green, blue, ir = plan.levels[row].tolist()
+        return Levels((red, green, blue, ir)), float(plan.exposure[row])
+    if step in ("dark", "flat"):
+        return Levels((FLAT_LEVEL if step == "flat" else 0.0,) * 4), 1.0
+    return session.fringes, 1.0
+
+
+def pose_light(session: Session, image: str) -> Step:
+    """Give what the projectors show for an image of a pose, such as visible/columns_36_0."""
+    beam, _, name = image.partition("/")
+    axis, number, step = name.split("_")
+    shift_rad = session.step_plan.shift_rad(int(step))
+    return Step(float(number), shift_rad, axis, beam, session.fringes.layout)
+
+
+def pose_maps(session: Session, image: Callable[[str], NDArray[np.float32]]) -> dict[str, ProjectorMap]:
+    """Give the projector maps of a pose, by projector; `image` gives one by its name, (H, W) shares of full scale."""
+    plan = session.step_plan
+    found = {}
+    for beam in session.beams:
+        columns, rows = (
+            [
+                np.stack([image(f"{beam}/{axis}_{number:g}_{step}") for step in range(plan.steps)])
+                for number in plan.fringes.numbers
+            ]
+            for axis in AXES
+        )
+        found[beam] = projector_map(columns, rows, plan)
+    return found
+
+
+def _has_images(folder: Path) -> bool:
+    return folder.is_dir() and any(path.suffix.lower() in SUFFIXES for path in folder.iterdir())
+
+
+def _file(folder: Path, image: str) -> Path | None:
+    found = [path for suffix in SUFFIXES if (path := folder / f"{image}{suffix}").is_file()]
+    return found[0] if found else None
+
+
+def _some(names: list[str]) -> str:
+    return f"{', '.join(names[:3])}{f' and {len(names) - 3} more' if len(names) > 3 else ''}"

@@ -1,0 +1,119 @@
+"""From the captures of a session to one calibration: the steps in order, each said in plain words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
+
+from quadfringe import _core
+from quadfringe.calibration.session import geometry, light
+from quadfringe.calibration.session.captures import Captures
+from quadfringe.calibration.session.outcome import Outcome
+from quadfringe.calibration.session.session import STEPS, Step
+from quadfringe.data import Calibration, CalibrationRecord
+
+__all__ = ["Guided", "guide"]
+
+SOME = 6  # names of missing captures that are told
+
+
+@dataclass(frozen=True)
+class Guided:
+    """What came of a session: all outcomes, and the captures that are missing by step.
+
+    `calibration` is None when a step that it needs lacks captures.
+    """
+
+    calibration: Calibration | None
+    outcomes: tuple[Outcome, ...]
+    missing: Mapping[str, tuple[str, ...]]
+
+    @property
+    def good(self) -> bool:
+        """Whether there is a calibration and every step that was done is good."""
+        return self.calibration is not None and all(outcome.step.good for outcome in self.outcomes)
+
+    def outcome(self, name: str) -> Outcome | None:
+        """Give the outcome of a step; None when it was not done."""
+        return next((outcome for outcome in self.outcomes if outcome.step.name == name), None)
+
+
+def guide(captures: Captures, say: Callable[[str], None] = lambda _: None) -> Guided:
+    """Do every step whose captures are there, and `say` what to do, what is missing and what came of it.
+
+    Raises `InputError` for captures that cannot be used, `CalibrationError` for those that no calibration can be
+    trusted from. Nothing is written.
+    """
+    walk = _Walk(captures, say)
+    for step in STEPS:
+        walk.take(step)
+    return Guided(walk.calibration(), tuple(walk.outcomes), walk.missing)
+
+
+class _Walk:
+    """The state of a session on its way through the steps."""
+
+    def __init__(self, captures: Captures, say: Callable[[str], None]) -> None:
+        self.captures, self.say = captures, say
+        self.outcomes: list[Outcome] = []
+        self.missing: dict[str, tuple[str, ...]] = {}
+        self.fields: dict[str, Any] = {}
+
+    def take(self, step: Step) -> None:
+        """Do a step, or say what it lacks."""
+        lacks = tuple(self.captures.missing(step.name))
+        self.say(f"{step.name}: {step.title}")
+        if lacks:
+            self.missing[step.name] = lacks
+            more = f" and {len(lacks) - SOME} more" if len(lacks) > SOME else ""
+            need = "needed" if step.needed else "may be left out"
+            self.say(f"  missing ({need}): {', '.join(lacks[:SOME])}{more}\n  {step.how}")
+            return
+        if step.name in ("planes", "acceptance") and self.calibration() is None:
+            self.say("  waits for the steps before")
+            return
+        for outcome in self._outcomes(step.name):
+            self.outcomes.append(outcome)
+            self.fields |= outcome.fields
+            word = "good" if outcome.step.good else "NOT GOOD"
+            self.say(f"  {outcome.step.name}: {word}: {outcome.step.verdict}")
+
+    def _outcomes(self, name: str) -> list[Outcome]:
+        dark = self.fields.get("dark", (0.0,) * 4)
+        if name == "dark":
+            return [light.dark(self.captures)]
+        if name == "levels":
+            return [light.levels(self.captures, dark)]
+        if name == "flat":
+            return [light.flat(self.captures, dark)]
+        if name == "poses":
+            return self._poses()
+        calibration = self.calibration()
+        assert calibration is not None
+        work = geometry.planes if name == "planes" else geometry.acceptance
+        return [work(self.captures, calibration)]
+
+    def _poses(self) -> list[Outcome]:
+        maps = {}
+        for name in self.captures.session.captures("poses"):
+            maps[name] = self.captures.pose(name)
+            self.say(f"  pose {name}: read")
+        registered = geometry.registration(self.captures, maps) if self.captures.session.infrared else None
+        found = None if registered is None else registered.details["registration"]
+        rest = [geometry.poses(self.captures, maps, found)]
+        return rest if registered is None else [registered, *rest]
+
+    def calibration(self) -> Calibration | None:
+        """Give the calibration as far as it is known; None while a needed step is missing."""
+        done = {outcome.step.name for outcome in self.outcomes}
+        if not {step.name for step in STEPS if step.needed} <= done:
+            return None
+        made = CalibrationRecord(
+            made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+            quadfringe_version=_core.__version__,
+            rig=self.captures.session.rig,
+            steps=tuple(outcome.step for outcome in self.outcomes),
+        )
+        return Calibration(**self.fields, record=made)

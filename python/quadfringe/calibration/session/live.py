@@ -1,0 +1,159 @@
+"""Captures of a session from the camera and the projectors of a system, into its folder."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.calibration.detect import find_target
+from quadfringe.calibration.session.captures import FolderCaptures, light_of, pose_light
+from quadfringe.calibration.session.session import FILE, STEP_NAMES, Session, step_named
+from quadfringe.config import SystemConfig
+from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig
+from quadfringe.data import AnyShot, BayerShot
+from quadfringe.data.shot_files import write_shot
+from quadfringe.decoding import stages
+from quadfringe.devices import Camera
+from quadfringe.devices.light import Light
+from quadfringe.errors import CalibrationError, ConfigError, InputError
+from quadfringe.files import folder_for
+from quadfringe.io.images import write_image
+from quadfringe.scanner import Scanner, open_system
+
+__all__ = ["Hands", "take_captures"]
+
+Hands = Callable[[str, str, Camera], None]
+TRIES = 3  # of a pose in which the board is not found
+SETTLED_S = 0.1  # a display shows an image some frames after it was drawn
+
+
+def take_captures(
+    config: SystemConfig,
+    folder: Path,
+    hands: Hands,
+    steps: Iterable[str] = STEP_NAMES,
+    say: Callable[[str], None] = lambda _: None,
+) -> list[Path]:
+    """Take every capture of these steps that the session in `folder` lacks; returns the folders written.
+
+    `hands(step, name, camera)` puts what a capture is of before the camera, and returns when it stands still: a person
+    that is asked, or the virtual bench. A pose in which the board is not found is said to be so, and taken again.
+    What is there is kept, so that an interrupted session goes on where it was; a capture is written whole or not at
+    all. Raises `ConfigError` when the system cannot show or expose what the session asks for, `InputError` when
+    the camera's bits or mosaic are not those of the session, `CalibrationError` when a board is not found three times.
+
+    >>> from quadfringe.calibration.session.live import take_captures
+    >>> take_captures(load_system(Path("system.toml")), Path("session"), hands)  # doctest: +SKIP
+    """
+    captures = FolderCaptures(folder)
+    taken = []
+    for step in steps:
+        wanted = [name for name in captures.session.captures(step_named(step).name) if _lacks(captures, step, name)]
+        by_exposure: dict[float, list[str]] = {}
+        for name in wanted:
+            by_exposure.setdefault(light_of(captures.session, step, name)[1], []).append(name)
+        for exposure, names in by_exposure.items():
+            with open_system(exposed(config, exposure)) as scanner:
+                for name in names:
+                    say(f"{step}/{name}")
+                    taken.append(_taken(captures, step, name, scanner, hands, say))
+    return taken
+
+
+def exposed(config: SystemConfig, share: float) -> SystemConfig:
+    """Give the system at a share of its exposure; raises `ConfigError` when that cannot be set."""
+    capture = config.capture
+    if isinstance(capture, ReplayConfig):
+        raise ConfigError("capture: a recording cannot be put under other light; name a camera")
+    changes: dict[str, Any] = {"calibration": None}  # it is to be made
+    if isinstance(capture, VirtualConfig):
+        gain = tuple(share * one for one in config.scene.gain or (1.0,) * 4)
+        changes["scene"] = config.scene.model_copy(update={"gain": gain})
+        # Then every shot has noise of its own.
+        changes["capture"] = capture.model_copy(update={"frame_rate_hz": capture.frame_rate_hz or 1.0})
+    elif share != 1:
+        changes["capture"] = _shorter(capture, share)
+    return config.model_copy(update=changes)
+
+
+def _shorter(capture: AravisConfig, share: float) -> AravisConfig:
+    def times(exposure_us: float | None) -> float | None:
+        return None if exposure_us is None else share * exposure_us
+
+    chips = {name: getattr(capture, name) for name in ("visible", "infrared")}
+    if capture.exposure_us is None and any(chip.exposure_us is None for chip in chips.values()):
+        raise ConfigError("capture.exposure_us: state it; a calibration takes some levels at a part of the exposure")
+    own = {name: chip.model_copy(update={"exposure_us": times(chip.exposure_us)}) for name, chip in chips.items()}
+    return capture.model_copy(update={"exposure_us": times(capture.exposure_us), **own})
+
+
+def _lacks(captures: FolderCaptures, step: str, name: str) -> bool:
+    return bool(captures.lacking_images(name)) if step == "poses" else name in captures.missing(step)
+
+
+def _taken(
+    captures: FolderCaptures, step: str, name: str, scanner: Scanner, hands: Hands, say: Callable[[str], None]
+) -> Path:
+    """Take one capture, beside its place until it is whole and good."""
+    place = folder_for(captures.folder / step) / name
+    part = place.with_name(f"{name}.part")
+    for left in reversed(range(TRIES)):
+        shutil.rmtree(part, ignore_errors=True)
+        hands(step, name, scanner.camera)
+        if step != "poses":
+            shot = _shown(scanner, light_of(captures.session, step, name)[0])
+            _check_shot(captures.session, shot)
+            write_shot(folder_for(part), shot)
+            break
+        for image in captures.session.pose_images():
+            light = pose_light(captures.session, image)
+            shot = _shown(scanner, light)
+            _check_shot(captures.session, shot)
+            grey = _grey(shot, light.beam)
+            folder_for((part / image).parent)
+            write_image(part / f"{image}.png", grey)
+        try:
+            find_target(captures.pose(part.name)["visible"].background, captures.session.target)
+            break
+        except CalibrationError as error:
+            if not left:
+                raise CalibrationError(error.reason, f"pose {name}: {error}") from error
+            say(f"  the board is not found: {error}; take this pose again")
+    shutil.rmtree(place, ignore_errors=True)
+    part.replace(place)
+    return place
+
+
+def _shown(scanner: Scanner, light: Light) -> AnyShot:
+    scanner.projector.show(light)
+    if not isinstance(scanner.config.capture, VirtualConfig):
+        time.sleep(SETTLED_S)
+    return scanner.camera.snap()
+
+
+def _check_shot(session: Session, shot: AnyShot) -> None:
+    """Refuse shots that the settings of the session would read back as something else."""
+    pattern = shot.bayer if isinstance(shot, BayerShot) else None
+    bits = round(np.log2(shot.full_scale_value + 1))
+    meant = session.bits or (16 if shot.images["ir"].dtype == np.uint16 else bits)
+    if (pattern, bits) != (session.bayer, meant):
+        raise InputError(
+            f"{FILE}: bits is {session.bits or 'absent'} and bayer {session.bayer or 'absent'}, the camera delivers "
+            f"{bits} bits and {pattern or 'whole planes'}; write there what it delivers"
+        )
+
+
+def _grey(shot: AnyShot, beam: str) -> NDArray[Any]:
+    """Give what a chip saw of one step: its colours all show the same, and green stands for them."""
+    if beam == "infrared":
+        return shot.images["ir"]
+    if isinstance(shot, BayerShot):
+        green = stages.linear_light(shot)["green"] * shot.full_scale_value
+        return np.asarray(np.rint(green).clip(0, shot.full_scale_value), shot.raw.dtype)
+    return shot.green

@@ -1,0 +1,159 @@
+"""What a calibration session consists of: its settings, and every capture by name.
+
+A session is a folder with `session.json` and one folder for each capture, such as `levels/r050_g000_b000_ir000_e100`
+with red.png, green.png, blue.png and ir.png, as `quadfringe calibrate plan` lists them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from quadfringe.calibration.acceptance import SPHERE_DIAMETER_MM, STEP_HEIGHTS_MM
+from quadfringe.calibration.levels import LevelPlan, level_plan
+from quadfringe.calibration.projector import AXES, StepPlan
+from quadfringe.calibration.targets import Target, ring_board
+from quadfringe.config import BayerPattern, Fringes, Pixels
+from quadfringe.config._base import Finite, Positive
+from quadfringe.data import Stored
+from quadfringe.errors import InputError
+
+__all__ = ["BEAMS", "STEPS", "STEP_NAMES", "Session", "Step", "step_named"]
+
+BEAMS = ("visible", "infrared")
+FILE = "session.json"
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of a session: what it is for, what a person has to do, and whether a calibration needs it."""
+
+    name: str
+    title: str
+    how: str
+    needed: bool
+
+
+STEPS = (
+    Step(
+        "dark",
+        "dark level",
+        "Cover the lens and switch the projectors to black; take the shots one after another.",
+        True,
+    ),
+    Step(
+        "levels",
+        "responses and crosstalk",
+        "Put a white, matt board where you will measure, so that it fills the middle of the image. Show each channel "
+        "evenly lit at the level in the name (per cent of red, green, blue, infrared), with the exposure e of it.",
+        True,
+    ),
+    Step(
+        "flat",
+        "flat field",
+        "Leave the white board, turn the lens out of focus, and light all channels evenly to about half of full scale.",
+        False,
+    ),
+    Step(
+        "poses",
+        "camera, projectors and their poses",
+        "Put the calibration board into the light of both projectors. Keep it still while every fringe image of a pose "
+        "is taken: one projector shows it, the other is black. Tilt it to all four sides by 20 to 40 degrees, put it "
+        "nearer and farther, and into the corners of the image.",
+        True,
+    ),
+    Step(
+        "planes",
+        "height from phase",
+        "Put the white board on a stage, facing the camera, at the heights in the names (mm, towards the camera), and "
+        "take one shot with the measuring fringes at each.",
+        False,
+    ),
+    Step(
+        "acceptance",
+        "acceptance",
+        "Measure the plane, the sphere and the steps with the measuring fringes: plane_1, sphere_1, steps_1.",
+        False,
+    ),
+)
+
+STEP_NAMES = tuple(step.name for step in STEPS)
+
+
+def step_named(name: str) -> Step:
+    """Give a step; `InputError` that lists them all when there is none of that name."""
+    for step in STEPS:
+        if step.name == name:
+            return step
+    raise InputError(f"step: expected one of {', '.join(step.name for step in STEPS)}, got {name!r}")
+
+
+class Session(Stored):
+    """Settings of a session; what is absent is that of the published bench.
+
+    `rig` names the bench, and a session whose captures come from another one is refused. `distance_mm` is how far the
+    board of the first pose stood from the camera, roughly. `bits` are those in use in 16-bit files.
+    """
+
+    schema_version: Literal[1] = 1
+    rig: str
+    target: Target = Field(default_factory=ring_board)
+    fringes: Fringes = Fringes()
+    projector_size_px: tuple[Pixels, Pixels] = (912, 1140)
+    infrared: bool = True
+    bits: Literal[10, 12, 14, 16] | None = None
+    bayer: BayerPattern | None = None
+    dark_shots: Annotated[int, Field(ge=2, le=100)] = 4
+    level_steps: Annotated[int, Field(ge=4, le=32)] = 8
+    flat_shots: Annotated[int, Field(ge=4, le=100)] = 8
+    poses: Annotated[int, Field(ge=4, le=60)] = 12
+    phase_steps: Annotated[int, Field(ge=4, le=64)] = 8
+    distance_mm: Positive | None = None
+    heights_mm: tuple[Finite, ...] = (-60.0, -40.0, -20.0, 0.0, 20.0, 40.0, 60.0)
+    height_degree: Annotated[int, Field(ge=1, le=5)] = 3
+    sphere_diameter_mm: Positive = SPHERE_DIAMETER_MM
+    step_heights_mm: tuple[Positive, ...] = STEP_HEIGHTS_MM
+
+    @property
+    def level_plan(self) -> LevelPlan:
+        """The evenly lit captures."""
+        return level_plan(self.level_steps)
+
+    @property
+    def step_plan(self) -> StepPlan:
+        """The fringes of a pose."""
+        return StepPlan(self.fringes, self.phase_steps, self.projector_size_px)
+
+    @property
+    def beams(self) -> tuple[str, ...]:
+        """Projectors that are calibrated."""
+        return BEAMS if self.infrared else BEAMS[:1]
+
+    def captures(self, step: str) -> tuple[str, ...]:
+        """Give the names of the captures of a step, in the order in which they are taken; a pose counts as one."""
+        names = {
+            "dark": tuple(_numbered(self.dark_shots)),
+            "levels": self.level_plan.names,
+            "flat": tuple(_numbered(self.flat_shots)),
+            "poses": tuple(_numbered(self.poses)),
+            "planes": tuple(f"{height:+07.2f}" for height in self.heights_mm),
+            "acceptance": ("plane_1", "sphere_1", "steps_1"),
+        }
+        return names[step_named(step).name]
+
+    def pose_images(self) -> tuple[str, ...]:
+        """Give the names of the images of one pose, such as visible/columns_36_0."""
+        numbers = self.fringes.numbers
+        return tuple(
+            f"{beam}/{axis}_{number:g}_{step}"
+            for beam in self.beams
+            for axis in AXES
+            for number in numbers
+            for step in range(self.phase_steps)
+        )
+
+
+def _numbered(count: int) -> list[str]:
+    return [f"{i:02d}" for i in range(1, count + 1)]

@@ -1,0 +1,35 @@
+"""The records that flow and are saved: `Shot` or `BayerShot` in, `Calibration` with it, `Shape` out."""
+
+from quadfringe.data.calibration import (
+    Calibration,
+    CalibrationRecord,
+    CalibrationStep,
+    ResponseCalibration,
+    conditioning,
+)
+from quadfringe.data.optics import core_device, device_model
+from quadfringe.data.shape import Shape
+from quadfringe.data.shot import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp, Truth
+from quadfringe.data.shot_files import read_bayer_shot, read_folder, read_shot, write_shot
+
+__all__ = [
+    "AnyShot",
+    "BayerShot",
+    "Calibration",
+    "CalibrationRecord",
+    "CalibrationStep",
+    "ChipImage",
+    "FrameStamp",
+    "ResponseCalibration",
+    "Shape",
+    "Shot",
+    "Stamp",
+    "Truth",
+    "conditioning",
+    "core_device",
+    "device_model",
+    "read_bayer_shot",
+    "read_folder",
+    "read_shot",
+    "write_shot",
+]

@@ -1,0 +1,129 @@
+"""The images that projectors show."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe import _core
+from quadfringe.config import DeviceModel, Fringes, Row4
+from quadfringe.data.optics import core_device
+from quadfringe.errors import InputError
+
+if TYPE_CHECKING:
+    from quadfringe.data import Calibration
+
+__all__ = ["Levels", "Light", "Predeformation", "Step", "light_images", "predeformation", "projector_images"]
+
+
+@dataclass(frozen=True)
+class Levels:
+    """Even light: each channel (R, G, B, IR) at a level of its own from 0 to 1."""
+
+    levels: Row4
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an N-step capture: the same fringes in all channels of one projector, while the other is black.
+
+    Fringes count over "columns" or "rows"; the `beam` is "visible" or "infrared", the mirrors "regular" or "diamond".
+    """
+
+    number: float
+    shift_rad: float
+    axis: str
+    beam: str
+    layout: str = "regular"
+
+
+Light = Fringes | Levels | Step  # of a shot, or of a calibration
+
+
+@dataclass(frozen=True)
+class Predeformation:
+    """What makes up for an infrared projector that is not coaxial: both calibrated projectors and the plane (S11).
+
+    Exact on the plane at depth `z_mm`; where the centres of the projectors differ it drifts with depth.
+    """
+
+    visible: DeviceModel
+    infrared: DeviceModel
+    z_mm: float
+
+    def light(self, fringe_number: float, layout: str) -> NDArray[np.float32]:
+        """Give the infrared image, (H, W), linear light from 0 to 1; mirrors that miss the plane are dark."""
+        pair = (core_device(self.visible), core_device(self.infrared))
+        return _core.predeform(*pair, fringe_number, z_mm=self.z_mm, layout=layout)
+
+
+def predeformation(fringes: Fringes, calibration: Calibration | None) -> Predeformation | None:
+    """Give the pre-deformation that these fringes ask for; None when they ask for none.
+
+    Raises `InputError` when they do and the calibration does not know both projectors.
+    """
+    if fringes.predeformed_z_mm is None:
+        return None
+    if calibration is None or calibration.infrared is None:
+        raise InputError("predeformed_z_mm needs a calibration with both projectors: one that has an `infrared` device")
+    return Predeformation(calibration.projector, calibration.infrared, fringes.predeformed_z_mm)
+
+
+def projector_images(
+    fringes: tuple[float, float, float],
+    size_px: tuple[int, int],
+    layout: str,
+    deformed: Predeformation | None = None,
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Give the composite colour image (H, W, 3) and the infrared image (H, W), uint8; `size_px` is (W, H).
+
+    Raises ValueError when the joint range of the fringes does not cover the width, and when the projectors of a
+    pre-deformation have another size.
+    """
+    _core.check_code(fringes, size_px[0])
+    red, green, blue, ir = (
+        _core.pattern(channel, fringes, *size_px, layout=layout) for channel in ("R", "G", "B", "IR")
+    )
+    if deformed is not None:
+        for device in (deformed.visible, deformed.infrared):
+            if (device.width_px, device.height_px) != size_px:
+                raise InputError(
+                    f"the calibration is for projectors of {device.width_px} x {device.height_px} mirrors, "
+                    f"the images have {size_px[0]} x {size_px[1]}"
+                )
+        ir = deformed.light(fringes[2], layout)
+    return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
+
+
+def light_images(
+    light: Light, size_px: tuple[int, int], deformed: Predeformation | None = None
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Give the colour image (H, W, 3) and the infrared image (H, W), uint8, of any light; `size_px` is (W, H).
+
+    Raises ValueError as `projector_images`, and for levels that are not from 0 to 1.
+
+    >>> from quadfringe.devices.light import Levels, light_images
+    >>> visible, infrared = light_images(Levels((1.0, 0.0, 0.0, 0.5)), (912, 1140))
+    >>> visible[0, 0].tolist(), int(infrared[0, 0])
+    ([255, 0, 0], 128)
+    """
+    if isinstance(light, Fringes):
+        return projector_images(light.numbers, size_px, light.layout, deformed)
+    shape = size_px[::-1]
+    if isinstance(light, Levels):
+        if not all(0 <= level <= 1 for level in light.levels):
+            raise ValueError(f"levels: expected numbers from 0 to 1, got {light.levels}")
+        red, green, blue, ir = (np.full(shape, level, np.float32) for level in light.levels)
+        return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
+    shown = eight_bit(_core.step_pattern(light.number, light.shift_rad, *size_px, axis=light.axis, layout=light.layout))
+    black = np.zeros(shape, np.uint8)
+    visible, infrared = (shown if light.beam == beam else black for beam in ("visible", "infrared"))
+    return np.repeat(visible[:, :, None], 3, axis=2), infrared
+
+
+def eight_bit(light: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Give linear light from 0 to 1 as the levels that a projector takes."""
+    return np.round(light * 255).astype(np.uint8)

@@ -1,0 +1,182 @@
+"""A scene that moves, measured shot by shot: the raw recording, a PLY of every instant, and a movie."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import dataclass
+from importlib.util import find_spec
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import cv2
+import numpy as np
+
+from quadfringe.config import SceneConfig, SystemConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig, ReplayConfig, VirtualConfig
+from quadfringe.data import AnyShot, BayerShot, Shape, Truth
+from quadfringe.decoding.compare import Comparison, compare
+from quadfringe.devices.emulator import Emulator
+from quadfringe.files import folder_for
+from quadfringe.recording import Recorder
+from quadfringe.scanner import Scanner, open_system
+from quadfringe.view.colours import Picture, channels_picture, texture
+from quadfringe.view.movie import movie, solid_picture
+
+__all__ = ["Film", "film", "hand", "hand_system"]
+
+RATE_HZ = 10.0
+SHOTS = 30  # three seconds: the fingers close and open once
+PICTURE_PX = (640, 480)
+HAND_MIDDLE_MM = (0.0, 10.0, 760.0)
+
+
+@dataclass(frozen=True)
+class Film:
+    """What filming gave: files, and what was lost on the way; errors for shots whose truth is known."""
+
+    recording: Path
+    movie: Path
+    shots: int
+    shapes: int
+    lost: int
+    depth_rms_mm: tuple[float, ...]
+    wrong_order_percent: tuple[float, ...]
+
+
+def hand_system() -> SystemConfig:
+    """Give the virtual bench with the moving hand before a camera with a Bayer chip, lightly coloured, with noise."""
+    scene = SceneConfig(surface="hand", albedo=(0.92, 0.70, 0.58, 0.85), noise=0.01, seed=1, bayer="rggb")
+    return SystemConfig(capture=VirtualConfig(frame_rate_hz=RATE_HZ), scene=scene)
+
+
+def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> tuple[dict[str, float], Path]:
+    """Film the moving hand: `out`/hand.h5, `out`/hand/shot_000000.ply ..., `out`/hand.mp4.
+
+    The virtual bench renders the frames; two emulated chips send them over GigE Vision on the loopback interface, and
+    they are received, paired, recorded and decoded as those of a real camera are. Without the extra `aravis` they come
+    from a file, and `hand_over_gige_vision` is 0.
+    """
+    with TemporaryDirectory(prefix="quadfringe-") as name:
+        stage = _render(system or hand_system(), shots, Path(name))
+        with ExitStack() as stack:
+            scanner = _wired(stage, stack)
+            over_wire = scanner is not None
+            made = film(scanner or stack.enter_context(_replayed(stage)), out, "hand", shots, stage.truth_of)
+    figures = {
+        "hand_over_gige_vision": float(over_wire),
+        "hand_shots": float(made.shots),
+        "hand_shapes": float(made.shapes),
+        "hand_lost": float(made.lost),
+        "hand_shots_with_wrong_pixels": float(made.shapes - len(made.depth_rms_mm)),
+    }
+    if made.depth_rms_mm:
+        figures["hand_depth_rms_mm_median"] = float(np.median(made.depth_rms_mm))
+        figures["hand_wrong_order_percent_worst"] = max(made.wrong_order_percent)
+    return figures, made.movie
+
+
+@dataclass(frozen=True)
+class _Stage:
+    """Rendered frames, as the emulated chips read them and as a recording, and what is true of each."""
+
+    config: SystemConfig
+    frames: Path
+    take: Path
+    calibration: Path
+    truths: dict[int, Truth]
+
+    def truth_of(self, shot: AnyShot) -> Truth | None:
+        """Find the truth of a shot by its pixels: None when one of them came out otherwise than it was sent."""
+        return self.truths.get(_pixels(shot))
+
+
+def _pixels(shot: AnyShot) -> int:
+    return hash(tuple(image.tobytes() for image in shot.images.values()))
+
+
+def _render(config: SystemConfig, shots: int, folder: Path) -> _Stage:
+    stage = _Stage(config, folder / "frames.npz", folder / "take.h5", folder / "calibration.json", {})
+    visible, infrared = [], []
+    with open_system(config) as scanner:
+        scanner.projector.show(config.fringes)
+        with Recorder(stage.take, scanner.config, scanner.known_calibration) as recorder:
+            for shot in scanner.camera.stream(shots, keep="all"):
+                assert isinstance(shot, BayerShot), "the hand is seen by a Bayer chip"
+                assert shot.truth is not None, "the virtual bench knows the truth"
+                visible.append(shot.raw)
+                infrared.append(shot.ir)
+                stage.truths[_pixels(shot)] = shot.truth
+                recorder.write(shot)
+        scanner.calibration.save(stage.calibration)
+    np.savez(stage.frames, visible=np.stack(visible), infrared=np.stack(infrared))
+    return stage
+
+
+def _wired(stage: _Stage, stack: ExitStack) -> Scanner | None:
+    """Open a system whose camera is emulated on the loopback interface; None without the extra that it needs."""
+    if find_spec("gi") is None:
+        return None
+    emulator = stack.enter_context(Emulator(stage.frames))
+    visible, infrared = emulator.addresses
+    capture = AravisConfig(
+        visible=ChipConfig(device=visible, pixel_format="BayerRG8"),
+        infrared=ChipConfig(device=infrared, pixel_format="Mono8"),
+    )
+    config = stage.config.model_copy(update={"capture": capture, "calibration": stage.calibration})
+    return stack.enter_context(open_system(config))
+
+
+def _replayed(stage: _Stage) -> Scanner:
+    return open_system(stage.config.model_copy(update={"capture": ReplayConfig(file=stage.take, speed="full")}))
+
+
+def film(
+    scanner: Scanner, out: Path, name: str, shots: int, truth_of: Callable[[AnyShot], Truth | None] | None = None
+) -> Film:
+    """Measure `shots` with any system while recording them; an earlier film of this name is replaced.
+
+    Shots whose shape cannot be trusted have no PLY and no picture.
+    """
+    folder = folder_for(out / name)
+    for earlier in (*folder.glob("shot_*.ply"), out / f"{name}.h5"):
+        earlier.unlink(missing_ok=True)
+    found: list[Comparison] = []
+    shapes = 0
+    period_px = (
+        scanner.known_calibration.projector.width_px if scanner.known_calibration else 912
+    ) / scanner.config.fringes.numbers[0]
+    with (
+        Recorder(out / f"{name}.h5", scanner.config, scanner.known_calibration) as recorder,
+        movie(out / f"{name}.mp4", RATE_HZ) as pictures,
+        scanner.stream(shots, keep="all", taps={"record": recorder.write}) as stream,
+    ):
+        for measured in stream:
+            if measured.error is not None:
+                continue
+            shot, shape = measured.shot, measured.shape
+            shape.save(folder / f"shot_{shapes:06d}.ply")
+            pictures.add(_picture(shot, shape, shapes, shots))
+            if truth_of is not None and (truth := truth_of(shot)) is not None:
+                found.append(compare(shape, truth, period_px))
+            shapes += 1
+        counted = stream.statistics()
+    return Film(
+        out / f"{name}.h5",
+        out / f"{name}.mp4",
+        recorder.statistics().written,
+        shapes,
+        counted.camera.dropped + counted.camera.unpaired + sum(queue.dropped for queue in counted.queues.values()),
+        tuple(comparison.depth_rms_mm for comparison in found),
+        tuple(comparison.wrong_order_percent for comparison in found),
+    )
+
+
+def _picture(shot: AnyShot, shape: Shape, number: int, shots: int) -> Picture:
+    """Put what the camera saw beside the shape, seen from an eye that goes to and fro."""
+    swing = np.sin(2 * np.pi * number / max(shots, 1))
+    solid = solid_picture(
+        shape, texture(shot, shape), turn_deg=(25.0 * swing, -12.0), middle_mm=HAND_MIDDLE_MM, size_px=PICTURE_PX
+    )
+    seen = cv2.resize(channels_picture(shot, PICTURE_PX[0]), PICTURE_PX, interpolation=cv2.INTER_AREA)
+    return np.hstack([seen.astype(np.uint8), solid])

@@ -1,0 +1,224 @@
+"""A bench whose infrared projector does not stand where the visible one does, before a plane.
+
+A `Pair` is plain data: devices, mirrors, light. `expose` renders a shot of a plane, `decoded` gives what the decoder
+makes of it, without a verdict, `infrared_error_rad` what its infrared fringes really are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe import _core
+from quadfringe.calibration.pair import deviated
+from quadfringe.config import ChannelResponse, DecodeConfig, DeviceModel, Fringes, Matrix4, Response
+from quadfringe.data import Calibration, Shot, core_device, device_model
+from quadfringe.decoding import Plan, kernel_decoder
+from quadfringe.decoding.stages import carrier, fourier, linear_light
+from quadfringe.devices.light import eight_bit, predeformation
+
+__all__ = [
+    "FRINGES",
+    "PLANE_MM",
+    "Exposure",
+    "Pair",
+    "decoded",
+    "expose",
+    "ideal_pair",
+    "infrared_error_rad",
+    "real_pair",
+    "wrong_percent",
+]
+
+Map = NDArray[np.float32]
+Vector3 = tuple[float, float, float]
+Method = Literal["published", "best"]
+Unwrapping = Literal["coaxial", "pair"]
+
+FRINGES = Fringes()
+PLANE_MM = 800.0  # the reference plane
+DEVIATION_DEG, DEVIATION_MM = 1.0, 0.5  # on every axis
+SEED = 4
+
+# Lenses as they are bought: a tenth of a per cent to a per cent at the edges, another one in each device.
+CAMERA_LENS = (-0.12, 0.08, 2e-4, -3e-4, 0.0)
+VISIBLE_LENS = (-0.05, 0.03, 3e-4, -2e-4, 0.0)
+INFRARED_LENS = (-0.06, 0.04, -2e-4, 3e-4, 0.0)
+# What a real bench adds to the light: noise of 1 %, blur, 5 % crosstalk each way, response with an exponent of 1.8.
+LEAK, EXPONENT, DARK = 0.05, 1.8, 0.02
+CROSSTALK: Matrix4 = tuple(tuple(1.0 if i == j else LEAK for j in range(4)) for i in range(4))  # type: ignore[assignment]
+DEFECTS: dict[str, Any] = {
+    "noise": 0.01,
+    "blur_px": 0.7,
+    "crosstalk": CROSSTALK,
+    "gain": (0.85,) * 4,
+    "camera_exponent": (EXPONENT,) * 4,
+    "camera_offset": (DARK,) * 4,
+}
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Camera, visible and infrared projector, how their mirrors lie, and what the bench adds to the light."""
+
+    camera: DeviceModel
+    visible: DeviceModel
+    infrared: DeviceModel
+    layout: Literal["regular", "diamond"] = "regular"
+    light: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def single(self) -> Pair:
+        """The same bench with one projector for all four channels."""
+        return replace(self, infrared=self.visible)
+
+    @property
+    def bench(self) -> _core.Bench:
+        """The kernel's bench."""
+        camera, visible, infrared = (core_device(device) for device in (self.camera, self.visible, self.infrared))
+        return _core.Bench(camera=camera, visible=visible, infrared=infrared, layout=self.layout)
+
+    @property
+    def calibration(self) -> Calibration:
+        """What a perfect calibration of this bench would find."""
+        known: dict[str, Any] = {}
+        if self.light:
+            channel = ChannelResponse(offset=DARK, exponent=EXPONENT)
+            known["response"] = Response(red=channel, green=channel, blue=channel, ir=channel)
+            known["crosstalk"] = self.light["crosstalk"]
+        return Calibration(camera=self.camera, projector=self.visible, infrared=self.infrared, **known)
+
+
+def ideal_pair(
+    rotation_deg: Vector3, translation_mm: Vector3, shrink: int = 1, layout: Literal["regular", "diamond"] = "regular"
+) -> Pair:
+    """Give the published bench with a deviated infrared projector, perfect lenses and clean light.
+
+    The camera has 1/`shrink` of the pixels in each direction over the same field.
+    """
+    reference = _core.Bench(layout=layout)
+    visible = device_model(reference.visible)
+    camera = _shrunk(device_model(reference.camera), shrink)
+    return Pair(camera, visible, deviated(visible, rotation_deg, translation_mm), layout)
+
+
+def real_pair(
+    rotation_deg: Vector3 = (DEVIATION_DEG,) * 3,
+    translation_mm: Vector3 = (DEVIATION_MM,) * 3,
+    shrink: int = 1,
+    layout: Literal["regular", "diamond"] = "regular",
+) -> Pair:
+    """Give the same with lenses that distort and with all that a real bench adds to the light."""
+    pair = ideal_pair(rotation_deg, translation_mm, shrink, layout)
+    lenses = {"camera": CAMERA_LENS, "visible": VISIBLE_LENS, "infrared": INFRARED_LENS}
+    devices = {name: getattr(pair, name).model_copy(update={"distortion": lens}) for name, lens in lenses.items()}
+    return replace(pair, **devices, light=DEFECTS)
+
+
+def _shrunk(camera: DeviceModel, shrink: int) -> DeviceModel:
+    width, height = camera.width_px // shrink, camera.height_px // shrink
+    focal = tuple(f / shrink for f in camera.focal_px)
+    centre = ((width - 1) / 2, (height - 1) / 2)
+    size = {"width_px": width, "height_px": height, "focal_px": focal, "centre_px": centre}
+    return DeviceModel.model_validate(camera.model_dump() | size)
+
+
+@dataclass(frozen=True)
+class Exposure:
+    """A shot of a plane, and its truth: the exact phase in rad, (H, W), NaN where it is not judged.
+
+    What a projector does not light is not, nor the border of one infrared fringe beside it and beside the ends of the
+    rows, where the Fourier filter of the published method leaks, whatever the projectors do. `apart_rad` is how
+    far plain infrared fringes lie from the visible ones, stated for fringes of the first number.
+    """
+
+    shot: Shot
+    phase_rad: Map
+    apart_rad: Map
+    calibration: Calibration
+    fringes: Fringes
+
+
+def expose(pair: Pair, z_mm: float = PLANE_MM, known: Calibration | None = None, predeformed: bool = False) -> Exposure:
+    """Take a shot of the plane at depth `z_mm` that is to be decoded with what is `known` of the pair, or the truth.
+
+    The infrared image is plain, or pre-deformed for the reference plane by what is known, as the 8-bit image that a
+    projector takes.
+    """
+    known = known or pair.calibration
+    fringes = FRINGES.model_copy(update={"layout": pair.layout, "predeformed_z_mm": PLANE_MM if predeformed else None})
+    image = None
+    deformed = predeformation(fringes, known)
+    if deformed is not None:
+        image = eight_bit(deformed.light(fringes.numbers[2], pair.layout)).astype(np.float32) / np.float32(255)
+    bench = pair.bench
+    cast = bench.cast_plane(point_mm=(0.0, 0.0, z_mm), normal=(0.0, 0.0, -1.0))
+    images = bench.render(cast, fringes.numbers, infrared_image=image, seed=SEED, **pair.light)
+    per_px = np.float32(2 * np.pi * fringes.numbers[0] / pair.visible.width_px)
+    visible_rad, infrared_rad = (per_px * cast.column_px(infrared=infrared) for infrared in (False, True))
+    apart_rad = infrared_rad - visible_rad
+    truth_rad = np.where(_inside(visible_rad, apart_rad, fringes), visible_rad, np.float32(np.nan))
+    shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
+    return Exposure(shot, truth_rad, apart_rad, known, fringes)
+
+
+def _inside(visible_rad: Map, apart_rad: Map, fringes: Fringes) -> NDArray[np.bool_]:
+    """Tell which pixels have light of both projectors for an infrared fringe to either side, (H, W)."""
+    slope = abs(float(np.nanmedian(np.diff(visible_rad, axis=1))))
+    reach = int(np.ceil(2 * np.pi / slope * fringes.numbers[0] / fringes.numbers[2]))
+    lit = np.pad(np.isfinite(apart_rad), ((0, 0), (reach, reach)))
+    window = np.ones((1, 2 * reach + 1), np.uint8)
+    return np.asarray(cv2.erode(lit.astype(np.uint8), window)[:, reach:-reach], dtype=np.bool_)
+
+
+def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrapping = "coaxial") -> Map:
+    """Give the absolute phase in rad that the decoder finds, (H, W), wrong orders and all."""
+    plan = Plan(
+        projector_width_px=exposure.calibration.projector.width_px,
+        fringes=exposure.fringes,
+        calibration=exposure.calibration,
+        settings=DecodeConfig(method=method, unwrapping=unwrapping),
+    )
+    shot = exposure.shot
+    maps = kernel_decoder(shot, plan).decode(shot.red, shot.green, shot.blue, shot.ir)
+    return np.where(np.isfinite(exposure.phase_rad), maps["phase_rad"], np.float32(np.nan))
+
+
+def infrared_error_rad(exposure: Exposure, unwrapping: Unwrapping = "coaxial") -> Map:
+    """Give how far the infrared fringes are from what the unwrapping takes them for, (H, W).
+
+    The phase is that of the Fourier filter; its error is stated for fringes of the first number (36).
+    """
+    first, _, third = exposure.fringes.numbers
+    light = linear_light(exposure.shot, exposure.calibration)
+    period_px = carrier(light["red"])[0] * first / third
+    seen = fourier(light["ir"], period_px)
+    expected = exposure.phase_rad * np.float32(third / first)
+    if unwrapping == "pair":
+        expected = _table(exposure).infrared_rad(exposure.phase_rad)
+    error = seen - expected
+    error -= 2 * np.pi * np.round(error / (2 * np.pi))
+    return (error * np.float32(first / third)).astype(np.float32)
+
+
+def _table(exposure: Exposure) -> _core.PairTable:
+    known = exposure.calibration
+    assert known.infrared is not None
+    return _core.PairTable(
+        core_device(known.camera),
+        core_device(known.projector),
+        core_device(known.infrared),
+        exposure.fringes.numbers,
+        predeformed_z_mm=exposure.fringes.predeformed_z_mm,
+    )
+
+
+def wrong_percent(phase_rad: Map, truth_rad: Map) -> float:
+    """Give the share of pixels with a phase whose order is wrong, in per cent."""
+    known = np.isfinite(phase_rad) & np.isfinite(truth_rad)
+    wrong = np.abs(phase_rad[known] - truth_rad[known]) > np.pi
+    return 100.0 * float(wrong.mean()) if wrong.size else float("nan")

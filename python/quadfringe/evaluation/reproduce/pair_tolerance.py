@@ -1,0 +1,91 @@
+"""How far the infrared projector may stand from the visible one before the published unwrapping fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe import _core
+from quadfringe.calibration.pair import AXES
+from quadfringe.evaluation.reproduce.pair_bench import FRINGES, PLANE_MM, Pair, ideal_pair
+from quadfringe.view.report import Graph, draw_panels
+
+__all__ = ["orders_are_right", "pair_tolerance", "tolerances"]
+
+LIMITS = (5.0, 5.0, 5.0, 100.0, 100.0, 100.0)  # deg and mm: beyond them the infrared light leaves the field
+PRECISION = 1e-3  # of a tolerance, relative
+
+
+def pair_tolerance(out: Path, shrink: int = 4) -> tuple[dict[str, float], Path]:
+    """Find the largest deviation of each of the six parameters for which every order of a plane is still right.
+
+    Every `shrink`-th pixel of the camera is asked. Writes `out`/pair-tolerance.png: the share of wrong orders over each
+    deviation. Figures are by the names of
+    `quadfringe.calibration.pair.AXES`, deg and mm; one that stands at its limit in `LIMITS` does no harm at all.
+    """
+    found = tolerances(shrink)
+    factors = np.linspace(0.0, 3.0, 13)
+    graphs = []
+    for kind in ("deg", "mm"):
+        lines = {}
+        for axis, allowed in found.items():
+            if axis.endswith(kind):
+                deviations = factors * min(allowed, LIMITS[AXES.index(axis)] / 3)
+                wrong = np.array([_wrong_percent(_deviated(axis, d, shrink)) for d in deviations])
+                lines[f"{axis[:2]}: {allowed:.3g} {kind}"] = (np.maximum(deviations, deviations[1] / 10), wrong)
+        graphs.append(Graph(f"one parameter at a time, {kind}", f"deviation, {kind}", "wrong orders, %", lines))
+    draw_panels(out / "pair-tolerance.png", "allowable deviations of the infrared projector", [graphs])
+    return found, out / "pair-tolerance.png"
+
+
+def tolerances(shrink: int = 4) -> dict[str, float]:
+    """Give the largest allowable deviation of each parameter, of either sign, by bisection on exact phases."""
+    return {axis: min(_tolerance(axis, sign, shrink) for sign in (1.0, -1.0)) for axis in AXES}
+
+
+def _tolerance(axis: str, sign: float, shrink: int) -> float:
+    limit = LIMITS[AXES.index(axis)]
+    right, wrong = 0.0, limit / 2**10
+    while orders_are_right(_deviated(axis, sign * wrong, shrink)):
+        if wrong >= limit:
+            return limit
+        right, wrong = wrong, min(2 * wrong, limit)
+    while wrong - right > PRECISION * wrong:
+        middle = (right + wrong) / 2
+        if orders_are_right(_deviated(axis, sign * middle, shrink)):
+            right = middle
+        else:
+            wrong = middle
+    return right
+
+
+def _deviated(axis: str, deviation: float, shrink: int) -> Pair:
+    values = [0.0] * len(AXES)
+    values[AXES.index(axis)] = deviation
+    return ideal_pair((values[0], values[1], values[2]), (values[3], values[4], values[5]), shrink)
+
+
+def orders_are_right(pair: Pair, z_mm: float = PLANE_MM) -> bool:
+    """Tell whether the published unwrapping finds every order of a plane, from phases without any error."""
+    return not _misses(pair, z_mm).any()
+
+
+def _wrong_percent(pair: Pair) -> float:
+    return 100.0 * float(_misses(pair, PLANE_MM).mean())
+
+
+def _misses(pair: Pair, z_mm: float) -> NDArray[np.bool_]:
+    """Tell which of the pixels that both projectors light have a wrong order, (n,)."""
+    cast = pair.bench.cast_plane(point_mm=(0.0, 0.0, z_mm), normal=(0.0, 0.0, -1.0))
+    columns = [cast.column_px(), cast.column_px(), cast.column_px(infrared=True)]
+    width = pair.visible.width_px
+    phases = [
+        2 * np.pi * number / width * column.astype(np.float64)
+        for number, column in zip(FRINGES.numbers, columns, strict=True)
+    ]
+    wrapped = [np.angle(np.exp(1j * phase)).astype(np.float32) for phase in phases]
+    found, _ = _core.unwrap(wrapped[0], wrapped[1], wrapped[2], FRINGES.numbers, width)
+    lit = np.isfinite(phases[0]) & np.isfinite(phases[2])
+    return ~(np.abs(found[lit] - phases[0][lit]) < np.pi)

@@ -1,0 +1,37 @@
+"""A shot of the virtual bench as files: what a camera would have written, and the truth behind it."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from quadfringe.config import SystemConfig, checked, load_system
+from quadfringe.data import Truth
+from quadfringe.data.shot_files import write_shot
+from quadfringe.files import folder_for
+from quadfringe.io.export import write_npz
+from quadfringe.scanner import open_system
+
+__all__ = ["bench_config", "write_simulation"]
+
+
+def bench_config(system: Path | None, **scene: Any) -> SystemConfig:
+    """Give the config of a system file, or the bench as it comes, with scene settings replaced when not None."""
+    config = SystemConfig() if system is None else load_system(system)
+    given = {name: value for name, value in scene.items() if value is not None}
+    return checked(SystemConfig, config.model_dump() | {"scene": config.scene.model_dump() | given}, "scene")
+
+
+def write_simulation(folder: Path, config: SystemConfig) -> list[Path]:
+    """Write the images as `write_shot` does, calibration.json and truth.npz; returns their paths."""
+    with open_system(config) as scanner:
+        shot = scanner.grab()
+    paths = list(write_shot(folder_for(folder), shot).values())
+    scanner.calibration.save(folder / "calibration.json")
+    paths.append(folder / "calibration.json")
+    if shot.truth is not None:
+        maps = {f.name: getattr(shot.truth, f.name) for f in fields(Truth)}
+        write_npz(folder / "truth.npz", maps, {"config": scanner.config.model_dump_json(exclude_none=True)})
+        paths.append(folder / "truth.npz")
+    return paths

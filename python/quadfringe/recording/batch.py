@@ -1,0 +1,295 @@
+"""Many recordings on many cores or machines: every shot decoded once, into zarr and PLY.
+
+The work is handed to any executor of `concurrent.futures`; `executor_for` gives one of this machine or of a dask
+cluster. A shot is a task of its own, and its status is written last, so that a run that was killed goes on where it
+was and ends with the same files.
+
+    OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status; with the settings
+    OUT/take/shot_000000.ply ...
+    OUT/take/errors.json     by number of the shot, why it has no shape; only when there are such shots
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import pickle
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from quadfringe.config import SystemConfig
+from quadfringe.config.cameras import ReplayConfig
+from quadfringe.data import Shape
+from quadfringe.errors import BatchError, DecodeError, InputError, require
+from quadfringe.files import atomic, atomic_folder, folder_for
+from quadfringe.recording import Recording
+from quadfringe.recording._cores import usable_cores
+from quadfringe.scanner import Scanner, open_system
+
+__all__ = ["Job", "Outcome", "decode_recordings", "executor_for", "prepare", "run"]
+
+MAPS = ("phase_rad", "modulation", "quality")
+DONE, REFUSED = 1, 2
+RESTARTS = 3
+FORMAT = "quadfringe batch"
+
+
+@dataclass(frozen=True)
+class Job:
+    """One recording, where its results go, and the shots that are still to be decoded."""
+
+    recording: Path
+    out: Path
+    config: SystemConfig
+    ply: bool
+    shots: int
+    pending: tuple[int, ...]
+
+    @property
+    def store(self) -> Path:
+        """The zarr group."""
+        return self.out / f"{self.recording.stem}.zarr"
+
+    @property
+    def folder(self) -> Path:
+        """The folder of PLY files and errors."""
+        return self.out / self.recording.stem
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of a shot: the share of pixels returned, or why there is no shape."""
+
+    recording: Path
+    shot: int
+    returned_percent: float | None
+    error: str | None
+
+
+def prepare(
+    recordings: Sequence[Path], out: Path, system: SystemConfig | None = None, *, ply: bool = True
+) -> list[Job]:
+    """Look at every recording, make the empty results or find those of an earlier run; nothing is decoded yet.
+
+    Settings of `system` replace the recorded ones. Raises `InputError` for recordings that cannot be read, for two of
+    one name, for results of other settings in `out`, and for PLY files without a calibration.
+    """
+    require("zarr", "batch")
+    if ply:
+        require("trimesh", "batch")
+    stems = [recording.stem for recording in recordings]
+    if twice := sorted({stem for stem in stems if stems.count(stem) > 1}):
+        raise InputError(f"two recordings are named {', '.join(twice)}; give each an --out of its own")
+    folder_for(out)
+    return [_prepared(recording, out, system or SystemConfig(), ply) for recording in recordings]
+
+
+def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Job:
+    config = system.model_copy(update={"capture": ReplayConfig(file=recording.resolve(), speed="full")})
+    with Recording(recording) as take, _opened(config) as scanner:
+        if ply and scanner.known_calibration is None:
+            raise InputError(
+                f"{recording}: recorded without a calibration, so there are no points: name one, or no PLY"
+            )
+        job = Job(recording.resolve(), out.resolve(), config, ply, len(take), ())
+        status = _open_store(job, take, scanner)[:]
+    pending = tuple(int(shot) for shot in np.flatnonzero(status != DONE))
+    folder_for(job.folder)
+    return Job(job.recording, job.out, config, ply, job.shots, pending)
+
+
+def _opened(config: SystemConfig) -> Scanner:
+    """Open a recording as a system with one thread: as many processes as cores share the machine."""
+    scanner = open_system(config)
+    decode = scanner.config.decode.model_copy(update={"threads": 1})
+    scanner.config = scanner.config.model_copy(update={"decode": decode})
+    return scanner
+
+
+def _open_store(job: Job, take: Recording, scanner: Scanner) -> Any:
+    """Give the status array of a store, made new when there is none; raises when it belongs to something else."""
+    import zarr
+
+    attributes = {"format": FORMAT, "source": job.recording.name, "settings": _settings(scanner)}
+    if job.store.exists():
+        try:
+            group = zarr.open_group(job.store, mode="r")
+            found, shots = dict(group.attrs), group["status"].shape[0]
+        except (KeyError, ValueError, OSError) as error:
+            raise InputError(f"{job.store}: not the result of a batch: {error}; choose another --out") from error
+        if found != attributes or shots != job.shots:
+            raise InputError(f"{job.store}: made with other settings or from another recording; choose another --out")
+        _sweep(job)
+        return group["status"]
+    # Made beside its place: a store that is there is complete.
+    with atomic_folder(job.store) as temporary:
+        _fill(
+            zarr.open_group(temporary, mode="w", attributes=attributes),
+            take,
+            calibrated=scanner.known_calibration is not None,
+        )
+    return zarr.open_group(job.store, mode="r")["status"]
+
+
+def _sweep(job: Job) -> None:
+    """Remove what a killed worker was just writing."""
+    for leftover in (*job.store.rglob("*.partial"), *job.folder.glob(".shot_*")):
+        leftover.unlink(missing_ok=True)
+
+
+def _fill(group: Any, take: Recording, calibrated: bool) -> None:
+    from zarr.codecs import BloscCodec
+
+    packed = [BloscCodec(cname="lz4", clevel=1, shuffle="shuffle", typesize=4)]
+    size = (len(take), take.header.height_px, take.header.width_px)
+    nan, axes = float("nan"), ("shot", "y", "x")
+    for name in MAPS:
+        group.create_array(
+            name,
+            shape=size,
+            chunks=(1, *size[1:]),
+            dtype="f4",
+            fill_value=nan,
+            compressors=packed,
+            dimension_names=axes,
+        )
+    if calibrated:
+        group.create_array(
+            "xyz_mm",
+            shape=(*size, 3),
+            chunks=(1, *size[1:], 3),
+            dtype="f4",
+            fill_value=nan,
+            compressors=packed,
+            dimension_names=(*axes, "xyz"),
+        )
+    for name, numbers in (("id", take.ids), ("time_us", take.times_us)):
+        group.create_array(name, data=numbers, dimension_names=("shot",))
+    group.create_array("status", shape=(len(take),), chunks=(1,), dtype="u1", fill_value=0, dimension_names=("shot",))
+
+
+def _settings(scanner: Scanner) -> dict[str, Any]:
+    """Give what decides about the results, as plain data."""
+    config = scanner.config.model_dump(mode="json", exclude_none=True, exclude={"capture", "calibration"})
+    calibration = scanner.known_calibration
+    known = None if calibration is None else calibration.model_dump(mode="json", exclude_none=True)
+    settings: dict[str, Any] = json.loads(json.dumps({"config": config, "calibration": known}))
+    return settings
+
+
+def decode_recordings(
+    recordings: Sequence[Path],
+    out: Path,
+    system: SystemConfig | None = None,
+    *,
+    ply: bool = True,
+    workers: int | None = None,
+    scheduler: str | None = None,
+) -> Iterator[Outcome]:
+    """Decode all shots that are not decoded yet; outcomes come as they are ready, some twice if a process died.
+
+    Raises `InputError` as `prepare` and `executor_for` do, `BatchError` when worker processes die again and again.
+    """
+    for _ in range(RESTARTS):
+        jobs = prepare(recordings, out, system, ply=ply)
+        try:
+            with executor_for(workers, scheduler) as executor:
+                yield from run(jobs, executor)
+            return
+        except BrokenProcessPool:
+            continue  # what was done stays done
+    raise BatchError(f"worker processes died {RESTARTS} times; is there enough memory for --workers?")
+
+
+def run(jobs: Sequence[Job], executor: Executor) -> Iterator[Outcome]:
+    """Decode every pending shot with an executor. Errors are kept in errors.json at the end."""
+    errors: dict[Path, dict[int, str]] = {job.folder: {} for job in jobs}
+    futures: list[Future[Outcome]] = [executor.submit(decode_shot, job, shot) for job in jobs for shot in job.pending]
+    folders = {job.recording: job.folder for job in jobs}
+    try:
+        for future in as_completed(futures):
+            outcome = future.result()
+            if outcome.error is not None:
+                errors[folders[outcome.recording]][outcome.shot] = outcome.error
+            yield outcome
+    finally:
+        for future in futures:
+            future.cancel()
+    for folder, found in errors.items():
+        _write_errors(folder / "errors.json", found)
+
+
+def _write_errors(path: Path, errors: dict[int, str]) -> None:
+    path.unlink(missing_ok=True)
+    if errors:
+        with atomic(path) as temporary:
+            temporary.write_text(json.dumps({str(shot): errors[shot] for shot in sorted(errors)}, indent=2) + "\n")
+
+
+_ONE_AT_A_TIME = Lock()  # a worker of a cluster may have threads; a decoder has not
+
+
+def decode_shot(job: Job, shot: int) -> Outcome:
+    """Decode one shot of a recording and write its results; the status last."""
+    import zarr
+
+    with _ONE_AT_A_TIME:
+        take, scanner = _reader(job)
+        group = zarr.open_group(job.store, mode="r+")
+        try:
+            shape = scanner.decode(take[shot])
+        except (DecodeError, InputError) as error:
+            group["status"][shot] = REFUSED
+            return Outcome(job.recording, shot, None, str(error))
+        _save(job, shot, shape, group)
+        group["status"][shot] = DONE
+        return Outcome(job.recording, shot, 100.0 * float(shape.returned.mean()), None)
+
+
+def _reader(job: Job) -> tuple[Recording, Scanner]:
+    """Give the recording and its decoder, planned once for each process."""
+    return _planned(job.recording, pickle.dumps(job.config))
+
+
+@lru_cache(maxsize=2)
+def _planned(recording: Path, config: bytes) -> tuple[Recording, Scanner]:
+    return Recording(recording), _opened(pickle.loads(config))
+
+
+def _save(job: Job, shot: int, shape: Shape, group: Any) -> None:
+    for name in MAPS:
+        group[name][shot] = getattr(shape, name)
+    if shape.xyz_mm is not None:
+        group["xyz_mm"][shot] = shape.xyz_mm
+        if job.ply:
+            shape.save(job.folder / f"shot_{shot:06d}.ply")
+
+
+@contextmanager
+def executor_for(workers: int | None = None, scheduler: str | None = None) -> Iterator[Executor]:
+    """Give processes of this machine, as many as cores by default, or the workers of a dask scheduler.
+
+    Workers of a cluster must see recordings and results under the same paths, and have quadfringe installed.
+    Raises `InputError` when no scheduler answers at the address.
+    """
+    if scheduler is None:
+        # Spawned, because a process with threads of the kernel and of HDF5 must not be forked.
+        with ProcessPoolExecutor(workers or usable_cores(), mp_context=multiprocessing.get_context("spawn")) as pool:
+            yield pool
+        return
+    distributed = require("distributed", "batch")
+    try:
+        client = distributed.Client(scheduler, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise InputError(f"no dask scheduler at {scheduler}: {error}") from error
+    with client, client.get_executor(retries=RESTARTS, pure=False) as cluster:
+        yield cluster

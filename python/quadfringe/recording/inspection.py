@@ -1,0 +1,96 @@
+"""What a file holds, in lines for a reader."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.config import load_system
+from quadfringe.data import Calibration, ResponseCalibration
+from quadfringe.errors import ConfigError, InputError
+from quadfringe.files import read_bytes
+from quadfringe.io.export import read_npy, read_npz
+from quadfringe.io.images import read_image
+from quadfringe.recording import Recording
+
+__all__ = ["lines_about"]
+
+IMAGES = (".png", ".tif", ".tiff", ".bmp")
+
+
+def lines_about(path: Path) -> list[str]:
+    """Describe a shape, calibration, response, system file, recording, array or image; else raises `InputError`."""
+    suffix = path.suffix.lower()
+    if suffix == ".npz":
+        return _arrays(read_npz(path))
+    if suffix == ".npy":
+        return _arrays({"array": read_npy(path)})
+    if suffix == ".json":
+        return _calibration(path)
+    if suffix == ".toml":
+        return load_system(path).model_dump_json(indent=2, exclude_none=True).splitlines()
+    if suffix in IMAGES:
+        return _arrays({"image": read_image(path)})
+    if suffix == ".ply":
+        return _ply_header(path)
+    if suffix == ".h5":
+        return _recording(path)
+    raise InputError(f"{path}: expected .npz, .npy, .json, .toml, .ply, .h5 or {', '.join(IMAGES)}")
+
+
+def _arrays(stored: dict[str, NDArray[Any]]) -> list[str]:
+    return [_array(name, array) for name, array in stored.items()]
+
+
+def _array(name: str, array: NDArray[Any]) -> str:
+    if array.dtype.kind == "U":
+        return f"{name}: {array}"
+    size = f"{name}: {array.dtype.name} {array.shape}"
+    if array.dtype.kind not in "fui" or not array.size:
+        return size
+    finite = np.isfinite(array)
+    if not finite.any():
+        return f"{size}, no data"
+    values = array[finite]
+    return f"{size}, {values.min():.6g} to {values.max():.6g}, {100 * finite.mean():.1f} % data"
+
+
+def _calibration(path: Path) -> list[str]:
+    try:
+        keys = set(json.loads(read_bytes(path)))
+    except (ValueError, TypeError) as error:
+        raise ConfigError(f"{path}: not valid JSON: {error}") from error
+    known_by = Calibration if {"camera", "projector"} & keys else ResponseCalibration
+    loaded = known_by.load(path)
+    return [
+        type(loaded).__name__,
+        *loaded.model_dump_json(indent=2, exclude_none=True).splitlines(),
+    ]
+
+
+def _recording(path: Path) -> list[str]:
+    with Recording(path) as take:
+        times_us = take.times_us
+        lines = [f"Recording: {len(take)} shots of {take.header.described()}"]
+        if len(take):
+            lost = int(take.ids[-1] - take.ids[0]) + 1 - len(take)
+            begin = datetime.fromtimestamp(times_us[0] / 1e6, UTC).isoformat(timespec="milliseconds")
+            lines.append(f"begin: {begin}, {(times_us[-1] - times_us[0]) / 1e6:.3f} s, {lost} exposures missing")
+        if not take.closed_in_order:
+            lines.append("not closed in order: still being written, or its writer was killed (quadfringe recover)")
+        for name, model in (("calibration", take.calibration), ("config", take.config)):
+            known = None if model is None else model.model_dump_json(indent=2, exclude_none=True)
+            lines += [f"{name}:", *("none" if known is None else known).splitlines()]
+    return lines
+
+
+def _ply_header(path: Path) -> list[str]:
+    header, end, _ = read_bytes(path).partition(b"end_header\n")
+    if not header.startswith(b"ply") or not end:
+        raise InputError(f"{path}: not a PLY file")
+    return header.decode("ascii", "replace").splitlines()

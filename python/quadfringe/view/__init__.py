@@ -1,0 +1,1 @@
+"""Pictures, reports, movies and the live page."""
