@@ -75,7 +75,7 @@ def measure(
     system: SystemFile = None,
 ) -> None:
     """Take one shot with a system and save its shape."""
-    from quadfringe.data import SUFFIXES
+    from quadfringe.data.shape import SUFFIXES
     from quadfringe.files import require_suffix
     from quadfringe.scanner import open_system
 

@@ -76,7 +76,8 @@ def decode(
 ) -> None:
     """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
     from quadfringe.config import DecodeConfig, Fringes, checked
-    from quadfringe.data import SUFFIXES, AnyShot, Calibration
+    from quadfringe.data import AnyShot, Calibration
+    from quadfringe.data.shape import SUFFIXES
     from quadfringe.data.shot_files import read_bayer_shot, read_shot
     from quadfringe.decoding import Plan
     from quadfringe.decoding import decode as decode_shot

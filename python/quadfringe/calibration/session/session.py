@@ -17,7 +17,7 @@ from quadfringe.calibration.projector import AXES, StepPlan
 from quadfringe.calibration.targets import Target, ring_board
 from quadfringe.config import BayerPattern, Fringes, Pixels
 from quadfringe.config._base import Finite, Positive
-from quadfringe.data import Stored
+from quadfringe.data.calibration import Stored
 from quadfringe.errors import InputError
 
 __all__ = ["BEAMS", "STEPS", "STEP_NAMES", "Session", "Step", "step_named"]
