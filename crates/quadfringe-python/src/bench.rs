@@ -8,7 +8,7 @@ use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::BayerPattern;
-use quadfringe::fringe::{Channel, FringeCode};
+use quadfringe::encoding::{Channel, FringeCode};
 use quadfringe::optics::Pose;
 use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, Print, RenderOptions};
 use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};

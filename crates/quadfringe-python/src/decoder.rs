@@ -232,15 +232,16 @@ fn response_of((offset, exponent, knee): (f32, f32, f32)) -> Response {
 fn name_of(method: Method) -> &'static str {
     match method {
         Method::Published => "published",
-        Method::Best => "best",
+        Method::Joint => "joint",
     }
 }
 
 fn method_named(name: &str) -> PyResult<Method> {
     match name {
         "published" => Ok(Method::Published),
-        "best" => Ok(Method::Best),
-        _ => Err(unknown("method", name, "published or best")),
+        // Files and settings written before the method had this name say "best".
+        "joint" | "best" => Ok(Method::Joint),
+        _ => Err(unknown("method", name, "published or joint")),
     }
 }
 

@@ -4,7 +4,7 @@ use crate::arrays::value_error;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use quadfringe::fringe::{Axis, Channel, DmdLayout, FringeCode};
+use quadfringe::encoding::{Axis, Channel, DmdLayout, FringeCode};
 use quadfringe::optics;
 
 /// A camera or a projector.
@@ -115,7 +115,7 @@ pub fn pattern<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let code = FringeCode::new(fringe_numbers, width).map_err(value_error)?;
     let (channel, layout) = (channel_named(channel)?, layout_named(layout)?);
-    let image = py.detach(|| quadfringe::fringe::pattern(&code, channel, height, layout));
+    let image = py.detach(|| quadfringe::encoding::pattern(&code, channel, height, layout));
     Ok(image.into_pyarray(py))
 }
 
@@ -133,7 +133,8 @@ pub fn step_pattern<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (axis, layout) = (axis_named(axis)?, layout_named(layout)?);
     let size = [width, height];
-    let image = py.detach(|| quadfringe::fringe::step_pattern(fringe_number, shift_rad, axis, size, layout));
+    let image =
+        py.detach(|| quadfringe::encoding::step_pattern(fringe_number, shift_rad, axis, size, layout));
     Ok(image.map_err(value_error)?.into_pyarray(py))
 }
 

@@ -8,7 +8,7 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::{self, ResponseEstimate, Sample};
-use quadfringe::demod::{self, Background, Band};
+use quadfringe::stages::{self, Background, Band};
 use quadfringe::{BayerPattern, Conditioner, FringeCode, Shot};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
@@ -100,7 +100,7 @@ pub fn background<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let (view, kind) = (image.as_array(), background_named(kind)?);
-    let found = py.detach(|| demod::background(view, kind, period_px)).map_err(value_error)?;
+    let found = py.detach(|| stages::background(view, kind, period_px)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -109,7 +109,7 @@ pub fn background<'py>(
 pub fn carrier(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
     let image = map("image", image)?;
     let view = image.as_array();
-    let found = py.detach(|| demod::carrier(view));
+    let found = py.detach(|| stages::carrier(view));
     Ok((found.row_px, found.column_px))
 }
 
@@ -122,7 +122,7 @@ pub fn two_step<'py>(
 ) -> PyResult<Map<'py>> {
     let (red, blue) = (map("red", red)?, map("blue", blue)?);
     let views = (red.as_array(), blue.as_array());
-    let found = py.detach(|| demod::two_step(views.0, views.1)).map_err(value_error)?;
+    let found = py.detach(|| stages::two_step(views.0, views.1)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -138,7 +138,7 @@ pub fn fourier<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let (view, band, kind) = (image.as_array(), band_named(band)?, background_named(kind)?);
-    let found = py.detach(|| demod::fourier(view, band, kind, period_px)).map_err(value_error)?;
+    let found = py.detach(|| stages::fourier(view, band, kind, period_px)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -155,7 +155,7 @@ pub fn unwrap<'py>(
     let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
     let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
     let views = maps.each_ref().map(PyReadonlyArray2::as_array);
-    let found = py.detach(|| quadfringe::unwrap::unwrap(&code, views)).map_err(value_error)?;
+    let found = py.detach(|| stages::unwrap(&code, views)).map_err(value_error)?;
     Ok((found.0.into_pyarray(py), found.1.into_pyarray(py)))
 }
 
@@ -164,7 +164,7 @@ pub fn unwrap<'py>(
 pub fn n_step<'py>(py: Python<'py>, stack: &Bound<'py, PyAny>) -> PyResult<(Map<'py>, Map<'py>, Map<'py>)> {
     let stack = expected::<f32, 3>("stack", stack)?;
     let view = stack.as_array();
-    let found = py.detach(|| demod::n_step(view)).map_err(value_error)?;
+    let found = py.detach(|| stages::n_step(view)).map_err(value_error)?;
     let maps = [found.phase_rad, found.background, found.modulation];
     let [phase, background, modulation] = maps.map(|map| map.into_pyarray(py));
     Ok((phase, background, modulation))

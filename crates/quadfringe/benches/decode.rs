@@ -11,11 +11,11 @@
 use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use quadfringe::condition::linearise;
-use quadfringe::demod::{self, Background, Band};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
+use quadfringe::stages::{self, Background, Band};
 use quadfringe::{
-    BayerPattern, Conditioner, Decoded, Decoder, FringeCode, Method, Options, Result, Shot, surface, unwrap,
+    BayerPattern, Conditioner, Decoded, Decoder, FringeCode, Method, Options, Result, Shot, surface,
 };
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
@@ -135,7 +135,7 @@ fn ratios(_: &mut Criterion) {
     let floor = Floor::new(scene.shape()[1]);
     let mut out = Decoded::new(scene.shape(), true);
     let pools = [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
-    for method in [Method::Published, Method::Best] {
+    for method in [Method::Published, Method::Joint] {
         let mut decoder = scene.decoder(method).expect("the reference bench is calibrated");
         let mut least = [[f64::INFINITY; 2]; 2];
         for _ in 0..TURNS {
@@ -171,7 +171,7 @@ fn whole_shots(c: &mut Criterion) {
     let scene = Scene::new().expect("the reference bench renders");
     let mut group = c.benchmark_group("shot");
     group.sample_size(30);
-    for (name, method) in [("published", Method::Published), ("best", Method::Best)] {
+    for (name, method) in [("published", Method::Published), ("joint", Method::Joint)] {
         let mut decoder = scene.decoder(method).expect("the reference bench is calibrated");
         let shot = scene.shot().expect("four images of one size");
         let mut out = decoder.decode(&shot).expect("a shot of the decoder's size");
@@ -198,17 +198,17 @@ fn stages(c: &mut Criterion) {
     };
     let registered = || linearise(black_box(&shot), &turned);
     group.bench_function("conditioning with registration", |b| b.iter(registered));
-    group.bench_function("carrier", |b| b.iter(|| demod::carrier(black_box(red.view()))));
+    group.bench_function("carrier", |b| b.iter(|| stages::carrier(black_box(red.view()))));
     for (name, kind) in [("mean envelope", Background::MeanEnvelope), ("moving mean", Background::MovingMean)]
     {
-        group.bench_function(name, |b| b.iter(|| demod::background(black_box(red.view()), kind, PERIOD_PX)));
+        group.bench_function(name, |b| b.iter(|| stages::background(black_box(red.view()), kind, PERIOD_PX)));
     }
-    group.bench_function("two-step", |b| b.iter(|| demod::two_step(black_box(red.view()), blue.view())));
-    let improved = |image| demod::fourier(image, Band::Improved, Background::MeanEnvelope, PERIOD_PX);
+    group.bench_function("two-step", |b| b.iter(|| stages::two_step(black_box(red.view()), blue.view())));
+    let improved = |image| stages::fourier(image, Band::Improved, Background::MeanEnvelope, PERIOD_PX);
     group.bench_function("improved Fourier", |b| b.iter(|| improved(black_box(green.view()))));
     let wrapped = [&red, &green, &infrared].map(|light| improved(light.view()).expect("a fair period"));
     let maps = wrapped.each_ref().map(|map| map.view());
-    group.bench_function("ladder", |b| b.iter(|| unwrap::unwrap(&scene.code, black_box(maps))));
+    group.bench_function("ladder", |b| b.iter(|| stages::unwrap(&scene.code, black_box(maps))));
     let triangulator = scene.triangulator().expect("the reference bench is calibrated");
     let columns = Array2::from_shape_fn(scene.shape(), |(_, x)| 100.0 + 0.7 * x as f32);
     group.bench_function("triangulation", |b| b.iter(|| triangulator.xyz_mm(black_box(columns.view()))));

@@ -128,7 +128,7 @@ impl Contenders {
             let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
             Ok((plain.triangulate_with(triangulator)?, Decoded::new([rows, columns], true)))
         };
-        let methods = [decoder(Method::Published)?, decoder(Method::Best)?];
+        let methods = [decoder(Method::Published)?, decoder(Method::Joint)?];
         Ok(Self { floor: Floor::new(rows, columns), planes, methods })
     }
 

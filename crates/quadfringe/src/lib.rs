@@ -14,18 +14,19 @@
 //! | | |
 //! |---|---|
 //! | [`error`] | what can be wrong with an input |
-//! | [`fringe`] | what is projected: numbers, shifts, channels, ideal images |
+//! | [`encoding`] | what is projected: numbers, shifts, channels, ideal images |
 //! | [`optics`] | the pinhole device, of which a projector is an inverse one, and the Bayer chip |
 //! | [`surface`] | forward: what is measured, as implicit surfaces |
 //! | [`rig`] | forward: the virtual bench, from a surface to a shot |
 //! | [`condition`] | inverse: raw shot to linear light |
-//! | [`demod`] | inverse: linear light to wrapped phase |
-//! | [`unwrap`] | inverse: wrapped phases to absolute phase |
+//! | [`stages`] | inverse: the stages of the published method, each by itself: linear light to wrapped and absolute phase |
 //! | [`height`] | inverse: absolute phase to mm |
-//! | [`decode`] | the recipe: one shot through all of the inverse half |
+//! | `published` | inverse: the published method, strip by strip |
+//! | `joint` | inverse: the default method, which fits all four channels together |
+//! | [`decode`] | one shot through all of the inverse half, by either method |
 //!
-//! The forward half (surface, rig) and the inverse half (condition, demod, unwrap, height, decode) never import each
-//! other: they meet in tests, where `inverse(forward(h))` gives h back.
+//! The forward half (surface, rig) and the inverse half (condition to decode) never import each other: they meet in
+//! tests, where `inverse(forward(h))` gives h back. The two methods never import each other either.
 //!
 //! # A shot, there and back
 //! ```
@@ -50,10 +51,9 @@
 // Common ground. Comments keep the order: rustfmt sorts neighbours.
 pub mod error;
 
-mod angle;
-mod slots;
+mod parallel;
 
-pub mod fringe;
+pub mod encoding;
 
 pub mod optics;
 
@@ -65,18 +65,20 @@ pub mod rig;
 // Inverse.
 pub mod condition;
 
-pub mod demod;
-
-pub mod unwrap;
+pub mod stages;
 
 pub mod height;
+
+mod published;
+
+mod joint;
 
 pub mod decode;
 
 pub use condition::{Conditioner, Response, Shot};
 pub use decode::{Decoded, Decoder, Method, Options, aligned_zeros};
+pub use encoding::{Channel, DmdLayout, FringeCode};
 pub use error::{Error, Result};
-pub use fringe::{Channel, DmdLayout, FringeCode};
 pub use optics::{BayerPattern, Device};
 
 /// The Rust of the README is run too.

@@ -6,8 +6,7 @@ use common::{bench, cast_scene, code, decode_planes, noisy};
 use ndarray::{Array2, Array3};
 use quadfringe::rig::{Light, Planes};
 use quadfringe::{
-    Conditioner, Decoded, Decoder, Device, FringeCode, Method, Options, Response, Shot, condition, demod,
-    unwrap,
+    Conditioner, Decoded, Decoder, Device, FringeCode, Method, Options, Response, Shot, condition, stages,
 };
 
 type Four = [Array2<u8>; 4];
@@ -57,7 +56,7 @@ fn sizes_are_named() {
     let mixed = Shot::new([whole.view(), odd.view(), whole.view(), whole.view()]);
     assert_says(mixed, &["G image", "[384, 512]", "[384, 511]"]);
     let small = Shot::new([odd.view(), odd.view(), odd.view(), odd.view()]).expect("one size");
-    let result = decoder(Method::Best).decode(&small);
+    let result = decoder(Method::Joint).decode(&small);
     assert_says(result, &["shot", "[384, 512]", "[384, 511]"]);
     let empty = image(0, 8);
     let none = Shot::new([empty.view(), empty.view(), empty.view(), empty.view()]);
@@ -110,9 +109,9 @@ fn plans_out_of_range_are_refused() {
 #[test]
 fn stages_refuse_maps_that_do_not_fit() {
     let (a, b) = (Array2::<f32>::zeros((4, 8)), Array2::<f32>::zeros((4, 9)));
-    assert!(demod::two_step(a.view(), b.view()).is_err());
-    assert!(unwrap::unwrap(&code(), [a.view(), a.view(), b.view()]).is_err());
-    assert!(demod::n_step(Array3::<f32>::zeros((2, 4, 8)).view()).is_err());
+    assert!(stages::two_step(a.view(), b.view()).is_err());
+    assert!(stages::unwrap(&code(), [a.view(), a.view(), b.view()]).is_err());
+    assert!(stages::n_step(Array3::<f32>::zeros((2, 4, 8)).view()).is_err());
     let black = Array3::<f32>::zeros((12, 32, 32));
     assert!(condition::estimate_response(&[black.view()]).is_err());
     assert!(Device::pinhole(0, 8, [10.0; 2], [4.0; 2]).is_err());
@@ -124,7 +123,7 @@ fn a_blind_channel_is_no_data() {
         for level in [0, 255] {
             let mut images = shot_of_steps();
             images[channel].fill(level);
-            let found = returned(&decode(Method::Best, images));
+            let found = returned(&decode(Method::Joint, images));
             assert!(found < 0.01, "channel {channel} at {level}: {found}");
         }
     }
@@ -134,7 +133,7 @@ fn a_blind_channel_is_no_data() {
 fn four_equal_images_are_no_data() {
     let [red, ..] = shot_of_steps();
     let images = [red.clone(), red.clone(), red.clone(), red];
-    let found = returned(&decode(Method::Best, images));
+    let found = returned(&decode(Method::Joint, images));
     assert!(found < 0.01, "{found}");
 }
 
@@ -146,12 +145,12 @@ fn exchanged_channels_leave_little_or_no_trust() {
         known.sort_by(f32::total_cmp);
         known.get(known.len() / 2).copied().unwrap_or(0.0)
     };
-    let sound = decode(Method::Best, shot_of_steps());
+    let sound = decode(Method::Joint, shot_of_steps());
     assert!(returned(&sound) > 0.8, "{}", returned(&sound));
     for (first, second) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
         let mut images = shot_of_steps();
         images.swap(first, second);
-        let decoded = decode(Method::Best, images);
+        let decoded = decode(Method::Joint, images);
         let (trust, least) = (median(&decoded), median(&sound));
         println!("{first}{second}: median quality {trust}, sound {least}, returned {}", returned(&decoded));
         assert!(trust < 0.6 * least, "{first} for {second}: {trust} {least}");
@@ -164,7 +163,7 @@ fn saturated_parts_are_no_data_and_the_rest_stays() {
     for image in &mut images {
         image.slice_mut(ndarray::s![100..200, 100..300]).fill(255);
     }
-    let decoded = decode(Method::Best, images);
+    let decoded = decode(Method::Joint, images);
     let inside = decoded.phase_rad.slice(ndarray::s![100..200, 100..300]);
     assert!(inside.iter().all(|p| p.is_nan()));
     assert!(returned(&decoded) > 0.7, "{}", returned(&decoded));

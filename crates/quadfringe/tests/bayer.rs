@@ -50,7 +50,7 @@ fn three_ways(bench: &Bench, cast: &Cast, plain: &RenderOptions, method: Method)
 fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
     let bench = bench(1);
     let cast = cast_scene(&bench, "peaks");
-    for (method, times_better) in [(Method::Published, 4.0), (Method::Best, 1.05)] {
+    for (method, times_better) in [(Method::Published, 4.0), (Method::Joint, 1.05)] {
         let [full, raw, bilinear] = three_ways(&bench, &cast, &clean(), method);
         println!("{method:?}\n{full:?}\n{raw:?}\n{bilinear:?}");
         assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
@@ -65,7 +65,7 @@ fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
 fn a_mosaic_loses_no_orders_at_edges() {
     let bench = bench(1);
     let cast = cast_scene(&bench, "steps");
-    let [full, raw, _] = three_ways(&bench, &cast, &clean(), Method::Best);
+    let [full, raw, _] = three_ways(&bench, &cast, &clean(), Method::Joint);
     println!("{full:?}\n{raw:?}");
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
@@ -79,7 +79,7 @@ fn a_noisy_mosaic_leaves_a_tenth_of_a_millimetre() {
     let bench = bench(1);
     for (seed, name) in (21..).zip(["steps", "face"]) {
         let cast = cast_scene(&bench, name);
-        let raw = found(&bench, &cast, &mosaic(&noisy(seed)), Method::Best);
+        let raw = found(&bench, &cast, &mosaic(&noisy(seed)), Method::Joint);
         println!("{name}: {raw:?}");
         assert!(raw.depth_rms_mm < 0.10, "{name}: {raw:?}");
         assert!(raw.wrong_share() <= 1e-3, "{name}: {raw:?}");
@@ -110,7 +110,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         ir_registration: MISALIGNED,
         ..Conditioner::default()
     };
-    for method in [Method::Published, Method::Best] {
+    for method in [Method::Published, Method::Joint] {
         let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), method);
         let undone = there_and_back_by(&apart, &cast_apart, &code(), &flawed, method, &conditioner);
         let rms = [&plain, &undone].map(|decoded| inner_phase_rms_rad(decoded, &cast));
@@ -131,9 +131,9 @@ fn registration_costs_neither_phase_nor_orders() {
     let conditioner = Conditioner { ir_registration: MISALIGNED, ..Conditioner::default() };
     let cases = [
         ("peaks", clean(), Method::Published),
-        ("peaks", clean(), Method::Best),
-        ("steps", clean(), Method::Best),
-        ("steps", noisy(5), Method::Best),
+        ("peaks", clean(), Method::Joint),
+        ("steps", clean(), Method::Joint),
+        ("steps", noisy(5), Method::Joint),
     ];
     for (name, render, method) in cases {
         let [cast, cast_apart] = [&bench, &apart].map(|bench| cast_scene(bench, name));

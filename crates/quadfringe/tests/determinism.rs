@@ -31,7 +31,7 @@ fn printed() -> RenderOptions {
 #[test]
 fn threads_change_no_bit() {
     let bench = bench(2);
-    let cases = [(Method::Best, noisy(5)), (Method::Best, printed()), (Method::Published, noisy(5))];
+    let cases = [(Method::Joint, noisy(5)), (Method::Joint, printed()), (Method::Published, noisy(5))];
     for (method, options) in cases {
         let run = |threads: usize| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
@@ -55,7 +55,7 @@ fn a_shot_leaves_nothing_behind() {
         let planes = bench.render(&cast, &Light::shot(&code()), &options);
         planes.expect("a valid scene")
     });
-    for method in [Method::Best, Method::Published] {
+    for method in [Method::Joint, Method::Published] {
         let options = Options { method, ..Options::default() };
         let (rows, columns) = shots[0].shape();
         let mut decoder =
@@ -79,7 +79,7 @@ fn maps_may_hold_anything() {
         let planes = bench.render(&cast, &Light::shot(&code()), &options).expect("a valid scene");
         let Planes::U8(images) = &planes else { panic!("noisy images have 8 bit") };
         let shot = Shot::new(images.each_ref().map(|image| image.view())).expect("equal images");
-        for method in [Method::Best, Method::Published] {
+        for method in [Method::Joint, Method::Published] {
             let options = Options { method, ..Options::default() };
             let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("valid devices");
             let mut decoder = Decoder::new(code(), [height, width], &Conditioner::default(), options)

@@ -1,7 +1,7 @@
 //! The virtual bench against what it must be.
 
 use ndarray::{Array2, Array3};
-use quadfringe::fringe::{Channel, DmdLayout, FringeCode, pattern};
+use quadfringe::encoding::{Channel, DmdLayout, FringeCode, pattern};
 use quadfringe::optics::{BayerPattern, Device};
 use quadfringe::rig::{Albedo, Beam, Bench, BitDepth, Light, Planes, RenderOptions};
 use quadfringe::surface::{Plane, scene};

@@ -36,7 +36,7 @@ fn analytic_geometry_agrees_with_a_ray_cast_of_its_layout() {
             if !on_plane.is_lit(Beam::Visible) || !on_object.is_lit(Beam::Visible) {
                 continue;
             }
-            let phase = |column_px: f64| quadfringe::fringe::phase_at(&code, 0, column_px);
+            let phase = |column_px: f64| quadfringe::encoding::phase_at(&code, 0, column_px);
             let difference_rad = phase(on_object.lit_from_px[0][0]) - phase(on_plane.lit_from_px[0][0]);
             let found = layout.height_from_phase(difference_rad, on_plane.xyz_mm[0]);
             assert!((found - height_mm).abs() < 1e-9, "{found} for {height_mm}");

@@ -3,7 +3,7 @@
 mod common;
 
 use common::{bench, clean, code, decode_planes, noisy};
-use quadfringe::fringe::phase_at;
+use quadfringe::encoding::phase_at;
 use quadfringe::height::{PairTable, Triangulator};
 use quadfringe::optics::CoaxialPair;
 use quadfringe::rig::{Beam, Bench, Cast, Light, RenderOptions};
@@ -174,6 +174,6 @@ fn bad_input_is_refused() {
     };
     assert_eq!(plan([48, 64], Method::Published), Ok(true));
     assert!(plan([48, 60], Method::Published).is_err());
-    let refused = plan([48, 64], Method::Best).expect_err("not yet").to_string();
+    let refused = plan([48, 64], Method::Joint).expect_err("not yet").to_string();
     assert!(refused.contains("published"), "{refused}");
 }

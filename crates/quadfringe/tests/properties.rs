@@ -8,8 +8,7 @@ use proptest::prelude::*;
 use quadfringe::optics::rotation_from_vector;
 use quadfringe::rig::{Bench, BitDepth, Light, Planes, RenderOptions};
 use quadfringe::{
-    Channel, Conditioner, Decoder, Device, DmdLayout, FringeCode, Method, Options, Shot, demod, fringe,
-    unwrap,
+    Channel, Conditioner, Decoder, Device, DmdLayout, FringeCode, Method, Options, Shot, encoding, stages,
 };
 use std::f64::consts::TAU;
 
@@ -32,7 +31,7 @@ fn wrap(angle: f64) -> f64 {
 /// The images that a camera sees which sees the projector's columns one to one: a + b * pattern, and a shift of a.
 fn one_to_one(code: &FringeCode, rows: usize, offset: f32, scale: f32) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
-        let image = fringe::pattern(code, channel, rows, DmdLayout::Regular);
+        let image = encoding::pattern(code, channel, rows, DmdLayout::Regular);
         image.mapv(|light| offset + scale * light)
     })
 }
@@ -60,19 +59,19 @@ proptest! {
         let shape = (1, columns.len());
         let maps: [Array2<f32>; 3] = std::array::from_fn(|i| {
             Array2::from_shape_fn(shape, |(_, x)| {
-                wrap(fringe::phase_at(&code, i, columns[x]) + errors[32 * i + x]) as f32
+                wrap(encoding::phase_at(&code, i, columns[x]) + errors[32 * i + x]) as f32
             })
         });
-        let (phase, margin) = unwrap::unwrap(&code, maps.each_ref().map(|m| m.view())).expect("same size");
+        let (phase, margin) = stages::unwrap(&code, maps.each_ref().map(|m| m.view())).expect("same size");
         for (x, column) in columns.iter().enumerate() {
-            let truth = fringe::phase_at(&code, 0, *column) + errors[x];
+            let truth = encoding::phase_at(&code, 0, *column) + errors[x];
             prop_assert!((f64::from(phase[[0, x]]) - truth).abs() < 1e-3, "column {column}");
             prop_assert!((0.0..=1.0).contains(&margin[[0, x]]));
         }
         let maps: [Array2<f32>; 3] = std::array::from_fn(|i| {
             Array2::from_shape_fn(shape, |(_, x)| strangers[32 * i + x])
         });
-        let (phase, _) = unwrap::unwrap(&code, maps.each_ref().map(|m| m.view())).expect("same size");
+        let (phase, _) = stages::unwrap(&code, maps.each_ref().map(|m| m.view())).expect("same size");
         for (given, found) in maps[0].iter().zip(&phase) {
             prop_assert!(wrap(f64::from(found - given)).abs() < 1e-3);
         }
@@ -90,8 +89,8 @@ proptest! {
         let stack = |offset: f64| ndarray::Array3::from_shape_fn((steps, 2, 3), |(k, _, _)| {
             (offset + level + amplitude * (phase + TAU * k as f64 / steps as f64).cos()) as f32
         });
-        let plain = demod::n_step(stack(0.0).view()).expect("enough steps");
-        let shifted = demod::n_step(stack(offset).view()).expect("enough steps");
+        let plain = stages::n_step(stack(0.0).view()).expect("enough steps");
+        let shifted = stages::n_step(stack(offset).view()).expect("enough steps");
         prop_assert!(wrap(f64::from(plain.phase_rad[[1, 1]]) - phase).abs() < 2e-4);
         prop_assert!(wrap(f64::from(shifted.phase_rad[[1, 1]]) - phase).abs() < 2e-4);
         prop_assert!((f64::from(shifted.background[[1, 1]] - plain.background[[1, 1]]) - offset).abs() < 1e-5);

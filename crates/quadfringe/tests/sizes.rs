@@ -5,7 +5,7 @@ mod common;
 use common::decode_planes;
 use ndarray::{Array2, s};
 use quadfringe::rig::Planes;
-use quadfringe::{Channel, Conditioner, Decoder, DmdLayout, FringeCode, Method, Options, fringe};
+use quadfringe::{Channel, Conditioner, Decoder, DmdLayout, FringeCode, Method, Options, encoding};
 use std::f64::consts::TAU;
 
 /// What a camera sees that sees the projector's columns one to one, but those from `step` on `shift` columns further.
@@ -16,7 +16,7 @@ fn images(code: &FringeCode, shape: [usize; 2], step: usize, shift: usize) -> [A
 /// What a camera sees whose pixel `(y, x)` looks at column `source(y, x)`.
 fn seen(code: &FringeCode, shape: [usize; 2], source: impl Fn(usize, usize) -> f64) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
-        let image = fringe::pattern(code, channel, 1, DmdLayout::Regular);
+        let image = encoding::pattern(code, channel, 1, DmdLayout::Regular);
         Array2::from_shape_fn(shape, |(y, x)| {
             let column = source(y, x);
             let (left, part) = (column as usize, column.fract() as f32);
@@ -36,7 +36,7 @@ fn columns_come_back(
 ) {
     let code = FringeCode::new(numbers, 912).expect("valid");
     let images = Planes::F32(seen(&code, shape, &source));
-    for method in [Method::Best, Method::Published] {
+    for method in [Method::Joint, Method::Published] {
         let options = Options { method, ..Options::default() };
         let mut decoder = Decoder::new(code.clone(), shape, &Conditioner::default(), options).expect("valid");
         let phase = decode_planes(&mut decoder, &images).expect("valid shot").phase_rad;

@@ -1,7 +1,7 @@
 //! What comes out of a shot.
 
-use crate::demod::{first_of_line, spare};
 use crate::height::Triangulator;
+use crate::parallel::{first_of_line, spare};
 use crate::{Error, FringeCode, Result};
 use multiversion::multiversion;
 use ndarray::{Array, Array1, Array2, Array3, Dimension, IntoDimension, s};
@@ -112,12 +112,12 @@ impl Decoded {
     }
 
     /// All maps row by row, for an engine to fill.
-    pub(super) fn rows(&mut self) -> impl IndexedParallelIterator<Item = OutputRow<'_>> {
+    pub(crate) fn rows(&mut self) -> impl IndexedParallelIterator<Item = OutputRow<'_>> {
         self.row_by_row().into_par_iter().with_min_len(ROWS_AT_ONCE)
     }
 
     /// The same one after the other.
-    pub(super) fn row_by_row(&mut self) -> Vec<OutputRow<'_>> {
+    pub(crate) fn row_by_row(&mut self) -> Vec<OutputRow<'_>> {
         let width = self.phase_rad.ncols();
         let maps = [
             &mut self.phase_rad,
@@ -147,10 +147,10 @@ impl Decoded {
 }
 
 /// Fewest rows that a thread takes at once.
-pub(super) const ROWS_AT_ONCE: usize = 8;
+pub(crate) const ROWS_AT_ONCE: usize = 8;
 
 /// One row of every map.
-pub(super) struct OutputRow<'a> {
+pub(crate) struct OutputRow<'a> {
     pub phase: &'a mut [f32],
     pub column: &'a mut [f32],
     pub modulation: &'a mut [f32],
@@ -163,7 +163,7 @@ pub(super) struct OutputRow<'a> {
 }
 
 /// The last step of either method, row by row: columns, points and their uncertainty from the phase and its own.
-pub(super) struct Finish<'a> {
+pub(crate) struct Finish<'a> {
     pub code: &'a FringeCode,
     pub triangulator: Option<&'a Triangulator>,
 }
@@ -185,7 +185,7 @@ impl Finish<'_> {
 /// 0, or NaN to turn what it is added to into no data: of a choice between a number in memory and NaN a compiler makes masked
 /// stores, which some processors are slow at.
 #[inline(always)]
-pub(super) fn hole_unless(known: bool) -> f32 {
+pub(crate) fn hole_unless(known: bool) -> f32 {
     if known { 0.0 } else { f32::NAN }
 }
 

@@ -13,7 +13,7 @@ use super::Triangulator;
 use crate::FringeCode;
 use crate::error::{Error, Result};
 use crate::optics::{CoaxialPair, Device};
-use crate::unwrap::{AlongRay, RayRow};
+use crate::stages::{AlongRay, RayRow};
 
 /// Coefficients of the cubic.
 const NODES: usize = 4;

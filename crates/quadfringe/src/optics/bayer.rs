@@ -1,7 +1,7 @@
 //! The colour filters of a chip that sees one colour at each pixel.
 
+use crate::encoding::Channel;
 use crate::error::{Error, Result};
-use crate::fringe::Channel;
 
 /// Colours of the first two pixels of the first row and of the second row of a Bayer chip, row by row.
 ///

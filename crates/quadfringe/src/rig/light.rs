@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use ndarray::ArrayView2;
 
+use crate::encoding::{Axis, Channel, DmdLayout, FringeCode, row_shift};
 use crate::error::{Error, Result};
-use crate::fringe::{Axis, Channel, DmdLayout, FringeCode, row_shift};
 use crate::optics::Device;
 
 use super::Beam;
@@ -116,7 +116,7 @@ fn sample(image: &ArrayView2<'_, f32>, layout: DmdLayout, [column, row]: [f64; 2
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fringe::pattern;
+    use crate::encoding::pattern;
 
     #[test]
     fn images_follow_the_continuous_fringes_in_both_layouts() {

@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, Zip};
 
-use crate::fringe::Channel;
+use crate::encoding::Channel;
 use crate::optics::BayerPattern;
 
 /// What the chip delivers: at each pixel the one of R, G and B that it sees.

@@ -4,8 +4,8 @@ use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use super::{Bench, Light};
+use crate::encoding::mirror_column;
 use crate::error::Result;
-use crate::fringe::mirror_column;
 use crate::optics::check_plane;
 
 impl Bench {

@@ -4,8 +4,8 @@ use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
 use super::{Beam, Bench, Cast, Hit, Light, RenderOptions, blur, expose, mosaic};
+use crate::encoding::Channel;
 use crate::error::{Error, Result};
-use crate::fringe::Channel;
 
 /// The images of a shot, each `(rows, columns)`: four in the order R, G, B, IR, or the raw mosaic of a Bayer chip and IR.
 ///

@@ -3,7 +3,7 @@
 use ndarray::{Array2, Array3};
 
 use super::{Beam, Cast, Hit};
-use crate::fringe::{FringeCode, phase_at};
+use crate::encoding::{FringeCode, phase_at};
 
 impl Cast {
     /// Size of the maps (rows, columns).

@@ -1,7 +1,7 @@
 //! Pixels of the stacks, packed for fast scoring, and the error that a two-step measurement of them would have.
 
 use super::Response;
-use crate::angle::atan2;
+use crate::parallel::angle::atan2;
 use ndarray::{Array2, ArrayView1, Zip};
 use rayon::prelude::*;
 use std::f64::consts::TAU;

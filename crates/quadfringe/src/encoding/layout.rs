@@ -1,0 +1,139 @@
+//! Where the mirrors lie, and the ideal images for them.
+
+use std::f64::consts::TAU;
+
+use ndarray::Array2;
+
+use super::{Channel, FringeCode, phase_at};
+use crate::error::{Error, Result};
+
+/// How the mirrors of a projector's micromirror array lie.
+///
+/// ```
+/// use quadfringe::DmdLayout;
+/// assert_eq!(DmdLayout::Diamond.pitch_um(), [10.8, 5.4]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum DmdLayout {
+    /// Square grid: mirror (row, column) lies at (row, column).
+    #[default]
+    Regular,
+    /// Diamond array: odd rows lie half a column to the right.
+    Diamond,
+}
+
+impl DmdLayout {
+    /// Spacing of columns and of rows in um for the 912 x 1140 array: 7.63 and 7.63, or 10.8 and 5.4 (diamond).
+    #[must_use]
+    pub const fn pitch_um(self) -> [f64; 2] {
+        match self {
+            Self::Regular => [7.63, 7.63],
+            Self::Diamond => [10.8, 5.4],
+        }
+    }
+}
+
+/// Direction in which fringes count.
+///
+/// ```
+/// use quadfringe::encoding::Axis;
+/// use quadfringe::rig::Light;
+/// let horizontal = Light::Fringes { number: 45.0, shift_rad: 0.0, axis: Axis::Rows };
+/// assert_ne!(horizontal, Light::fringes(45.0, 0.0));
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+pub enum Axis {
+    /// Vertical fringes, counted over the columns.
+    #[default]
+    Columns,
+    /// Horizontal fringes, counted over the rows; for calibrating a projector.
+    Rows,
+}
+
+/// Where the mirror stored at (row, column) lies, in columns.
+///
+/// ```
+/// use quadfringe::encoding::{DmdLayout, mirror_column};
+/// assert_eq!(mirror_column(DmdLayout::Diamond, 3, 10), 10.5);
+/// assert_eq!(mirror_column(DmdLayout::Regular, 3, 10), 10.0);
+/// ```
+#[must_use]
+pub fn mirror_column(layout: DmdLayout, row: usize, column: usize) -> f64 {
+    column as f64 + row_shift(layout, row)
+}
+
+/// How far a row of mirrors lies to the right, in columns.
+pub(crate) fn row_shift(layout: DmdLayout, row: usize) -> f64 {
+    match layout {
+        DmdLayout::Diamond if row % 2 == 1 => 0.5,
+        _ => 0.0,
+    }
+}
+
+/// Ideal image of a channel, `(height, projector width)`, linear light from 0 to 1 (S1).
+///
+/// ```
+/// use quadfringe::encoding::{Channel, DmdLayout, FringeCode, pattern};
+/// let code = FringeCode::optimum(36, 912)?;
+/// let red = pattern(&code, Channel::R, 1140, DmdLayout::Regular);
+/// assert_eq!((red.dim(), red[[0, 0]]), ((1140, 912), 1.0));
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+#[must_use]
+pub fn pattern(code: &FringeCode, channel: Channel, height: usize, layout: DmdLayout) -> Array2<f32> {
+    let level = |row: usize, column: usize| {
+        let phase = phase_at(code, channel.phase_index(), mirror_column(layout, row, column));
+        (0.5 + 0.5 * (phase + channel.shift_rad()).cos()) as f32
+    };
+    let kinds: Vec<Vec<f32>> =
+        (0..2).map(|row| (0..code.projector_width).map(|column| level(row, column)).collect()).collect();
+    Array2::from_shape_fn((height, code.projector_width), |(row, column)| kinds[row % 2][column])
+}
+
+/// Ideal image of one step of an N-step capture, `(height, width)`, linear light `0.5 + 0.5 cos(2 pi number u / size + shift)`
+/// with the column or the row for `u`, at the places of the mirrors.
+///
+/// # Errors
+/// [`Error::Value`] when the image has no pixels or a number is not finite.
+///
+/// ```
+/// use quadfringe::encoding::{Axis, DmdLayout, step_pattern};
+/// let image = step_pattern(36.0, 0.0, Axis::Rows, [912, 1140], DmdLayout::Diamond)?;
+/// assert!((image[[0, 5]], image[[1140 / 72, 5]]) > (0.99, 0.0) && image[[1140 / 72, 5]] < 0.01);
+/// # Ok::<(), quadfringe::error::Error>(())
+/// ```
+pub fn step_pattern(
+    number: f64,
+    shift_rad: f64,
+    axis: Axis,
+    [width, height]: [usize; 2],
+    layout: DmdLayout,
+) -> Result<Array2<f32>> {
+    if width == 0 || height == 0 || !(number.is_finite() && shift_rad.is_finite()) {
+        let actual = format!("{width} x {height}, number {number}, shift {shift_rad} rad");
+        return Err(Error::value("step pattern", "an image size and a finite number and shift", actual));
+    }
+    Ok(Array2::from_shape_fn((height, width), |(row, column)| {
+        let cycles = match axis {
+            Axis::Columns => mirror_column(layout, row, column) / width as f64,
+            Axis::Rows => row as f64 / height as f64,
+        };
+        (0.5 + 0.5 * (TAU * number * cycles + shift_rad).cos()) as f32
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+
+    #[test]
+    fn diamond_rows_are_shifted() {
+        let code = FringeCode::optimum(36, 912).expect("valid code");
+        let image = pattern(&code, Channel::B, 4, DmdLayout::Diamond);
+        let expected = 0.5 + 0.5 * (phase_at(&code, 0, 7.5) + PI / 2.0).cos();
+        assert!((f64::from(image[[3, 7]]) - expected).abs() < 1e-7);
+        assert_eq!(image.row(0), image.row(2));
+    }
+}

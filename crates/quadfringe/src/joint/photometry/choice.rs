@@ -1,0 +1,418 @@
+//! Whose backgrounds a pixel takes. Beside an edge between two colours a window mixes both; some way off, on the side that the
+//! pixel belongs to, it does not. Where light does not fit the backgrounds of its own place, every pixel takes those of the place
+//! around it that explain it and its neighbours best.
+
+use super::carriers;
+use crate::joint::cells::{CellMaps, Grid, RowMaps};
+use crate::joint::local_fit::binomial;
+use crate::joint::scene::Scene;
+use crate::joint::slopes::Slopes;
+use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
+use crate::parallel::slots::Slots;
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+/// How far off the nearer places are, in fringe periods: somewhat more than the window of the backgrounds is wide (sigma).
+const ASIDE: f32 = 0.35;
+/// Places to take backgrounds from, in units of that: rows down, columns right. The own one comes first, then row by row.
+const PLACES: [[isize; 2]; 17] = [
+    [0, 0],
+    [-2, -2],
+    [-2, 0],
+    [-2, 2],
+    [-1, -1],
+    [-1, 0],
+    [-1, 1],
+    [0, -2],
+    [0, -1],
+    [0, 1],
+    [0, 2],
+    [1, -1],
+    [1, 0],
+    [1, 1],
+    [2, -2],
+    [2, 0],
+    [2, 2],
+];
+/// Pixels look around where they miss more, on average over a vector in the rows of a task, than this many times what noise
+/// does: three standard deviations of that average.
+const NOISES: f32 = 1.2;
+/// Root mean square, in units of the modulation, that has to be missed on top of that and gained by another place: what a curved or
+/// blurred surface misses without being another colour must not send its pixels elsewhere.
+const SHARE: f32 = 0.02;
+/// Squared misfit in units of the variance of the noise: four intensities less albedo and phase.
+const MISSED_BY_NOISE: f32 = 2.0;
+/// Other backgrounds are taken when they miss less than this share of what a pixel's own do.
+const BETTER: f32 = 0.9;
+/// Rows of one task.
+const BLOCK: usize = 16;
+
+/// The place that every pixel takes its backgrounds from.
+#[derive(Debug, Default)]
+pub(super) struct Choice {
+    /// Numbers in [`PLACES`], in padded rows of the scene of the fit; none when all pixels take their own.
+    places: Vec<u8>,
+    stride: usize,
+    aside: usize,
+    slots: Slots<Rows>,
+}
+
+/// Rows of one task, of which one lies above and one below its pixels: misfits are averaged over neighbours.
+#[derive(Debug, Default)]
+struct Rows {
+    maps: RowMaps,
+    /// Backgrounds of one row, continued to both sides as far as the furthest place.
+    wide: [Vec<f32>; 8],
+    /// Cosines and derivatives of the four channels.
+    carriers: Vec<[Vec<f32>; 8]>,
+    /// Misfits with the backgrounds of places beside each other, place by place.
+    misfit: Vec<Vec<f32>>,
+    /// What another place has to undercut.
+    best: Vec<Vec<f32>>,
+    /// Vectors of pixels that look around.
+    asked: Vec<bool>,
+    smooth: Vec<f32>,
+    spare: Vec<f32>,
+}
+
+impl Choice {
+    /// Every pixel takes its own.
+    pub fn forget(&mut self) {
+        self.places.clear();
+    }
+
+    /// Put 0 where the pixels of row `y` have chosen another place.
+    pub fn leave_out(&self, y: usize, usable: &mut [f32]) {
+        if self.places.is_empty() {
+            return;
+        }
+        for (usable, &place) in usable.iter_mut().zip(&self.places[y * self.stride..][..self.stride]) {
+            *usable = if place == 0 { *usable } else { 0.0 };
+        }
+    }
+
+    /// Choose among backgrounds on a grid of cells over a scene, by how well the four intensities fit, whatever the albedo and to
+    /// first order whatever the phase. Returns the share of the lit pixels that do not take their own.
+    pub fn make(
+        &mut self,
+        (grid, maps): (&Grid, &CellMaps),
+        scene: &Scene<'_>,
+        how: ([f32; 3], &Slopes),
+        [phase, modulation]: [&[f32]; 2],
+        noise: f32,
+    ) -> f32 {
+        let Self { places, stride, aside, slots } = self;
+        (*stride, *aside) = (grid.stride, (ASIDE * scene.period_px as f32).round().max(1.0) as usize);
+        let aside = *aside as isize;
+        places.clear();
+        places.resize(grid.pixels(), 0);
+        let least = NOISES * MISSED_BY_NOISE * noise * noise;
+        places.par_chunks_mut(BLOCK * *stride).enumerate().for_each_init(
+            || slots.take(),
+            |rows, (block, places)| {
+                let inside = |y: isize| y.clamp(0, grid.height as isize - 1) as usize;
+                let (first, count) = ((block * BLOCK) as isize, places.len() / grid.stride);
+                let rows = &mut **rows;
+                let lines: Vec<usize> = (first - 1..=first + count as isize).map(inside).collect();
+                rows.prepare(scene, &lines, phase, how);
+                let from = |y: usize, down: isize| inside(y as isize + down * aside);
+                let planes = [modulation, scene.usable];
+                rows.miss((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
+                let lights = lines[1..=count].iter().map(|&y| scene.row(modulation, y));
+                if !rows.ask(lights, grid.width, least) {
+                    return;
+                }
+                let mut places_left = (1..PLACES.len()).peekable();
+                while let Some(&first) = places_left.peek() {
+                    let down = PLACES[first][0];
+                    let rights: Vec<isize> =
+                        std::iter::from_fn(|| places_left.next_if(|&place| PLACES[place][0] == down))
+                            .map(|place| PLACES[place][1] * aside)
+                            .collect();
+                    rows.miss((grid, maps), scene, planes, &lines, |y| from(y, down), &rights);
+                    for k in 0..rights.len() {
+                        rows.compare((first + k) as u8, k * lines.len(), grid, places);
+                    }
+                }
+            },
+        );
+        let chosen = count(places, |place| *place != 0);
+        chosen as f32 / count(modulation, |light| *light > 0.0).max(1) as f32
+    }
+
+    /// Put what the pixels of row `y` have chosen into the backgrounds of that row; the cells lie over the scene of the fit or over
+    /// a finer one.
+    pub fn apply(&self, grid: &Grid, maps: &CellMaps, y: usize, rows: &mut [&mut [f32]; 8]) {
+        if self.places.is_empty() {
+            return;
+        }
+        let places = &self.places[y * self.stride / grid.stride * self.stride..][..self.stride];
+        apply(places, self.aside, (grid, maps), y, rows);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn apply(
+    places: &[u8],
+    aside: usize,
+    (grid, maps): (&Grid, &CellMaps),
+    y: usize,
+    rows: &mut [&mut [f32]; 8],
+) {
+    let factor = grid.stride / places.len();
+    let aside = (aside * factor) as isize;
+    let last = [grid.height - 1, grid.width - 1].map(|last| last as isize);
+    for (group, places) in places.chunks(LANES).enumerate() {
+        // Most vectors hold no other place; they are told apart at once.
+        if places.iter().fold(0, |any, place| any | place) == 0 {
+            continue;
+        }
+        for (i, &place) in places.iter().enumerate().filter(|(_, place)| **place != 0) {
+            let [down, right] = PLACES[usize::from(place)].map(|steps| steps * aside);
+            let first = factor * (group * LANES + i);
+            let from_row = (y as isize + down).clamp(0, last[0]) as usize;
+            let from = (first as isize + right).clamp(0, last[1]) as f32 + 0.5 * (factor - 1) as f32;
+            let found: [f32; 8] = maps.at(grid, from_row, from);
+            for (row, value) in rows.iter_mut().zip(found) {
+                row[first..first + factor].fill(value);
+            }
+        }
+    }
+}
+
+impl Rows {
+    fn prepare(
+        &mut self,
+        scene: &Scene<'_>,
+        lines: &[usize],
+        phase: &[f32],
+        (ratios, slopes): ([f32; 3], &Slopes),
+    ) {
+        let stride = scene.grid.stride;
+        let Self { maps, carriers, best, asked, smooth, .. } = self;
+        carriers.resize_with(lines.len(), Default::default);
+        for (rows, &y) in carriers.iter_mut().zip(lines) {
+            rows.iter_mut().for_each(|row| row.resize(stride, 0.0));
+            carry(
+                [scene.row(phase, y), slopes.loss(scene, y, maps)],
+                ratios,
+                rows.each_mut().map(Vec::as_mut_slice),
+            );
+        }
+        best.resize_with(lines.len(), Vec::new);
+        best.iter_mut().for_each(|row| row.resize(stride, 0.0));
+        smooth.resize(stride, 0.0);
+        asked.clear();
+        asked.resize(stride / LANES, true);
+    }
+
+    /// Misfits of the rows `lines` with backgrounds of the rows `from`, so many columns to the right.
+    fn miss(
+        &mut self,
+        (grid, maps): (&Grid, &CellMaps),
+        scene: &Scene<'_>,
+        planes: [&[f32]; 2],
+        lines: &[usize],
+        from: impl Fn(usize) -> usize,
+        rights: &[isize],
+    ) {
+        let Self { maps: rows, wide, carriers, misfit, asked, .. } = self;
+        let reach = rights.iter().map(|right| right.unsigned_abs()).max().unwrap_or(0);
+        misfit.resize_with(misfit.len().max(rights.len() * lines.len()), Vec::new);
+        for (i, &y) in lines.iter().enumerate() {
+            let model: [&[f32]; 8] = rows.sample(grid, maps, 0, from(y));
+            wide.iter_mut()
+                .zip(model)
+                .for_each(|(wide, row)| widen(&row[..grid.width], reach, grid.stride, wide));
+            let carriers = carriers[i].each_ref().map(Vec::as_slice);
+            let lit = planes.map(|plane| scene.row(plane, y));
+            for (k, right) in rights.iter().enumerate() {
+                let first = reach.saturating_add_signed(*right);
+                let model = wide.each_ref().map(|row| &row[first..first + grid.stride]);
+                let out = &mut misfit[k * lines.len() + i];
+                out.resize(grid.stride, 0.0);
+                miss(model, carriers, scene.rows(y), lit, asked, out);
+            }
+        }
+    }
+
+    /// Which vectors look around, if any: those that miss more than `least` and a share of the modulation on average, and their
+    /// neighbours. The others have nothing to gain. `lights` are the rows of the modulation.
+    fn ask<'a>(&mut self, lights: impl Iterator<Item = &'a [f32]> + Clone, width: usize, least: f32) -> bool {
+        let Self { misfit, best, asked, spare, smooth, .. } = self;
+        let misses = |group: usize| {
+            let pixels = LANES * group..LANES * (group + 1);
+            let own = misfit[1..].iter().zip(lights.clone()).flat_map(|(row, light)| {
+                row[pixels.clone()].iter().zip(&light[pixels.clone()]).filter(|(own, _)| **own > 0.0)
+            });
+            let excess = own.map(|(own, light)| own - least - (SHARE * light).powi(2));
+            excess.sum::<f32>() > 0.0
+        };
+        let much: Vec<bool> = (0..asked.len()).map(misses).collect();
+        for (i, asked) in asked.iter_mut().enumerate() {
+            *asked = much[i.saturating_sub(1)..(i + 2).min(much.len())].contains(&true);
+        }
+        for (i, (best, light)) in best.iter_mut().zip(lights).enumerate() {
+            binomial([&misfit[i], &misfit[i + 1], &misfit[i + 2]], width, spare, smooth);
+            for (best, (own, light)) in best.iter_mut().zip(smooth.iter().zip(light)) {
+                *best = BETTER * own - (SHARE * light).powi(2);
+            }
+        }
+        much.contains(&true)
+    }
+
+    /// Take the backgrounds of `place`, whose misfits begin at number `first`, where they are better than any before.
+    fn compare(&mut self, place: u8, first: usize, grid: &Grid, places: &mut [u8]) {
+        let Self { misfit, best, spare, smooth, .. } = self;
+        for (i, (places, best)) in places.chunks_mut(grid.stride).zip(best).enumerate() {
+            let near = [0, 1, 2].map(|k| misfit[first + i + k].as_slice());
+            binomial(near, grid.width, spare, smooth);
+            take_better(place, &smooth[..grid.width], best, places);
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn take_better(place: u8, missed: &[f32], best: &mut [f32], places: &mut [u8]) {
+    for ((missed, best), chosen) in missed.iter().zip(best).zip(places) {
+        let better = *missed < *best;
+        *best = best.min(*missed);
+        *chosen = if better { place } else { *chosen };
+    }
+}
+
+fn count<T: Sync>(values: &[T], which: impl Fn(&T) -> bool + Sync) -> usize {
+    values.par_chunks(1 << 14).map(|values| values.iter().filter(|value| which(value)).count()).sum()
+}
+
+/// A row with its ends repeated: `reach` times before, and behind as far as there are `stride + 2 reach` numbers.
+fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
+    out.clear();
+    out.resize(reach, row[0]);
+    out.extend_from_slice(row);
+    out.resize(stride + 2 * reach, row[row.len() - 1]);
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn carry(pixels: [&[f32]; 2], ratios: [f32; 3], out: [&mut [f32]; 8]) {
+    let pixels = pixels.map(lanes);
+    let mut out = out.map(lanes_mut);
+    for i in 0..pixels[0].len() {
+        let [phase, loss] = take(&pixels, i);
+        let mut found = [[0.0; LANES]; 8];
+        for x in 0..LANES {
+            let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
+            for c in 0..4 {
+                (found[c][x], found[4 + c][x]) = (cosines[c], derivatives[c]);
+            }
+        }
+        put(&mut out, i, &found);
+    }
+}
+
+/// Sum of squares of what neither the albedo nor a small change of the phase explains; 0 where there is nothing to see, too much
+/// in vectors that nobody asked.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn miss(
+    model: [&[f32]; 8],
+    carriers: [&[f32]; 8],
+    light: [&[f32]; 4],
+    lit: [&[f32]; 2],
+    asked: &[bool],
+    out: &mut [f32],
+) {
+    let (model, carriers) = (model.map(lanes), carriers.map(lanes));
+    let (light, lit) = (light.map(lanes), lit.map(lanes));
+    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
+        if !asked[i] {
+            *out = [f32::MAX; LANES];
+            continue;
+        }
+        let (model, carriers) = (take(&model, i), take(&carriers, i));
+        let (light, lit) = (take(&light, i), take(&lit, i));
+        let mut found = [0.0; LANES];
+        for x in 0..LANES {
+            let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
+            let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
+            for c in 0..4 {
+                let (a, b) = (model[2 * c][x], model[2 * c + 1][x]);
+                let (m, d, s) = (a + b * carriers[c][x], b * carriers[4 + c][x], light[c][x]);
+                mm += m * m;
+                md += m * d;
+                dd += d * d;
+                ms += m * s;
+                ds += d * s;
+                ss += s * s;
+            }
+            let (own, across) = (dd - md * md / mm, ds - md * ms / mm);
+            let rest = ss - ms * ms / mm - across * across / if own > 1e-9 { own } else { 1e-9 };
+            let on = (lit[0][x] > 0.0) & (lit[1][x] > 0.0);
+            found[x] = if on & (rest > 0.0) { rest } else { 0.0 };
+        }
+        *out = found;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::edge::{Edge, RATIOS};
+    use super::*;
+
+    /// What the pixels choose, and the share of them that take another place.
+    fn choose(edge: &Edge, noise: f32) -> (Choice, f32) {
+        let (lit, modulation) = (edge.plane(1.0), edge.plane(0.2));
+        let how = (RATIOS, &Slopes::flat(&edge.grid));
+        let mut choice = Choice::default();
+        let share =
+            choice.make((&edge.grid, &edge.maps), &edge.scene(&lit), how, [&edge.phase, &modulation], noise);
+        (choice, share)
+    }
+
+    /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
+    /// neighbours.
+    fn errors(edge: &Edge, choice: &Choice) -> [f32; 2] {
+        let mut rows = RowMaps::default();
+        let mut sampled = rows.sample_mut::<8>(&edge.grid, &edge.maps, 0, 30);
+        let error = |rows: &[&mut [f32]; 8]| {
+            let off = |x: usize, k: usize| (rows[k][x] - edge.colour(x)[k]).abs();
+            (20..236)
+                .filter(|x| !(127..130).contains(x))
+                .flat_map(|x| (0..8).map(move |k| off(x, k)))
+                .fold(0.0, f32::max)
+        };
+        let own = error(&sampled);
+        choice.apply(&edge.grid, &edge.maps, 30, &mut sampled);
+        [own, error(&sampled)]
+    }
+
+    #[test]
+    fn pixels_beside_an_edge_take_the_backgrounds_of_their_side() {
+        let colours =
+            [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
+        let edge = Edge::new(colours, 0.0);
+        let (choice, share) = choose(&edge, 1e-3);
+        let [own, chosen] = errors(&edge, &choice);
+        assert!(own > 0.1, "{own}");
+        assert!(chosen < 0.02, "{chosen}");
+        // Those are the pixels that see a mixture in their own place, and they are left out of the next fit.
+        let mut usable = vec![1.0; 256];
+        choice.leave_out(30, &mut usable);
+        let left_out: Vec<usize> = (0..256).filter(|&x| usable[x] == 0.0).collect();
+        assert!(left_out.iter().all(|x| (112..144).contains(x)), "{left_out:?}");
+        assert!(
+            (118..138).filter(|x| !(127..130).contains(x)).all(|x| left_out.contains(&x)),
+            "{left_out:?}"
+        );
+        assert!((0.04..0.13).contains(&share), "{share}");
+    }
+
+    #[test]
+    fn what_noise_explains_stays_where_it_is() {
+        let colours = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
+        let edge = Edge::new(colours, 0.0);
+        let (choice, share) = choose(&edge, 0.03);
+        let [own, chosen] = errors(&edge, &choice);
+        assert_eq!(own, chosen);
+        assert_eq!(share, 0.0);
+    }
+}

@@ -1,0 +1,171 @@
+//! One shot at one resolution: four planes of linear light, and which pixels count.
+
+pub(in crate::joint) mod upsample;
+
+use crate::joint::cells::Grid;
+use crate::joint::scene::Scene;
+use crate::parallel::lanes::{LANES, lanes, lanes_mut};
+use multiversion::multiversion;
+use rayon::prelude::*;
+
+/// Planes of pixels, padded as their grid says.
+#[derive(Debug, Default)]
+pub(in crate::joint) struct Level {
+    pub light: [Vec<f32>; 4],
+    /// 1 where light of the projector may fall, 0 for glare.
+    pub lit: Vec<f32>,
+    /// 1 for pixels that may take part in a fit: not saturated, seen by both chips.
+    pub usable: Vec<f32>,
+}
+
+impl Level {
+    pub fn resize(&mut self, pixels: usize) {
+        let planes = self.light.iter_mut().chain([&mut self.lit, &mut self.usable]);
+        planes.for_each(|plane| plane.resize(pixels, 0.0));
+    }
+
+    /// The planes with a grid of cells; a fringe period is `period_px` wide, a pixel is the mean of `factor` x `factor`.
+    pub fn scene<'a>(&'a self, grid: &'a Grid, period_px: f64, factor: usize) -> Scene<'a> {
+        let light = self.light.each_ref().map(Vec::as_slice);
+        Scene { light, usable: &self.usable, grid, period_px, factor }
+    }
+
+    /// Takes the pixels out where `found` has no light.
+    pub fn restrict(&mut self, grid: &Grid, found: &[f32]) {
+        let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
+        masks.zip(found.par_chunks(grid.stride)).for_each(|((lit, usable), found)| {
+            for ((lit, usable), found) in lit.iter_mut().zip(usable).zip(found) {
+                *lit *= found;
+                *usable *= *lit;
+            }
+        });
+    }
+
+    /// The image with the mean of every `factor` x `factor` pixels of `fine`, lit where all of them are and usable where half of
+    /// them are; so what lies in part beyond the last row or column is dark. Light repeats beyond the last row; beyond the last
+    /// column pixels count as far as they exist.
+    pub fn shrink(&mut self, fine: &Self, [grid, fine_grid]: [&Grid; 2], factor: usize) {
+        self.resize(grid.pixels());
+        let planes = self.light.each_mut().map(|plane| plane.par_chunks_mut(grid.stride));
+        let [red, green, blue, infrared] = planes;
+        let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
+        let rows = red.zip(green).zip(blue.zip(infrared)).zip(masks).enumerate();
+        rows.for_each(|(row, (((red, green), (blue, infrared)), (lit, usable)))| {
+            let light = [red, green, blue, infrared].into_iter().zip(&fine.light);
+            for (out, plane) in light {
+                mean(factor, &rows_of(plane, fine_grid, row, factor), out);
+                if !fine_grid.width.is_multiple_of(factor) {
+                    // The padding is dark.
+                    out[grid.width - 1] *= factor as f32 / (fine_grid.width % factor) as f32;
+                }
+            }
+            least(factor, &rows_of(&fine.lit, fine_grid, row, factor), lit);
+            if (row + 1) * factor > fine_grid.height {
+                // Its phase would be that of another place than its middle.
+                lit.fill(0.0);
+            }
+            // Noise takes single pixels of a crest beyond full scale; without the crest nothing of the fringe would fit.
+            mean(factor, &rows_of(&fine.usable, fine_grid, row, factor), usable);
+            at_least_half(lit, usable);
+        });
+    }
+}
+
+/// The rows of `plane` that make up row `row` of an image with `factor` times fewer.
+fn rows_of<'a>(plane: &'a [f32], grid: &Grid, row: usize, factor: usize) -> Vec<&'a [f32]> {
+    debug_assert_eq!(plane.len(), grid.pixels());
+    let place = |i: usize| (row * factor + i).min(grid.height - 1) * grid.stride;
+    (0..factor).map(|i| &plane[place(i)..][..grid.stride]).collect()
+}
+
+/// `lit` where a share is half or more, else 0.
+fn at_least_half(lit: &[f32], shares: &mut [f32]) {
+    for (share, lit) in shares.iter_mut().zip(lit) {
+        *share = if *share >= 0.5 { *lit } else { 0.0 };
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn mean(factor: usize, rows: &[&[f32]], out: &mut [f32]) {
+    match factor {
+        2 => fold::<2>(rows, out, |a, b| a + b, 0.25),
+        _ => fold::<4>(rows, out, |a, b| a + b, 0.0625),
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn least(factor: usize, rows: &[&[f32]], out: &mut [f32]) {
+    let lower = |a: f32, b: f32| if a < b { a } else { b };
+    match factor {
+        2 => fold::<2>(rows, out, lower, 1.0),
+        _ => fold::<4>(rows, out, lower, 1.0),
+    }
+}
+
+/// `F` rows and `F` columns into one.
+#[inline(always)]
+fn fold<const F: usize>(rows: &[&[f32]], out: &mut [f32], join: impl Fn(f32, f32) -> f32, scale: f32) {
+    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
+        let mut columns = [[0.0; LANES]; F];
+        for (k, row) in rows.iter().enumerate() {
+            let row = &lanes(row)[F * i..F * (i + 1)];
+            for (column, pixels) in columns.iter_mut().zip(row) {
+                for x in 0..LANES {
+                    column[x] = if k == 0 { pixels[x] } else { join(column[x], pixels[x]) };
+                }
+            }
+        }
+        let columns = columns.as_flattened();
+        for x in 0..LANES {
+            let mut sum = columns[F * x];
+            for k in 1..F {
+                sum = join(sum, columns[F * x + k]);
+            }
+            out[x] = scale * sum;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_shrunk_image_has_means_of_light_and_the_least_of_masks_at_odd_borders_too() {
+        let (height, width) = (5, 7);
+        // One pixel of a square, two of another, three of a third.
+        let saturated = [(0, 0), (2, 0), (3, 1), (2, 2), (2, 3), (3, 2)];
+        for factor in [2, 4] {
+            let fine_grid = Grid::with_stride([height, width], LANES * factor, 4.0);
+            let grid = fine_grid.shrunk(factor);
+            assert_eq!((grid.stride, grid.step, grid.rows), (LANES, 4 / factor, fine_grid.rows));
+            let (mut fine, mut out) = (Level::default(), Level::default());
+            fine.resize(fine_grid.pixels());
+            for (y, x) in (0..height).flat_map(|y| (0..width).map(move |x| (y, x))) {
+                let at = y * fine_grid.stride + x;
+                fine.light.iter_mut().for_each(|plane| plane[at] = (10 * y + x) as f32);
+                fine.usable[at] = f32::from(u8::from(!saturated.contains(&(y, x))));
+                fine.lit[at] = f32::from(u8::from((y, x) != (1, 2)));
+            }
+            out.shrink(&fine, [&grid, &fine_grid], factor);
+            for (row, column) in (0..grid.height).flat_map(|y| (0..grid.width).map(move |x| (y, x))) {
+                let ys = (0..factor).map(|i| (row * factor + i).min(height - 1));
+                let xs = column * factor..((column + 1) * factor).min(width);
+                let pixels: Vec<_> = ys.flat_map(|y| xs.clone().map(move |x| (y, x))).collect();
+                let mean = pixels.iter().map(|(y, x)| (10 * y + x) as f32).sum::<f32>() / pixels.len() as f32;
+                let at = row * grid.stride + column;
+                assert!(
+                    (out.light[2][at] - mean).abs() < 1e-4,
+                    "{row} {column}: {} {mean}",
+                    out.light[2][at]
+                );
+                let dark = pixels.contains(&(1, 2));
+                let beyond = (row + 1) * factor > height || (column + 1) * factor > width;
+                assert_eq!(out.lit[at] == 0.0, dark || beyond, "{row} {column}");
+                let unusable = pixels.iter().filter(|pixel| saturated.contains(pixel)).count();
+                let usable = out.lit[at] > 0.0 && 2 * unusable <= pixels.len();
+                assert_eq!(out.usable[at] > 0.0, usable, "{row} {column}");
+            }
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What the model leaves of the light around every cell. Beside an edge of colours, where no backgrounds are right yet, that
+//! is more than noise, and neighbouring phases differ by as much.
+
+use super::cells::{CellMaps, CellWork, RowMaps};
+use super::scene::Scene;
+use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
+use crate::parallel::slots::Slots;
+use multiversion::multiversion;
+
+/// Width (sigma) in fringe periods over which squares are averaged.
+const WIDTH: f32 = 0.125;
+/// Rows of pixels that stand for a row of cells.
+const SAMPLED_ROWS: usize = 2;
+
+/// Mean square residual in linear light on the cells.
+#[derive(Debug)]
+pub(crate) struct Residuals {
+    maps: CellMaps,
+    sums: CellMaps,
+    slots: Slots<((), CellWork)>,
+}
+
+impl Default for Residuals {
+    fn default() -> Self {
+        Self { maps: CellMaps::new(1), sums: CellMaps::default(), slots: Slots::default() }
+    }
+}
+
+impl Residuals {
+    /// Average the mean squares `misfit` of the pixels; `modulation` is 0 where there is no light.
+    pub fn measure(&mut self, scene: &Scene<'_>, misfit: &[f32], modulation: &[f32]) {
+        scene.grid.window_sums::<2, ()>(
+            (scene.cells(WIDTH), SAMPLED_ROWS),
+            &self.slots,
+            &mut self.sums,
+            &mut self.maps,
+            |(), y, sums| add_lit([misfit, modulation].map(|plane| scene.row(plane, y)), sums),
+            |_, [count, squares], out| {
+                for (out, (square, n)) in out.iter_mut().zip(squares.iter().zip(count)) {
+                    *out = square / n.max(1e-6);
+                }
+            },
+        );
+    }
+
+    /// Those of row `y`, of the scene that was measured or of a finer one.
+    pub fn row<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample(scene.grid, &self.maps, 0, y);
+        row
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_lit(pixels: [&[f32]; 2], sums: &mut [[Lanes; 2]]) {
+    let pixels = pixels.map(lanes);
+    for (i, sums) in sums.iter_mut().enumerate() {
+        let [misfit, modulation] = take(&pixels, i);
+        let mut terms = [[0.0; LANES]; 2];
+        for x in 0..LANES {
+            let lit = modulation[x] > 0.0;
+            (terms[0][x], terms[1][x]) = if lit { (1.0, misfit[x]) } else { (0.0, 0.0) };
+        }
+        add(sums, &terms);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::Grid;
+    use super::*;
+
+    #[test]
+    fn squares_are_averaged_over_lit_pixels_near_by() {
+        let grid = Grid::new([64, 128], 4.0);
+        let plane = |value: &dyn Fn(usize) -> f32| -> Vec<f32> {
+            (0..grid.pixels()).map(|i| value(i % 128)).collect()
+        };
+        // Every second column is dark, and whatever is missed there does not count.
+        let modulation = plane(&|x| if x % 2 == 0 { 0.4 } else { 0.0 });
+        let misfit = plane(&|x| {
+            if x % 2 == 1 {
+                1.0
+            } else if x < 64 {
+                1e-4
+            } else {
+                4e-4
+            }
+        });
+        let light = vec![0.5; grid.pixels()];
+        let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
+        let mut residuals = Residuals::default();
+        residuals.measure(&scene, &misfit, &modulation);
+        let mut maps = RowMaps::default();
+        let row = residuals.row(&scene, 30, &mut maps);
+        for x in 0..128 {
+            let off = match x {
+                0..48 => row[x] / 1e-4 - 1.0,
+                80..128 => row[x] / 4e-4 - 1.0,
+                _ => continue,
+            };
+            assert!(off.abs() < 1e-3, "{x} {}", row[x]);
+        }
+        assert!((1.5e-4..3.5e-4).contains(&row[64]), "{}", row[64]);
+    }
+}

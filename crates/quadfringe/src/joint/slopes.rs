@@ -1,0 +1,205 @@
+//! Slopes of the phase on the cells, from a wrapped phase.
+
+use super::cells::{CellMaps, CellWork, RowMaps};
+use super::scene::Scene;
+use crate::parallel::angle::wrap;
+use crate::parallel::lanes::{LANES, Lanes, lanes, take};
+use crate::parallel::slots::Slots;
+use multiversion::multiversion;
+use std::f32::consts::PI;
+
+/// Width (sigma) in fringe periods over which slopes are averaged.
+const WIDTH: f32 = 0.43;
+/// The same for the slopes of a phase that is sure, which follow the surface closer.
+const FINE_WIDTH: f32 = 0.2;
+/// What the slopes of the wide window count among them, as a share of the pixels of a whole fine one.
+const BACKING: f32 = 0.1;
+/// Rows of pixels that stand for a row of cells.
+const SAMPLED_ROWS: usize = 2;
+
+/// Weights and weighted steps along and down, and lit pixels.
+const TERMS: usize = 5;
+
+/// Slopes of the phase in rad per cell, which stays right when the cells are laid over another image.
+#[derive(Debug)]
+pub(crate) struct Slopes {
+    maps: CellMaps,
+    /// Slopes that back finer ones.
+    wide: CellMaps,
+    sums: CellMaps,
+    slots: Slots<([Vec<f32>; 2], CellWork)>,
+}
+
+impl Default for Slopes {
+    fn default() -> Self {
+        let [maps, wide] = [4, 4].map(CellMaps::new);
+        Self { maps, wide, sums: CellMaps::default(), slots: Slots::default() }
+    }
+}
+
+impl Slopes {
+    /// Measure a phase (rad, wrapped or not); `modulation` is 0 where there is no light.
+    pub fn measure(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
+        self.take(scene, [phase, modulation], WIDTH, 0.0);
+    }
+
+    /// Measure a phase that is sure once more, in a smaller window; where that holds little the slopes stay as they were.
+    pub fn refine(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
+        std::mem::swap(&mut self.maps, &mut self.wide);
+        self.take(scene, [phase, modulation], FINE_WIDTH, BACKING);
+    }
+
+    fn take(&mut self, scene: &Scene<'_>, [phase, modulation]: [&[f32]; 2], width: f32, backing: f32) {
+        let grid = scene.grid;
+        let Self { maps, wide, sums, slots } = self;
+        let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
+        let backing = backing * whole;
+        grid.window_sums::<TERMS, [Vec<f32>; 2]>(
+            (scene.cells(width), SAMPLED_ROWS),
+            slots,
+            sums,
+            maps,
+            |right, y, sums| {
+                let below = (y + 1).min(grid.height - 1);
+                for (shifted, plane) in right.iter_mut().zip([phase, modulation]) {
+                    shifted.clear();
+                    shifted.extend_from_slice(&scene.row(plane, y)[1..grid.width]);
+                    shifted.resize(grid.stride, 0.0);
+                }
+                let here = [scene.row(phase, y), scene.row(modulation, y)];
+                add_steps(here, [&right[0], &right[1]], [0, 1], sums);
+                add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
+                add_lit(scene.row(modulation, y), sums);
+            },
+            |row, [w, along, v, down, lit], out| {
+                let (columns, step) = (w.len(), grid.step as f32);
+                let slope = |i: usize, sum: &[f32], weight: &[f32], map: usize| {
+                    let backed = if backing > 0.0 { backing * wide.line(row, map)[i] } else { 0.0 };
+                    (step * sum[i] + backed) / (weight[i] + backing).max(1e-6)
+                };
+                for i in 0..columns {
+                    out[i] = slope(i, along, w, 0);
+                    out[columns + i] = slope(i, down, v, 1);
+                    out[3 * columns + i] = lit[i] / whole;
+                    out[2 * columns + i] = (out[i] * out[i] + out[columns + i] * out[columns + i]) / 24.0;
+                }
+            },
+        );
+    }
+
+    /// Slopes of nothing.
+    #[cfg(test)]
+    pub fn flat(grid: &super::cells::Grid) -> Self {
+        let mut flat = Self::default();
+        flat.maps.fill::<4>(grid, |_, lines| lines.into_iter().for_each(|line| line.fill(0.0)));
+        flat
+    }
+
+    /// Slopes along and down at a cell.
+    pub fn at(&self, row: usize, column: usize) -> [f32; 2] {
+        [0, 1].map(|k| self.maps.line(row, k)[column])
+    }
+
+    /// Share of the contrast of the first fringes that averaging camera pixels has cost in row `y`; that of others goes with
+    /// the square of their number. Of a phase with the step `s` per pixel, the mean of `f` parts of it, it is
+    /// `(1 - 1 / f^2) s^2 / 24` in each direction.
+    pub fn loss<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample_mut(scene.grid, &self.maps, 2, y);
+        let scale = loss_scale(scene);
+        row.iter_mut().for_each(|loss| *loss *= scale);
+        row
+    }
+
+    /// The same at a cell.
+    pub fn loss_at(&self, scene: &Scene<'_>, [row, column]: [usize; 2]) -> f32 {
+        self.maps.line(row, 2)[column] * loss_scale(scene)
+    }
+
+    /// Share of the window around the pixels of row `y` that is lit; nothing is lit beyond the borders.
+    pub fn lit<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample(scene.grid, &self.maps, 3, y);
+        row
+    }
+
+    /// Slopes along row `y`.
+    pub fn along<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample(scene.grid, &self.maps, 0, y);
+        row
+    }
+
+    /// Slopes down at row `y`.
+    pub fn down<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
+        let [row] = maps.sample(scene.grid, &self.maps, 1, y);
+        row
+    }
+}
+
+fn loss_scale(scene: &Scene<'_>) -> f32 {
+    (1.0 - 1.0 / (scene.factor * scene.factor) as f32) / (scene.grid.step * scene.grid.step) as f32
+}
+
+/// Adds weights and weighted differences between lit pixels; a difference near half a turn belongs to an edge.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [[Lanes; TERMS]]) {
+    let (here, there) = (here.map(lanes), there.map(lanes));
+    for (i, sums) in sums.iter_mut().enumerate() {
+        let ([phase, lit], [other, other_lit]) = (take(&here, i), take(&there, i));
+        let mut terms = [[0.0; LANES]; 2];
+        for x in 0..LANES {
+            let step = wrap(other[x] - phase[x]);
+            let part = step * (1.0 / PI);
+            let near = 1.0 - part * part;
+            let both = (lit[x] > 0.0) & (other_lit[x] > 0.0);
+            let weight = if both { near * near } else { 0.0 };
+            (terms[0][x], terms[1][x]) = (weight, weight * step);
+        }
+        for x in 0..LANES {
+            sums[to[0]][x] += terms[0][x];
+            sums[to[1]][x] += terms[1][x];
+        }
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn add_lit(modulation: &[f32], sums: &mut [[Lanes; TERMS]]) {
+    for (sums, modulation) in sums.iter_mut().zip(lanes(modulation)) {
+        for x in 0..LANES {
+            sums[TERMS - 1][x] += if modulation[x] > 0.0 { 1.0 } else { 0.0 };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::Grid;
+    use super::*;
+
+    #[test]
+    fn refined_slopes_follow_the_surface_and_stay_where_little_is_seen() {
+        let grid = Grid::new([96, 256], 4.0);
+        let wave = std::f32::consts::TAU / 50.0;
+        let phase: Vec<f32> = (0..grid.pixels())
+            .map(|i| {
+                let x = (i % 256) as f32;
+                0.25 * x + (wave * x).sin()
+            })
+            .collect();
+        // Beyond column 160 the surface is lost but for what only the wide window reaches.
+        let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % 256 < 160))).collect();
+        let light = vec![0.5; grid.pixels()];
+        let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
+        let mut slopes = Slopes::default();
+        slopes.measure(&scene, &phase, &lit);
+        let (before, beyond) = (slopes.maps.line(12, 0).to_vec(), slopes.at(12, 44));
+        slopes.refine(&scene, &phase, &lit);
+        let after = slopes.maps.line(12, 0);
+        let truth = |column: usize| 4.0 * (0.25 + wave * (wave * (4.0 * column as f32 + 2.0)).cos());
+        let worst =
+            |line: &[f32]| (8..32).map(|column| (line[column] - truth(column)).abs()).fold(0.0, f32::max);
+        assert!(worst(after) < 0.45 * worst(&before), "{} {}", worst(after), worst(&before));
+        for k in 0..2 {
+            assert!((slopes.at(12, 44)[k] - beyond[k]).abs() < 0.02, "{:?} {beyond:?}", slopes.at(12, 44));
+        }
+        assert!(beyond[0] > 0.5, "{beyond:?}");
+    }
+}

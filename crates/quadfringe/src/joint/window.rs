@@ -1,0 +1,413 @@
+//! A smoothing window that follows the local slope of the phase and stops at edges.
+//!
+//! Neighbours count as far as their phase fits the slope through the pixel within the noise (a bilateral window,
+//! Tukey's biweight), first along rows and then along columns; what is added up are the normal equations of a
+//! Gauss-Newton step, so that every neighbour counts by what it knows.
+
+use super::cells::RowMaps;
+use super::residuals::Residuals;
+use super::scene::Scene;
+use super::slopes::Slopes;
+use crate::parallel::angle::wrap;
+use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
+use crate::parallel::slots::Slots;
+use multiversion::multiversion;
+use rayon::prelude::*;
+use std::f32::consts::TAU;
+
+/// Width (sigma) of the window in fringe periods.
+const WIDTH: f32 = 0.125;
+/// Width (sigma) of a window that averages over what wrong backgrounds do to the phase, in fringe periods.
+const WIDE: f32 = 0.5;
+/// Neighbours further off than this many noise widths belong to another surface.
+const REACH_SIGMAS: f32 = 7.0;
+/// The same for a capture without noise.
+const REACH_RAD: f32 = 0.06;
+/// Rows that one task works on.
+const BLOCK: usize = 32;
+/// One pixel in so many is asked for the noise.
+const NOISE_STRIDE: usize = 13;
+
+/// The window of one shot.
+#[derive(Clone, Copy)]
+pub(crate) struct Window<'a> {
+    scene: &'a Scene<'a>,
+    slopes: &'a Slopes,
+    modulation: &'a [f32],
+    /// Neighbours to each side, and their distance from one to the next in pixels.
+    radius: usize,
+    spacing: usize,
+    sigma: f32,
+    noise: f32,
+    residuals: Option<&'a Residuals>,
+}
+
+/// A phase averaged along rows, and its weight.
+#[derive(Clone, Copy)]
+pub(crate) struct Average<'a> {
+    pub phase: &'a [f32],
+    pub weight: &'a [f32],
+}
+
+/// Rows of one task.
+#[derive(Debug, Default)]
+pub(crate) struct WindowRows {
+    maps: RowMaps,
+    slopes: Vec<f32>,
+    sharpness: Vec<f32>,
+    residuals: RowMaps,
+    weight: Vec<f32>,
+    padded: [Vec<f32>; 4],
+}
+
+impl<'a> Window<'a> {
+    /// A window over a scene whose intensities have `noise` (standard deviation in linear light); `modulation` is 0
+    /// where there is no light.
+    pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
+        let sigma = (WIDTH * scene.period_px as f32).clamp(0.8, 6.0);
+        let radius = (2.0 * sigma).ceil() as usize;
+        Self { scene, slopes, modulation, radius, spacing: 1, sigma, noise, residuals: None }
+    }
+
+    /// Modulation of row `y`, 0 where there is no light.
+    pub fn modulation(&self, y: usize) -> &'a [f32] {
+        self.scene.row(self.modulation, y)
+    }
+
+    /// Share of contrast that is lost in row `y`, see [`Slopes::loss`].
+    pub fn loss<'b>(&self, y: usize, maps: &'b mut RowMaps) -> &'b [f32] {
+        self.slopes.loss(self.scene, y, maps)
+    }
+
+    /// The same with a reach of two pixels, enough on the way to a solution.
+    pub fn near(self) -> Self {
+        Self { radius: self.radius.min(2), ..self }
+    }
+
+    /// The same with a reach of a whole fringe: what wrong backgrounds do to the phase changes its sign along a fringe.
+    pub fn wide(self) -> Self {
+        let sigma = WIDE * self.scene.period_px as f32;
+        // A third of sigma apart neighbours still add up to a smooth window.
+        let spacing = (sigma / 3.0).max(1.0) as usize;
+        Self { sigma, spacing, radius: (2.0 * sigma / spacing as f32).ceil() as usize, ..self }
+    }
+
+    /// The same where the model leaves `residuals` above the noise: phases of one surface differ by as much there.
+    pub fn loosened(self, residuals: &'a Residuals) -> Self {
+        Self { residuals: Some(residuals), ..self }
+    }
+
+    /// Average along row `y` of a phase. `measure` writes the normal equations of a step of it, `numerator / denominator` and 0
+    /// where there is nothing to measure by; `out` receives phase plus mean step, and weight.
+    pub fn along(
+        &self,
+        y: usize,
+        rows: &mut WindowRows,
+        phase: &[f32],
+        measure: impl FnOnce([&mut [f32]; 2]),
+        out: [&mut [f32]; 2],
+    ) {
+        let (grid, reach) = (self.scene.grid, self.reach());
+        let WindowRows { maps, sharpness, residuals, padded, .. } = rows;
+        let slope = self.slopes.along(self.scene, y, maps);
+        self.sharpen(y, residuals, sharpness);
+        let inner = padded.each_mut().map(|row| {
+            row.resize(2 * reach + grid.stride, 0.0);
+            // What another window has left beside the row is nothing to measure by.
+            let (before, rest) = row.split_at_mut(reach);
+            let (inner, behind) = rest.split_at_mut(grid.stride);
+            before.fill(0.0);
+            behind.fill(0.0);
+            inner
+        });
+        let [phases, slopes, numerator, denominator] = inner;
+        phases.copy_from_slice(phase);
+        slopes.copy_from_slice(slope);
+        measure([numerator, denominator]);
+        let padded = padded.each_ref().map(Vec::as_slice);
+        let taps = self.taps(0..2 * self.radius + 1);
+        average_along((&taps, self.spacing), padded, [phase, slope, sharpness], out);
+    }
+
+    /// Furthest neighbour in pixels.
+    fn reach(&self) -> usize {
+        self.spacing * self.radius
+    }
+
+    /// Half distances in cells and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
+    fn taps(&self, numbers: std::ops::Range<usize>) -> Vec<[f32; 2]> {
+        let distance = |k: usize| self.spacing as f32 * (k as f32 - self.radius as f32);
+        let half = 0.5 / self.scene.grid.step as f32;
+        numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
+    }
+
+    /// Average along columns what [`Self::along`] left; rows of `information` receive the weights that the window
+    /// has added up, each as many as it holds.
+    pub fn down<T: Default + Send>(
+        &self,
+        average: &Average<'_>,
+        slots: &Slots<T>,
+        rows: impl Fn(&mut T) -> &mut WindowRows + Sync,
+        phase: &mut [f32],
+        information: &mut [&mut [f32]],
+    ) {
+        let stride = self.scene.grid.stride;
+        let out = phase.par_chunks_mut(BLOCK * stride).zip(information.par_chunks_mut(BLOCK));
+        out.enumerate().for_each_init(
+            || slots.take(),
+            |slot, (block, (phase, information))| {
+                let first = block * BLOCK;
+                let rows = rows(slot);
+                self.slopes_down(first, phase.len() / stride, rows);
+                let mut weight = std::mem::take(&mut rows.weight);
+                weight.resize(stride, 0.0);
+                for (i, (phase, information)) in phase.chunks_exact_mut(stride).zip(information).enumerate() {
+                    self.row_down(average, first + i, i, rows, [phase, &mut weight]);
+                    information.copy_from_slice(&weight[..information.len()]);
+                }
+                rows.weight = weight;
+            },
+        );
+    }
+
+    /// Sum of squared weights over the sum of weights, for a window that lies on one surface, or is cut in half by an edge:
+    /// noise of the mean is this share of noise over information.
+    pub fn share(&self) -> f32 {
+        let taps = self.taps(0..2 * self.radius + 1);
+        let [squares, sum] = [2, 1].map(|power| taps.iter().map(|[_, near]| near.powi(power)).sum::<f32>());
+        (squares / sum).powi(2)
+    }
+
+    /// Slopes of the rows that `count` rows from `first` on need.
+    fn slopes_down(&self, first: usize, count: usize, rows: &mut WindowRows) {
+        let (stride, reach) = (self.scene.grid.stride, self.reach());
+        rows.slopes.resize((BLOCK + 2 * reach) * stride, 0.0);
+        for (k, line) in rows.slopes.chunks_exact_mut(stride).take(count + 2 * reach).enumerate() {
+            let y = (first + k).saturating_sub(reach).min(self.scene.grid.height - 1);
+            line.copy_from_slice(self.slopes.down(self.scene, y, &mut rows.maps));
+        }
+    }
+
+    /// Row `y`, number `index` of its block.
+    fn row_down(
+        &self,
+        average: &Average<'_>,
+        y: usize,
+        index: usize,
+        rows: &mut WindowRows,
+        out: [&mut [f32]; 2],
+    ) {
+        let grid = self.scene.grid;
+        self.sharpen(y, &mut rows.residuals, &mut rows.sharpness);
+        let slope = |k: usize| &rows.slopes[(index + self.spacing * k) * grid.stride..][..grid.stride];
+        // Neighbours inside the image.
+        let [above, below] = [y, grid.height - 1 - y].map(|rows| (rows / self.spacing).min(self.radius));
+        let inside = self.radius - above..self.radius + below + 1;
+        let there: Vec<[&[f32]; 3]> = (inside.clone())
+            .map(|k| {
+                let row = y + self.spacing * k - self.reach();
+                [self.scene.row(average.phase, row), self.scene.row(average.weight, row), slope(k)]
+            })
+            .collect();
+        let here = [self.scene.row(average.phase, y), slope(self.radius), &rows.sharpness];
+        average_down(&self.taps(inside), &there, here, out);
+    }
+
+    /// How sharply a misfit counts at every pixel of a row: one over the square of what still belongs to the surface.
+    fn sharpen(&self, y: usize, maps: &mut RowMaps, sharpness: &mut Vec<f32>) {
+        sharpness.clear();
+        match self.residuals {
+            None => sharpness.resize(self.scene.grid.stride, 0.0),
+            Some(residuals) => sharpness.extend_from_slice(residuals.row(self.scene, y, maps)),
+        }
+        sharpen(self.modulation(y), self.noise, sharpness);
+    }
+}
+
+/// Mean square residuals become what [`Window::sharpen`] says.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn sharpen(modulation: &[f32], noise: f32, squares: &mut [f32]) {
+    for (square, &modulation) in squares.iter_mut().zip(modulation) {
+        let light = if modulation > 1e-6 { modulation } else { 1e-6 };
+        let missed = if *square > noise * noise { *square } else { noise * noise };
+        let reach = REACH_SIGMAS * REACH_SIGMAS * missed / (light * light);
+        let reach = if reach > REACH_RAD * REACH_RAD { reach } else { REACH_RAD * REACH_RAD };
+        *square = 1.0 / if reach < TAU * TAU { reach } else { TAU * TAU };
+    }
+}
+
+/// Weight of a neighbour `d` off the slope between two pixels.
+#[inline(always)]
+fn fit(d: f32, sharpness: f32) -> f32 {
+    let miss = 1.0 - d * d * sharpness;
+    let fits = if miss > 0.0 { miss } else { 0.0 };
+    fits * fits
+}
+
+/// Average over neighbours along a row, as far as they fit: the phase between two pixels is the mean of their slopes
+/// times their distance, which is exact for a surface of constant curvature.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn average_along(
+    (taps, spacing): (&[[f32; 2]], usize),
+    there: [&[f32]; 4],
+    here: [&[f32]; 3],
+    out: [&mut [f32]; 2],
+) {
+    let here = here.map(lanes);
+    let mut out = out.map(lanes_mut);
+    for i in 0..here[0].len() {
+        let [phase, slope, sharpness] = take(&here, i);
+        let mut sums = [[0.0; LANES]; 2];
+        for (k, &[half, near]) in taps.iter().enumerate() {
+            let from = i * LANES + k * spacing;
+            let [other, other_slope, numerator, denominator]: [&Lanes; 4] =
+                there.map(|row| row[from..].first_chunk().expect("rows are padded"));
+            for x in 0..LANES {
+                let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
+                let weight = near * fit(d, sharpness[x]);
+                let known = weight * denominator[x];
+                sums[0][x] += weight * numerator[x] + known * d;
+                sums[1][x] += known;
+            }
+        }
+        let mut found = [phase, sums[1]];
+        for x in 0..LANES {
+            found[0][x] += sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
+        }
+        put(&mut out, i, &found);
+    }
+}
+
+/// The same along columns, over `there`: phase, weight and slope of every neighbouring row.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out: [&mut [f32]; 2]) {
+    let here = here.map(lanes);
+    let mut out = out.map(lanes_mut);
+    for i in 0..here[0].len() {
+        let [phase, slope, sharpness] = take(&here, i);
+        let mut sums = [[0.0; LANES]; 2];
+        for (&[half, near], there) in taps.iter().zip(there) {
+            let [other, weight, other_slope]: [&Lanes; 3] = there.map(|row| &lanes(row)[i]);
+            for x in 0..LANES {
+                let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
+                let known = near * fit(d, sharpness[x]) * weight[x];
+                sums[0][x] += known * d;
+                sums[1][x] += known;
+            }
+        }
+        let mut found = [phase, sums[1]];
+        for x in 0..LANES {
+            found[0][x] += sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
+        }
+        put(&mut out, i, &found);
+    }
+}
+
+/// Standard deviation of the intensities, from the second differences of the phase: slopes and most curvature drop out.
+pub(crate) fn noise(scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) -> f32 {
+    let grid = scene.grid;
+    let mut seen: Vec<f32> = (0..phase.len())
+        .step_by(NOISE_STRIDE)
+        .filter(|i| (1..grid.width - 1).contains(&(i % grid.stride)))
+        .filter(|&i| modulation[i - 1].min(modulation[i]).min(modulation[i + 1]) > 0.0)
+        .map(|i| {
+            let bend = wrap(wrap(phase[i + 1] - phase[i]) - wrap(phase[i] - phase[i - 1]));
+            bend.abs() * modulation[i]
+        })
+        .collect();
+    if seen.is_empty() {
+        return 0.0;
+    }
+    let middle = seen.len() / 2;
+    let (_, median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
+    *median / (0.6745 * 6f32.sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::Grid;
+    use super::*;
+
+    /// A phase averaged by a window that counts every pixel alike.
+    fn averaged(window: &Window<'_>, seen: &[f32]) -> Vec<f32> {
+        let grid = window.scene.grid;
+        let (mut along, mut weight) = (seen.to_vec(), vec![1.0; grid.pixels()]);
+        let mut rows = WindowRows::default();
+        let lines = along.chunks_mut(grid.stride).zip(weight.chunks_mut(grid.stride));
+        for (y, (phase, weight)) in lines.enumerate() {
+            let level = |[numerator, denominator]: [&mut [f32]; 2]| {
+                numerator.fill(0.0);
+                denominator[..grid.width].fill(1.0);
+            };
+            window.along(y, &mut rows, &seen[y * grid.stride..][..grid.stride], level, [phase, weight]);
+        }
+        let average = Average { phase: &along, weight: &weight };
+        let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
+        let mut lines: Vec<_> = information.chunks_mut(grid.stride).collect();
+        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut lines);
+        phase
+    }
+
+    #[test]
+    fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
+        let grid = Grid::new([96, 256], 4.0);
+        // What wrong backgrounds do to a two-step phase, beside a step of 1.3 rad.
+        let truth = |i: usize| 0.25 * (i % 256) as f32 + if i % 256 >= 128 { 1.3 } else { 0.0 };
+        let ripple = |i: usize| 0.05 * (2.0 * truth(i)).sin();
+        let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + ripple(i)).collect();
+        let light = vec![0.5; grid.pixels()];
+        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
+        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+        let mut slopes = Slopes::default();
+        slopes.measure(&scene, &seen, &modulation);
+        let mut residuals = Residuals::default();
+        residuals.measure(&scene, &vec![(0.04f32 * 0.4).powi(2); grid.pixels()], &modulation);
+        let window = || Window::new(&scene, &slopes, &modulation, 1e-4);
+        let worst = |phase: &[f32], columns: std::ops::Range<usize>| {
+            let inside = |i: &usize| (32..64).contains(&(i / 256)) && columns.contains(&(i % 256));
+            let errors = (0..grid.pixels()).filter(inside).map(|i| (phase[i] - truth(i)).abs());
+            errors.fold(0.0, f32::max)
+        };
+        let flat = 40..88;
+        let [narrow, strict, wide] =
+            [window().loosened(&residuals), window().wide(), window().wide().loosened(&residuals)]
+                .map(|window| averaged(&window, &seen));
+        let [narrow, strict, loose] = [&narrow, &strict, &wide].map(|phase| worst(phase, flat.clone()));
+        assert!(loose < 0.012 && strict > 0.04 && narrow > 0.015, "{narrow} {strict} {loose}");
+        // The step is none of it.
+        assert!(worst(&wide, 112..144) < 0.15, "{}", worst(&wide, 112..144));
+    }
+
+    #[test]
+    fn noise_goes_edges_and_curvature_stay() {
+        let grid = Grid::new([64, 128], 4.0);
+        // A curved surface with a step of 1.3 rad.
+        let truth = |i: usize| {
+            let (x, y) = ((i % 128) as f32, (i / 128) as f32);
+            0.25 * x + 1e-3 * (x - 64.0).powi(2) - 8e-4 * (y - 32.0).powi(2)
+                + if x >= 60.0 { 1.3 } else { 0.0 }
+        };
+        let mut state = 1u32;
+        let mut uniform = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + 0.02 * uniform()).collect();
+        let light = vec![0.5; grid.pixels()];
+        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
+        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+        let mut slopes = Slopes::default();
+        slopes.measure(&scene, &seen, &modulation);
+        let window = Window::new(&scene, &slopes, &modulation, noise(&scene, &seen, &modulation));
+        let phase = averaged(&window, &seen);
+        let error = |i: usize| (phase[i] - truth(i)).abs();
+        let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
+        // Beside the step its rise leaks into the slopes.
+        assert!(worst < 0.05, "{worst}");
+        // Away from step and borders, where the window is whole, noise of 0.0115 rad is down to a fifth.
+        let inside = |i: usize| (16..48).contains(&(i / 128)) && (76..112).contains(&(i % 128));
+        let errors: Vec<f32> = (0..grid.pixels()).filter(|&i| inside(i)).map(|i| error(i).powi(2)).collect();
+        let rms = (errors.iter().sum::<f32>() / errors.len() as f32).sqrt();
+        assert!(rms < 0.0022, "{rms}");
+    }
+}

@@ -1,0 +1,275 @@
+//! Fringe orders by the light of both projectors where they really stand.
+
+use crate::FringeCode;
+use crate::parallel::angle::{round, wrap_positive};
+use std::f32::consts::TAU;
+
+/// Pixels that are searched together.
+const BLOCK: usize = 64;
+
+/// What is known of the rays of a row of pixels, an entry for each pixel.
+#[derive(Debug, Clone, Copy)]
+pub struct RayRow<'a> {
+    /// The infrared phase in rad as a cubic of the first absolute phase, from the constant term up.
+    pub infrared: [&'a [f32]; 4],
+    /// Least and greatest first absolute phase in rad that a surface on the ray can have, no farther apart than the field
+    /// is wide; NaN where there is none.
+    pub range_rad: [&'a [f32]; 2],
+}
+
+impl RayRow<'_> {
+    /// The infrared phase in rad, not wrapped, at a pixel of the row whose first absolute phase is known.
+    #[must_use]
+    pub fn infrared_rad(&self, column: usize, phase_rad: f32) -> f32 {
+        let [e0, e1, e2, e3] = self.infrared.map(|line| line[column]);
+        e0 + phase_rad * (e1 + phase_rad * (e2 + phase_rad * e3))
+    }
+}
+
+/// Orders of one pixel at a time, searched along the camera ray: each candidate is a point of the ray, which both
+/// projectors light with phases that are known. The one that the second and third phase agree with best wins, whether
+/// the projectors are coaxial or not.
+///
+/// Where the beat of the first two fringe numbers has one fringe over the field, it says which candidates are near: those
+/// farther away than half a beat of the third number cannot win.
+#[derive(Debug, Clone)]
+pub(crate) struct AlongRay {
+    /// Second fringe number over the first.
+    ratio: f32,
+    /// Square of the distance of neighbouring candidates, turns.
+    apart: f32,
+    near: Option<Near>,
+}
+
+/// How the beat of the first two phases leads to candidates.
+#[derive(Debug, Clone, Copy)]
+struct Near {
+    /// 1, or -1 when the second number is the greater.
+    sign: f32,
+    /// Orders after which all phases but the infrared one repeat.
+    cycle: f32,
+    /// Candidates to either side.
+    reach: i32,
+}
+
+impl Near {
+    fn of([first, second, third]: [f64; 3]) -> Option<Self> {
+        let whole = first.fract() == 0.0 && (first - second).abs() == 1.0;
+        let reach = (0.5 * first / (first - third).abs()).ceil();
+        let shorter = 2.0 * reach + 1.0 < first;
+        (whole && shorter).then_some(Self {
+            sign: (first - second) as f32,
+            cycle: first as f32,
+            reach: reach as i32,
+        })
+    }
+}
+
+/// The least and the second least cost of the candidates of a block of pixels so far, as bits, which grow with a number that
+/// is not negative: of a choice between two of them a compiler makes no masked stores, as it does with floating-point numbers.
+struct Best {
+    least: [u32; BLOCK],
+    next: [u32; BLOCK],
+}
+
+impl AlongRay {
+    pub fn new(code: &FringeCode) -> Self {
+        let numbers = code.numbers();
+        let apart = code.ambiguity_margin_rad() as f32 / TAU;
+        let ratio = (numbers[1] / numbers[0]) as f32;
+        Self { ratio, apart: apart * apart, near: Near::of(numbers) }
+    }
+
+    /// Order a row of pixels: absolute phase, and 1 when the second and third phase are met exactly, 0 when another
+    /// candidate is as good; NaN in, NaN out, and where no candidate lies on the ray.
+    #[inline(always)]
+    pub fn order_row(&self, wrapped: [&[f32]; 3], rays: &RayRow<'_>, phase: &mut [f32], margin: &mut [f32]) {
+        let out = phase.chunks_mut(BLOCK).zip(margin.chunks_mut(BLOCK));
+        for (block, (phase, margin)) in out.enumerate() {
+            let at = block * BLOCK..block * BLOCK + phase.len();
+            let wrapped = wrapped.map(|row| &row[at.clone()]);
+            let rays = RayRow {
+                infrared: rays.infrared.map(|row| &row[at.clone()]),
+                range_rad: rays.range_rad.map(|row| &row[at.clone()]),
+            };
+            let mut best = Best::beyond(self.apart);
+            match self.near {
+                Some(near) => self.ask_near(near, wrapped, &rays, &mut best, phase),
+                None => self.ask_all(wrapped, &rays, &mut best, phase),
+            }
+            best.settle(phase, margin);
+        }
+    }
+
+    /// The candidates that the beat of the first two phases leads to.
+    #[inline(always)]
+    fn ask_near(
+        &self,
+        near: Near,
+        wrapped: [&[f32]; 3],
+        rays: &RayRow<'_>,
+        best: &mut Best,
+        phase: &mut [f32],
+    ) {
+        let ([first, second, _], [low, high]) = (wrapped, rays.range_rad);
+        let mut start = [0.0; BLOCK];
+        for i in 0..phase.len() {
+            let own = wrap_positive(first[i]);
+            let coarse = wrap_positive((first[i] - second[i]) * near.sign) * near.cycle;
+            start[i] = own + TAU * round((coarse - own) * (1.0 / TAU));
+        }
+        let cycle = TAU * near.cycle;
+        for step in -near.reach..=near.reach {
+            let turns = TAU * step as f32;
+            let guess = |i: usize| {
+                // The ends of the field look alike to the beat.
+                let guess = start[i] + turns;
+                let guess = if guess > high[i] { guess - cycle } else { guess };
+                if guess < low[i] { guess + cycle } else { guess }
+            };
+            self.ask(guess, wrapped, rays, best, phase);
+        }
+    }
+
+    /// Every order that a pixel of the block can have.
+    #[inline(always)]
+    fn ask_all(&self, wrapped: [&[f32]; 3], rays: &RayRow<'_>, best: &mut Best, phase: &mut [f32]) {
+        let [low, high] = rays.range_rad;
+        let low = low.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let high = high.iter().fold(0.0, |a: f32, b| a.max(*b));
+        for order in (low / TAU).floor() as i32 - 1..(high / TAU).ceil() as i32 {
+            let turns = TAU * order as f32;
+            self.ask(|i| wrap_positive(wrapped[0][i]) + turns, wrapped, rays, best, phase);
+        }
+    }
+
+    /// One candidate for each pixel.
+    #[inline(always)]
+    fn ask(
+        &self,
+        guess: impl Fn(usize) -> f32,
+        wrapped: [&[f32]; 3],
+        rays: &RayRow<'_>,
+        best: &mut Best,
+        phase: &mut [f32],
+    ) {
+        let ([_, second, third], [low, high]) = (wrapped, rays.range_rad);
+        let [e0, e1, e2, e3] = rays.infrared;
+        for i in 0..phase.len() {
+            let guess = guess(i);
+            let infrared = e0[i] + guess * (e1[i] + guess * (e2[i] + guess * e3[i]));
+            let cost = miss(guess * self.ratio, second[i]) + miss(infrared, third[i]);
+            let on_the_ray = (guess >= low[i]) & (guess <= high[i]);
+            let cost = if on_the_ray { cost } else { f32::INFINITY };
+            let cost = cost.to_bits();
+            let least = best.least[i];
+            best.next[i] = best.next[i].min(cost.max(least));
+            best.least[i] = least.min(cost);
+            phase[i] = if cost < least { guess } else { phase[i] };
+        }
+    }
+}
+
+impl Best {
+    /// Before the first candidate, for pixels of which a second one is no farther than `apart`.
+    #[inline(always)]
+    fn beyond(apart: f32) -> Self {
+        Self { least: [f32::INFINITY.to_bits(); BLOCK], next: [apart.to_bits(); BLOCK] }
+    }
+
+    /// Margins, and no data where there was no candidate.
+    #[inline(always)]
+    fn settle(&self, phase: &mut [f32], margin: &mut [f32]) {
+        for (i, (phase, margin)) in phase.iter_mut().zip(margin).enumerate() {
+            let [least, next] = [&self.least, &self.next].map(|costs| f32::from_bits(costs[i]));
+            let found = least.is_finite();
+            let lead = 1.0 - (least / next.max(f32::MIN_POSITIVE)).sqrt();
+            *phase = if found { *phase } else { f32::NAN };
+            *margin = if found { lead.max(0.0) } else { f32::NAN };
+        }
+    }
+}
+
+/// Squared difference of two angles in turns, whole turns left out.
+#[inline(always)]
+fn miss(predicted: f32, seen: f32) -> f32 {
+    let turns = (predicted - seen) * (1.0 / TAU);
+    let rest = turns - round(turns);
+    rest * rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::parallel::angle::wrap;
+
+    const COAXIAL: [f32; 4] = [0.0, 30.0 / 36.0, 0.0, 0.0];
+    const APART: [f32; 4] = [4.0, 0.85, -1e-4, 1e-7];
+
+    fn optimum() -> AlongRay {
+        AlongRay::new(&FringeCode::optimum(36, 912).expect("valid code"))
+    }
+
+    /// Phase and margin of a pixel at the absolute phase `truth`, whose phases stray by `noise`.
+    fn search(
+        way: &AlongRay,
+        infrared: [f32; 4],
+        range: [f32; 2],
+        truth: f32,
+        noise: [f32; 3],
+    ) -> (f32, f32) {
+        let [e0, e1, e2, e3] = infrared;
+        let seen = e0 + truth * (e1 + truth * (e2 + truth * e3));
+        let exact = [truth, truth * way.ratio, seen];
+        let wrapped: [[f32; 1]; 3] = std::array::from_fn(|i| [wrap(exact[i] + noise[i])]);
+        let (coefficients, range) = (infrared.map(|v| [v]), range.map(|v| [v]));
+        let rays = RayRow {
+            infrared: coefficients.each_ref().map(|v| v.as_slice()),
+            range_rad: range.each_ref().map(|v| v.as_slice()),
+        };
+        let (mut phase, mut margin) = ([0.0], [0.0]);
+        way.order_row(wrapped.each_ref().map(|v| v.as_slice()), &rays, &mut phase, &mut margin);
+        (phase[0], margin[0])
+    }
+
+    #[test]
+    fn a_pair_that_is_far_from_coaxial_is_ordered_right() {
+        let other = FringeCode::new([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920).expect("valid code");
+        let backwards = FringeCode::new([35.0, 36.0, 30.0], 912).expect("valid code");
+        for way in [optimum(), AlongRay::new(&other), AlongRay::new(&backwards)] {
+            for i in 0..1990 {
+                let truth = 0.11 * i as f32;
+                let (phase, margin) = search(&way, APART, [-0.3, 219.5], truth, [0.0; 3]);
+                assert!((phase - truth).abs() < 1e-3 && margin > 0.97, "{way:?} {truth}: {phase} {margin}");
+            }
+        }
+    }
+
+    #[test]
+    fn near_candidates_are_as_good_as_all() {
+        let near = optimum();
+        let all = AlongRay { near: None, ..near.clone() };
+        assert!(near.near.is_some());
+        for i in 0..4000 {
+            let truth = 0.0564 * i as f32 + 0.12;
+            let stray = |k: f32| 0.12 * (k * i as f32).sin();
+            let noise = [stray(1.3), stray(2.7), stray(3.9)];
+            let found = [&near, &all].map(|way| search(way, APART, [-0.124, 226.07], truth, noise));
+            assert!((found[0].0 - found[1].0).abs() < 1e-3, "{truth}: {found:?}");
+            assert!((found[0].0 - truth).abs() < 0.5, "{truth}: {found:?}");
+        }
+    }
+
+    #[test]
+    fn candidates_end_with_the_ray() {
+        for way in [optimum(), AlongRay { near: None, ..optimum() }] {
+            let none = [0.0; 3];
+            let (phase, margin) = search(&way, COAXIAL, [60.0, 90.0], 100.0, none);
+            assert!(phase.is_nan() || ((60.0..=90.0).contains(&phase) && margin < 0.2), "{phase} {margin}");
+            for range in [[f32::NAN, f32::NAN], [99.0, 99.5]] {
+                assert!(search(&way, COAXIAL, range, 100.0, none).0.is_nan());
+            }
+            assert!(search(&way, COAXIAL, [0.0, 226.0], f32::NAN, none).0.is_nan());
+        }
+    }
+}
