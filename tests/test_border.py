@@ -210,7 +210,7 @@ def test_values_that_are_not_finite_are_refused(images: Four, value: float) -> N
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"method": "magic"}, 'method: expected published or best, got "magic"'),
+        ({"method": "magic"}, 'method: expected published or joint, got "magic"'),
         ({"modulation_min": 2.0}, "modulation_min"),
         ({"quality_min": -1.0}, "quality_min"),
         ({"period_px": 1.0}, "period_px"),

@@ -219,13 +219,13 @@ class DecodeConfig(Model):
     """Settings of the decoder; what is absent takes the kernel's default.
 
     `channel_instants_us` are the instants at which R, G, B and IR are seen, from the one that the shape stands for: a
-    projector that shows its colours one after another needs them when the surface moves. Method "best" alone has it.
+    projector that shows its colours one after another needs them when the surface moves. Method "joint" alone has it.
     `unwrapping` says what the infrared light is taken for: "coaxial" with the visible (as published, and when absent),
     or where the calibrated "pair" really puts it, so that the order is searched along the camera ray of each pixel,
     at depths within `depth_range_mm` (nearest, farthest) when given.
     """
 
-    method: Literal["published", "best"] | None = None
+    method: Literal["published", "joint", "best"] | None = None
     unwrapping: Literal["coaxial", "pair"] | None = None
     depth_range_mm: tuple[NotNegative, Positive] | None = None
     modulation_min: NotNegative | None = None

@@ -23,7 +23,7 @@ RETURNED_MIN = 0.05  # share of lit pixels that must come back
 # Median order margin of the lit pixels. Sound shots leave above 0.75, and the published way 0.4 when the response is
 # not corrected; channels exchanged leave at most 0.44 (best) and 0.49 (published); other fringe numbers 0.5 to the
 # best way and 0.3 to the ladder.
-COLLAPSED = {"best": 0.55, "published": 0.35}
+COLLAPSED = {"joint": 0.55, "best": 0.55, "published": 0.35}
 DOUBTFUL = 0.6
 CLEARLY_BETTER = 1.2  # ratio of margins that tells channels are exchanged
 
