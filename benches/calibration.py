@@ -31,7 +31,7 @@ from quadfringe.calibration.detect import View
 from quadfringe.calibration.levels import dark_level, mean_levels
 from quadfringe.calibration.projector import StepPlan
 from quadfringe.calibration.rehearsal import board_poses, rehearse
-from quadfringe.calibration.session.virtual import BenchCaptures
+from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.calibration.targets import Target, ring_board
 from quadfringe.config import DeviceModel, Fringes, SceneConfig, SystemConfig
 from quadfringe.data import core_device
@@ -155,7 +155,7 @@ def light_figures() -> dict[str, float]:
     """Calibrate responses and crosstalk of a bench with gamma 2.2 and 15 % each way, and give what is left."""
     mixed = tuple(tuple(1.0 if i == j else 0.15 for j in range(4)) for i in range(4))
     light = {"crosstalk": mixed, "projector_exponent": 2.2, "noise": 0.01, "gain": 0.6, "ambient": 0.01, "seed": 1}
-    captures = BenchCaptures(SystemConfig(scene=SceneConfig.model_validate(light | {"camera_offset": 0.02})))
+    captures = VirtualCaptures(SystemConfig(scene=SceneConfig.model_validate(light | {"camera_offset": 0.02})))
     dark = dark_level([captures.shot("dark", name) for name in captures.session.captures("dark")]).level
     plan = captures.session.level_plan
     seen = np.array([mean_levels(captures.shot("levels", name)) for name in plan.names])

@@ -14,7 +14,7 @@ import tempfile
 from pathlib import Path
 from time import perf_counter
 
-from quadfringe.evaluation.simulate import bench_config, write_simulation
+from quadfringe.evaluation.simulate import virtual_bench_config, write_simulation
 from quadfringe.files import figures_text
 
 BAR_S = 1.5
@@ -27,7 +27,7 @@ def main() -> int:
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write_simulation(folder, bench_config(None))
+        write_simulation(folder, virtual_bench_config(None))
         times_s = [decode_once(folder) for _ in range(REPEATS)]
     best_s = min(times_s)
     print(f"first frame: best {best_s:.2f} s, worst {max(times_s):.2f} s of {REPEATS}; bar {BAR_S} s")

@@ -32,7 +32,7 @@ from matplotlib.colors import LightSource
 from matplotlib.figure import Figure
 
 import quadfringe as qf
-from quadfringe.evaluation.film import hand_system
+from quadfringe.evaluation.moving_scene import hand_system
 from quadfringe.view.viewer import Viewer
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -37,9 +37,9 @@ noise = 0.01
 @pytest.fixture(scope="session")
 def small_bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with one simulated shot of 512 x 384 pixels as files, its system file, calibration and truth."""
-    from quadfringe.evaluation.simulate import bench_config, write_simulation
+    from quadfringe.evaluation.simulate import virtual_bench_config, write_simulation
 
     folder = tmp_path_factory.mktemp("bench")
     (folder / "system.toml").write_text(SMALL_SYSTEM)
-    write_simulation(folder, bench_config(folder / "system.toml"))
+    write_simulation(folder, virtual_bench_config(folder / "system.toml"))
     return folder

@@ -19,7 +19,7 @@ import resource, signal, sys
 sys.path.insert(0, sys.argv[1])
 from takes import numbered_shot
 from quadfringe.recording import RecordingWriter
-from quadfringe.recording.layout import Header
+from quadfringe.recording._layout import Header
 path, limit, height, width = sys.argv[2], *map(int, sys.argv[3:])
 if limit:
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)

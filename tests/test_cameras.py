@@ -12,8 +12,9 @@ from typer.testing import CliRunner
 from quadfringe.cli.app import app
 from quadfringe.config import SystemConfig, checked
 from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig, capture_config
-from quadfringe.devices.aravis import _gi, profiles
-from quadfringe.devices.aravis.formats import FORMATS, format_named
+from quadfringe.devices.aravis import _gi
+from quadfringe.devices.aravis import _profiles as profiles
+from quadfringe.devices.aravis._formats import FORMATS, format_named
 from quadfringe.devices.emulator.frames import TestPattern, packed
 from quadfringe.errors import CameraError, CameraNotFoundError, ConfigError, MissingExtraError
 

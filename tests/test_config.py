@@ -127,5 +127,5 @@ def test_projectors_at_fault_are_named(visible: dict[str, object], infrared: dic
 
 def test_a_virtual_camera_is_not_sold_as_a_real_one() -> None:
     config = checked(SystemConfig, {"projectors": {"visible": VISIBLE, "infrared": INFRARED}}, "s.toml")
-    with pytest.raises(ConfigError, match="the camera of the virtual bench cannot see them"):
+    with pytest.raises(ConfigError, match="the virtual camera cannot see real projectors"):
         open_system(config)

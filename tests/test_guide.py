@@ -11,9 +11,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from quadfringe.calibration.session import FolderCaptures, Guided, Session, guide, take_captures
-from quadfringe.calibration.session.live import exposed
+from quadfringe.calibration.session.acquisition import exposed
 from quadfringe.calibration.session.pictures import write_pictures
-from quadfringe.calibration.session.virtual import BenchCaptures
+from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
 from quadfringe.config.cameras import AravisConfig, ReplayConfig
@@ -61,7 +61,7 @@ def told() -> list[str]:
 
 @pytest.fixture(scope="module")
 def guided(told: list[str]) -> Guided:
-    return guide(BenchCaptures(CONFIG, SESSION), told.append)
+    return guide(VirtualCaptures(CONFIG, SESSION), told.append)
 
 
 def test_every_step_is_good(guided: Guided, told: list[str]) -> None:
@@ -111,7 +111,7 @@ def test_the_pictures_are_drawn(guided: Guided, tmp_path: Path) -> None:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Dark shots and levels of the bench as files, and no more."""
     place = tmp_path_factory.mktemp("session") / "captures"
-    BenchCaptures(CONFIG, SESSION).write(place, ("dark", "levels"))
+    VirtualCaptures(CONFIG, SESSION).write(place, ("dark", "levels"))
     return place
 
 
@@ -132,12 +132,12 @@ def test_a_folder_gives_what_the_bench_gave(folder: Path, guided: Guided) -> Non
 
 def test_pose_images_of_a_folder_give_what_the_bench_gave(tmp_path: Path) -> None:
     session = SESSION.model_copy(update={"poses": 4, "phase_steps": 4})
-    captures = BenchCaptures(CONFIG, session)
+    captures = VirtualCaptures(CONFIG, session)
     captures.session.save(tmp_path / "session.json")
     (tmp_path / "poses" / "01").mkdir(parents=True)
     captures._write_pose(tmp_path / "poses" / "01", "01")
     maps = FolderCaptures(tmp_path).pose("01")
-    expected = BenchCaptures(CONFIG, session).pose("01")
+    expected = VirtualCaptures(CONFIG, session).pose("01")
     for beam in ("visible", "infrared"):
         np.testing.assert_allclose(maps[beam].column_px, expected[beam].column_px, atol=1e-4)
     missing = FolderCaptures(tmp_path).missing("poses")
@@ -187,8 +187,8 @@ def test_a_plan_is_written_once(tmp_path: Path) -> None:
 # Captures by camera and projectors
 
 
-def planned(folder: Path, **changes: object) -> tuple[Path, BenchCaptures]:
-    captures = BenchCaptures(CONFIG, SESSION.model_copy(update=changes))
+def planned(folder: Path, **changes: object) -> tuple[Path, VirtualCaptures]:
+    captures = VirtualCaptures(CONFIG, SESSION.model_copy(update=changes))
     folder.mkdir()
     captures.session.save(folder / "session.json")
     return folder, captures

@@ -11,7 +11,8 @@ from typer.testing import CliRunner
 
 import quadfringe as qf
 from quadfringe.calibration.acceptance import Acceptance, Artefacts, Limits, accept, measure_artefacts, write_acceptance
-from quadfringe.calibration.fitting import (
+from quadfringe.calibration.height import HeightCalibration, compare_heights, fit_heights, heights_over
+from quadfringe.calibration.surfaces import (
     Sphere,
     dominant_plane,
     dominant_sphere,
@@ -20,7 +21,6 @@ from quadfringe.calibration.fitting import (
     form_of,
     measure_steps,
 )
-from quadfringe.calibration.height import HeightCalibration, compare_heights, fit_heights, heights_over
 from quadfringe.cli import app
 from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
 from quadfringe.devices.virtual import VirtualBench

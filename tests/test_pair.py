@@ -12,14 +12,14 @@ import pytest
 from typer.testing import CliRunner
 
 import quadfringe as qf
-from quadfringe.calibration.pair import AXES, deviated, pair_pose
+from quadfringe.calibration.projector_pair import AXES, deviated, pair_pose
 from quadfringe.cli import app
 from quadfringe.config import DecodeConfig, DeviceModel
 from quadfringe.data import Calibration, device_model
 from quadfringe.decoding import Plan, ShotDecoder
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.evaluation.reproduce import pair_calibration, pair_correction, pair_depth, pair_deviation
-from quadfringe.evaluation.reproduce.pair_bench import ideal_pair, real_pair
+from quadfringe.evaluation.reproduce._deviated_pair import ideal_pair, real_pair
 from quadfringe.evaluation.reproduce.pair_tolerance import tolerances
 from quadfringe.io.images import read_image
 

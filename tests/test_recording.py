@@ -18,7 +18,7 @@ from quadfringe.data import AnyShot, BayerShot, FrameStamp, Stamp
 from quadfringe.devices import open_camera
 from quadfringe.errors import InputError, RecordingError, ShotTimeoutError
 from quadfringe.recording import Recorder, Recording, RecordingWriter, recover
-from quadfringe.recording.layout import Header
+from quadfringe.recording._layout import Header
 from quadfringe.recording.replay import ReplayCamera
 
 

@@ -16,10 +16,10 @@ sys.path.append(str(ROOT / "benches"))
 import calibration as bench
 
 from quadfringe import _core
+from quadfringe.calibration._adjustment import Adjustment, Sight
+from quadfringe.calibration._grid import homography, jacobians
 from quadfringe.calibration.bundle import Pose, RigCalibration, calibrate_camera, calibrate_rig
 from quadfringe.calibration.detect import View
-from quadfringe.calibration.grid import homography, jacobians
-from quadfringe.calibration.model import Adjustment, Sight
 from quadfringe.calibration.poses import DegeneratePosesError
 from quadfringe.calibration.projector import (
     ProjectorMap,

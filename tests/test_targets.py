@@ -13,9 +13,9 @@ import pytest
 from numpy.typing import NDArray
 from typer.testing import CliRunner
 
-from quadfringe.calibration.centres import refined_centres
+from quadfringe.calibration._centres import refined_centres
+from quadfringe.calibration._grid import blobs, homography, symmetries, through
 from quadfringe.calibration.detect import TargetNotFoundError, View, find_target
-from quadfringe.calibration.grid import blobs, homography, symmetries, through
 from quadfringe.calibration.rehearsal import BoardRoom
 from quadfringe.calibration.targets import (
     Target,
@@ -116,7 +116,7 @@ def test_the_middle_of_a_ring_is_not_the_middle_of_its_image() -> None:
     """Nearly without noise: taking the perspective off is what makes the difference."""
     image, truth = seen("circles", TILTS["45 degrees about x"], noise=1e-4, bit_depth=16)
     target = BOARDS["circles"]
-    from quadfringe.calibration import centres
+    from quadfringe.calibration import _centres as centres
 
     right = refined_centres(image, target, truth)
     matrix = homography(target.points_mm[:, :2], truth)

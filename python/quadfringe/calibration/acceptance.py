@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration.fitting import (
+from quadfringe.calibration.surfaces import (
     Form,
     cap_towards_camera,
     dominant_plane,

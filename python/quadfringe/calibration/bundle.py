@@ -14,13 +14,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._adjustment import DEVICES, Adjustment, Sight
+from quadfringe.calibration._initial_values import check_distance, first_values
 from quadfringe.calibration.detect import View
-from quadfringe.calibration.fits import DeviceFit, device_fit, pair_fit
-from quadfringe.calibration.model import DEVICES, Adjustment, Sight
-from quadfringe.calibration.pair import PairPose
+from quadfringe.calibration.device_fit import DeviceFit, device_fit, pair_fit
 from quadfringe.calibration.poses import PoseSpread, check_poses
 from quadfringe.calibration.projector import ProjectorPoints
-from quadfringe.calibration.start import check_distance, first_values
+from quadfringe.calibration.projector_pair import PairPose
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError, InputError
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration.centres import refined_centres
-from quadfringe.calibration.grid import blobs, homography, in_grid_order, jacobians, symmetries, through
+from quadfringe.calibration._centres import refined_centres
+from quadfringe.calibration._grid import blobs, homography, in_grid_order, jacobians, symmetries, through
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError, InputError
 from quadfringe.io.images import full_scale as full_scale_of

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.calibration.fitting import fit_plane
+from quadfringe.calibration.surfaces import fit_plane
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
 from quadfringe.io.export import read_npz, write_npz

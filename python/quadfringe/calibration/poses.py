@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._grid import homography, jacobians
 from quadfringe.calibration.detect import View
-from quadfringe.calibration.grid import homography, jacobians
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError, InputError
 

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, rows, say, write_figures
+from quadfringe.cli._output import JsonOption, rows, say, write_figures
 
 __all__ = ["accept"]
 
@@ -45,7 +45,7 @@ def accept(
     from quadfringe.calibration import acceptance
     from quadfringe.data import Calibration
     from quadfringe.errors import InputError
-    from quadfringe.evaluation.simulate import bench_config
+    from quadfringe.evaluation.simulate import virtual_bench_config
     from quadfringe.files import require_suffix
 
     if out is not None:
@@ -59,7 +59,7 @@ def accept(
         artefacts = acceptance.read_artefacts(*given, sphere_diameter_mm, step_height_mm or [])
     else:
         known = None if calibration is None else Calibration.load(calibration)
-        artefacts = acceptance.measure_artefacts(bench_config(system, noise=None if system else 0.01), known)
+        artefacts = acceptance.measure_artefacts(virtual_bench_config(system, noise=None if system else 0.01), known)
     limits = acceptance.Limits(plane_form_mm, sphere_form_mm, sphere_size_mm, step_mm)
     found = acceptance.accept(artefacts, limits)
     lines = [(line.name, line.value_mm, line.limit_mm, "yes" if line.accepted else "NO") for line in found.lines]

@@ -18,13 +18,15 @@ from quadfringe.cli import (
     doctor,
     info,
     live,
+    measure,
+    pattern,
     projector,
     record,
     reproduce,
+    simulate,
     target,
-    timing,
 )
-from quadfringe.cli.output import complain
+from quadfringe.cli._output import complain
 from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
 __all__ = ["app"]
@@ -79,10 +81,10 @@ def options(
 
 app.command("demo")(demo.demo)
 app.command("target")(target.target)
-app.command("pattern")(bench.pattern)
-app.command("simulate")(bench.simulate)
+app.command("pattern")(pattern.pattern)
+app.command("simulate")(simulate.simulate)
 app.command("decode")(decode.decode)
-app.command("measure")(bench.measure)
+app.command("measure")(measure.measure)
 app.command("live")(live.live)
 app.command("record")(record.record)
 app.command("recover")(record.recover)
@@ -91,7 +93,7 @@ app.command("accept")(accept.accept)
 app.command("doctor")(doctor.doctor)
 app.command("info")(info.info)
 app.command("reproduce")(reproduce.reproduce)
-app.command("bench")(timing.bench)
+app.command("bench")(bench.bench)
 app.add_typer(calibrate.app, name="calibrate")
 app.add_typer(projector.app, name="projector")
 app.add_typer(camera.app, name="camera")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, rows, say, steps, write_figures
+from quadfringe.cli._output import JsonOption, rows, say, steps, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.recording.batch import Outcome

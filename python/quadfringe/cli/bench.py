@@ -1,88 +1,100 @@
-"""`pattern`, `simulate`, `measure`: the fringes, a simulated shot of them, and the whole way at once."""
+"""`quadfringe bench`: how fast this machine decodes, and what a decoder holds in memory."""
 
 from __future__ import annotations
 
-from enum import StrEnum
+import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import Bayer, Fringes3, PredeformedOption, say
+from quadfringe.cli._output import JsonOption, rows, say, write_record
+from quadfringe.cli.decode import Method
 
-__all__ = ["measure", "pattern", "simulate"]
+if TYPE_CHECKING:
+    from quadfringe.evaluation.timing import Case, Timing
 
-OutFolder = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the files; made when missing.")]
-SystemFile = Annotated[Path | None, typer.Argument(metavar="[SYSTEM.toml]", help="Default: the virtual bench.")]
+__all__ = ["bench"]
 
-
-class Layout(StrEnum):
-    """How the mirrors of the projector are arranged."""
-
-    regular = "regular"
-    diamond = "diamond"
+SMALLEST_PX = 16
 
 
-def pattern(
-    out: OutFolder,
-    fringes: Fringes3 = (36.0, 35.0, 30.0),
-    width: Annotated[int, typer.Option(min=2, help="Columns of the projector.")] = 912,
-    height: Annotated[int, typer.Option(min=1, help="Rows of the projector.")] = 1140,
-    layout: Annotated[Layout, typer.Option(help="Mirror layout.")] = Layout.regular,
-    calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Both projectors calibrated, JSON.")] = None,
-    predeformed_z_mm: PredeformedOption = None,
+def bench(
+    size: Annotated[list[str], typer.Option(metavar="WxH", help="Size of an image; may be repeated.")] = ["1024x768"],  # noqa: B006 - typer only reads it
+    method: Annotated[list[Method] | None, typer.Option(help="Default: both.")] = None,
+    threads: Annotated[list[int] | None, typer.Option(min=1, help="Default: 1, and all cores.")] = None,
+    repeats: Annotated[int, typer.Option(min=3, help="Timed decodes of each case.")] = 20,
+    surface: Annotated[str, typer.Option(help="What stands on the bench.")] = "face",
+    patch_mm: Annotated[float | None, typer.Option(min=0.1, help="Print coloured squares of this side, mm.")] = None,
+    scaling: Annotated[bool, typer.Option("--scaling", help="Time 0.25 to 16 million pixels too.")] = False,
+    json: JsonOption = None,
 ) -> None:
-    """Write the two images to project: visible.png (red, green, blue) and infrared.png, 8 bit.
+    """Time decoding of a bench shot, four 8-bit images to X, Y, Z, and weigh the decoders."""
+    from quadfringe.config import SceneConfig
+    from quadfringe.evaluation import timing
+    from quadfringe.evaluation.machine import described, usable_cores
 
-    With --calibration and --predeformed-z-mm the infrared image makes up for an infrared projector that does not stand
-    where the visible one does: exact on the plane at that depth.
-    """
-    from quadfringe.config import Fringes
-    from quadfringe.data import Calibration
-    from quadfringe.devices.light import predeformation
-    from quadfringe.devices.patterns import write_patterns
-    from quadfringe.errors import InputError
+    sizes = [_size(text) for text in dict.fromkeys(size)]
+    methods = list(dict.fromkeys(m.value for m in method)) if method else list(timing.METHODS)
+    scene = SceneConfig.model_validate({"surface": surface, "patch_mm": patch_mm, "noise": timing.NOISE})
+    counts = sorted(set(threads or (1, usable_cores())))
+    machine = described()
+    say("\n".join(f"{name}: {value}" for name, value in machine.items() if value is not None), json)
+    timings = [t for wh in sizes for t in timing.time_decoding(wh, methods, counts, repeats=repeats, scene=scene)]
+    _show(f"{surface}, 3 % noise, 8 bit to X, Y, Z and verdict, {repeats} times; ms and busy cores", timings, json)
+    memories = [m for wh in sizes for m in timing.memory(wh, methods, counts[-1], scene=scene)]
+    if memories:
+        held = [(m.case.method, _words(m.case), m.held_mb) for m in memories]
+        rows("resident memory of one decoder, results included", ("method", "size", "held MB"), held, json)
+    grown = list(timing.scaling(methods, counts[-1], repeats=repeats, scene=scene)) if scaling else []
+    if scaling:
+        _show("cost against pixels, the same field of view; ms, ns and busy cores", grown, json, "ns_per_pixel")
+    costs = [timing.cost_of([t for t in grown if t.case.method == method]) for method in methods if grown]
+    if costs:
+        heads = ("method", "every shot ms", "a pixel ns", "furthest from the line %", "spread of a pixel %")
+        lines = [(c.method, c.fixed_ms, c.ns_per_pixel, c.off_percent, c.spread_percent) for c in costs]
+        rows("the line through these times", heads, lines, json)
+    record = {
+        "schema_version": 1,
+        "machine": machine,
+        "surface": surface,
+        "patch_mm": patch_mm,
+        "noise": timing.NOISE,
+        "timings": [t.record() for t in timings],
+        "memory": [m.record() for m in memories],
+        "scaling": [t.record() for t in grown],
+        "cost": [cost.record() for cost in costs],
+        "figures": dict(_figure(t, usable_cores()) for t in timings),
+    }
+    write_record(record, json)
 
-    if calibration is not None and predeformed_z_mm is None:
-        raise InputError("--calibration changes nothing without --predeformed-z-mm, the depth of the reference plane")
-    known = None if calibration is None else Calibration.load(calibration)
-    asked = Fringes(numbers=fringes, layout=layout.value, predeformed_z_mm=predeformed_z_mm)
-    for path in write_patterns(out, asked.numbers, (width, height), layout.value, predeformation(asked, known)):
-        say(str(path))
+
+def _size(text: str) -> tuple[int, int]:
+    found = re.fullmatch(r"(\d+)x(\d+)", text)
+    if found is None:
+        raise typer.BadParameter(f"expected width x height as in 1024x768, got {text!r}", param_hint="--size")
+    width, height = int(found[1]), int(found[2])
+    if min(width, height) < SMALLEST_PX:
+        raise typer.BadParameter(f"expected at least 16 x 16 pixels, got {text}", param_hint="--size")
+    return width, height
 
 
-def simulate(
-    out: OutFolder,
-    system: SystemFile = None,
-    surface: Annotated[str | None, typer.Option(help="What stands on the bench, in place of the file's.")] = None,
-    noise: Annotated[float | None, typer.Option(min=0, help="Noise, fraction of full scale.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the noise.")] = None,
-    bayer: Annotated[Bayer | None, typer.Option(help="A Bayer chip: raw.png in place of three images.")] = None,
-) -> None:
-    """Render one shot of the virtual bench: its images, calibration.json, truth.npz."""
-    from quadfringe.evaluation.simulate import bench_config, write_simulation
-
-    config = bench_config(system, surface=surface, noise=noise, seed=seed, bayer=None if bayer is None else bayer.value)
-    for path in write_simulation(out, config):
-        say(str(path))
+def _figure(timing: Timing, cores: int) -> tuple[str, float]:
+    """Give a name that stays the same on every machine, as in best_1024x768_all_threads_ms, and the median."""
+    case = timing.case
+    threads = "all" if case.threads == cores else str(case.threads)
+    return f"{case.method}_{_words(case)}_{threads}_threads_ms", timing.median_ms
 
 
-def measure(
-    out: Annotated[
-        list[Path],
-        typer.Option(metavar="FILE", help="Result: .ply, .tif or .npz; may be repeated."),
-    ],
-    system: SystemFile = None,
-) -> None:
-    """Take one shot with a system and save its shape."""
-    from quadfringe.data.shape import SUFFIXES
-    from quadfringe.files import require_suffix
-    from quadfringe.scanner import open_system
+def _words(case: Case) -> str:
+    return f"{case.width_px}x{case.height_px}"
 
-    for path in out:
-        require_suffix(path, SUFFIXES)
-    with open_system(system) as scanner:
-        shape = scanner.measure()
-    for path in out:
-        shape.save(path)
-        say(f"{path}: {int(shape.returned.sum())} points")
+
+def _show(title: str, timings: list[Timing], json: Path | None, cost: str = "shots_per_s") -> None:
+    heads = {"shots_per_s": "shots/s", "ns_per_pixel": "ns/pixel"}
+    cells = [
+        (t.case.method, _words(t.case), t.case.threads, t.median_ms, t.minimum_ms, t.verdict_ms, cost_of, t.busy_cores)
+        for t in timings
+        for cost_of in [t.record()[cost]]
+    ]
+    rows(title, ("method", "size", "threads", "median", "min", "verdict", heads[cost], "busy"), cells, json)

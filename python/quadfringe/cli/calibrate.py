@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, say, table, write_figures, write_record
+from quadfringe.cli._output import JsonOption, say, table, write_figures, write_record
 
 __all__ = ["app"]
 
@@ -56,9 +56,9 @@ def run(
     """
     from quadfringe.calibration.session import FolderCaptures, guide
     from quadfringe.calibration.session.geometry import height_calibration
-    from quadfringe.calibration.session.virtual import BenchCaptures, bench_session
+    from quadfringe.calibration.session.virtual import VirtualCaptures, virtual_session
     from quadfringe.errors import InputError
-    from quadfringe.evaluation.simulate import bench_config
+    from quadfringe.evaluation.simulate import virtual_bench_config
     from quadfringe.files import require_suffix
 
     require_suffix(out, (".json",))
@@ -71,13 +71,13 @@ def run(
     if captures is not None:
         found = guide(FolderCaptures(captures, rig), lambda words: say(words, json))
     else:
-        config = bench_config(system, noise=None if system else 0.01)
+        config = virtual_bench_config(system, noise=None if system else 0.01)
         if config.capture.kind != "virtual":
             raise InputError(
                 f"{system}: has a camera, not the virtual bench: take its captures with quadfringe calibrate capture "
                 "DIR --system FILE, then calibrate run --captures DIR"
             )
-        found = guide(BenchCaptures(config, bench_session(config, poses)), lambda words: say(words, json))
+        found = guide(VirtualCaptures(config, virtual_session(config, poses)), lambda words: say(words, json))
     if found.calibration is None:
         say("no calibration: take the missing captures and run this again", json)
         raise typer.Exit(NOT_GOOD)
@@ -103,7 +103,7 @@ def plan(
     poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
 ) -> None:
     """Write session.json, whose settings may then be edited, and list every capture to take."""
-    from quadfringe.calibration.session.session import FILE, Session
+    from quadfringe.calibration.session.settings import FILE, Session
     from quadfringe.errors import InputError
     from quadfringe.files import folder_for
 
@@ -126,7 +126,7 @@ def check(
 def _list_captures(folder: Path) -> bool:
     """Say what is there and what is not; tell whether a needed step is incomplete."""
     from quadfringe.calibration.session import FolderCaptures
-    from quadfringe.calibration.session.session import STEPS
+    from quadfringe.calibration.session.settings import STEPS
 
     captures, lacking = FolderCaptures(folder), False
     for step in STEPS:
@@ -154,8 +154,8 @@ def capture(
     bench nobody is asked.
     """
     from quadfringe.calibration.session import FolderCaptures, take_captures
-    from quadfringe.calibration.session.session import STEP_NAMES, step_named
-    from quadfringe.calibration.session.virtual import BenchCaptures
+    from quadfringe.calibration.session.settings import STEP_NAMES, step_named
+    from quadfringe.calibration.session.virtual import VirtualCaptures
     from quadfringe.config import load_system
     from quadfringe.config.cameras import VirtualConfig
 
@@ -170,7 +170,7 @@ def capture(
 
     config, session = load_system(system), FolderCaptures(folder).session
     virtual = isinstance(config.capture, VirtualConfig)
-    hands = BenchCaptures(config, session).hands if virtual else person
+    hands = VirtualCaptures(config, session).hands if virtual else person
     taken = take_captures(config, folder, hands, step or STEP_NAMES, say)
     say(f"{folder}: {len(taken)} captures taken; now quadfringe calibrate check {folder}")
 
@@ -182,11 +182,11 @@ def rehearse(
     poses: Annotated[int, typer.Option(min=4, max=60, help="Poses of the board.")] = 12,
 ) -> None:
     """Write every capture of a calibration of the virtual bench as images, to see what a session looks like."""
-    from quadfringe.calibration.session.virtual import BenchCaptures, bench_session
-    from quadfringe.evaluation.simulate import bench_config
+    from quadfringe.calibration.session.virtual import VirtualCaptures, virtual_session
+    from quadfringe.evaluation.simulate import virtual_bench_config
 
-    config = bench_config(system, noise=None if system else 0.01)
-    written = BenchCaptures(config, bench_session(config, poses)).write(folder)
+    config = virtual_bench_config(system, noise=None if system else 0.01)
+    written = VirtualCaptures(config, virtual_session(config, poses)).write(folder)
     say(f"{folder}: {len(written)} captures; now quadfringe calibrate run --captures {folder} --out calibration.json")
 
 

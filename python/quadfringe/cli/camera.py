@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from quadfringe.cli.output import JsonOption, complain, say, write_record
+from quadfringe.cli._output import JsonOption, complain, say, write_record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

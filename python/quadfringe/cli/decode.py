@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import Bayer, Fringes3, JsonOption, PredeformedOption, say, write_figures
+from quadfringe.cli._output import Bayer, Fringes3, JsonOption, PredeformedOption, say, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern, Response

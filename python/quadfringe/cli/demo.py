@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, say, steps, table, write_figures
+from quadfringe.cli._output import JsonOption, say, steps, table, write_figures
 
 __all__ = ["demo"]
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import Bayer, JsonOption, say, write_record
+from quadfringe.cli._output import Bayer, JsonOption, say, write_record
 
 if TYPE_CHECKING:
     from quadfringe.data import AnyShot, Calibration

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli.output import say
+from quadfringe.cli._output import say
 
 __all__ = ["info"]
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import say, stoppable
-from quadfringe.cli.record import FileSize, ShotsOption, SystemFile
+from quadfringe.cli._output import SystemFile, say, stoppable
+from quadfringe.cli.record import FileSize, ShotsOption
 
 if TYPE_CHECKING:
     from quadfringe.recording import Recorder

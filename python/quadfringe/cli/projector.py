@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import complain, say
+from quadfringe.cli._output import complain, say
 from quadfringe.errors import InputError
 
 if TYPE_CHECKING:

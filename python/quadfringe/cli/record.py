@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli.output import JsonOption, complain, say, steps, stop_asked, write_figures
+from quadfringe.cli._output import JsonOption, SystemFile, complain, say, steps, stop_asked, write_figures
 
 if TYPE_CHECKING:
     from threading import Event
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
 
 __all__ = ["record", "recover"]
 
-SystemFile = Annotated[Path | None, typer.Argument(metavar="[SYSTEM.toml]", help="Default: the virtual bench.")]
 ShotsOption = Annotated[int | None, typer.Option(min=1, help="End after so many shots.")]
 SecondsOption = Annotated[float | None, typer.Option(min=0, help="End after so many seconds.")]
 FileSize = Annotated[float | None, typer.Option(min=0.01, help="Begin a new file at this size, GB.")]

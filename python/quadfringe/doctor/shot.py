@@ -6,8 +6,8 @@ import numpy as np
 
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.doctor._fringes import Fit, fit_fringes, infrared_drift
 from quadfringe.doctor.finding import Finding, graded
-from quadfringe.doctor.fringes import Fit, fit_fringes, infrared_drift
 from quadfringe.errors import DecodeError
 
 __all__ = ["examine_shot"]

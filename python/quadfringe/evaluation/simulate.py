@@ -13,10 +13,10 @@ from quadfringe.files import folder_for
 from quadfringe.io.export import write_npz
 from quadfringe.scanner import open_system
 
-__all__ = ["bench_config", "write_simulation"]
+__all__ = ["virtual_bench_config", "write_simulation"]
 
 
-def bench_config(system: Path | None, **scene: Any) -> SystemConfig:
+def virtual_bench_config(system: Path | None, **scene: Any) -> SystemConfig:
     """Give the config of a system file, or the bench as it comes, with scene settings replaced when not None."""
     config = SystemConfig() if system is None else load_system(system)
     given = {name: value for name, value in scene.items() if value is not None}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot, Calibration, Stamp
 from quadfringe.errors import InputError
-from quadfringe.recording.layout import Header, crcs_of, stamp_at
+from quadfringe.recording._layout import Header, crcs_of, stamp_at
 
 __all__ = ["Recording"]
 

@@ -10,7 +10,7 @@ from threading import Lock
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot, Calibration
 from quadfringe.errors import InputError, RecordingError
-from quadfringe.recording.layout import Header
+from quadfringe.recording._layout import Header
 from quadfringe.recording.writer import RecordingWriter
 
 __all__ = ["Recorder", "RecorderStatistics"]

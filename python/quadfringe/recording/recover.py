@@ -7,7 +7,7 @@ from pathlib import Path
 
 from quadfringe.errors import InputError
 from quadfringe.files import atomic
-from quadfringe.recording.layout import crcs_of
+from quadfringe.recording._layout import crcs_of
 from quadfringe.recording.reader import Recording
 from quadfringe.recording.writer import RecordingWriter
 

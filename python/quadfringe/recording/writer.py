@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Stamp
 from quadfringe.errors import InputError, RecordingError
-from quadfringe.recording.layout import Header, crcs_of, make_datasets, stamp_values
+from quadfringe.recording._layout import Header, crcs_of, make_datasets, stamp_values
 
 __all__ = ["RecordingWriter", "require_room"]
 

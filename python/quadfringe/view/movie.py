@@ -56,11 +56,11 @@ def movie(path: Path, rate_hz: float) -> Iterator[Movie]:
     """Write an MP4 of the pictures that are added, whole or not at all."""
     require_suffix(path, (".mp4",))
     with atomic(path) as temporary:
-        film = _Mp4(temporary, rate_hz)
+        writer = _Mp4(temporary, rate_hz)
         try:
-            yield film
+            yield writer
         finally:
-            film.close()
+            writer.close()
 
 
 def solid_picture(

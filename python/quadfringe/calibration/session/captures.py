@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.calibration.projector import AXES, ProjectorMap, projector_map
-from quadfringe.calibration.session.session import FILE, Session
+from quadfringe.calibration.session.settings import FILE, Session
 from quadfringe.data import AnyShot
 from quadfringe.data.shot_files import SUFFIXES, read_folder
 from quadfringe.devices.light import Levels, Light, Step

@@ -11,7 +11,7 @@ from quadfringe import _core
 from quadfringe.calibration.session import geometry, light
 from quadfringe.calibration.session.captures import Captures
 from quadfringe.calibration.session.outcome import Outcome
-from quadfringe.calibration.session.session import STEPS, Step
+from quadfringe.calibration.session.settings import STEPS, Step
 from quadfringe.data import Calibration, CalibrationRecord
 
 __all__ = ["Guided", "guide"]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from quadfringe.calibration.projector import ProjectorMap
 from quadfringe.calibration.rehearsal import INK, PAPER, TEXEL_MM, board_poses
 from quadfringe.calibration.session.captures import light_of, pose_light, pose_maps
-from quadfringe.calibration.session.session import FILE, STEP_NAMES, Session
+from quadfringe.calibration.session.settings import FILE, STEP_NAMES, Session
 from quadfringe.calibration.targets import raster
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot
@@ -24,14 +24,14 @@ from quadfringe.errors import InputError
 from quadfringe.files import folder_for
 from quadfringe.io.images import write_image
 
-__all__ = ["BenchCaptures", "bench_session"]
+__all__ = ["VirtualCaptures", "virtual_session"]
 
 BOARD_MM = 800.0  # where the white board stands
 LEVEL = (0.0, 0.0, -1.0)
 TILTED = (0.2588, 0.0, -0.9659)  # normal of the plane of the acceptance test
 
 
-def bench_session(config: SystemConfig, poses: int = 12) -> Session:
+def virtual_session(config: SystemConfig, poses: int = 12) -> Session:
     """Give the session of a virtual bench."""
     bench = VirtualBench(config).resolved(config)
     assert bench.projector is not None
@@ -39,7 +39,7 @@ def bench_session(config: SystemConfig, poses: int = 12) -> Session:
     return Session(rig="virtual bench", fringes=config.fringes, projector_size_px=size, poses=poses)
 
 
-class BenchCaptures:
+class VirtualCaptures:
     """Renders every capture when it is asked for; the same name is the same image, noise included.
 
     The bench of `config` gives devices, light and camera; what stands on it is put there as the step asks.
@@ -49,7 +49,7 @@ class BenchCaptures:
         if config.scene.bayer is not None and config.scene.demosaic is None:
             raise InputError("scene.bayer: the rehearsal of a calibration takes whole planes; set scene.demosaic")
         bits = None if config.scene.bit_depth == 8 else config.scene.bit_depth
-        self.session = (session or bench_session(config)).model_copy(update={"bits": bits})
+        self.session = (session or virtual_session(config)).model_copy(update={"bits": bits})
         self._config = config
         self._bench = VirtualBench(config)
         self._poses = dict(

@@ -15,8 +15,8 @@ from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, Calibration, ChipImage
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
 from quadfringe.devices._queue import DroppingQueue
-from quadfringe.devices.aravis.link import Link
-from quadfringe.devices.aravis.profiles import CHIPS
+from quadfringe.devices.aravis._link import Link
+from quadfringe.devices.aravis._profiles import CHIPS
 from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, UnpairedError, WrongFrameError
 
 __all__ = ["AravisCamera", "ChipCamera", "open_devices"]
@@ -146,8 +146,8 @@ class _Running(Generic[Item]):
             chips[chip] = ChipStatistics(
                 so_far.frames + reader.frames,
                 so_far.damaged + reader.damaged,
-                so_far.missed + link.pairer.missed[n],
-                so_far.unpaired + link.pairer.unpaired[n],
+                so_far.missed + link.matcher.missed[n],
+                so_far.unpaired + link.matcher.unpaired[n],
             )
         return chips
 

@@ -7,10 +7,10 @@ import sys
 from pathlib import Path
 
 from quadfringe.devices.emulator import ADDRESSES, MODEL, SERIAL, keep_pace
-from quadfringe.devices.emulator.camera import EmulatedCamera
-from quadfringe.devices.emulator.control import Identity
+from quadfringe.devices.emulator._camera import EmulatedCamera
+from quadfringe.devices.emulator._control import Identity
+from quadfringe.devices.emulator._registers import PIXEL_FORMATS
 from quadfringe.devices.emulator.frames import FileFrames, Source, TestPattern
-from quadfringe.devices.emulator.registers import PIXEL_FORMATS
 
 COLOUR = ("BayerRG8", *(name for name in PIXEL_FORMATS if name.startswith(("Bayer", "RGB")) and name != "BayerRG8"))
 GREY = tuple(name for name in PIXEL_FORMATS if name.startswith("Mono"))

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.devices.emulator.registers import PIXEL_FORMATS
+from quadfringe.devices.emulator._registers import PIXEL_FORMATS
 
 __all__ = ["FileFrames", "Source", "TestPattern", "packed"]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from quadfringe.evaluation.film import hand
+from quadfringe.evaluation.moving_scene import hand
 from quadfringe.evaluation.reproduce.pair_calibration import pair_calibration
 from quadfringe.evaluation.reproduce.pair_correction import pair_correction
 from quadfringe.evaluation.reproduce.pair_depth import pair_depth

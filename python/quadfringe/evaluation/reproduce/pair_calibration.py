@@ -9,17 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.calibration.bundle import RigCalibration
-from quadfringe.calibration.pair import AXES, pair_pose
 from quadfringe.calibration.projector import StepPlan
+from quadfringe.calibration.projector_pair import AXES, pair_pose
 from quadfringe.calibration.rehearsal import board_poses, rehearse
 from quadfringe.calibration.targets import ring_board
 from quadfringe.config import SceneConfig, SystemConfig
 from quadfringe.data import Calibration
 from quadfringe.decoding.compare import rms
-from quadfringe.evaluation.reproduce.pair_bench import (
+from quadfringe.evaluation.reproduce._deviated_pair import (
     FRINGES,
     SEED,
-    Pair,
+    ProjectorPair,
     decoded,
     expose,
     infrared_error_rad,
@@ -37,12 +37,13 @@ ENDS_MM = (700.0, 900.0)
 def pair_calibration(
     out: Path, shrink: int = 1, poses: int = POSES, steps: int = STEPS
 ) -> tuple[dict[str, float], Path]:
-    """Calibrate a deviated pair from a ring board in nine poses, then correct it and search with what was found.
+    """Calibrate a deviated pair from a ring board in nine poses; then use the result to correct and to search.
 
-    The bench has all defects of a real one. Writes `out`/pair-calibration.png. Figures: mean reprojection errors in px
-    (published: 0.2690 and 0.2210); the pair by the names of `quadfringe.calibration.pair.AXES` with its error and the
-    reach of its joint interval of 95 %; and, after the correction and by the search along the ray at both ends of the
-    depth range, infrared fringes against expectation in rad at 36 fringes and wrong orders in per cent.
+    The bench has all defects of a real one. Writes `out`/pair-calibration.png. The figures are: the mean reprojection
+    errors in px (published: 0.2690 and 0.2210); the six parameters of the pair by the names of
+    `quadfringe.calibration.projector_pair.AXES`, each with its error and the half width of its joint 95 % interval; the
+    RMS error of the infrared fringes in rad at 36 fringes and the share of wrong orders in per cent, both after the
+    correction on the reference plane and by the search along the ray at both ends of the depth range.
     """
     pair = real_pair(shrink=shrink)
     scene = SceneConfig(seed=SEED, **pair.light)
@@ -65,7 +66,7 @@ def pair_calibration(
     return figures, out / "pair-calibration.png"
 
 
-def _pair_figures(found: RigCalibration, pair: Pair) -> dict[str, float]:
+def _pair_figures(found: RigCalibration, pair: ProjectorPair) -> dict[str, float]:
     assert found.pair is not None
     (r1, t1), (r2, t2) = ((d.rotation, d.translation_mm) for d in (pair.visible, pair.infrared))
     truth = pair_pose(r1, t1, r2, t2).values
@@ -77,7 +78,7 @@ def _pair_figures(found: RigCalibration, pair: Pair) -> dict[str, float]:
     }
 
 
-def _use_figures(pair: Pair, known: Calibration) -> dict[str, float]:
+def _use_figures(pair: ProjectorPair, known: Calibration) -> dict[str, float]:
     """Give what the calibration is good for: the correction on the reference plane, the search at both ends."""
     corrected = expose(pair, known=known, predeformed=True)
     figures = {

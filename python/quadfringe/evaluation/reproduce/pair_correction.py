@@ -11,17 +11,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.calibration.pair import AXES, PairPose, pair_pose
+from quadfringe.calibration.projector_pair import AXES, PairPose, pair_pose
 from quadfringe.config import DeviceModel
 from quadfringe.data import Calibration, core_device
 from quadfringe.decoding.compare import rms
 from quadfringe.devices.light import predeformation
 from quadfringe.errors import InputError
-from quadfringe.evaluation.reproduce.pair_bench import (
+from quadfringe.evaluation.reproduce._deviated_pair import (
     FRINGES,
     PLANE_MM,
     Exposure,
-    Pair,
+    ProjectorPair,
     decoded,
     expose,
     infrared_error_rad,
@@ -78,7 +78,7 @@ def pair_correction(
     return figures, out / "pair-correction.png"
 
 
-def remaining_deviation(pair: Pair, known: Calibration) -> PairPose:
+def remaining_deviation(pair: ProjectorPair, known: Calibration) -> PairPose:
     """Give the deviation that calibrating again would find with the pre-deformed patterns.
 
     Every mirror now stands for the position of the visible projector that it was computed from; where board points are

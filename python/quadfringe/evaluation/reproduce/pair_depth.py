@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.decoding.compare import rms
-from quadfringe.evaluation.reproduce.pair_bench import (
+from quadfringe.evaluation.reproduce._deviated_pair import (
     PLANE_MM,
-    Pair,
+    ProjectorPair,
     Unwrapping,
     decoded,
     expose,
@@ -64,7 +64,7 @@ def pair_depth(out: Path, shrink: int = 1, depths_mm: Sequence[float] = DEPTHS_M
     return figures, out / "pair-depth.png"
 
 
-def _measured(pair: Pair, way: str, z_mm: float, alone: Map) -> tuple[float, float, float, float]:
+def _measured(pair: ProjectorPair, way: str, z_mm: float, alone: Map) -> tuple[float, float, float, float]:
     """Give the four figures of one way at one depth, where one projector alone finds the phase `alone`."""
     deformed, unwrapping = WAYS[way]
     shot = expose(pair, z_mm, predeformed=deformed)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from quadfringe.decoding.compare import rms
-from quadfringe.evaluation.reproduce.pair_bench import (
+from quadfringe.evaluation.reproduce._deviated_pair import (
     DEVIATION_DEG,
     DEVIATION_MM,
     decoded,

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.calibration.pair import AXES
-from quadfringe.evaluation.reproduce.pair_bench import FRINGES, PLANE_MM, Pair, ideal_pair
+from quadfringe.calibration.projector_pair import AXES
+from quadfringe.evaluation.reproduce._deviated_pair import FRINGES, PLANE_MM, ProjectorPair, ideal_pair
 from quadfringe.view.report import Graph, draw_panels
 
 __all__ = ["orders_are_right", "pair_tolerance", "tolerances"]
@@ -21,9 +21,9 @@ PRECISION = 1e-3  # of a tolerance, relative
 def pair_tolerance(out: Path, shrink: int = 4) -> tuple[dict[str, float], Path]:
     """Find the largest deviation of each of the six parameters for which every order of a plane is still right.
 
-    Every `shrink`-th pixel of the camera is asked. Writes `out`/pair-tolerance.png: the share of wrong orders over each
-    deviation. Figures are by the names of
-    `quadfringe.calibration.pair.AXES`, deg and mm; one that stands at its limit in `LIMITS` does no harm at all.
+    Every `shrink`-th camera pixel is checked. Writes `out`/pair-tolerance.png: the share of wrong orders against each
+    deviation. The figures have the names of `quadfringe.calibration.projector_pair.AXES`, in deg and mm; a figure that
+    equals its entry in `LIMITS` means that this parameter does no harm within the field.
     """
     found = tolerances(shrink)
     factors = np.linspace(0.0, 3.0, 13)
@@ -61,22 +61,22 @@ def _tolerance(axis: str, sign: float, shrink: int) -> float:
     return right
 
 
-def _deviated(axis: str, deviation: float, shrink: int) -> Pair:
+def _deviated(axis: str, deviation: float, shrink: int) -> ProjectorPair:
     values = [0.0] * len(AXES)
     values[AXES.index(axis)] = deviation
     return ideal_pair((values[0], values[1], values[2]), (values[3], values[4], values[5]), shrink)
 
 
-def orders_are_right(pair: Pair, z_mm: float = PLANE_MM) -> bool:
+def orders_are_right(pair: ProjectorPair, z_mm: float = PLANE_MM) -> bool:
     """Tell whether the published unwrapping finds every order of a plane, from phases without any error."""
     return not _misses(pair, z_mm).any()
 
 
-def _wrong_percent(pair: Pair) -> float:
+def _wrong_percent(pair: ProjectorPair) -> float:
     return 100.0 * float(_misses(pair, PLANE_MM).mean())
 
 
-def _misses(pair: Pair, z_mm: float) -> NDArray[np.bool_]:
+def _misses(pair: ProjectorPair, z_mm: float) -> NDArray[np.bool_]:
     """Tell which of the pixels that both projectors light have a wrong order, (n,)."""
     cast = pair.bench.cast_plane(point_mm=(0.0, 0.0, z_mm), normal=(0.0, 0.0, -1.0))
     columns = [cast.column_px(), cast.column_px(), cast.column_px(infrared=True)]

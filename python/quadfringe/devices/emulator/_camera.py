@@ -11,9 +11,9 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
-from quadfringe.devices.emulator.control import STREAM_0, STREAM_STEP, Control, Identity, Resend
+from quadfringe.devices.emulator._control import STREAM_0, STREAM_STEP, Control, Identity, Resend
+from quadfringe.devices.emulator._registers import FEATURES, PIXEL_FORMATS
 from quadfringe.devices.emulator.frames import Source, packed
-from quadfringe.devices.emulator.registers import FEATURES, PIXEL_FORMATS
 
 __all__ = ["Chip", "EmulatedCamera", "Faults"]
 

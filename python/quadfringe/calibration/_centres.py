@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration.grid import homography, jacobians, through
+from quadfringe.calibration._grid import homography, jacobians, through
 from quadfringe.calibration.targets import Target
 
 __all__ = ["darkness_centroids", "perspective_shift", "refined_centres"]

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration.grid import through
-from quadfringe.calibration.model import Adjustment, Sight
+from quadfringe.calibration._adjustment import Adjustment, Sight
+from quadfringe.calibration._grid import through
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError
 

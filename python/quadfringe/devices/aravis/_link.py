@@ -12,12 +12,12 @@ import numpy as np
 
 from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, BayerShot, ChipImage, Shot, Stamp
-from quadfringe.devices.aravis import profiles
+from quadfringe.devices.aravis import _profiles as profiles
+from quadfringe.devices.aravis._formats import format_named
+from quadfringe.devices.aravis._frame_matching import FrameMatcher, SingleChip, Stamped
 from quadfringe.devices.aravis._gi import Device, found
-from quadfringe.devices.aravis.formats import format_named
-from quadfringe.devices.aravis.pairing import Pairer, Single, Stamped
-from quadfringe.devices.aravis.profiles import CHIPS, Place
-from quadfringe.devices.aravis.reader import Agreed, ChipReader, Frame
+from quadfringe.devices.aravis._profiles import CHIPS, Place
+from quadfringe.devices.aravis._reader import Agreed, ChipReader, Frame
 from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError
 
 __all__ = ["Link"]
@@ -42,7 +42,9 @@ class Link:
             self.places = _patiently(lambda: self._open_devices(config), patience_s)
             self.config = self._set_up(config)
             both = len(chips) == len(CHIPS)
-            self.pairer: Pairer[Frame] | Single[Frame] = Pairer(1000 * config.pair_tolerance_us) if both else Single()
+            self.matcher: FrameMatcher[Frame] | SingleChip[Frame] = (
+                FrameMatcher(1000 * config.pair_tolerance_us) if both else SingleChip()
+            )
             undo.pop_all()
         self._pairing = threading.Lock()
 
@@ -102,7 +104,7 @@ class Link:
         """Start a run: readers first, then the chips, the one that triggers the other last."""
         # What waits for its partner holds buffers only when they are borrowed.
         pending = {"pending": max(self.config.buffers // 3, 2)} if borrow else {}
-        self.pairer.begin(sole=self.config.trigger == "software", **pending)
+        self.matcher.begin(sole=self.config.trigger == "software", **pending)
         self._running = True
         for n, reader in enumerate(self.readers):
             reader.start(lambda frame, n=n: self._match(n, frame, deliver), borrow=borrow)  # type: ignore[misc]
@@ -111,8 +113,8 @@ class Link:
 
     def _match(self, chip: int, frame: Frame, deliver: Callable[[Any], None]) -> None:
         with self._pairing:
-            matches = self.pairer.push(chip, frame.stamp, frame)
-            offset_ns = self.pairer.host_offset_ns
+            matches = self.matcher.push(chip, frame.stamp, frame)
+            offset_ns = self.matcher.host_offset_ns
             for frames in matches:
                 deliver(self._made(frames, offset_ns))
 
@@ -151,7 +153,7 @@ class Link:
             reader.quit()
         for reader in self.readers:
             reader.stop()
-        self.pairer.end()
+        self.matcher.end()
 
     def lost(self, silent_s: float) -> CameraLostError | None:
         """Ask the devices of chips that have been silent for so long; give the error of one that does not answer."""

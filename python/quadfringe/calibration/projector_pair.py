@@ -67,7 +67,7 @@ def pair_pose(
     (rad) and the translation (mm) of the visible projector, then of the infrared one; it is propagated to first order.
     Raises `InputError` for other shapes, for rotations that are none, and for a covariance that is not symmetric.
 
-    >>> from quadfringe.calibration.pair import pair_pose
+    >>> from quadfringe.calibration.projector_pair import pair_pose
     >>> import numpy as np
     >>> sd = np.array([1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1] * 2)  # rad and mm
     >>> pose = pair_pose(np.eye(3), [-200, 0, 0], np.eye(3), [-199.5, 0, 0], np.diag(sd**2))

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import FrameStamp
+from quadfringe.devices.aravis._formats import PixelFormat
 from quadfringe.devices.aravis._gi import Buffer, Stream
-from quadfringe.devices.aravis.formats import PixelFormat
 
 __all__ = ["Agreed", "ChipReader", "Frame"]
 

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from quadfringe.devices.emulator.registers import FEATURES, XML_ADDRESS, genicam
+from quadfringe.devices.emulator._registers import FEATURES, XML_ADDRESS, genicam
 
 __all__ = ["Control", "Identity", "Resend"]
 

@@ -1,7 +1,7 @@
-"""A bench whose infrared projector does not stand where the visible one does, before a plane.
+"""A virtual bench whose infrared projector deviates from the visible one, in front of a plane.
 
-A `Pair` is plain data: devices, mirrors, light. `expose` renders a shot of a plane, `decoded` gives what the decoder
-makes of it, without a verdict, `infrared_error_rad` what its infrared fringes really are.
+A `ProjectorPair` holds devices, mirror layout and light. `expose` renders a shot of a plane, `decoded` returns the
+absolute phase that the decoder finds, without a verdict, and `infrared_error_rad` the error of the infrared fringes.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.calibration.pair import deviated
+from quadfringe.calibration.projector_pair import deviated
 from quadfringe.config import ChannelResponse, DecodeConfig, DeviceModel, Fringes, Matrix4, Response
 from quadfringe.data import Calibration, Shot, core_device, device_model
 from quadfringe.decoding import Plan, kernel_decoder
@@ -25,7 +25,7 @@ __all__ = [
     "FRINGES",
     "PLANE_MM",
     "Exposure",
-    "Pair",
+    "ProjectorPair",
     "decoded",
     "expose",
     "ideal_pair",
@@ -62,7 +62,7 @@ DEFECTS: dict[str, Any] = {
 
 
 @dataclass(frozen=True)
-class Pair:
+class ProjectorPair:
     """Camera, visible and infrared projector, how their mirrors lie, and what the bench adds to the light."""
 
     camera: DeviceModel
@@ -72,7 +72,7 @@ class Pair:
     light: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def single(self) -> Pair:
+    def single(self) -> ProjectorPair:
         """The same bench with one projector for all four channels."""
         return replace(self, infrared=self.visible)
 
@@ -95,7 +95,7 @@ class Pair:
 
 def ideal_pair(
     rotation_deg: Vector3, translation_mm: Vector3, shrink: int = 1, layout: Literal["regular", "diamond"] = "regular"
-) -> Pair:
+) -> ProjectorPair:
     """Give the published bench with a deviated infrared projector, perfect lenses and clean light.
 
     The camera has 1/`shrink` of the pixels in each direction over the same field.
@@ -103,7 +103,7 @@ def ideal_pair(
     reference = _core.Bench(layout=layout)
     visible = device_model(reference.visible)
     camera = _shrunk(device_model(reference.camera), shrink)
-    return Pair(camera, visible, deviated(visible, rotation_deg, translation_mm), layout)
+    return ProjectorPair(camera, visible, deviated(visible, rotation_deg, translation_mm), layout)
 
 
 def real_pair(
@@ -111,7 +111,7 @@ def real_pair(
     translation_mm: Vector3 = (DEVIATION_MM,) * 3,
     shrink: int = 1,
     layout: Literal["regular", "diamond"] = "regular",
-) -> Pair:
+) -> ProjectorPair:
     """Give the same with lenses that distort and with all that a real bench adds to the light."""
     pair = ideal_pair(rotation_deg, translation_mm, shrink, layout)
     lenses = {"camera": CAMERA_LENS, "visible": VISIBLE_LENS, "infrared": INFRARED_LENS}
@@ -143,7 +143,9 @@ class Exposure:
     fringes: Fringes
 
 
-def expose(pair: Pair, z_mm: float = PLANE_MM, known: Calibration | None = None, predeformed: bool = False) -> Exposure:
+def expose(
+    pair: ProjectorPair, z_mm: float = PLANE_MM, known: Calibration | None = None, predeformed: bool = False
+) -> Exposure:
     """Take a shot of the plane at depth `z_mm` that is to be decoded with what is `known` of the pair, or the truth.
 
     The infrared image is plain, or pre-deformed for the reference plane by what is known, as the 8-bit image that a

@@ -18,7 +18,9 @@ __all__ = [
     "Bayer",
     "Fringes3",
     "JsonOption",
+    "OutFolder",
     "PredeformedOption",
+    "SystemFile",
     "complain",
     "rows",
     "say",
@@ -41,6 +43,10 @@ Fringes3 = Annotated[
     typer.Option("--fringes", metavar="N N N", help="Fringe numbers: red and blue, green, infrared."),
 ]
 
+OutFolder = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the files; created when it is missing.")]
+SystemFile = Annotated[
+    Path | None, typer.Argument(metavar="[SYSTEM.toml]", help="System file; default: the virtual bench.")
+]
 PredeformedOption = Annotated[
     float | None,
     typer.Option(

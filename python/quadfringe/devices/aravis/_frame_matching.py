@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 
 from quadfringe.data import FrameStamp
 
-__all__ = ["Clock", "FrameNumbers", "Pairer", "Single", "Stamped"]
+__all__ = ["Clock", "FrameMatcher", "FrameNumbers", "SingleChip", "Stamped"]
 
 WINDOW = 256  # frames that the running minimum looks back: 50 ppm make 0.4 ms of it at 30 Hz
 CALM = 8  # frames in a row that come evenly, within this share of a period: then nothing holds the host up
@@ -99,8 +99,8 @@ class Stamped(Generic[Item]):
     item: Item
 
 
-class Single(Generic[Item]):
-    """The frames of one chip as they come, numbered and counted as `Pairer` does it; nothing waits."""
+class SingleChip(Generic[Item]):
+    """The frames of one chip as they come, numbered and counted as `FrameMatcher` does it; nothing waits."""
 
     def __init__(self) -> None:
         self.unpaired, self.missed = [0], [0]
@@ -128,7 +128,7 @@ class Single(Generic[Item]):
         return self._clock.offset_ns
 
 
-class Pairer(Generic[Item]):
+class FrameMatcher(Generic[Item]):
     """Matches the frames of two chips that are exposed together; feed it frames in the order of their arrival.
 
     Until both clocks have settled frames wait, 8 of each chip as a rule. `begin` starts a run of the camera; the clocks

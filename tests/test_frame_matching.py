@@ -1,4 +1,4 @@
-"""Pairing: the truth is the number of the exposure, which the pairer never sees."""
+"""Pairing: the truth is the number of the exposure, which the matcher never sees."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quadfringe.data import FrameStamp
-from quadfringe.devices.aravis.pairing import SHORT_IDS, FrameNumbers, Pairer
+from quadfringe.devices.aravis._frame_matching import SHORT_IDS, FrameMatcher, FrameNumbers
 
 PERIOD_NS = 33_333_333
 TOLERANCE_NS = 2e6
@@ -57,11 +57,11 @@ def exposures(
     return iter(sorted(frames, key=lambda frame: frame[2].arrival_ns))
 
 
-def paired(pairer: Pairer[int], frames: Iterator[Frame]) -> list[tuple[int, int]]:
+def paired(matcher: FrameMatcher[int], frames: Iterator[Frame]) -> list[tuple[int, int]]:
     found = []
     for chip, exposure, stamp in frames:
-        found += [(a.item, b.item) for a, b in pairer.push(chip, stamp, exposure)]
-    pairer.end()
+        found += [(a.item, b.item) for a, b in matcher.push(chip, stamp, exposure)]
+    matcher.end()
     return found
 
 
@@ -70,18 +70,18 @@ def test_every_pair_is_of_one_exposure(seed: int) -> None:
     """The bar: 5000 s of offset, 50 ppm of drift, ids that jump, one frame in a hundred lost."""
     frames = list(exposures(seed))
     seen = [{exposure for chip, exposure, _ in frames if chip == wanted} for wanted in (0, 1)]
-    pairer: Pairer[int] = Pairer(TOLERANCE_NS)
-    pairs = paired(pairer, iter(frames))
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
+    pairs = paired(matcher, iter(frames))
     assert all(a == b for a, b in pairs)
     assert {a for a, _ in pairs} == seen[0] & seen[1], "and every exposure that both chips have is there"
-    assert pairer.unpaired == [len(seen[0] - seen[1]), len(seen[1] - seen[0])]
-    assert pairer.missed[1] >= 2000 * 0.01 / 2
+    assert matcher.unpaired == [len(seen[0] - seen[1]), len(seen[1] - seen[0])]
+    assert matcher.missed[1] >= 2000 * 0.01 / 2
 
 
 @pytest.mark.parametrize("offset_s", [-5000.0, 0.0, 1e6])
 @pytest.mark.parametrize("drift_ppm", [-100.0, 0.0, 100.0])
 def test_any_offset_and_drift(offset_s: float, drift_ppm: float) -> None:
-    pairs = paired(Pairer(TOLERANCE_NS), exposures(1, offset_s=offset_s, drift_ppm=drift_ppm, lost=0.0))
+    pairs = paired(FrameMatcher(TOLERANCE_NS), exposures(1, offset_s=offset_s, drift_ppm=drift_ppm, lost=0.0))
     assert len(pairs) == 2000 - 4
     assert all(a == b for a, b in pairs)
 
@@ -89,44 +89,44 @@ def test_any_offset_and_drift(offset_s: float, drift_ppm: float) -> None:
 @pytest.mark.parametrize("start", [0, 3, 4, 5, 6, 8, 100])
 @pytest.mark.parametrize("length", [1, 2, 3, 7, 20])
 def test_a_host_that_stalls_makes_no_wrong_pair(start: int, length: int) -> None:
-    pairs = paired(Pairer(TOLERANCE_NS), exposures(2, stall=(start, length), jitter_ms=1.0))
+    pairs = paired(FrameMatcher(TOLERANCE_NS), exposures(2, stall=(start, length), jitter_ms=1.0))
     assert all(a == b for a, b in pairs)
     assert len(pairs) > 1800
 
 
 def test_the_start_of_one_chip_may_be_missed() -> None:
-    pairs = paired(Pairer(TOLERANCE_NS), exposures(3, late_start=40, lost=0.0))
+    pairs = paired(FrameMatcher(TOLERANCE_NS), exposures(3, late_start=40, lost=0.0))
     assert pairs == [(n, n) for n in range(40, 2000)]
 
 
 def test_a_silent_chip_is_counted_and_nothing_grows() -> None:
-    pairer: Pairer[int] = Pairer(TOLERANCE_NS)
-    pairs = paired(pairer, (frame for frame in exposures(4) if frame[0] == 0))
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
+    pairs = paired(matcher, (frame for frame in exposures(4) if frame[0] == 0))
     assert pairs == []
-    assert pairer.unpaired[0] > 1900
+    assert matcher.unpaired[0] > 1900
 
 
 def test_one_trigger_one_pair() -> None:
     """The first two frames that answer a software trigger need no clock."""
-    pairer: Pairer[str] = Pairer(TOLERANCE_NS)
-    pairer.begin(sole=True)
-    assert pairer.push(1, FrameStamp(9, 5, 10**18), "b") == []
-    ((a, b),) = pairer.push(0, FrameStamp(1, 777_000_000, 10**18 + 9), "a")
+    matcher: FrameMatcher[str] = FrameMatcher(TOLERANCE_NS)
+    matcher.begin(sole=True)
+    assert matcher.push(1, FrameStamp(9, 5, 10**18), "b") == []
+    ((a, b),) = matcher.push(0, FrameStamp(1, 777_000_000, 10**18 + 9), "a")
     assert (a.item, b.item) == ("a", "b")
     # The next trigger is answered by one chip alone, the one after by both.
-    assert pairer.push(0, FrameStamp(2, 877_000_000, 10**18 + 100_000_000), "lost partner") == []
-    assert pairer.push(1, FrameStamp(11, 200_000_005, 10**18 + 200_000_000), "d") == []
-    ((c, d),) = pairer.push(0, FrameStamp(3, 977_000_000, 10**18 + 200_000_000), "c")
+    assert matcher.push(0, FrameStamp(2, 877_000_000, 10**18 + 100_000_000), "lost partner") == []
+    assert matcher.push(1, FrameStamp(11, 200_000_005, 10**18 + 200_000_000), "d") == []
+    ((c, d),) = matcher.push(0, FrameStamp(3, 977_000_000, 10**18 + 200_000_000), "c")
     assert (c.item, d.item) == ("c", "d")
-    assert pairer.unpaired == [1, 0]
-    assert pairer.missed == [0, 1]
+    assert matcher.unpaired == [1, 0]
+    assert matcher.missed == [0, 1]
 
 
 def test_clocks_that_begin_anew_are_compared_anew() -> None:
-    pairer: Pairer[int] = Pairer(TOLERANCE_NS)
-    assert len(paired(pairer, exposures(5, 300, lost=0.0))) == 296
-    pairer.begin()
-    again = paired(pairer, exposures(6, 300, lost=0.0, offset_s=-3.0))
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
+    assert len(paired(matcher, exposures(5, 300, lost=0.0))) == 296
+    matcher.begin()
+    again = paired(matcher, exposures(6, 300, lost=0.0, offset_s=-3.0))
     assert all(a == b for a, b in again)
     assert len(again) > 270
 
@@ -134,21 +134,21 @@ def test_clocks_that_begin_anew_are_compared_anew() -> None:
 @pytest.mark.parametrize("idle_s", [1.0, 5.0, 15.0, 60.0, 3600.0])
 def test_a_pause_makes_no_wrong_pair(idle_s: float) -> None:
     """After an hour the clocks are 180 ms apart: other exposures look like partners then."""
-    pairer: Pairer[int] = Pairer(TOLERANCE_NS)
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
     pause = round(idle_s * 1e9 / PERIOD_NS)
     frames = list(exposures(8, pause + 400, lost=0.05, late_start=0))
     found = []
     for part in (range(200), range(pause + 200, pause + 400)):
-        pairer.begin()
-        found += paired(pairer, (frame for frame in frames if frame[1] in part))
+        matcher.begin()
+        found += paired(matcher, (frame for frame in frames if frame[1] in part))
     assert all(a == b for a, b in found)
     assert len(found) > 300
 
 
 @pytest.mark.parametrize("period_s", [0.01, 1.0, 20.0])
 def test_exposures_of_any_pace(period_s: float, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("test_pairing.PERIOD_NS", round(period_s * 1e9))
-    pairs = paired(Pairer(TOLERANCE_NS), exposures(9, 200, jitter_ms=0.5))
+    monkeypatch.setattr("test_frame_matching.PERIOD_NS", round(period_s * 1e9))
+    pairs = paired(FrameMatcher(TOLERANCE_NS), exposures(9, 200, jitter_ms=0.5))
     assert all(a == b for a, b in pairs)
     assert len(pairs) > 180
 

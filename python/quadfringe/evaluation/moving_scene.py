@@ -23,7 +23,7 @@ from quadfringe.scanner import Scanner, open_system
 from quadfringe.view.colours import Picture, channels_picture, texture
 from quadfringe.view.movie import movie, solid_picture
 
-__all__ = ["Film", "film", "hand", "hand_system"]
+__all__ = ["MovingScene", "hand", "hand_system", "measure_scene"]
 
 RATE_HZ = 10.0
 SHOTS = 30  # three seconds: the fingers close and open once
@@ -32,7 +32,7 @@ HAND_MIDDLE_MM = (0.0, 10.0, 760.0)
 
 
 @dataclass(frozen=True)
-class Film:
+class MovingScene:
     """What filming gave: files, and what was lost on the way; errors for shots whose truth is known."""
 
     recording: Path
@@ -51,7 +51,7 @@ def hand_system() -> SystemConfig:
 
 
 def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> tuple[dict[str, float], Path]:
-    """Film the moving hand: `out`/hand.h5, `out`/hand/shot_000000.ply ..., `out`/hand.mp4.
+    """MovingScene the moving hand: `out`/hand.h5, `out`/hand/shot_000000.ply ..., `out`/hand.mp4.
 
     The virtual bench renders the frames; two emulated chips send them over GigE Vision on the loopback interface, and
     they are received, paired, recorded and decoded as those of a real camera are. Without the extra `aravis` they come
@@ -62,7 +62,7 @@ def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> t
         with ExitStack() as stack:
             scanner = _wired(stage, stack)
             over_wire = scanner is not None
-            made = film(scanner or stack.enter_context(_replayed(stage)), out, "hand", shots, stage.truth_of)
+            made = measure_scene(scanner or stack.enter_context(_replayed(stage)), out, "hand", shots, stage.truth_of)
     figures = {
         "hand_over_gige_vision": float(over_wire),
         "hand_shots": float(made.shots),
@@ -131,9 +131,9 @@ def _replayed(stage: _Stage) -> Scanner:
     return open_system(stage.config.model_copy(update={"capture": ReplayConfig(file=stage.take, speed="full")}))
 
 
-def film(
+def measure_scene(
     scanner: Scanner, out: Path, name: str, shots: int, truth_of: Callable[[AnyShot], Truth | None] | None = None
-) -> Film:
+) -> MovingScene:
     """Measure `shots` with any system while recording them; an earlier film of this name is replaced.
 
     Shots whose shape cannot be trusted have no PLY and no picture.
@@ -161,7 +161,7 @@ def film(
                 found.append(compare(shape, truth, period_px))
             shapes += 1
         counted = stream.statistics()
-    return Film(
+    return MovingScene(
         out / f"{name}.h5",
         out / f"{name}.mp4",
         recorder.statistics().written,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from quadfringe.calibration.detect import find_target
 from quadfringe.calibration.session.captures import FolderCaptures, light_of, pose_light
-from quadfringe.calibration.session.session import FILE, STEP_NAMES, Session, step_named
+from quadfringe.calibration.session.settings import FILE, STEP_NAMES, Session, step_named
 from quadfringe.config import SystemConfig
 from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig
 from quadfringe.data import AnyShot, BayerShot
@@ -48,7 +48,7 @@ def take_captures(
     all. Raises `ConfigError` when the system cannot show or expose what the session asks for, `InputError` when
     the camera's bits or mosaic are not those of the session, `CalibrationError` when a board is not found three times.
 
-    >>> from quadfringe.calibration.session.live import take_captures
+    >>> from quadfringe.calibration.session.acquisition import take_captures
     >>> take_captures(load_system(Path("system.toml")), Path("session"), hands)  # doctest: +SKIP
     """
     captures = FolderCaptures(folder)

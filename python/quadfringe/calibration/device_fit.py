@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration.model import Adjustment
-from quadfringe.calibration.pair import PairPose, pair_pose
+from quadfringe.calibration._adjustment import Adjustment
+from quadfringe.calibration.projector_pair import PairPose, pair_pose
 from quadfringe.config import DeviceModel
 
 __all__ = ["DeviceFit", "DeviceSd", "device_fit", "pair_fit"]

@@ -1,0 +1,33 @@
+"""`quadfringe measure`: one shot of a system, decoded and saved."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from quadfringe.cli._output import SystemFile, say
+
+__all__ = ["measure"]
+
+
+def measure(
+    out: Annotated[
+        list[Path],
+        typer.Option(metavar="FILE", help="Result: .ply, .tif or .npz; may be repeated."),
+    ],
+    system: SystemFile = None,
+) -> None:
+    """Take one shot with a system and save its shape."""
+    from quadfringe.data.shape import SUFFIXES
+    from quadfringe.files import require_suffix
+    from quadfringe.scanner import open_system
+
+    for path in out:
+        require_suffix(path, SUFFIXES)
+    with open_system(system) as scanner:
+        shape = scanner.measure()
+    for path in out:
+        shape.save(path)
+        say(f"{path}: {int(shape.returned.sum())} points")

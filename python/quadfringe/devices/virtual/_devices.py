@@ -1,0 +1,115 @@
+"""The projector and the camera of the virtual bench, which share one simulated world."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import count as numbers
+from typing import Self
+
+from quadfringe.config import Fringes, SystemConfig
+from quadfringe.config.cameras import VirtualConfig
+from quadfringe.data import AnyShot, Calibration, Stamp
+from quadfringe.devices import CameraStatistics, Devices, Keep
+from quadfringe.devices.light import Levels, Light
+from quadfringe.devices.virtual._bench import VirtualBench
+from quadfringe.errors import ConfigError
+
+__all__ = ["VirtualCamera", "VirtualProjector", "open_devices"]
+
+
+class VirtualProjector:
+    """The projectors of the virtual bench."""
+
+    def __init__(self, bench: VirtualBench, calibration: Calibration | None = None) -> None:
+        self._bench = bench
+        self._calibration = calibration
+
+    def show(self, light: Light) -> None:
+        """Project this light; raises ValueError for fringe numbers that are ambiguous over the projector width."""
+        if isinstance(light, Fringes):
+            self._bench.project(light, self._calibration)
+        elif isinstance(light, Levels):
+            self._bench.project_levels(light.levels)
+        else:
+            self._bench.project_step(light)
+
+    def close(self) -> None:
+        """Switch the light off."""
+        self._bench.projected = None
+
+
+class VirtualCamera:
+    """The camera of the virtual bench; its shots carry the truth.
+
+    With a frame rate, the scene advances by one frame period from shot to shot and each shot has new noise. A shot is
+    rendered when it is requested, so none is ever dropped.
+    """
+
+    name = "virtual bench"
+    paced = False
+
+    def __init__(self, bench: VirtualBench, settings: VirtualConfig | None = None) -> None:
+        self._bench = bench
+        self._rate_hz = (settings or VirtualConfig()).frame_rate_hz
+        self._exposures = 0
+        self._closed = False
+
+    @property
+    def bench(self) -> VirtualBench:
+        """The simulated world in front of this camera."""
+        return self._bench
+
+    @property
+    def calibration(self) -> Calibration:
+        """The exact calibration of the bench."""
+        return self._bench.calibration()
+
+    def snap(self, timeout_s: float | None = None) -> AnyShot:  # noqa: ARG002 - rendering always ends
+        """Render one shot of the bench."""
+        return self._expose()
+
+    def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
+        """Render one shot after the other."""
+        self._check_open()
+        for _ in numbers() if count is None else range(count):
+            yield self._expose()
+
+    def _expose(self) -> AnyShot:
+        self._check_open()
+        exposure = self._exposures if self._rate_hz else 0
+        shot = self._bench.expose(exposure / self._rate_hz if self._rate_hz else 0.0, seed=self._bench.seed(exposure))
+        self._exposures += 1
+        return replace(shot, stamp=Stamp(self._exposures, time.time_ns() // 1000, self.name))
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError(f"the camera of the {self.name} is closed")
+
+    def statistics(self) -> CameraStatistics:
+        """Return the number of shots; none is ever lost."""
+        return CameraStatistics(shots=self._exposures)
+
+    def close(self) -> None:
+        """Take no more shots."""
+        self._closed = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()
+
+
+def open_devices(config: SystemConfig) -> Devices:
+    """Build a virtual bench from these settings; raises `ConfigError` when they name real projectors."""
+    if config.projectors is not None:
+        raise ConfigError(
+            "projectors: the virtual camera cannot see real projectors; name a real camera, such as "
+            'capture = "aravis:AD-080GE", or only show the fringes: quadfringe projector show --system FILE'
+        )
+    bench = VirtualBench(config)
+    settings = config.capture if isinstance(config.capture, VirtualConfig) else None
+    known = None if config.calibration is None else Calibration.load(config.calibration)
+    return Devices(VirtualCamera(bench, settings), VirtualProjector(bench, known), bench.resolved(config))
