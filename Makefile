@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
 
-.PHONY: demo test test-usb test-camera test-live fuzz coverage figures rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live fuzz coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
@@ -84,9 +84,14 @@ coverage:
 
 # Pictures and figures of the README; nothing in it is drawn or typed by hand.
 figures: $(STAMPS)/built
-	$(BIN)/python docs/make_figures.py
+	$(BIN)/python docs/draw_pictures.py
+	$(BIN)/python evaluation/figures.py
 
-# Times, memory, peers and accuracy into benches/RESULTS.md; let the machine do nothing else meanwhile.
+# Accuracy into evaluation/RESULTS.md.
+evaluation: $(STAMPS)/built
+	$(BIN)/python evaluation/results.py
+
+# Times, memory and other packages into benches/RESULTS.md; let the machine do nothing else meanwhile.
 bench: $(STAMPS)/peers
 	$(BIN)/python benches/results.py
 

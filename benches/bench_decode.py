@@ -11,21 +11,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy_chain
 from numpy.typing import NDArray
 
 import quadfringe as qf
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import numpy_chain, scoring
 from quadfringe.evaluation.timing import warm
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
-import scoring
 
 Maps = tuple[NDArray[Any], NDArray[Any]]  # phase_rad, xyz_mm
 Contender = Callable[[], Maps]
@@ -92,24 +89,6 @@ def timed(contenders: dict[str, Contender], repeats: int) -> dict[str, float]:
     return {name: float(np.median(values)) for name, values in spent.items()}
 
 
-def scene_from(shot: qf.Shot, config: qf.SystemConfig, width: int) -> scoring.Scene:
-    assert shot.truth is not None
-    numbers = config.fringes.numbers
-    return scoring.Scene(
-        name=config.scene.surface,
-        red=shot.red,
-        green=shot.green,
-        blue=shot.blue,
-        ir=shot.ir,
-        fringe_numbers=numbers,
-        projector_width=width,
-        phase_rad=2 * np.pi * numbers[0] * shot.truth.column_px.astype(np.float64) / width,
-        scored=np.isfinite(shot.truth.column_px) & ~shot.truth.edge & ~shot.truth.shadow,
-        depth_mm=shot.truth.depth_mm,
-        shadow=shot.truth.shadow,
-    )
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--json", type=Path, help="write the figures here")
@@ -130,7 +109,7 @@ def main() -> None:
                 shot, config, calibration, method=method, threads=threads
             )
     times = timed(contenders, options.repeats)
-    scene = scene_from(shot, config, calibration.projector.width_px)
+    scene = scenes.scene_from(shot, config, calibration.projector.width_px)
 
     figures: dict[str, float] = {}
     print(f"{options.surface}, {shot.red.shape[1]} x {shot.red.shape[0]}, {shot.red.dtype}")

@@ -36,12 +36,10 @@ from quadfringe.devices.aravis import AravisCamera
 from quadfringe.devices.emulator import ADDRESSES, Emulator
 from quadfringe.devices.emulator.frames import TestPattern
 from quadfringe.errors import CameraError
+from quadfringe.evaluation._fake_twin import fake_twin
 from quadfringe.files import figures_text
 from quadfringe.recording import Recorder, Recording
 from quadfringe.scanner import open_system
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "camera"))
-from fake_twin import fake_twin
 
 SIZE_PX = (1024, 768)
 RATE_HZ, FAST_HZ = 30.0, 66.0

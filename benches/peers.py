@@ -23,243 +23,28 @@ from __future__ import annotations
 
 import argparse
 import json
-import logging
-import os
-import subprocess
 import sys
 import time
-from collections.abc import Callable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
-from bench_decode import numpy_contender, product_contender, scene_from
-from numpy.typing import NDArray
+from contenders import NOISE, SURFACE, Bench, Contender, bench_shot, peers, plain_numpy, product
 
-import quadfringe as qf
-from quadfringe import _core
-from quadfringe.decoding.stages import wrapped_phases
-from quadfringe.evaluation.machine import described, usable_cores
-from quadfringe.evaluation.timing import warm
+from quadfringe.evaluation import scoring
+from quadfringe.evaluation.machine import described
 
-import scoring  # isort: skip  (bench_decode makes it known)
-
-ROOT = Path(__file__).resolve().parents[1]
-SURFACE, NOISE = "peaks", 0.03
-FRINGE_PX = 28
 REFERENCE = "numpy_float64"
 SKIPPABLE = ("floor", "opencv", "scikit-image", "fringes")
-ONE_SHOT = "4, one shot"
-
-Map = NDArray[Any]
-
-
-@dataclass(frozen=True)
-class Contender:
-    """Who is timed; `turn` gives one time in ms, `phase_rad` the map to judge, `kind` how to judge it."""
-
-    name: str
-    images: str
-    gives: str
-    threads: int
-    turn: Callable[[], float]
-    phase_rad: Callable[[], Map] | None = None
-    kind: str = "absolute"  # absolute, relative or wrapped
-
-
-@dataclass(frozen=True)
-class Bench:
-    """The scene all are given, and its truth."""
-
-    shot: qf.Shot
-    calibration: qf.Calibration
-    config: qf.SystemConfig
-    scene: scoring.Scene
-    inner: NDArray[np.bool_]
-
-    def steps(self, number: float, shifts_rad: list[float], seed: int) -> list[Map]:
-        """Give one image for each shift of the same scene, with the same noise but other seeds."""
-        bench = _core.Bench()
-        cast = bench.cast(SURFACE)
-        images = []
-        for i, shift_rad in enumerate(shifts_rad):
-            shown = bench.render_step(cast, number, shift_rad, noise=NOISE, seed=seed + i, bit_depth=8)
-            images.append(shown["red"])
-        return images
-
-
-def bench_shot() -> Bench:
-    config = qf.SystemConfig(scene=qf.SceneConfig(surface=SURFACE, noise=NOISE))
-    with qf.open(config) as scanner:
-        shot, calibration = scanner.grab(), scanner.calibration
-    scene = scene_from(shot, config, calibration.projector.width_px)
-    return Bench(shot, calibration, config, scene, scoring.inside(scene.scored, FRINGE_PX))
-
-
-def timed(run: Callable[[], object]) -> Callable[[], float]:
-    def turn() -> float:
-        warm(run)
-        start = time.perf_counter()
-        run()
-        return 1e3 * (time.perf_counter() - start)
-
-    return turn
-
-
-def product(bench: Bench) -> list[Contender]:
-    found = []
-    for method in ("published", "best"):
-        for threads in sorted({1, usable_cores()}):
-            run = product_contender(bench.shot, bench.config, bench.calibration, method=method, threads=threads)
-            name = f"{method}_{threads}_threads"
-            found.append(Contender(name, ONE_SHOT, "X, Y, Z", threads, timed(run), lambda run=run: run()[0]))
-    return found
-
-
-def plain_numpy(bench: Bench) -> list[Contender]:
-    found = []
-    for dtype in (np.float32, np.float64):
-        run = numpy_contender(bench.shot, bench.calibration, dtype)
-        name = f"numpy_{np.dtype(dtype).name}"
-        found.append(Contender(name, ONE_SHOT, "X, Y, Z", 1, timed(run), lambda run=run: run()[0]))
-    return found
-
-
-class FloorProcess:
-    """The compiled bench at a number of threads; answers a name with a time in ms."""
-
-    def __init__(self, program: str, threads: int) -> None:
-        environment = os.environ | {"RAYON_NUM_THREADS": str(threads)}
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen([program, "--serve"], env=environment, stdin=pipe, stdout=pipe, text=True)
-
-    def time_ms(self, name: str) -> float:
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(f"{name}\n")
-        self._process.stdin.flush()
-        return float(self._process.stdout.readline())
-
-    def __enter__(self) -> FloorProcess:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._process.communicate()
-
-
-def floor_program() -> str:
-    command = ["cargo", "bench", "--package", "quadfringe", "--bench", "floor", "--no-run", "--message-format=json"]
-    done = subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True)
-    programs = [message.get("executable") for message in map(json.loads, done.stdout.splitlines())]
-    return next(program for program in programs if program)
-
-
-def floor(stack: ExitStack) -> list[Contender]:
-    program = floor_program()
-    found = []
-    for threads in sorted({1, usable_cores()}):
-        process = stack.enter_context(FloorProcess(program, threads))
-        for name, gives in (("floor", "bytes"), ("published", "X, Y, Z"), ("best", "X, Y, Z")):
-            label = f"{'floor' if name == 'floor' else f'kernel_{name}'}_{threads}_threads"
-            found.append(Contender(label, ONE_SHOT, gives, threads, lambda p=process, n=name: p.time_ms(n)))
-    return found
-
-
-def opencv(bench: Bench) -> list[Contender]:
-    import cv2
-
-    light = cv2.structured_light
-    height, width = bench.shot.red.shape
-    thirds = [0.0, 2 * np.pi / 3, 4 * np.pi / 3]
-    # Its patterns are sines where the bench shows cosines; a constant offset, undone when judged.
-    images = bench.steps(bench.config.fringes.numbers[0], thirds, seed=100)
-    found = []
-    for name, method, used in (("opencv_ftp", light.FTP, "1"), ("opencv_psp", light.PSP, "3")):
-        settings = cv2.structured_light_SinusoidalPattern_Params()
-        settings.width, settings.height, settings.methodId = width, height, method
-        settings.nbrOfPeriods = int(bench.config.fringes.numbers[0])
-        pattern = light.SinusoidalPattern_create(settings)
-
-        def run(pattern: Any = pattern) -> Map:
-            phase_rad, _ = pattern.computePhaseMap(images)
-            return np.asarray(phase_rad)
-
-        found.append(Contender(name, used, "wrapped phase", cv2.getNumThreads(), timed(run), run, "wrapped"))
-    return found
-
-
-def scikit_image(bench: Bench) -> list[Contender]:
-    from skimage.restoration import unwrap_phase
-
-    wrapped_rad = wrapped_phases(bench.shot, bench.config.fringes.numbers)[0]
-    masked = np.ma.masked_array(wrapped_rad, ~np.isfinite(wrapped_rad))
-
-    def run() -> Map:
-        return np.ma.filled(unwrap_phase(masked, rng=0), np.nan)
-
-    return [Contender("scikit_image_unwrap", "wrapped phase", "relative phase", 1, timed(run), run, "relative")]
-
-
-def fringes(bench: Bench) -> list[Contender]:
-    logging.disable(logging.WARNING)  # it announces its first compilation
-    from fringes import Fringes
-
-    numbers, width = bench.config.fringes.numbers, bench.scene.projector_width
-    decoder = Fringes()
-    # One by one: given to the constructor together, it puts them back to its defaults.
-    decoder.X, decoder.Y, decoder.axes, decoder.K, decoder.N = width, bench.shot.red.shape[0], 1, len(numbers), 4
-    decoder.v = numbers
-    if width != decoder.X or list(decoder.v) != list(numbers) or list(decoder.N) != [4] * len(numbers):
-        raise SystemExit("fringes: this version does not take X, K, N, v as 2.1 does; --skip fringes")
-    shifts_rad = [np.pi - 0.5 * np.pi * i for i in range(4)]
-    stack = np.stack([image for i, n in enumerate(numbers) for image in bench.steps(n, shifts_rad, seed=200 + 4 * i)])
-
-    def run() -> Map:
-        column_px = np.asarray(decoder.decode(stack[..., None]).x).reshape(bench.shot.red.shape)
-        return 2 * np.pi * numbers[0] / width * column_px
-
-    return [Contender("fringes", "12", "column", usable_cores(), timed(run), run)]
-
-
-def peers(bench: Bench, skip: list[str], stack: ExitStack) -> list[Contender]:
-    makers: dict[str, Callable[[], list[Contender]]] = {
-        "floor": lambda: floor(stack),
-        "opencv": lambda: opencv(bench),
-        "scikit-image": lambda: scikit_image(bench),
-        "fringes": lambda: fringes(bench),
-    }
-    found = []
-    for name, make in makers.items():
-        if name in skip:
-            continue
-        try:
-            found += make()
-        except (ImportError, FileNotFoundError) as error:
-            raise SystemExit(f"{name}: {error}; install it by `make peers` (floor: Rust), or --skip {name}") from error
-    return found
 
 
 def judged(contender: Contender, bench: Bench) -> dict[str, float]:
-    """Give phase_rms_rad, and for what has orders wrong_orders_percent, of the inner pixels that are returned."""
+    """Give the phase errors of the inner pixels; none for a contender that returns no phase."""
     if contender.phase_rad is None:
         return {}
-    phase_rad, truth_rad = (m.astype(np.float64)[bench.inner] for m in (contender.phase_rad(), bench.scene.phase_rad))
-    truth_rad, phase_rad = truth_rad[np.isfinite(phase_rad)], phase_rad[np.isfinite(phase_rad)]
-    if contender.kind == "wrapped":
-        signed = [np.exp(1j * (sign * phase_rad - truth_rad)) for sign in (1, -1)]
-        turned = max(signed, key=lambda z: abs(z.mean()))
-        return {"phase_rms_rad": scoring.rms(np.angle(turned / turned.mean()))}
-    error_rad = phase_rad - truth_rad
-    if contender.kind == "relative":
-        error_rad -= 2 * np.pi * np.round(np.median(error_rad) / (2 * np.pi))
-    right = np.abs(error_rad) < np.pi
-    wrong_percent = 100.0 * float(1 - right.mean())
-    return {"phase_rms_rad": scoring.rms(error_rad[right]), "wrong_orders_percent": wrong_percent}
+    phase_rad, truth_rad = contender.phase_rad()[bench.inner], bench.scene.phase_rad[bench.inner]
+    return scoring.phase_errors(phase_rad, truth_rad, contender.kind)
 
 
 def times_ms(contenders: list[Contender], repeats: int) -> tuple[dict[str, float], dict[str, list[float]]]:
@@ -333,7 +118,7 @@ def main() -> None:
     with ExitStack() as stack:
         contenders = [*plain_numpy(bench), *product(bench), *peers(bench, options.skip, stack)]
         found = records(contenders, bench, options.repeats)
-    print(f"{SURFACE}, {bench.shot.red.shape[1]} x {bench.shot.red.shape[0]}, 8 bit, 3 % noise")
+    print(f"{SURFACE}, {bench.shot.red.shape[1]} x {bench.shot.red.shape[0]}, 8 bit, {NOISE:.0%} noise")
     show(found)
     if options.json:
         record = {"machine": described(), "reference": REFERENCE, "peers": found, "figures": figures(found)}

@@ -23,11 +23,9 @@ from time import perf_counter, process_time
 import numpy as np
 
 from quadfringe.data import AnyShot, Shot
+from quadfringe.evaluation._takes import kill_writer, whole
 from quadfringe.files import figures_text
 from quadfringe.recording import Recorder, Recording
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
-from takes import kill_writer, whole
 
 SHAPE = (768, 1024)
 BAR_MB_PER_S = 150.0

@@ -1,66 +1,21 @@
-"""Measure everything that benches/RESULTS.md says and write it; `make bench` runs this.
+"""Measure the times in benches/RESULTS.md and write it; `make bench` runs this.
 
     python benches/results.py [--out FILE] [--skip NAME ...] [--repeats 20]
 
-Runs `quadfringe bench --scaling`, benches/first_frame.py, benches/peers.py and benches/accuracy.py one after the other
-and writes their numbers, with machine, commit and date. --skip goes to peers.py. Without the test data the rows of real
-captures are missing, and the file says so.
+Runs `quadfringe bench --scaling`, benches/first_frame.py and benches/peers.py one after the other and writes their
+figures, with machine, commit and date. --skip goes to peers.py.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
-import subprocess
-import sys
-import tempfile
-from collections.abc import Iterable, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
+from quadfringe.evaluation._report import Record, columns, head_of, measured
 from quadfringe.evaluation.machine import described
 from quadfringe.files import atomic
 
 HERE = Path(__file__).resolve().parent
-Record = dict[str, Any]
-METHODS = ("published", "best")
-
-
-def measured(*command: str) -> Record:
-    """Run a script for its figures; one that misses a bar of its own ends with 1 and has figures all the same."""
-    with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "figures.json"
-        done = subprocess.run([sys.executable, *command, "--json", str(file)])
-        if not file.is_file():
-            raise SystemExit(f"{' '.join(command)}: no figures, exit status {done.returncode}")
-        record: Record = json.loads(file.read_text())
-    return record
-
-
-def words(cell: object) -> str:
-    if cell is None:
-        return ""
-    return f"{cell:.4g}" if isinstance(cell, float) else str(cell)
-
-
-def table(head: Sequence[str], lines: Iterable[Sequence[object]]) -> str:
-    rows = [head, ["---"] * len(head), *([words(cell) for cell in line] for line in lines)]
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows) + "\n"
-
-
-def columns(entries: list[Record], heads: dict[str, str]) -> str:
-    """Give a table of some keys of records; the words of its head by key."""
-    return table(list(heads.values()), ([entry.get(key) for key in heads] for entry in entries))
-
-
-def head_of(machine: Record) -> str:
-    date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
-    lines = [(name, value) for name, value in (machine | {"date": date}).items() if value is not None]
-    return (
-        "# Results\n\nMeasured and written by `make bench` (benches/results.py); nothing here is typed by hand.\n\n"
-        + table(("", ""), lines)
-    )
 
 
 def times(bench: Record, on_print: Record, first_frame: Record) -> str:
@@ -125,38 +80,22 @@ def peers(found: Record) -> str:
     )
 
 
-def accuracy(found: Record) -> str:
-    figures: dict[str, float] = found["figures"]
-    names = dict.fromkeys(key.partition("_")[2] for key in figures)
-    lines = [(name, *(figures.get(f"{method}_{name}") for method in METHODS)) for name in names]
-    missing = "" if any("capture" in name for name in names) else "\nReal captures: no test data here.\n"
-    return "\n".join(
-        [
-            "## Accuracy\n",
-            "`python benches/accuracy.py`: its head says what each name means, benches/efficiency.py what the "
-            "efficiency is.\n",
-            table(("figure", *METHODS), lines) + missing,
-        ]
-    )
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--out", type=Path, default=HERE / "RESULTS.md")
     parser.add_argument("--skip", action="append", default=[], help="a peer to leave out; may be repeated")
     parser.add_argument("--repeats", type=int, default=20)
     options = parser.parse_args()
-    head = head_of(described())
+    head = head_of(described(), "make bench", "benches/results.py")
     skip = [part for name in options.skip for part in ("--skip", name)]
     repeats = ("--repeats", str(options.repeats))
-    # Those that a wrong option or a missing peer can stop come first.
+    # The script that a wrong option or a missing package can stop runs first.
     beside = peers(measured(str(HERE / "peers.py"), *skip, *repeats))
     bench = ("-m", "quadfringe", "bench", *repeats)
     on_print = measured(*bench, "--patch-mm", "20")
     own = times(measured(*bench, "--scaling"), on_print, measured(str(HERE / "first_frame.py")))
-    exact = accuracy(measured(str(HERE / "accuracy.py")))
     with atomic(options.out) as temporary:
-        temporary.write_text("\n".join([head, own, beside, exact]))
+        temporary.write_text("\n".join([head, own, beside]))
 
 
 if __name__ == "__main__":

@@ -6,7 +6,8 @@ import os
 from pathlib import Path
 
 import pytest
-from scoring import data_folder
+
+from quadfringe.evaluation._scenes import data_folder
 
 
 @pytest.fixture(scope="session")

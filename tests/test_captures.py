@@ -10,9 +10,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-import scoring
 
 from quadfringe import Response, ResponseCalibration
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import scoring
 
 RIGHT_PERCENT = 95.5  # of all object pixels; a missing pixel counts as wrong
 RIGHT_OF_RETURNED_PERCENT = 99.7
@@ -26,16 +27,16 @@ def quadfringe(*words: object) -> None:
     assert done.returncode == 0, done.stderr
 
 
-@pytest.fixture(scope="module", params=scoring.CAPTURES)
+@pytest.fixture(scope="module", params=scenes.CAPTURES)
 def scene(request: pytest.FixtureRequest, data_dir: Path) -> scoring.Scene:
-    return scoring.capture(data_dir, request.param)
+    return scenes.capture(data_dir, request.param)
 
 
 @pytest.fixture(scope="module")
 def response_file(scene: scoring.Scene, data_dir: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp(scene.name) / "response.json"
-    files = scoring.step_files(data_dir, scene.name)
-    quadfringe("calibrate", "response", "--steps", scoring.STEPS, *files, "--out", out)
+    files = scenes.step_files(data_dir, scene.name)
+    quadfringe("calibrate", "response", "--steps", scenes.STEPS, *files, "--out", out)
     return out
 
 
@@ -65,13 +66,13 @@ def test_command_line_decodes_a_capture(scene: scoring.Scene, response_file: Pat
 
 def test_package_decodes_a_capture(scene: scoring.Scene, response_file: Path) -> None:
     response = ResponseCalibration.load(response_file)
-    shape = scoring.shape_of(scene, response=response)
+    shape = scenes.shape_of(scene, response=response)
     assert_bars(scoring.score(scene, shape.phase_rad))
 
 
 def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scene, response_file: Path) -> None:
     for response in (Response(), None, ResponseCalibration.load(response_file)):
-        shape = scoring.shape_of(scene, response=response)
+        shape = scenes.shape_of(scene, response=response)
         assert shape.wrong_order_probability is not None
         seen = scene.scored & shape.returned
         wrong = np.abs(shape.phase_rad - scene.phase_rad)[seen] >= np.pi
@@ -86,7 +87,7 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
 
 def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: Path) -> None:
     known = ResponseCalibration.load(response_file)
-    own, straight = scoring.shape_of(scene), scoring.shape_of(scene, response=known)
+    own, straight = scenes.shape_of(scene), scenes.shape_of(scene, response=known)
     assert own.config["response_of_shot"]
     scores = [scoring.score(scene, shape.phase_rad) for shape in (own, straight)]
     assert_bars(scores[0], OWN_RIGHT_PERCENT)
@@ -99,7 +100,7 @@ def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: P
 
 def test_the_published_way_takes_the_response_of_the_shot_too(scene: scoring.Scene) -> None:
     own, linear = (
-        scoring.score(scene, scoring.shape_of(scene, response=response, method="published").phase_rad)
+        scoring.score(scene, scenes.shape_of(scene, response=response, method="published").phase_rad)
         for response in (None, Response())
     )
     assert own.right_percent > linear.right_percent + 3
@@ -107,7 +108,7 @@ def test_the_published_way_takes_the_response_of_the_shot_too(scene: scoring.Sce
 
 
 def test_a_capture_whose_response_is_not_undone_is_still_ordered(scene: scoring.Scene) -> None:
-    shape = scoring.shape_of(scene, response=Response())
+    shape = scenes.shape_of(scene, response=Response())
     score = scoring.score(scene, shape.phase_rad)
     assert score.right_of_returned_percent >= 99.5
     assert score.right_percent >= 92.0
@@ -115,7 +116,7 @@ def test_a_capture_whose_response_is_not_undone_is_still_ordered(scene: scoring.
 
 def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file: Path) -> None:
     phases_rad = [
-        scoring.shape_of(scene, response=response).phase_rad
+        scenes.shape_of(scene, response=response).phase_rad
         for response in (Response(), ResponseCalibration.load(response_file))
     ]
     raw, linear = (scoring.score(scene, phase_rad) for phase_rad in phases_rad)
@@ -130,18 +131,18 @@ def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file
 
 def test_both_captures_tell_of_the_same_projector(data_dir: Path, tmp_path: Path) -> None:
     exponents = []
-    for name in scoring.CAPTURES:
+    for name in scenes.CAPTURES:
         out = tmp_path / f"{name}.json"
-        files = scoring.step_files(data_dir, name)
-        quadfringe("calibrate", "response", "--steps", scoring.STEPS, *files, "--out", out)
+        files = scenes.step_files(data_dir, name)
+        quadfringe("calibrate", "response", "--steps", scenes.STEPS, *files, "--out", out)
         exponents.append(json.loads(out.read_text())["red"]["exponent"])
     assert 0.3 < min(exponents) <= max(exponents) < 0.65
     assert abs(exponents[0] - exponents[1]) < 0.1
 
 
 def test_all_three_stacks_may_be_given_at_once(data_dir: Path, tmp_path: Path) -> None:
-    files = [f for k in range(3) for f in scoring.step_files(data_dir, "plate", k)]
-    assert len(files) == 3 * scoring.STEPS
+    files = [f for k in range(3) for f in scenes.step_files(data_dir, "plate", k)]
+    assert len(files) == 3 * scenes.STEPS
     out = tmp_path / "response.json"
-    quadfringe("calibrate", "response", "--steps", scoring.STEPS, *files, "--out", out)
+    quadfringe("calibrate", "response", "--steps", scenes.STEPS, *files, "--out", out)
     assert 0.3 < json.loads(out.read_text())["ir"]["exponent"] < 0.65

@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import ndimage
-from scoring import ROOT
 
-sys.path.append(str(ROOT / "benches"))
-import efficiency as measure
+from quadfringe.evaluation import efficiency as measure
 
 RATIOS = (1.0, 35 / 36, 1.0, 30 / 36)
 ROWS, COLUMNS = 400, 500

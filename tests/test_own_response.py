@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import scoring
 from typer.testing import CliRunner
 
 import quadfringe as qf
 from quadfringe.cli.app import app
 from quadfringe.data import AnyShot, Shape
+from quadfringe.evaluation import scoring
 from quadfringe.io.images import write_image
 
 WIDTH_PX = 912

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 import pytest
-import scoring
 
 import quadfringe as qf
-
-sys.path.append(str(scoring.ROOT / "benches"))
-import accuracy
+from quadfringe.evaluation import scoring
+from quadfringe.evaluation._textures import TEXTURES
+from quadfringe.evaluation.reproduce import WIDTH_PX, inside
 
 SEED = 1
 
@@ -30,11 +27,11 @@ SEED = 1
 def test_colours_leave_the_phase_alone(
     name: str, rms_rad: float, median_rad: float, shares: tuple[float, float, float]
 ) -> None:
-    shot, truth_rad = getattr(accuracy, name)(SEED)
-    shape = qf.decode(shot, qf.Plan(projector_width_px=accuracy.WIDTH_PX))
-    border = int(np.ceil(accuracy.WIDTH_PX / accuracy.FRINGES[0]))
+    shot, truth_rad = TEXTURES[name](SEED)
+    shape = qf.decode(shot, qf.Plan(projector_width_px=WIDTH_PX))
+    border = int(np.ceil(WIDTH_PX / qf.Fringes().numbers[0]))
     inner = np.s_[border:-border, border:-border]
-    error_rad = accuracy.inside(shape.phase_rad - truth_rad, border)[inner].astype(np.float64)
+    error_rad = inside(shape.phase_rad - truth_rad, border)[inner].astype(np.float64)
     sigma_rad = shape.uncertainty_rad[inner]
     returned = np.isfinite(error_rad)
     assert returned.mean() > 0.97

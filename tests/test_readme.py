@@ -9,7 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from scoring import ROOT
+
+from quadfringe.evaluation._scenes import ROOT
 
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 README = (ROOT / "README.md").read_text()

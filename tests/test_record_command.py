@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from takes import kill_writer
 from typer.testing import CliRunner, Result
 
 from quadfringe.cli import app
+from quadfringe.evaluation._takes import kill_writer
 from quadfringe.recording import Recording
 
 SYSTEM = """

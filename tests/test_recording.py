@@ -10,13 +10,13 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from takes import kill_writer, numbered_shot, run_with_file_limit, whole
 
 import quadfringe as qf
 from quadfringe.config.cameras import ReplayConfig
 from quadfringe.data import AnyShot, BayerShot, FrameStamp, Stamp
 from quadfringe.devices import open_camera
 from quadfringe.errors import InputError, RecordingError, ShotTimeoutError
+from quadfringe.evaluation._takes import kill_writer, numbered_shot, run_with_file_limit, whole
 from quadfringe.recording import Recorder, Recording, RecordingWriter, recover
 from quadfringe.recording._layout import Header
 from quadfringe.recording.replay import ReplayCamera

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-import scoring
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "benches"))
-import numpy_chain
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import numpy_chain, scoring
 
 if TYPE_CHECKING:
     from quadfringe import Calibration
@@ -21,13 +19,13 @@ NOISE = 0.03  # sigma, fraction of full scale
 
 @pytest.fixture(scope="module")
 def calibration(data_dir: Path) -> Calibration:
-    return scoring.calibration_of(scoring.rig(data_dir))
+    return scenes.calibration_of(scenes.rig(data_dir))
 
 
-@pytest.mark.parametrize("name", scoring.RENDERS)
+@pytest.mark.parametrize("name", scenes.RENDERS)
 def test_without_noise_every_order_is_right(name: str, data_dir: Path, calibration: Calibration) -> None:
-    scene = scoring.render(data_dir, name)
-    shape = scoring.shape_of(scene, calibration=calibration)
+    scene = scenes.render(data_dir, name)
+    shape = scenes.shape_of(scene, calibration=calibration)
     score = scoring.score(scene, shape.phase_rad, shape.xyz_mm)
     assert score.wrong_pixels == 0
     assert score.in_shadow_pixels == 0
@@ -40,12 +38,12 @@ def test_without_noise_every_order_is_right(name: str, data_dir: Path, calibrati
 
 
 @pytest.mark.parametrize("seed", [0, 100])
-@pytest.mark.parametrize("name", scoring.RENDERS)
+@pytest.mark.parametrize("name", scenes.RENDERS)
 def test_noise_of_three_percent_leaves_a_tenth_of_a_millimetre(
     name: str, seed: int, data_dir: Path, calibration: Calibration
 ) -> None:
-    scene = scoring.render(data_dir, name, NOISE, seed)
-    shape = scoring.shape_of(scene, calibration=calibration)
+    scene = scenes.render(data_dir, name, NOISE, seed)
+    shape = scenes.shape_of(scene, calibration=calibration)
     score = scoring.score(scene, shape.phase_rad, shape.xyz_mm)
     assert score.right_of_returned_percent >= 99.9
     assert score.returned_percent >= 99.0
@@ -55,9 +53,9 @@ def test_noise_of_three_percent_leaves_a_tenth_of_a_millimetre(
 
 
 def test_points_lie_on_their_camera_rays(data_dir: Path, calibration: Calibration) -> None:
-    shape = scoring.shape_of(scoring.render(data_dir, "peaks"), calibration=calibration)
+    shape = scenes.shape_of(scenes.render(data_dir, "peaks"), calibration=calibration)
     assert shape.xyz_mm is not None
-    k = scoring.rig(data_dir)["camera"]["K"]
+    k = scenes.rig(data_dir)["camera"]["K"]
     x_mm, y_mm, z_mm = np.moveaxis(shape.xyz_mm, -1, 0)
     rows, columns = np.indices(z_mm.shape)
     seen = np.isfinite(z_mm)
@@ -65,11 +63,11 @@ def test_points_lie_on_their_camera_rays(data_dir: Path, calibration: Calibratio
     assert np.abs(k[1][1] * y_mm / z_mm + k[1][2] - rows)[seen].max() < 1e-3
 
 
-@pytest.mark.parametrize("name", scoring.RENDERS)
+@pytest.mark.parametrize("name", scenes.RENDERS)
 def test_the_published_way_agrees_with_the_plain_numpy_chain(name: str, data_dir: Path) -> None:
-    scene = scoring.render(data_dir, name)
+    scene = scenes.render(data_dir, name)
     plain = numpy_chain.decode(scene.red, scene.green, scene.blue, scene.ir)
-    shape = scoring.shape_of(scene, method="published")
+    shape = scenes.shape_of(scene, method="published")
     inner = scoring.inside(scene.scored, scoring.fringe_px(scene))
     returned = inner & np.isfinite(shape.phase_rad)
     assert returned.sum() > 0.99 * inner.sum()

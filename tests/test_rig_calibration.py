@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 from typing import Any
 
@@ -10,10 +9,6 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scoring import ROOT
-
-sys.path.append(str(ROOT / "benches"))
-import calibration as bench
 
 from quadfringe import _core
 from quadfringe.calibration._adjustment import Adjustment, Sight
@@ -34,6 +29,7 @@ from quadfringe.calibration.targets import ring_board
 from quadfringe.config import Fringes
 from quadfringe.data import core_device
 from quadfringe.errors import CalibrationError, InputError
+from quadfringe.evaluation import _rig_bench as bench
 
 BOARD = ring_board()
 SYSTEM = bench.bench_system()
@@ -43,7 +39,7 @@ TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
 
 @pytest.mark.parametrize("layout", ["regular", "diamond"])
 def test_the_bars_hold_on_the_bench(layout: str) -> None:
-    """A camera of half the size: the whole of `benches/calibration.py` in a fraction of its time."""
+    """A camera of half the size: the whole of `evaluation/calibration.py` in a fraction of its time."""
     figures = bench.measured(bench.bench_system(layout, camera_scale=0.5), poses=7, steps=5)
     missed = {name: figures[name] for name, bar in bench.BARS.items() if not figures[name] <= bar}
     assert not missed, figures

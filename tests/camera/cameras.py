@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
-from fake_twin import fake_twin
 from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
 from quadfringe.config import DeviceModel, SystemConfig
@@ -15,6 +14,7 @@ from quadfringe.config.cameras import ReplayConfig, VirtualConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
 from quadfringe.devices.emulator import Emulator
+from quadfringe.evaluation._fake_twin import fake_twin
 from quadfringe.recording import Recorder
 
 SMALL = DeviceModel(width_px=128, height_px=96, focal_px=(322.5, 322.5), centre_px=(63.5, 47.5))

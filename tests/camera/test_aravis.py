@@ -9,7 +9,6 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from fake_twin import fake_twin
 from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, pattern, two_sources
 
 from quadfringe.config.cameras import AravisConfig, ChipConfig
@@ -18,6 +17,7 @@ from quadfringe.devices.aravis import AravisCamera, ChipCamera, found
 from quadfringe.devices.emulator import MODEL, SERIAL, Emulator
 from quadfringe.devices.emulator.frames import TestPattern
 from quadfringe.errors import CameraError, CameraNotFoundError, ShotTimeoutError, WrongFrameError
+from quadfringe.evaluation._fake_twin import fake_twin
 
 FORMATS = [
     ("BayerRG8", "Mono8"),

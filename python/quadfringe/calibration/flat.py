@@ -1,7 +1,7 @@
 """How evenly a camera sees even light: vignetting, gain of single pixels, defects, and the gain that makes it even.
 
 Decoding does not use the gain: phase does not see what varies slowly, and single pixels are averaged over a window.
-What it would save is measured by `benches/flat_field.py`.
+What it would save is measured by `evaluation/flat_field.py`.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ const TEMPERATURE_MIN: f32 = 1.0 / 333.0;
 /// contrast, and the variance is 1.17 to 1.21 times as much.
 const ALBEDO_LOSS: f32 = 1.18;
 
-/// What the best method is off by on a smooth surface without any noise, rad: `python benches/round_trip.py`, plane and peaks.
+/// What the best method is off by on a smooth surface without any noise, rad: `python evaluation/round_trip.py`, plane and peaks.
 const METHOD_RAD: f32 = 8e-4;
 
 /// Noise of the phases that a window has averaged.

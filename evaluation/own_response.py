@@ -1,6 +1,6 @@
 """What a shot tells of its own response (gamma), and what undoing it is worth, as one table.
 
-    python benches/own_response.py [--json FILE]
+    python evaluation/own_response.py [--json FILE]
 
 Scenes of the virtual bench, 8 bit, seed 1: taken as linear light, and with the response that the shot shows by itself.
 Phase: RMS over right orders of lit pixels; wrong: lit pixels with another order and pixels of shadows, of those

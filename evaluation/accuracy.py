@@ -1,6 +1,6 @@
 """Accuracy of both methods as one table: noise, texture, edges, depth, real captures, and the bound that noise sets.
 
-    python benches/accuracy.py [--json FILE] [--data FOLDER]
+    python evaluation/accuracy.py [--json FILE] [--data FOLDER]
 
 - peaks: the shot of `quadfringe reproduce peaks`, 3 % noise (sigma 0.03 of full scale), rounded to 8 bit; phase RMS in
   rad over the field without a border of one fringe.
@@ -9,8 +9,9 @@
 - peaks_printed: the shades times patches with sharp borders and random colours, inks nearly clear in the infrared.
 - plane, steps, sphere, face: shots of the virtual bench at about 800 mm, 3 % noise, 8 bit; lit pixels returned, wrong
   orders among returned, and depth RMS a fringe away from edges, borders and shadows, wrong orders included.
-- captures: real shots as benches/captures_report.py scores them; left out without the test data.
-- efficiency: phase variance over the Cramer-Rao bound at the same spatial resolution; benches/efficiency.py defines it.
+- captures: real shots as evaluation/captures_report.py scores them; left out without the test data.
+- efficiency: phase variance over the Cramer-Rao bound at the same spatial resolution, defined in
+  quadfringe.evaluation.efficiency.
 
 All seeds are fixed. Each figure of a bench shot is over the seeds 1, 2 and 3 together.
 """
@@ -19,23 +20,21 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from bench_decode import scene_from
 from captures_report import capture_scores
-from efficiency import Images, efficiency
 from numpy.typing import NDArray
-from scipy import spatial
 
 import quadfringe as qf
 from quadfringe import _core
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import scoring
+from quadfringe.evaluation._textures import TEXTURES
+from quadfringe.evaluation.efficiency import Images, efficiency
 from quadfringe.evaluation.machine import described
-from quadfringe.evaluation.reproduce import WIDTH_PX, inside, peaks_shot
-
-import scoring  # isort: skip  (bench_decode makes it known)
+from quadfringe.evaluation.reproduce import WIDTH_PX, inside
 
 METHODS = ("published", "best")
 NOISE = 0.03
@@ -45,70 +44,14 @@ SURFACES = ("plane", "steps", "sphere", "face")
 EFFICIENCY_SURFACES = ("plane", "peaks")
 FRINGES = qf.Fringes().numbers
 RATIOS = (1.0, FRINGES[1] / FRINGES[0], 1.0, FRINGES[2] / FRINGES[0])
-CELLS, PRINT_SEED = 400, 5
 
 Figures = dict[str, float]
-Albedo = NDArray[np.float64]  # (H, W, 4)
-
-
-def white(seed: int) -> tuple[qf.Shot, NDArray[Any]]:
-    return peaks_shot(noise=NOISE, seed=seed)
-
-
-def patches(seed: int) -> tuple[qf.Shot, NDArray[Any]]:
-    return peaks_shot(noise=NOISE, seed=seed, patch_mm=20.0)
-
-
-def shades(seed: int) -> tuple[qf.Shot, NDArray[Any]]:
-    return printed_with(shades_of, seed)
-
-
-def printed(seed: int) -> tuple[qf.Shot, NDArray[Any]]:
-    return printed_with(lambda shape: shades_of(shape) * patches_of(shape), seed)
-
-
-def printed_with(albedo_of: Callable[[tuple[int, ...]], Albedo], seed: int) -> tuple[qf.Shot, NDArray[Any]]:
-    """Print an albedo on the clean shot, then add noise and round to 8 bit."""
-    clean, truth_rad = peaks_shot(noise=0.0, bit_depth=16)
-    albedo = albedo_of(clean.red.shape)
-    channels = [
-        scoring.noisy_8bit(np.round(image * albedo[..., c]).astype(np.uint16), NOISE, 10 * seed + c)
-        for c, image in enumerate(clean.channels.values())
-    ]
-    return qf.Shot(*channels), truth_rad
-
-
-def shades_of(shape: tuple[int, ...]) -> Albedo:
-    """Give waves of 150 to 500 pixels in each channel, 0.6 to 1, (H, W, 4)."""
-    random = np.random.default_rng(PRINT_SEED)
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    found = np.empty((*shape, 4))
-    for channel in range(4):
-        along, across = random.uniform(2 * np.pi / 500, 2 * np.pi / 150, 2)
-        found[..., channel] = 0.8 + 0.2 * np.cos(along * x + channel) * np.cos(across * y)
-    return found
-
-
-def patches_of(shape: tuple[int, ...]) -> Albedo:
-    """Give cells of some 50 pixels around random points, each of its own colour, (H, W, 4)."""
-    random = np.random.default_rng(PRINT_SEED)
-    centres = random.uniform((0, 0), shape, (CELLS, 2))
-    y, x = np.mgrid[: shape[0], : shape[1]]
-    _, cell = spatial.KDTree(centres).query(np.stack([y, x], axis=-1))
-    colours = random.uniform((0.3, 0.3, 0.3, 0.8), 1.0, (CELLS, 4))
-    return np.asarray(colours[cell])
 
 
 def peaks_figures(method: str) -> Iterator[tuple[str, Figures]]:
     """Give phase errors of the returned pixels (RMS of right orders and of all, median of all), returned and wrong."""
     plan = qf.Plan(projector_width_px=WIDTH_PX, settings=qf.DecodeConfig.model_validate({"method": method}))
-    prints: dict[str, Callable[[int], tuple[qf.Shot, NDArray[Any]]]] = {
-        "peaks": white,
-        "peaks_patches": patches,
-        "peaks_shades": shades,
-        "peaks_printed": printed,
-    }
-    for name, take in prints.items():
+    for name, take in TEXTURES.items():
         errors = []
         for seed in SEEDS:
             shot, truth_rad = take(seed)
@@ -119,7 +62,7 @@ def peaks_figures(method: str) -> Iterator[tuple[str, Figures]]:
         returned = error[np.isfinite(error)]
         right = np.abs(returned) < np.pi
         yield (
-            name,
+            "peaks" if name == "white" else f"peaks_{name}",
             {
                 "phase_rms_rad": scoring.rms(returned[right]),
                 "phase_rms_all_rad": scoring.rms(returned),
@@ -142,7 +85,7 @@ def surface_figures(surface: str, method: str) -> Figures:
             shot = scanner.grab()
             shape = scanner.decode(shot)
         assert shot.truth is not None
-        scene = scene_from(shot, config, scanner.calibration.projector.width_px)
+        scene = scenes.scene_from(shot, config, scanner.calibration.projector.width_px)
         lit = np.isfinite(scene.phase_rad) & ~shot.truth.shadow
         found = scoring.score(scene, shape.phase_rad, mask=lit)
         lit_pixels += int(lit.sum())
@@ -184,7 +127,7 @@ def efficiency_figures(surface: str, method: str) -> Figures:
 
 def all_figures(data: Path) -> Iterator[tuple[str, str, Figures]]:
     """Give what was measured, the method, and the figures, one after the other."""
-    has_captures = all((data / name / "single_shot.npz").is_file() for name in scoring.CAPTURES)
+    has_captures = all((data / name / "single_shot.npz").is_file() for name in scenes.CAPTURES)
     for method in METHODS:
         for name, found in peaks_figures(method):
             yield name, method, found
@@ -200,7 +143,7 @@ def all_figures(data: Path) -> Iterator[tuple[str, str, Figures]]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--json", type=Path, help="write the figures here")
-    parser.add_argument("--data", type=Path, default=scoring.data_folder())
+    parser.add_argument("--data", type=Path, default=scenes.data_folder())
     options = parser.parse_args()
     figures: Figures = {}
     for name, method, found in all_figures(options.data):

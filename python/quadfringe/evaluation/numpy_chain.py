@@ -74,7 +74,7 @@ def envelope_mean_and_half(image: Map, period_px: float) -> tuple[Map, Map]:
 
 
 def two_step(red: Map, blue: Map, period_px: float) -> tuple[Map, Map]:
-    """Wrapped phase and modulation from two frames a quarter period apart (S2).
+    """Give wrapped phase and modulation from two frames a quarter period apart (S2).
 
     Backgrounds are subtracted, modulations made equal by dividing each by its own; then
     R = cos(Phi), B = -sin(Phi), Phi = atan2(-B, R).
@@ -88,7 +88,7 @@ def two_step(red: Map, blue: Map, period_px: float) -> tuple[Map, Map]:
 
 
 def improved_ftp(image: Map, period_px: float) -> Map:
-    """Wrapped phase of one frame by improved Fourier transform profilometry along rows (S3).
+    """Give the wrapped phase of one frame by improved Fourier transform profilometry along rows (S3).
 
     With the background gone the band may reach from just above zero to twice the carrier.
     """

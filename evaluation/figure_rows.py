@@ -1,45 +1,18 @@
-"""Draw the pictures of the README and measure its figures again; `make figures` runs this.
-
-    python docs/make_figures.py [--only WORD ...]
-
-With `--only`, figures are measured again by the commands that hold one of these words, and nothing is drawn. What was
-measured is written after every command: who interrupts it keeps what there is.
-
-Every row of the table names the command that gave its number. Rows on captures and renders need the test data
-(QUADFRINGE_DATA, or ../shared/data), those on cameras Aravis and a network of their own (`make test-camera`), those on
-the browser, and its picture, chromium (`make test-live`); they are left as they are without.
-"""
+"""The rows of the README's table of figures: for each command, the figures it measures, their words and their bars."""
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
 import shutil
 import subprocess
-import sys
-import tempfile
-import time
 from collections.abc import Callable
-from contextlib import closing
 from dataclasses import dataclass
 from importlib.util import find_spec
 from pathlib import Path
 
-import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import LightSource
-from matplotlib.figure import Figure
-
-import quadfringe as qf
-from quadfringe.evaluation.moving_scene import hand_system
-from quadfringe.view.viewer import Viewer
+from quadfringe.evaluation._scenes import data_folder
 
 ROOT = Path(__file__).resolve().parents[1]
-PICTURES = ROOT / "docs" / "images"
 LOOPBACK = ROOT / "scripts" / "loopback"
-PAGE_S = 20.0  # until the page has drawn, without a graphics card
-BEGIN, END = "<!-- figures -->", "<!-- /figures -->"
 
 
 @dataclass(frozen=True)
@@ -243,18 +216,18 @@ def has_browser() -> bool:
 
 
 SOURCES = (
-    Source(("benches/round_trip.py",), ROUND_TRIP),
-    Source(("benches/bayer.py",), BAYER),
-    Source(("benches/calibration.py",), (*CALIBRATION, *LIGHT)),
-    Source(("benches/calibration.py", "--layout", "diamond"), CALIBRATION),
+    Source(("evaluation/round_trip.py",), ROUND_TRIP),
+    Source(("evaluation/bayer.py",), BAYER),
+    Source(("evaluation/calibration.py",), (*CALIBRATION, *LIGHT)),
+    Source(("evaluation/calibration.py", "--layout", "diamond"), CALIBRATION),
     Source(("quadfringe", "accept"), ACCEPTANCE, out="acceptance.png"),
     Source(("quadfringe", "demo"), DEMO),
     Source(("quadfringe", "reproduce", "peaks"), PEAKS),
     Source(("quadfringe", "reproduce", "pair-tolerance"), PAIR_TOLERANCE),
     Source(("quadfringe", "reproduce", "pair-correction"), PAIR_CORRECTION),
     Source(("quadfringe", "reproduce", "pair-depth"), PAIR_DEPTH),
-    Source(("benches/accuracy.py",), PRINTS),
-    Source(("benches/captures_report.py",), CAPTURES, has_data),
+    Source(("evaluation/accuracy.py",), PRINTS),
+    Source(("evaluation/captures_report.py",), CAPTURES, has_data),
     Source(("benches/bench_decode.py",), SPEED),
     Source(("benches/first_frame.py",), (("first_frame_s", "first frame from process start, s", "1.5"),)),
     Source(("scripts/loopback", "benches/camera.py"), CAMERA, has_cameras),
@@ -263,130 +236,3 @@ SOURCES = (
     Source(("benches/live.py", "--browser"), BROWSER, has_browser),
     Source(("benches/batch.py",), BATCH),
 )
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description="Draw the pictures of the README and measure its figures again.")
-    parser.add_argument("--only", nargs="+", metavar="WORD", help="commands to run: those that hold one of these words")
-    only = parser.parse_args().only
-    chosen = [source for source in SOURCES if only is None or any(word in words_of(source.command) for word in only)]
-    if not chosen:
-        parser.error(f"no command holds one of {only}; the last column of the table in README.md names them")
-    if only is None:
-        draw()
-    for source in chosen:
-        if source.there():
-            write_table(source, run(source))
-
-
-def draw() -> None:
-    PICTURES.mkdir(parents=True, exist_ok=True)
-    with qf.open(qf.SystemConfig(scene=qf.SceneConfig(surface="face", noise=0.03))) as scanner:
-        shot = scanner.grab()
-        shape = scanner.decode(shot)
-    draw_fringes(PICTURES / "fringes.png", shot)
-    draw_shape(PICTURES / "shape.png", shape)
-    if has_browser():
-        draw_page(PICTURES / "live.png")
-
-
-def draw_fringes(path: Path, shot: qf.Shot) -> None:
-    """Draw the visible image and the infrared one, side by side, each cut in half."""
-    full = shot.full_scale_value
-    colour = np.stack([shot.red, shot.green, shot.blue], axis=2) / full
-    infrared = np.repeat(shot.ir[:, :, None], 3, axis=2) / full
-    middle = colour.shape[1] // 2
-    joined = np.concatenate([colour[:, :middle], infrared[:, middle:]], axis=1)
-    figure = Figure(figsize=(5.12, 3.84), dpi=110)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.imshow(joined, interpolation="antialiased", aspect="auto")
-    axes.axvline(middle, color="white", linewidth=1.5)
-    for x, words in ((0.02, "red, green, blue"), (0.52, "infrared")):
-        style = {"color": "white", "fontsize": 10, "transform": axes.transAxes}
-        axes.text(x, 0.03, words, bbox={"facecolor": "black", "alpha": 0.6, "edgecolor": "none"}, **style)
-    axes.set_axis_off()
-    figure.savefig(path)
-
-
-def draw_shape(path: Path, shape: qf.Shape, stride: int = 3) -> None:
-    """Draw the points as a lit surface, colour by depth."""
-    assert shape.xyz_mm is not None
-    x, y, z = np.moveaxis(shape.xyz_mm[::stride, ::stride], 2, 0).astype(float)
-    near, far = np.nanquantile(z, (0.001, 0.999))
-    height = np.clip(far - z, 0, far - near)
-    light = LightSource(azdeg=315, altdeg=40)
-    colour = light.shade(np.nan_to_num(height), cmap=colormaps["viridis"], vert_exag=2.0 / stride, blend_mode="soft")
-    colour[np.isnan(z)] = 0
-    figure = Figure(figsize=(5.12, 3.84), dpi=110)
-    axes = figure.add_axes((-0.32, -0.38, 1.64, 1.76), projection="3d")
-    axes.plot_surface(x, -y, height, facecolors=colour, rstride=1, cstride=1, antialiased=False, shade=False)
-    axes.set_box_aspect((np.ptp(x[np.isfinite(x)]), np.ptp(y[np.isfinite(y)]), 1.6 * (far - near)))
-    axes.view_init(elev=62, azim=-80)
-    axes.set_axis_off()
-    figure.savefig(path)
-
-
-def draw_page(path: Path) -> None:
-    """Take a picture of the live page with the hand on it."""
-    sys.path.append(str(ROOT / "benches"))
-    from live import Page
-
-    with (
-        qf.open(hand_system()) as scanner,
-        scanner.stream(2, keep="all") as stream,
-        Viewer(port=8700, colouring="height") as viewer,
-        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
-        closing(Page(folder)) as page,
-    ):
-        page.ask("Page.navigate", url=viewer.url)
-        viewer.follow(stream, columns=scanner.calibration.projector.width_px)
-        time.sleep(PAGE_S)
-        page.value("document.querySelectorAll('.mantine-Notification-closeButton').forEach(cross => cross.click()); 0")
-        time.sleep(PAGE_S / 4)
-        page.picture(path)
-
-
-def write_table(measured: Source, figures: dict[str, float]) -> None:
-    """Put the figures of one source into the README's table; all other rows stay as they stand there."""
-    readme = ROOT / "README.md"
-    before, _, rest = readme.read_text().partition(BEGIN)
-    old, _, after = rest.partition(END)
-    lines = ["| figure | value | bar | command |", "|---|---|---|---|"]
-    for source in SOURCES:
-        command = words_of(source.command)
-        if source is measured:
-            lines += [f"| {words} | {figures[name]:.4g} | {bar} | `{command}` |" for name, words, bar in source.rows]
-        else:
-            lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
-    table = "\n".join(lines)
-    readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
-
-
-def words_of(command: tuple[str, ...]) -> str:
-    if command[0] == "quadfringe":
-        return " ".join(command)
-    first = next(place for place, word in enumerate(command) if word.endswith(".py"))
-    return " ".join((*command[:first], "python", *command[first:]))
-
-
-def data_folder() -> Path:
-    return Path(os.environ.get("QUADFRINGE_DATA", ROOT.parent / "shared" / "data"))
-
-
-def run(source: Source) -> dict[str, float]:
-    command = source.command
-    with tempfile.TemporaryDirectory() as folder:
-        json_file = Path(folder) / "figures.json"
-        if command[0] == "quadfringe":
-            full = [sys.executable, "-m", *command, "--out", str(Path(folder) / source.out), "--json", str(json_file)]
-        else:
-            full = words_of(command).replace("python", sys.executable, 1).split()
-            full += ["--json", str(json_file)]
-        # A bar that is missed ends with a status of its own, and is a row like the others.
-        subprocess.run(full, check=False, stdout=subprocess.DEVNULL, cwd=ROOT)
-        figures: dict[str, float] = json.loads(json_file.read_text())["figures"]
-    return figures
-
-
-if __name__ == "__main__":
-    main()

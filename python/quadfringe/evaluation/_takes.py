@@ -1,4 +1,4 @@
-"""Takes for tests and benches: shots that tell their number everywhere, and writers that die."""
+"""Recordings that prove what was kept: shots that carry their number in every pixel, and writers that get killed."""
 
 from __future__ import annotations
 
@@ -11,16 +11,14 @@ import numpy as np
 
 from quadfringe.data import AnyShot, Shot
 
-HERE = Path(__file__).resolve().parent
 HEIGHT_PX, WIDTH_PX = 64, 96
 
 WRITER = """
 import resource, signal, sys
-sys.path.insert(0, sys.argv[1])
-from takes import numbered_shot
+from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.recording import RecordingWriter
 from quadfringe.recording._layout import Header
-path, limit, height, width = sys.argv[2], *map(int, sys.argv[3:])
+path, limit, height, width = sys.argv[1], *map(int, sys.argv[2:])
 if limit:
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
@@ -33,26 +31,28 @@ with RecordingWriter(path, Header.of(shots[0], None, None)) as writer:
 
 
 def numbered_shot(number: int, shape: tuple[int, int] = (HEIGHT_PX, WIDTH_PX)) -> AnyShot:
-    """A shot whose every pixel depends on its number (of sixteen)."""
+    """Give a shot in which every pixel depends on the number, modulo sixteen."""
     ramp = (np.arange(shape[0] * shape[1]) % 239).reshape(shape)
-    return Shot(*((ramp + 16 * channel + number % 16).astype(np.uint8) for channel in range(4)))
+    red, green, blue, ir = ((ramp + 16 * channel + number % 16).astype(np.uint8) for channel in range(4))
+    return Shot(red, green, blue, ir)
 
 
 def whole(shot: AnyShot, number: int) -> bool:
-    """Whether this is, to the last byte, the shot of this number."""
-    expected = numbered_shot(number, shot.images["ir"].shape).images  # type: ignore[arg-type]
+    """Tell whether this is the shot of that number, to the last byte."""
+    expected = numbered_shot(number, shot.images["ir"].shape).images
     return all(np.array_equal(image, expected[name]) for name, image in shot.images.items())
 
 
 def start_writer(
     path: Path, limit_bytes: int = 0, shape: tuple[int, int] = (HEIGHT_PX, WIDTH_PX)
 ) -> subprocess.Popen[str]:
-    command = [sys.executable, "-c", WRITER, str(HERE), str(path), str(limit_bytes), *map(str, shape)]
+    """Start a process that writes shots and prints how many it has reported as written."""
+    command = [sys.executable, "-c", WRITER, str(path), str(limit_bytes), *map(str, shape)]
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
 def kill_writer(path: Path, after_s: float, shape: tuple[int, int] = (HEIGHT_PX, WIDTH_PX)) -> int:
-    """Start a writer, kill it with SIGKILL some time after its first shot; returns the shots that it reported."""
+    """Kill a writer with SIGKILL some time after its first shot; give the number of shots that it reported."""
     with start_writer(path, shape=shape) as writer:
         assert writer.stdout is not None
         first = writer.stdout.readline()
@@ -62,7 +62,7 @@ def kill_writer(path: Path, after_s: float, shape: tuple[int, int] = (HEIGHT_PX,
 
 
 def run_with_file_limit(path: Path, limit_bytes: int) -> tuple[int, str]:
-    """Write until the system refuses at this file size; returns the shots that were reported, and the error."""
+    """Write until the system refuses at this file size; give the number of shots reported, and the error text."""
     with start_writer(path, limit_bytes) as writer:
         out, reason = writer.communicate(timeout=120)
     return int(out.split()[-1]), reason

@@ -1,26 +1,10 @@
-"""Calibration of the coaxial pair on the virtual bench, against its bars.
-
-    python benches/calibration.py [--json FILE] [--layout regular|diamond] [--poses N] [--steps N]
-    python benches/calibration.py --camera-scale 0.25 --poses 6 --steps 4 --seeds 12
-
-A 9 x 12 ring board is captured in poses tilted to all sides, under N-step fringes over columns and rows of both
-projectors. The bench has lens distortion in all three devices, a response (gamma 2.2) of the projectors, crosstalk of
-15 % between neighbouring channels, blur of 0.8 px, shading, noise of 1 % and 8 bit; the infrared chip is shifted,
-turned and scaled. The infrared projector deviates from the visible one by 1 degree and 0.5 mm on every axis. Seeds
-are fixed. Responses and crosstalk are calibrated with even light, at 15 % from every channel to every other. Exit
-status 1 when a bar is missed.
-
-With several seeds the calibration is done that often with other noise and other poses: `outside_their_interval` is then
-the share of runs in which any number of the pair left its interval, of which one in twenty should.
-"""
+"""A virtual bench with the defects of a real one, on which `evaluation/calibration.py` calibrates both projectors."""
 
 from __future__ import annotations
 
-import argparse
-import sys
-from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,29 +19,14 @@ from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.calibration.targets import Target, ring_board
 from quadfringe.config import DeviceModel, Fringes, SceneConfig, SystemConfig
 from quadfringe.data import core_device
-from quadfringe.files import figures_text
 
 DEVIATION_DEG, DEVIATION_MM = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
 SEEDS_APART = 100_003  # every exposure takes the next seed
 CROSSTALK = ((1.0, 0.15, 0.0, 0.02), (0.15, 1.0, 0.15, 0.0), (0.0, 0.15, 1.0, 0.02), (0.15, 0.0, 0.02, 1.0))
-BARS = {
-    "ring_centre_rms_px": 0.05,
-    "camera_mean_px": 0.15,
-    "visible_mean_px": 0.15,
-    "infrared_mean_px": 0.15,
-    "focal_error_percent": 0.1,
-    "centre_error_px": 1.0,
-    "pair_rotation_error_deg": 0.02,
-    "pair_translation_error_mm": 0.1,
-    "outside_their_interval": 0.0,
-}
-LIGHT_BARS = {"stray_after_percent": 0.5, "level_rms_after_percent": 0.5}
 
 
 def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int = 0) -> SystemConfig:
     """Give the bench; `camera_scale` 0.5 is a camera of half the size with the same field."""
-    import cv2
-
     published = _core.Bench(layout=layout)
     visible = published.visible
     turn = cv2.Rodrigues(np.radians(DEVIATION_DEG))[0]
@@ -106,6 +75,7 @@ def centre_errors_px(
     views: tuple[View, ...], config: SystemConfig, target: Target, poses: NDArray[Any]
 ) -> NDArray[Any]:
     """Give what was found less where the points are, (n, 2), over all views."""
+    assert config.camera is not None
     camera = core_device(config.camera)
     errors = []
     for view, pose in zip(views, poses, strict=True):
@@ -119,6 +89,7 @@ def figures_of(found: RigCalibration, config: SystemConfig) -> dict[str, float]:
     figures: dict[str, float] = {}
     focal, centre, outside = 0.0, 0.0, 0
     for name, model in (("camera", config.camera), ("visible", config.projector), ("infrared", config.infrared)):
+        assert model is not None
         fit = getattr(found, name)
         figures[f"{name}_mean_px"] = fit.mean_px
         missed = np.subtract(fit.device.focal_px, model.focal_px)
@@ -127,6 +98,7 @@ def figures_of(found: RigCalibration, config: SystemConfig) -> dict[str, float]:
         centre = max(centre, float(np.hypot(*off)))
         figures[f"{name}_focal_sd_px"] = max(fit.sd.focal_px)
     figures |= {"focal_error_percent": 100 * focal, "centre_error_px": centre}
+    assert found.pair is not None
     truth = np.array([*DEVIATION_DEG, *DEVIATION_MM])
     error = np.array([*found.pair.rotation_deg, *found.pair.translation_mm]) - truth
     low, high = found.pair.interval(0.95).T
@@ -160,41 +132,3 @@ def light_figures() -> dict[str, float]:
     plan = captures.session.level_plan
     seen = np.array([mean_levels(captures.shot("levels", name)) for name in plan.names])
     return fit_channels(plan, seen, dark).figures
-
-
-def over_seeds(layout: str, scale: float, poses: int, steps: int, seeds: int) -> dict[str, float]:
-    """Give the worst figures of several calibrations, their mean square error of the pair, and how many were off."""
-    runs = [measured(bench_system(layout, scale, seed), poses, steps, seed) for seed in range(seeds)]
-    figures = {name: max(run[name] for run in runs) for name in runs[0]}
-    figures["pair_mean_square_in_sd"] = float(np.mean([run["pair_mean_square_in_sd"] for run in runs]))
-    figures["outside_their_interval"] = float(np.mean([run["outside_their_interval"] > 0 for run in runs]))
-    return figures
-
-
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, metavar="FILE")
-    parser.add_argument("--layout", choices=("regular", "diamond"), default="regular")
-    parser.add_argument("--poses", type=int, default=12)
-    parser.add_argument("--steps", type=int, default=8)
-    parser.add_argument("--camera-scale", type=float, default=1.0, help="0.5: a camera of half the size, quicker")
-    parser.add_argument("--seeds", type=int, default=1, help="calibrations, each with noise and poses of its own")
-    given = parser.parse_args()
-    settings = (given.layout, given.camera_scale, given.poses, given.steps)
-    figures = over_seeds(*settings, given.seeds) | light_figures()
-    # One run in twenty may be outside; of a dozen, three are one time in fifty.
-    bars = (
-        BARS
-        | LIGHT_BARS
-        | {"outside_their_interval": 0.05 + 2.1 * (0.05 * 0.95 / given.seeds) ** 0.5 if given.seeds > 1 else 0.0}
-    )
-    if given.json is not None:
-        given.json.write_text(figures_text(figures))
-    for name, value in figures.items():
-        bar = f"   bar {bars[name]:.3g}" if name in bars else ""
-        print(f"{name:28} {value:.4g}{bar}")
-    sys.exit(int(any(not figures[name] <= bar for name, bar in bars.items())))
-
-
-if __name__ == "__main__":
-    main()

@@ -1,4 +1,4 @@
-"""Starts Aravis' own fake cameras in a process of their own, and gives the settings that open them."""
+"""Start the fake cameras that come with Aravis in a separate process, and give the settings that open them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from quadfringe.config.cameras import AravisConfig, ChipConfig
@@ -18,13 +17,13 @@ FAKES = ("127.0.0.5", "127.0.0.6")
 
 @dataclass(frozen=True)
 class FakeTwin:
-    """Settings that open the fake cameras, and the process that they live in."""
+    """Settings that open the fake cameras, and the process that runs them."""
 
     capture: AravisConfig
     process: subprocess.Popen[str]
 
     def sent(self, first: int, last: int) -> list[set[int]]:
-        """Which of these exposures, numbers modulo 65536, each of the cameras has sent."""
+        """Give the exposures from first to last, modulo 65536, that each of the two cameras has sent."""
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         print("sent", file=self.process.stdin, flush=True)
@@ -34,7 +33,8 @@ class FakeTwin:
 
 @contextmanager
 def fake_twin(size_px: tuple[int, int], rate_hz: float, **settings: Any) -> Iterator[FakeTwin]:
-    command = [sys.executable, str(Path(__file__).with_name("aravis_fake.py")), *map(str, (*size_px, rate_hz, *FAKES))]
+    """Run two fake cameras on the loopback interface; `settings` are those of `AravisConfig`."""
+    command = [sys.executable, "-m", "quadfringe.evaluation._aravis_fake", *map(str, (*size_px, rate_hz, *FAKES))]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout is not None

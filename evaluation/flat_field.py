@@ -1,4 +1,4 @@
-"""What uneven light and uneven pixels cost: `python benches/flat_field.py`.
+"""What uneven light and uneven pixels cost: `python evaluation/flat_field.py`.
 
 Shots of the virtual bench are weakened towards the corners, or pixel by pixel, and decoded without correction.
 """

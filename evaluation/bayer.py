@@ -1,6 +1,6 @@
 """A Bayer chip against full sampling: pure fringes, and whole shots of the virtual bench.
 
-    python benches/bayer.py [--json FILE]
+    python evaluation/bayer.py [--json FILE]
 
 Fringes: two-step phase error of red and blue on slanted fringes of one period, from the raw mosaic as it is
 developed here and as OpenCV interpolates it, and the share of white noise that is left. Shots: 1024 x 768, 16 bit
@@ -19,11 +19,11 @@ from typing import Any
 
 import cv2
 import numpy as np
-from bench_decode import scoring  # it makes the folder of the tests known
 from numpy.typing import NDArray
 
 import quadfringe as qf
 from quadfringe import _core
+from quadfringe.evaluation import scoring
 
 SURFACES = ("steps", "face", "peaks")
 NOISES = (0.0, 0.03)

@@ -1,6 +1,6 @@
 """Scores of the product on real captures and on independent renders, as one table.
 
-    python benches/captures_report.py [--data FOLDER] [--json FILE] [--method best]
+    python evaluation/captures_report.py [--data FOLDER] [--json FILE] [--method best]
 
 Captures are decoded as if their light was linear, with the response that the shot shows by itself (what `decode`
 does), and with the one estimated from the 12 images of their first frequency; renders at 16 bit without noise and at
@@ -13,15 +13,13 @@ from __future__ import annotations
 
 import argparse
 import json
-import sys
 from pathlib import Path
 from typing import Any
 
 import quadfringe as qf
 from quadfringe.calibration.response import estimate_from_files
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
-import scoring
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import scoring
 
 NOISE = 0.03
 HEAD = f"{'':28}{'right %':>9}{'of returned %':>15}{'returned %':>12}{'phase rad':>11}{'depth mm':>10}"
@@ -37,22 +35,22 @@ def line(name: str, score: scoring.Score) -> str:
 
 def capture_scores(data: Path, settings: dict[str, Any]) -> dict[str, scoring.Score]:
     scores = {}
-    for name in scoring.CAPTURES:
-        scene = scoring.capture(data, name)
-        response = estimate_from_files(scoring.step_files(data, name), scoring.STEPS).calibration
+    for name in scenes.CAPTURES:
+        scene = scenes.capture(data, name)
+        response = estimate_from_files(scenes.step_files(data, name), scenes.STEPS).calibration
         for label, known in (("as_linear", qf.Response()), ("own_response", None), ("with_response", response)):
-            shape = scoring.shape_of(scene, response=known, **settings)
+            shape = scenes.shape_of(scene, response=known, **settings)
             scores[f"{name}_{label}"] = scoring.score(scene, shape.phase_rad)
     return scores
 
 
 def render_scores(data: Path, settings: dict[str, Any]) -> dict[str, scoring.Score]:
-    calibration: qf.Calibration = scoring.calibration_of(scoring.rig(data))
+    calibration: qf.Calibration = scenes.calibration_of(scenes.rig(data))
     scores = {}
-    for name in scoring.RENDERS:
+    for name in scenes.RENDERS:
         for label, sigma in (("noise_free", None), ("noise_3_percent", NOISE)):
-            scene = scoring.render(data, name, sigma)
-            shape = scoring.shape_of(scene, calibration=calibration, **settings)
+            scene = scenes.render(data, name, sigma)
+            shape = scenes.shape_of(scene, calibration=calibration, **settings)
             inner = scoring.inside(scene.scored, scoring.fringe_px(scene))
             maps = (shape.phase_rad, shape.xyz_mm)
             scores[f"{name}_{label}"] = scoring.score(scene, *maps)
@@ -62,7 +60,7 @@ def render_scores(data: Path, settings: dict[str, Any]) -> dict[str, scoring.Sco
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--data", type=Path, default=scoring.data_folder())
+    parser.add_argument("--data", type=Path, default=scenes.data_folder())
     parser.add_argument("--json", type=Path, help="write the figures here")
     parser.add_argument("--method", choices=["published", "best"])
     options = parser.parse_args()

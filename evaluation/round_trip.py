@@ -1,6 +1,6 @@
 """decode(simulate(h)) without noise, and the identity of the virtual bench, as figures.
 
-    python benches/round_trip.py [--json FILE]
+    python evaluation/round_trip.py [--json FILE]
 
 Shots of the reference bench, 1024 x 768, 16 bit. Phase errors are over pixels more than a fringe away from edges,
 wrong orders over everything that is returned. Identity: camera and projector are the same device before a plane at
@@ -14,12 +14,11 @@ import json
 from pathlib import Path
 
 import numpy as np
-from bench_decode import scene_from
 
 import quadfringe as qf
 from quadfringe import _core
-
-import scoring  # isort: skip  (bench_decode makes it known)
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import scoring
 
 SURFACES = ("plane", "peaks", "steps", "sphere")
 FRINGE_PX = 28
@@ -31,7 +30,7 @@ def round_trip(surface: str) -> dict[str, float]:
     with qf.open(config) as scanner:
         shot = scanner.grab()
         shape = scanner.decode(shot)
-    scene = scene_from(shot, config, scanner.calibration.projector.width_px)
+    scene = scenes.scene_from(shot, config, scanner.calibration.projector.width_px)
     lit = np.isfinite(scene.phase_rad)
     whole = scoring.score(scene, shape.phase_rad, mask=lit)
     smooth = scoring.score(scene, shape.phase_rad, mask=scoring.inside(scene.scored, FRINGE_PX))

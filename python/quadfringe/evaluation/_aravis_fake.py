@@ -1,10 +1,11 @@
-"""Aravis' own fake cameras as two chips that show the test pattern: an implementation of the wire that is not ours.
+"""Two fake cameras of Aravis that show the test pattern: an implementation of GigE Vision independent of ours.
 
-    python tests/camera/aravis_fake.py WIDTH HEIGHT RATE_HZ ADDRESS ADDRESS
+    python -m quadfringe.evaluation._aravis_fake WIDTH HEIGHT RATE_HZ ADDRESS ADDRESS
 
-"ready" on stdout; every line on stdin is answered by the exposures that each has sent, JSON; its end ends them. Frames
-are made by a C callback: the one of the binding is freed at once and crashes, so that it is set through ctypes and kept
-here. The two have no common clock but the period: one that is woken more than a period late skips an exposure.
+Prints "ready" when both run. Each line on stdin is answered by a line of JSON with the exposures that each camera has
+sent; the end of stdin ends the process. A C callback fills the frames. The callback that the binding sets is freed at
+once and crashes, so this module sets it through ctypes and keeps it alive. The cameras share no clock except the
+period: one that wakes more than a period late skips an exposure.
 """
 
 from __future__ import annotations
@@ -73,6 +74,7 @@ class Chip:
 
 
 def main() -> None:
+    """Run both cameras until stdin ends."""
     width, height, rate_hz = int(sys.argv[1]), int(sys.argv[2]), float(sys.argv[3])
     source = TestPattern((height, width))
     keep_pace()
@@ -83,4 +85,5 @@ def main() -> None:
     os._exit(0)
 
 
-main()
+if __name__ == "__main__":
+    main()

@@ -72,9 +72,11 @@ class Efficiency:
 
     @property
     def variance_over_bound(self) -> float:
+        """Variance over the Cramer-Rao bound at the same resolution; 1 is the optimum."""
         return self.variance_rad2 / self.bound_rad2
 
     def as_figures(self) -> dict[str, float]:
+        """Give the figures by name with unit."""
         return {
             "variance_over_bound": self.variance_over_bound,
             "noise_rms_rad": self.variance_rad2**0.5,
@@ -142,7 +144,7 @@ def images(phase_rad: Map, ratios: Ratios, seed: int) -> Images:
 def information(phase_rad: Map, ratios: Ratios) -> Map:
     """Give J, the Fisher information of a pixel on its phase, 1 / rad^2."""
     terms = [(k * np.sin(k * phase_rad + s)) ** 2 for k, s in zip(ratios, SHIFTS_RAD, strict=True)]
-    return (MODULATION / SIGMA) ** 2 * np.sum(terms, axis=0)
+    return np.asarray((MODULATION / SIGMA) ** 2 * np.sum(terms, axis=0))
 
 
 def response(change_rad: Map, coin: Map, reach_px: int) -> Map:

@@ -1,0 +1,78 @@
+"""Measure the figures of the README again and write them into its table; `make figures` runs this.
+
+    python evaluation/figures.py [--only WORD ...]
+
+With `--only`, runs the commands that contain one of these words. The table is written after every command, so that an
+interrupted run keeps what it has measured.
+
+Each row names the command that gave its figure. Rows on captures and renders need the test data (QUADFRINGE_DATA, or
+../shared/data), rows on cameras need Aravis and a network namespace (`make test-camera`), rows on the browser need
+chromium (`make test-live`). Rows whose requirement is missing stay as they are.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from figure_rows import ROOT, SOURCES, Source
+
+BEGIN, END = "<!-- figures -->", "<!-- /figures -->"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--only", nargs="+", metavar="WORD", help="run the commands that contain one of these words")
+    only = parser.parse_args().only
+    chosen = [source for source in SOURCES if only is None or any(word in words_of(source.command) for word in only)]
+    if not chosen:
+        parser.error(f"no command contains one of {only}; the last column of the table in README.md lists the commands")
+    for source in chosen:
+        if source.there():
+            write_table(source, run(source))
+
+
+def write_table(measured: Source, figures: dict[str, float]) -> None:
+    """Put the figures of one source into the README's table; all other rows stay as they stand there."""
+    readme = ROOT / "README.md"
+    before, _, rest = readme.read_text().partition(BEGIN)
+    old, _, after = rest.partition(END)
+    lines = ["| figure | value | bar | command |", "|---|---|---|---|"]
+    for source in SOURCES:
+        command = words_of(source.command)
+        if source is measured:
+            lines += [f"| {words} | {figures[name]:.4g} | {bar} | `{command}` |" for name, words, bar in source.rows]
+        else:
+            lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
+    table = "\n".join(lines)
+    readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
+
+
+def words_of(command: tuple[str, ...]) -> str:
+    if command[0] == "quadfringe":
+        return " ".join(command)
+    first = next(place for place, word in enumerate(command) if word.endswith(".py"))
+    return " ".join((*command[:first], "python", *command[first:]))
+
+
+def run(source: Source) -> dict[str, float]:
+    command = source.command
+    with tempfile.TemporaryDirectory() as folder:
+        json_file = Path(folder) / "figures.json"
+        if command[0] == "quadfringe":
+            full = [sys.executable, "-m", *command, "--out", str(Path(folder) / source.out), "--json", str(json_file)]
+        else:
+            full = words_of(command).replace("python", sys.executable, 1).split()
+            full += ["--json", str(json_file)]
+        # A bar that is missed ends with a status of its own, and is a row like the others.
+        subprocess.run(full, check=False, stdout=subprocess.DEVNULL, cwd=ROOT)
+        figures: dict[str, float] = json.loads(json_file.read_text())["figures"]
+    return figures
+
+
+if __name__ == "__main__":
+    main()
