@@ -20,7 +20,7 @@ from matplotlib.figure import Figure
 
 import quadfringe as qf
 from quadfringe.evaluation._page import Page
-from quadfringe.evaluation.film import hand_system
+from quadfringe.evaluation.moving_scene import hand_system
 from quadfringe.view.viewer import Viewer
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -17,7 +17,7 @@ from quadfringe.evaluation import _textures as textures
 from quadfringe.evaluation._scenes import ROOT
 from quadfringe.evaluation.scoring import phase_errors
 
-SCRIPTS = sorted(path for folder in ("benches", "evaluation") for path in (ROOT / folder).glob("*.py"))
+SCRIPTS = sorted(path for folder in ("benches", "docs", "evaluation") for path in (ROOT / folder).glob("*.py"))
 
 
 @pytest.fixture(scope="module")
