@@ -1,20 +1,23 @@
-//! One struct per message of the controller, with its word, its name and its bytes.
+//! One struct per message of the controller: command word, name and encoding.
 //!
-//! Registers that can be read and written have one type for both; where the two differ there are two types with the
-//! same word. What is outside the range of a register is an error when encoded, and never truncated.
+//! Registers that can be read and written have one type for both; where reading and writing differ there are two types
+//! with the same word. Encoding a value outside the range of its register is an error; no value is truncated.
 
 mod bytes;
 mod display;
+mod input;
 mod led;
 mod pattern;
 mod picture;
+mod signal;
 mod status;
 mod table;
 mod trigger;
 
-pub use display::{
-    ChannelOrder, ChannelSwap, DisplayArea, DisplayMode, FpdLink, Gamma, InputPort, InputSource,
-    LongAxisFlip, ParallelWidth, PixelFormat, PortClock, Rectangle, ShortAxisFlip, SwapPort,
+pub use display::{DisplayArea, DisplayMode, Gamma, LongAxisFlip, Rectangle, ShortAxisFlip};
+pub use input::{
+    ChannelOrder, ChannelSwap, FpdLink, InputPort, InputSource, ParallelWidth, PixelFormat, PortClock,
+    SwapPort,
 };
 pub use led::{BlueLedDelay, GreenLedDelay, LedCurrent, LedEnable, LedPolarity, RedLedDelay};
 pub use pattern::{
@@ -22,9 +25,10 @@ pub use pattern::{
     Validation,
 };
 pub use picture::{Curtain, FlashImage, ImageLoadTime, MeasureImageLoad, TestPattern, TestPatternColours};
+pub use signal::VideoSignal;
 pub use status::{
     DisplayFreeze, DmdPark, FirmwareTag, FlashImageCount, HardwareStatus, MainStatus, PowerMode,
-    SoftwareReset, SystemStatus, Version, Versions, VideoSignal,
+    SoftwareReset, SystemStatus, Version, Versions,
 };
 pub use table::{
     EntryTrigger, ImageTable, LutEntry, PatternTable, VariableControl, VariableEntry, VariableOffset,
@@ -34,26 +38,26 @@ pub use trigger::{EdgeDelay, TriggerIn1Delay, TriggerIn2Edge, TriggerOut1, Trigg
 use crate::error::Result;
 use crate::packet::Access;
 
-/// A message: its word, its name in errors, its bytes.
+/// A message of the controller.
 pub trait Message: Sized {
     /// Command word, CMD2 in the high byte and CMD3 in the low one.
     const WORD: u16;
-    /// What it is, in the words of a user.
+    /// Name of the message in errors.
     const NAME: &'static str;
 
-    /// The data bytes; an error when a field is outside its range.
+    /// Encode the data bytes. A field outside its range is an error.
     fn encode(&self) -> Result<Vec<u8>>;
 
-    /// The message of these data bytes; an error when there are too few or one of them has no meaning.
+    /// Decode the data bytes. Too few bytes, or a byte without meaning, are an error.
     fn decode(data: &[u8]) -> Result<Self>;
 }
 
-/// A message that the device gives when asked.
+/// A message that can be read from the device.
 pub trait Readable: Message {}
 
-/// A message that the device takes.
+/// A message that can be written to the device.
 pub trait Writable: Message {
-    /// Acknowledged, unless the device leaves the bus upon it.
+    /// Whether the device acknowledges it; a device that resets does not.
     const ACCESS: Access = Access::Write;
 }
 

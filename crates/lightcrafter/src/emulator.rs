@@ -1,8 +1,8 @@
 //! A DLPC350 in memory: registers, mailbox, validator, busy states, quirks of the real chip, and faults on demand.
 //!
-//! Its tables are written from the guide, byte by byte, and share nothing with [`command`](crate::command) but the
-//! framing: where driver and model agree, both agree with the guide. It speaks reports of 64 bytes and answers as USB
-//! delivers: in memory through [`EmulatedTransport`], behind the real libusb through the `testbed` feature.
+//! Its tables are written from the programmer's guide, byte by byte, and share only the framing with
+//! [`command`](crate::command), so a wrong encoding in the driver shows up as a difference. It takes and gives reports of
+//! 64 bytes: in memory through [`EmulatedTransport`], behind the real libusb through the `testbed` feature.
 //!
 //! ```
 //! use lightcrafter::emulator::{Dlpc350, EmulatedTransport, Fault};
@@ -32,15 +32,15 @@ use registers::Registers;
 use std::collections::VecDeque;
 use tables::Tables;
 
-/// Requests that are remembered for tests.
+/// Number of recent requests that are kept for tests.
 const LOG: usize = 4096;
 
-/// The model of one controller.
+/// An emulated controller.
 #[derive(Debug)]
 pub struct Dlpc350 {
     pub(crate) registers: Registers,
     pub(crate) tables: Tables,
-    /// Its oddities.
+    /// Deviations of the real chip from its guide.
     pub quirks: Quirks,
     /// Whether a video signal of 912 x 1140 is connected.
     pub video: bool,
@@ -63,7 +63,7 @@ impl Default for Dlpc350 {
 }
 
 impl Dlpc350 {
-    /// Firmware with this tag, of which 32 characters count, and this many images in flash.
+    /// Firmware with this tag, cut to 32 characters, and this many images in flash.
     pub fn new(tag: &str, images: u8) -> Self {
         Self {
             registers: Registers::new(tag, images),
@@ -82,7 +82,7 @@ impl Dlpc350 {
         }
     }
 
-    /// Let the next `times` replies suffer; faults queue up.
+    /// Apply a fault to the next `times` replies; faults queue up.
     pub fn inject(&mut self, fault: Fault, times: usize) {
         self.faults.extend(std::iter::repeat_n(fault, times));
     }
@@ -92,12 +92,12 @@ impl Dlpc350 {
         self.plugged
     }
 
-    /// Pull the cable.
+    /// Unplug the device.
     pub fn unplug(&mut self) {
         self.plugged = false;
     }
 
-    /// Power off and on, on the bus again: everything is as after power-on, and faults are gone.
+    /// Switch power off and on: registers are as after power-on, faults are gone, and the device is plugged in.
     pub fn power_cycle(&mut self) {
         let registers = Registers::new(&self.registers.tag(), self.registers.image_count());
         let (quirks, video, transactions) = (self.quirks, self.video, self.transactions);
@@ -105,13 +105,13 @@ impl Dlpc350 {
         *self = fresh;
     }
 
-    /// Another version of the firmware.
+    /// Set the version of the firmware.
     pub fn set_version(&mut self, major: u8, minor: u8, patch: u16) {
         let [low, high] = patch.to_le_bytes();
         self.registers.force(0x0205, &[low, high, minor, major].repeat(4));
     }
 
-    /// What HDMI data do to the board: it goes to video by itself.
+    /// An HDMI signal appears: the board switches to video by itself.
     pub fn video_appears(&mut self) {
         self.video = true;
         self.registers.force(0x1A1B, &[0]);
@@ -123,12 +123,12 @@ impl Dlpc350 {
         self.log.iter()
     }
 
-    /// How many requests came since the model was made.
+    /// Number of requests since the emulator was created.
     pub fn transactions(&self) -> u64 {
         self.transactions
     }
 
-    /// Take one report; returns what the device sends in answer, each item as one transfer on the wire.
+    /// Take one report. Returns the transfers that the device sends in reply.
     pub fn take(&mut self, report: &Report) -> Vec<Vec<u8>> {
         if !self.plugged || self.frozen {
             return Vec::new();
@@ -151,7 +151,7 @@ impl Dlpc350 {
         answers(&request, outcome, fault)
     }
 
-    /// Neither waking nor some commands after it are answered.
+    /// Whether this request gets no reply: waking and some commands after it.
     fn silent(&mut self, unheard: bool) -> bool {
         if unheard {
             self.silent_left = self.quirks.silent_reads_after_waking;
@@ -174,7 +174,7 @@ impl Dlpc350 {
         self.registers.byte(0x0200) & 3 != 0
     }
 
-    /// The data of the reply; none when refused.
+    /// Data of the reply; `None` if the device refuses.
     fn execute(&mut self, request: &Request) -> Option<Vec<u8>> {
         match request.access {
             Access::Read => self.read(request.word),
@@ -266,7 +266,7 @@ impl Dlpc350 {
     }
 }
 
-/// The reply as it goes over the wire, with what the fault does to it.
+/// The transfers of a reply, with the fault applied.
 fn answers(request: &Request, outcome: Option<Vec<u8>>, fault: Option<Fault>) -> Vec<Vec<u8>> {
     let wrong = fault == Some(Fault::WrongSequence);
     let sequence = if wrong { request.sequence.wrapping_add(17) } else { request.sequence };

@@ -1,4 +1,4 @@
-//! Everything that can go wrong; the doc comment of a variant is the message that the user reads.
+//! Errors of the driver; the doc comment of a variant is the message that the user reads.
 
 use displaydoc::Display;
 
@@ -12,139 +12,139 @@ pub const UDEV_RULE: &str =
 /// Where the rule of [`UDEV_RULE`] belongs.
 pub const UDEV_FILE: &str = "/etc/udev/rules.d/70-lightcrafter4500.rules";
 
-/// What was expected, what came, and what to do.
+/// An error that says what was expected, what happened, and what to do.
 #[derive(Debug, Clone, PartialEq, Eq, Display)]
 #[non_exhaustive]
 pub enum Error {
     /// no LightCrafter 4500 at {wanted}; connected: {present}; check the power and the USB cable
     NotFound {
-        /// The device asked for.
+        /// The requested device.
         wanted: String,
-        /// The devices that are there.
+        /// The connected devices.
         present: String,
     },
-    /// more than one LightCrafter 4500 is meant by {wanted}: {present}; all units may carry the same serial number, so choose one by its port, such as 1-2
+    /// {wanted} matches more than one LightCrafter 4500: {present}; all units may carry the same serial number, so choose one by its port, such as 1-2
     Ambiguous {
-        /// The device asked for.
+        /// The requested device.
         wanted: String,
-        /// The devices that match.
+        /// The matching devices.
         present: String,
     },
     /// no permission to open the LightCrafter 4500 at {place}; as root, write the line {rule} into {file}, run `udevadm control --reload && udevadm trigger`, and plug the projector in again
     AccessDenied {
         /// Bus and port path.
         place: String,
-        /// The line of the rule.
+        /// Line of the udev rule.
         rule: &'static str,
-        /// The file it belongs to.
+        /// File that the line belongs to.
         file: &'static str,
     },
-    /// the LightCrafter 4500 at {place} is held by another program; close what may have it open: TI's LightCrafter GUI, another driver, or another process of this one
+    /// the LightCrafter 4500 at {place} is in use by another program; close the one that may have it open: TI's LightCrafter GUI, another driver, or a second copy of this program
     Busy {
         /// Bus and port path.
         place: String,
     },
-    /// the LightCrafter 4500 at {place} has left the bus; check the cable and the power, then open it again
+    /// the LightCrafter 4500 at {place} was disconnected; check the cable and the power, then open it again
     Disconnected {
         /// Bus and port path.
         place: String,
     },
-    /// the LightCrafter 4500 at {place} did not answer within {waited_ms} ms while {doing}; try again, and switch its power off and on when it stays silent
+    /// the LightCrafter 4500 at {place} did not answer within {waited_ms} ms while {doing}; try again; if it stays silent, switch its power off and on
     Timeout {
         /// Bus and port path.
         place: String,
-        /// What was asked of it.
+        /// The operation that failed, such as `reading the versions`.
         doing: String,
-        /// How long was waited.
+        /// Time waited, ms.
         waited_ms: u64,
     },
     /// USB failed at {place} while {doing}: {reason}; plug the projector in again, and pass USB (/dev/bus/usb) into a container or virtual machine
     Usb {
         /// Bus and port path.
         place: String,
-        /// What was asked of it.
+        /// The operation that failed, such as `reading the versions`.
         doing: String,
-        /// The word of libusb.
+        /// Error text of libusb.
         reason: String,
     },
     /// the LightCrafter 4500 at {place} refused {doing}: the command is unknown to its firmware, or not allowed in its present state
     Refused {
         /// Bus and port path.
         place: String,
-        /// What was asked of it.
+        /// The operation that failed, such as `reading the versions`.
         doing: String,
     },
-    /// the reply to {doing} from {place} carries sequence number {actual}, expected {expected}, and no other came in time; does another program talk to this projector?
+    /// the reply to {doing} from {place} carries sequence number {actual}, expected {expected}, and no other reply came in time; close any other program that talks to this projector
     Sequence {
         /// Bus and port path.
         place: String,
-        /// What was asked of it.
+        /// The operation that failed, such as `reading the versions`.
         doing: String,
-        /// The number sent.
+        /// Number of the request.
         expected: u8,
-        /// The number received.
+        /// Number of the reply.
         actual: u8,
     },
-    /// malformed {what}: expected {expected}, got {actual}; try again, and switch the power of the projector off and on when it repeats
+    /// malformed {what}: expected {expected}, got {actual}; try again; if this repeats, switch the power of the projector off and on
     Malformed {
-        /// The message at fault.
+        /// The malformed message.
         what: String,
-        /// The form asked for.
+        /// The expected form.
         expected: String,
-        /// What came.
+        /// The actual value.
         actual: String,
     },
     /// {name}: expected {expected}, got {actual}
     Value {
-        /// The parameter at fault, with its unit.
+        /// The parameter, with its unit.
         name: String,
-        /// The range or form asked for.
+        /// The expected range or form.
         expected: String,
-        /// What came.
+        /// The actual value.
         actual: String,
     },
     /// the projector at {place} does not accept this pattern sequence: {faults}
     Rejected {
         /// Bus and port path.
         place: String,
-        /// Every fault bit of the validator, by name.
+        /// Every fault that the validator reports, by name.
         faults: String,
     },
     /// the video input of the projector at {place} is not locked: {signal}; connect and enable the HDMI output at 912 x 1140, without scaling, before the pattern sequence
     NotLocked {
         /// Bus and port path.
         place: String,
-        /// What the projector sees.
+        /// State of the input signal.
         signal: String,
     },
-    /// the projector at {place} stays in the state {actual} after being told {asked}, {waited_ms} ms long; switch its power off and on when this repeats
+    /// the projector at {place} is still in the state {actual} {waited_ms} ms after the command {asked}; if this repeats, switch its power off and on
     Stuck {
         /// Bus and port path.
         place: String,
-        /// The state asked for.
+        /// The commanded state.
         asked: String,
-        /// The state it is in.
+        /// The present state.
         actual: String,
-        /// How long was waited.
+        /// Time waited, ms.
         waited_ms: u64,
     },
-    /// the projector at {place} went to video by itself, as it does when HDMI data appear; connect and enable the HDMI output first, then load and start the patterns again
+    /// the projector at {place} switched to video by itself, as it does when an HDMI signal appears; connect and enable the HDMI output first, then load and start the patterns again
     LeftPatterns {
         /// Bus and port path.
         place: String,
     },
     /// output {wanted}: {reason}; outputs: {present}
     Output {
-        /// The output asked for.
+        /// The requested output.
         wanted: String,
-        /// Why it cannot carry a pattern.
+        /// Why it cannot show a pattern.
         reason: String,
-        /// The outputs that are there.
+        /// The outputs that exist.
         present: String,
     },
-    /// no window can be shown: {reason}; run in a graphical session, with DISPLAY or WAYLAND_DISPLAY set
+    /// cannot show a window: {reason}; run in a graphical session, with DISPLAY or WAYLAND_DISPLAY set
     NoDisplay {
-        /// The word of the window system.
+        /// Error text of the window system.
         reason: String,
     },
 }
@@ -152,7 +152,7 @@ pub enum Error {
 impl std::error::Error for Error {}
 
 impl Error {
-    /// A parameter outside its range, named with what was expected and what came.
+    /// A parameter outside its range.
     pub(crate) fn value(
         name: impl Into<String>,
         expected: impl Into<String>,
@@ -161,7 +161,7 @@ impl Error {
         Self::Value { name: name.into(), expected: expected.into(), actual: actual.to_string() }
     }
 
-    /// Bytes that are no message.
+    /// Bytes that form no valid message.
     pub(crate) fn malformed(
         what: impl Into<String>,
         expected: impl Into<String>,
@@ -170,7 +170,7 @@ impl Error {
         Self::Malformed { what: what.into(), expected: expected.into(), actual: actual.to_string() }
     }
 
-    /// Whether what went wrong may have left bytes of an old reply on the way.
+    /// Whether bytes of an old reply may still be in flight after this error.
     pub(crate) fn leaves_residue(&self) -> bool {
         matches!(
             self,

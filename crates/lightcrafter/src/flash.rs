@@ -1,8 +1,8 @@
-//! Images of 24 bit for the flash of the projector: patterns of any bit depth, packed plane by plane into BMP files.
+//! 24-bit images for the flash of the projector: patterns of any bit depth, packed plane by plane into BMP files.
 //!
-//! This crate does not write flash: a write that goes wrong needs the boot loader to mend. Give the files to TI's
+//! This crate does not write flash, because a failed write can only be repaired with the boot loader. Give the files to TI's
 //! LightCrafter 4500 program, which builds a firmware image and uploads it; then
-//! [`check_flash`](crate::LightCrafter::check_flash) tells whether the projector has it.
+//! [`check_flash`](crate::LightCrafter::check_flash) checks whether the projector has it.
 
 use crate::error::{Error, Result};
 use crate::sequence::{HEIGHT_PX, WIDTH_PX, depth_limits, first_plane};
@@ -20,7 +20,7 @@ pub struct FlashPattern<'a> {
     pub bit_depth: u8,
 }
 
-/// Where a pattern went: what a [`LutEntry`](crate::command::LutEntry) needs to show it.
+/// Place of a pattern in flash, as a [`LutEntry`](crate::command::LutEntry) needs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Placement {
     /// Number of the image.
@@ -31,9 +31,9 @@ pub struct Placement {
     pub bit_depth: u8,
 }
 
-/// Pack patterns in their order; returns the BMP files and the place of each pattern.
+/// Pack patterns in order. Returns the BMP files and the place of each pattern.
 ///
-/// An image is closed when the next pattern does not fit into the planes that are left. Errors: a pattern of the wrong
+/// A new image begins when the next pattern does not fit into the remaining planes. Errors: a pattern of the wrong
 /// size, a value that needs more bits, more than 256 images.
 pub fn pack(patterns: &[FlashPattern<'_>]) -> Result<(Vec<Vec<u8>>, Vec<Placement>)> {
     let placements = place(patterns)?;
@@ -118,7 +118,7 @@ fn bmp(planes: &[u32]) -> Vec<u8> {
 mod tests {
     use super::*;
 
-    /// Blue, green, red of the pixel in the first row and column: it stands at the start of the last row of the file.
+    /// Blue, green, red of the pixel in the first row and column: the first pixel of the last row of the file.
     fn corner(bmp: &[u8]) -> [u8; 3] {
         let at = HEADER_BYTES + 3 * WIDTH_PX * (HEIGHT_PX - 1);
         [bmp[at], bmp[at + 1], bmp[at + 2]]

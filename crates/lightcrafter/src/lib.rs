@@ -8,15 +8,15 @@
 //! | [`error`] | what can go wrong |
 //! | [`packet`] | framing: messages as reports of 64 bytes |
 //! | [`command`] | one struct per message |
-//! | [`transport`] | the wire, real or emulated |
+//! | [`transport`] | the USB link, real or emulated |
 //! | [`sequence`] | pattern sequences and their rules |
-//! | [`profile`] | the light engine: what differs and is dangerous to get wrong |
-//! | [`projector`] | the projector in the verbs of its user |
-//! | [`flash`] | images of 24 bit for TI's program |
+//! | [`profile`] | the light engine: current limits and polarities |
+//! | [`projector`] | the projector with one method for each thing a user does |
+//! | [`flash`] | 24-bit images for TI's program |
 //! | `usb` | real devices (feature `usb`) |
-//! | `window` | HDMI: a window on the output of a projector (feature `window`, Linux) |
+//! | `window` | HDMI: a window on the output that feeds a projector (feature `window`, Linux) |
 //! | `emulator` | a DLPC350 in memory (feature `emulator`) |
-//! | `testbed` | the same behind the real libusb (feature `testbed`, Linux) |
+//! | `testbed` | that emulator behind the real libusb (feature `testbed`, Linux) |
 
 pub mod command;
 pub mod error;

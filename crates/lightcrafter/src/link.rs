@@ -1,4 +1,4 @@
-//! One transaction at a time: number it, send it, wait for the reply with that number, within a bound.
+//! Transactions, one at a time: send a numbered request and wait for the reply with the same number.
 
 use crate::command::{Readable, Writable};
 use crate::error::{Error, Result};
@@ -6,11 +6,11 @@ use crate::packet::{Access, Assembler, REPORT_BYTES, Reply, Request};
 use crate::transport::Transport;
 use std::time::{Duration, Instant};
 
-/// Reports that are discarded at most before a command, after one went wrong.
+/// Most stale reports that are discarded before a command that follows an error.
 const DRAIN_REPORTS: usize = 16;
 const DRAIN_WAIT: Duration = Duration::from_millis(20);
 
-/// A transport, and what is needed to tell a reply from an old one.
+/// A transport with the state that distinguishes a reply from a stale one.
 #[derive(Debug)]
 pub struct Link<T> {
     transport: T,
@@ -20,7 +20,7 @@ pub struct Link<T> {
 }
 
 impl<T: Transport> Link<T> {
-    /// Old replies may wait in a device whose last owner did not fetch them: the first command drains them.
+    /// The first command discards replies that an earlier owner of the device did not fetch.
     pub fn new(transport: T, reply_timeout: Duration) -> Self {
         Self { transport, reply_timeout, sequence: 0, residue: true }
     }
@@ -37,21 +37,21 @@ impl<T: Transport> Link<T> {
         self.transport
     }
 
-    /// Ask for a register; asked once more when nothing, or nothing readable, came.
+    /// Read a register. A read without a valid reply is repeated once.
     pub fn read<M: Readable>(&mut self) -> Result<M> {
         let first = self.transact(Access::Read, M::WORD, M::NAME, Vec::new());
         let data = match first {
             Err(error) if error.leaves_residue() => self.transact(Access::Read, M::WORD, M::NAME, Vec::new()),
             other => other,
         }?;
-        // An empty answer is the other way in which the firmware refuses.
+        // The firmware also refuses with an empty reply.
         if data.is_empty() {
             return Err(self.refused(&doing(Access::Read, M::NAME)));
         }
         M::decode(&data).map_err(|error| at(self.transport.place(), error, &doing(Access::Read, M::NAME)))
     }
 
-    /// Set a register; never sent twice, because the first may have been heard.
+    /// Write a register. A write is never repeated, because the device may have executed the first one.
     pub fn write<M: Writable>(&mut self, message: &M) -> Result<()> {
         self.transact(M::ACCESS, M::WORD, M::NAME, message.encode()?).map(|_| ())
     }
@@ -86,18 +86,18 @@ impl<T: Transport> Link<T> {
         Ok(reply.data)
     }
 
-    /// The reply with the number of the request; others are left-overs and discarded.
+    /// Wait for the reply with the number of the request; discard stale replies.
     fn reply(&mut self, request: &Request, doing: &str) -> Result<Reply> {
         let deadline = Instant::now() + self.reply_timeout;
         let mut assembler = Assembler::default();
-        let mut stranger = None;
+        let mut stale = None;
         loop {
             let remaining = deadline.saturating_duration_since(Instant::now());
             let mut report = [0; REPORT_BYTES];
             let count =
                 if remaining.is_zero() { 0 } else { self.transport.receive(&mut report, remaining)? };
             if count == 0 {
-                return Err(self.nothing_came(request, doing, stranger));
+                return Err(self.no_reply(request, doing, stale));
             }
             if count != REPORT_BYTES {
                 return Err(Error::malformed("reply", format!("a report of {REPORT_BYTES} bytes"), count));
@@ -107,13 +107,13 @@ impl<T: Transport> Link<T> {
             if reply.sequence == request.sequence {
                 return Ok(reply);
             }
-            stranger = Some(reply.sequence);
+            stale = Some(reply.sequence);
         }
     }
 
-    fn nothing_came(&self, request: &Request, doing: &str, stranger: Option<u8>) -> Error {
+    fn no_reply(&self, request: &Request, doing: &str, stale: Option<u8>) -> Error {
         let (place, doing) = (self.place(), doing.to_owned());
-        match stranger {
+        match stale {
             Some(actual) => Error::Sequence { place, doing, expected: request.sequence, actual },
             None => Error::Timeout { place, doing, waited_ms: self.reply_timeout.as_millis() as u64 },
         }
@@ -123,7 +123,7 @@ impl<T: Transport> Link<T> {
         Error::Refused { place: self.place(), doing: doing.to_owned() }
     }
 
-    /// Fetch what an earlier command left behind.
+    /// Discard replies to earlier commands.
     fn drain(&mut self) -> Result<()> {
         let mut report = [0; REPORT_BYTES];
         for _ in 0..DRAIN_REPORTS {
@@ -142,7 +142,7 @@ fn doing(access: Access, name: &str) -> String {
     format!("{verb} the {name}")
 }
 
-/// Name the projector and what was asked of it. A value out of range is the fault of who sent it: of the device, here.
+/// Add the projector and the operation to an error. A value out of range in a reply is a malformed reply.
 fn at(place: &str, error: Error, doing: &str) -> Error {
     let doing = doing.to_owned();
     match error {
@@ -150,7 +150,7 @@ fn at(place: &str, error: Error, doing: &str) -> Error {
         Error::Usb { place, reason, .. } => Error::Usb { place, doing, reason },
         Error::Malformed { what: field, expected, actual }
         | Error::Value { name: field, expected, actual } => {
-            Error::Malformed { what: format!("answer of {place} while {doing} ({field})"), expected, actual }
+            Error::Malformed { what: format!("reply of {place} while {doing} ({field})"), expected, actual }
         }
         other => other,
     }

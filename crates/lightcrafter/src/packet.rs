@@ -8,7 +8,7 @@
 //! | 4, 5 | command word, little-endian; in a read reply the data start here |
 //! | 6.. | data, padded with zeros |
 //!
-//! The header stands in the first report only; the following ones are raw continuations.
+//! Only the first report has a header; the data continue in the following ones.
 
 use crate::error::{Error, Result};
 
@@ -27,18 +27,18 @@ const READ: u8 = 0x80;
 const REPLY: u8 = 0x40;
 const ERROR: u8 = 0x20;
 
-/// What is asked of the device.
+/// Kind of a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
-    /// Read, answered with data.
+    /// Read: the device replies with data.
     Read,
-    /// Write, answered with an acknowledgement.
+    /// Write: the device acknowledges.
     Write,
-    /// Write without an answer: commands after which the device leaves the bus.
+    /// Write without acknowledgement, for commands after which the device disappears from the bus.
     WriteUnacknowledged,
 }
 
-/// From the host to the device.
+/// A message from the host to the device.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Request {
     /// Read or write.
@@ -52,7 +52,7 @@ pub struct Request {
 }
 
 impl Request {
-    /// The reports to send; an error when the data are longer than a message can be.
+    /// Split into reports. Data longer than [`DATA_BYTES`] are an error.
     pub fn to_reports(&self) -> Result<Vec<Report>> {
         if self.data.len() > DATA_BYTES {
             let expected = format!("at most {DATA_BYTES} bytes of data");
@@ -83,21 +83,21 @@ impl Request {
     }
 }
 
-/// From the device to the host.
+/// A message from the device to the host.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Reply {
-    /// Whether a read is answered.
+    /// Whether this is the reply to a read.
     pub read: bool,
-    /// Whether the device refused.
+    /// Whether the device refused the request.
     pub refused: bool,
     /// Number of the request.
     pub sequence: u8,
-    /// Data of a read; the echoed command word of a write.
+    /// Data of a read, or the command word that a write echoes.
     pub data: Vec<u8>,
 }
 
 impl Reply {
-    /// The reports that carry this reply.
+    /// Split into reports.
     pub fn to_reports(&self) -> Vec<Report> {
         let read = if self.read { READ } else { 0 };
         let error = if self.refused { ERROR } else { 0 };
@@ -108,7 +108,7 @@ impl Reply {
     pub fn from_message(message: &[u8]) -> Result<Self> {
         let (flags, sequence, body) = parts(message, "reply")?;
         let read = flags & READ != 0;
-        // The length field of an acknowledgement is not documented; the echo always stands in bytes 4 and 5.
+        // The length field of an acknowledgement is not documented; the echo is always in bytes 4 and 5.
         let data = if read { body } else { &message[HEADER_BYTES..HEADER_BYTES + WORD_BYTES] };
         Ok(Self { read, refused: flags & ERROR != 0, sequence, data: data.to_vec() })
     }
@@ -141,15 +141,15 @@ fn payload_length(header: &[u8]) -> usize {
     usize::from(u16::from_le_bytes([header[2], header[3]]))
 }
 
-/// Puts a message together from its reports.
+/// Assembles a message from its reports.
 #[derive(Debug, Clone, Default)]
 pub struct Assembler {
     bytes: Vec<u8>,
 }
 
 impl Assembler {
-    /// Take one report; returns the message, padding included, when it is complete. A header that announces more than
-    /// a message can hold is an error, after which the next report starts afresh.
+    /// Add one report. Returns the message with its padding when it is complete. A header that announces more than
+    /// [`MESSAGE_BYTES`] is an error; the next report then starts a new message.
     pub fn push(&mut self, report: &Report) -> Result<Option<Vec<u8>>> {
         self.bytes.extend_from_slice(report);
         let wanted = HEADER_BYTES + payload_length(&self.bytes);

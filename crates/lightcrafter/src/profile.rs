@@ -1,31 +1,31 @@
-//! What differs from one light engine to another, and is dangerous to get wrong.
+//! Properties that differ between light engines; wrong ones can damage the LEDs.
 
 use crate::error::{Error, Result};
 
 /// The light engine behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Profile {
-    /// Whether the byte of the LED current is inverted (0 is full current), as on TI's board with normal polarity.
+    /// Whether the byte of the LED current is inverted (0 is full current), as on TI's board.
     pub current_inverted: bool,
-    /// The highest drive of red, green, blue, 0 to 255; without one, no drive can be set.
+    /// Highest allowed drive of red, green and blue, 0 to 255; with `None` no drive can be set.
     pub drive_limit: Option<[u8; 3]>,
-    /// The byte that inverts a trigger output: 1 as TI's own program sends it, 2 as the guide has it.
+    /// Byte that inverts a trigger output: TI's program sends 1, the programmer's guide says 2.
     pub trigger_invert_byte: u8,
 }
 
 impl Profile {
-    /// TI's board after power-on: register bytes 0x97, 0x78, 0x7D, inverted.
+    /// Drive of TI's board after power-on: register bytes 0x97, 0x78, 0x7D, inverted.
     pub const POWER_ON_DRIVE: [u8; 3] = [104, 135, 130];
 
-    /// The LightCrafter 4500 with TI's own light engine. Drives up to those after power-on are allowed: how much the
-    /// LEDs bear beyond depends on power supply and cooling, so state it in `drive_limit`.
+    /// The LightCrafter 4500 with TI's own light engine. Its limit is the drive after power-on. Whether
+    /// the LEDs stand more depends on power supply and cooling; state a higher limit in `drive_limit`.
     pub const EVM: Self =
         Self { current_inverted: true, drive_limit: Some(Self::POWER_ON_DRIVE), trigger_invert_byte: 1 };
 
-    /// Another light engine, such as an infrared one: no drive can be set until its limit is stated.
+    /// Another light engine, such as an infrared one. No drive can be set until you state its limit.
     pub const EXTERNAL: Self = Self { drive_limit: None, ..Self::EVM };
 
-    /// The register bytes of a drive, where 0 is off and 255 full current; an error beyond the limit.
+    /// Register bytes for a drive, where 0 is off and 255 is full current. A drive above the limit is an error.
     pub fn raw_current(&self, drive: [u8; 3]) -> Result<[u8; 3]> {
         let Some(limit) = self.drive_limit else {
             let expected = "a drive limit stated in the profile of this light engine";
@@ -38,7 +38,7 @@ impl Profile {
         Ok(drive.map(|value| self.exchanged(value)))
     }
 
-    /// The drive of register bytes.
+    /// Drive for register bytes.
     pub fn drive(&self, raw: [u8; 3]) -> [u8; 3] {
         raw.map(|value| self.exchanged(value))
     }

@@ -1,4 +1,4 @@
-//! A LightCrafter 4500 in the verbs of its user.
+//! A LightCrafter 4500, with one method for each thing that a user does.
 
 mod configure;
 mod play;
@@ -17,22 +17,22 @@ use crate::transport::Transport;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Every wait has a bound; these are the documented ones.
+/// Time limits and intervals of all waits; the defaults are those of the README.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Waits {
-    /// For a reply. A read that got none is asked once more.
+    /// Limit for a reply. A read without a reply is repeated once.
     pub reply: Duration,
-    /// Between two looks at a state that is about to change.
+    /// Interval between two reads of a state that is about to change.
     pub poll: Duration,
-    /// For a mode, the run state or a verdict to come true.
+    /// Limit for a change of mode or run state, and for a validation.
     pub change: Duration,
-    /// Between asking for a verdict and the first look.
+    /// Interval between starting a validation and reading its result.
     pub verdict: Duration,
-    /// Between waking and the first look, during which the controller may not answer.
+    /// Interval between waking and the first read; the controller may not reply during it.
     pub wake: Duration,
-    /// For the controller to be awake, or asleep.
+    /// Limit for waking and going to sleep.
     pub power: Duration,
-    /// For the video input to lock.
+    /// Limit for the video input to lock.
     pub lock: Duration,
 }
 
@@ -51,7 +51,7 @@ impl Default for Waits {
     }
 }
 
-/// Everything that a projector says of itself.
+/// Complete state of a projector.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Status {
     /// The hardware.
@@ -68,29 +68,29 @@ pub struct Status {
     pub run: RunState,
     /// The input of the video mode.
     pub input: InputSource,
-    /// The video signal; not locked while patterns run, which is no fault.
+    /// The video signal. It reads as not locked while patterns run, which is normal.
     pub signal: VideoSignal,
 }
 
 impl Status {
-    /// What is wrong, in words; empty when all is well.
+    /// Faults of the hardware, in words; empty if there are none.
     pub fn faults(&self) -> Vec<&'static str> {
         let HardwareStatus { initialised, reset_overlap, forced_swap, sequencer_abort, sequencer_error } =
             self.hardware;
         let faults = [
             (!initialised, "the controller did not initialise: switch its power off and on"),
             (!self.system.memory_passed, "the internal memory failed its test: switch the power off and on"),
-            (reset_overlap, "two operations of the mirrors overlapped"),
-            (forced_swap, "a buffer was swapped by force: patterns come faster than images load"),
-            (sequencer_abort, "the sequencer gave up: load the sequence again"),
-            (sequencer_error, "the sequencer found an error: load the sequence again"),
+            (reset_overlap, "two mirror operations overlapped"),
+            (forced_swap, "a buffer swap was forced: patterns are shown faster than images load"),
+            (sequencer_abort, "the sequencer aborted: load the sequence again"),
+            (sequencer_error, "the sequencer reports an error: load the sequence again"),
         ];
         faults.iter().filter(|(set, _)| *set).map(|(_, name)| *name).collect()
     }
 }
 
-/// One projector. It takes `&mut self` for every transaction, so that one is in flight; nothing is global, and any
-/// number of projectors work at the same time from as many threads.
+/// One projector. Every transaction takes `&mut self`, so only one is in flight. There is no global state: several
+/// projectors can be used at the same time from several threads.
 #[derive(Debug)]
 pub struct LightCrafter<T> {
     link: Link<T>,
@@ -100,19 +100,19 @@ pub struct LightCrafter<T> {
 }
 
 impl<T: Transport> LightCrafter<T> {
-    /// A projector at the end of a transport, with TI's light engine and the documented waits. Nothing is sent.
+    /// Create a projector on a transport, with TI's light engine and the default waits. This sends no command.
     pub fn new(transport: T) -> Self {
         let waits = Waits::default();
         Self { link: Link::new(transport, waits.reply), profile: Profile::EVM, waits, loaded: None }
     }
 
-    /// With another light engine.
+    /// Set another light engine.
     pub fn with_profile(mut self, profile: Profile) -> Self {
         self.profile = profile;
         self
     }
 
-    /// With other waits.
+    /// Set other waits.
     pub fn with_waits(mut self, waits: Waits) -> Self {
         self.link.set_reply_timeout(waits.reply);
         self.waits = waits;
@@ -129,22 +129,22 @@ impl<T: Transport> LightCrafter<T> {
         self.profile
     }
 
-    /// Give the transport back; the projector goes on showing what it shows.
+    /// Return the transport; the projector keeps its image.
     pub fn into_transport(self) -> T {
         self.link.into_transport()
     }
 
-    /// Read any register: the door to what has no verb.
+    /// Read any register, for functions that have no method here.
     pub fn read<M: Readable>(&mut self) -> Result<M> {
         self.link.read()
     }
 
-    /// Write any register: the door to what has no verb.
+    /// Write any register, for functions that have no method here.
     pub fn write<M: Writable>(&mut self, message: &M) -> Result<()> {
         self.link.write(message)
     }
 
-    /// Everything that the projector says of itself.
+    /// Read the complete state.
     pub fn status(&mut self) -> Result<Status> {
         Ok(Status {
             hardware: self.read()?,
@@ -163,17 +163,17 @@ impl<T: Transport> LightCrafter<T> {
         self.read()
     }
 
-    /// The name that the maker of the firmware image gave it.
+    /// Tag of the firmware image, given when the image was built.
     pub fn firmware_tag(&mut self) -> Result<String> {
         self.read().map(|FirmwareTag(tag)| tag)
     }
 
-    /// How many images of 24 bit are in flash.
+    /// Number of 24-bit images in flash.
     pub fn flash_image_count(&mut self) -> Result<u8> {
         self.read().map(|FlashImageCount(count)| count)
     }
 
-    /// Compare flash with what it should hold; an error that says what differs.
+    /// Check that flash holds at least so many images and has this firmware tag. The error names the difference.
     pub fn check_flash(&mut self, images: u8, tag: Option<&str>) -> Result<()> {
         let present = self.flash_image_count()?;
         if present < images {
@@ -190,7 +190,7 @@ impl<T: Transport> LightCrafter<T> {
         Err(Error::value(name, format!("{wanted:?}"), format!("{found:?}")))
     }
 
-    /// Wake the projector, or send it to sleep, and wait until it is. Waking may go without acknowledgement.
+    /// Wake the projector or send it to sleep, and wait until it is done. The device may not acknowledge waking.
     pub fn set_power(&mut self, power: PowerMode) -> Result<()> {
         if self.read::<PowerMode>()? == power {
             return Ok(());
@@ -204,7 +204,7 @@ impl<T: Transport> LightCrafter<T> {
         self.wait_for_power(power)
     }
 
-    /// As [`wait_for`](Self::wait_for), for a controller that may still be silent.
+    /// Like [`wait_for`](Self::wait_for), for a controller that may not reply yet.
     fn wait_for_power(&mut self, power: PowerMode) -> Result<()> {
         let deadline = Instant::now() + self.waits.power;
         loop {
@@ -221,17 +221,17 @@ impl<T: Transport> LightCrafter<T> {
         }
     }
 
-    /// Start the firmware again. The device leaves the bus, so the projector is used up: open it again after 5 to 10 s.
+    /// Restart the firmware. The device disappears from the bus, so this consumes `self`; open it again after 5 to 10 s.
     pub fn reset(mut self) -> Result<()> {
         self.write(&SoftwareReset)
     }
 
-    /// The video signal as the projector sees it.
+    /// The video signal at the input.
     pub fn video_signal(&mut self) -> Result<VideoSignal> {
         self.read()
     }
 
-    /// Wait until the video input is locked; an error with what is seen instead.
+    /// Wait until the video input is locked. The error contains the present signal.
     pub fn wait_for_lock(&mut self) -> Result<VideoSignal> {
         let deadline = Instant::now() + self.waits.lock;
         loop {
@@ -246,7 +246,7 @@ impl<T: Transport> LightCrafter<T> {
         }
     }
 
-    /// Look at a register until it has this value.
+    /// Read a register until it has this value.
     fn wait_for<M>(&mut self, wanted: M, bound: Duration) -> Result<()>
     where
         M: Readable + PartialEq + std::fmt::Debug,

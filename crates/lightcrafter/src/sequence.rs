@@ -1,4 +1,4 @@
-//! A pattern sequence as a whole: what is shown, for how long, started by what; and the rules it must keep.
+//! Pattern sequences: patterns, exposures, trigger, and the rules that they must satisfy.
 
 mod rules;
 
@@ -9,11 +9,11 @@ use crate::error::{Error, Result};
 pub const WIDTH_PX: usize = 912;
 /// Rows of the mirror array.
 pub const HEIGHT_PX: usize = 1140;
-/// The longest exposure, us.
+/// Longest exposure, us.
 pub const MAX_EXPOSURE_US: u32 = 200_000_000;
-/// The shortest black between two patterns, us.
+/// Shortest black time between two patterns, us.
 pub const MIN_GAP_US: u32 = 230;
-/// The time that loading a flash image may take, us, when it has not been measured.
+/// Longest time that loading a flash image takes, us; used unless measured.
 pub const WORST_LOAD_US: u32 = 200_000;
 
 /// The LED selection red of [`LutEntry::leds`].
@@ -23,14 +23,14 @@ pub const GREEN: u8 = 2;
 /// The LED selection blue.
 pub const BLUE: u8 = 4;
 
-/// What a bit depth allows.
+/// Limits of a bit depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct DepthLimits {
     /// The shortest exposure, us.
     pub min_exposure_us: u32,
     /// The highest pattern number; at 1 bit, 24 is a pattern without planes: black, and white when inverted.
     pub last_number: u8,
-    /// Patterns that fit into the two buffers of flash images, and so need no loading.
+    /// Patterns that fit into the two buffers for flash images and need no loading.
     pub preloaded: u8,
 }
 
@@ -50,8 +50,8 @@ pub fn depth_limits(bit_depth: u8) -> Result<DepthLimits> {
     Ok(DepthLimits { min_exposure_us, last_number, preloaded })
 }
 
-/// The bit planes of a pattern number, in the order G0 to G7, R0 to R7, B0 to B7, as first plane; as many as the bit
-/// depth follow.
+/// First bit plane of a pattern number, in the order G0 to G7, R0 to R7, B0 to B7. The pattern has as many planes as
+/// its bit depth.
 pub fn first_plane(bit_depth: u8, number: u8) -> Result<u8> {
     let last = depth_limits(bit_depth)?.last_number.min(23);
     if number > last {
@@ -68,7 +68,7 @@ pub fn first_plane(bit_depth: u8, number: u8) -> Result<u8> {
     })
 }
 
-/// Where the bit planes come from.
+/// Colour channel that holds the bit planes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Colour {
     /// Green: the first planes.
@@ -84,14 +84,14 @@ pub enum Colour {
 pub enum Source {
     /// The video input.
     Video {
-        /// Frames per second of the input; all patterns of a frame must fit into it.
+        /// Frame rate of the input, Hz; all patterns of a frame must fit into one period.
         frame_rate_hz: f64,
     },
     /// Flash.
     Flash {
-        /// Image numbers in the order of use: one for the first pattern, one for each that takes the next image.
+        /// Image numbers in the order of use: one for the first pattern and one for each pattern with `next_image`.
         images: Vec<u8>,
-        /// How long an image takes to load, us: [`WORST_LOAD_US`] unless measured.
+        /// Time to load an image, us: [`WORST_LOAD_US`] unless measured.
         load_us: u32,
     },
 }
@@ -99,13 +99,13 @@ pub enum Source {
 /// How long patterns are shown.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Exposures {
-    /// All alike.
+    /// The same for all patterns.
     Fixed(Timing),
-    /// One for each pattern; firmware 3.0 or newer.
+    /// One for each pattern; needs firmware 3.0 or newer.
     Each(Vec<Timing>),
 }
 
-/// Everything that a projector must know before it starts.
+/// A complete pattern sequence.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sequence {
     /// Where patterns come from.
@@ -114,9 +114,9 @@ pub struct Sequence {
     pub trigger_mode: TriggerMode,
     /// The patterns in order.
     pub patterns: Vec<LutEntry>,
-    /// Their times.
+    /// Their exposures.
     pub exposures: Exposures,
-    /// Again and again, or once.
+    /// Whether the sequence repeats.
     pub repeat: bool,
 }
 
@@ -134,14 +134,14 @@ pub fn channel(colour: Colour, bit_depth: u8, leds: u8) -> LutEntry {
     }
 }
 
-/// Green, red and blue one after another, each with its own LED: a colour image.
+/// A colour image: green, red and blue one after another, each with the LED of its colour.
 pub fn colour_channels(bit_depth: u8) -> Vec<LutEntry> {
     let order = [(Colour::Green, GREEN), (Colour::Red, RED), (Colour::Blue, BLUE)];
     order.map(|(colour, led)| channel(colour, bit_depth, led)).to_vec()
 }
 
 impl Sequence {
-    /// Patterns of every video frame, again and again; the first waits for the frame, the others follow.
+    /// Show the patterns in every video frame. The first pattern waits for the frame, the others follow it.
     pub fn from_video(mut patterns: Vec<LutEntry>, frame_rate_hz: f64, exposure_us: u32) -> Self {
         for (i, pattern) in patterns.iter_mut().enumerate() {
             pattern.trigger = if i == 0 { EntryTrigger::Rising } else { EntryTrigger::Continue };
@@ -156,7 +156,7 @@ impl Sequence {
         }
     }
 
-    /// Patterns of one flash image, again and again.
+    /// Show the patterns of one flash image repeatedly.
     pub fn from_flash(image: u8, patterns: Vec<LutEntry>, exposure_us: u32) -> Self {
         Self {
             source: Source::Flash { images: vec![image], load_us: WORST_LOAD_US },
@@ -167,7 +167,7 @@ impl Sequence {
         }
     }
 
-    /// Times of pattern `i`; the last ones given when there are fewer.
+    /// Exposure and period of pattern `i`, or the last ones if fewer are given.
     fn timing(&self, i: usize) -> Timing {
         match &self.exposures {
             Exposures::Fixed(timing) => *timing,
@@ -175,13 +175,13 @@ impl Sequence {
         }
     }
 
-    /// The control of the pattern table, for fixed exposures.
+    /// Control message of the pattern table, for fixed exposures.
     pub fn lut_control(&self) -> LutControl {
         let count = self.patterns.len() as u16;
         LutControl { entries: count, repeat: self.repeat, patterns: count, images: self.image_count() }
     }
 
-    /// The control of the variable table, for an exposure each.
+    /// Control message of the variable table, for individual exposures.
     pub fn variable_control(&self) -> VariableControl {
         let count = self.patterns.len() as u16;
         VariableControl { entries: count, patterns: count, images: self.image_count(), repeat: self.repeat }
@@ -194,7 +194,7 @@ impl Sequence {
         }
     }
 
-    /// Whether each pattern has its own exposure.
+    /// Whether the patterns have individual exposures.
     pub fn variable(&self) -> bool {
         matches!(self.exposures, Exposures::Each(_))
     }
@@ -205,7 +205,8 @@ impl Sequence {
     }
 }
 
-/// The exposure of each pattern, us, when `count` patterns of this bit depth share a frame; an error when they do not fit.
+/// Exposure of each pattern, us, if `count` patterns of this bit depth share a frame. Patterns that do not fit are an
+/// error.
 pub fn exposure_in_frame_us(count: usize, bit_depth: u8, frame_rate_hz: f64) -> Result<u32> {
     let least = depth_limits(bit_depth)?.min_exposure_us;
     check_frame_rate(frame_rate_hz)?;

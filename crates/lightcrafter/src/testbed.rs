@@ -1,14 +1,15 @@
 //! The emulator behind the real libusb: a umockdev testbed with projectors in chosen ports (Linux).
 //!
-//! umockdev's preload library shows a program `/sys` and `/dev` of our making, and sends each ioctl on a device node to a
-//! socket, on which this module answers as usbfs does. libusb and everything above it run unmodified. Programs find the
+//! umockdev's preload library shows a program fake `/sys` and `/dev` folders and sends each ioctl on a device node to a
+//! socket, where this module answers like usbfs. libusb and everything above it run unmodified. Programs find the
 //! control socket of the testbed through the environment variable [`CONTROL`] and inject faults with [`Control`].
 //!
-//! The protocol between the preload library and the socket is internal to umockdev: it is known for 0.17, and
-//! [`Testbed::command`] refuses another version by name.
+//! The protocol between the preload library and the socket is internal to umockdev: this module
+//! knows that of version 0.17, and [`Testbed::command`] refuses any other version.
 
 mod control;
 mod descriptors;
+mod ioctl;
 mod node;
 mod usbfs;
 
@@ -27,7 +28,7 @@ pub const CONTROL: &str = "LIGHTCRAFTER_TESTBED";
 const PRELOAD: &str = "libumockdev-preload.so.0";
 const KNOWN_VERSION: &str = "0.17.";
 
-/// Projectors on a bus of our own; removed when dropped.
+/// Emulated projectors on a fake bus, which is removed when dropped.
 #[derive(Debug)]
 pub struct Testbed {
     root: PathBuf,
@@ -35,7 +36,7 @@ pub struct Testbed {
 }
 
 impl Testbed {
-    /// Bus 1 with one projector in each of these ports, all with the same serial number.
+    /// Create bus 1 with one projector in each of these ports, all with the same serial number.
     pub fn new(ports: &[u8]) -> io::Result<Self> {
         let root = std::env::temp_dir().join(format!("lightcrafter-testbed-{}", std::process::id()));
         let _ = std::fs::remove_dir_all(&root);
@@ -51,12 +52,12 @@ impl Testbed {
         Ok(Self { root, nodes })
     }
 
-    /// The folder with `/sys` and `/dev` as the program sees them.
+    /// Folder that holds the `/sys` and `/dev` of the program.
     pub fn root(&self) -> &Path {
         &self.root
     }
 
-    /// A command that will run in the testbed; an error when umockdev is absent or of an unknown version.
+    /// Prepare a command that runs in the testbed. A missing umockdev, or one of an unknown version, is an error.
     pub fn command(&self, program: &str) -> io::Result<Command> {
         check_umockdev()?;
         let mut command = Command::new(program);
@@ -65,7 +66,7 @@ impl Testbed {
         Ok(command)
     }
 
-    /// How many requests each projector got.
+    /// Number of requests that each projector received.
     pub fn transactions(&self) -> Vec<(String, u64)> {
         self.nodes.iter().map(|node| (node.place.clone(), node.model().transactions())).collect()
     }
@@ -85,7 +86,8 @@ fn check_umockdev() -> io::Result<()> {
     if version.starts_with(KNOWN_VERSION) {
         return Ok(());
     }
-    let message =
-        format!("umockdev {version} has another ioctl protocol than {KNOWN_VERSION}x: install that one");
+    let message = format!(
+        "umockdev {version} has another ioctl protocol than {KNOWN_VERSION}x: install version {KNOWN_VERSION}x"
+    );
     Err(io::Error::new(io::ErrorKind::Unsupported, message))
 }

@@ -1,15 +1,15 @@
-//! The wire: what a driver asks of USB, so that an emulator can stand in for it.
+//! The USB link as a trait, so that an emulator can replace the device.
 
 use crate::error::Result;
 use crate::packet::Report;
 use std::time::Duration;
 
-/// Sends and receives reports of one device. It belongs to one owner at a time, so that one transaction is in flight.
+/// Sends and receives the reports of one device. It has one owner at a time, so only one transaction is in flight.
 pub trait Transport: Send {
-    /// Hand one report to the device, within `timeout`.
+    /// Send one report to the device within `timeout`.
     fn send(&mut self, report: &Report, timeout: Duration) -> Result<()>;
 
-    /// Wait for one report; returns how many bytes came, 0 when nothing did within `timeout`.
+    /// Wait for one report. Returns the number of bytes received, 0 if none arrived within `timeout`.
     fn receive(&mut self, report: &mut Report, timeout: Duration) -> Result<usize>;
 
     /// Bus and port path of the device, for messages.

@@ -1,8 +1,8 @@
 //! Real devices, through libusb.
 //!
-//! All units may carry the same serial number (`LCR2`), so a projector is named by bus and port path, such as `1-2` or
-//! `3-1.4`: the socket that its cable is in. On Linux the kernel's HID driver owns both interfaces; interface 0 alone is
-//! taken from it and given back. The configuration is never set and the device never reset.
+//! All units may carry the same serial number (`LCR2`), so a projector is identified by bus and port path, such as `1-2`
+//! or `3-1.4`: the socket that its cable is plugged into. On Linux the kernel's HID driver owns both interfaces; the driver detaches it
+//! from interface 0 only and attaches it again. It never sets the configuration and never resets the device.
 
 use crate::error::{Error, Result, UDEV_FILE, UDEV_RULE};
 use crate::packet::Report;
@@ -21,10 +21,10 @@ const INTERFACE: u8 = 0;
 const OUT: u8 = 0x01;
 const IN: u8 = 0x81;
 const STRINGS_TIMEOUT: Duration = Duration::from_millis(1000);
-/// libusb counts in ms, and takes 0 for "without bound".
+/// libusb counts in ms and takes 0 for "no timeout".
 const LEAST_TIMEOUT: Duration = Duration::from_millis(1);
 
-/// Bus and port path: where a cable is plugged in.
+/// Bus and port path of the socket that the cable is plugged into.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct PortPath {
     /// Number of the bus.
@@ -55,10 +55,10 @@ impl FromStr for PortPath {
     }
 }
 
-/// Which projector is meant.
+/// Which projector to open.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum Selector {
-    /// The only one that is connected.
+    /// The only connected one.
     #[default]
     Only,
     /// The one in this socket.
@@ -92,9 +92,9 @@ impl Selector {
 pub struct Found {
     /// Where it is plugged in.
     pub port: PortPath,
-    /// Its number on the bus, which changes whenever it is plugged in.
+    /// Its address on the bus, which changes whenever it is plugged in.
     pub address: u8,
-    /// Its serial number, when it may be opened.
+    /// Its serial number, or `None` without permission to open it.
     pub serial: Option<String>,
 }
 
@@ -107,7 +107,7 @@ impl fmt::Display for Found {
     }
 }
 
-/// All projectors on the bus, in the order of their ports. No permission is needed, but for the serial numbers.
+/// All connected projectors in the order of their ports. Only the serial numbers need permission.
 pub fn list() -> Result<Vec<Found>> {
     Ok(devices()?.into_iter().map(|(found, _)| found).collect())
 }
@@ -137,7 +137,7 @@ fn serial(device: &Device<Context>) -> Option<String> {
     handle.read_serial_number_string(language, &descriptor, STRINGS_TIMEOUT).ok()
 }
 
-/// The command interface of one device, held until dropped.
+/// The command interface of one device, released when dropped.
 #[derive(Debug)]
 pub struct UsbTransport {
     handle: DeviceHandle<Context>,
@@ -145,7 +145,7 @@ pub struct UsbTransport {
 }
 
 impl UsbTransport {
-    /// Open the projector that is meant; an ambiguous choice is an error that lists the candidates.
+    /// Open the selected projector. An ambiguous selection is an error that lists the candidates.
     pub fn open(selector: &Selector) -> Result<Self> {
         let mut devices = devices()?;
         let listed = |devices: &[(Found, Device<Context>)]| {
@@ -205,7 +205,7 @@ impl Transport for UsbTransport {
 }
 
 impl LightCrafter<UsbTransport> {
-    /// Open a real projector. Opening sends nothing: it goes on showing what it shows.
+    /// Open a real projector. Opening sends no command, so the projector keeps its image.
     pub fn open(selector: &Selector) -> Result<Self> {
         UsbTransport::open(selector).map(Self::new)
     }

@@ -1,11 +1,11 @@
 //! The HDMI route: a borderless window of exactly 912 x 1140 pixels on the output that feeds a projector.
 //!
-//! A pattern is worth nothing when a desktop scales it. So an output of another size, or one that is scaled, rotated or
-//! transformed, is refused with what it is; and [`PatternWindow::show`] returns when the picture has been handed to the
-//! display, whose size is compared once more. Pixels are copied, without colour management or OpenGL.
+//! Scaling destroys a pattern. The window therefore refuses an output of another size, and one that is scaled, rotated
+//! or transformed, and names the reason. [`PatternWindow::show`] checks the size again and returns once the display has
+//! the image. Pixels are copied without colour management or OpenGL.
 //!
-//! The event loop of the window system exists once in a process and lives in a thread of its own, which is started by
-//! the first call and serves all windows. Another program may still draw over the window.
+//! A process can have one event loop of the window system. The first call starts a thread for it, which serves all
+//! windows. Another program may still draw over the window.
 
 mod events;
 mod scaling;
@@ -21,20 +21,20 @@ pub const IMAGE_BYTES: usize = 3 * WIDTH_PX * HEIGHT_PX;
 /// An output of the computer, with a display or a projector behind it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Output {
-    /// Its name, as `xrandr` has it: HDMI-1.
+    /// Its name as `xrandr` shows it, such as HDMI-1.
     pub name: String,
-    /// Its corner on the desktop, pixels.
+    /// Its top-left corner on the desktop (x, y), px.
     pub position_px: (i32, i32),
-    /// Its size on the desktop, pixels.
+    /// Its size on the desktop (width, height), px.
     pub size_px: (u32, u32),
-    /// Its frame rate.
+    /// Its frame rate, Hz.
     pub frame_rate_hz: Option<f64>,
-    /// Why its pixels are not those of the desktop; none when they are.
+    /// Why its pixels differ from those of the desktop; `None` if they are the same.
     pub scaling: Option<String>,
 }
 
 impl Output {
-    /// Why it cannot carry a pattern; none when it can.
+    /// Why it cannot show a pattern; `None` if it can.
     pub fn unfit(&self) -> Option<String> {
         let (width, height) = self.size_px;
         if (width as usize, height as usize) != (WIDTH_PX, HEIGHT_PX) {
@@ -57,12 +57,12 @@ impl fmt::Display for Output {
     }
 }
 
-/// All outputs that are on.
+/// All active outputs.
 pub fn outputs() -> Result<Vec<Output>> {
     ask(Order::Outputs)
 }
 
-/// The output of this name, or the only one that is fit; an error when there is none.
+/// Choose the output of this name, or without a name the only suitable one.
 fn choose(outputs: &[Output], name: Option<&str>) -> Result<usize> {
     let names: Vec<String> = outputs.iter().map(Output::to_string).collect();
     let present = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
@@ -73,12 +73,15 @@ fn choose(outputs: &[Output], name: Option<&str>) -> Result<usize> {
         let fit: Vec<usize> = (0..outputs.len()).filter(|i| outputs[*i].unfit().is_none()).collect();
         return match fit.as_slice() {
             [only] => Ok(*only),
-            [] => refused("for the projector", format!("none of {WIDTH_PX} x {HEIGHT_PX}, unscaled, is on")),
-            _ => refused("for the projector", "several are fit, so choose one by its name".to_owned()),
+            [] => refused(
+                "for the projector",
+                format!("no active output is {WIDTH_PX} x {HEIGHT_PX} and unscaled"),
+            ),
+            _ => refused("for the projector", "several are suitable, so choose one by its name".to_owned()),
         };
     };
     match outputs.iter().position(|output| output.name == name) {
-        None => refused(name, "no such output is on".to_owned()),
+        None => refused(name, "no such output is active".to_owned()),
         Some(i) => match outputs[i].unfit() {
             None => Ok(i),
             Some(reason) => refused(name, reason),
@@ -94,7 +97,7 @@ pub struct PatternWindow {
 }
 
 impl PatternWindow {
-    /// Cover the output of this name with black; without a name, the only one of the right size.
+    /// Cover the output of this name with black; without a name, the only suitable one.
     pub fn open(output: Option<&str>) -> Result<Self> {
         let name = output.map(str::to_owned);
         let (number, output) = ask(|reply| Order::Open { name, reply })?;
@@ -103,12 +106,12 @@ impl PatternWindow {
         Ok(window)
     }
 
-    /// The output that it covers.
+    /// The covered output.
     pub fn output(&self) -> &Output {
         &self.output
     }
 
-    /// Show 912 x 1140 pixels of red, green, blue, row by row, until told otherwise.
+    /// Show 912 x 1140 pixels of red, green, blue, row by row, until the next call.
     pub fn show(&mut self, image: &[u8]) -> Result<()> {
         if image.len() != IMAGE_BYTES {
             let expected =
@@ -123,7 +126,7 @@ impl PatternWindow {
 
 impl Drop for PatternWindow {
     fn drop(&mut self) {
-        // A display that is gone has closed the window already.
+        // If the display is gone, the window is closed already.
         let _ = ask(|reply| Order::Close { number: self.number, reply });
     }
 }
@@ -138,15 +141,15 @@ mod tests {
     }
 
     #[test]
-    fn an_output_is_chosen_by_name_or_because_it_is_the_only_fit_one() {
+    fn an_output_is_chosen_by_name_or_as_the_only_suitable_one() {
         let desk = output("DP-1", (1920, 1080), None);
         let (one, two) = (output("HDMI-1", (912, 1140), None), output("HDMI-2", (912, 1140), None));
         let scaled = output("HDMI-3", (912, 1140), Some("transformed"));
         assert_eq!(choose(&[desk.clone(), one.clone()], None).unwrap(), 1);
         assert_eq!(choose(&[one.clone(), two.clone()], Some("HDMI-2")).unwrap(), 1);
         let refused = |outputs: &[Output], name| choose(outputs, name).unwrap_err().to_string();
-        assert!(refused(&[one.clone(), two], None).contains("several are fit"));
-        assert!(refused(&[desk.clone(), scaled.clone()], None).contains("none of 912 x 1140"));
+        assert!(refused(&[one.clone(), two], None).contains("several are suitable"));
+        assert!(refused(&[desk.clone(), scaled.clone()], None).contains("no active output is 912 x 1140"));
         assert!(refused(&[scaled], Some("HDMI-3")).contains("transformed"));
         assert!(
             refused(std::slice::from_ref(&desk), Some("DP-1")).contains("1920 x 1080 pixels, not 912 x 1140")

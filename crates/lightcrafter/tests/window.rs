@@ -123,7 +123,7 @@ impl Drop for Server {
 fn under_xvfb() {
     Server::xvfb("912x1140").run("every_pixel_is_on_the_screen");
     Server::xvfb("1920x1140").run("another_size_is_refused");
-    Server::two_outputs().run("each_of_two_outputs_gets_its_own");
+    Server::two_outputs().run("each_of_two_outputs_gets_its_image");
     run_alone("no_display_is_an_error", |command| command.env_remove("DISPLAY"));
 }
 
@@ -181,11 +181,11 @@ fn desktop_from(column: i16) -> Vec<u8> {
 
 #[test]
 #[ignore = "run by under_xvfb"]
-fn each_of_two_outputs_gets_its_own() {
+fn each_of_two_outputs_gets_its_image() {
     let found = outputs().unwrap();
     let places: Vec<_> = found.iter().map(|output| (output.name.as_str(), output.position_px)).collect();
     assert_eq!(places, [("DUMMY0", (0, 0)), ("DUMMY1", (912, 0))]);
-    assert!(PatternWindow::open(None).unwrap_err().to_string().contains("several are fit"));
+    assert!(PatternWindow::open(None).unwrap_err().to_string().contains("several are suitable"));
     let (left, right) = (noise(10), noise(11));
     // The second output first: a window that ignored its output would stand on the first.
     let mut windows = ["DUMMY1", "DUMMY0"].map(|name| PatternWindow::open(Some(name)).unwrap());
@@ -198,7 +198,7 @@ fn each_of_two_outputs_gets_its_own() {
 #[ignore = "run by under_xvfb"]
 fn another_size_is_refused() {
     let error = PatternWindow::open(None).unwrap_err();
-    assert!(error.to_string().contains("none of 912 x 1140"), "{error}");
+    assert!(error.to_string().contains("no active output is 912 x 1140"), "{error}");
     let name = outputs().unwrap()[0].name.clone();
     let error = PatternWindow::open(Some(&name)).unwrap_err();
     assert!(error.to_string().contains("1920 x 1140 pixels, not 912 x 1140"), "{error}");

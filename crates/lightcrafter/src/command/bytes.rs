@@ -1,8 +1,8 @@
-//! Bytes in and out of messages, and the three shapes that most registers have.
+//! Encoding and decoding of message bytes, and macros for the three kinds of register.
 
 use crate::error::{Error, Result};
 
-/// Takes fields from the front of a message; bytes that are left over are padding.
+/// Reads fields from the front of a message. The remaining bytes are padding.
 pub struct Bytes<'a> {
     name: &'static str,
     data: &'a [u8],
@@ -50,12 +50,12 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// The little-endian bytes of 16-bit fields, one after another.
+/// Little-endian bytes of a sequence of 16-bit fields.
 pub fn from_u16s(values: &[u16]) -> Vec<u8> {
     values.iter().flat_map(|value| value.to_le_bytes()).collect()
 }
 
-/// A number of a register; an error that names it when it is outside.
+/// Check the range of a register value; the error names the register.
 pub fn in_range(name: &str, value: u32, low: u32, high: u32) -> Result<u32> {
     if (low..=high).contains(&value) {
         return Ok(value);
@@ -63,7 +63,7 @@ pub fn in_range(name: &str, value: u32, low: u32, high: u32) -> Result<u32> {
     Err(Error::value(name, format!("{low} to {high}"), value))
 }
 
-/// Say in which directions a message goes.
+/// Declare whether a message can be read, written, or both.
 macro_rules! direction {
     ($name:ident, read) => {
         impl crate::command::Readable for $name {}
@@ -134,7 +134,7 @@ macro_rules! bits {
     };
 }
 
-/// A register of one byte that is on or off.
+/// A register of one byte that holds a switch.
 macro_rules! switch {
     ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident) => {
         $(#[$doc])*

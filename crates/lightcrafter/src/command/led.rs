@@ -1,5 +1,5 @@
-//! Light sources, as the registers have them; [`LightCrafter::set_led_drive`](crate::LightCrafter::set_led_drive) is
-//! the way to set a brightness.
+//! Registers of the light sources. To set a brightness, use
+//! [`LightCrafter::set_led_drive`](crate::LightCrafter::set_led_drive).
 
 use super::Message;
 use super::bytes::{Bytes, bits, choice, direction};
@@ -7,28 +7,28 @@ use super::trigger::EdgeDelay;
 use crate::error::Result;
 
 bits! {
-    /// Which LEDs are on. After power-on the sequencer decides, as the pattern table says.
+    /// Which LEDs are on. After power-on the sequencer selects them from the pattern table.
     LedEnable, 0x1A07, "LED selection", both, {
-        /// Red, when set by hand.
+        /// Red, in manual selection.
         red = 0,
-        /// Green, when set by hand.
+        /// Green, in manual selection.
         green = 1,
-        /// Blue, when set by hand.
+        /// Blue, in manual selection.
         blue = 2,
-        /// The sequencer decides; the other bits do not count.
+        /// The sequencer selects the LEDs and ignores the other bits.
         sequencer = 3,
     }
 }
 
 impl LedEnable {
-    /// The pattern table decides: the state after power-on.
+    /// The sequencer selects the LEDs: the state after power-on.
     pub const SEQUENCER: Self = Self { red: false, green: false, blue: false, sequencer: true };
 }
 
 /// The current registers. On the LightCrafter 4500 they are inverted: 0 is full current, 255 is off.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LedCurrent {
-    /// Bytes of red, green, blue as the controller has them.
+    /// Register bytes of red, green, blue.
     pub raw: [u8; 3],
 }
 
@@ -49,24 +49,24 @@ impl Message for LedCurrent {
 direction!(LedCurrent, both);
 
 choice! {
-    /// Polarity of the signals that set the LED currents; it must stand before the LEDs have power.
+    /// Polarity of the signals that set the LED currents; set it before the LEDs get power.
     LedPolarity, 0x1A05, "LED polarity", both, {
-        /// As the LightCrafter 4500 needs it: the byte of the current is inverted.
+        /// Polarity of the LightCrafter 4500: the byte of the current is inverted.
         Normal = 0,
-        /// Exchanged.
+        /// The opposite polarity.
         Inverted = 1,
     }
 }
 
-/// A delay of both edges of one LED; pattern mode only, both zero in video mode.
+/// Delays of both edges of one LED. They apply in pattern mode; set both to zero in video mode.
 macro_rules! led_delay {
     ($name:ident, $word:literal, $colour:literal) => {
-        #[doc = concat!("Delays of the ", $colour, " LED; pattern mode only, none in video mode.")]
+        #[doc = concat!("Delays of the ", $colour, " LED. They apply in pattern mode only.")]
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
         pub struct $name {
-            /// Delay of switching on.
+            /// Delay of the rising edge (on).
             pub rising: EdgeDelay,
-            /// Delay of switching off.
+            /// Delay of the falling edge (off).
             pub falling: EdgeDelay,
         }
 

@@ -19,9 +19,9 @@ choice! {
     TriggerMode, 0x1A23, "trigger mode", both, {
         /// Vertical synchronisation of the video input.
         VideoSync = 0,
-        /// The internal clock, or trigger input 1, as each entry says.
+        /// The internal clock or trigger input 1, as each entry selects.
         Internal = 1,
-        /// Input 1 alternates a pair of patterns, input 2 goes to the next pair.
+        /// Input 1 alternates between the two patterns of a pair; input 2 advances to the next pair.
         Alternate = 2,
         /// As `Internal`, with an exposure for each entry.
         VariableInternal = 3,
@@ -33,9 +33,9 @@ choice! {
 /// Exposure and period of all patterns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Timing {
-    /// Light per pattern, us.
+    /// Exposure of each pattern, us.
     pub exposure_us: u32,
-    /// From start to start, us.
+    /// Time from one start to the next, us.
     pub period_us: u32,
 }
 
@@ -55,16 +55,16 @@ impl Message for Timing {
 
 direction!(Timing, both);
 
-/// How much of the tables is used.
+/// How many entries of the tables are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LutControl {
     /// Entries of the pattern table, 1 to 128.
     pub entries: u16,
-    /// Again and again, or once.
+    /// Whether the sequence repeats.
     pub repeat: bool,
-    /// Patterns to show, 1 to 256; when repeating, patterns per pulse of trigger output 2.
+    /// Patterns to show, 1 to 256. In a repeating sequence: patterns per pulse of trigger output 2.
     pub patterns: u16,
-    /// Entries of the image table, 1 to 64; of no meaning for video.
+    /// Entries of the image table, 1 to 64; unused for video.
     pub images: u16,
 }
 
@@ -97,9 +97,9 @@ impl Message for LutControl {
 direction!(LutControl, both);
 
 choice! {
-    /// The table that the mailbox fills.
+    /// Table that the mailbox writes to.
     Mailbox, 0x1A33, "mailbox", write, {
-        /// None; the controller takes over what was written.
+        /// None: the mailbox is closed and the controller uses the new tables.
         Close = 0,
         /// Image indexes.
         Images = 1,
@@ -110,7 +110,7 @@ choice! {
     }
 }
 
-/// The entry at which the next data of the mailbox go, 0 to 127.
+/// Entry that the next mailbox data are written to, 0 to 127.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MailboxOffset(pub u8);
 
@@ -132,11 +132,11 @@ impl Message for MailboxOffset {
 direction!(MailboxOffset, write);
 
 switch! {
-    /// Dark for bright in all patterns.
+    /// Invert all patterns.
     InvertData, 0x1A30, "inversion of all patterns", both
 }
 
-/// Ask the controller to judge the sequence; [`Validation`] gives the verdict.
+/// Make the controller validate the sequence; read [`Validation`] for the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Validate;
 
@@ -159,7 +159,7 @@ impl Message for Validate {
 direction!(Validate, write);
 
 bits! {
-    /// The verdict of the controller on a sequence.
+    /// Result of the validation of a sequence.
     Validation, 0x1A1A, "verdict on the sequence", read, {
         /// Exposure or period is not allowed.
         bad_timing = 0,
@@ -171,13 +171,13 @@ bits! {
         no_black_before_trigger = 3,
         /// Period and exposure differ by less than 230 us.
         short_gap = 4,
-        /// The verdict is not ready.
+        /// The validation is still running.
         busy = 7,
     }
 }
 
 impl Validation {
-    /// Faults with which a sequence must not be started, in words.
+    /// Faults that forbid starting the sequence, in words.
     pub fn errors(&self) -> Vec<&'static str> {
         let faults = [
             (self.bad_timing, "exposure or period is out of range for the bit depth"),
@@ -186,7 +186,7 @@ impl Validation {
         named(&faults)
     }
 
-    /// Faults with which a sequence runs, in words.
+    /// Faults that do not prevent the sequence from running, in words.
     pub fn warnings(&self) -> Vec<&'static str> {
         let faults = [
             (self.trigger_overlap, "trigger output 1 stays high, or black overlaps the next pattern"),
@@ -202,13 +202,13 @@ fn named(faults: &[(bool, &'static str)]) -> Vec<&'static str> {
 }
 
 choice! {
-    /// Whether patterns are shown.
+    /// Run state of the sequence.
     RunState, 0x1A24, "run state", both, {
-        /// Nothing; the tables must be sent again before the next start.
+        /// Stopped. The tables must be sent again before the next start.
         Stop = 0,
-        /// The current pattern stays.
+        /// Paused: the current pattern stays on.
         Pause = 1,
-        /// Patterns follow one another.
+        /// Running.
         Start = 2,
     }
 }

@@ -1,11 +1,11 @@
-//! Pictures of the controller itself: test patterns, flash images, the curtain.
+//! Images that the controller provides: test patterns, flash images, the curtain.
 
 use super::Message;
 use super::bytes::{Bytes, choice, direction, from_u16s, in_range};
 use crate::error::Result;
 
 choice! {
-    /// Picture of the generator.
+    /// Image of the test pattern generator.
     TestPattern, 0x1203, "test pattern", both, {
         /// One colour.
         Solid = 0,
@@ -37,7 +37,7 @@ choice! {
 pub struct TestPatternColours {
     /// Lines, fields and full scale.
     pub foreground: [u16; 3],
-    /// What lies between.
+    /// The areas in between.
     pub background: [u16; 3],
 }
 
@@ -66,7 +66,7 @@ fn colour_bytes(colour: [u16; 3]) -> Result<Vec<u8>> {
     Ok(from_u16s(&colour))
 }
 
-/// Show the flash image of this number; video mode, input from flash.
+/// Show the flash image of this number (video mode with the input from flash).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FlashImage(pub u8);
 
@@ -85,12 +85,12 @@ impl Message for FlashImage {
 
 direction!(FlashImage, both);
 
-/// Measure how long flash images take to load; [`ImageLoadTime`] gives the answer.
+/// Measure how long flash images take to load; read [`ImageLoadTime`] for the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MeasureImageLoad {
     /// First image.
     pub first: u8,
-    /// How many.
+    /// Number of images.
     pub count: u8,
 }
 
@@ -110,7 +110,7 @@ impl Message for MeasureImageLoad {
 
 direction!(MeasureImageLoad, write);
 
-/// The answer to [`MeasureImageLoad`].
+/// Result of [`MeasureImageLoad`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct ImageLoadTime {
     /// Ticks of 18.667 MHz.

@@ -2,22 +2,22 @@
 
 use super::Message;
 use super::Writable;
-use super::bytes::{Bytes, bits, direction, from_u16s, switch};
+use super::bytes::{Bytes, bits, direction, switch};
 use crate::error::{Error, Result};
 use crate::packet::Access;
 
 bits! {
-    /// What the hardware reports of itself.
+    /// State of the hardware.
     HardwareStatus, 0x1A0A, "hardware status", read, {
         /// Initialisation succeeded.
         initialised = 0,
         /// The reset controller of the mirrors overlapped two operations.
         reset_overlap = 2,
-        /// A buffer was swapped by force: patterns came faster than they could be loaded.
+        /// A forced buffer swap: patterns were shown faster than they could be loaded.
         forced_swap = 3,
-        /// The sequencer gave up.
+        /// The sequencer aborted.
         sequencer_abort = 6,
-        /// The sequencer found an error.
+        /// The sequencer reports an error.
         sequencer_error = 7,
     }
 }
@@ -31,9 +31,9 @@ bits! {
 }
 
 bits! {
-    /// What the display does at the moment.
+    /// Present state of the display.
     MainStatus, 0x1A0C, "main status", read, {
-        /// The mirrors are parked: nothing is shown.
+        /// The mirrors are parked, so no image is shown.
         parked = 0,
         /// The sequencer runs.
         running = 1,
@@ -102,7 +102,7 @@ impl Message for Versions {
 
 direction!(Versions, read);
 
-/// The name that the maker of a firmware image gave it, at most 32 characters of ASCII.
+/// Tag of the firmware image, at most 32 ASCII characters, given when the image was built.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FirmwareTag(pub String);
 
@@ -113,7 +113,7 @@ impl Message for FirmwareTag {
     fn encode(&self) -> Result<Vec<u8>> {
         let printable = self.0.bytes().all(|byte| byte.is_ascii() && byte != 0);
         if self.0.len() > 32 || !printable {
-            return Err(Error::value(Self::NAME, "at most 32 characters of ASCII", format!("{:?}", self.0)));
+            return Err(Error::value(Self::NAME, "at most 32 ASCII characters", format!("{:?}", self.0)));
         }
         let mut data = self.0.clone().into_bytes();
         data.resize(32, 0);
@@ -123,7 +123,7 @@ impl Message for FirmwareTag {
     fn decode(data: &[u8]) -> Result<Self> {
         let text = data.split(|byte| *byte == 0).next().unwrap_or_default();
         let printable = text.len() <= 32 && text.is_ascii() && !data.is_empty();
-        let expected = "at most 32 characters of ASCII";
+        let expected = "at most 32 ASCII characters";
         if !printable {
             return Err(Error::malformed(Self::NAME, expected, format!("{text:02x?}")));
         }
@@ -133,7 +133,7 @@ impl Message for FirmwareTag {
 
 direction!(FirmwareTag, read);
 
-/// How many images of 24 bit are in flash.
+/// Number of 24-bit images in flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FlashImageCount(pub u8);
 
@@ -169,7 +169,7 @@ impl Message for PowerMode {
         Ok(vec![u8::from(*self == Self::Standby)])
     }
 
-    /// Anything in the two lowest bits means standby.
+    /// Any value but 0 in the two lowest bits means standby.
     fn decode(data: &[u8]) -> Result<Self> {
         let asleep = Bytes::new(Self::NAME, data).u8()? & 3 != 0;
         Ok(if asleep { Self::Standby } else { Self::Normal })
@@ -178,7 +178,7 @@ impl Message for PowerMode {
 
 direction!(PowerMode, both);
 
-/// Start the firmware again; the device leaves the bus for some seconds and does not acknowledge.
+/// Restart the firmware. The device does not acknowledge and disappears from the bus for some seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct SoftwareReset;
 
@@ -200,102 +200,11 @@ impl Writable for SoftwareReset {
 }
 
 switch! {
-    /// Park the mirrors, for transport and long rests.
+    /// Park the mirrors for transport or storage.
     DmdPark, 0x0609, "mirror parking", write
 }
 
 switch! {
-    /// Hold the image that is shown, whatever arrives.
+    /// Keep the present image and ignore new ones.
     DisplayFreeze, 0x100A, "display freeze", both
 }
-
-/// The video signal that the controller sees. Rates are as the firmware gives them; their units are not documented.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct VideoSignal {
-    /// State of the detection in the two lowest bits: 2 is locked.
-    pub state: u8,
-    /// Columns of the source.
-    pub width_px: u16,
-    /// Rows of the source.
-    pub height_px: u16,
-    /// Polarity of the horizontal synchronisation.
-    pub hsync_polarity: u8,
-    /// Polarity of the vertical synchronisation.
-    pub vsync_polarity: u8,
-    /// Pixel clock, raw.
-    pub pixel_clock: u32,
-    /// Line rate, raw.
-    pub line_rate: u16,
-    /// Frame rate, raw.
-    pub frame_rate: u16,
-    /// Columns, blanking included.
-    pub total_px: u16,
-    /// Lines, blanking included.
-    pub total_lines: u16,
-    /// Columns with image.
-    pub active_px: u16,
-    /// Lines with image.
-    pub active_lines: u16,
-    /// First column with image.
-    pub first_px: u16,
-    /// First line with image.
-    pub first_line: u16,
-}
-
-impl VideoSignal {
-    /// Whether the controller follows the source.
-    pub fn locked(&self) -> bool {
-        self.state & 3 == 2
-    }
-}
-
-impl std::fmt::Display for VideoSignal {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let state = if self.locked() { "locked" } else { "no stable signal" };
-        write!(f, "{state}, {} x {} pixels", self.active_px, self.active_lines)
-    }
-}
-
-impl Message for VideoSignal {
-    const WORD: u16 = 0x071C;
-    const NAME: &'static str = "video signal";
-
-    fn encode(&self) -> Result<Vec<u8>> {
-        let mut data = vec![self.state];
-        data.extend(from_u16s(&[self.width_px, self.height_px]));
-        data.extend([0, self.hsync_polarity, self.vsync_polarity]);
-        data.extend(self.pixel_clock.to_le_bytes());
-        let (total, active) = ([self.total_px, self.total_lines], [self.active_px, self.active_lines]);
-        let (rates, first) = ([self.line_rate, self.frame_rate], [self.first_px, self.first_line]);
-        data.extend(from_u16s(&[rates, total, active, first].concat()));
-        Ok(data)
-    }
-
-    fn decode(data: &[u8]) -> Result<Self> {
-        let mut bytes = Bytes::new(Self::NAME, data);
-        let state = bytes.u8()?;
-        let [width_px, height_px] = bytes.u16s()?;
-        let [_reserved, hsync_polarity, vsync_polarity] = [bytes.u8()?, bytes.u8()?, bytes.u8()?];
-        let pixel_clock = bytes.u32()?;
-        let [line_rate, frame_rate, total_px, total_lines, active_px, active_lines, first_px, first_line] =
-            bytes.u16s()?;
-        Ok(Self {
-            state,
-            width_px,
-            height_px,
-            hsync_polarity,
-            vsync_polarity,
-            pixel_clock,
-            line_rate,
-            frame_rate,
-            total_px,
-            total_lines,
-            active_px,
-            active_lines,
-            first_px,
-            first_line,
-        })
-    }
-}
-
-direction!(VideoSignal, read);

@@ -1,4 +1,4 @@
-//! The tables of pattern mode: patterns, images, patterns with an exposure each.
+//! Tables of pattern mode: patterns, images, and patterns with individual exposures.
 
 use super::Message;
 use super::bytes::{Bytes, direction, in_range};
@@ -10,15 +10,15 @@ use crate::error::Result;
 pub enum EntryTrigger {
     /// The internal clock.
     Internal = 0,
-    /// The rising edge of an external signal; the first pattern of a video frame too.
+    /// The rising edge of an external signal, or the start of a video frame.
     Rising = 1,
     /// The falling edge of an external signal.
     Falling = 2,
-    /// The end of the entry before.
+    /// The end of the previous entry.
     Continue = 3,
 }
 
-/// One pattern: bit planes, light, and what happens around it.
+/// One pattern: its bit planes, its LEDs, and its transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LutEntry {
     /// What starts it.
@@ -29,18 +29,18 @@ pub struct LutEntry {
     pub bit_depth: u8,
     /// LEDs: bit 0 red, bit 1 green, bit 2 blue.
     pub leds: u8,
-    /// Dark for bright.
+    /// Whether the pattern is inverted.
     pub invert: bool,
-    /// Black after the pattern, which takes 230 us.
+    /// Insert black after the pattern, which takes 230 us.
     pub black_after: bool,
-    /// Take the next image before this pattern.
+    /// Switch to the next image before this pattern.
     pub next_image: bool,
-    /// Trigger output 1 stays high, the exposure is shared with the entry before.
+    /// Share the exposure of the previous entry; trigger output 1 stays high.
     pub shares_exposure: bool,
 }
 
 impl LutEntry {
-    /// Give the 24 bits of the entry.
+    /// The 24 bits of the entry.
     fn to_word(self) -> Result<u32> {
         let number = in_range("pattern number", self.number.into(), 0, 63)?;
         let depth = in_range("bit depth", self.bit_depth.into(), 1, 8)?;
@@ -99,8 +99,8 @@ impl Message for PatternTable {
 
 direction!(PatternTable, both);
 
-/// Flash images for the open mailbox [`Mailbox::Images`](super::Mailbox::Images), at most 64. A table of two is exchanged on the wire, a
-/// special case of the firmware.
+/// Flash images for the open mailbox [`Mailbox::Images`](super::Mailbox::Images), at most 64. The firmware
+/// expects a table of exactly two images in reverse order.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct ImageTable(pub Vec<u8>);
 
@@ -131,7 +131,7 @@ impl Message for ImageTable {
 
 direction!(ImageTable, both);
 
-/// The entry at which [`VariableEntry`] goes, 0 to 1823; to be sent before each.
+/// Index of the next [`VariableEntry`], 0 to 1823; send it before each entry.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct VariableOffset(pub u16);
 
@@ -153,7 +153,7 @@ impl Message for VariableOffset {
 
 direction!(VariableOffset, write);
 
-/// A pattern with its own exposure; firmware 3.0 or newer.
+/// A pattern with an individual exposure; needs firmware 3.0 or newer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VariableEntry {
     /// The pattern.
@@ -179,7 +179,7 @@ impl Message for VariableEntry {
 
 direction!(VariableEntry, write);
 
-/// How much of the variable table is used.
+/// How many entries of the variable table are used.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct VariableControl {
     /// Entries of the table, 1 to 1824.
@@ -188,7 +188,7 @@ pub struct VariableControl {
     pub patterns: u16,
     /// Entries of the image table, 1 to 256.
     pub images: u16,
-    /// Again and again, or once.
+    /// Whether the sequence repeats.
     pub repeat: bool,
 }
 

@@ -4,16 +4,16 @@ use super::Message;
 use super::bytes::{Bytes, choice, direction, in_range};
 use crate::error::{Error, Result};
 
-/// When an edge comes relative to the start of an exposure: a byte of 107.2 ns per step, where 0xBB is 0.
+/// Time of an edge relative to the start of an exposure: one byte, 107.2 ns per step, 0xBB is 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct EdgeDelay(pub u8);
 
 impl EdgeDelay {
-    /// Together with the exposure.
+    /// No delay: at the start of the exposure.
     pub const NONE: Self = Self(0xBB);
     const STEP_US: f64 = 0.1072;
 
-    /// The step nearest to a delay in us: -20.05 to 7.29, negative before the exposure.
+    /// Step nearest to a delay in us, -20.05 to 7.29; negative delays come before the exposure.
     pub fn from_us(delay_us: f64) -> Result<Self> {
         let step = (delay_us / Self::STEP_US).round() + f64::from(Self::NONE.0);
         if (0.0..=255.0).contains(&step) {
@@ -35,10 +35,10 @@ impl Default for EdgeDelay {
 }
 
 /// Trigger output 1: high during each exposure. Sources disagree about the bit that inverts it (see
-/// [`Profile`](crate::Profile)), so the byte is given as it is; check with an oscilloscope.
+/// [`Profile`](crate::Profile)), so this struct holds the raw byte; check it with an oscilloscope.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TriggerOut1 {
-    /// The byte with the invert bit: 0 is high during the exposure.
+    /// Byte with the invert bit; 0 gives a high level during the exposure.
     pub invert_byte: u8,
     /// Rising edge, at most 2.787 us late.
     pub rising: EdgeDelay,
@@ -46,7 +46,7 @@ pub struct TriggerOut1 {
     pub falling: EdgeDelay,
 }
 
-/// The last step that output 1 accepts.
+/// Highest step that output 1 accepts.
 const OUT_1_LAST_STEP: u32 = 0xD5;
 
 impl Message for TriggerOut1 {
@@ -79,7 +79,7 @@ fn invert_byte(byte: u8) -> Result<u8> {
 /// Trigger output 2: a pulse of fixed length at the start of the pattern sequence.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TriggerOut2 {
-    /// The byte with the invert bit, as in [`TriggerOut1`].
+    /// Byte with the invert bit, as in [`TriggerOut1`].
     pub invert_byte: u8,
     /// Rising edge.
     pub rising: EdgeDelay,
@@ -144,7 +144,7 @@ impl Message for TriggerIn1Delay {
 direction!(TriggerIn1Delay, both);
 
 choice! {
-    /// Edge of trigger input 2 that counts, in the alternating trigger mode.
+    /// Active edge of trigger input 2 in the alternating trigger mode.
     TriggerIn2Edge, 0x1A36, "edge of trigger input 2", both, {
         /// Low to high.
         Rising = 0,

@@ -1,14 +1,14 @@
-//! What can go wrong with the model, on demand and by its nature.
+//! Faults on demand, and the quirks of the real chip.
 
 use crate::error::{Error, Result};
 use std::str::FromStr;
 
-/// What the next reply suffers.
+/// A fault of the next reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Fault {
     /// The command is refused and has no effect.
     Refuse,
-    /// The command is heard and never answered.
+    /// The command is executed and gets no reply.
     Silence,
     /// The reply stops in the middle of a report.
     Truncate,
@@ -16,7 +16,7 @@ pub enum Fault {
     WrongSequence,
     /// A reply to an earlier command comes first.
     Stale,
-    /// The device leaves the bus instead of answering.
+    /// The device disappears from the bus instead of replying.
     Unplug,
 }
 
@@ -39,22 +39,22 @@ impl FromStr for Fault {
     }
 }
 
-/// Oddities of the real chip; in [`Dlpc350::default`](super::Dlpc350::default) they are as users report them.
+/// Quirks of the real chip; the defaults are those that users report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quirks {
     /// After video mode the first start of a sequence is acknowledged and ignored.
     pub ignores_first_start: bool,
     /// Waking from standby is not acknowledged.
     pub silent_wake: bool,
-    /// Commands after waking that are not answered either.
+    /// Number of commands after waking that get no reply either.
     pub silent_reads_after_waking: u32,
-    /// Reads of the verdict that still say busy.
+    /// Number of reads of a validation that still report busy.
     pub busy_polls: u32,
-    /// Reads after which a new mode or run state shows.
+    /// Number of reads until a new mode or run state appears.
     pub lag_polls: u32,
-    /// Video mode set again this often with a signal connected freezes the chip.
+    /// Number of redundant writes of the video mode, with a signal connected, that freeze the chip.
     pub redundant_modes_to_freeze: u32,
-    /// Every sequence is judged to have a wrong pattern number.
+    /// Every validation reports a wrong pattern number.
     pub rejects: bool,
 }
 

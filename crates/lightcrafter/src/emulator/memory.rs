@@ -1,4 +1,4 @@
-//! The model at the end of a wire of no length.
+//! A transport to an emulator in the same process.
 
 use super::Dlpc350;
 use crate::error::{Error, Result};
@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A [`Transport`] to a model in the same process. What is not answered at once never will be: timeouts cost no time.
+/// A [`Transport`] to an emulator in the same process. Replies come at once or never, so timeouts take no time.
 #[derive(Debug)]
 pub struct EmulatedTransport {
     device: Arc<Mutex<Dlpc350>>,
@@ -17,22 +17,22 @@ pub struct EmulatedTransport {
 }
 
 impl EmulatedTransport {
-    /// A wire to this model.
+    /// A transport to this emulator.
     pub fn new(device: Dlpc350) -> Self {
         Self::to(Arc::new(Mutex::new(device)), "emulator")
     }
 
-    /// A wire to a shared model, with a name for messages.
+    /// A transport to a shared emulator, with a name for messages.
     pub fn to(device: Arc<Mutex<Dlpc350>>, place: impl Into<String>) -> Self {
         Self { device, incoming: VecDeque::new(), place: place.into() }
     }
 
-    /// The model, to look into it and to inject faults.
+    /// The emulator, to inspect it and to inject faults.
     pub fn device(&self) -> Arc<Mutex<Dlpc350>> {
         Arc::clone(&self.device)
     }
 
-    /// A model that a test left locked while panicking can still be used.
+    /// Use the emulator even if a test panicked while it held the lock.
     fn locked(&self) -> MutexGuard<'_, Dlpc350> {
         self.device.lock().unwrap_or_else(PoisonError::into_inner)
     }

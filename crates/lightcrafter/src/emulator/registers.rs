@@ -1,4 +1,4 @@
-//! The plain registers: length, reset value and what they accept, as the guide lists them.
+//! The plain registers: length, reset value and accepted values, as in the programmer's guide.
 
 use std::collections::BTreeMap;
 
@@ -84,7 +84,7 @@ pub fn needs_stop(word: u16) -> bool {
     )
 }
 
-/// A value, and for how many reads the one before is still seen.
+/// A value, and the number of reads that still return the previous one.
 #[derive(Debug, Clone)]
 struct Cell {
     kind: Kind,
@@ -125,7 +125,7 @@ impl Registers {
         self.images
     }
 
-    /// The first byte of a register, as it is and not as it lags.
+    /// The first byte of a register without the lag of reads.
     pub fn byte(&self, word: u16) -> u8 {
         self.bytes(word).first().copied().unwrap_or(0)
     }
@@ -161,7 +161,7 @@ impl Registers {
         self.write_late(word, data, 0)
     }
 
-    /// A write that shows only after some reads.
+    /// A write that becomes visible after some reads.
     pub fn write_late(&mut self, word: u16, data: &[u8], lag: u32) -> Option<()> {
         if word == 0x1A3A && data.len() == 2 {
             self.load_images = data[1];
@@ -178,7 +178,7 @@ impl Registers {
     }
 }
 
-/// What the detection of the video input says; while patterns run it sees no stable signal.
+/// Detection state of the video input; while patterns run it reports no stable signal.
 pub fn video_signal(connected: bool, video_mode: bool) -> Vec<u8> {
     let mut data = vec![0; 28];
     if !connected {

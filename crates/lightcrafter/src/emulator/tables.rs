@@ -12,7 +12,7 @@ const IMAGE_BOX: u8 = 1;
 const PATTERN_BOX: u8 = 2;
 const VARIABLE_BOX: u8 = 3;
 
-/// One line of either table, with its times.
+/// One entry of either table, with its exposure and period.
 struct Line {
     word: u32,
     exposure_us: u32,
@@ -45,19 +45,19 @@ impl Default for Tables {
 }
 
 impl Tables {
-    /// A trip through video mode loses everything.
+    /// Video mode clears the tables.
     pub fn lose(&mut self) {
         *self = Self::default();
     }
 
-    /// After running, the tables have to be sent again.
+    /// After a run the tables must be sent again.
     pub fn lose_after_run(&mut self, ran: bool) {
         if ran {
             self.lose();
         }
     }
 
-    /// A verdict holds for what it was asked about.
+    /// A change of the tables invalidates the last validation.
     pub fn changed(&mut self) {
         self.validated = false;
     }
@@ -66,7 +66,7 @@ impl Tables {
         self.validated && self.written && self.verdict & 3 == 0
     }
 
-    /// Busy for some looks, then the verdict.
+    /// Busy for some reads, then the result.
     pub fn verdict(&mut self) -> u8 {
         if self.busy > 0 {
             self.busy -= 1;
@@ -111,7 +111,7 @@ impl Tables {
         Some(())
     }
 
-    /// Judge what is in the tables; with the mailbox open nothing can be judged.
+    /// Validate the tables. An open mailbox counts as a wrong pattern number.
     pub fn validate(&mut self, registers: &Registers, quirks: &Quirks) {
         let lines = self.lines(registers);
         let flash = registers.byte(0x1A22) == 3;
@@ -144,7 +144,7 @@ impl Tables {
     }
 }
 
-/// The firmware exchanges a pair of images.
+/// The firmware swaps the two entries of a table of two images.
 fn in_wire_order(images: &[u8]) -> Vec<u8> {
     match images {
         [first, second] => vec![*second, *first],
@@ -157,7 +157,7 @@ fn variable_offset(registers: &Registers) -> usize {
     usize::from(bytes[0]) | usize::from(bytes[1]) << 8
 }
 
-/// Bits 0, 1 and 4 of the verdict, and bit 2 for black that has no time.
+/// Bits 0, 1 and 4 of the result, and bit 2 for black without time for it.
 fn faults_of(line: &Line) -> u8 {
     let (depth, number) = ((line.word >> 8 & 15) as u8, (line.word >> 2 & 63) as u8);
     let Ok(limits) = depth_limits(depth) else { return 3 };
@@ -174,7 +174,7 @@ fn faults_of(line: &Line) -> u8 {
         | u8::from(short_gap) << 4
 }
 
-/// Bit 3: an external trigger wants black before its pattern.
+/// Bit 3: an external trigger needs black before its pattern.
 fn darkness(word: u32, before: Option<u32>) -> u8 {
     let external = matches!(word & 3, 1 | 2);
     let black_before = before.is_none_or(|before| before & 1 << 17 != 0);

@@ -10,10 +10,10 @@ use crate::error::{Error, Result};
 use crate::transport::Transport;
 use std::thread::sleep;
 
-/// A trigger output in us around the exposure.
+/// A trigger output; delays are relative to the exposure.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct TriggerOut {
-    /// Low while it would be high.
+    /// Whether the output is inverted.
     pub inverted: bool,
     /// Delay of the rising edge, us, -20.05 to 2.787 (output 2: 7.29).
     pub rising_us: f64,
@@ -21,16 +21,16 @@ pub struct TriggerOut {
     pub falling_us: f64,
 }
 
-/// All triggers.
+/// Settings of all triggers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Triggers {
-    /// High during each exposure.
+    /// Output 1: high during each exposure.
     pub out_1: TriggerOut,
-    /// A pulse at the start of the sequence.
+    /// Output 2: a pulse at the start of the sequence.
     pub out_2: TriggerOut,
-    /// From input 1 to the pattern, us, 0 to 56170.
+    /// Delay from input 1 to the pattern, us, 0 to 56170.
     pub in_1_delay_us: f64,
-    /// The edge of input 2 that counts.
+    /// Active edge of input 2.
     pub in_2_edge: TriggerIn2Edge,
 }
 
@@ -42,8 +42,9 @@ impl Default for Triggers {
 }
 
 impl<T: Transport> LightCrafter<T> {
-    /// Set the brightness of red, green, blue: 0 is off, 255 full current, whatever the register has. It must not
-    /// exceed the limit of the [`Profile`](crate::Profile); the register is read back.
+    /// Set the brightness of red, green, blue: 0 is off, 255 is full current, for either
+    /// polarity of the register. A drive above the limit of the [`Profile`](crate::Profile) is an error. The method reads
+    /// the register back.
     pub fn set_led_drive(&mut self, drive: [u8; 3]) -> Result<()> {
         let raw = self.profile.raw_current(drive)?;
         self.require_normal_polarity()?;
@@ -62,23 +63,23 @@ impl<T: Transport> LightCrafter<T> {
         Ok(self.profile.drive(raw))
     }
 
-    /// With exchanged polarity the same byte would mean the opposite current.
+    /// With inverted polarity the same byte would mean the opposite current.
     fn require_normal_polarity(&mut self) -> Result<()> {
         match self.read()? {
             LedPolarity::Normal => Ok(()),
             LedPolarity::Inverted => {
                 let name = format!("LED polarity of {}", self.place());
-                Err(Error::value(name, "Normal, for which the profile is made", "Inverted"))
+                Err(Error::value(name, "Normal, which the profile assumes", "Inverted"))
             }
         }
     }
 
-    /// Choose LEDs by hand, or leave the choice to the pattern table ([`LedEnable::SEQUENCER`]).
+    /// Select LEDs manually, or let the pattern table select them ([`LedEnable::SEQUENCER`]).
     pub fn set_leds(&mut self, leds: LedEnable) -> Result<()> {
         self.write(&leds)
     }
 
-    /// Delay switching on and off of red, green, blue in us; pattern mode only.
+    /// Set the delays of switching red, green and blue on and off, us; pattern mode only.
     pub fn set_led_delays_us(&mut self, rising_us: [f64; 3], falling_us: [f64; 3]) -> Result<()> {
         let edges = |delays: [f64; 3]| -> Result<[EdgeDelay; 3]> {
             let [red, green, blue] = delays.map(EdgeDelay::from_us);
@@ -90,7 +91,7 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&BlueLedDelay { rising: rising[2], falling: falling[2] })
     }
 
-    /// Set all triggers; every value is checked before the first is sent.
+    /// Set all triggers. All values are checked before the first is sent.
     pub fn set_triggers(&mut self, triggers: &Triggers) -> Result<()> {
         let invert_byte = |out: TriggerOut| if out.inverted { self.profile.trigger_invert_byte } else { 0 };
         let edge = EdgeDelay::from_us;
@@ -105,7 +106,7 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&triggers.in_2_edge)
     }
 
-    /// The triggers as the projector has them, to the nearest step.
+    /// Read all triggers; delays are multiples of the register steps.
     pub fn triggers(&mut self) -> Result<Triggers> {
         let (out_1, out_2) = (self.read::<TriggerOut1>()?, self.read::<TriggerOut2>()?);
         Ok(Triggers {
@@ -124,7 +125,7 @@ impl<T: Transport> LightCrafter<T> {
         })
     }
 
-    /// Mirror the image along its axes; in pattern mode from the next image on.
+    /// Mirror the image along its axes; in pattern mode this takes effect with the next image.
     pub fn set_flips(&mut self, long_axis: bool, short_axis: bool) -> Result<()> {
         self.write(&LongAxisFlip(long_axis))?;
         self.write(&ShortAxisFlip(short_axis))

@@ -1,4 +1,4 @@
-//! Modes, and a sequence from its rules to its first pattern.
+//! Display modes, and loading, starting and stopping of pattern sequences.
 
 use super::LightCrafter;
 use crate::command::{
@@ -13,7 +13,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant};
 
 impl<T: Transport> LightCrafter<T> {
-    /// Show the video input as it is, in linear light; an error when it does not lock.
+    /// Show the video input in linear light. An input that does not lock is an error.
     pub fn show_video(&mut self) -> Result<()> {
         self.set_power(PowerMode::Normal)?;
         self.enter(DisplayMode::Video)?;
@@ -22,7 +22,7 @@ impl<T: Transport> LightCrafter<T> {
         self.wait_for_lock().map(|_| ())
     }
 
-    /// Show a picture of the generator, in video mode.
+    /// Show an image of the test pattern generator in video mode.
     pub fn show_test_pattern(&mut self, pattern: TestPattern, colours: TestPatternColours) -> Result<()> {
         self.set_power(PowerMode::Normal)?;
         self.enter(DisplayMode::Video)?;
@@ -31,7 +31,7 @@ impl<T: Transport> LightCrafter<T> {
         self.select_input(InputSource::TEST_PATTERN)
     }
 
-    /// Show an image of flash as a still picture, in video mode and linear light.
+    /// Show a flash image as a still picture, in video mode and linear light.
     pub fn show_flash_image(&mut self, image: u8) -> Result<()> {
         self.set_power(PowerMode::Normal)?;
         self.check_images(&[image])?;
@@ -41,13 +41,13 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&FlashImage(image))
     }
 
-    /// Choose the input of the video mode, unless it is chosen already.
+    /// Select the input of the video mode unless it is selected already.
     pub fn select_input(&mut self, input: InputSource) -> Result<()> {
         if self.read::<InputSource>()? == input { Ok(()) } else { self.write(&input) }
     }
 
-    /// Change the mode, unless it is the present one: a redundant write can freeze the chip, and so can leaving the
-    /// generator of test patterns by the mode.
+    /// Change the mode unless it is the present one, because a redundant write can freeze the chip. Changing the mode
+    /// with the test pattern generator as input can freeze it too, so the input changes first.
     fn enter(&mut self, mode: DisplayMode) -> Result<()> {
         if self.read::<DisplayMode>()? == mode {
             return Ok(());
@@ -57,7 +57,7 @@ impl<T: Transport> LightCrafter<T> {
         }
         if mode == DisplayMode::Video {
             self.stop()?;
-            // Delays of the LEDs belong to patterns alone.
+            // LED delays apply to pattern mode only.
             self.set_led_delays_us([0.0; 3], [0.0; 3])?;
         }
         self.loaded = None;
@@ -65,8 +65,8 @@ impl<T: Transport> LightCrafter<T> {
         self.wait_for(mode, self.waits.change)
     }
 
-    /// Send a sequence to the projector and have it judged; it is not started. Warnings are in the verdict, and what
-    /// must not run is an error that names every fault.
+    /// Send a sequence to the projector and validate it without starting it. Warnings are in the result; a sequence
+    /// that must not run is an error that names every fault.
     pub fn load(&mut self, sequence: &Sequence) -> Result<Validation> {
         sequence.check()?;
         self.set_power(PowerMode::Normal)?;
@@ -82,7 +82,7 @@ impl<T: Transport> LightCrafter<T> {
         if sequence.variable() {
             let Versions { application, .. } = self.versions()?;
             if application.major < 3 {
-                let expected = "3.0 or newer for an exposure of each pattern";
+                let expected = "3.0 or newer for individual exposures";
                 return Err(Error::value("firmware", expected, application));
             }
         }
@@ -99,10 +99,10 @@ impl<T: Transport> LightCrafter<T> {
             return Ok(());
         }
         let name = format!("flash image of the projector at {}", self.place());
-        Err(Error::value(name, format!("below {present}, the number of images there"), last))
+        Err(Error::value(name, format!("below {present}, the number of images in its flash"), last))
     }
 
-    /// In pattern mode the signal reads as not locked, so the lock is asked for before.
+    /// Wait for the lock before entering pattern mode, in which the signal always reads as not locked.
     fn enter_pattern_mode(&mut self, sequence: &Sequence) -> Result<()> {
         if sequence.from_the_video_input() {
             self.select_input(InputSource::HDMI)?;
@@ -149,7 +149,7 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&Mailbox::Close)?;
         let Source::Flash { images, .. } = &sequence.source else { return Ok(()) };
         self.write(&Mailbox::Images)?;
-        // In chunks, because a table holds 64 entries in one message; never of two, which the firmware exchanges.
+        // One message holds 64 entries. A chunk of exactly two must not occur, because the firmware swaps the two.
         let size = if images.len() % 64 == 2 { 63 } else { 64 };
         for (i, chunk) in images.chunks(size).enumerate() {
             self.write(&VariableOffset((size * i) as u16))?;
@@ -158,7 +158,7 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&Mailbox::Close)
     }
 
-    /// Ask for the verdict on the tables that were sent.
+    /// Validate the tables on the projector.
     fn validate(&mut self) -> Result<Validation> {
         self.write(&Validate)?;
         sleep(self.waits.verdict);
@@ -179,12 +179,12 @@ impl<T: Transport> LightCrafter<T> {
         Err(Error::Rejected { place: self.place(), faults })
     }
 
-    /// Start the loaded sequence, or go on after a pause. The firmware loses its tables when stopped, and ignores the
-    /// first start after video mode: both are made good here.
+    /// Start the loaded sequence or resume it after a pause. The firmware loses its tables at a stop and ignores the
+    /// first start after video mode; this method sends the tables again and repeats the start.
     pub fn start(&mut self) -> Result<()> {
         if self.read::<RunState>()? == RunState::Stop {
             let Some(sequence) = self.loaded.clone() else {
-                let expected = "a sequence from load(), or one that pauses";
+                let expected = "a sequence from load(), or a paused one";
                 return Err(Error::value(
                     format!("start of {}", self.place()),
                     expected,
@@ -197,7 +197,7 @@ impl<T: Transport> LightCrafter<T> {
         self.begin()
     }
 
-    /// Run, and see that patterns are shown: the board goes to video by itself when HDMI data appear.
+    /// Run, and check that the board is still in pattern mode, which it leaves when an HDMI signal appears.
     fn begin(&mut self) -> Result<()> {
         self.run(RunState::Start)?;
         match self.read::<DisplayMode>()? {
@@ -209,29 +209,29 @@ impl<T: Transport> LightCrafter<T> {
         }
     }
 
-    /// Load and start.
+    /// Load a sequence and start it.
     pub fn play(&mut self, sequence: &Sequence) -> Result<Validation> {
         let verdict = self.load(sequence)?;
         self.begin()?;
         Ok(verdict)
     }
 
-    /// Hold the current pattern.
+    /// Pause at the current pattern.
     pub fn pause(&mut self) -> Result<()> {
         self.run(RunState::Pause)
     }
 
-    /// Stop the patterns, and wait until nothing runs.
+    /// Stop the patterns and wait until the sequencer has stopped.
     pub fn stop(&mut self) -> Result<()> {
         self.run(RunState::Stop)?;
         if let Some(Sequence { source: Source::Video { frame_rate_hz }, .. }) = &self.loaded {
-            // Two frames, as the input is buffered twice.
+            // Wait two frames, because the input is double-buffered.
             sleep(Duration::from_secs_f64(2.0 / frame_rate_hz));
         }
         Ok(())
     }
 
-    /// Change exposure and period of the loaded sequence; it is started again when it ran.
+    /// Change exposure and period of the loaded sequence; a running sequence is restarted.
     pub fn set_timing(&mut self, timing: Timing) -> Result<Validation> {
         let Some(mut sequence) = self.loaded.clone() else {
             let name = format!("timing of {}", self.place());
@@ -242,7 +242,7 @@ impl<T: Transport> LightCrafter<T> {
         if running { self.play(&sequence) } else { self.load(&sequence) }
     }
 
-    /// Ask for a run state until it is reached, and ask again every time.
+    /// Write a run state repeatedly until the projector reports it.
     fn run(&mut self, state: RunState) -> Result<()> {
         let deadline = Instant::now() + self.waits.change;
         loop {

@@ -1,11 +1,11 @@
-//! The rules that a sequence must keep, as far as they can be known without the projector.
+//! Rules of a sequence that can be checked without the projector.
 
 use super::{Exposures, MAX_EXPOSURE_US, MIN_GAP_US, Sequence, Source, check_frame_rate, depth_limits};
 use crate::command::{EntryTrigger, Timing, TriggerMode};
 use crate::error::{Error, Result};
 
 impl Sequence {
-    /// Check every rule that can be known without the projector; the error names the rule, the pattern and the limit.
+    /// Check every rule that does not need the projector. The error names the rule, the pattern and the limit.
     pub fn check(&self) -> Result<()> {
         self.check_sizes()?;
         self.check_trigger_mode()?;
@@ -62,8 +62,8 @@ impl Sequence {
             }
         }
         if self.patterns[0].trigger == EntryTrigger::Continue || self.patterns[0].shares_exposure {
-            let expected = "a trigger of its own";
-            return Err(Error::value("pattern 0", expected, "a continuation of the pattern before"));
+            let expected = "a trigger that starts it";
+            return Err(Error::value("pattern 0", expected, "a continuation of the previous pattern"));
         }
         Ok(())
     }
@@ -79,7 +79,7 @@ impl Sequence {
         Ok(())
     }
 
-    /// Patterns that share an exposure divide it among themselves.
+    /// Check patterns that share an exposure: each gets an equal part of it.
     fn check_exposure(&self, start: usize, group: usize) -> Result<()> {
         let mut least = 0;
         for pattern in &self.patterns[start..start + group] {
@@ -128,11 +128,12 @@ impl Sequence {
         let most = if self.variable() { 256 } else { 64 };
         let needed = 1 + self.patterns[1..].iter().filter(|pattern| pattern.next_image).count();
         if images.len() != needed || needed > most {
-            let expected =
-                format!("{needed}: one, and one for each pattern that takes the next (at most {most})");
+            let expected = format!(
+                "{needed}: one for the first pattern and one for each pattern with next_image (at most {most})"
+            );
             return Err(Error::value("flash images of the sequence", expected, images.len()));
         }
-        // Two buffers hold two images; with more, each must be shown for longer than the next takes to load.
+        // Two images fit into the two buffers. With more, each must be shown longer than the next one takes to load.
         if needed <= 2 {
             return Ok(());
         }
@@ -151,7 +152,7 @@ impl Sequence {
         if shown_us > u64::from(load_us) {
             return Ok(());
         }
-        let expected = format!("more than {load_us}, in which the next flash image is loaded");
+        let expected = format!("more than {load_us}, the time to load the next flash image");
         Err(Error::value(
             format!("time of the image that ends before pattern {end}, in us"),
             expected,

@@ -82,7 +82,7 @@ fn first_pattern_numbers_and_leds() {
     refused(&sequence, &["LED selection of pattern 1"]);
     sequence.patterns[1].leds = 1;
     sequence.patterns[0].trigger = EntryTrigger::Continue;
-    refused(&sequence, &["a trigger of its own"]);
+    refused(&sequence, &["a trigger that starts it"]);
     sequence.patterns.clear();
     refused(&sequence, &["1 to 128", "got 0"]);
     sequence.patterns = vec![channel(Colour::Green, 8, RED); 129];

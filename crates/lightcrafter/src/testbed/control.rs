@@ -1,4 +1,4 @@
-//! The other side of a test: faults and cables, by lines of text over a socket.
+//! Control of the testbed by lines of text over a socket: faults, unplugging, permissions.
 
 use super::CONTROL;
 use super::node::Node;
@@ -11,7 +11,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::thread;
 
-/// Serve lines "PORT VERB [ARGUMENT] [COUNT]"; each is answered by "ok [VALUE]" or "error REASON".
+/// Serve lines "PORT VERB [ARGUMENT] [COUNT]" and answer each with "ok [VALUE]" or "error REASON".
 pub fn listen(path: &Path, nodes: Vec<Arc<Node>>) -> io::Result<()> {
     let listener = UnixListener::bind(path)?;
     set_permissions(path, Permissions::from_mode(0o777))?;
@@ -62,14 +62,14 @@ fn obey(nodes: &[Arc<Node>], line: &str) -> Result<String, String> {
     Ok(String::new())
 }
 
-/// Orders to the testbed that this process runs in.
+/// Client for the testbed that this process runs in.
 #[derive(Debug)]
 pub struct Control {
     stream: BufReader<UnixStream>,
 }
 
 impl Control {
-    /// Connect to the testbed named by the environment; an error outside of one.
+    /// Connect to the testbed named by the environment variable [`CONTROL`]. Outside a testbed this is an error.
     pub fn connect() -> io::Result<Self> {
         let path = std::env::var_os(CONTROL).ok_or_else(|| {
             io::Error::new(io::ErrorKind::NotFound, format!("{CONTROL} is not set: no testbed"))
@@ -78,7 +78,7 @@ impl Control {
     }
 
     /// Give an order to the device in a port: `fault NAME COUNT`, `plug`, `unplug`, `video on|off|appears`, `deny`,
-    /// `allow`, `transactions`. Returns the value that the order asks for.
+    /// `allow`, `transactions`. Returns the requested value.
     pub fn order(&mut self, place: &str, order: &str) -> io::Result<String> {
         self.stream.get_mut().write_all(format!("{place} {order}\n").as_bytes())?;
         let mut answer = String::new();

@@ -1,4 +1,4 @@
-//! What the device says of itself: a composite HID of two interfaces, commands on the first.
+//! USB descriptors of the device: a composite HID with two interfaces, commands on the first.
 
 /// Report descriptor: 64 bytes in, 64 bytes out, vendor page 0xFF00.
 pub const REPORT_DESCRIPTOR: [u8; 32] = [
@@ -29,7 +29,7 @@ fn interface(number: u8, endpoint: u8) -> Vec<u8> {
     bytes
 }
 
-/// The answer to a control request; none is a stall.
+/// Reply to a control request; `None` is a stall.
 pub fn control_answer(setup: &[u8; 8]) -> Option<Vec<u8>> {
     let (kind, index) = (setup[3], setup[2]);
     let length = usize::from(u16::from_le_bytes([setup[6], setup[7]]));

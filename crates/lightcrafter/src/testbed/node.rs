@@ -1,4 +1,4 @@
-//! One device in the testbed: its folder in `/sys`, its node in `/dev`, and who holds its interfaces.
+//! One device in the testbed: its folder in `/sys`, its node in `/dev`, and the holders of its interfaces.
 
 use super::descriptors::{DEVICE, configuration};
 use super::usbfs;
@@ -12,12 +12,12 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
 
-/// A file that nobody may open for writing, root neither: what a node without permission looks like.
+/// A file that nobody may open for writing, not even root. It stands in for a node without permission.
 const FORBIDDEN: &str = "/sys/kernel/uevent_seqnum";
 /// umockdev takes a file with the sticky bit for a device node.
 const DEVICE_MODE: u32 = 0o1666;
 
-/// Who has an interface.
+/// Holder of an interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Holder {
     /// Nobody.
@@ -32,7 +32,7 @@ pub enum Holder {
 #[derive(Debug)]
 pub struct Shared {
     pub holders: [Holder; 2],
-    /// Reports on their way to whoever reads next.
+    /// Reports for the next reader.
     pub incoming: VecDeque<Vec<u8>>,
 }
 
@@ -47,7 +47,7 @@ pub struct Node {
 }
 
 impl Node {
-    /// Write the files and answer on the socket until the process ends.
+    /// Write the files and serve the socket until the process ends.
     pub fn start(
         root: &Path,
         bus: u8,
@@ -96,7 +96,7 @@ impl Node {
         self.shared.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Show the device on the bus, or take it off, as the model has it.
+    /// Add the device to the bus or remove it, to match the emulator.
     pub fn reflect(&self) -> io::Result<()> {
         let plugged = self.model().plugged();
         match (plugged, self.link.is_symlink()) {

@@ -1,9 +1,11 @@
-//! usbfs as a process sees it: ioctls on a device node, answered over umockdev's socket.
+//! Replacement for usbfs: ioctls on a device node, answered over umockdev's socket.
 //!
-//! Messages are three words of 64 bits. The program asks {1, request, argument}; we may answer {5, address, length} to
-//! read its memory and {6, address, length} with bytes to write it, and end with {3, result, errno}.
+//! Messages are three words of 64 bits. The program sends {1, request, argument}. This side may reply
+//! {5, address, length} to read its memory and {6, address, length} with bytes to write it; it ends with
+//! {3, result, errno}.
 
 use super::descriptors::control_answer;
+use super::ioctl::*;
 use super::node::{Holder, Node};
 use crate::packet::REPORT_BYTES;
 use std::collections::VecDeque;
@@ -12,54 +14,12 @@ use std::os::unix::net::UnixStream;
 use std::thread::sleep;
 use std::time::Duration;
 
-const IOCTL: u64 = 1;
-const DONE: u64 = 3;
-const READ_MEMORY: u64 = 5;
-const WRITE_MEMORY: u64 = 6;
-
-// Directions as Linux numbers them in ioctls.
-const NONE: u32 = 0;
-const WRITE: u32 = 1;
-const READ: u32 = 2;
-
-/// The number of a usbfs ioctl, as Linux composes it.
-const fn ioctl(direction: u32, number: u32, size: u32) -> u32 {
-    direction << 30 | size << 16 | 0x55 << 8 | number
-}
-
-const SET_INTERFACE: u32 = ioctl(READ, 4, 8);
-const SET_CONFIGURATION: u32 = ioctl(READ, 5, 4);
-const GET_DRIVER: u32 = ioctl(WRITE, 8, 260);
-const SUBMIT_URB: u32 = ioctl(READ, 10, 56);
-const DISCARD_URB: u32 = ioctl(NONE, 11, 0);
-const REAP_URB: u32 = ioctl(WRITE, 12, 8);
-const REAP_URB_NOW: u32 = ioctl(WRITE, 13, 8);
-const CLAIM: u32 = ioctl(READ, 15, 4);
-const RELEASE: u32 = ioctl(READ, 16, 4);
-const DRIVER: u32 = ioctl(WRITE | READ, 18, 16);
-const RESET: u32 = ioctl(NONE, 20, 0);
-const CLEAR_HALT: u32 = ioctl(READ, 21, 4);
-const DISCONNECT: u32 = ioctl(NONE, 22, 0);
-const CONNECT: u32 = ioctl(NONE, 23, 0);
-const CAPABILITIES: u32 = ioctl(READ, 26, 4);
-const DISCONNECT_CLAIM: u32 = ioctl(READ, 27, 264);
-
-const ENOENT: i32 = 2;
-const EAGAIN: i32 = 11;
-const EBUSY: i32 = 16;
-const ENODEV: i32 = 19;
-const EINVAL: i32 = 22;
-const ENOTTY: i32 = 25;
-const EPIPE: i32 = 32;
-const ENODATA: i32 = 61;
-const ESHUTDOWN: i32 = 108;
-
 const URB_BYTES: usize = 56;
 const CONTROL_URB: u8 = 2;
 const COMMAND_OUT: u8 = 0x01;
 const COMMAND_IN: u8 = 0x81;
 const EXCEPT_DRIVER: u32 = 2;
-/// A fake node always polls as ready: a short rest keeps a waiting program from spinning.
+/// A fake node always polls as ready; this pause keeps a waiting program from spinning.
 const REST: Duration = Duration::from_micros(200);
 
 /// A transfer that waits for data.
@@ -70,7 +30,7 @@ struct Pending {
     endpoint: u8,
 }
 
-/// A transfer that is over.
+/// A finished transfer.
 struct Finished {
     urb: u64,
     status: i32,
@@ -89,7 +49,7 @@ struct Connection<'a> {
 /// Result of an ioctl: its value, or an errno.
 type Answer = Result<i64, i32>;
 
-/// Answer until the program closes the file; then its claims are dropped, as usbfs does.
+/// Serve until the program closes the file, then release its interfaces, as usbfs does.
 pub fn serve(node: &Node, number: u64, stream: UnixStream) {
     let mut connection = Connection { node, number, stream, pending: Vec::new(), finished: VecDeque::new() };
     while connection.answer_one().is_ok() {}
@@ -290,7 +250,7 @@ impl Connection<'_> {
         Ok(Ok(0))
     }
 
-    /// Give reports to the transfers that wait for them; after an unplug all of them end.
+    /// Hand reports to waiting transfers. After an unplug all transfers end.
     fn deliver(&mut self) -> io::Result<()> {
         if !self.node.model().plugged() {
             let ended =

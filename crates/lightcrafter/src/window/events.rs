@@ -1,4 +1,4 @@
-//! The thread that owns the event loop: orders come in, windows are painted.
+//! The thread that owns the event loop: it takes orders and paints the windows.
 
 use super::{Output, choose, scaling};
 use crate::error::{Error, Result};
@@ -20,13 +20,13 @@ use winit::platform::wayland::ActiveEventLoopExtWayland;
 use winit::platform::x11::{EventLoopBuilderExtX11, MonitorHandleExtX11, WindowAttributesExtX11};
 use winit::window::{Fullscreen, Window, WindowId};
 
-/// How long an order may take; a compositor that never gives a window its size ends here.
+/// Time limit of an order. A compositor may never give a window its size.
 const PATIENCE: Duration = Duration::from_secs(5);
 const SIZE: PhysicalSize<u32> = PhysicalSize::new(WIDTH_PX as u32, HEIGHT_PX as u32);
 
 type Reply<T> = Sender<Result<T>>;
 
-/// What the thread is asked for.
+/// An order to the thread.
 pub enum Order {
     Outputs(Reply<Vec<Output>>),
     Open { name: Option<String>, reply: Reply<(u64, Output)> },
@@ -56,7 +56,7 @@ fn start() -> std::result::Result<Mutex<EventLoopProxy<Order>>, String> {
             Err(error) => return drop(ready.send(Err(reason(error)))),
         };
         let _ = ready.send(Ok(Mutex::new(event_loop.create_proxy())));
-        // When the display goes away, so does the thread, and `ask` says so.
+        // When the display closes, the thread ends, and `ask` reports it.
         let _ = event_loop.run_app(&mut Panes::default());
     };
     let thread = thread::Builder::new().name("pattern windows".into()).spawn(run);
@@ -65,14 +65,14 @@ fn start() -> std::result::Result<Mutex<EventLoopProxy<Order>>, String> {
     started.recv_timeout(PATIENCE).map_err(silent)?
 }
 
-/// The words of an error of the window system, without the place in its source that winit puts before them.
+/// Error text of the window system without the source location that winit puts before it.
 fn reason(error: impl std::fmt::Display) -> String {
     let text = error.to_string();
     let words = text.strip_prefix("os error at ").and_then(|rest| rest.split_once(": "));
     words.map_or(text.as_str(), |(_, words)| words).trim_end_matches('.').to_owned()
 }
 
-/// A window, what it shows, and who waits for it.
+/// A window, its pixels, and the caller that waits for it.
 struct Pane {
     window: Rc<Window>,
     surface: Surface<OwnedDisplayHandle, Rc<Window>>,
@@ -122,7 +122,7 @@ impl Panes {
             .with_resizable(false)
             .with_inner_size(SIZE)
             .with_position(monitor.position())
-            // X11: no window manager places, scales or covers it.
+            // X11: keep the window manager from moving, scaling or covering it.
             .with_override_redirect(true);
         if wayland {
             attributes = attributes.with_fullscreen(Some(Fullscreen::Borderless(Some(monitor))));
@@ -156,7 +156,7 @@ impl Panes {
 }
 
 impl Pane {
-    /// Paint, and tell who waits. A new window may not have its size yet, and is painted again when it has.
+    /// Paint and answer the waiting caller. A new window without its final size is painted again at the next resize.
     fn paint(&mut self) {
         let size = self.window.inner_size();
         let scaled = self.wayland && self.window.scale_factor() != 1.0;
@@ -183,7 +183,7 @@ impl Pane {
         buffer.copy_from_slice(&self.pixels);
         self.window.pre_present_notify();
         buffer.present().map_err(no_display)?;
-        // Asking for the next buffer waits until the server has taken this one.
+        // Getting the next buffer waits until the server has taken this one.
         self.surface.buffer_mut().map_err(no_display)?;
         Ok(())
     }
@@ -193,7 +193,7 @@ impl ApplicationHandler<Order> for Panes {
     fn resumed(&mut self, _: &ActiveEventLoop) {}
 
     fn user_event(&mut self, events: &ActiveEventLoop, order: Order) {
-        // Who asked may have given up waiting.
+        // The caller may have stopped waiting, so a failed reply is no error.
         match order {
             Order::Outputs(reply) => {
                 let wayland = events.is_wayland();

@@ -1,21 +1,21 @@
-//! Whether the pixels of an X11 output are those of the desktop: its mode, its rotation and its transform.
+//! Checks that an X11 output shows the pixels of the desktop one to one: mode, rotation and transform.
 
 use x11rb::connection::Connection;
 use x11rb::protocol::randr::{ConnectionExt, GetCrtcTransformReply, Rotation};
 
-/// One, in the fixed-point numbers of X11.
+/// The number 1 in the fixed-point format of X11.
 const ONE: i32 = 1 << 16;
 
-/// What the X server says of a CRTC.
+/// State of a CRTC in the X server.
 struct Crtc {
     upright: bool,
     size_px: (u16, u16),
     mode_px: (u16, u16),
-    /// Row by row.
+    /// 3 x 3 matrix, row by row.
     transform: [i32; 9],
 }
 
-/// Why this CRTC does not show the pixels of the desktop one to one; none when it does, or when X11 does not say.
+/// Why this CRTC does not show the pixels of the desktop one to one; `None` if it does or if X11 does not report it.
 pub fn of_crtc(crtc: u32) -> Option<String> {
     let (connection, screen) = x11rb::connect(None).ok()?;
     let root = connection.setup().roots.get(screen)?.root;
