@@ -31,7 +31,7 @@ Contender = Callable[[], Maps]
 def geometry_from(calibration: qf.Calibration) -> numpy_chain.Geometry:
     camera, projector = calibration.camera, calibration.projector
 
-    def matrix(device: qf.DeviceModel) -> NDArray[np.float64]:
+    def matrix(device: qf.Device) -> NDArray[np.float64]:
         (fx, fy), (cx, cy) = device.focal_px, device.centre_px
         return np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])
 
@@ -61,9 +61,9 @@ def product_contender(
         projector_width_px=calibration.projector.width_px,
         fringes=config.fringes,
         calibration=calibration,
-        settings=qf.DecodeConfig(**settings),
+        decode=qf.DecodeConfig(**settings),
     )
-    decoder = qf.ShotDecoder(shot, plan)
+    decoder = qf.Decoder(shot, plan)
 
     def run() -> Maps:
         shape = decoder.decode(shot)

@@ -50,7 +50,7 @@ Figures = dict[str, float]
 
 def peaks_figures(method: str) -> Iterator[tuple[str, Figures]]:
     """Give phase errors of the returned pixels (RMS of right orders and of all, median of all), returned and wrong."""
-    plan = qf.Plan(projector_width_px=WIDTH_PX, settings=qf.DecodeConfig.model_validate({"method": method}))
+    plan = qf.Plan(projector_width_px=WIDTH_PX, decode=qf.DecodeConfig.model_validate({"method": method}))
     for name, take in TEXTURES.items():
         errors = []
         for seed in SEEDS:
@@ -116,7 +116,7 @@ def efficiency_figures(surface: str, method: str) -> Figures:
     bench = _core.Bench()
     column_px = bench.cast(surface).column_px().astype(np.float64)
     phase_rad = 2 * np.pi * FRINGES[0] / bench.visible.width * column_px
-    decoder = qf.Decoder(column_px.shape, FRINGES, bench.visible.width, full_scale=1.0, method=method)
+    decoder = _core.Decoder(column_px.shape, FRINGES, bench.visible.width, full_scale=1.0, method=method)
 
     def estimate(images: Images) -> NDArray[np.float32]:
         return decoder.decode(*images)["phase_rad"]

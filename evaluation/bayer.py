@@ -90,7 +90,7 @@ def shot_figures(surface: str, noise: float) -> Iterator[tuple[str, float]]:
         smooth = scoring.inside(lit & ~shot.truth.edge, FRINGE_PX)
         for method in METHODS:
             settings = qf.DecodeConfig.model_validate({"method": method})
-            shape = qf.decode(shot, qf.Plan(912, calibration=calibration, settings=settings))
+            shape = qf.decode(shot, qf.Plan(912, calibration=calibration, decode=settings))
             error = np.abs(shape.phase_rad - truth)
             right = shape.returned & (error < np.pi)
             name = f"{surface}_noise_{100 * noise:.0f}_percent_{method}_{way}"

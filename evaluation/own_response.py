@@ -43,7 +43,7 @@ def scored(shot: qf.Shot, response: qf.Response | None) -> Found:
     """Decode with `response`, without a verdict, and compare with the truth of the bench."""
     assert shot.truth is not None
     plan = qf.Plan(WIDTH_PX, response=response or qf.Response())
-    phase_rad = qf.ShotDecoder(shot, plan).shape(shot).phase_rad
+    phase_rad = qf.Decoder(shot, plan).shape(shot).phase_rad
     truth_rad = 2 * np.pi * qf.Fringes().numbers[0] * shot.truth.column_px / WIDTH_PX
     lit = np.isfinite(truth_rad) & ~shot.truth.shadow
     error = np.abs(phase_rad - truth_rad)
@@ -67,7 +67,7 @@ def main() -> None:
             config = qf.SceneConfig.model_validate({**scene, "projector_exponent": gamma, "seed": 1})
             with qf.open(qf.SystemConfig(scene=config)) as scanner:
                 shot = scanner.grab()
-            response = qf.own_response(shot, qf.Plan(WIDTH_PX))
+            response = qf.estimate_response(shot, qf.Plan(WIDTH_PX))
             linear, own = scored(shot, None), scored(shot, response)
             settled = gamma * (1.0 if response is None else response.red.exponent)
             pairs = "".join(f"{a:10.4f}{b:8.4f}" for a, b in zip(linear, own, strict=True))

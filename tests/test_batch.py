@@ -20,7 +20,7 @@ from quadfringe.errors import InputError
 from quadfringe.recording import Recorder, Recording
 from quadfringe.recording.batch import decode_recordings, executor_for, prepare, run
 
-CAMERA = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
+CAMERA = qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 SYSTEM = qf.SystemConfig(
     camera=CAMERA, scene=qf.SceneConfig(surface="steps", noise=0.01), decode=qf.DecodeConfig(method="published")
 )

@@ -14,7 +14,7 @@ from typer.testing import CliRunner, Result
 import quadfringe as qf
 from quadfringe import _core
 from quadfringe.cli import app
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 from quadfringe.decoding import stages
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.io.images import write_image
@@ -22,7 +22,7 @@ from quadfringe.io.images import write_image
 PATTERNS = ("rggb", "grbg", "gbrg", "bggr")
 METHODS = ("best", "published")
 CODE = ((36.0, 35.0, 30.0), 912)
-CAMERA = DeviceModel(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
+CAMERA = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
 FRINGES = ["--fringes", "36", "35", "30", "--projector-width", "912"]
 Image = np.ndarray[Any, Any]
 
@@ -48,7 +48,7 @@ def mosaic(planes: list[Image], pattern: str) -> Image:
 
 
 def plan(method: str) -> qf.Plan:
-    return qf.Plan(912, settings=qf.DecodeConfig.model_validate({"method": method}))
+    return qf.Plan(912, decode=qf.DecodeConfig.model_validate({"method": method}))
 
 
 def run(*arguments: object) -> Result:

@@ -92,7 +92,7 @@ def test_any_number_of_threads_gives_the_same_bits(small_bench: Any, method: str
     shapes = []
     for threads in (1, 2, 3):
         settings = DecodeConfig.model_validate({"method": method, "threads": threads})
-        shapes.append(qf.decode(shot, qf.Plan(912, calibration=calibration, settings=settings)))
+        shapes.append(qf.decode(shot, qf.Plan(912, calibration=calibration, decode=settings)))
     for other in shapes[1:]:
         for name, values in shapes[0].maps.items():
             np.testing.assert_array_equal(values, other.maps[name], err_msg=name)

@@ -11,13 +11,13 @@ from quadfringe import _core
 from quadfringe.calibration.channels import Channels, fit_channels
 from quadfringe.calibration.flat import flat_field
 from quadfringe.calibration.levels import CHANNELS, LevelPlan, dark_level, level_plan, mean_levels
-from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config import Device, SceneConfig, SystemConfig
 from quadfringe.data import Calibration, Shot
 from quadfringe.decoding.stages import linear_light
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.errors import InputError
 
-CAMERA = DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
+CAMERA = Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 MIXED = tuple(tuple(1.0 if i == j else 0.15 for j in range(4)) for i in range(4))
 BAR_PERCENT = 0.5  # of full scale
 BENCHES = {

@@ -9,7 +9,7 @@ import pytest
 from pydantic import ValidationError
 
 from quadfringe.config import (
-    DeviceModel,
+    Device,
     Response,
     SystemConfig,
     checked,
@@ -79,7 +79,7 @@ def test_settings_are_frozen() -> None:
 
 def test_a_missing_key_is_named() -> None:
     with pytest.raises(ConfigError, match="focal_px: this key is required and missing"):
-        checked(DeviceModel, {"width_px": 8, "height_px": 8, "centre_px": (1, 1)}, "x")
+        checked(Device, {"width_px": 8, "height_px": 8, "centre_px": (1, 1)}, "x")
 
 
 def test_one_number_stands_for_all_channels(tmp_path: Path) -> None:

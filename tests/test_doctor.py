@@ -12,13 +12,13 @@ from typer.testing import CliRunner
 
 import quadfringe as qf
 from quadfringe.cli import app
-from quadfringe.config import IDENTITY, DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config import IDENTITY, Device, SceneConfig, SystemConfig
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
 from quadfringe.data.shot_files import write_shot
 from quadfringe.doctor import Finding, examine_calibration, examine_installation, examine_shot
 from quadfringe.doctor import installation as installed
 
-SMALL = DeviceModel(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
+SMALL = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
 PLAN = qf.Plan(912)
 
 

@@ -15,7 +15,7 @@ from quadfringe.calibration.session.acquisition import exposed
 from quadfringe.calibration.session.pictures import write_pictures
 from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.cli import app
-from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config import Device, SceneConfig, SystemConfig
 from quadfringe.config.cameras import AravisConfig, ReplayConfig
 from quadfringe.data import Calibration
 from quadfringe.devices import Camera, ExternalLight
@@ -25,7 +25,7 @@ from quadfringe.doctor import examine_calibration
 from quadfringe.errors import CalibrationError, ConfigError, InputError
 from quadfringe.io.images import write_image
 
-CAMERA = DeviceModel(
+CAMERA = Device(
     width_px=512,
     height_px=384,
     focal_px=(1290.0, 1291.0),

@@ -22,11 +22,11 @@ from quadfringe.calibration.surfaces import (
     measure_steps,
 )
 from quadfringe.cli import app
-from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config import Device, SceneConfig, SystemConfig
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.errors import InputError
 
-SMALL = DeviceModel(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
+SMALL = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
 HEIGHTS_MM = (-45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0)
 
 
@@ -39,7 +39,7 @@ def planes() -> list[qf.Shape]:
     for i, height in enumerate((*HEIGHTS_MM, 22.0)):
         bench.place_plane((0.0, 0.0, 800.0 - height), (0.0, 0.0, -1.0))
         shots.append(bench.expose(seed=i))
-    decoder = qf.ShotDecoder(shots[0], qf.Plan(912, calibration=bench.calibration()))
+    decoder = qf.Decoder(shots[0], qf.Plan(912, calibration=bench.calibration()))
     return [decoder.decode(shot) for shot in shots]
 
 

@@ -15,7 +15,7 @@ from quadfringe.recording import Recording
 from quadfringe.view.colours import texture
 from quadfringe.view.movie import movie, solid_picture
 
-SMALL = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
+SMALL = qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 
 
 def frames_of(path: Path) -> list[np.ndarray]:

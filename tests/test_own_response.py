@@ -50,9 +50,9 @@ def test_the_response_of_a_shot_is_undone_and_told(bent: qf.Shot) -> None:
 
 
 def test_many_shots_take_it_from_one(bent: qf.Shot) -> None:
-    response = qf.own_response(bent, PLAN)
+    response = qf.estimate_response(bent, PLAN)
     other = taken(surface="steps", projector_exponent=1.8)
-    shape = qf.ShotDecoder(other, replace(PLAN, response=response)).decode(other)
+    shape = qf.Decoder(other, replace(PLAN, response=response)).decode(other)
     assert phase_rms_rad(shape, other) < 0.15 * phase_rms_rad(qf.decode(other, LINEAR), other)
 
 
@@ -67,10 +67,10 @@ def test_a_part_of_the_image_will_do(bent: qf.Shot) -> None:
     middle = np.s_[256:512, 384:640]
     printed = taken(surface="plane", patch_mm=10.0, noise=0.03)
     parts = [qf.Shot(*(image[middle].copy() for image in shot.channels.values())) for shot in (bent, printed)]
-    found = qf.own_response(parts[0], PLAN)
+    found = qf.estimate_response(parts[0], PLAN)
     assert found is not None
     assert found.red.exponent == pytest.approx(1 / 1.8, rel=0.1)
-    assert qf.own_response(parts[1], PLAN) is None
+    assert qf.estimate_response(parts[1], PLAN) is None
 
 
 @pytest.mark.parametrize("scene", [{"surface": "face"}, {"surface": "plane", "patch_mm": 10.0, "noise": 0.03}])
@@ -90,7 +90,7 @@ def test_what_is_known_is_not_asked_of_the_shot(bent: qf.Shot) -> None:
     for plan in (LINEAR, replace(PLAN, calibration=known)):
         assert "response_of_shot" not in qf.decode(bent, plan).config
         with pytest.raises(qf.InputError, match="knows the response already"):
-            qf.own_response(bent, plan)
+            qf.estimate_response(bent, plan)
     shape = qf.decode(bent, replace(PLAN, calibration=silent))
     assert shape.config["response_of_shot"] is True
     assert shape.xyz_mm is not None

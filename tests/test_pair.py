@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 import quadfringe as qf
 from quadfringe.calibration.projector_pair import AXES, deviated, pair_pose
 from quadfringe.cli import app
-from quadfringe.config import DecodeConfig, DeviceModel
-from quadfringe.data import Calibration, device_model
-from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.config import DecodeConfig, Device
+from quadfringe.data import Calibration, device_from_core
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.evaluation.reproduce import pair_calibration, pair_correction, pair_depth, pair_deviation
 from quadfringe.evaluation.reproduce._deviated_pair import ideal_pair, real_pair
@@ -223,10 +223,10 @@ def test_the_search_needs_both_projectors_and_says_so() -> None:
     searched = DecodeConfig(method="published", unwrapping="pair")
     for known in (None, single):
         with pytest.raises(InputError, match="both projectors"):
-            ShotDecoder(shot, Plan(912, calibration=known, settings=searched))
+            Decoder(shot, Plan(912, calibration=known, decode=searched))
     best = DecodeConfig(method="best", unwrapping="pair")
     with pytest.raises(ValueError, match="method: expected published"):
-        ShotDecoder(shot, Plan(912, calibration=pair.calibration, settings=best))
+        Decoder(shot, Plan(912, calibration=pair.calibration, decode=best))
     with pytest.raises(ValueError, match="depth_range_mm"):
         DecodeConfig(depth_range_mm=(600.0, 900.0))
 
@@ -243,8 +243,8 @@ def test_calibrations_keep_the_infrared_projector(tmp_path: Path) -> None:
 
 
 def test_deviating_back_gives_the_device() -> None:
-    device: DeviceModel = real_pair().visible
+    device: Device = real_pair().visible
     moved = deviated(device, (0, 0, 2.0), (0, 0, 3.0))
     back = deviated(moved, (0, 0, -2.0), (0, 0, -3.0))
     np.testing.assert_allclose(back.translation_mm, device.translation_mm, atol=1e-9)
-    assert device_model(real_pair().bench.visible) == device
+    assert device_from_core(real_pair().bench.visible) == device

@@ -11,13 +11,13 @@ import tifffile
 import trimesh
 
 import quadfringe as qf
-from quadfringe.config import ChannelResponse, DeviceModel, Response
+from quadfringe.config import ChannelResponse, Device, Response
 from quadfringe.data import Calibration, ResponseCalibration, Shape
 from quadfringe.errors import ConfigError, InputError
 
 CALIBRATION = Calibration(
-    camera=DeviceModel(width_px=8, height_px=6, focal_px=(20.0, 20.0), centre_px=(3.5, 2.5)),
-    projector=DeviceModel(
+    camera=Device(width_px=8, height_px=6, focal_px=(20.0, 20.0), centre_px=(3.5, 2.5)),
+    projector=Device(
         width_px=912,
         height_px=1140,
         focal_px=(1572.7, 1572.7),

@@ -9,7 +9,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import quadfringe as qf
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 from quadfringe.data import core_device
 from quadfringe.decoding.compare import compare
 
@@ -22,14 +22,14 @@ codes = st.sampled_from([(36.0, 35.0, 30.0), (25.0, 24.0, 20.0), (28.25, 27.3, 2
 
 
 @st.composite
-def projectors(draw: st.DrawFn) -> DeviceModel:
+def projectors(draw: st.DrawFn) -> Device:
     """Draw a projector 10 to 22 degrees beside the camera that lights the whole field through some lens."""
     angle = math.radians(draw(st.floats(10, 22))) * draw(st.sampled_from([1, -1]))
     distance_mm = draw(st.floats(600, 1500))
     columns = draw(st.sampled_from([912, 1280, 1920]))
     sine, cosine = math.sin(angle), math.cos(angle)
     focal = columns / (1.3 * FIELD_MM) * distance_mm
-    return DeviceModel(
+    return Device(
         width_px=columns,
         height_px=columns,
         focal_px=(focal, focal),
@@ -40,7 +40,7 @@ def projectors(draw: st.DrawFn) -> DeviceModel:
     )
 
 
-CAMERA = DeviceModel(
+CAMERA = Device(
     width_px=WIDTH,
     height_px=HEIGHT,
     focal_px=(WIDTH / FIELD_MM * DEPTH_MM,) * 2,
@@ -51,7 +51,7 @@ CAMERA = DeviceModel(
 @settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
 @given(surface=surfaces, numbers=codes, projector=projectors(), noise=st.sampled_from([0.0, 0.01]))
 def test_simulated_shapes_come_back(
-    surface: str, numbers: tuple[float, float, float], projector: DeviceModel, noise: float
+    surface: str, numbers: tuple[float, float, float], projector: Device, noise: float
 ) -> None:
     config = qf.SystemConfig(
         camera=CAMERA,
@@ -74,7 +74,7 @@ def test_simulated_shapes_come_back(
 
 @settings(max_examples=10, deadline=None, derandomize=True)
 @given(projector=projectors())
-def test_points_lie_where_the_camera_sees_them(projector: DeviceModel) -> None:
+def test_points_lie_where_the_camera_sees_them(projector: Device) -> None:
     """X, Y, Z of each pixel project back onto it, and onto the decoded column of the projector."""
     config = qf.SystemConfig(camera=CAMERA, projector=projector, scene=qf.SceneConfig(surface="plane"))
     with qf.open(config) as scanner:

@@ -27,7 +27,7 @@ from quadfringe.calibration.targets import (
     ring_board,
 )
 from quadfringe.cli import app
-from quadfringe.config import DeviceModel, SceneConfig, SystemConfig
+from quadfringe.config import Device, SceneConfig, SystemConfig
 from quadfringe.data import core_device
 from quadfringe.errors import ConfigError, InputError
 
@@ -38,7 +38,7 @@ BOARDS = {
     "charuco": charuco_board(),
 }
 LENS = (-0.1, 0.08, 3e-4, -2e-4, 0.0)
-CAMERA = DeviceModel(width_px=1024, height_px=768, focal_px=(2580.0, 2585.0), centre_px=(505.0, 390.0), distortion=LENS)
+CAMERA = Device(width_px=1024, height_px=768, focal_px=(2580.0, 2585.0), centre_px=(505.0, 390.0), distortion=LENS)
 SHAKEN = {"noise": 0.01, "blur_px": 0.8, "shading": True, "projector_exponent": (2.2, 2.2, 2.2, 2.2), "seed": 3}
 TILTS = {
     "straight": (0.0, 0.0, 0.05),

@@ -23,7 +23,7 @@ def sound(small_bench: Any) -> qf.Shot:
 
 
 def plan(method: str) -> qf.Plan:
-    return qf.Plan(912, settings=qf.DecodeConfig.model_validate({"method": method}))
+    return qf.Plan(912, decode=qf.DecodeConfig.model_validate({"method": method}))
 
 
 def changed(shot: qf.Shot, change: Callable[[Images], Images]) -> qf.Shot:
@@ -90,7 +90,7 @@ def test_other_fringe_numbers_are_suspected(sound: qf.Shot) -> None:
 
 @pytest.mark.parametrize("method", METHODS)
 def test_later_shots_of_a_decoder_are_judged_too(sound: qf.Shot, method: str) -> None:
-    decoder = qf.ShotDecoder(sound, plan(method))
+    decoder = qf.Decoder(sound, plan(method))
     decoder.decode(sound)
     swapped = changed(sound, lambda i: {**i, "green": i["ir"], "ir": i["green"]})
     with pytest.raises(DecodeError, match="may be swapped"):

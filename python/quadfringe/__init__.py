@@ -1,10 +1,15 @@
 """quadfringe: one exposure in, one metric 3D shape out.
 
-Three doors of rising power: one call (`open`), the stages (`decode`, `render`, `pattern`, `stages`), the
-parts (`Decoder`, `Device`). Names are loaded when first used, so that importing the package costs nothing.
+Three levels of detail: one call (`open` gives a `Scanner`), the steps (`read_shot`, `decode`, `Shape.save`; many shots
+with a `Decoder`), and the stages of the published method one by one (`stages`).
 
-Conventions: arrays are (H, W), x right, y down, z forward, pixel centres at integers; phase in rad, lengths
-in mm; NaN is "no data".
+Conventions: arrays are (H, W), x to the right, y down, z forward, pixel centres at integers; phase in rad, lengths in
+mm; NaN means no data. A property holds data or follows from it without arguments, and cannot fail. A method reads,
+writes, takes arguments, can fail, or computes for long.
+
+Names are loaded when they are first used, so that the import is fast. `quadfringe.open` is `open_system`; a star
+import leaves it out, because it would replace the built-in function, and the packages (`devices`, `recording`, ...)
+because `io` would replace that of Python.
 """
 
 from __future__ import annotations
@@ -13,8 +18,22 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from quadfringe._core import Decoder, Device, __version__, check_code, optimum, pattern
-    from quadfringe.config import DecodeConfig, DeviceModel, Fringes, Response, SceneConfig, SystemConfig
+    from quadfringe import (  # noqa: F401 - used as quadfringe.devices and so on
+        calibration,
+        config,
+        data,
+        decoding,
+        devices,
+        doctor,
+        errors,
+        evaluation,
+        io,
+        recording,
+        scanner,
+        view,
+    )
+    from quadfringe._core import __version__, check_code, optimum, pattern
+    from quadfringe.config import DecodeConfig, Device, Fringes, Response, SceneConfig, SystemConfig
     from quadfringe.data import (
         BayerShot,
         Calibration,
@@ -26,68 +45,117 @@ if TYPE_CHECKING:
         read_bayer_shot,
         read_shot,
     )
-    from quadfringe.decoding import Plan, ShotDecoder, decode, own_response
+    from quadfringe.decoding import Decoder, Plan, decode, estimate_response, stages
     from quadfringe.devices import open_camera, open_projector
-    from quadfringe.errors import CameraError, ConfigError, DecodeError, InputError, MissingExtraError
-    from quadfringe.scanner import Scanner
-    from quadfringe.scanner import open_system as open  # noqa: A004 - read as quadfringe.open
-
-_HOME = {
-    "_core": ("Decoder", "Device", "__version__", "check_code", "optimum", "pattern"),
-    "config": ("DecodeConfig", "DeviceModel", "Fringes", "Response", "SceneConfig", "SystemConfig"),
-    "data": ("BayerShot", "Calibration", "ResponseCalibration", "Shape", "Shot", "Stamp", "Truth"),
-    "decoding": ("Plan", "ShotDecoder", "decode", "own_response"),
-    "devices": ("open_camera", "open_projector"),
-    "errors": ("CameraError", "ConfigError", "DecodeError", "InputError", "MissingExtraError"),
-    "scanner": ("Scanner", "open_system"),
-    "data.shot_files": ("read_bayer_shot", "read_shot"),
-}
-_MODULE_OF = {name: module for module, names in _HOME.items() for name in names}
+    from quadfringe.errors import (
+        BatchError,
+        CalibrationError,
+        CameraBusyError,
+        CameraError,
+        CameraLostError,
+        CameraNotFoundError,
+        ConfigError,
+        DecodeError,
+        InputError,
+        MissingExtraError,
+        RecordingError,
+        ShotTimeoutError,
+        UnpairedError,
+        WrongFrameError,
+    )
+    from quadfringe.scanner import Scanner, open_system
+    from quadfringe.scanner import open_system as open  # noqa: A004, F401 - used as quadfringe.open
 
 __all__ = [
+    "BatchError",
     "BayerShot",
     "Calibration",
+    "CalibrationError",
+    "CameraBusyError",
     "CameraError",
+    "CameraLostError",
+    "CameraNotFoundError",
     "ConfigError",
     "DecodeConfig",
     "DecodeError",
     "Decoder",
     "Device",
-    "DeviceModel",
     "Fringes",
     "InputError",
     "MissingExtraError",
     "Plan",
+    "RecordingError",
     "Response",
     "ResponseCalibration",
     "Scanner",
     "SceneConfig",
     "Shape",
     "Shot",
-    "ShotDecoder",
+    "ShotTimeoutError",
     "Stamp",
     "SystemConfig",
     "Truth",
+    "UnpairedError",
+    "WrongFrameError",
     "__version__",
     "check_code",
     "decode",
-    "open",
+    "estimate_response",
     "open_camera",
     "open_projector",
+    "open_system",
     "optimum",
-    "own_response",
     "pattern",
     "read_bayer_shot",
     "read_shot",
+    "stages",
 ]
+
+_NAMES_IN = {
+    "_core": ("__version__", "check_code", "optimum", "pattern"),
+    "config": ("DecodeConfig", "Device", "Fringes", "Response", "SceneConfig", "SystemConfig"),
+    "data": (
+        "BayerShot",
+        "Calibration",
+        "ResponseCalibration",
+        "Shape",
+        "Shot",
+        "Stamp",
+        "Truth",
+        "read_bayer_shot",
+        "read_shot",
+    ),
+    "decoding": ("Decoder", "Plan", "decode", "estimate_response"),
+    "devices": ("open_camera", "open_projector"),
+    "scanner": ("Scanner", "open_system"),
+}
+_MODULE_OF = {name: module for module, names in _NAMES_IN.items() for name in names}
+_MODULE_OF |= {name: "errors" for name in __all__ if name.endswith("Error")}
+_PACKAGES = (
+    "calibration",
+    "config",
+    "data",
+    "decoding",
+    "devices",
+    "doctor",
+    "errors",
+    "evaluation",
+    "io",
+    "recording",
+    "scanner",
+    "view",
+)
+_MODULES = {name: f"quadfringe.{name}" for name in _PACKAGES} | {"stages": "quadfringe.decoding.stages"}
 
 
 def __getattr__(name: str) -> Any:
-    asked = "open_system" if name == "open" else name
-    if asked not in _MODULE_OF:
+    if name in _MODULES:
+        return import_module(_MODULES[name])
+    sought = "open_system" if name == "open" else name
+    if sought not in _MODULE_OF:
         raise AttributeError(f"module 'quadfringe' has no attribute {name!r}")
-    return getattr(import_module(f"quadfringe.{_MODULE_OF[asked]}"), asked)
+    return getattr(import_module(f"quadfringe.{_MODULE_OF[sought]}"), sought)
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return [*__all__, *_PACKAGES, "open"]

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
-from quadfringe.config import DeviceModel, SystemConfig
+from quadfringe.config import Device, SystemConfig
 from quadfringe.config.cameras import ReplayConfig, VirtualConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
@@ -17,7 +17,7 @@ from quadfringe.devices.emulator import Emulator
 from quadfringe.evaluation._fake_twin import fake_twin
 from quadfringe.recording import Recorder
 
-SMALL = DeviceModel(width_px=128, height_px=96, focal_px=(322.5, 322.5), centre_px=(63.5, 47.5))
+SMALL = Device(width_px=128, height_px=96, focal_px=(322.5, 322.5), centre_px=(63.5, 47.5))
 
 
 @contextmanager

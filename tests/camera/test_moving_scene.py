@@ -8,7 +8,7 @@ import quadfringe as qf
 from quadfringe.evaluation import moving_scene
 from quadfringe.recording import Recording
 
-SMALL = qf.DeviceModel(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
+SMALL = qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 
 
 def test_the_hand_is_filmed_over_the_wire(tmp_path: Path) -> None:

@@ -21,7 +21,7 @@ from quadfringe.calibration.surfaces import (
 )
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot, Calibration, Shape
-from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.view.report import Panel, draw_panels
 
@@ -183,8 +183,8 @@ def measure_artefacts(config: SystemConfig, calibration: Calibration | None = No
     for surface in ("sphere", "steps"):
         bench.place_scene(surface)
         shots.append(bench.expose(seed=_seed(config, len(shots))))
-    plan = Plan(known.projector.width_px, config.fringes, known, settings=config.decode)
-    decoder = ShotDecoder(shots[0], plan)
+    plan = Plan(known.projector.width_px, config.fringes, known, decode=config.decode)
+    decoder = Decoder(shots[0], plan)
     points = [decoder.decode(shot).points_mm for shot in shots]
     return Artefacts(tuple(points[:2]), (points[2],), SPHERE_DIAMETER_MM, (points[3],), STEP_HEIGHTS_MM)
 

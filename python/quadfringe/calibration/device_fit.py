@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from quadfringe.calibration._adjustment import Adjustment
 from quadfringe.calibration.projector_pair import PairPose, pair_pose
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 
 __all__ = ["DeviceFit", "DeviceSd", "device_fit", "pair_fit"]
 
@@ -36,7 +36,7 @@ class DeviceFit:
     of their lengths; the mean is the reprojection error as published.
     """
 
-    device: DeviceModel
+    device: Device
     sd: DeviceSd
     residuals_px: tuple[Array, ...]
     mean_px: float
@@ -58,7 +58,7 @@ def device_fit(
     if name != "camera":
         motion, motion_sd = (adjustment.part(v, name, "motion") for v in (values, sd))
     fx, fy, cx, cy, *distortion = lens.tolist()
-    device = DeviceModel(
+    device = Device(
         width_px=size_px[0],
         height_px=size_px[1],
         focal_px=(fx, fy),

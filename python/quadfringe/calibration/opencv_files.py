@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 from quadfringe.data import Calibration
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
@@ -41,7 +41,7 @@ def write_opencv(path: Path, calibration: Calibration) -> None:
             storage.release()
 
 
-def _matrices(name: str, device: DeviceModel) -> dict[str, NDArray[np.float64]]:
+def _matrices(name: str, device: Device) -> dict[str, NDArray[np.float64]]:
     (fx, fy), (cx, cy) = device.focal_px, device.centre_px
     found = {
         f"{name}_matrix": np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float),
@@ -81,7 +81,7 @@ def devices_from_opencv(matrices: dict[str, NDArray[np.float64]], source: str = 
     return Calibration(**devices)
 
 
-def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) -> DeviceModel:
+def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) -> Device:
     matrix = _matrix(f"{name}_matrix", (3, 3), matrices, source)
     skewed = max(abs(matrix[0, 1]), np.abs(matrix[2] - (0, 0, 1)).max(), abs(matrix[1, 0])) > SKEW_MAX
     if skewed:
@@ -100,7 +100,7 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
             raise ConfigError(f"{source}: R_{name}_camera: expected a rotation matrix, got {rotation.tolist()}")
         translation = _matrix(f"T_{name}_camera", (3, 1), matrices, source)[:, 0]
         pose = {"rotation": rotation.tolist(), "translation_mm": translation.tolist()}
-    return DeviceModel.model_validate(
+    return Device.model_validate(
         {
             "width_px": round(size[0]),
             "height_px": round(size[1]),

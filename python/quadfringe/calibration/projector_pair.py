@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 from quadfringe.errors import InputError
 
 __all__ = ["AXES", "PairPose", "deviated", "pair_pose"]
@@ -97,7 +97,7 @@ def pair_pose(
     return PairPose(values[:3], values[3:], spread)
 
 
-def deviated(device: DeviceModel, rotation_deg: ArrayLike, translation_mm: ArrayLike) -> DeviceModel:
+def deviated(device: Device, rotation_deg: ArrayLike, translation_mm: ArrayLike) -> Device:
     """Give the same device turned by a rotation vector (deg) and moved (mm) in its own frame.
 
     `pair_pose` finds both back.
@@ -106,7 +106,7 @@ def deviated(device: DeviceModel, rotation_deg: ArrayLike, translation_mm: Array
     turn = cv2.Rodrigues(np.radians(_array("rotation_deg", rotation_deg, (3,))))[0]
     moved = turn @ np.asarray(device.translation_mm) + _array("translation_mm", translation_mm, (3,))
     pose = {"rotation": (turn @ np.asarray(device.rotation)).tolist(), "translation_mm": moved.tolist()}
-    return DeviceModel.model_validate(device.model_dump() | pose)
+    return Device.model_validate(device.model_dump() | pose)
 
 
 def _relative(posed: Vector) -> Vector:

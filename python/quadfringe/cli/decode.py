@@ -97,7 +97,7 @@ def decode(
         fringes=Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
         calibration=None if calibration is None else Calibration.load(calibration),
         response=_response(response, linear),
-        settings=checked(DecodeConfig, settings, "options"),
+        decode=checked(DecodeConfig, settings, "options"),
     )
     bits_in_use = None if bits is None else int(bits)
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}

@@ -56,7 +56,7 @@ def live(
         scanner = stack.enter_context(open_system(system))
         recorder = None
         if record is not None:
-            recorder = stack.enter_context(Recorder(record, scanner.config, scanner.known_calibration, file_gb=file_gb))
+            recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))
         viewer = stack.enter_context(
             Viewer(host, port, stride=view_stride, clouds_per_s=clouds_per_s, colouring=colour.value)
         )
@@ -72,7 +72,7 @@ def live(
 
 
 def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: int | None) -> None:
-    columns = scanner.known_calibration.projector.width_px if scanner.known_calibration else 912
+    columns = scanner.projector_width_px
     taps = {} if recorder is None else {"record": recorder.write}
     with scanner.stream(shots, taps=taps, resume=True) as stream:
         viewer.follow(stream, recorder.statistics if recorder else None, columns)

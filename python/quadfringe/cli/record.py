@@ -42,7 +42,7 @@ def record(
 
     with (
         open_system(system) as scanner,
-        Recorder(out, scanner.config, scanner.known_calibration, file_gb=file_gb) as recorder,
+        Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
         stop_asked() as asked,
         steps(_shots(scanner, shots, seconds, asked), "recording", shots) as taken,
     ):

@@ -25,7 +25,7 @@ __all__ = [
     "BayerPattern",
     "ChannelResponse",
     "DecodeConfig",
-    "DeviceModel",
+    "Device",
     "FlashRoute",
     "Fringes",
     "HdmiRoute",
@@ -51,7 +51,7 @@ BayerPattern = Literal["rggb", "grbg", "gbrg", "bggr"]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-class DeviceModel(Model):
+class Device(Model):
     """A pinhole device, camera or projector: P_device = rotation P_camera + translation_mm, then the lens (S8).
 
     Distortion is OpenCV's k1, k2, p1, p2, k3; pixel centres are at integers.
@@ -250,9 +250,9 @@ class SystemConfig(Model):
 
     schema_version: Literal[1] = 1
     capture: AnyCapture = VirtualConfig()
-    camera: DeviceModel | None = None
-    projector: DeviceModel | None = None
-    infrared: DeviceModel | None = None
+    camera: Device | None = None
+    projector: Device | None = None
+    infrared: Device | None = None
     calibration: Path | None = None
     projectors: ProjectorsConfig | None = None
     fringes: Fringes = Fringes()

@@ -7,7 +7,7 @@ from quadfringe.data.calibration import (
     ResponseCalibration,
     conditioning,
 )
-from quadfringe.data.optics import core_device, device_model
+from quadfringe.data.optics import core_device, device_from_core
 from quadfringe.data.shape import Shape
 from quadfringe.data.shot import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp, Truth
 from quadfringe.data.shot_files import read_bayer_shot, read_folder, read_shot, write_shot
@@ -27,7 +27,7 @@ __all__ = [
     "Truth",
     "conditioning",
     "core_device",
-    "device_model",
+    "device_from_core",
     "read_bayer_shot",
     "read_folder",
     "read_shot",

@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field
 
-from quadfringe.config import Affine, DeviceModel, Matrix4, Model, Response, Row4, checked
+from quadfringe.config import Affine, Device, Matrix4, Model, Response, Row4, checked
 from quadfringe.errors import ConfigError
 from quadfringe.files import atomic, read_bytes, require_suffix
 
@@ -83,9 +83,9 @@ class Calibration(Stored):
     """
 
     schema_version: Literal[1, 2] = 2
-    camera: DeviceModel
-    projector: DeviceModel
-    infrared: DeviceModel | None = None
+    camera: Device
+    projector: Device
+    infrared: Device | None = None
     dark: Row4 | None = None
     response: Response | None = None
     crosstalk: Matrix4 | None = None

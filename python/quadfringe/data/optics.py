@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from quadfringe import _core
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 
-__all__ = ["core_device", "device_model"]
+__all__ = ["core_device", "device_from_core"]
 
 
-def core_device(model: DeviceModel) -> _core.Device:
+def core_device(model: Device) -> _core.Device:
     """Make the kernel's device from its settings."""
     return _core.Device(
         model.width_px,
@@ -21,9 +21,9 @@ def core_device(model: DeviceModel) -> _core.Device:
     )
 
 
-def device_model(device: _core.Device) -> DeviceModel:
+def device_from_core(device: _core.Device) -> Device:
     """Write out a device of the kernel as settings."""
-    return DeviceModel(
+    return Device(
         width_px=device.width,
         height_px=device.height,
         focal_px=device.focal_px,

@@ -1,5 +1,5 @@
 """From a shot to a shape: the kernel's decoder planned once, the verdict on its result, and the stages one by one."""
 
-from quadfringe.decoding.decoder import Plan, ShotDecoder, decode, kernel_decoder, own_response
+from quadfringe.decoding.decoder import Decoder, Plan, decode, estimate_response, kernel_decoder
 
-__all__ = ["Plan", "ShotDecoder", "decode", "kernel_decoder", "own_response"]
+__all__ = ["Decoder", "Plan", "decode", "estimate_response", "kernel_decoder"]

@@ -13,7 +13,7 @@ from quadfringe.decoding.stages import response_of_shot
 from quadfringe.decoding.verdict import judge, order_margin
 from quadfringe.errors import InputError
 
-__all__ = ["Plan", "ShotDecoder", "decode", "kernel_decoder", "own_response"]
+__all__ = ["Decoder", "Plan", "decode", "estimate_response", "kernel_decoder"]
 
 ROUNDS_MAX = 8  # of decoding and estimating: each takes a part of the bend out of the phase
 SETTLED = 0.02  # change of the exponents, as a share, at which the rounds end
@@ -31,7 +31,7 @@ class Plan:
     fringes: Fringes = Fringes()
     calibration: Calibration | None = None
     response: Response | None = None
-    settings: DecodeConfig = DecodeConfig()
+    decode: DecodeConfig = DecodeConfig()
 
     def described(self) -> dict[str, Any]:
         """Describe what is decoded, as plain data for a saved file; the decoder adds the settings in force."""
@@ -43,7 +43,7 @@ class Plan:
         }
 
 
-class ShotDecoder:
+class Decoder:
     """Decodes shots of one size; planned and checked when made.
 
     The first shot is looked at for exchanged channels too, which do not come and go afterwards.
@@ -77,7 +77,7 @@ class ShotDecoder:
 
 
 def kernel_decoder(like: AnyShot, plan: Plan) -> _core.Decoder:
-    """Plan the kernel's decoder for shots like this one, which passes no verdict; errors as `ShotDecoder`."""
+    """Plan the kernel's decoder for shots like this one, which passes no verdict; errors as `Decoder`."""
     _check_sizes(like, plan)
     return _core.Decoder(
         next(iter(like.images.values())).shape,
@@ -86,30 +86,30 @@ def kernel_decoder(like: AnyShot, plan: Plan) -> _core.Decoder:
         full_scale=like.full_scale_value,
         **conditioning(plan.calibration, plan.response),
         **_geometry(plan),
-        **plan.settings.model_dump(exclude_none=True, exclude={"unwrapping"}),
+        **plan.decode.model_dump(exclude_none=True, exclude={"unwrapping"}),
     )
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:
-    """Decode one shot: plan, decode, judge. For many shots make one `ShotDecoder`.
+    """Decode one shot: plan, decode, judge. For many shots make one `Decoder`.
 
-    Where neither plan nor calibration know a response, the one that the shot itself shows is undone (`own_response`);
-    `config` of the shape then has it, and "response_of_shot" true. Errors as `ShotDecoder`.
+    Where neither plan nor calibration know a response, the one that the shot itself shows is undone
+    (`estimate_response`); `config` of the shape then has it, and "response_of_shot" true. Errors as `Decoder`.
     """
     if _response_known(plan):
-        return ShotDecoder(shot, plan).decode(shot)
+        return Decoder(shot, plan).decode(shot)
     decoder, shape = _straightened(shot, plan)
     own = {"response_of_shot": decoder.plan.response is not None}
     return decoder.judged(shape, shot).with_settings({**shape.config, **own}, plan.calibration)
 
 
-def own_response(shot: AnyShot, plan: Plan) -> Response | None:
+def estimate_response(shot: AnyShot, plan: Plan) -> Response | None:
     """Give the response (gamma) of the channels that one shot shows, None when it is linear as far as can be told.
 
     Any object does that fills a good part of the image: pixels of a tile sorted by their phase are what a stack of
     phase steps is to `quadfringe calibrate response`. The shot is decoded and the response estimated in turn until it
-    stays. For many shots of one bench put it into the plan of a `ShotDecoder`. Raises `InputError` when the plan knows
-    a response already, otherwise as `ShotDecoder`.
+    stays. For many shots of one bench put it into the plan of a `Decoder`. Raises `InputError` when the plan knows
+    a response already, otherwise as `Decoder`.
 
     >>> import quadfringe as qf
     >>> from dataclasses import replace
@@ -117,31 +117,31 @@ def own_response(shot: AnyShot, plan: Plan) -> Response | None:
     >>> with qf.open(bent) as scanner:
     ...     shot = scanner.grab()
     >>> plan = qf.Plan(projector_width_px=912)
-    >>> response = qf.own_response(shot, plan)
+    >>> response = qf.estimate_response(shot, plan)
     >>> print(f"{response.red.exponent:.1f}")
     0.6
-    >>> decoder = qf.ShotDecoder(shot, replace(plan, response=response))
+    >>> decoder = qf.Decoder(shot, replace(plan, response=response))
     """
     if _response_known(plan):
         raise InputError("this plan knows the response already, from its `response` or its calibration; leave both out")
     return _straightened(shot, plan)[0].plan.response
 
 
-def _straightened(shot: AnyShot, plan: Plan) -> tuple[ShotDecoder, Shape]:
+def _straightened(shot: AnyShot, plan: Plan) -> tuple[Decoder, Shape]:
     """Decode, with the response that the shot shows if the orders are the surer for it."""
-    first = ShotDecoder(shot, plan)
+    first = Decoder(shot, plan)
     as_captured = first.shape(shot)
     found = _response_of(shot, as_captured, plan)
     if found is None:
         return first, as_captured
     # The published method needs a response more than it can help to find one.
-    best = replace(plan, settings=plan.settings.model_copy(update={"method": "best"}))
+    best = replace(plan, decode=plan.decode.model_copy(update={"method": "best"}))
     for _ in range(ROUNDS_MAX):
-        shape = ShotDecoder(shot, replace(best, response=found)).shape(shot)
+        shape = Decoder(shot, replace(best, response=found)).shape(shot)
         before, found = found, _response_of(shot, shape, plan) or found
         if _close(found, before):
             break
-    decoder = ShotDecoder(shot, replace(plan, response=found))
+    decoder = Decoder(shot, replace(plan, response=found))
     shape = decoder.shape(shot)
     better = order_margin(shape) > order_margin(as_captured)
     return (decoder, shape) if better else (first, as_captured)
@@ -183,7 +183,7 @@ def _check_sizes(shot: AnyShot, plan: Plan) -> None:
 
 def _geometry(plan: Plan) -> dict[str, Any]:
     calibration = plan.calibration
-    searched = plan.settings.unwrapping == "pair"
+    searched = plan.decode.unwrapping == "pair"
     if searched and (calibration is None or calibration.infrared is None):
         raise InputError(
             'unwrapping = "pair" needs a calibration with both projectors: one that has an `infrared` device'

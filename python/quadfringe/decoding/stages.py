@@ -59,8 +59,8 @@ def response_of_shot(
     """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; None for linear light.
 
     The phase of a shot whose response was not undone is bent itself: decode again with what was found, and repeat;
-    `quadfringe.own_response` does. A channel that shows nothing stays linear. Dark level and registration are those of
-    the `calibration`. ValueError when the sizes differ.
+    `quadfringe.estimate_response` does. A channel that shows nothing stays linear. Dark level and registration are
+    those of the `calibration`. ValueError when the sizes differ.
     """
     light = linear_light(shot, calibration)
     found = _core.estimate_response_of_shot(

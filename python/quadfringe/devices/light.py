@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config import DeviceModel, Fringes, Row4
+from quadfringe.config import Device, Fringes, Row4
 from quadfringe.data.optics import core_device
 from quadfringe.errors import InputError
 
@@ -50,8 +50,8 @@ class Predeformation:
     Exact on the plane at depth `z_mm`; where the centres of the projectors differ it drifts with depth.
     """
 
-    visible: DeviceModel
-    infrared: DeviceModel
+    visible: Device
+    infrared: Device
     z_mm: float
 
     def light(self, fringe_number: float, layout: str) -> NDArray[np.float32]:

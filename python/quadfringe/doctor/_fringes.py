@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.calibration.levels import CHANNELS
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Plan
 from quadfringe.decoding.stages import carrier, linear_light
@@ -165,7 +165,7 @@ def _expected_ir_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
     return _columns_px(shape.xyz_mm, calibration.infrared)
 
 
-def _columns_px(xyz_mm: Map, device: DeviceModel) -> NDArray[np.float64]:
+def _columns_px(xyz_mm: Map, device: Device) -> NDArray[np.float64]:
     import cv2
 
     turn, _ = cv2.Rodrigues(np.array(device.rotation))

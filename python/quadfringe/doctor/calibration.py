@@ -6,7 +6,7 @@ from datetime import UTC, datetime
 
 import numpy as np
 
-from quadfringe.config import ChannelResponse, DeviceModel, Response
+from quadfringe.config import ChannelResponse, Device, Response
 from quadfringe.data import Calibration
 from quadfringe.doctor.finding import Finding, graded
 
@@ -59,7 +59,7 @@ def _baseline(calibration: Calibration) -> Finding:
     return graded("triangulation angle", angle, BASELINE_DEG, words, fix)
 
 
-def _device(name: str, device: DeviceModel) -> Finding:
+def _device(name: str, device: Device) -> Finding:
     away = max(
         abs(centre / (0.5 * (size - 1)) - 1)
         for centre, size in zip(device.centre_px, (device.width_px, device.height_px), strict=True)

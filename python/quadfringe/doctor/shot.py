@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from quadfringe.data import AnyShot, Shape
-from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.doctor._fringes import Fit, fit_fringes, infrared_drift
 from quadfringe.doctor.finding import Finding, graded
 from quadfringe.errors import DecodeError
@@ -29,7 +29,7 @@ def examine_shot(shot: AnyShot, plan: Plan) -> list[Finding]:
     """
     found = [*_saturation(shot), *_black(shot)]
     try:
-        shape = ShotDecoder(shot, plan).decode(shot)
+        shape = Decoder(shot, plan).decode(shot)
     except DecodeError as error:
         fix = "mend what is named here first; the rest can only be looked at once the shot decodes"
         return [*found, Finding("fringe orders", "fault", str(error), fix)]

@@ -17,7 +17,7 @@ from quadfringe.calibration.projector import StepPlan
 from quadfringe.calibration.rehearsal import board_poses, rehearse
 from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.calibration.targets import Target, ring_board
-from quadfringe.config import DeviceModel, Fringes, SceneConfig, SystemConfig
+from quadfringe.config import Device, Fringes, SceneConfig, SystemConfig
 from quadfringe.data import core_device
 
 DEVIATION_DEG, DEVIATION_MM = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
@@ -67,8 +67,8 @@ def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int =
         noise=0.01,
         seed=1 + SEEDS_APART * seed,
     )
-    devices = {name: DeviceModel(**size, **values) for name, values in projectors.items()}
-    return SystemConfig(camera=DeviceModel(**camera), **devices, fringes=Fringes(layout=layout), scene=scene)
+    devices = {name: Device(**size, **values) for name, values in projectors.items()}
+    return SystemConfig(camera=Device(**camera), **devices, fringes=Fringes(layout=layout), scene=scene)
 
 
 def centre_errors_px(

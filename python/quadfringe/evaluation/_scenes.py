@@ -89,11 +89,11 @@ def rig(data: Path) -> dict[str, Any]:
 
 def calibration_of(devices: dict[str, Any]) -> Calibration:
     """Make the product's calibration from what `rig` read."""
-    from quadfringe import Calibration, DeviceModel
+    from quadfringe import Calibration, Device
 
-    def model(device: dict[str, Any]) -> DeviceModel:
+    def model(device: dict[str, Any]) -> Device:
         k = device["K"]
-        return DeviceModel(
+        return Device(
             width_px=device["width"],
             height_px=device["height"],
             focal_px=(k[0][0], k[1][1]),
@@ -121,7 +121,7 @@ def plan_of(
         fringes=Fringes(numbers=scene.fringe_numbers),
         calibration=calibration,
         response=response,
-        settings=DecodeConfig(**settings),
+        decode=DecodeConfig(**settings),
     )
     return Shot(scene.red, scene.green, scene.blue, scene.ir), plan
 

@@ -36,7 +36,7 @@ def run_scene(surface: str, out: Path) -> SceneResult:
         shape, decode_ms = _timed_decode(scanner, shot)
     assert shot.truth is not None, "the virtual bench knows the truth"
     numbers = config.fringes.numbers
-    found = compare(shape, shot.truth, scanner.calibration.projector.width_px / numbers[0])
+    found = compare(shape, shot.truth, scanner.projector_width_px / numbers[0])
     shape.save(out / f"{surface}.ply")
     wrapped = wrapped_phases(shot, numbers)
     write_report(out / f"{surface}.png", surface, shot, shape, wrapped, found)

@@ -100,7 +100,7 @@ def _render(config: SystemConfig, shots: int, folder: Path) -> _Stage:
     visible, infrared = [], []
     with open_system(config) as scanner:
         scanner.projector.show(config.fringes)
-        with Recorder(stage.take, scanner.config, scanner.known_calibration) as recorder:
+        with Recorder(stage.take, scanner.config, scanner.calibration) as recorder:
             for shot in scanner.camera.stream(shots, keep="all"):
                 assert isinstance(shot, BayerShot), "the hand is seen by a Bayer chip"
                 assert shot.truth is not None, "the virtual bench knows the truth"
@@ -108,6 +108,7 @@ def _render(config: SystemConfig, shots: int, folder: Path) -> _Stage:
                 infrared.append(shot.ir)
                 stage.truths[_pixels(shot)] = shot.truth
                 recorder.write(shot)
+        assert scanner.calibration is not None, "the virtual bench has a calibration"
         scanner.calibration.save(stage.calibration)
     np.savez(stage.frames, visible=np.stack(visible), infrared=np.stack(infrared))
     return stage
@@ -143,11 +144,9 @@ def measure_scene(
         earlier.unlink(missing_ok=True)
     found: list[Comparison] = []
     shapes = 0
-    period_px = (
-        scanner.known_calibration.projector.width_px if scanner.known_calibration else 912
-    ) / scanner.config.fringes.numbers[0]
+    period_px = scanner.projector_width_px / scanner.config.fringes.numbers[0]
     with (
-        Recorder(out / f"{name}.h5", scanner.config, scanner.known_calibration) as recorder,
+        Recorder(out / f"{name}.h5", scanner.config, scanner.calibration) as recorder,
         movie(out / f"{name}.mp4", RATE_HZ) as pictures,
         scanner.stream(shots, keep="all", taps={"record": recorder.write}) as stream,
     ):

@@ -28,6 +28,7 @@ def write_simulation(folder: Path, config: SystemConfig) -> list[Path]:
     with open_system(config) as scanner:
         shot = scanner.grab()
     paths = list(write_shot(folder_for(folder), shot).values())
+    assert scanner.calibration is not None, "the virtual bench has a calibration"
     scanner.calibration.save(folder / "calibration.json")
     paths.append(folder / "calibration.json")
     if shot.truth is not None:

@@ -96,7 +96,7 @@ def prepare(
 def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Job:
     config = system.model_copy(update={"capture": ReplayConfig(file=recording.resolve(), speed="full")})
     with Recording(recording) as take, _opened(config) as scanner:
-        if ply and scanner.known_calibration is None:
+        if ply and scanner.calibration is None:
             raise InputError(
                 f"{recording}: recorded without a calibration, so there are no points: name one, or no PLY"
             )
@@ -135,7 +135,7 @@ def _open_store(job: Job, take: Recording, scanner: Scanner) -> Any:
         _fill(
             zarr.open_group(temporary, mode="w", attributes=attributes),
             take,
-            calibrated=scanner.known_calibration is not None,
+            calibrated=scanner.calibration is not None,
         )
     return zarr.open_group(job.store, mode="r")["status"]
 
@@ -180,7 +180,7 @@ def _fill(group: Any, take: Recording, calibrated: bool) -> None:
 def _settings(scanner: Scanner) -> dict[str, Any]:
     """Give what decides about the results, as plain data."""
     config = scanner.config.model_dump(mode="json", exclude_none=True, exclude={"capture", "calibration"})
-    calibration = scanner.known_calibration
+    calibration = scanner.calibration
     known = None if calibration is None else calibration.model_dump(mode="json", exclude_none=True)
     settings: dict[str, Any] = json.loads(json.dumps({"config": config, "calibration": known}))
     return settings

@@ -14,9 +14,8 @@ from pathlib import Path
 
 from quadfringe.config import SystemConfig, load_system
 from quadfringe.data import AnyShot, Calibration, Shape
-from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.devices import Camera, Keep, Projector, open_devices
-from quadfringe.errors import InputError
 from quadfringe.scanner.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
@@ -27,31 +26,25 @@ LIGHTCRAFTER_COLUMNS = 912  # projector columns that fringes cover when no calib
 class Scanner:
     """A projector, a camera and a decoder that belong together; close it, or use it in a `with` block.
 
-    Without a calibration shapes have a phase and no millimetres.
+    `calibration` turns shots into millimetres; it is None when the system has none, and shapes then hold phase only.
     """
 
     def __init__(
         self, config: SystemConfig, projector: Projector, camera: Camera, calibration: Calibration | None
     ) -> None:
         self.config = config
-        self._calibration = calibration
+        self.calibration = calibration
         self.projector = projector
         self.camera = camera
         self._described = config.model_dump(mode="json", exclude_none=True)
-        self._idle: list[ShotDecoder] = []
+        self._idle: list[Decoder] = []
         self._live: LiveStream | None = None
 
     @property
-    def known_calibration(self) -> Calibration | None:
-        """What turns shots into millimetres; None when the system has none."""
-        return self._calibration
-
-    @property
-    def calibration(self) -> Calibration:
-        """What turns shots into millimetres; raises `InputError` when the system has none."""
-        if self._calibration is None:
-            raise InputError("this system has no calibration: name one in the system file, calibration = FILE")
-        return self._calibration
+    def projector_width_px(self) -> int:
+        """Projector columns that the fringes cover: those of the calibration, else of the system file, else 912."""
+        projector = self.config.projector if self.calibration is None else self.calibration.projector
+        return LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px
 
     def grab(self) -> AnyShot:
         """Project the fringes and take one shot of them."""
@@ -66,12 +59,12 @@ class Scanner:
         try:
             decoder = self._idle.pop()
         except IndexError:
-            decoder = ShotDecoder(shot, self._plan())
+            decoder = Decoder(shot, self._plan())
         try:
             shape = decoder.decode(shot)
         finally:
             self._idle.append(decoder)
-        return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self._calibration)
+        return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self.calibration)
 
     def measure(self) -> Shape:
         """Project, grab, decode: one exposure in, one metric shape out."""
@@ -112,12 +105,11 @@ class Scanner:
             self._live = None
 
     def _plan(self) -> Plan:
-        projector = self.config.projector if self._calibration is None else self._calibration.projector
         return Plan(
-            projector_width_px=LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px,
+            projector_width_px=self.projector_width_px,
             fringes=self.config.fringes,
-            calibration=self._calibration,
-            settings=self.config.decode,
+            calibration=self.calibration,
+            decode=self.config.decode,
         )
 
     def close(self) -> None:

@@ -17,7 +17,7 @@ from quadfringe.calibration.registration import Registration, register_views
 from quadfringe.calibration.session.captures import Captures
 from quadfringe.calibration.session.outcome import Outcome, record
 from quadfringe.data import Calibration, Shape
-from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import CalibrationError, DecodeError
 
 __all__ = ["acceptance", "planes", "poses", "registration"]
@@ -169,11 +169,11 @@ def acceptance(captures: Captures, calibration: Calibration) -> Outcome:
 def _decoded(captures: Captures, step: str, names: tuple[str, ...], calibration: Calibration) -> list[Shape]:
     session = captures.session
     plan = Plan(calibration.projector.width_px, session.fringes, calibration)
-    decoder: ShotDecoder | None = None
+    decoder: Decoder | None = None
     found = []
     for name in names:
         shot = captures.shot(step, name)
-        decoder = decoder or ShotDecoder(shot, plan)
+        decoder = decoder or Decoder(shot, plan)
         try:
             found.append(decoder.decode(shot))
         except DecodeError as error:

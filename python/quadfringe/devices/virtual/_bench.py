@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config import ChannelResponse, Fringes, Response, Row4, SystemConfig, Triple
-from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth, core_device, device_model
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth, core_device, device_from_core
 from quadfringe.devices.light import Levels, Light, Step, eight_bit, predeformation
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.io.export import read_npy
@@ -72,7 +72,7 @@ class VirtualBench:
     def resolved(self, config: SystemConfig) -> SystemConfig:
         """Return the config with every device written out."""
         devices = {"camera": self._bench.camera, "projector": self._bench.visible, "infrared": self._bench.infrared}
-        return config.model_copy(update={name: device_model(device) for name, device in devices.items()})
+        return config.model_copy(update={name: device_from_core(device) for name, device in devices.items()})
 
     def calibration(self) -> Calibration:
         """Return the exact calibration of this bench."""
@@ -86,9 +86,9 @@ class VirtualBench:
         separate = scene.crosstalk is not None
         combined = [seen if separate else seen / sent for seen, sent in zip(camera, projector, strict=True)]
         return Calibration(
-            camera=device_model(self._bench.camera),
-            projector=device_model(self._bench.visible),
-            infrared=device_model(self._bench.infrared),
+            camera=device_from_core(self._bench.camera),
+            projector=device_from_core(self._bench.visible),
+            infrared=device_from_core(self._bench.infrared),
             response=_responses(offsets, combined),
             crosstalk=scene.crosstalk,
             projector_response=_responses((0.0,) * 4, [1 / sent for sent in projector]) if separate else None,

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.calibration.projector_pair import deviated
-from quadfringe.config import ChannelResponse, DecodeConfig, DeviceModel, Fringes, Matrix4, Response
-from quadfringe.data import Calibration, Shot, core_device, device_model
+from quadfringe.config import ChannelResponse, DecodeConfig, Device, Fringes, Matrix4, Response
+from quadfringe.data import Calibration, Shot, core_device, device_from_core
 from quadfringe.decoding import Plan, kernel_decoder
 from quadfringe.decoding.stages import carrier, fourier, linear_light
 from quadfringe.devices.light import eight_bit, predeformation
@@ -65,9 +65,9 @@ DEFECTS: dict[str, Any] = {
 class ProjectorPair:
     """Camera, visible and infrared projector, how their mirrors lie, and what the bench adds to the light."""
 
-    camera: DeviceModel
-    visible: DeviceModel
-    infrared: DeviceModel
+    camera: Device
+    visible: Device
+    infrared: Device
     layout: Literal["regular", "diamond"] = "regular"
     light: dict[str, Any] = field(default_factory=dict)
 
@@ -101,8 +101,8 @@ def ideal_pair(
     The camera has 1/`shrink` of the pixels in each direction over the same field.
     """
     reference = _core.Bench(layout=layout)
-    visible = device_model(reference.visible)
-    camera = _shrunk(device_model(reference.camera), shrink)
+    visible = device_from_core(reference.visible)
+    camera = _shrunk(device_from_core(reference.camera), shrink)
     return ProjectorPair(camera, visible, deviated(visible, rotation_deg, translation_mm), layout)
 
 
@@ -119,12 +119,12 @@ def real_pair(
     return replace(pair, **devices, light=DEFECTS)
 
 
-def _shrunk(camera: DeviceModel, shrink: int) -> DeviceModel:
+def _shrunk(camera: Device, shrink: int) -> Device:
     width, height = camera.width_px // shrink, camera.height_px // shrink
     focal = tuple(f / shrink for f in camera.focal_px)
     centre = ((width - 1) / 2, (height - 1) / 2)
     size = {"width_px": width, "height_px": height, "focal_px": focal, "centre_px": centre}
-    return DeviceModel.model_validate(camera.model_dump() | size)
+    return Device.model_validate(camera.model_dump() | size)
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrap
         projector_width_px=exposure.calibration.projector.width_px,
         fringes=exposure.fringes,
         calibration=exposure.calibration,
-        settings=DecodeConfig(method=method, unwrapping=unwrapping),
+        decode=DecodeConfig(method=method, unwrapping=unwrapping),
     )
     shot = exposure.shot
     maps = kernel_decoder(shot, plan).decode(shot.red, shot.green, shot.blue, shot.ir)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.calibration.projector_pair import AXES, PairPose, pair_pose
-from quadfringe.config import DeviceModel
+from quadfringe.config import Device
 from quadfringe.data import Calibration, core_device
 from quadfringe.decoding.compare import rms
 from quadfringe.devices.light import predeformation
@@ -101,7 +101,7 @@ def remaining_deviation(pair: ProjectorPair, known: Calibration) -> PairPose:
 
 
 def _posed(
-    device: DeviceModel, points_mm: NDArray[np.float64], seen_px: NDArray[np.float64]
+    device: Device, points_mm: NDArray[np.float64], seen_px: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     (fx, fy), (cx, cy) = device.focal_px, device.centre_px
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]])

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config import DeviceModel, Fringes
+from quadfringe.config import Device, Fringes
 from quadfringe.data import Shot, core_device
 from quadfringe.decoding import Plan, decode
 from quadfringe.decoding.compare import rms
@@ -76,12 +76,12 @@ def peaks_shot(**light: Any) -> tuple[Shot, Map]:
     return shot, phase_rad.astype(np.float32)
 
 
-def _camera() -> DeviceModel:
+def _camera() -> Device:
     focal_px = WIDTH_PX / FIELD_MM * DEPTH_MM
     return _device((focal_px, focal_px))
 
 
-def _projector() -> DeviceModel:
+def _projector() -> Device:
     """Give a projector beside the camera that looks at the middle of the field and lights all of it."""
     sine, cosine = math.sin(math.radians(ANGLE_DEG)), math.cos(math.radians(ANGLE_DEG))
     focal_px = (WIDTH_PX * DISTANCE_MM / (1.15 * FIELD_MM * cosine), WIDTH_PX * DISTANCE_MM / (1.3 * FIELD_MM))
@@ -90,9 +90,9 @@ def _projector() -> DeviceModel:
     return _device(focal_px).model_copy(update={"rotation": rotation, "translation_mm": translation_mm})
 
 
-def _device(focal_px: tuple[float, float]) -> DeviceModel:
+def _device(focal_px: tuple[float, float]) -> Device:
     centre_px = ((WIDTH_PX - 1) / 2, (HEIGHT_PX - 1) / 2)
-    return DeviceModel(width_px=WIDTH_PX, height_px=HEIGHT_PX, focal_px=focal_px, centre_px=centre_px)
+    return Device(width_px=WIDTH_PX, height_px=HEIGHT_PX, focal_px=focal_px, centre_px=centre_px)
 
 
 def _turnless(error: Map) -> Map:

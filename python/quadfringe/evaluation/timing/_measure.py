@@ -95,6 +95,7 @@ def _shot_folder(size: tuple[int, int], scene: SceneConfig) -> Iterator[Path]:
     with open_system(_resized_bench(size, scene)) as scanner, tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         np.save(folder / "shot.npy", np.stack(list(scanner.grab().channels.values())))
+        assert scanner.calibration is not None, "the virtual bench has a calibration"
         scanner.calibration.save(folder / "calibration.json")
         yield folder
 
@@ -102,7 +103,8 @@ def _shot_folder(size: tuple[int, int], scene: SceneConfig) -> Iterator[Path]:
 def _resized_bench(size: tuple[int, int], scene: SceneConfig) -> SystemConfig:
     """Return the published bench with a camera of another size and the same field of view."""
     with open_system(SystemConfig(scene=scene)) as scanner:
-        camera = scanner.calibration.camera
+        camera = scanner.config.camera
+    assert camera is not None, "the virtual bench writes its devices out"
     width, height = size
     scale = width / camera.width_px
     resized = {

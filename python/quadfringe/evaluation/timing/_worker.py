@@ -16,7 +16,7 @@ import numpy as np
 
 from quadfringe.config import DecodeConfig
 from quadfringe.data import Calibration, Shot
-from quadfringe.decoding import Plan, ShotDecoder
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.verdict import judge
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.evaluation.machine import resident_bytes
@@ -88,17 +88,17 @@ def work() -> None:
     shot = Shot(*np.load(folder / "shot.npy"))
     calibration = Calibration.load(folder / "calibration.json")
     settings = DecodeConfig.model_validate({"method": method})
-    plan = Plan(calibration.projector.width_px, calibration=calibration, settings=settings)
+    plan = Plan(calibration.projector.width_px, calibration=calibration, decode=settings)
     answers = {"time": _timed, "weigh": _weighed}
     try:
-        decoder = ShotDecoder(shot, plan)
+        decoder = Decoder(shot, plan)
         for line in sys.stdin:
             print(json.dumps(answers[line.strip()](decoder, shot)), flush=True)
     except (DecodeError, InputError, ValueError) as error:
         print(json.dumps({"error": str(error)}), flush=True)
 
 
-def _timed(decoder: ShotDecoder, shot: Shot) -> dict[str, float]:
+def _timed(decoder: Decoder, shot: Shot) -> dict[str, float]:
     warm(lambda: decoder.decode(shot))
     start, processor_start = perf_counter(), process_time()
     shape = decoder.decode(shot)
@@ -113,12 +113,12 @@ def _timed(decoder: ShotDecoder, shot: Shot) -> dict[str, float]:
     }
 
 
-def _weighed(first: ShotDecoder, shot: Shot) -> dict[str, float]:
+def _weighed(first: Decoder, shot: Shot) -> dict[str, float]:
     decoders = [first]
     first.decode(shot)
     before = _resident_mb()
     for _ in range(DECODERS - 1):
-        decoders.append(ShotDecoder(shot, first.plan))
+        decoders.append(Decoder(shot, first.plan))
         for _ in range(2):
             decoders[-1].decode(shot)
     return {"held_mb": (_resident_mb() - before) / (DECODERS - 1)}
