@@ -1,0 +1,1 @@
+"""Helpers for tests alone; pytest puts the folder `tests` on the path."""

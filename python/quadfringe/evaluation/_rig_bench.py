@@ -26,37 +26,14 @@ CROSSTALK = ((1.0, 0.15, 0.0, 0.02), (0.15, 1.0, 0.15, 0.0), (0.0, 0.15, 1.0, 0.
 
 
 def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int = 0) -> SystemConfig:
-    """Give the bench; `camera_scale` 0.5 is a camera of half the size with the same field."""
-    published = _core.Bench(layout=layout)
-    visible = published.visible
-    turn = cv2.Rodrigues(np.radians(DEVIATION_DEG))[0]
-    rotation = turn @ np.array(visible.rotation)
-    translation = turn @ np.array(visible.translation_mm) + DEVIATION_MM
-    fx, fy = visible.focal_px
-    camera = {
-        "width_px": round(1024 * camera_scale),
-        "height_px": round(768 * camera_scale),
-        "focal_px": (2590.0 * camera_scale, 2588.0 * camera_scale),
-        "centre_px": (505.0 * camera_scale, 390.0 * camera_scale),
-        "distortion": (-0.1, 0.08, 3e-4, -2e-4, 0.0),
-    }
-    projectors = {
-        "projector": {
-            "focal_px": (1.002 * fx, 1.001 * fy),
-            "centre_px": (458.0, 573.0),
-            "distortion": (-0.06, 0.03, -2e-4, 4e-4, 0.0),
-            "rotation": visible.rotation,
-            "translation_mm": visible.translation_mm,
-        },
-        "infrared": {
-            "focal_px": (0.998 * fx, 0.999 * fy),
-            "centre_px": (452.0, 566.0),
-            "distortion": (-0.055, 0.02, 2e-4, 1e-4, 0.0),
-            "rotation": rotation.tolist(),
-            "translation_mm": translation.tolist(),
-        },
-    }
-    size = {"width_px": 912, "height_px": 1140}
+    """Give the bench; `camera_scale` 0.5 halves the pixels along each side and keeps the field of view."""
+    camera = Device(
+        width_px=round(1024 * camera_scale),
+        height_px=round(768 * camera_scale),
+        focal_px=(2590.0 * camera_scale, 2588.0 * camera_scale),
+        centre_px=(505.0 * camera_scale, 390.0 * camera_scale),
+        distortion=(-0.1, 0.08, 3e-4, -2e-4, 0.0),
+    )
     scene = SceneConfig(
         shading=True,
         projector_exponent=(2.2, 2.2, 2.2, 2.0),
@@ -67,8 +44,37 @@ def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int =
         noise=0.01,
         seed=1 + SEEDS_APART * seed,
     )
-    devices = {name: Device(**size, **values) for name, values in projectors.items()}
-    return SystemConfig(camera=Device(**camera), **devices, fringes=Fringes(layout=layout), scene=scene)
+    visible, infrared = _projectors(layout)
+    fringes = Fringes.model_validate({"layout": layout})
+    return SystemConfig(camera=camera, projector=visible, infrared=infrared, fringes=fringes, scene=scene)
+
+
+def _projectors(layout: str) -> tuple[Device, Device]:
+    """Give both projectors: off the published focal lengths and centres, with lenses, 1 degree and 0.5 mm apart."""
+    published = _core.Bench(layout=layout).visible
+    turn = cv2.Rodrigues(np.radians(DEVIATION_DEG))[0]
+    rotation = turn @ np.array(published.rotation)
+    translation_mm = turn @ np.array(published.translation_mm) + DEVIATION_MM
+    fx, fy = published.focal_px
+    visible = Device(
+        width_px=912,
+        height_px=1140,
+        focal_px=(1.002 * fx, 1.001 * fy),
+        centre_px=(458.0, 573.0),
+        distortion=(-0.06, 0.03, -2e-4, 4e-4, 0.0),
+        rotation=published.rotation,
+        translation_mm=published.translation_mm,
+    )
+    infrared = Device(
+        width_px=912,
+        height_px=1140,
+        focal_px=(0.998 * fx, 0.999 * fy),
+        centre_px=(452.0, 566.0),
+        distortion=(-0.055, 0.02, 2e-4, 1e-4, 0.0),
+        rotation=rotation.tolist(),
+        translation_mm=translation_mm.tolist(),
+    )
+    return visible, infrared
 
 
 def centre_errors_px(
