@@ -66,13 +66,6 @@ TO_DO = {
     "crates/quadfringe/src/published/mod.rs::run",
     "python/quadfringe/calibration/device_fit.py::device_fit",
     "python/quadfringe/calibration/projector_pair.py::pair_pose",
-    "python/quadfringe/cli/accept.py::accept",
-    "python/quadfringe/cli/bench.py::bench",
-    "python/quadfringe/cli/calibrate.py::run",
-    "python/quadfringe/cli/decode.py::decode",
-    "python/quadfringe/cli/doctor.py::doctor",
-    "python/quadfringe/cli/live.py::live",
-    "python/quadfringe/cli/target.py::target",
     "python/quadfringe/devices/emulator/_registers.py::_nodes",
 }
 

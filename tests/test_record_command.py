@@ -120,6 +120,6 @@ def test_batch_says_what_it_did_and_what_is_wrong(system: Path, tmp_path: Path) 
     done = run("batch", take, "--out", out, "--workers", 1, "--no-ply", "--json", "-")
     assert done.exit_code == 0, done.output
     assert json.loads(done.stdout)["figures"] == {"shots": 2, "decoded": 2, "errors": 0, "finished_before": 0}
-    assert "2 finished before" in run("batch", take, "--out", out, "--workers", 1, "--no-ply").stdout
+    assert "2 were already finished" in run("batch", take, "--out", out, "--workers", 1, "--no-ply").stdout
     refused(run("batch", take, "--out", out, "--workers", 1, "--scheduler", "tcp://127.0.0.1:9"), 2, "one of them")
     refused(run("batch", tmp_path / "no.h5", "--out", out), 2, "no.h5")

@@ -255,8 +255,8 @@ def test_what_is_in_an_svg_is_what_was_drawn(tmp_path: Path) -> None:
     ("options", "words"),
     [
         (["rings", "--pitch", "40"], "the board is 500 x 380 mm"),
-        (["circles", "--hole", "3"], "--hole: a board of circles has none"),
-        (["charuco", "--no-marks"], "--marks: a board of charuco has none"),
+        (["circles", "--hole", "3"], "--hole: a circles board has none"),
+        (["charuco", "--no-marks"], "--marks: a charuco board has none"),
         (["rings", "--diameter", "19"], "less than 14 mm"),
     ],
 )

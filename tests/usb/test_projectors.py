@@ -112,10 +112,10 @@ def test_show(system: Path) -> None:
     assert run("show", "--port", "1-2", "--test-pattern", "grid").exit_code == 0
     for arguments, reason in [
         ([], "one of"),
-        (["--system", system, "--port", "1-1"], "--port goes with"),
+        (["--system", system, "--port", "1-1"], "--port is for"),
         (["--port", "1-1", "--flash-image", "9"], "below 3"),
         (["--port", "1-1", "--test-pattern", "kittens"], "checkerboard"),
-        (["--port", "1-1", "--flash-image", "1", "--seconds", "1"], "--seconds goes with"),
+        (["--port", "1-1", "--flash-image", "1", "--seconds", "1"], "--seconds is for"),
     ]:
         refused = run("show", *arguments)
         assert refused.exit_code == 2, refused.output

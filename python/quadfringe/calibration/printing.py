@@ -3,27 +3,41 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from quadfringe.calibration.targets import Disc, Target, drawing
 from quadfringe.errors import InputError, require
 from quadfringe.files import atomic, require_suffix
 
-__all__ = ["PAGES_MM", "write_target"]
+__all__ = ["PAGES_MM", "PageSize", "write_target"]
 
-PAGES_MM = {"a4": (297.0, 210.0), "a3": (420.0, 297.0), "a2": (594.0, 420.0), "letter": (279.4, 215.9)}
+
+class PageSize(NamedTuple):
+    """Width and height of a page, mm."""
+
+    width_mm: float
+    height_mm: float
+
+
+# ISO 216 and ANSI sizes in landscape orientation.
+PAGES_MM = {
+    "a4": PageSize(297.0, 210.0),
+    "a3": PageSize(420.0, 297.0),
+    "a2": PageSize(594.0, 420.0),
+    "letter": PageSize(279.4, 215.9),
+}
 MM_PER_INCH = 25.4
-BAR_MM = 100.0
+BAR_MM = 100.0  # length of the scale bar: a ruler reads it to 0.2 %
 UNPRINTABLE_MM = 4.0  # border that common printers leave white
-CAPTION_MM = 3.0
+CAPTION_MM = 3.0  # height of the caption line
 
 
-def write_target(path: Path, target: Target, page: str = "fit", dpi: int = 600) -> tuple[float, float]:
-    """Draw the board to scale and return the size of the page (width, height) in mm.
+def write_target(path: Path, target: Target, page: str = "fit", dpi: int = 600) -> PageSize:
+    """Draw the board to scale as PDF, SVG or PNG, and return the size of the page.
 
-    `page` is a4, a3, a2 or letter, lying, or "fit" for a page of the size of the board. A bar of 100 mm and what the
-    board is stand below it, on the white border of a page that has room for them. `dpi` matters to PNG alone. Needs
-    matplotlib (extra `plot`). Raises `InputError` for a board larger than its page.
+    `page` is a4, a3, a2 or letter in landscape orientation, or "fit" for a page of the size of the board. Where the
+    border of the page has room, a scale bar of 100 mm and a description of the board are printed below it. `dpi`
+    applies to PNG only. Needs matplotlib (extra `plot`). Raises `InputError` for a board larger than its page.
     """
     suffix = require_suffix(path, (".pdf", ".svg", ".png"))
     require("matplotlib", "plot")
@@ -44,26 +58,26 @@ def write_target(path: Path, target: Target, page: str = "fit", dpi: int = 600) 
     plain = {"Creator": "quadfringe"} | ({"CreationDate": None} if suffix == ".pdf" else {"Date": None})
     with atomic(path) as temporary, rc_context({"svg.hashsalt": "quadfringe", "svg.fonttype": "none"}):
         figure.savefig(temporary, format=suffix[1:], dpi=dpi, metadata=None if suffix == ".png" else plain)
-    return width, height
+    return PageSize(width, height)
 
 
-def _page(target: Target, page: str) -> tuple[float, float]:
+def _page(target: Target, page: str) -> PageSize:
     if page == "fit":
-        return target.size_mm
+        return PageSize(*target.size_mm)
     if page not in PAGES_MM:
         raise InputError(f"page: expected fit, {', '.join(PAGES_MM)}, got {page!r}")
-    width, height = PAGES_MM[page]
+    size = PAGES_MM[page]
     across, down = target.size_mm
-    if across > width or down > height:
+    if across > size.width_mm or down > size.height_mm:
         raise InputError(
-            f"the board is {across:g} x {down:g} mm with its white border, a page {page} {width:g} x {height:g} mm; "
-            "take a smaller --pitch, fewer --rows and --columns, or a larger --page"
+            f"the board is {across:g} x {down:g} mm with its white border, but a page {page} is {size.width_mm:g} x "
+            f"{size.height_mm:g} mm; choose a smaller --pitch, fewer --rows and --columns, or a larger --page"
         )
-    return width, height
+    return size
 
 
 def _patch(item: Any, shift: tuple[float, float]) -> Any:
-    """Give a shape of matplotlib; snapping would move edges of a PNG to whole pixels."""
+    """Return the matplotlib shape of an item; snapping is off, because it would move edges to whole pixels."""
     from matplotlib.patches import Circle, Rectangle
 
     look: dict[str, Any] = {
@@ -79,7 +93,7 @@ def _patch(item: Any, shift: tuple[float, float]) -> Any:
 
 
 def _caption(axes: Any, target: Target, width: float, height: float) -> None:
-    """Draw a bar of 100 mm to hold a ruler against, and a line that says what this is."""
+    """Draw the scale bar, and a line that describes the board."""
     from matplotlib.patches import Rectangle
 
     bottom = height - UNPRINTABLE_MM - CAPTION_MM

@@ -1,31 +1,24 @@
-"""What commands say and where: results to stdout or a file, progress and complaints to stderr."""
+"""Where commands write: results go to standard output or a file, progress and errors to standard error."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from enum import StrEnum
 from pathlib import Path
 from threading import Event
-from typing import Annotated, Any, TypeVar
+from typing import Any, TypeVar
 
 import typer
 
 from quadfringe.files import atomic, figures_text
 
 __all__ = [
-    "Bayer",
-    "Fringes3",
-    "JsonOption",
-    "OutFolder",
-    "PredeformedOption",
-    "SystemFile",
     "complain",
+    "progress",
     "rows",
     "say",
-    "steps",
-    "stop_asked",
+    "stop_requested",
     "stoppable",
     "table",
     "write_figures",
@@ -34,59 +27,30 @@ __all__ = [
 
 Item = TypeVar("Item")
 
-JsonOption = Annotated[
-    Path | None,
-    typer.Option("--json", metavar="FILE", help="Write the figures as JSON; - is standard output."),
-]
-Fringes3 = Annotated[
-    tuple[float, float, float],
-    typer.Option("--fringes", metavar="N N N", help="Fringe numbers: red and blue, green, infrared."),
-]
-
-OutFolder = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the files; created when it is missing.")]
-SystemFile = Annotated[
-    Path | None, typer.Argument(metavar="[SYSTEM.toml]", help="System file; default: the virtual bench.")
-]
-PredeformedOption = Annotated[
-    float | None,
-    typer.Option(
-        "--predeformed-z-mm", min=1.0, metavar="MM", help="Infrared pre-deformed for the plane at this depth."
-    ),
-]
-
-
-class Bayer(StrEnum):
-    """Colours of the first two pixels of the first row and of the second row of a chip."""
-
-    rggb = "rggb"
-    grbg = "grbg"
-    gbrg = "gbrg"
-    bggr = "bggr"
-
 
 def complain(message: str) -> None:
-    """Say what is wrong, on stderr."""
+    """Print an error on standard error."""
     typer.echo(f"error: {message}", err=True)
 
 
 def say(message: str, json: Path | None = None) -> None:
-    """Tell a person what was done; on stderr when stdout carries JSON."""
-    typer.echo(message, err=_stdout_is_taken(json))
+    """Print a message for a person; on standard error when `json` occupies standard output."""
+    typer.echo(message, err=_is_stdout(json))
 
 
-def _stdout_is_taken(json: Path | None) -> bool:
+def _is_stdout(json: Path | None) -> bool:
     return json is not None and str(json) == "-"
 
 
 def table(title: str, figures: Mapping[str, float], json: Path | None = None) -> None:
-    """Print figures as a table; on stderr when stdout carries JSON."""
+    """Print figures as a table of two columns; on standard error as in `say`."""
     rows(title, ("figure", "value"), figures.items(), json)
 
 
 def rows(
     title: str, head: Sequence[str], lines: Iterable[Sequence[str | int | float]], json: Path | None = None
 ) -> None:
-    """Print lines of words and numbers under a head; the first column to the left; on stderr as in `say`."""
+    """Print a table with a title and column heads, first column left-aligned; on standard error as in `say`."""
     from rich.console import Console
     from rich.table import Table
 
@@ -95,18 +59,18 @@ def rows(
         drawn.add_column(name, justify="right" if column else "left")
     for line in lines:
         drawn.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in line))
-    console = Console(stderr=_stdout_is_taken(json))
+    console = Console(stderr=_is_stdout(json))
     console.print(title, highlight=False, soft_wrap=True)
     console.print(drawn)
 
 
 def write_figures(figures: Mapping[str, float], json: Path | None) -> None:
-    """Write {"figures": {...}} to the file, or to stdout for "-"."""
+    """Write {"figures": {...}} to a file, or to standard output for "-"; do nothing without `json`."""
     _write(figures_text(figures), json)
 
 
 def write_record(record: Mapping[str, Any], json: Path | None) -> None:
-    """Write plain data to the file, or to stdout for "-"."""
+    """Write plain data as JSON to a file, or to standard output for "-"; do nothing without `json`."""
     from json import dumps
 
     _write(dumps(record, indent=2, allow_nan=False) + "\n", json)
@@ -115,7 +79,7 @@ def write_record(record: Mapping[str, Any], json: Path | None) -> None:
 def _write(text: str, json: Path | None) -> None:
     if json is None:
         return
-    if _stdout_is_taken(json):
+    if _is_stdout(json):
         sys.stdout.write(text)
         return
     with atomic(json) as temporary:
@@ -123,8 +87,8 @@ def _write(text: str, json: Path | None) -> None:
 
 
 @contextmanager
-def steps(items: Iterable[Item], title: str, total: int | None = None) -> Iterator[Iterable[Item]]:
-    """Walk over long work with a progress bar on stderr; silent when stderr is not a terminal."""
+def progress(items: Iterable[Item], title: str, total: int | None = None) -> Iterator[Iterable[Item]]:
+    """Iterate with a progress bar on standard error; without a bar when standard error is not a terminal."""
     from rich.console import Console
     from rich.progress import track
 
@@ -134,7 +98,7 @@ def steps(items: Iterable[Item], title: str, total: int | None = None) -> Iterat
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Let Ctrl-C, or the SIGTERM of a service, end the block in order."""
+    """Let Ctrl-C, or the SIGTERM of a service manager, end the block without an error."""
     import signal
 
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)
@@ -147,24 +111,25 @@ def stoppable() -> Iterator[None]:
 
 
 @contextmanager
-def stop_asked() -> Iterator[Event]:
-    """Give an event that Ctrl-C or SIGTERM sets; the second Ctrl-C interrupts.
+def stop_requested() -> Iterator[Event]:
+    """Yield an event that Ctrl-C or SIGTERM sets; a second Ctrl-C raises KeyboardInterrupt.
 
-    Nothing is interrupted in the middle, and a signal cannot be lost in a callback of a library.
+    The block polls the event where it can stop safely. An exception from a signal handler could be raised inside a
+    callback of a library, which would swallow it.
     """
     import signal
 
-    asked = Event()
+    requested = Event()
     before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
-    def ask(*_: object) -> None:
-        asked.set()
+    def request(*_: object) -> None:
+        requested.set()
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
     for number in before:
-        signal.signal(number, ask)
+        signal.signal(number, request)
     try:
-        yield asked
+        yield requested
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -1,4 +1,4 @@
-"""The commands in the order of a session, and the one place where errors become exit statuses."""
+"""The commands, in the order of a measuring session, and the one place that turns errors into exit statuses."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ USAGE, FAILED = 2, 1
 
 
 class Commands(TyperGroup):
-    """Bad input exits with 2, a failed run with 1; both say why in one message, without a traceback."""
+    """Exit with 2 for bad input and with 1 for a failed run; both print one message and no traceback."""
 
     def invoke(self, ctx: Any) -> Any:
-        """Run the command and translate its errors."""
+        """Run the command and turn its errors into exit statuses."""
         try:
             return super().invoke(ctx)
         except (BatchError, DecodeError, CameraError, RecordingError) as error:
             complain(str(error))
             raise typer.Exit(FAILED) from error
         except BrokenPipeError:
-            raise  # a reader that left early, as `head` does, is no error
+            raise  # the reader closed the pipe early, as `head` does; this is no error
         except (ValueError, OSError, MissingExtraError) as error:
             complain(str(error))
             raise typer.Exit(USAGE) from error
@@ -54,15 +54,15 @@ class Commands(TyperGroup):
 app = typer.Typer(
     cls=Commands,
     name="quadfringe",
-    help="Single-shot 3D: four fringe images of one exposure to absolute phase and millimetres.",
+    help="Single-shot 3D measurement: from the four fringe images of one exposure to absolute phase and millimetres.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
 
 
-def _show_version(asked: bool) -> None:
-    if asked:
+def _show_version(requested: bool) -> None:
+    if requested:
         from quadfringe import _core
 
         typer.echo(f"quadfringe {_core.__version__}")
@@ -73,10 +73,10 @@ def _show_version(asked: bool) -> None:
 def options(
     version: Annotated[
         bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version."),
+        typer.Option("--version", callback=_show_version, is_eager=True, help="Print the version and exit."),
     ] = False,
 ) -> None:
-    """Single-shot 3D: four fringe images of one exposure to absolute phase and millimetres."""
+    """Single-shot 3D measurement: from the four fringe images of one exposure to absolute phase and millimetres."""
 
 
 app.command("demo")(demo.demo)

@@ -1,4 +1,4 @@
-"""`quadfringe camera`: the cameras of a bench."""
+"""`quadfringe camera`: list cameras, show their settings, take single shots."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from quadfringe.cli._output import JsonOption, complain, say, write_record
+from quadfringe.cli._options import JsonOption
+from quadfringe.cli._output import complain, say, write_record
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,26 +24,33 @@ __all__ = ["app"]
 app = typer.Typer(name="camera", help="The cameras of a bench.", no_args_is_help=True)
 
 FAILED = 1
-Camera = Annotated[
-    str, typer.Argument(metavar="CAMERA", help="aravis:NAME, aravis: for the only one, virtual:, or a system file.")
+CameraArgument = Annotated[
+    str,
+    typer.Argument(
+        metavar="CAMERA",
+        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, virtual:, or a "
+        "system file .toml.",
+    ),
 ]
 
 
 class Chip(StrEnum):
-    """One chip of a camera."""
+    """One chip of a 2CCD camera."""
 
     visible = "visible"
     infrared = "infrared"
 
 
-OneChip = Annotated[
+ChipOption = Annotated[
     Chip | None,
-    typer.Option(help="This chip alone, also of a camera that has but one, with aravis: or the system file of one."),
+    typer.Option(
+        help="Use this chip alone, to focus it or while the other is missing; also for a camera with one chip."
+    ),
 ]
 
 
 def _system(camera: str) -> SystemConfig:
-    """Give the system of a word such as aravis:NAME, or of a system file."""
+    """Return the system of a word such as aravis:NAME, or of a system file."""
     from quadfringe.config import SystemConfig, load_system
     from quadfringe.config.cameras import capture_config
 
@@ -64,13 +72,13 @@ def _one_chip(camera: str, chip: Chip) -> ChipCamera:
 
     capture = _system(camera).capture
     if not isinstance(capture, AravisConfig):
-        raise InputError(f"--chip is for cameras through Aravis, and {camera} is of kind {capture.kind}")
+        raise InputError(f"--chip needs an aravis camera, but {camera} is of kind {capture.kind}; leave --chip out")
     return ChipCamera(capture, chip.value)
 
 
 @app.command("list")
 def list_cameras() -> None:
-    """List the devices that answer; a JAI 2CCD camera is two of them, with one serial number."""
+    """List the devices that answer; a JAI 2CCD camera appears as two devices with one serial number."""
     from quadfringe.devices.aravis import found
 
     devices = found()
@@ -82,39 +90,37 @@ def list_cameras() -> None:
 
 
 @app.command()
-def info(
-    camera: Camera = "aravis:",
-    chip: OneChip = None,
-    json: JsonOption = None,
-) -> None:
-    """Open a camera and tell its settings as the camera took them."""
+def info(camera: CameraArgument = "aravis:", chip: ChipOption = None, json: JsonOption = None) -> None:
+    """Open a camera and print its settings as the camera accepted them."""
     if chip is not None:
         with _one_chip(camera, chip) as opened:
-            name, taken = opened.name, opened.config
+            name, accepted = opened.name, opened.config
     else:
         devices = _opened(camera)
         with closing(devices.projector), devices.camera as both:
-            name, taken = both.name, devices.config.capture  # type: ignore[assignment]
-    settings = taken.model_dump(mode="json", exclude_none=True)
+            name, accepted = both.name, devices.config.capture  # type: ignore[assignment]
+    settings = accepted.model_dump(mode="json", exclude_none=True)
     say(name, json)
     for key, value in settings.items():
         say(f"  {key} = {value}", json)
-    if json is not None:
-        write_record({"name": name, "capture": settings}, json)
+    write_record({"name": name, "capture": settings}, json)
 
 
 @app.command()
 def snap(
-    camera: Camera = "aravis:",
-    out: Annotated[Path, typer.Option("--out", metavar="FOLDER", help="Where the images go.")] = Path("shot"),
-    chip: OneChip = None,
+    camera: CameraArgument = "aravis:",
+    out: Annotated[
+        Path, typer.Option("--out", metavar="FOLDER", help="Folder for the images; created when it is missing.")
+    ] = Path("shot"),
+    chip: ChipOption = None,
     timeout_s: Annotated[
-        float | None, typer.Option("--timeout", min=0.0, metavar="S", help="How long to wait for the shot.")
+        float | None,
+        typer.Option("--timeout", min=0.0, metavar="S", help="Longest wait for the shot, s; default: of the camera."),
     ] = None,
 ) -> None:
-    """Take one shot: raw.png and ir.png of a Bayer chip, else red.png, green.png, blue.png and ir.png.
+    """Take one shot: write raw.png and ir.png for a Bayer chip, else red.png, green.png, blue.png and ir.png.
 
-    Of one chip alone: visible.png or infrared.png, a mosaic as it was read out.
+    With --chip, write visible.png or infrared.png, a Bayer mosaic unprocessed.
     """
     from quadfringe.data.shot_files import write_shot
     from quadfringe.files import folder_for
@@ -137,4 +143,4 @@ def snap(
 
 def _say_image(path: Path, image: NDArray[Any], full_scale: float, more: str = "") -> None:
     height, width = image.shape[:2]
-    say(f"{path}: {width} x {height}, {image.dtype}, up to {full_scale:g}{more}")
+    say(f"{path}: {width} x {height}, {image.dtype}, full scale {full_scale:g}{more}")

@@ -1,40 +1,40 @@
-"""`quadfringe decode`: image files of one shot to phase and shape."""
+"""`quadfringe decode`: the image files of one shot to absolute phase and shape."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from quadfringe.cli._output import Bayer, Fringes3, JsonOption, PredeformedOption, say, write_figures
+from quadfringe.cli._options import Bayer, CalibrationOption, ColumnsOption, Fringes3, JsonOption, PredeformedOption
+from quadfringe.cli._output import say, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern, Response
+    from quadfringe.data import AnyShot, Shape
 
 __all__ = ["Bits", "Method", "Unwrapping", "decode"]
 
-ImageOption = Annotated[Path | None, typer.Option(metavar="FILE", help="Image of this channel.")]
-
 
 class Method(StrEnum):
-    """The published way, or the best known one."""
+    """The published decoding method, or the default one, which is more accurate."""
 
     published = "published"
     best = "best"
 
 
 class Unwrapping(StrEnum):
-    """Infrared light as coaxial with the visible, or where the calibrated pair really puts it."""
+    """How unwrapping treats the infrared projector: as coaxial with the visible one, or at its calibrated pose."""
 
     coaxial = "coaxial"
     pair = "pair"
 
 
 class Bits(StrEnum):
-    """Bits in use in a 16-bit file."""
+    """Significant bits of 16-bit files."""
 
     ten = "10"
     twelve = "12"
@@ -42,84 +42,115 @@ class Bits(StrEnum):
     sixteen = "16"
 
 
+ResultOption = Annotated[
+    Path, typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply or .tif.")
+]
+ImageOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="Image of this channel: PNG, TIFF or BMP, 8 or 16 bit.")
+]
+RgbOption = Annotated[
+    Path | None, typer.Option(metavar="FILE", help="One colour image in place of --red, --green and --blue.")
+]
+RawOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Raw Bayer mosaic in place of --red, --green and --blue; needs --bayer."),
+]
+BayerOption = Annotated[
+    Bayer | None, typer.Option(help="Filter colours of the first 2 x 2 pixels of --raw, row by row.")
+]
+ResponseOption = Annotated[
+    Path | None,
+    typer.Option(
+        metavar="FILE",
+        help="Camera response of the channels, .json, as `calibrate response` writes it; default: that of the "
+        "calibration, else estimated from the shot.",
+    ),
+]
+LinearOption = Annotated[
+    bool, typer.Option("--linear", help="Take the images as linear light; do not estimate a response from the shot.")
+]
+MethodOption = Annotated[
+    Method | None,
+    typer.Option(help="Decoding method; default: the more accurate one. Use published to reproduce the paper."),
+]
+UnwrappingOption = Annotated[
+    Unwrapping | None,
+    typer.Option(
+        help="Treat the projectors as coaxial (default), or search along the camera ray with both projectors where "
+        "--calibration puts them (pair); use pair when they are not aligned.",
+    ),
+]
+DepthRangeOption = Annotated[
+    tuple[float, float] | None,
+    typer.Option(metavar="MM MM", help="Nearest and farthest depth that --unwrapping pair searches, mm."),
+]
+BitsOption = Annotated[
+    Bits | None, typer.Option(help="Significant bits of 16-bit files; default: 16. Use it for 10 to 14-bit cameras.")
+]
+InstantsOption = Annotated[
+    tuple[float, float, float, float] | None,
+    typer.Option(
+        metavar="R G B IR",
+        help="Time at which each channel is exposed, us, relative to the instant of the result; use it for moving "
+        "objects when the projector shows the colours one after another. Default: all at once.",
+    ),
+]
+
+
 def decode(
     fringes: Fringes3,
-    projector_width: Annotated[int, typer.Option(min=2, help="Columns that the fringes cover.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Result: .npz, or .ply, .tif when calibrated.")],
+    projector_width: ColumnsOption,
+    out: ResultOption,
     red: ImageOption = None,
     green: ImageOption = None,
     blue: ImageOption = None,
     ir: ImageOption = None,
-    rgb: Annotated[Path | None, typer.Option(metavar="FILE", help="One colour image for all three.")] = None,
-    raw: Annotated[Path | None, typer.Option(metavar="FILE", help="Raw mosaic for all three, with --bayer.")] = None,
-    bayer: Annotated[Bayer | None, typer.Option(help="Colours of the first 2 x 2 pixels of --raw.")] = None,
-    response: Annotated[Path | None, typer.Option(metavar="FILE", help="Response of the channels, JSON.")] = None,
-    linear: Annotated[
-        bool, typer.Option("--linear", help="The light is linear; else its response is estimated from the shot.")
-    ] = False,
-    calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Calibration, JSON.")] = None,
-    method: Annotated[Method | None, typer.Option(help="How to demodulate and unwrap.")] = None,
-    unwrapping: Annotated[
-        Unwrapping | None, typer.Option(help="Take both projectors as one, or where --calibration puts them.")
-    ] = None,
-    depth_range_mm: Annotated[
-        tuple[float, float] | None,
-        typer.Option(metavar="MM MM", help="Nearest and farthest depth that --unwrapping pair searches."),
-    ] = None,
+    rgb: RgbOption = None,
+    raw: RawOption = None,
+    bayer: BayerOption = None,
+    response: ResponseOption = None,
+    linear: LinearOption = False,
+    calibration: CalibrationOption = None,
+    method: MethodOption = None,
+    unwrapping: UnwrappingOption = None,
+    depth_range_mm: DepthRangeOption = None,
     predeformed_z_mm: PredeformedOption = None,
-    bits: Annotated[Bits | None, typer.Option(help="Bits in use in 16-bit files.")] = None,
-    channel_instants_us: Annotated[
-        tuple[float, float, float, float] | None,
-        typer.Option(metavar="R G B IR", help="When each channel is seen, us from the instant of the result."),
-    ] = None,
+    bits: BitsOption = None,
+    channel_instants_us: InstantsOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Decode the images of one shot to absolute phase, and to millimetres when calibrated."""
+    """Decode the images of one shot to absolute phase, and with --calibration to millimetres."""
+    from quadfringe import decoding
     from quadfringe.config import DecodeConfig, Fringes, checked
-    from quadfringe.data import AnyShot, Calibration
+    from quadfringe.data import Calibration
+
+    _check_result(out, calibration)
+    settings: dict[str, Any] = {"method": method and method.value, "unwrapping": unwrapping and unwrapping.value}
+    settings |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
+    plan = decoding.Plan(
+        projector_width,
+        Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
+        None if calibration is None else Calibration.load(calibration),
+        _response(response, linear),
+        checked(DecodeConfig, settings, "options"),
+    )
+    files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}
+    shape = decoding.decode(_shot(files, raw, bayer, bits), plan)
+    _save(shape, out, json)
+
+
+def _check_result(out: Path, calibration: Path | None) -> None:
+    """Refuse a result file that this command could not write, before anything is decoded."""
     from quadfringe.data.shape import SUFFIXES
-    from quadfringe.data.shot_files import read_bayer_shot, read_shot
-    from quadfringe.decoding import Plan
-    from quadfringe.decoding import decode as decode_shot
     from quadfringe.errors import InputError
     from quadfringe.files import require_suffix
 
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
-        raise InputError(f"{out}: millimetres need --calibration FILE; without it write .npz")
-    settings = {
-        "method": None if method is None else method.value,
-        "unwrapping": None if unwrapping is None else unwrapping.value,
-        "depth_range_mm": depth_range_mm,
-        "channel_instants_us": channel_instants_us,
-    }
-    plan = Plan(
-        projector_width_px=projector_width,
-        fringes=Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
-        calibration=None if calibration is None else Calibration.load(calibration),
-        response=_response(response, linear),
-        decode=checked(DecodeConfig, settings, "options"),
-    )
-    bits_in_use = None if bits is None else int(bits)
-    files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}
-    if raw is None and bayer is None:
-        shot: AnyShot = read_shot(files, bits_in_use)
-    else:
-        shot = read_bayer_shot(*_mosaic(raw, bayer, files), bits_in_use)
-    shape = decode_shot(shot, plan)
-    shape.save(out)
-    figures = shape.figures()
-    percent = figures["returned_percent"]
-    say(f"{out}: {percent:.1f} % of {shape.phase_rad.size} pixels returned{_sureness(figures)}", json)
-    if shape.config.get("response_of_shot"):
-        exponents = {name: channel["exponent"] for name, channel in shape.config["response"].items()}
-        listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
-        say(f"response estimated from the shot, exponents: {listed} (--linear leaves it as it is)", json)
-        figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
-    write_figures(figures, json)
+        raise InputError(f"{out}: millimetres need --calibration FILE; without a calibration, write .npz")
 
 
 def _response(file: Path | None, linear: bool) -> Response | None:
-    """Give what the options say of the response; None leaves it to the shot."""
+    """Return the response that the options name; None estimates it from the shot."""
     from quadfringe.config import Response
     from quadfringe.data import ResponseCalibration
     from quadfringe.errors import InputError
@@ -131,17 +162,18 @@ def _response(file: Path | None, linear: bool) -> Response | None:
     return Response() if linear else None
 
 
-def _sureness(figures: Mapping[str, float]) -> str:
-    """Tell how sure the pixels are, in words."""
-    for unit in ("mm", "rad"):
-        if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
-            wrong = figures.get("wrong_orders_at_most", 0.0)
-            return f", uncertainty {sigma:.3g} {unit} (median), at most {wrong:.3g} wrong orders to be expected"
-    return ""
+def _shot(files: Mapping[str, Path | None], raw: Path | None, bayer: Bayer | None, bits: Bits | None) -> AnyShot:
+    """Read the shot from separate images, a colour image, or a raw mosaic."""
+    from quadfringe.data.shot_files import read_bayer_shot, read_shot
+
+    bits_in_use = None if bits is None else int(bits)
+    if raw is None and bayer is None:
+        return read_shot(files, bits_in_use)
+    return read_bayer_shot(*_mosaic(raw, bayer, files), bits_in_use)
 
 
 def _mosaic(raw: Path | None, bayer: Bayer | None, files: Mapping[str, Path | None]) -> tuple[Path, BayerPattern, Path]:
-    """Give the mosaic, its pattern and the infrared image; raise when one is missing or there is too much."""
+    """Return mosaic file, pattern and infrared file; raise `InputError` when one is missing or too many are given."""
     from quadfringe.errors import InputError
 
     ir = files["ir"]
@@ -153,3 +185,26 @@ def _mosaic(raw: Path | None, bayer: Bayer | None, files: Mapping[str, Path | No
     if more := [name for name, path in files.items() if path is not None and name != "ir"]:
         raise InputError(f"--raw already holds red, green and blue; leave out --{' --'.join(more)}")
     return raw, bayer.value, ir
+
+
+def _save(shape: Shape, out: Path, json: Path | None) -> None:
+    """Save the shape, print a summary and write its figures."""
+    shape.save(out)
+    figures = shape.figures()
+    pixels = f"{figures['returned_percent']:.1f} % of {shape.phase_rad.size} pixels returned"
+    say(f"{out}: {pixels}{_uncertainty(figures)}", json)
+    if shape.config.get("response_of_shot"):
+        exponents = {name: channel["exponent"] for name, channel in shape.config["response"].items()}
+        listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
+        say(f"response estimated from the shot, exponents: {listed} (--linear skips this)", json)
+        figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
+    write_figures(figures, json)
+
+
+def _uncertainty(figures: Mapping[str, float]) -> str:
+    """Describe the median uncertainty and how many wrong fringe orders to expect; empty when neither is known."""
+    for unit in ("mm", "rad"):
+        if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
+            wrong = figures.get("wrong_orders_at_most", 0.0)
+            return f", median uncertainty {sigma:.3g} {unit}, at most {wrong:.3g} pixels of wrong fringe order expected"
+    return ""

@@ -1,63 +1,98 @@
-"""`quadfringe doctor`: what is wrong with the installation, a shot or a calibration, and the fix for each."""
+"""`quadfringe doctor`: find what is wrong with the installation, a shot or a calibration, and say how to fix it."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from quadfringe.cli._output import Bayer, JsonOption, say, write_record
+from quadfringe.cli._options import Bayer, ColumnsOption, JsonOption
+from quadfringe.cli._output import say, write_record
 
 if TYPE_CHECKING:
-    from quadfringe.data import AnyShot, Calibration
+    from quadfringe.data import AnyShot
     from quadfringe.doctor import Finding
 
 __all__ = ["doctor"]
 
 FAULT = 1
 MARKS = {"good": "ok     ", "warning": "WARNING", "fault": "FAULT  "}
+PathsArgument = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="[PATH]...",
+        help="A folder with a shot (red, green, blue and ir, or raw and ir, .png), a calibration .json, or both; "
+        "without a path, the installation is examined.",
+    ),
+]
+FringesOption = Annotated[
+    tuple[float, float, float],
+    typer.Option(metavar="N N N", help="Fringe numbers of the shot: of red and blue, of green, of infrared."),
+]
+BayerOption = Annotated[
+    Bayer | None, typer.Option(help="Filter colours of the first 2 x 2 pixels of raw.png; needed for a raw mosaic.")
+]
 
 
 def doctor(
-    files: Annotated[
-        list[Path] | None,
-        typer.Argument(
-            metavar="[PATH]...",
-            help="A folder with a shot (red, green, blue, ir .png, or raw and ir), a calibration .json, or both.",
-        ),
-    ] = None,
-    fringes: Annotated[
-        tuple[float, float, float], typer.Option(metavar="N N N", help="Fringe numbers of the shot.")
-    ] = (36.0, 35.0, 30.0),
-    projector_width: Annotated[int, typer.Option(min=2, help="Columns that the fringes cover.")] = 912,
-    bayer: Annotated[Bayer | None, typer.Option(help="Colours of the first 2 x 2 pixels of raw.png.")] = None,
+    files: PathsArgument = None,
+    fringes: FringesOption = (36.0, 35.0, 30.0),
+    projector_width: ColumnsOption = 912,
+    bayer: BayerOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Say what is wrong with the installation, or with a shot or a calibration, and how to mend it.
+    """Examine the installation, or a shot or a calibration; say what is wrong and how to fix it.
 
-    The status is 1 when a fault is found.
+    The exit status is 1 when a fault is found.
     """
     from quadfringe.config import Fringes
     from quadfringe.data import Calibration
     from quadfringe.decoding import Plan
     from quadfringe.doctor import examine_calibration, examine_installation, examine_shot
+
+    given = _sorted_paths(files or [])
+    calibration = None if given.calibration is None else Calibration.load(given.calibration)
+    found: list[Finding] = [] if files else examine_installation()
+    if calibration is not None:
+        found += examine_calibration(calibration)
+    if given.shot is not None:
+        plan = Plan(projector_width, Fringes(numbers=fringes), calibration)
+        found += examine_shot(_shot_in(given.shot, bayer), plan)
+    _report(found, json)
+
+
+class _Paths(NamedTuple):
+    """The folder of a shot and the file of a calibration, as far as they are given."""
+
+    shot: Path | None
+    calibration: Path | None
+
+
+def _sorted_paths(paths: Sequence[Path]) -> _Paths:
+    """Tell the shot from the calibration; raise `InputError` for anything else, and for two of a kind."""
     from quadfringe.errors import InputError
 
-    given = files or []
-    folders = [path for path in given if path.is_dir()]
-    calibrations = [path for path in given if path.suffix.lower() == ".json"]
-    if len(folders) > 1 or len(calibrations) > 1 or len(folders) + len(calibrations) < len(given):
-        wrong = ", ".join(str(path) for path in given)
+    folders = [path for path in paths if path.is_dir()]
+    calibrations = [path for path in paths if path.suffix.lower() == ".json"]
+    if len(folders) > 1 or len(calibrations) > 1 or len(folders) + len(calibrations) < len(paths):
+        wrong = ", ".join(str(path) for path in paths)
         raise InputError(f"expected one folder with a shot, one calibration .json, or both, got {wrong}")
-    calibration: Calibration | None = None
-    found: list[Finding] = [] if given else examine_installation()
-    if calibrations:
-        calibration = Calibration.load(calibrations[0])
-        found += examine_calibration(calibration)
-    if folders:
-        plan = Plan(projector_width, Fringes(numbers=fringes), calibration)
-        found += examine_shot(_shot_in(folders[0], bayer), plan)
+    return _Paths(folders[0] if folders else None, calibrations[0] if calibrations else None)
+
+
+def _shot_in(folder: Path, bayer: Bayer | None) -> AnyShot:
+    from quadfringe.data.shot_files import read_folder
+    from quadfringe.errors import InputError
+
+    if bayer is None and (folder / "raw.png").exists():
+        raise InputError(f"{folder}: holds a raw mosaic; name its filter pattern with --bayer")
+    return read_folder(folder, None if bayer is None else bayer.value)
+
+
+def _report(found: Sequence[Finding], json: Path | None) -> None:
+    """Print the findings with their fixes, and exit with status 1 when one is a fault."""
     for one in found:
         say(f"{MARKS[one.grade]} {one.name}: {one.found}", json)
         if one.fix:
@@ -67,12 +102,3 @@ def doctor(
     write_record({"findings": [vars(one) for one in found]}, json)
     if faults:
         raise typer.Exit(FAULT)
-
-
-def _shot_in(folder: Path, bayer: Bayer | None) -> AnyShot:
-    from quadfringe.data.shot_files import read_folder
-    from quadfringe.errors import InputError
-
-    if bayer is None and (folder / "raw.png").exists():
-        raise InputError(f"{folder}: holds a raw mosaic; say its pattern with --bayer")
-    return read_folder(folder, None if bayer is None else bayer.value)

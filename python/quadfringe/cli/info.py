@@ -1,4 +1,4 @@
-"""`quadfringe info`: what a file holds."""
+"""`quadfringe info`: describe a file."""
 
 from __future__ import annotations
 
@@ -13,9 +13,11 @@ __all__ = ["info"]
 
 
 def info(
-    file: Annotated[Path, typer.Argument(help="A shape, calibration, response, system file, recording or image.")],
+    file: Annotated[
+        Path, typer.Argument(help="A shape, calibration, camera response, system file, recording or image.")
+    ],
 ) -> None:
-    """Say what a file holds: maps and their ranges, settings, calibration."""
+    """Describe a file: its maps and their ranges, its settings, its calibration."""
     from quadfringe.recording.inspection import lines_about
 
     for line in lines_about(file):

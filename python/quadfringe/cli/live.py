@@ -1,4 +1,4 @@
-"""`quadfringe live`: the moving shape in a browser, and on disk when asked."""
+"""`quadfringe live`: show the moving shape in a browser, and optionally record the shots."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli._output import SystemFile, say, stoppable
-from quadfringe.cli.record import FileSize, ShotsOption
+from quadfringe.cli._options import FileSizeOption, ShotsOption, SystemFile
+from quadfringe.cli._output import say, stoppable
 
 if TYPE_CHECKING:
     from quadfringe.recording import Recorder
@@ -20,31 +20,46 @@ __all__ = ["live"]
 
 
 class Colour(StrEnum):
-    """What the points are coloured by."""
+    """Colouring of the points: by brightness, by depth, or by quality."""
 
     texture = "texture"
     height = "height"
     quality = "quality"
 
 
+RecordOption = Annotated[
+    Path | None, typer.Option(metavar="FILE.h5", help="Also record every raw shot into this new file.")
+]
+HostOption = Annotated[
+    str, typer.Option(help="Address that the page is served on; 0.0.0.0 shows it to the whole network.")
+]
+PortOption = Annotated[
+    int, typer.Option(min=1, max=65535, help="Port of the page; when it is taken, the next free port is used.")
+]
+StrideOption = Annotated[
+    int, typer.Option(min=1, max=64, help="Show every n-th pixel of every n-th row; raise it for a slow browser.")
+]
+CloudsOption = Annotated[
+    float,
+    typer.Option(min=0.1, max=100.0, help="Largest number of point clouds per second; a graphics card manages 10."),
+]
+ColourOption = Annotated[Colour, typer.Option(help="Initial colouring of the points.")]
+
+
 def live(
     system: SystemFile = None,
-    record: Annotated[Path | None, typer.Option(metavar="FILE.h5", help="Record every raw shot as well.")] = None,
-    host: Annotated[
-        str, typer.Option(help="Address to serve; 0.0.0.0 shows the page to the whole network.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(min=1, max=65535, help="Port of the page; the next free one if taken.")] = 8080,
-    view_stride: Annotated[int, typer.Option(min=1, max=64, help="Every n-th pixel of every n-th row is shown.")] = 2,
-    clouds_per_s: Annotated[
-        float, typer.Option(min=0.1, max=100.0, help="Most clouds a second; with a graphics card 10 and more go.")
-    ] = 4.0,
-    colour: Annotated[Colour, typer.Option(help="Colour of the points at first.")] = Colour.texture,
+    record: RecordOption = None,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8080,
+    view_stride: StrideOption = 2,
+    clouds_per_s: CloudsOption = 4.0,
+    colour: ColourOption = Colour.texture,
     shots: ShotsOption = None,
-    file_gb: FileSize = None,
+    file_gb: FileSizeOption = None,
 ) -> None:
-    """Measure without pause and show the shape, the channels and the figures in a browser, until Ctrl-C or --shots.
+    """Measure continuously and show the shape, the channels and the figures in a browser, until Ctrl-C or --shots.
 
-    Nobody but this machine sees the page unless --host says so; there is no password.
+    Only this machine can open the page, unless --host says otherwise; the page has no password.
     """
     from contextlib import ExitStack
 
@@ -60,15 +75,15 @@ def live(
         viewer = stack.enter_context(
             Viewer(host, port, stride=view_stride, clouds_per_s=clouds_per_s, colouring=colour.value)
         )
-        say(f"live at {viewer.url}; Ctrl-C ends")
+        say(f"live at {viewer.url}; stop with Ctrl-C")
         with stoppable():
             _follow(scanner, viewer, recorder, shots)
             if shots is None:
-                say("the camera gives no more shots; the last shape stays until Ctrl-C")
+                say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
                 _sleep()
     if recorder is not None:
         done = recorder.statistics()
-        say(f"{record}: {done.written} shots recorded, {done.refused} not")
+        say(f"{record}: {done.written} shots recorded, {done.refused} refused by the disk")
 
 
 def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: int | None) -> None:

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._output import SystemFile, say
+from quadfringe.cli._options import SystemFile
+from quadfringe.cli._output import say
 
 __all__ = ["measure"]
 
@@ -15,11 +16,11 @@ __all__ = ["measure"]
 def measure(
     out: Annotated[
         list[Path],
-        typer.Option(metavar="FILE", help="Result: .ply, .tif or .npz; may be repeated."),
+        typer.Option(metavar="FILE", help="Result file: .ply, .tif or .npz; may be repeated."),
     ],
     system: SystemFile = None,
 ) -> None:
-    """Take one shot with a system and save its shape."""
+    """Take one shot with a system, decode it and save the shape."""
     from quadfringe.data.shape import SUFFIXES
     from quadfringe.files import require_suffix
     from quadfringe.scanner import open_system

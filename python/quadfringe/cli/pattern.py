@@ -8,13 +8,14 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._output import Fringes3, OutFolder, PredeformedOption, say
+from quadfringe.cli._options import Fringes3, OutFolder, PredeformedOption
+from quadfringe.cli._output import say
 
 __all__ = ["pattern"]
 
 
 class Layout(StrEnum):
-    """How the mirrors of the projector are arranged."""
+    """Arrangement of the projector mirrors: on a regular grid, or with odd rows shifted by half a column."""
 
     regular = "regular"
     diamond = "diamond"
@@ -23,16 +24,21 @@ class Layout(StrEnum):
 def pattern(
     out: OutFolder,
     fringes: Fringes3 = (36.0, 35.0, 30.0),
-    width: Annotated[int, typer.Option(min=2, help="Columns of the projector.")] = 912,
-    height: Annotated[int, typer.Option(min=1, help="Rows of the projector.")] = 1140,
-    layout: Annotated[Layout, typer.Option(help="Mirror layout.")] = Layout.regular,
-    calibration: Annotated[Path | None, typer.Option(metavar="FILE", help="Both projectors calibrated, JSON.")] = None,
+    width: Annotated[int, typer.Option(min=2, help="Columns of the projector, px.")] = 912,
+    height: Annotated[int, typer.Option(min=1, help="Rows of the projector, px.")] = 1140,
+    layout: Annotated[
+        Layout, typer.Option(help="Mirror layout of the projector; a LightCrafter 4500 is diamond.")
+    ] = Layout.regular,
+    calibration: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Calibration of both projectors, .json; needs --predeformed-z-mm."),
+    ] = None,
     predeformed_z_mm: PredeformedOption = None,
 ) -> None:
     """Write the two images to project: visible.png (red, green, blue) and infrared.png, 8 bit.
 
-    With --calibration and --predeformed-z-mm the infrared image makes up for an infrared projector that does not stand
-    where the visible one does: exact on the plane at that depth.
+    With --calibration and --predeformed-z-mm, the infrared image is pre-deformed for an infrared projector that is not
+    aligned with the visible one. The correction is exact on the plane at that depth.
     """
     from quadfringe.config import Fringes
     from quadfringe.data import Calibration
@@ -41,7 +47,9 @@ def pattern(
     from quadfringe.errors import InputError
 
     if calibration is not None and predeformed_z_mm is None:
-        raise InputError("--calibration changes nothing without --predeformed-z-mm, the depth of the reference plane")
+        raise InputError(
+            "--calibration has no effect without --predeformed-z-mm, the depth of the reference plane; add it"
+        )
     known = None if calibration is None else Calibration.load(calibration)
     asked = Fringes(numbers=fringes, layout=layout.value, predeformed_z_mm=predeformed_z_mm)
     for path in write_patterns(out, asked.numbers, (width, height), layout.value, predeformation(asked, known)):

@@ -1,4 +1,4 @@
-"""`quadfringe projector`: the LightCrafter 4500s of a bench."""
+"""`quadfringe projector`: control the LightCrafter 4500 projectors of a bench."""
 
 from __future__ import annotations
 
@@ -19,20 +19,24 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(name="projector", help="The LightCrafter 4500s of a bench.", no_args_is_help=True)
+app = typer.Typer(name="projector", help="The LightCrafter 4500 projectors of a bench.", no_args_is_help=True)
 
 FAILED = 1
 PortOption = Annotated[
-    str | None, typer.Option("--port", metavar="BUS-PORT", help="Which projector, such as 1-2; else the only one.")
+    str | None,
+    typer.Option("--port", metavar="BUS-PORT", help="USB port of the projector, such as 1-2; default: the only one."),
 ]
 SystemOption = Annotated[
-    Path | None, typer.Option("--system", metavar="FILE", help="A system file with a [projectors] table.")
+    Path | None,
+    typer.Option(
+        "--system", metavar="FILE", help="System file with a [projectors] table, .toml: acts on both projectors."
+    ),
 ]
 
 
 @contextmanager
 def _devices() -> Iterator[None]:
-    """Let what a device did end the run with status 1; what the caller chose wrongly ends with 2, as everywhere."""
+    """Exit with status 1 for a device error; bad input exits with 2, as in every command."""
     try:
         yield
     except OSError as error:
@@ -46,8 +50,8 @@ def _system(file: Path) -> SystemConfig:
     config = load_system(file)
     if config.projectors is None:
         raise InputError(
-            f"{file}: no [projectors] table, so that its fringes are shown by the virtual bench (quadfringe simulate); "
-            "add one that names two ports, as the README has it"
+            f"{file}: no [projectors] table, so its fringes belong to the virtual bench (quadfringe simulate); add a "
+            "table that names the ports of both projectors, as in the README"
         )
     return config
 
@@ -58,21 +62,21 @@ def _chosen(which: ProjectorConfig | str | None) -> LightCrafter:
     return LightCrafter(which) if which is None or isinstance(which, str) else open_device(which)
 
 
-def _meant(port: str | None, system: Path | None) -> Sequence[ProjectorConfig | str | None]:
-    """Give the projectors that are meant: one by its port, the only one, or both of a system."""
+def _selected(port: str | None, system: Path | None) -> Sequence[ProjectorConfig | str | None]:
+    """Return the selected projectors: the one at a port, the only one, or both of a system."""
     if system is None:
         return [port]
     if port is not None:
-        raise InputError("give --port or --system, not both")
+        raise InputError("--port selects one projector and --system both; give one of them")
     projectors = _system(system).projectors
     assert projectors is not None
     return [projectors.visible, projectors.infrared]
 
 
 def _each(port: str | None, system: Path | None, act: Callable[[LightCrafter], object]) -> None:
-    """Do it to every projector that is meant, also when one of them fails."""
+    """Call `act` with every selected projector, also after one of them failed."""
     failed = False
-    for one in _meant(port, system):
+    for one in _selected(port, system):
         try:
             with _chosen(one) as device:
                 act(device)
@@ -85,7 +89,7 @@ def _each(port: str | None, system: Path | None, act: Callable[[LightCrafter], o
 
 @app.command("list")
 def list_projectors() -> None:
-    """List projectors by their ports; all of them may have the same serial number."""
+    """List the projectors by USB port, because all of them may have the same serial number."""
     from quadfringe.devices.lightcrafter import lightcrafters
 
     with _devices():
@@ -100,7 +104,7 @@ def list_projectors() -> None:
 
 @app.command()
 def status(port: PortOption = None, system: SystemOption = None) -> None:
-    """Say what projectors do, and what is wrong with them."""
+    """Print the state of the projectors and their faults."""
     _each(port, system, _report)
 
 
@@ -109,7 +113,7 @@ def _report(device: LightCrafter) -> list[str]:
     firmware = device.versions()["application"]
     say(f"port {device.port}: {state['run']}, mode {state['mode']}, power {state['power']}, input {state['input']}")
     say(f"  firmware {firmware} ({device.firmware_tag()}), {device.flash_image_count()} images in flash")
-    video = state["video"] if state["mode"] == "video" else "not watched in pattern mode"
+    video = state["video"] if state["mode"] == "video" else "not monitored in pattern mode"
     say(f"  video: {video}; LED drive (red, green, blue) {' '.join(map(str, device.led_drive()))}")
     for fault in state["faults"]:
         say(f"  fault: {fault}")
@@ -121,22 +125,31 @@ def show(
     system: SystemOption = None,
     port: PortOption = None,
     flash_image: Annotated[
-        int | None, typer.Option("--flash-image", metavar="N", help="Show this image of flash and return.")
+        int | None,
+        typer.Option(
+            "--flash-image", metavar="N", help="Show this image of the flash memory, counted from 0, and return."
+        ),
     ] = None,
     test_pattern: Annotated[
-        str | None, typer.Option("--test-pattern", metavar="NAME", help="Show a picture of the generator and return.")
+        str | None,
+        typer.Option(
+            "--test-pattern", metavar="NAME", help="Show this built-in test pattern, such as checkerboard, and return."
+        ),
     ] = None,
     seconds: Annotated[
-        float | None, typer.Option("--seconds", min=0.0, help="Show the fringes this long; else until Ctrl-C.")
+        float | None,
+        typer.Option("--seconds", min=0.0, help="Show the fringes for this time, s; default: until Ctrl-C."),
     ] = None,
 ) -> None:
-    """Show the fringes of a system on its pair of projectors, or a still picture on one projector."""
+    """Show the fringes of a system on both of its projectors, or a still image on one projector."""
     if sum(choice is not None for choice in (system, flash_image, test_pattern)) != 1:
         raise InputError("give one of --system, --flash-image and --test-pattern")
     if system is not None and port is not None:
-        raise InputError("--port goes with --flash-image and --test-pattern; --system names both ports")
+        raise InputError(
+            "--port is for --flash-image and --test-pattern; --system names both ports, so leave --port out"
+        )
     if system is None and seconds is not None:
-        raise InputError("--seconds goes with --system; a still picture stays")
+        raise InputError("--seconds is for --system; a still image stays, so leave --seconds out")
     with _devices():
         if system is not None:
             _show_fringes(_system(system), seconds)
@@ -150,7 +163,7 @@ def _show_fringes(config: SystemConfig, seconds: float | None) -> None:
     projector = open_projector(config)
     try:
         projector.show(config.fringes)
-        say("showing; Ctrl-C ends it" if seconds is None else f"showing for {seconds:g} s")
+        say("showing; stop with Ctrl-C" if seconds is None else f"showing for {seconds:g} s")
         _rest(seconds)
     finally:
         projector.close()
@@ -178,14 +191,14 @@ def _show_still(port: str | None, flash_image: int | None, test_pattern: str | N
 
 @app.command()
 def start(port: PortOption = None, system: SystemOption = None) -> None:
-    """Go on after a pause; with a system whose patterns are in flash, load and start them, and leave them running."""
+    """Resume after a pause; with --system, start the patterns in flash memory and leave them running."""
     if system is None:
         with _devices(), _chosen(port) as device:
             device.start()
             say(f"port {device.port}: running")
         return
     if port is not None:
-        raise InputError("give --port or --system, not both")
+        raise InputError("--port selects one projector and --system both; give one of them")
     with _devices():
         _start_from_flash(_system(system), system)
 
@@ -195,7 +208,7 @@ def _start_from_flash(config: SystemConfig, file: Path) -> None:
 
     assert config.projectors is not None
     if any(one.hdmi is not None for one in (config.projectors.visible, config.projectors.infrared)):
-        raise InputError(f"{file}: HDMI needs a window that stays: use quadfringe projector show --system {file}")
+        raise InputError(f"{file}: HDMI needs a window that stays open; use quadfringe projector show --system {file}")
     pair = CoaxialPair(config.projectors)
     try:
         pair.show(config.fringes)
@@ -208,7 +221,7 @@ def _start_from_flash(config: SystemConfig, file: Path) -> None:
 
 @app.command()
 def pause(port: PortOption = None, system: SystemOption = None) -> None:
-    """Hold the current pattern."""
+    """Freeze the current pattern."""
     _each(port, system, _pause)
 
 
@@ -230,7 +243,7 @@ def _stop(device: LightCrafter) -> None:
 
 @app.command()
 def doctor() -> None:
-    """Open every projector and look at every output; say what is wrong and how to mend it."""
+    """Open every projector and examine every video output; say what is wrong and how to fix it."""
     from quadfringe.devices.lightcrafter import lightcrafters
 
     with _devices():
@@ -247,7 +260,7 @@ def doctor() -> None:
 
 
 def _examine(port: str) -> int:
-    """Give the number of problems of one projector, each said with its cure."""
+    """Print the problems of one projector, each with its fix, and return their number."""
     from quadfringe.devices.lightcrafter import udev_rule
 
     try:
@@ -263,7 +276,7 @@ def _examine(port: str) -> int:
 
 
 def _examine_outputs() -> None:
-    """Tell which outputs can carry patterns; none is needed when they are in flash."""
+    """Print which video outputs can carry patterns; patterns in flash memory need none."""
     from quadfringe.devices.lightcrafter import outputs
 
     try:

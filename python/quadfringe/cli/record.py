@@ -1,4 +1,4 @@
-"""`quadfringe record` and `recover`: raw shots on disk, and what a crash left of them."""
+"""`quadfringe record` and `quadfringe recover`: write raw shots to disk, and rescue them after a crash."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli._output import JsonOption, SystemFile, complain, say, steps, stop_asked, write_figures
+from quadfringe.cli._options import FileSizeOption, JsonOption, ShotsOption, SystemFile
+from quadfringe.cli._output import complain, progress, say, stop_requested, write_figures
 
 if TYPE_CHECKING:
     from threading import Event
@@ -19,22 +20,22 @@ if TYPE_CHECKING:
 
 __all__ = ["record", "recover"]
 
-ShotsOption = Annotated[int | None, typer.Option(min=1, help="End after so many shots.")]
-SecondsOption = Annotated[float | None, typer.Option(min=0, help="End after so many seconds.")]
-FileSize = Annotated[float | None, typer.Option(min=0.01, help="Begin a new file at this size, GB.")]
+SecondsOption = Annotated[float | None, typer.Option(min=0, help="Stop after this many seconds; default: no limit.")]
 
 
 def record(
-    out: Annotated[Path, typer.Option(metavar="FILE.h5", help="The recording; never overwritten.")],
+    out: Annotated[
+        Path, typer.Option(metavar="FILE.h5", help="Recording to create; an existing file is never overwritten.")
+    ],
     system: SystemFile = None,
     shots: ShotsOption = None,
     seconds: SecondsOption = None,
-    file_gb: FileSize = None,
+    file_gb: FileSizeOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Record raw shots with stamps, settings and calibration, until Ctrl-C, SIGTERM, --shots or --seconds.
+    """Record raw shots with their time stamps, settings and calibration until Ctrl-C, SIGTERM, --shots or --seconds.
 
-    Nothing is decoded. Every shot that was written can be read after a crash or on a full disk.
+    Nothing is decoded. Every shot on file stays readable after a crash and when the disk is full.
     """
     from quadfringe.errors import RecordingError
     from quadfringe.recording import Recorder
@@ -43,8 +44,8 @@ def record(
     with (
         open_system(system) as scanner,
         Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
-        stop_asked() as asked,
-        steps(_shots(scanner, shots, seconds, asked), "recording", shots) as taken,
+        stop_requested() as stop,
+        progress(_shots(scanner, shots, seconds, stop), "recording", shots) as taken,
     ):
         _write_all(taken, recorder)
         camera = scanner.camera.statistics()
@@ -53,22 +54,24 @@ def record(
     say(f"{files}: {done.written} shots, {done.image_bytes / 1e6:.0f} MB; the camera dropped {camera.dropped}", json)
     write_figures({"written": done.written, "refused": done.refused, "dropped": camera.dropped}, json)
     if done.refused:
-        raise RecordingError(f"{done.refused} shots were not recorded: {done.fault or 'the disk was full for a while'}")
+        raise RecordingError(
+            f"{done.refused} shots were not recorded: {done.fault or 'the disk was full for a while'}; free disk space"
+        )
 
 
 def _write_all(shots: Iterable[AnyShot], recorder: Recorder) -> None:
-    """Write shots, and say at once when the disk refuses them and when it takes them again."""
+    """Write shots; print when the disk starts to refuse them, and when recording resumes."""
     fault = None
     for shot in shots:
         recorder.write(shot)
         now = recorder.statistics().fault
         if (now is None) != (fault is None):
-            complain(now) if now else say("recording goes on in a new file")
+            complain(now) if now else say("recording resumes in a new file")
         fault = now
 
 
-def _shots(scanner: Scanner, shots: int | None, seconds: float | None, asked: Event) -> Iterator[AnyShot]:
-    """Give shots of the camera until one of the limits, or until the end is asked for."""
+def _shots(scanner: Scanner, shots: int | None, seconds: float | None, stop: Event) -> Iterator[AnyShot]:
+    """Yield shots of the camera until a limit is reached or a stop is requested."""
     from contextlib import closing
     from time import monotonic
 
@@ -77,19 +80,27 @@ def _shots(scanner: Scanner, shots: int | None, seconds: float | None, asked: Ev
     with closing(scanner.camera.stream(shots, keep="all")) as stream:  # type: ignore[type-var]
         for shot in stream:
             yield shot
-            if asked.is_set() or (end_s is not None and monotonic() >= end_s):
+            if stop.is_set() or (end_s is not None and monotonic() >= end_s):
                 return
 
 
 def recover(
-    file: Annotated[Path, typer.Argument(help="A recording whose writer was killed, or that was damaged.")],
-    out: Annotated[Path, typer.Option(metavar="FILE.h5", help="Where the whole recording goes.")],
+    file: Annotated[Path, typer.Argument(help="Recording whose writer was killed, or which is damaged.")],
+    out: Annotated[
+        Path,
+        typer.Option(
+            metavar="FILE.h5", help="New recording for the whole shots; an existing file is never overwritten."
+        ),
+    ],
     json: JsonOption = None,
 ) -> None:
-    """Copy every whole shot of a recording into a new one that any HDF5 program opens; the old file is only read."""
+    """Copy every whole shot of a damaged recording into a new one, which any HDF5 program opens.
+
+    The damaged file is only read.
+    """
     from quadfringe.recording import recover as recover_file
 
     found = recover_file(file, out)
-    damaged = f", {len(found.damaged)} damaged ones left behind" if found.damaged else ""
+    damaged = f", {len(found.damaged)} damaged shots left out" if found.damaged else ""
     say(f"{out}: {found.shots} shots{damaged}", json)
     write_figures({"shots": found.shots, "damaged": len(found.damaged)}, json)

@@ -1,4 +1,4 @@
-"""`quadfringe reproduce`: a published figure, computed again."""
+"""`quadfringe reproduce`: compute a published result again."""
 
 from __future__ import annotations
 
@@ -8,13 +8,14 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._output import JsonOption, say, table, write_figures
+from quadfringe.cli._options import JsonOption
+from quadfringe.cli._output import say, table, write_figures
 
 __all__ = ["reproduce"]
 
 
 class Published(StrEnum):
-    """What can be reproduced."""
+    """Results of the paper, and of the projector pair, that can be reproduced."""
 
     hand = "hand"
     peaks = "peaks"
@@ -26,11 +27,11 @@ class Published(StrEnum):
 
 
 def reproduce(
-    name: Annotated[Published, typer.Argument(help="Which published result.")],
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the figure.")] = Path("out/reproduce"),
+    name: Annotated[Published, typer.Argument(help="The result to compute.")],
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the picture.")] = Path("out/reproduce"),
     json: JsonOption = None,
 ) -> None:
-    """Compute a published result again: its figure as PNG, its numbers as JSON."""
+    """Compute a published result again: write its figure as PNG (the hand: MP4) and print its numbers."""
     from quadfringe.evaluation.reproduce import REPRODUCTIONS
     from quadfringe.files import folder_for
 

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._output import Bayer, OutFolder, SystemFile, say
+from quadfringe.cli._options import Bayer, OutFolder, SystemFile
+from quadfringe.cli._output import say
 
 __all__ = ["simulate"]
 
@@ -14,12 +15,25 @@ __all__ = ["simulate"]
 def simulate(
     out: OutFolder,
     system: SystemFile = None,
-    surface: Annotated[str | None, typer.Option(help="What stands on the bench, in place of the file's.")] = None,
-    noise: Annotated[float | None, typer.Option(min=0, help="Noise, fraction of full scale.")] = None,
-    seed: Annotated[int | None, typer.Option(min=0, help="Seed of the noise.")] = None,
-    bayer: Annotated[Bayer | None, typer.Option(help="A Bayer chip: raw.png in place of three images.")] = None,
+    surface: Annotated[
+        str | None,
+        typer.Option(help="Surface in front of the camera, such as face or steps; default: that of the system file."),
+    ] = None,
+    noise: Annotated[
+        float | None,
+        typer.Option(
+            min=0, help="Standard deviation of the sensor noise, share of full scale; default: that of the system file."
+        ),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the noise; another seed gives another noise realisation.")
+    ] = None,
+    bayer: Annotated[
+        Bayer | None,
+        typer.Option(help="Simulate a Bayer chip with these filter colours: write raw.png in place of three images."),
+    ] = None,
 ) -> None:
-    """Render one shot of the virtual bench: its images, calibration.json, truth.npz."""
+    """Render one shot of the virtual bench: write its images, calibration.json and truth.npz."""
     from quadfringe.evaluation.simulate import virtual_bench_config, write_simulation
 
     config = virtual_bench_config(

@@ -1,0 +1,84 @@
+"""Command line options that several commands share."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+__all__ = [
+    "Bayer",
+    "BoardPosesOption",
+    "CalibrationOption",
+    "ColumnsOption",
+    "FileSizeOption",
+    "Fringes3",
+    "JsonOption",
+    "OutFolder",
+    "PredeformedOption",
+    "ShotsOption",
+    "SystemFile",
+    "VirtualSystemOption",
+]
+
+
+class Bayer(StrEnum):
+    """Filter colours of a Bayer chip: the first two pixels of the first row, then those of the second row."""
+
+    rggb = "rggb"
+    grbg = "grbg"
+    gbrg = "gbrg"
+    bggr = "bggr"
+
+
+JsonOption = Annotated[
+    Path | None,
+    typer.Option("--json", metavar="FILE", help="Write the figures as JSON to this file; - writes to standard output."),
+]
+OutFolder = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the files; created when it is missing.")]
+SystemFile = Annotated[
+    Path | None, typer.Argument(metavar="[SYSTEM.toml]", help="System file; without one, the virtual bench.")
+]
+VirtualSystemOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--system", metavar="FILE", help="System file of the virtual bench, .toml; default: the built-in one."
+    ),
+]
+Fringes3 = Annotated[
+    tuple[float, float, float],
+    typer.Option(
+        "--fringes",
+        metavar="N N N",
+        help="Number of fringes over the projector width: of red and blue, of green, of infrared.",
+    ),
+]
+ColumnsOption = Annotated[
+    int, typer.Option("--projector-width", min=2, help="Columns of the projector that the fringes cover, px.")
+]
+CalibrationOption = Annotated[
+    Path | None,
+    typer.Option("--calibration", metavar="FILE", help="Calibration, .json; needed for millimetres."),
+]
+PredeformedOption = Annotated[
+    float | None,
+    typer.Option(
+        "--predeformed-z-mm",
+        min=1.0,
+        metavar="MM",
+        help="Depth of the reference plane, mm, for which the infrared pattern is pre-deformed; leave it out for "
+        "coaxial projectors.",
+    ),
+]
+BoardPosesOption = Annotated[
+    int, typer.Option("--poses", min=4, max=60, help="Number of poses of the calibration board; 9 to 15 are good.")
+]
+ShotsOption = Annotated[int | None, typer.Option(min=1, help="Stop after this many shots; default: no limit.")]
+FileSizeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--file-gb", min=0.01, help="Start a new file when one reaches this size, GB; default: one file of any size."
+    ),
+]
