@@ -17,7 +17,7 @@ LOOPBACK = ROOT / "scripts" / "loopback"
 
 @dataclass(frozen=True)
 class Source:
-    """A command that writes figures as JSON, and the rows that come from it: figure, words, bar."""
+    """A command that writes figures as JSON, and its rows: figure, words, and key of the bar (for times the bar)."""
 
     command: tuple[str, ...]
     rows: tuple[tuple[str, str, str], ...]
@@ -27,14 +27,30 @@ class Source:
 
 SURFACES = ("plane", "peaks", "steps", "sphere")
 ROUND_TRIP = (
-    ("identity_max_difference", "bench identity: captured against projected image, share of full scale", "1e-4"),
+    (
+        "identity_max_difference",
+        "bench identity: captured against projected image, share of full scale",
+        "round_trip.identity",
+    ),
     *(
         row
         for name in SURFACES
         for row in (
-            (f"{name}_phase_rms_rad", f"{name} without noise: phase RMS a fringe away from edges, rad", "0.005"),
-            (f"{name}_wrong_pixels", f"{name} without noise: wrong orders among returned pixels, pixels", "0"),
-            (f"{name}_in_shadow_pixels", f"{name} without noise: returned in shadow, pixels", "0"),
+            (
+                f"{name}_phase_rms_rad",
+                f"{name} without noise: phase RMS a fringe away from edges, rad",
+                "round_trip.phase_rms_rad",
+            ),
+            (
+                f"{name}_wrong_pixels",
+                f"{name} without noise: wrong orders among returned pixels, pixels",
+                "round_trip.wrong_pixels",
+            ),
+            (
+                f"{name}_in_shadow_pixels",
+                f"{name} without noise: returned in shadow, pixels",
+                "round_trip.in_shadow_pixels",
+            ),
         )
     ),
 )
@@ -43,9 +59,13 @@ DEMO = (
         row
         for name in ("steps", "face")
         for row in (
-            (f"{name}_depth_rms_mm", f"{name}, 3 % noise, 8 bit: depth RMS away from edges, mm", "0.10"),
-            (f"{name}_wrong_order_percent", f"{name}: wrong fringe orders among returned pixels, %", "0.1"),
-            (f"{name}_returned_percent", f"{name}: lit pixels returned, %", ""),
+            (f"{name}_depth_rms_mm", f"{name}, 3 % noise, 8 bit: depth RMS away from edges, mm", "demo.depth_rms_mm"),
+            (
+                f"{name}_wrong_order_percent",
+                f"{name}: wrong fringe orders among returned pixels, %",
+                "demo.wrong_order_percent",
+            ),
+            (f"{name}_returned_percent", f"{name}: lit pixels returned, %", "demo.returned_percent"),
         )
     ),
     ("decode_ms", "one decode and its verdict, 1024 x 768 to X, Y, Z, best of 5, ms", ""),
@@ -53,10 +73,10 @@ DEMO = (
 PEAKS = (
     ("traditional_ftp_rms_rad", "peaks, 3 % noise: traditional FTP, full field, rad", "fails at slopes"),
     ("traditional_ftp_rms_rad_row760", "the same along row 760, rad (published 0.1316)", "fails at slopes"),
-    ("improved_ftp_rms_rad", "improved FTP, full field, rad", "0.0408"),
-    ("improved_ftp_rms_rad_row760", "the same along row 760, rad (published 0.0408)", "0.0408"),
-    ("proposed_rms_rad", "proposed, full field, rad", "0.0099"),
-    ("proposed_rms_rad_row760", "the same along row 760, rad (published 0.0099)", "0.0099"),
+    ("improved_ftp_rms_rad", "improved FTP, full field, rad", "peaks.improved_ftp_rms_rad"),
+    ("improved_ftp_rms_rad_row760", "the same along row 760, rad (published 0.0408)", "peaks.improved_ftp_rms_rad"),
+    ("proposed_rms_rad", "proposed, full field, rad", "peaks.proposed_rms_rad"),
+    ("proposed_rms_rad_row760", "the same along row 760, rad (published 0.0099)", "peaks.proposed_rms_rad"),
 )
 PAIR_TOLERANCE = tuple(
     (axis, f"allowable deviation of the infrared projector, {axis.replace('_', ', ')}", "")
@@ -64,11 +84,11 @@ PAIR_TOLERANCE = tuple(
 )
 PAIR_CORRECTION = (
     ("infrared_before_rms_rad_row130", "pair 1 degree and 0.5 mm apart, row 130: infrared fringes before, rad", ""),
-    ("infrared_after_rms_rad_row130", "the same with a pre-deformed image, rad (published 0.031)", "0.02"),
-    ("infrared_after_rms_rad", "the same over the field, rad", "0.02"),
-    ("after_rms_rad", "unwrapped phase against one projector, published method, rad", "0.02"),
-    ("after_best_rms_rad", "unwrapped phase against one projector, best method, rad", "0.02"),
-    ("after_wrong_order_percent", "wrong orders after the correction, %", "0"),
+    ("infrared_after_rms_rad_row130", "the same with a pre-deformed image, rad (published 0.031)", "pair.rms_rad"),
+    ("infrared_after_rms_rad", "the same over the field, rad", "pair.rms_rad"),
+    ("after_rms_rad", "unwrapped phase against one projector, published method, rad", "pair.rms_rad"),
+    ("after_best_rms_rad", "unwrapped phase against one projector, best method, rad", "pair.rms_rad"),
+    ("after_wrong_order_percent", "wrong orders after the correction, %", "pair.wrong_order_percent"),
 )
 PAIR_DEPTH = tuple(
     row
@@ -77,13 +97,17 @@ PAIR_DEPTH = tuple(
         (
             f"{way}_0.5mm_infrared_rms_rad",
             f"{words}, 700 to 900 mm: infrared against expectation, worst, rad",
-            "0.02" if way == "searched" else "",
+            "pair.rms_rad" if way == "searched" else "",
         ),
-        (f"{way}_0.5mm_wrong_order_percent", f"{words}, 1 degree and 0.5 mm apart: wrong orders, worst, %", "0"),
+        (
+            f"{way}_0.5mm_wrong_order_percent",
+            f"{words}, 1 degree and 0.5 mm apart: wrong orders, worst, %",
+            "pair.wrong_order_percent",
+        ),
         (
             f"{way}_5mm_wrong_order_percent",
             f"{words}, 1 degree and 5 mm apart: wrong orders, worst, %",
-            "0" if way == "searched" else "",
+            "pair.wrong_order_percent" if way == "searched" else "",
         ),
     )
 )
@@ -91,13 +115,16 @@ CAPTURES = (
     *(
         row
         for name in ("plate", "bottle")
-        for key, words in (("own_response", "as it came"), ("with_response", "with its response"))
+        for key, words, bar in (
+            ("own_response", "as it came", "captures.auto_right_percent"),
+            ("with_response", "with its response", "captures.right_percent"),
+        )
         for row in (
-            (f"{name}_{key}_right_percent", f"real capture, {name}, {words}: right order, object pixels, %", "95"),
+            (f"{name}_{key}_right_percent", f"real capture, {name}, {words}: right order, object pixels, %", bar),
             (
                 f"{name}_{key}_right_of_returned_percent",
                 f"real capture, {name}, {words}: right order, returned pixels, %",
-                "99",
+                "captures.right_of_returned_percent",
             ),
         )
     ),
@@ -105,11 +132,15 @@ CAPTURES = (
         row
         for name in ("plane", "peaks")
         for row in (
-            (f"{name}_noise_3_percent_depth_rms_mm", f"independent render, {name}, 3 % noise: depth RMS, mm", "0.10"),
+            (
+                f"{name}_noise_3_percent_depth_rms_mm",
+                f"independent render, {name}, 3 % noise: depth RMS, mm",
+                "renders.depth_rms_mm",
+            ),
             (
                 f"{name}_noise_3_percent_right_of_returned_percent",
                 f"independent render, {name}: right order, returned pixels, %",
-                "99.9",
+                "renders.right_of_returned_percent",
             ),
         )
     ),
@@ -135,33 +166,45 @@ BAYER = (
     ("steps_noise_3_percent_best_mosaic_returned_percent", "the same: lit pixels returned, %", ""),
 )
 CALIBRATION = (
-    ("ring_centre_rms_px", "centres of rings, RMS, px", "0.05"),
-    ("camera_mean_px", "mean reprojection error, camera, px", "0.15"),
-    ("visible_mean_px", "the same, visible projector, px (published 0.269)", "0.15"),
-    ("infrared_mean_px", "the same, infrared projector, px (published 0.221)", "0.15"),
-    ("focal_error_percent", "worst focal length, %", "0.1"),
-    ("centre_error_px", "worst principal point, px", "1"),
-    ("pair_rotation_error_deg", "rotation between the projectors, deg", "0.02"),
-    ("pair_translation_error_mm", "translation between the projectors, mm", "0.1"),
-    ("outside_their_interval", "of the six, outside the joint interval of 95 %", "0"),
+    ("ring_centre_rms_px", "centres of rings, RMS, px", "calibration.ring_centre_rms_px"),
+    ("camera_mean_px", "mean reprojection error, camera, px", "calibration.camera_mean_px"),
+    ("visible_mean_px", "the same, visible projector, px (published 0.269)", "calibration.visible_mean_px"),
+    ("infrared_mean_px", "the same, infrared projector, px (published 0.221)", "calibration.infrared_mean_px"),
+    ("focal_error_percent", "worst focal length, %", "calibration.focal_error_percent"),
+    ("centre_error_px", "worst principal point, px", "calibration.centre_error_px"),
+    ("pair_rotation_error_deg", "rotation between the projectors, deg", "calibration.pair_rotation_error_deg"),
+    ("pair_translation_error_mm", "translation between the projectors, mm", "calibration.pair_translation_error_mm"),
+    ("outside_their_interval", "of the six, outside the joint interval of 95 %", "calibration.outside_their_interval"),
 )
 LIGHT = (
-    ("stray_after_percent", "gamma 2.2, crosstalk 15 % each way: stray light left, % of full scale", "0.5"),
-    ("level_rms_after_percent", "the same: RMS of the levels, % of full scale", "0.5"),
+    (
+        "stray_after_percent",
+        "gamma 2.2, crosstalk 15 % each way: stray light left, % of full scale",
+        "calibration.stray_after_percent",
+    ),
+    ("level_rms_after_percent", "the same: RMS of the levels, % of full scale", "calibration.level_rms_after_percent"),
 )
 ACCEPTANCE = (
-    ("plane_1_form_mm", "acceptance, noise 1 %: form of a plane, mm", "0.10"),
-    ("sphere_1_form_6sigma_mm", "the same: form of a sphere, mm", "0.15"),
-    ("sphere_1_size_error_mm", "the same: diameter of a sphere, mm", "0.10"),
-    ("steps_1_50mm_error_mm", "the same: step of 50 mm, mm", "0.05"),
+    ("plane_1_form_mm", "acceptance, noise 1 %: form of a plane, mm", "acceptance.plane_form_mm"),
+    ("sphere_1_form_6sigma_mm", "the same: form of a sphere, mm", "acceptance.sphere_form_mm"),
+    ("sphere_1_size_error_mm", "the same: diameter of a sphere, mm", "acceptance.sphere_size_mm"),
+    ("steps_1_50mm_error_mm", "the same: step of 50 mm, mm", "acceptance.step_mm"),
 )
 PRINTS = (
-    ("best_peaks_phase_rms_all_rad", "peaks, 3 % noise, white: phase RMS, rad", "0.006"),
-    ("best_peaks_shades_phase_rms_all_rad", "the same with coloured shades, rad", "0.03"),
-    ("best_peaks_patches_phase_rms_all_rad", "the same with coloured squares of 20 mm, rad", "0.03"),
-    ("best_peaks_patches_phase_median_rad", "the same, median, rad", ""),
-    ("best_peaks_printed_phase_rms_all_rad", "the same with shades and sharp random colours, rad", "0.03"),
-    ("best_peaks_printed_phase_median_rad", "the same, median, rad", ""),
+    ("best_peaks_phase_rms_all_rad", "peaks, 3 % noise, white: phase RMS, rad", "textures.white_rms_rad"),
+    ("best_peaks_shades_phase_rms_all_rad", "the same with coloured shades, rad", "textures.shades_rms_rad"),
+    (
+        "best_peaks_patches_phase_rms_all_rad",
+        "the same with coloured squares of 20 mm, rad",
+        "textures.patches_rms_rad",
+    ),
+    ("best_peaks_patches_phase_median_rad", "the same, median, rad", "textures.patches_median_rad"),
+    (
+        "best_peaks_printed_phase_rms_all_rad",
+        "the same with shades and sharp random colours, rad",
+        "textures.printed_rms_rad",
+    ),
+    ("best_peaks_printed_phase_median_rad", "the same, median, rad", "textures.printed_median_rad"),
 )
 SPEED = (
     ("numpy_float64_ms", "published chain in plain NumPy, float64, 1024 x 768, u8 to X, Y, Z, ms", ""),

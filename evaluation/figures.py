@@ -21,6 +21,8 @@ from pathlib import Path
 
 from figure_rows import ROOT, SOURCES, Source
 
+from quadfringe.evaluation._ledger import bars
+
 BEGIN, END = "<!-- figures -->", "<!-- /figures -->"
 
 
@@ -45,11 +47,18 @@ def write_table(measured: Source, figures: dict[str, float]) -> None:
     for source in SOURCES:
         command = words_of(source.command)
         if source is measured:
-            lines += [f"| {words} | {figures[name]:.4g} | {bar} | `{command}` |" for name, words, bar in source.rows]
+            lines += [
+                f"| {words} | {figures[name]:.4g} | {bar_text(bar)} | `{command}` |" for name, words, bar in source.rows
+            ]
         else:
             lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
     table = "\n".join(lines)
     readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
+
+
+def bar_text(bar: str) -> str:
+    """Give what the table shows for a bar: a key of the ledger as its limits, the bar of a time as it stands."""
+    return bars()[bar].text if bar in bars() else bar
 
 
 def words_of(command: tuple[str, ...]) -> str:

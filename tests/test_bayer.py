@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.bars import hold, tolerance
 from typer.testing import CliRunner, Result
 
 import quadfringe as qf
@@ -69,8 +70,8 @@ def test_every_pattern_gives_the_shape(pattern: str, method: str) -> None:
     assert shot.truth is not None
     shape = qf.decode(shot, plan(method))
     error = shape.phase_rad - shot.truth.column_px * (2 * np.pi * 36 / 912)
-    assert shape.returned.mean() > 0.99
-    assert np.sqrt(np.nanmean(error**2)) < 0.01
+    hold("bayer.returned", shape.returned.mean())
+    hold("bayer.phase_rms_rad", np.sqrt(np.nanmean(error**2)))
 
 
 def test_the_scanner_takes_a_mosaic_to_millimetres() -> None:
@@ -78,7 +79,7 @@ def test_the_scanner_takes_a_mosaic_to_millimetres() -> None:
         shot = scanner.grab()
         shape = scanner.decode(shot)
     assert shot.truth is not None
-    assert np.nanmedian(np.abs(shape.depth_mm - shot.truth.depth_mm)) < 0.1
+    hold("bayer.depth_median_mm", np.nanmedian(np.abs(shape.depth_mm - shot.truth.depth_mm)))
     assert shape.config["scene"]["bayer"] == "gbrg"
 
 
@@ -97,7 +98,7 @@ def test_light_comes_back_where_another_colour_was_seen(ideal: list[Image], patt
     shot = qf.BayerShot(mosaic(ideal, pattern), pattern, ideal[3])  # type: ignore[arg-type]
     for image, light in zip(ideal, stages.linear_light(shot).values(), strict=True):
         np.testing.assert_allclose(light[8:-8, 8:-8], image[8:-8, 8:-8], atol=2e-4)
-        np.testing.assert_allclose(light, image, atol=0.03)
+        np.testing.assert_allclose(light, image, atol=tolerance("bayer.light"))
 
 
 def test_channels_are_samples_of_their_own_colour() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.bars import hold
 
 import quadfringe as qf
 from quadfringe import _core
@@ -43,8 +44,8 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
     maps = decoder(method=method, full_scale=full_scale).decode(*shot)
     assert list(maps) == ["phase_rad", "column_px", "modulation", "quality", *SURENESS]
     error = np.abs(maps["column_px"] - np.arange(912))[8:-8, 30:-30]
-    assert np.isfinite(error).mean() > 0.98
-    assert np.nanmedian(error) < 0.1
+    hold("demo.border_returned", np.isfinite(error).mean())
+    hold("demo.border_depth_median_mm", np.nanmedian(error))
     assert all(m.dtype == np.float32 and m.shape == (96, 912) for m in maps.values())
 
 

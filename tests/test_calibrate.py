@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.bars import hold, tolerance
 from typer.testing import CliRunner, Result
 
 from quadfringe import _core
@@ -42,8 +43,9 @@ def test_the_response_is_found(capture: list[Path], tmp_path: Path) -> None:
     result = calibrate(capture, "--steps", STEPS, "--out", tmp_path / "r.json", "--json", "-")
     assert result.exit_code == 0, result.output
     figures = json.loads(result.stdout)["figures"]
-    assert figures["exponent"] == pytest.approx(1 / GAMMA, abs=0.03)
-    assert figures["two_step_rms_after_rad"] < figures["two_step_rms_before_rad"] / 3
+    assert figures["exponent"] == pytest.approx(1 / GAMMA, abs=tolerance("response.steps_exponent_error"))
+    improved = figures["two_step_rms_after_rad"] / figures["two_step_rms_before_rad"]
+    hold("response.two_step_after_over_before", improved)
     found = ResponseCalibration.load(tmp_path / "r.json")
     assert found.steps == STEPS
     assert found.inputs == tuple(path.name for path in capture)

@@ -8,6 +8,7 @@ from pathlib import Path
 import cv2
 import pytest
 import trimesh
+from support.bars import hold
 from typer.testing import CliRunner
 
 from quadfringe.cli import app
@@ -48,9 +49,8 @@ def test_demo_names_its_figures(demo: Figures, folder: Path) -> None:
 
 @pytest.mark.parametrize("scene", SCENES)
 def test_demo_is_metric(demo: Figures, folder: Path, scene: str) -> None:
-    assert demo[f"{scene}_depth_rms_mm"] <= 0.10
-    assert demo[f"{scene}_wrong_order_percent"] <= 0.1
-    assert demo[f"{scene}_returned_percent"] >= 95
+    for figure in ("depth_rms_mm", "wrong_order_percent", "returned_percent"):
+        hold(f"demo.{figure}", demo[f"{scene}_{figure}"])
     cloud = trimesh.load(folder / f"{scene}.ply")
     assert len(cloud.vertices) > 500_000
     report = cv2.imread(str(folder / f"{scene}.png"))
@@ -62,7 +62,6 @@ def test_peaks_stand_as_published(peaks: Figures, folder: Path) -> None:
     names = {f"{method}_rms_rad" for method in ("traditional_ftp", "improved_ftp", "proposed")}
     assert set(peaks) == names | {f"{name}_row760" for name in names}
     for row in ("", "_row760"):
-        assert peaks[f"traditional_ftp_rms_rad{row}"] > 0.0408
-        assert peaks[f"improved_ftp_rms_rad{row}"] <= 0.0408
-        assert peaks[f"proposed_rms_rad{row}"] <= 0.0099
+        for method in ("traditional_ftp", "improved_ftp", "proposed"):
+            hold(f"peaks.{method}_rms_rad", peaks[f"{method}_rms_rad{row}"])
     assert cv2.imread(str(folder / "peaks.png")) is not None

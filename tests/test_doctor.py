@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.bars import tolerance
 from typer.testing import CliRunner
 
 import quadfringe as qf
@@ -55,7 +56,7 @@ def test_crosstalk_is_told_with_its_channels() -> None:
     assert told.grade == "fault"
     assert told.found.startswith("green sees")
     assert "of the fringes of ir" in told.found
-    assert told.value == pytest.approx(0.2, abs=0.03)
+    assert told.value == pytest.approx(0.2, abs=tolerance("doctor.value"))
     assert by_name(examine_shot(shot, qf.Plan(912, calibration=calibration)))["crosstalk"].grade == "good"
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from support.bars import hold
 
 import quadfringe as qf
 from quadfringe.errors import InputError
@@ -34,7 +35,7 @@ def test_a_film_of_the_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     figures, path = moving_scene.hand(tmp_path, 4, system)
     assert (figures["hand_shots"], figures["hand_shapes"], figures["hand_lost"]) == (4, 4, 0)
     assert figures["hand_shots_with_wrong_pixels"] == figures["hand_over_gige_vision"] == 0
-    assert figures["hand_depth_rms_mm_median"] < 0.3
+    hold("demo.hand_depth_rms_mm", figures["hand_depth_rms_mm_median"])
     assert sorted(p.name for p in (tmp_path / "hand").iterdir()) == [f"shot_{k:06d}.ply" for k in range(4)]
     with Recording(tmp_path / "hand.h5") as take:
         assert len(take) == 4

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.bars import tolerance
 
 from quadfringe import _core
 from quadfringe.calibration.detect import View
@@ -35,7 +36,11 @@ def test_projector_points_follow_bent_maps_and_registration() -> None:
     view = View(np.array([[60.3, 70.7], [100.2, 70.1], [60.4, 30.9], [198.0, 148.0]]), np.arange(4), (200, 150))
     found = projector_points(flat_map(), view, radius_px=15)
     x, y = view.points_px[:3].T
-    np.testing.assert_allclose(found.points_px[:3, 0], 300 + 0.6 * x + 0.02 * y + 1e-4 * (x - 80) ** 2, atol=1e-3)
+    np.testing.assert_allclose(
+        found.points_px[:3, 0],
+        300 + 0.6 * x + 0.02 * y + 1e-4 * (x - 80) ** 2,
+        atol=tolerance("projector_map.points_px"),
+    )
     np.testing.assert_allclose(found.slope[:3, 1, 1], 0.7 - 2e-4 * x, atol=1e-4)
     assert np.isnan(found.points_px[3]).all()  # too little around it
     moved = projector_points(flat_map(), view, radius_px=15, ir_registration=((1.0, 0.0, 2.0), (0.0, 1.0, -1.0)))
@@ -60,8 +65,8 @@ def test_patterns_of_both_layouts_lead_back_to_their_mirrors(layout: Any) -> Non
     y, x = np.mgrid[:286, :228]
     shift = 0.5 * (y % 2) if layout == "diamond" else 0.0
     # The last mirror of a shifted row lies where the field ends, and has the phases of its beginning.
-    np.testing.assert_allclose(found.column_px[:, :-1], (x + shift)[:, :-1], atol=2e-3)
-    np.testing.assert_allclose(found.row_px, y, atol=2e-3)
+    np.testing.assert_allclose(found.column_px[:, :-1], (x + shift)[:, :-1], atol=tolerance("projector_map.column_px"))
+    np.testing.assert_allclose(found.row_px, y, atol=tolerance("projector_map.column_px"))
 
 
 def test_missing_steps_and_mixed_sizes_are_named() -> None:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
+from support.bars import hold
 
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import numpy_chain, scoring
@@ -29,12 +30,12 @@ def test_without_noise_every_order_is_right(name: str, data_dir: Path, calibrati
     score = scoring.score(scene, shape.phase_rad, shape.xyz_mm)
     assert score.wrong_pixels == 0
     assert score.in_shadow_pixels == 0
-    assert score.returned_percent >= 99.0
+    hold("renders.returned_percent", score.returned_percent)
     inner = scoring.inside(scene.scored, scoring.fringe_px(scene))
     score = scoring.score(scene, shape.phase_rad, shape.xyz_mm, inner)
-    assert score.phase_rms_rad < 0.005
     assert score.depth_rms_mm is not None
-    assert score.depth_rms_mm < 0.03
+    hold("renders.clean_phase_rms_rad", score.phase_rms_rad)
+    hold("renders.clean_depth_rms_mm", score.depth_rms_mm)
 
 
 @pytest.mark.parametrize("seed", [0, 100])
@@ -45,11 +46,11 @@ def test_noise_of_three_percent_leaves_a_tenth_of_a_millimetre(
     scene = scenes.render(data_dir, name, NOISE, seed)
     shape = scenes.shape_of(scene, calibration=calibration)
     score = scoring.score(scene, shape.phase_rad, shape.xyz_mm)
-    assert score.right_of_returned_percent >= 99.9
-    assert score.returned_percent >= 99.0
+    hold("renders.right_of_returned_percent", score.right_of_returned_percent)
+    hold("renders.returned_percent", score.returned_percent)
     assert score.depth_rms_mm is not None
-    assert score.depth_rms_mm <= 0.10
-    assert score.right_phase_rms_rad <= 0.02  # 0.10 mm at 5.1 mm per rad
+    hold("renders.depth_rms_mm", score.depth_rms_mm)
+    hold("renders.phase_rms_rad", score.right_phase_rms_rad)
 
 
 def test_points_lie_on_their_camera_rays(data_dir: Path, calibration: Calibration) -> None:
@@ -59,8 +60,8 @@ def test_points_lie_on_their_camera_rays(data_dir: Path, calibration: Calibratio
     x_mm, y_mm, z_mm = np.moveaxis(shape.xyz_mm, -1, 0)
     rows, columns = np.indices(z_mm.shape)
     seen = np.isfinite(z_mm)
-    assert np.abs(k[0][0] * x_mm / z_mm + k[0][2] - columns)[seen].max() < 1e-3
-    assert np.abs(k[1][1] * y_mm / z_mm + k[1][2] - rows)[seen].max() < 1e-3
+    hold("renders.ray_px", np.abs(k[0][0] * x_mm / z_mm + k[0][2] - columns)[seen])
+    hold("renders.ray_px", np.abs(k[1][1] * y_mm / z_mm + k[1][2] - rows)[seen])
 
 
 @pytest.mark.parametrize("name", scenes.RENDERS)
@@ -70,8 +71,8 @@ def test_the_published_way_agrees_with_the_plain_numpy_chain(name: str, data_dir
     shape = scenes.shape_of(scene, method="published")
     inner = scoring.inside(scene.scored, scoring.fringe_px(scene))
     returned = inner & np.isfinite(shape.phase_rad)
-    assert returned.sum() > 0.99 * inner.sum()
+    hold("renders.numpy_returned", returned.sum() / inner.sum())
     apart = np.angle(np.exp(1j * (shape.phase_rad - plain.phase_rad)[returned].astype(np.float64)))
-    assert scoring.rms(apart) < 0.02
+    hold("renders.numpy_apart_rad", scoring.rms(apart))
     for phase_rad in (plain.phase_rad, shape.phase_rad):
         assert scoring.score(scene, phase_rad, mask=inner).wrong_pixels == 0

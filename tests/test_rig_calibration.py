@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from support.bars import hold, tolerance
 
 from quadfringe.calibration._adjustment import Adjustment, Sight
 from quadfringe.calibration._grid import homography, jacobians
@@ -27,6 +28,17 @@ from quadfringe.evaluation import _rig_bench as bench
 BOARD = ring_board()
 SYSTEM = bench.bench_system()
 POINT_SD_PX = 0.01
+FIGURES = (
+    "ring_centre_rms_px",
+    "camera_mean_px",
+    "visible_mean_px",
+    "infrared_mean_px",
+    "focal_error_percent",
+    "centre_error_px",
+    "pair_rotation_error_deg",
+    "pair_translation_error_mm",
+    "outside_their_interval",
+)
 TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
 
 
@@ -34,8 +46,8 @@ TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
 def test_the_bars_hold_on_the_bench(layout: str) -> None:
     """A camera of half the size: the whole of `evaluation/calibration.py` in a fraction of its time."""
     figures = bench.measured(bench.bench_system(layout, camera_scale=0.5), poses=7, steps=5)
-    missed = {name: figures[name] for name, bar in bench.BARS.items() if not figures[name] <= bar}
-    assert not missed, figures
+    for name in FIGURES:
+        hold(f"calibration.{name}", figures[name])
 
 
 def points_of(device: Any, points_mm: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -83,14 +95,16 @@ def test_stated_uncertainties_are_those_of_repeated_calibrations(places: NDArray
         off.append(np.concatenate([error / done.pair.sd, *lens]))
     off = np.array(off)
     # 120 numbers of unit variance that hang together by tens: their mean square within a factor of two.
-    assert 0.5 < np.square(off).mean() < 2.0
-    assert (np.abs(off) < 1.96).mean() > 0.85
+    hold("calibration.mean_square_in_sd", np.square(off).mean())
+    hold("calibration.inside_95", (np.abs(off) < 1.96).mean())
 
 
 def test_projectors_share_the_errors_of_the_camera_and_that_is_known(found: RigCalibration) -> None:
     assert set(found.point_sd_px) == {"camera", "visible", "infrared"}
-    assert np.array(list(found.point_sd_px.values())) == pytest.approx(POINT_SD_PX, rel=0.1)
-    assert found.visible.rms_px > 1.2 * POINT_SD_PX * np.sqrt(2)  # both errors are in what is seen
+    assert np.array(list(found.point_sd_px.values())) == pytest.approx(
+        POINT_SD_PX, rel=tolerance("calibration.point_sd_relative")
+    )
+    hold("calibration.projector_rms_over_points", found.visible.rms_px / (POINT_SD_PX * np.sqrt(2)))
 
 
 def test_wrong_points_are_left_out_and_spoil_nothing(places: NDArray[np.float64], found: RigCalibration) -> None:
@@ -107,8 +121,8 @@ def test_wrong_points_are_left_out_and_spoil_nothing(places: NDArray[np.float64]
     for i, missed in enumerate(done.infrared.residuals_px):
         out = sorted(rings + lit) if i in (1, 4, 7) else []
         assert np.flatnonzero(np.isnan(missed).any(axis=1)).tolist() == out
-    assert np.abs((done.pair.values - found.pair.values) / found.pair.sd).max() < 0.5
-    assert done.infrared.max_px < 0.1
+    hold("calibration.spoiled_pose_in_sd", np.abs((done.pair.values - found.pair.values) / found.pair.sd))
+    hold("calibration.cleaned_max_px", done.infrared.max_px)
     assert (found.camera.left_out, found.infrared.left_out) == (0, 0)
 
 
@@ -128,7 +142,9 @@ def test_coordinates_have_their_own_precision(places: NDArray[np.float64]) -> No
         worse = pose.visible.points_px + random.normal(0, 3 * POINT_SD_PX, (108, 2)) * (0, 1)
         poses[i] = replace(pose, visible=replace(pose.visible, points_px=worse))
     done = calibrate_rig(poses, BOARD)
-    assert done.point_sd_px["visible"] == pytest.approx(POINT_SD_PX * np.array((1, np.sqrt(10))), rel=0.1)
+    assert done.point_sd_px["visible"] == pytest.approx(
+        POINT_SD_PX * np.array((1, np.sqrt(10))), rel=tolerance("calibration.point_sd_relative")
+    )
 
 
 def test_records_are_whole(found: RigCalibration, places: NDArray[np.float64]) -> None:
@@ -137,14 +153,20 @@ def test_records_are_whole(found: RigCalibration, places: NDArray[np.float64]) -
     assert found.covariance.shape == (count, count)
     sd = dict(zip(found.names, np.sqrt(np.diag(found.covariance)), strict=True))
     assert sd["visible.focal_x_px"] == pytest.approx(found.visible.sd.focal_px[0])
-    np.testing.assert_allclose(found.T_camera_board, places, atol=0.2)
+    np.testing.assert_allclose(found.T_camera_board, places, atol=tolerance("calibration.board_pose"))
     assert [r.shape for r in found.infrared.residuals_px] == [(108, 2)] * len(places)
     assert found.camera.device.rotation == ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    np.testing.assert_allclose(found.visible.device.translation_mm, SYSTEM.projector.translation_mm, atol=0.1)
+    np.testing.assert_allclose(
+        found.visible.device.translation_mm,
+        SYSTEM.projector.translation_mm,
+        atol=tolerance("calibration.projector_translation_mm"),
+    )
     alone = calibrate_camera([pose.view for pose in simulated(places, seed=0)], BOARD)
     assert alone.visible is None
     assert alone.pair is None
-    np.testing.assert_allclose(alone.camera.device.focal_px, SYSTEM.camera.focal_px, rtol=1e-3)
+    np.testing.assert_allclose(
+        alone.camera.device.focal_px, SYSTEM.camera.focal_px, rtol=tolerance("calibration.camera_focal_relative")
+    )
 
 
 def test_derivatives_are_those_of_the_residuals(places: NDArray[np.float64], found: RigCalibration) -> None:

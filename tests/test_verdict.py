@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from support.bars import hold
 
 import quadfringe as qf
 from quadfringe.errors import DecodeError
@@ -40,8 +41,8 @@ def reason(shot: qf.Shot, method: str) -> str:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_sound_shot_passes(sound: qf.Shot, method: str) -> None:
     shape = qf.decode(sound, plan(method))
-    assert np.nanmedian(shape.quality) > 0.6
-    assert shape.returned.mean() > 0.8
+    hold("demo.simulated_quality", np.nanmedian(shape.quality))
+    hold("demo.simulated_returned", shape.returned.mean())
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -105,4 +106,4 @@ def test_a_patch_of_glare_is_no_data_and_the_rest_stays(sound: qf.Shot) -> None:
 
     shape = qf.decode(changed(sound, glare), plan("best"))
     assert not shape.returned[100:200, 100:300].any()
-    assert shape.returned.mean() > 0.7
+    hold("demo.mixed_returned", shape.returned.mean())

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from support.bars import hold
+
 import quadfringe as qf
 from quadfringe.evaluation import moving_scene
 from quadfringe.recording import Recording
@@ -16,7 +18,7 @@ def test_the_hand_is_filmed_over_the_wire(tmp_path: Path) -> None:
     assert figures["hand_over_gige_vision"] == 1
     assert (figures["hand_shots"], figures["hand_shapes"], figures["hand_lost"]) == (5, 5, 0)
     assert figures["hand_shots_with_wrong_pixels"] == 0
-    assert figures["hand_depth_rms_mm_median"] < 0.3
+    hold("demo.hand_depth_rms_mm", figures["hand_depth_rms_mm_median"])
     assert movie.stat().st_size > 10_000
     with Recording(tmp_path / "hand.h5") as take:
         assert len(take) == 5

@@ -250,23 +250,14 @@ fn hammering_from_two_threads() {
     let hammer = |port: &'static str, drive: u8| {
         move || {
             let mut projector = open(port);
-            let mut times = Vec::with_capacity(EACH);
             for i in 0..EACH / 2 {
                 let raw = [drive, i as u8, (i >> 8) as u8];
-                let start = Instant::now();
                 projector.write(&LedCurrent { raw }).unwrap();
-                let middle = Instant::now();
                 assert_eq!(projector.read::<LedCurrent>().unwrap().raw, raw);
-                times.extend([middle - start, middle.elapsed()]);
             }
-            times
         }
     };
-    let threads = [thread::spawn(hammer("1-1", 1)), thread::spawn(hammer("1-2", 2))];
-    let mut times: Vec<Duration> = threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect();
-    assert_eq!(times.len(), 2 * EACH);
-    let median = *times.select_nth_unstable(EACH).1;
-    let last = times.iter().max().unwrap();
-    println!("{} transactions, median {median:?}, slowest {last:?}", 2 * EACH);
-    assert!(median < Duration::from_millis(5), "{median:?}");
+    for thread in [thread::spawn(hammer("1-1", 1)), thread::spawn(hammer("1-2", 2))] {
+        thread.join().unwrap();
+    }
 }

@@ -1,0 +1,29 @@
+"""Hold measured figures against the bars of `evaluation/bars.toml`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from quadfringe.evaluation._ledger import Bar, bars
+
+
+def bar(key: str) -> Bar:
+    """Give a bar of the ledger, for tolerances."""
+    known = bars()
+    assert key in known, f"evaluation/bars.toml has no bar {key!r}"
+    return known[key]
+
+
+def tolerance(key: str) -> float:
+    """Give the upper limit of a deviation."""
+    limit = bar(key).upper
+    assert limit is not None, f"{key} has no upper limit"
+    return limit
+
+
+def hold(key: str, values: ArrayLike) -> None:
+    """Fail unless every value keeps the bar."""
+    limits = bar(key)
+    missed = [value for value in np.ravel(np.asarray(values, dtype=np.float64)).tolist() if not limits.holds(value)]
+    assert not missed, f"{key}: {limits.figure}: {missed[:5]} {limits.unit}, bar {limits.text}"
