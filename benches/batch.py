@@ -1,13 +1,13 @@
-"""Batch: how much faster two worker processes decode a recording than one.
+"""Batch decoding: how much faster two worker processes are than one.
 
     python benches/batch.py [--shots 200] [--turns 1] [--only speed|restart] [--folder DIR] [--json FILE]
 
-The default scene at 1024 x 768, the published steps, decoded with the best method into zarr and PLY, one kernel thread
-a worker; one worker and two in turns. The time is from the first result to the last, so that starting processes, which
-a long batch does once, is not weighed; with it the factor is given too. Busy cores are what the workers got of the
-processors: the machine must have two free ones for the figure to mean anything. Then a run is killed with SIGKILL in
-the middle, given again, and every file compared with those of the first. Bars: 1.7, and no file differs; exit status 1
-otherwise. DIR needs 40 MB a shot and is the system's temporary folder by default.
+Decodes one recording of the published steps (1024 x 768, joint method) into zarr and PLY, with one kernel thread per
+worker, by one worker and by two in turns. The time runs from the first result to the last, because a long batch starts
+its processes only once; the factor that includes the start is reported too. The busy cores show how much processor time
+the workers got: the figure means something only on two free cores. Then the script kills a run with SIGKILL, gives the
+same command again, and compares every file with those of the first run. Bars: 1.7, and no file differs; the exit status
+is 1 otherwise. DIR needs 40 MB a shot; the default is the system's temporary folder.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ BAR = 1.7
 
 
 def recording(path: Path, shots: int) -> None:
-    """Record one scene many times, with noise of its own in every shot."""
+    """Record one scene many times, each shot with different noise."""
     noise = np.random.default_rng(1)
     with qf.open(qf.SystemConfig(scene=qf.SceneConfig(surface="steps", noise=0.01))) as scanner:
         shot = scanner.grab()
@@ -84,7 +84,7 @@ def same(one: Path, other: Path) -> bool:
 
 @contextmanager
 def stopped_like_an_error() -> Iterator[None]:
-    """Let SIGTERM unwind as Ctrl-C does, so that nothing is left on the disk."""
+    """Let SIGTERM unwind as Ctrl-C does, so that no temporary file stays on the disk."""
     before = signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     yield
     signal.signal(signal.SIGTERM, before)

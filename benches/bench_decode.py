@@ -1,10 +1,10 @@
-"""Time per frame of the product against a plain NumPy version of the same chain, in one run.
+"""Time of a decode against a plain NumPy version of the published chain, in one run.
 
     python benches/bench_decode.py [--json FILE] [--repeats 15] [--surface face]
 
-Frames: one shot of the virtual bench, 1024 x 768, 8 bit, 3 % noise; every contender gets the same
-arrays and gives absolute phase, order, quality and X, Y, Z. They take turns, so that a busy moment of
-the machine hits all of them; the median counts. Planning (once per bench) is outside the clock.
+All contenders get the same shot of the virtual bench (1024 x 768, 8 bit, 3 % noise) and return absolute phase, order,
+quality and X, Y, Z. They take turns, so that other load on the machine affects all of them; the median counts.
+Planning, which happens once per bench, is not timed.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ def product_contender(
 
 
 def timed(contenders: dict[str, Contender], repeats: int) -> dict[str, float]:
-    """Median milliseconds of each contender; one round to warm up, then `repeats` rounds in turn.
+    """Give the median milliseconds of each contender over `repeats` rounds, after one round to warm up.
 
-    A turn is some calls off the clock and one on it: nobody pays for the caches that another has filled.
+    In each round a contender runs several times before the timed call, so that it finds its data in the cache.
     """
     spent: dict[str, list[float]] = {name: [] for name in contenders}
     for turn in range(repeats + 1):

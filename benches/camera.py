@@ -1,18 +1,18 @@
-"""Two cameras over the wire of GigE Vision, into shots and into shapes: what is lost, what is wrong, how late it is.
+"""Two cameras over GigE Vision, into shots and into shapes: losses, wrong pixels and delays.
 
     scripts/loopback .venv/bin/python benches/camera.py [--seconds 60] [--json FILE]
 
-Four runs at 1024 x 768 twice, on the loopback interface:
-wire     Aravis' own fake cameras at 30 fps; every pixel of every shot is compared with what was sent. An exposure that
-         one of the two did not make, because this machine woke it too late, is no shot; it is counted as skipped.
+Four runs with two chips of 1024 x 768, on the loopback interface:
+wire     the fake cameras of Aravis at 30 fps; compares every pixel of every shot with the sent image. If the machine
+         wakes one of the two too late to make an exposure, there is no shot; the exposure counts as skipped.
 decode   the emulated camera at 30 fps with a scene of the virtual bench, decoded by the published method and recorded;
-         every shot is compared, and the time from the arrival of the second frame to the shape is taken.
-rate     the same at 66 fps, recorded and not compared: shapes in a second.
-faults   how long it takes until each fault has ended in its error, and until shots come again.
+         compares every shot and measures the time from the arrival of the second frame to the shape.
+rate     the same at 66 fps, recorded and not compared: shapes per second.
+faults   the time until each fault has ended in its error, and until shots arrive again.
 
-For decode and rate the processor time of a shot is told by thread, and that of the emulated camera. A wrong pixel ends
-with status 1 always; lost shots and times above their bars only with --bars, because a machine that does other work
-loses shots.
+For decode and rate the script reports the processor time of a shot by thread, and that of the emulated camera. The exit
+status is 1 for a wrong pixel; for lost shots and times above their bars only with --bars, because a machine with other
+load loses shots.
 """
 
 from __future__ import annotations

@@ -36,7 +36,7 @@ Map = NDArray[Any]
 
 @dataclass(frozen=True)
 class Contender:
-    """Who is timed; `turn` gives one time in ms, `phase_rad` the map to judge, `kind` how to judge it."""
+    """A program to time: `turn` gives one time in ms, `phase_rad` its phase map, `kind` the meaning of that map."""
 
     name: str
     images: str
@@ -49,7 +49,7 @@ class Contender:
 
 @dataclass(frozen=True)
 class Bench:
-    """The scene all are given, and its truth."""
+    """The scene that all contenders get, and its truth."""
 
     shot: qf.Shot
     calibration: qf.Calibration

@@ -2,7 +2,7 @@
 
     .venv/bin/python benches/first_frame.py [--json FILE]
 
-The shot lies ready as image files, as it would from a camera. The bar is 1.5 s; exit status 1 above it.
+The shot is read from image files. The bar is 1.5 s; the exit status is 1 above it.
 """
 
 from __future__ import annotations

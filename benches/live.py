@@ -1,14 +1,14 @@
-"""Live view: clouds a second to a websocket client and in a browser, beside decoding, and the memory it takes.
+"""Live view: point clouds per second to a websocket client and to a browser while decoding, and memory.
 
     python benches/live.py [--seconds 30] [--browser [--screenshot FILE.png]] [--clouds 2] [--json FILE]
 
-A camera of 30 shots a second shows six shots of the moving hand, 1024 x 768, in turn; they are decoded with the
-published method and served. A client in another process takes the full-resolution clouds and draws nothing; memory is
-what the serving process grows by from the second third of the time to the last. With --browser Debian's chromium draws
-every 4th point of every 4th row in software instead, as often as `quadfringe live` sends them by default; --clouds asks
-for another rate: the more clouds, the less time for pictures and figures. Clouds are counted where they go to OpenGL,
-pictures and figures where the page changes. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and 5 figures/s in
-the browser; exit status 1 below them.
+A camera of 30 shots a second repeats six shots of the moving hand, 1024 x 768; the published method decodes them and
+the viewer serves them. A client in another process receives full-resolution clouds without drawing them. The memory
+figure is the growth of the serving process from the second third of the time to the last. With --browser, Debian's
+chromium draws every 4th point of every 4th row in software, at the rate of `quadfringe live`; --clouds sets another
+rate: more clouds leave less time for pictures and figures. Clouds are counted at their upload to OpenGL, pictures and
+figures at changes of the page. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and 5 figures/s in the
+browser; the exit status is 1 below them.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ from quadfringe.view.viewer import CLOUDS_PER_S, Viewer
 
 SHOTS, RATE_HZ = 6, 30.0
 WARM_UP_S = 8.0
-SENT_PER_S = 20.0  # clouds asked for: as many as go
+SENT_PER_S = 20.0  # requested clouds: more than the client receives
 CLOUD_BYTES = 5_000_000
 BARS = {"clouds": 10.0}
 BROWSER_BARS = {"clouds": 1.0, "pictures": 5.0, "figures": 5.0}
@@ -78,7 +78,7 @@ document.addEventListener("DOMContentLoaded", () => watch.observe(document.body,
 
 
 class Carousel:
-    """A camera that shows the same shots for ever, at its own pace."""
+    """A camera that repeats the same shots at a fixed rate."""
 
     name, paced, calibration = "carousel", True, None
 

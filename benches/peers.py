@@ -1,21 +1,21 @@
-"""Times and phase errors of the product, of its peers and of the floor under it, in one run.
+"""Times and phase errors of quadfringe, of other packages, and of the floor below them, in one run.
 
     python benches/peers.py [--json FILE] [--repeats 11] [--skip NAME ...]
 
-Scene: peaks on the virtual bench, 1024 x 768, 8 bit, 3 % noise. All take turns, and in every turn some runs off the
-clock go before the one on it. Not all do the same job, and the table says what each needs and gives:
+Scene: peaks on the virtual bench, 1024 x 768, 8 bit, 3 % noise. All contenders take turns; in each turn several runs
+precede the timed one. They do not all do the same job, and the table states their inputs and results:
 
 - quadfringe and the published chain in plain NumPy: one shot of four images to absolute phase and X, Y, Z; quadfringe
   through Python, with new maps and a verdict on every shot.
 - floor, and kernel: the compiled bench `floor` (crates/quadfringe/benches/floor.rs) on the same shot: the bytes and the
-  row transforms without a decoder, and both methods into maps made before, without Python.
+  row transforms without a decoder, and both methods into existing maps, without Python.
 - OpenCV structured_light: wrapped phase alone, from one image (FTP) or three (PSP). Its sign and constant offset are
-  undone; its own patterns have a whole number of pixels to a period, so the bench shows the fringes instead.
+  corrected; its patterns have a whole number of pixels per period, so the bench shows the fringes instead.
 - scikit-image unwrap_phase: the wrapped two-step phase to one without jumps; relative, without holes or steps.
 - Fringes: twelve images, 36, 35 and 30 fringes in four steps each, to the projector column.
 
 Errors are RMS in rad of the 36-fringe phase over pixels a fringe away from edges, border and shadow; a wrong order is
-an error beyond pi. For a wrapped phase whole turns are left out. A peer that is not installed is an error; --skip
+an error beyond pi. For a wrapped phase whole periods are left out. A package that is not installed is an error; --skip
 leaves it out.
 """
 

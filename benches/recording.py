@@ -1,12 +1,11 @@
-"""Recording: megabytes a second against the disk itself, and shots that kill -9 takes away.
+"""Recording: megabytes per second against a plain file, and shots lost to kill -9.
 
     python benches/recording.py [--folder DIR] [--shots 300] [--kills 20] [--json FILE]
 
-Raw shots of 1024 x 768, four images of 8 bit with noise in them, 3.1 MB, are written into DIR as fast as they go, in
-turns with the same bytes written to a plain file; both are synced to the disk before the clock stops. Then writers are
-killed with SIGKILL at random times: a shot that one of them had reported and that is not on file, to the last byte,
-counts as lost. The bar is 150 MB/s or the plain file's speed, whichever is lower, and no shot lost; exit status 1
-otherwise.
+Writes raw shots of 1024 x 768 (four images of 8 bit with noise, 3.1 MB) into DIR as fast as possible, in turns with the
+same bytes in a plain file; both are synced to the disk before the clock stops. Then it kills writers with SIGKILL at
+random times: a shot that a writer had reported and that is not on file, to the last byte, counts as lost. The bars are
+150 MB/s or the speed of the plain file, whichever is lower, and no shot lost; the exit status is 1 otherwise.
 """
 
 from __future__ import annotations

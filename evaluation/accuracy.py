@@ -4,12 +4,12 @@
 
 - peaks: the shot of `quadfringe reproduce peaks`, 3 % noise (sigma 0.03 of full scale), rounded to 8 bit; phase RMS in
   rad over the field without a border of one fringe.
-- peaks_patches: the same, printed with coloured squares of 20 mm, an option of the bench.
+- peaks_patches: the same with coloured squares of 20 mm.
 - peaks_shades: the same with smooth shades, waves of 150 to 500 pixels that differ from channel to channel.
-- peaks_printed: the shades times patches with sharp borders and random colours, inks nearly clear in the infrared.
+- peaks_printed: the shades times patches with sharp borders and random colours, nearly clear in the infrared.
 - plane, steps, sphere, face: shots of the virtual bench at about 800 mm, 3 % noise, 8 bit; lit pixels returned, wrong
   orders among returned, and depth RMS a fringe away from edges, borders and shadows, wrong orders included.
-- captures: real shots as evaluation/captures_report.py scores them; left out without the test data.
+- captures: real shots, scored as in evaluation/captures_report.py; left out without the test data.
 - efficiency: phase variance over the Cramer-Rao bound at the same spatial resolution, defined in
   quadfringe.evaluation.efficiency.
 

@@ -2,11 +2,11 @@
 
     python evaluation/bayer.py [--json FILE]
 
-Fringes: two-step phase error of red and blue on slanted fringes of one period, from the raw mosaic as it is
-developed here and as OpenCV interpolates it, and the share of white noise that is left. Shots: 1024 x 768, 16 bit
-without noise, 8 bit with 3 %, fixed seeds; full sampling, mosaic, and planes interpolated by the camera (bilinear).
-Phase errors are over pixels more than a fringe away from edges and from the rim, wrong orders over lit pixels that
-are returned; pixels returned in shadow lie beside lit ones and are counted on their own.
+Fringes: two-step phase error of red and blue on slanted fringes of one period, with the interpolation of the decoder
+and with that of OpenCV, and the share of white noise that remains. Shots: 1024 x 768, 16 bit without noise, 8 bit with
+3 %, fixed seeds; full sampling, mosaic, and planes interpolated by the camera (bilinear). Phase errors are over pixels
+more than a fringe away from edges and border, wrong orders over returned lit pixels; pixels returned in shadow, next
+to lit ones, are counted apart.
 """
 
 from __future__ import annotations

@@ -7,11 +7,11 @@ A 9 x 12 ring board is captured in poses tilted to all sides, under N-step fring
 projectors. The bench has lens distortion in all three devices, a response (gamma 2.2) of the projectors, crosstalk of
 15 % between neighbouring channels, blur of 0.8 px, shading, noise of 1 % and 8 bit; the infrared chip is shifted,
 turned and scaled. The infrared projector deviates from the visible one by 1 degree and 0.5 mm on every axis. Seeds
-are fixed. Responses and crosstalk are calibrated with even light, at 15 % from every channel to every other. Exit
-status 1 when a bar is missed.
+are fixed. Responses and crosstalk are calibrated with even light, at 15 % from every channel to every other. The exit
+status is 1 when a bar is missed.
 
-With several seeds the calibration is done that often with other noise and other poses: `outside_their_interval` is then
-the share of runs in which any number of the pair left its interval, of which one in twenty should.
+With several seeds the calibration is repeated with other noise and other poses: `outside_their_interval` is then the
+share of runs in which any number of the pair left its interval; one run in twenty should.
 """
 
 from __future__ import annotations

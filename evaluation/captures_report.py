@@ -1,12 +1,11 @@
-"""Scores of the product on real captures and on independent renders, as one table.
+"""Scores on real captures and on independent renders, as one table.
 
-    python evaluation/captures_report.py [--data FOLDER] [--json FILE] [--method best]
+    python evaluation/captures_report.py [--data FOLDER] [--json FILE] [--method joint]
 
-Captures are decoded as if their light was linear, with the response that the shot shows by itself (what `decode`
-does), and with the one estimated from the 12 images of their first frequency; renders at 16 bit without noise and at
-8 bit with 3 % noise, with their rig as calibration.
-Right order: |phase - truth| < pi; a missing pixel counts as wrong in `right`. The first fringe inside
-the border is left out of the figures marked `inside`.
+Captures are decoded as linear light, with the response estimated from the shot (the default of `decode`), and with the
+response estimated from the 12 images of their first frequency; renders at 16 bit without noise and at 8 bit with 3 %
+noise, with their rig as calibration. Right order: |phase - truth| < pi; a missing pixel counts as wrong in `right`. The
+figures marked `inside` leave out the first fringe from the border.
 """
 
 from __future__ import annotations

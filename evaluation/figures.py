@@ -77,7 +77,7 @@ def run(source: Source) -> dict[str, float]:
         else:
             full = words_of(command).replace("python", sys.executable, 1).split()
             full += ["--json", str(json_file)]
-        # A bar that is missed ends with a status of its own, and is a row like the others.
+        # A script that misses a bar exits with status 1; its figures make rows like all others.
         subprocess.run(full, check=False, stdout=subprocess.DEVNULL, cwd=ROOT)
         figures: dict[str, float] = json.loads(json_file.read_text())["figures"]
     return figures

@@ -1,6 +1,8 @@
-"""What uneven light and uneven pixels cost: `python evaluation/flat_field.py`.
+"""Effect of vignetting and of uneven pixels on uncorrected shots, as one table.
 
-Shots of the virtual bench are weakened towards the corners, or pixel by pixel, and decoded without correction.
+    python evaluation/flat_field.py
+
+Shots of the virtual bench are attenuated towards the corners, or pixel by pixel, and decoded without correction.
 """
 
 from __future__ import annotations

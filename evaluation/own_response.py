@@ -1,11 +1,11 @@
-"""What a shot tells of its own response (gamma), and what undoing it is worth, as one table.
+"""Accuracy of the response (gamma) that is estimated from one shot, and the gain of correcting it, as one table.
 
     python evaluation/own_response.py [--json FILE]
 
-Scenes of the virtual bench, 8 bit, seed 1: taken as linear light, and with the response that the shot shows by itself.
-Phase: RMS over right orders of lit pixels; wrong: lit pixels with another order and pixels of shadows, of those
-returned. `settled` is the exponent of red times the projector's gamma, 1 when both undo each other. A shot whose orders
-no verdict would let pass is scored all the same.
+Scenes of the virtual bench, 8 bit, seed 1, decoded as linear light and with the estimated response. Phase: RMS over
+lit pixels with the right order. Wrong: share of the returned pixels that have another order or lie in shadow. `settled`
+is the exponent of red times the projector's gamma, 1 when they cancel. Shots that the verdict would refuse are scored
+too.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""decode(simulate(h)) without noise, and the identity of the virtual bench, as figures.
+"""Decoding simulated shots without noise, and the identity of the virtual bench, as figures.
 
     python evaluation/round_trip.py [--json FILE]
 
 Shots of the reference bench, 1024 x 768, 16 bit. Phase errors are over pixels more than a fringe away from edges,
-wrong orders over everything that is returned. Identity: camera and projector are the same device before a plane at
-800 mm; the captured image must be the projected one.
+wrong orders over all returned pixels. Identity: camera and projector are the same device before a plane at 800 mm; the
+captured image must be the projected one.
 """
 
 from __future__ import annotations

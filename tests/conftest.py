@@ -1,4 +1,4 @@
-"""What every test may ask for."""
+"""Fixtures of all tests."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from quadfringe.evaluation._scenes import data_folder
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
-    """The folder of captures and renders; without it a test is skipped, and fails in CI."""
+    """The folder of captures and renders; without it a test is skipped, or fails when CI is set."""
     folder = data_folder()
     if not (folder / "renders" / "rig.json").is_file():
         reason = f"no test data in {folder}; set QUADFRINGE_DATA to the folder that holds renders/"

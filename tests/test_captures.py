@@ -90,7 +90,7 @@ def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: P
     assert own.config["response_of_shot"]
     scores = [scoring.score(scene, shape.phase_rad) for shape in (own, straight)]
     assert_bars(scores[0], "captures.auto_right_percent")
-    # Nearly as good as twelve images of each channel tell, on both captures.
+    # Nearly as good as the response from twelve images of each channel, on both captures.
     hold("captures.auto_right_below_known_percent", scores[1].right_percent - scores[0].right_percent)
     hold("captures.auto_phase_over_known", scores[0].right_phase_rms_rad / scores[1].right_phase_rms_rad)
     exponents = np.array([list(channel.values()) for channel in own.config["response"].values()])[:, 1]

@@ -1,4 +1,4 @@
-"""The doctor finds what was broken on purpose, names the fix, and finds nothing on a sound bench."""
+"""The doctor finds planted faults, names the fix, and reports no fault on a sound bench."""
 
 from __future__ import annotations
 

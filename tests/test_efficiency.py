@@ -1,4 +1,4 @@
-"""The measure of efficiency, held against estimators whose efficiency is known on paper."""
+"""The measure of efficiency, on estimators whose efficiency is known from theory."""
 
 from __future__ import annotations
 

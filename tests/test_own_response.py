@@ -1,4 +1,4 @@
-"""A shot whose response (gamma) nobody states tells it by itself; one that is known is left alone."""
+"""The response (gamma) is estimated from the shot, unless it is known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From camera to shape without pause: what is dropped is counted, what fails is told, and nothing waits for ever."""
+"""Continuous measurement: dropped shots are counted, failures are reported, and no call blocks for ever."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tests on the wire: `make test-camera` runs them in a network of their own; plain pytest leaves this folder out."""
+"""Tests over GigE Vision: `make test-camera` runs them in a network namespace; plain pytest leaves this folder out."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How every camera ends."""
+"""Every camera closes in order."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What every camera keeps to, whatever it is."""
+"""Rules that every kind of camera keeps."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What fails on a wire: each ends in an error of its own or is counted, and no wrong shot is ever delivered."""
+"""Faults of the network and the camera: each ends in its error or is counted, and no wrong shot is delivered."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the tests on the wire share: settings of the emulated camera, and the proof that a shot is right."""
+"""Helpers of the tests over GigE Vision: settings of the emulated camera, and the check that a shot is right."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What people see: a page with the shape, the pictures and the figures, and nothing that leaves the machine."""
+"""The page of the live view: the shape, the pictures and the figures, and no request that leaves the machine."""
 
 from __future__ import annotations
 

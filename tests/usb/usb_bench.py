@@ -1,4 +1,4 @@
-"""What tests behind the testbed hold in their hands."""
+"""Helpers of the tests in the umockdev testbed."""
 
 from __future__ import annotations
 

@@ -17,19 +17,19 @@ FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader
 
 
 class Page:
-    """A page of Debian's chromium without a screen, over its own protocol.
+    """A page of headless chromium, driven over the DevTools protocol.
 
-    Test drivers listen to the network of the page, and copying every cloud to them takes more than drawing it.
+    Browser test drivers record the network traffic of the page, and copying every cloud costs more than drawing it.
     """
 
     def __init__(self, folder: str) -> None:
         words = ["--headless=new", "--remote-debugging-port=0", f"--user-data-dir={folder}", "--window-size=1280,887"]
-        # It ends with this program, however that ends: a page that nobody looks at draws on.
+        # The kernel kills chromium when this program ends in any way; otherwise it would go on drawing.
         alone = ["setpriv", "--pdeathsig", "KILL", shutil.which("chromium") or "chromium"]
         self._chromium = subprocess.Popen([*alone, *FLAGS, *words, "about:blank"], stderr=subprocess.PIPE, text=True)
         assert self._chromium.stderr is not None
         said = next(line for line in self._chromium.stderr if "DevTools listening on" in line)
-        # What else it says must be read, or it waits for ever.
+        # Read the rest of its output, or it blocks on a full pipe.
         threading.Thread(target=self._chromium.stderr.read, daemon=True).start()
         port = said.split("/")[2]
         with urlopen(f"http://{port}/json/list") as answer:

@@ -23,7 +23,7 @@ STEPS = 12
 
 
 def data_folder() -> Path:
-    """Where the captures and renders lie: QUADFRINGE_DATA, else shared/data beside the checkout."""
+    """Give the folder of captures and renders: QUADFRINGE_DATA, or shared/data next to the checkout."""
     beside = ROOT.parent / "shared" / "data"
     return Path(os.environ.get("QUADFRINGE_DATA", beside))
 

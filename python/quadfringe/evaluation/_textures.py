@@ -64,7 +64,7 @@ def shades_of(shape: tuple[int, ...]) -> Albedo:
 
 
 def patches_of(shape: tuple[int, ...]) -> Albedo:
-    """Give cells of some 50 pixels around random points, each of its own colour, (H, W, 4)."""
+    """Give cells of some 50 pixels around random points, each with a random colour, (H, W, 4)."""
     random = np.random.default_rng(PRINT_SEED)
     centres = random.uniform((0, 0), shape, (CELLS, 2))
     y, x = np.mgrid[: shape[0], : shape[1]]

@@ -1,4 +1,4 @@
-"""How near a phase estimate comes to the least variance that noise allows at its own spatial resolution.
+"""Efficiency of a phase estimate: its variance over the least one that noise allows at the same spatial resolution.
 
 The estimator is a black box from four images to a phase map. The images are
 
@@ -9,8 +9,8 @@ sigma known carries the Fisher information
 
     J(x) = (b / sigma)^2 sum_c k_c^2 sin^2(k_c phi(x) + s_c)
 
-on its phase, so that 1 / J is the Cramer-Rao bound of a pixel on its own. Background and modulation count as known;
-where they are not, the true bound is higher, so the ratio given here never flatters.
+on its phase, so that 1 / J is the Cramer-Rao bound of a single pixel. Background and modulation count as known; if they
+are not, the true bound is higher, so the ratio given here is never too good.
 
 An estimator that averages over neighbours has less variance than that, and less resolution. Let h_x(d) be the change
 of its mean at x for a unit change of the true phase at x - d. For the same h the Cramer-Rao inequality of biased
@@ -22,19 +22,20 @@ and, averaged over the field (Cauchy-Schwarz),
 
     mean Var >= sum_d h(d)^2 / mean J = 1 / (N mean J),    h = mean of h_x,    N = 1 / sum_d h(d)^2.
 
-N is the number of independent pixels that one value stands for: its resolution, measured from its own response. The
-efficiency is the ratio of the two sides: 1 is the optimum, and no estimator can be below it but for the errors of
-measurement. It cannot be bought by smoothing, which raises N and lowers the bound alike.
+N is the number of independent pixels that one value averages: the resolution, measured from the response of the
+estimator. The efficiency is the ratio of the two sides: 1 is the optimum, and an estimator is below it only by errors
+of measurement. Smoothing does not improve it, because it raises N and lowers the bound alike.
 
-The second step wants windows in which J averages out, half a fringe or more; for a single pixel the best possible ratio
-is mean J mean 1/J, 1.06 for 36, 35, 30 fringes. tests/test_efficiency.py holds it against estimators known on paper.
+The second step needs windows in which J averages out, half a fringe or more; for a single pixel the best possible ratio
+is mean J mean 1/J, 1.06 for 36, 35, 30 fringes. tests/test_efficiency.py checks the measure
+on estimators whose efficiency is known.
 
-h is measured where the estimator works, under noise: the true phase of every pixel is changed by +-EPSILON_RAD as a
-fair coin falls, the noise stays the same, and the change of the estimate is correlated with the coins. Two halves of
-the seeds give h independently, and sum h^2 is the sum of their products, in which the error of one does not meet
-itself. The sum of h must be near 1: a flat change of phase comes through, and the window of d holds the response. It
-is the least certain of the figures, by the width of the window over the root of the pixels: 0.04 for six seeds of
-0.75 million pixels.
+h is measured under noise, the working point of the estimator: the true phase of every pixel changes by +-EPSILON_RAD
+at random, the noise stays the same, and the change of the estimate is correlated with the signs. Two halves of the
+seeds give h independently, and sum h^2 is the sum of their products, so that the error of one half is not squared. The
+sum of h must be near 1: then a uniform change of phase passes unchanged, and the window of d contains the response. It
+is the least certain of the figures; its error is the width of the window over the root of the pixels: 0.04 for six
+seeds of 0.75 million pixels.
 """
 
 from __future__ import annotations
@@ -65,7 +66,7 @@ class Efficiency:
     """Figures of one estimator on one phase field; variances are means over the pixels that count."""
 
     variance_rad2: float
-    bound_rad2: float  # at the estimator's own resolution
+    bound_rad2: float  # at the resolution of the estimator
     pixels_per_value: float  # N
     response_sum: float  # of h; 1 when a flat change of phase comes through
     bias_rms_rad: float  # of the mean over the seeds against the truth
@@ -99,7 +100,7 @@ def efficiency(
     """Measure an estimator on a phase field (H, W), NaN where there is no light, over the pixels of `inner`.
 
     `ratios` are k_c of R, G, B, IR. Pixels that any of the runs does not return with the right order are left out.
-    Raises ValueError when the estimate does not answer to the phase at all.
+    Raises ValueError when the estimate does not depend on the phase.
     """
     plain, changed, coins = [], [], []
     for seed in range(seeds):

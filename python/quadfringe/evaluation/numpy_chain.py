@@ -1,11 +1,10 @@
-"""The published chain in plain NumPy and SciPy: what the product is timed and judged against.
+"""The published chain in plain NumPy and SciPy: the reference for times and results.
 
 It is the method of "Single-shot 3D shape measurement of discontinuous objects based on a coaxial
-fringe projection system" (Applied Optics, 2019), written as a competent NumPy user would write it:
+fringe projection system" (Applied Optics, 2019), written as an experienced NumPy user would write it:
 whole images at a time, no loops over pixels, default SciPy settings (one thread). `dtype` chooses
-float32 (the default: the faster, so the harder to beat) or float64 (what NumPy does when nobody
-asks). Nothing is made slow on purpose. Equation numbers (S1..S8) are those of the product's
-documentation.
+float32 (the default: the faster, so the harder to beat) or float64 (NumPy's default).
+It is not slowed down on purpose. Equation numbers (S1) to (S8) refer to docs/method/equations.md.
 
 Frames are (H, W); fringes are vertical or leaning, their phase grows along a row. No data is NaN.
 """

@@ -62,7 +62,7 @@ def fringe_px(scene: Scene) -> int:
 
 
 def rms(values: Map) -> float:
-    """Root of the mean square; 0 of nothing is NaN."""
+    """Give the root mean square; NaN for an empty map."""
     return float(np.sqrt(np.mean(np.square(values, dtype=np.float64)))) if values.size else np.nan
 
 
