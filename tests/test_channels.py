@@ -137,7 +137,7 @@ def test_captures_at_fault_are_explained() -> None:
         fit_channels(plan, seen[:-1])
     with pytest.raises(InputError, match="red is saturated in all but 0 captures"):
         fit_channels(plan, np.ones_like(seen))
-    with pytest.raises(InputError, match="are the channels in the order"):
+    with pytest.raises(InputError, match="put the channels into the order"):
         fit_channels(plan, seen_of(bench_of(crosstalk=None, gain=(0.9, 0.9, 0.9, 0.001)), plan))
     with pytest.raises(InputError, match="two shots or more"):
         dark_level([bench.expose(capped=True)])

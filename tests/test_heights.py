@@ -84,7 +84,7 @@ def test_planes_at_fault_are_explained(planes: list[qf.Shape], heights: HeightCa
     phases = [shape.phase_rad for shape in planes[:-1]]
     with pytest.raises(InputError, match="7 heights for 6 phase maps"):
         fit_heights(HEIGHTS_MM, phases[:-1])
-    with pytest.raises(InputError, match="all must be alike"):
+    with pytest.raises(InputError, match="all must have one size"):
         fit_heights(HEIGHTS_MM, [*phases[:-1], phases[-1][:-1]])
     with pytest.raises(InputError, match="4 different heights for degree 3"):
         fit_heights(HEIGHTS_MM[:4], phases[:4])
@@ -172,13 +172,13 @@ def test_steps_are_measured_and_missing_ones_named() -> None:
     assert found.errors_mm == pytest.approx((0.02, 0.0), abs=1e-6)
     with pytest.raises(InputError, match="points lie near 30 mm"):
         measure_steps(xyz, (10.0, 30.0))
-    with pytest.raises(InputError, match="must be 2 mm apart"):
+    with pytest.raises(InputError, match="at least 2 mm apart"):
         measure_steps(xyz, (10.0, 11.0))
 
 
 def test_artefacts_that_are_not_there_are_named() -> None:
     flat = np.dstack([*np.meshgrid(np.arange(300.0), np.arange(200.0)), np.full((200, 300), 800.0)])
-    with pytest.raises(InputError, match="no sphere of about 60 mm"):
+    with pytest.raises(InputError, match="found no sphere of about 60 mm"):
         accept(Artefacts(spheres=(flat,), sphere_diameter_mm=60.0))
     with pytest.raises(InputError, match="0 points"):
         fit_plane(np.full((4, 4, 3), np.nan))

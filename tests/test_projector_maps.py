@@ -74,7 +74,7 @@ def test_missing_steps_and_mixed_sizes_are_named() -> None:
     columns, rows = stacks(plan, "columns"), stacks(plan, "rows")
     for bad, words in (
         (columns[:2], "expected 3 stacks"),
-        ([columns[0], columns[1][:3], columns[2]], "35 fringes over columns: expected 4 steps"),
+        ([columns[0], columns[1][:3], columns[2]], "35 fringes along columns: expected 4 steps"),
         ([columns[0], columns[1][:, :100], columns[2]], "must have one size"),
         ([stack[:, :100] for stack in columns], "must have one size"),
     ):

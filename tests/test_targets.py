@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from quadfringe.calibration._centres import refined_centres
 from quadfringe.calibration._grid import blobs, homography, symmetries, through
 from quadfringe.calibration.detect import TargetNotFoundError, View, find_target
-from quadfringe.calibration.rehearsal import BoardRoom
+from quadfringe.calibration.rehearsal import VirtualBoard
 from quadfringe.calibration.targets import (
     Target,
     asymmetric_grid,
@@ -50,8 +50,8 @@ TILTS = {
 
 
 @cache
-def room(kind: str, **scene: Any) -> BoardRoom:
-    return BoardRoom(SystemConfig(camera=CAMERA, scene=SceneConfig(**scene)), BOARDS[kind])
+def room(kind: str, **scene: Any) -> VirtualBoard:
+    return VirtualBoard(SystemConfig(camera=CAMERA, scene=SceneConfig(**scene)), BOARDS[kind])
 
 
 def pose(
@@ -182,9 +182,9 @@ def test_marks_that_are_covered_or_missing_are_named() -> None:
 
 def test_images_that_are_none_are_refused() -> None:
     for image in (np.zeros((4, 4, 4, 4), np.uint8), np.zeros((40, 40), np.int64), np.zeros((0, 4), np.uint8)):
-        with pytest.raises(InputError, match="expected an image"):
+        with pytest.raises(InputError, match="image: expected"):
             find_target(image, BOARDS["rings"])
-    with pytest.raises(InputError, match="not finite"):
+    with pytest.raises(InputError, match="expected finite values"):
         find_target(np.full((40, 40), np.nan, np.float32), BOARDS["rings"])
 
 

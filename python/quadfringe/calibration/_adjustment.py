@@ -1,9 +1,9 @@
-"""What is adjusted and how it is measured: parameters by name, residuals, and their sparse derivatives.
+"""The adjustment problem: parameters by name, residuals, and their sparse Jacobian.
 
-A board point is seen by the camera, and lit by each projector as by an inverse camera (S8). The camera's residual is
-what its lens and pose predict less what was found. A projector pixel was read where the camera found the point, so an
-error of the camera's point is in it too, times the slope of the map between them: that part is taken off, and what is
-left is independent from device to device. Without it the confidence intervals of two projectors would be wrong.
+The camera observes a board point, and each projector lights it as an inverse camera (S8). A camera residual is the
+predicted minus the observed image point. A projector pixel was read at the observed camera point, so an error of that
+point enters it too, multiplied by the slope of the map between the two. This part is subtracted; the remaining
+residuals are independent between devices, which the confidence intervals of the pair need.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ MOTION = (
 
 @dataclass(frozen=True)
 class Sight:
-    """Points of one pose as one device sees them.
+    """The points of one pose as one device observes them.
 
-    `board_mm` (n, 3), `points_px` (n, 2); for a projector `slope` (n, 2, 2) and `camera_rows` (n,), the camera's own
-    points of this pose that they were read at.
+    `board_mm` (n, 3) and `points_px` (n, 2) correspond. A projector also has `slope` (n, 2, 2), the change of its pixel
+    per camera pixel, and `camera_rows` (n,), the indices of its points among those of the camera in this pose.
     """
 
     device: str
@@ -48,12 +48,11 @@ class Sight:
 
 
 class Adjustment:
-    """Residuals and Jacobian over all sights, for scipy's least squares; parameters are found by name.
+    """Residuals and Jacobian over all sights, for `scipy.optimize.least_squares`, with parameters by name.
 
-    With `radial3` false the third radial coefficient stays 0. `sd_px` are the standard deviations (2,) along x and y by
-    device, by which residuals are divided: mirrors are not as far apart along columns as along rows, least of all in a
-    diamond, and fringes over both are not as fine. `kept` are the points (n,) of each sight that count; without it
-    all do.
+    With `radial3` false, the third radial coefficient stays 0. `sd_px` maps each device to the standard deviations (2,)
+    along x and y that divide its residuals; they differ because mirror pitch and fringe period differ between columns
+    and rows. `kept` marks the points (n,) of each sight that are used; without it, all are.
     """
 
     def __init__(
@@ -87,32 +86,32 @@ class Adjustment:
         names.extend(f"{owner}.{field}" for field in fields)
 
     def part(self, values: Array, owner: str, part: str) -> Array:
-        """Give the parameters of an owner ("camera", "pose_3"), its "lens" or its "motion"."""
+        """Return the "lens" or the "motion" parameters of an owner ("camera", "pose_3")."""
         return values[self.places[owner, part]]
 
     def raw(self, values: Array) -> list[Array]:
-        """Give the residuals (n, 2) in px of each sight: predicted less found."""
+        """Return the residuals (n, 2), px, of each sight: predicted minus observed."""
         return [self._predicted(values, sight)[0] - sight.points_px for sight in self.sights]
 
     def residuals(self, values: Array) -> Array:
-        """Give independent residuals of unit variance, in one vector; 0 for points that do not count."""
-        own = self.independent(values)
-        return np.concatenate([(r * k[:, None]).ravel() for r, k in zip(own, self.kept, strict=True)])
+        """Return independent residuals of unit variance as one vector; 0 for points that are not kept."""
+        scaled = self.independent(values)
+        return np.concatenate([(r * k[:, None]).ravel() for r, k in zip(scaled, self.kept, strict=True)])
 
     def independent(self, values: Array) -> list[Array]:
-        """Give the residuals (n, 2) of each sight less the camera's share in them, in standard deviations."""
+        """Return the residuals (n, 2) of each sight without the part of the camera, in standard deviations."""
         raw = self.raw(values)
         camera = {s.pose: r for s, r in zip(self.sights, raw, strict=True) if s.device == "camera"}
         out = []
         for sight, residual in zip(self.sights, raw, strict=True):
-            own = residual
+            remaining = residual
             if sight.slope is not None:
-                own = residual - (sight.slope @ camera[sight.pose][sight.camera_rows][:, :, None])[:, :, 0]
-            out.append(own / self.sd_px[sight.device])
+                remaining = residual - (sight.slope @ camera[sight.pose][sight.camera_rows][:, :, None])[:, :, 0]
+            out.append(remaining / self.sd_px[sight.device])
         return out
 
     def jacobian(self, values: Array) -> Any:
-        """Give the derivatives of `residuals` as a sparse matrix."""
+        """Return the Jacobian of `residuals` as a sparse matrix."""
         from scipy import sparse
 
         blocks: list[tuple[slice, slice, Array]] = []
@@ -127,14 +126,14 @@ class Adjustment:
                 ]
             weight = (kept[:, None] / self.sd_px[sight.device])[:, :, None]
             blocks += [(rows, columns, (part * weight).reshape(-1, part.shape[2])) for columns, part in slopes]
-        if self._at is None:  # where derivatives stand never changes
+        if self._at is None:  # the sparsity pattern never changes
             index = [np.mgrid[r, c] for r, c, _ in blocks]
             self._at = tuple(np.concatenate([i[k].ravel() for i in index]) for k in (0, 1))
         data = np.concatenate([part.ravel() for *_, part in blocks])
         return sparse.coo_matrix((data, self._at), shape=(self.count, len(self.names))).tocsr()
 
     def _predicted(self, values: Array, sight: Sight) -> tuple[Array, list[tuple[slice, Array]]]:
-        """Give the predicted pixels (n, 2), and their derivatives (n, 2, k) by the place of k parameters."""
+        """Return the predicted pixels (n, 2), and their derivatives (n, 2, k) by parameter slice."""
         import cv2
 
         pose, board = (
@@ -144,11 +143,11 @@ class Adjustment:
         motion, chains = board, [(pose, np.eye(6))]
         if sight.device != "camera":
             device = self.places[sight.device, "motion"]
-            own = values[device]
-            found = cv2.composeRT(board[:3], board[3:], own[:3], own[3:])
+            projector = values[device]
+            found = cv2.composeRT(board[:3], board[3:], projector[:3], projector[3:])
             motion = np.concatenate([found[0].ravel(), found[1].ravel()])
             by = [np.hstack([np.asarray(d) for d in row]) for row in (found[2:6], found[6:10])]
-            both = np.vstack(by)  # rows: rotation and translation; columns: board's six, then the device's six
+            both = np.vstack(by)  # rows: rotation and translation; columns: six of the board, then six of the projector
             chains = [(pose, both[:, :6]), (device, both[:, 6:])]
         lens = self.places[sight.device, "lens"]
         fx, fy, cx, cy, *distortion = values[lens]

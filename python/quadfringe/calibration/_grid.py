@@ -1,4 +1,4 @@
-"""Blobs of a circle or ring board, and their order in its grid."""
+"""Detection of the blobs of a circle or ring board and their assignment to its grid; homographies."""
 
 from __future__ import annotations
 
@@ -7,28 +7,26 @@ import itertools
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import BLOB_AREA_MIN_PX, BLOB_SIZE_RATIO_MAX, NEIGHBOUR_OFF_MAX, SEEDS
 from quadfringe.calibration.targets import Target
 
 __all__ = ["blobs", "homography", "in_grid_order", "jacobians", "symmetries", "through"]
 
 Points = NDArray[np.float64]
-AREA_MIN_PX = 12.0
-LIKE_SIZES = 1.9  # largest over smallest blob of one board, tilted by 45 degrees
-STRAY = 0.3  # of a step: how far a neighbour may lie from where the step before points
-SEEDS = 5
+LATTICE_OFF_MAX = 1 / 6  # share of the spacing by which lens distortion may displace a point from a homography
 
 
 def blobs(image: NDArray[np.uint8], target: Target) -> Points:
-    """Give the centres (n, 2) of blobs of one size that may be rings or discs of the target.
+    """Return the centres (n, 2), px, of similar blobs that may be the rings or discs of the target.
 
-    OpenCV looks at the middle of a blob, which is white in a ring: with its default colour no ring is found at all.
+    OpenCV filters by the colour at the centre of a blob, which is white in a ring.
     """
     import cv2
 
     most = image.size / (target.rows * target.columns)
     settings = cv2.SimpleBlobDetector.Params()
     settings.filterByColor, settings.blobColor = True, 255 if target.kind == "rings" else 0
-    settings.filterByArea, settings.minArea, settings.maxArea = True, AREA_MIN_PX, float(most)
+    settings.filterByArea, settings.minArea, settings.maxArea = True, BLOB_AREA_MIN_PX, float(most)
     settings.filterByCircularity, settings.minCircularity = True, 0.55
     settings.filterByInertia, settings.minInertiaRatio = True, 0.15
     settings.filterByConvexity, settings.minConvexity = True, 0.8
@@ -36,23 +34,23 @@ def blobs(image: NDArray[np.uint8], target: Target) -> Points:
     settings.minDistBetweenBlobs, settings.minRepeatability = 5, 2
     found = cv2.SimpleBlobDetector.create(settings).detect(image)
     places = np.array([blob.pt for blob in found], np.float64).reshape(-1, 2)
-    return places[_alike(np.array([blob.size for blob in found]))]
+    return places[_similar(np.array([blob.size for blob in found]))]
 
 
-def _alike(sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark the largest group of sizes that differ by no more than boards do."""
+def _similar(sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Mark the largest group of sizes (n,) whose ratio stays within that of one board."""
     if not sizes.size:
         return np.zeros(0, np.bool_)
-    inside = [(sizes >= low) & (sizes <= LIKE_SIZES * low) for low in sizes]
+    inside = [(sizes >= low) & (sizes <= BLOB_SIZE_RATIO_MAX * low) for low in sizes]
     return max(inside, key=lambda group: (int(group.sum()), float(np.median(sizes[group]))))
 
 
 def in_grid_order(places: Points, target: Target) -> tuple[Points | None, int]:
-    """Give the places in the order of the target's points up to its symmetries, and how many of its points are there.
+    """Return the places in the order of the target's points, up to its symmetries, and how many points were found.
 
-    None when places are missing or lie in no such grid. Neighbours are followed step by step from the middle, so that
-    perspective and the lens may bend the grid. OpenCV's `findCirclesGrid` finds the same, but takes minutes now and
-    then, and says nothing of how far it came.
+    The places are None when points are missing or do not form this grid. The grid is followed from neighbour to
+    neighbour from the middle, which tolerates perspective and lens distortion. OpenCV's `findCirclesGrid` would return
+    the same order, but occasionally takes minutes and does not report how many points it found.
     """
     most = 0
     middle = np.linalg.norm(places - np.median(places, axis=0), axis=1) if len(places) else np.zeros(0)
@@ -67,14 +65,14 @@ def in_grid_order(places: Points, target: Target) -> tuple[Points | None, int]:
 
 
 def _cells(target: Target) -> NDArray[np.intp]:
-    """Whole coordinates (N, 2) of the points along the two nearest directions of their lattice."""
+    """Return the integer lattice coordinates (N, 2) of the points along its two shortest directions."""
     half = 0.5 * target.pitch_mm
     basis = [[half, half], [half, -half]] if target.kind == "asymmetric" else [[2 * half, 0], [0, 2 * half]]
     return np.rint(target.points_mm[:, :2] @ np.linalg.inv(basis)).astype(np.intp)
 
 
 def _followed(places: Points, seed: int) -> dict[tuple[int, int], int]:
-    """Give the places by whole coordinates, found from neighbour to neighbour from the seed on."""
+    """Return the indices of the places by lattice coordinates, following neighbours from `seed`."""
     away = places - places[seed]
     distance = np.linalg.norm(away, axis=1)
     nearest = [i for i in np.argsort(distance)[1:9] if distance[i] > 0]
@@ -91,24 +89,24 @@ def _followed(places: Points, seed: int) -> dict[tuple[int, int], int]:
     while queue:
         cell = queue.pop(0)
         for axis, sign in ((0, 1), (0, -1), (1, 1), (1, -1)):
-            beside = (cell[0] + sign * (axis == 0), cell[1] + sign * (axis == 1))
-            if beside in cells:
+            neighbour = (cell[0] + sign * (axis == 0), cell[1] + sign * (axis == 1))
+            if neighbour in cells:
                 continue
             step = steps[cell][axis]
             missed = np.linalg.norm(places - (places[cells[cell]] + sign * step), axis=1)
             found = int(missed.argmin())
-            if missed[found] > STRAY * np.hypot(*step) or found in taken:
+            if missed[found] > NEIGHBOUR_OFF_MAX * np.hypot(*step) or found in taken:
                 continue
             taken.add(found)
-            cells[beside] = found
+            cells[neighbour] = found
             moved = sign * (places[found] - places[cells[cell]])
-            steps[beside] = (moved, steps[cell][1]) if axis == 0 else (steps[cell][0], moved)
-            queue.append(beside)
+            steps[neighbour] = (moved, steps[cell][1]) if axis == 0 else (steps[cell][0], moved)
+            queue.append(neighbour)
     return cells
 
 
 def _matched(cells: dict[tuple[int, int], int], wanted: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Give the place of each wanted cell, -1 where there is none, for the best of all turns and shifts."""
+    """Return the place index of each wanted cell, -1 where there is none, for the best rotation and translation."""
     numbered = np.array(list(cells))
     low = numbered.min(axis=0)
     size = numbered.max(axis=0) - low + 1
@@ -128,15 +126,15 @@ def _matched(cells: dict[tuple[int, int], int], wanted: NDArray[np.intp]) -> NDA
 
 
 def _is_lattice(places: Points, target: Target) -> bool:
-    """Tell whether a homography explains the places to a sixth of their spacing: lenses bend less than that."""
+    """Return whether a homography explains the places within `LATTICE_OFF_MAX` of their spacing."""
     matrix = homography(target.points_mm[:, :2], places)
     missed = np.linalg.norm(through(matrix, target.points_mm[:, :2]) - places, axis=1)
     step = np.linalg.norm(places[1] - places[0])
-    return bool(missed.max() < step / 6)
+    return bool(missed.max() < LATTICE_OFF_MAX * step)
 
 
 def symmetries(target: Target) -> list[NDArray[np.intp]]:
-    """Give the orders of the points, (N,) indices each, that turn or mirror the grid into itself."""
+    """Return the permutations of the points, (N,) indices each, that rotate or mirror the grid onto itself."""
     points = target.points_mm[:, :2]
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
     orders = []
@@ -149,7 +147,7 @@ def symmetries(target: Target) -> list[NDArray[np.intp]]:
 
 
 def homography(points: Points, places: Points) -> Points:
-    """Give the 3 x 3 homography that takes points (n, 2) to places (n, 2), by least squares."""
+    """Return the least-squares homography (3, 3) from points (n, 2) to places (n, 2); NaN when there is none."""
     import cv2
 
     matrix, _ = cv2.findHomography(points, places, 0)
@@ -157,13 +155,13 @@ def homography(points: Points, places: Points) -> Points:
 
 
 def through(matrix: Points, points: Points) -> Points:
-    """Take points (..., 2) through a homography."""
+    """Map points (..., 2) by a homography."""
     image = points @ matrix[:, :2].T + matrix[:, 2]
     return np.asarray(image[..., :2] / image[..., 2:], np.float64)
 
 
 def jacobians(matrix: Points, points: Points) -> Points:
-    """Give the derivatives (..., 2, 2) of a homography at points (..., 2)."""
+    """Return the Jacobians (..., 2, 2) of a homography at points (..., 2)."""
     image = points @ matrix[:, :2].T + matrix[:, 2]
     place, depth = image[..., :2] / image[..., 2:], image[..., 2]
     change = matrix[:2, :2] - place[..., :, None] * matrix[2, :2]

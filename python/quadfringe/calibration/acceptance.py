@@ -1,4 +1,4 @@
-"""Whether the instrument is good: a plane, a sphere and steps, judged in the spirit of VDI/VDE 2634, part 2."""
+"""Acceptance test of the instrument: a plane, a sphere and steps, in the manner of VDI/VDE 2634 part 2."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import ARTEFACT_BAND_MM, BORDER_PX, CAP_DEG
 from quadfringe.calibration.surfaces import (
     Form,
     cap_towards_camera,
@@ -39,17 +40,14 @@ __all__ = [
 ]
 
 Map = NDArray[np.float32]
-BORDER_PX = 30  # about a fringe: windows that reach beyond the image know less
-CAP_DEG = 60.0  # of a sphere, what is seen more steeply than this is left out
-BAND_MM = 1.0  # points farther from the artefact than this belong to something else
-# Of the ready scenes of the virtual bench.
+# Calibrated sizes of the artefacts in the built-in scenes of the virtual bench.
 SPHERE_DIAMETER_MM = 68.0
 STEP_HEIGHTS_MM = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 45.0, 50.0)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What is accepted, mm."""
+    """Largest accepted absolute value of each kind of figure, mm."""
 
     plane_form_mm: float = 0.10
     sphere_form_mm: float = 0.15
@@ -59,7 +57,7 @@ class Limits:
 
 @dataclass(frozen=True)
 class Artefacts:
-    """Measured points (H, W, 3), mm, of each artefact, and its calibrated sizes; any may be absent."""
+    """Measured points (H, W, 3), mm, of each artefact, and its calibrated sizes; every kind may be absent."""
 
     planes: tuple[Map, ...] = ()
     spheres: tuple[Map, ...] = ()
@@ -70,7 +68,7 @@ class Artefacts:
 
 @dataclass(frozen=True)
 class Line:
-    """One figure against its limit, mm."""
+    """One figure and its limit, mm."""
 
     name: str
     value_mm: float
@@ -78,13 +76,13 @@ class Line:
 
     @property
     def accepted(self) -> bool:
-        """Whether the figure keeps its limit, whatever its sign."""
+        """Whether the absolute value of the figure is within the limit."""
         return abs(self.value_mm) <= self.limit_mm
 
 
 @dataclass(frozen=True)
 class Acceptance:
-    """The judged figures, others that explain them, and the deviations (H, W) mm of every measurement by name."""
+    """The judged figures, further figures by name, and the deviation map (H, W), mm, of every artefact by name."""
 
     lines: tuple[Line, ...]
     figures: Mapping[str, float]
@@ -92,16 +90,17 @@ class Acceptance:
 
     @property
     def accepted(self) -> bool:
-        """Whether every line keeps its limit."""
+        """Whether every line is within its limit."""
         return all(line.accepted for line in self.lines)
 
 
 def accept(artefacts: Artefacts, limits: Limits | None = None) -> Acceptance:
-    """Judge measured artefacts; raises `InputError` when one cannot be found in its points.
+    """Judge measured artefacts; raises `InputError` when an artefact cannot be found in its points.
 
-    Form is the range of distances from the fitted surface with the worst 3 of 1000 points left out, by which planes
-    are judged; the figure with `6sigma` in its name is that inside +-3 standard deviations, by which spheres are.
-    Points within 30 px of the image border are left out, and those of a sphere seen more steeply than 60 degrees.
+    Planes are judged by their form: the range of the distances from the fitted plane without the worst 3 of 1000
+    points. Spheres are judged by the range inside +-3 standard deviations (`6sigma` in the name of the figure) and by
+    their diameter. Points within 30 px of the image border are left out, and points of a sphere that the camera sees
+    at more than 60 degrees from the surface normal.
     """
     limits = limits or Limits()
     found = [
@@ -119,22 +118,22 @@ def accept(artefacts: Artefacts, limits: Limits | None = None) -> Acceptance:
 def _plane(name: str, xyz_mm: Map, limits: Limits) -> Acceptance:
     inner = _without_border(xyz_mm)
     first = dominant_plane(inner)
-    mine = np.where((np.abs(first.distances_mm(inner)) < BAND_MM)[..., None], inner, np.nan)
-    away = fit_plane(mine).distances_mm(mine)
-    form = form_of(away)
+    part = np.where((np.abs(first.distances_mm(inner)) < ARTEFACT_BAND_MM)[..., None], inner, np.nan)
+    distances = fit_plane(part).distances_mm(part)
+    form = form_of(distances)
     lines = (Line(f"{name}_form_mm", form.form_mm, limits.plane_form_mm),)
-    return Acceptance(lines, _form_figures(name, form), {name: away})
+    return Acceptance(lines, _form_figures(name, form), {name: distances})
 
 
 def _sphere(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acceptance:
     inner = _without_border(xyz_mm)
     sphere = dominant_sphere(inner, artefacts.sphere_diameter_mm)
     for _ in range(2):
-        near = np.abs(sphere.distances_mm(inner)) < BAND_MM
-        mine = np.where((near & cap_towards_camera(inner, sphere, CAP_DEG))[..., None], inner, np.nan)
-        sphere = fit_sphere(mine, sphere)
-    away = sphere.distances_mm(mine)
-    form = form_of(away)
+        near = np.abs(sphere.distances_mm(inner)) < ARTEFACT_BAND_MM
+        part = np.where((near & cap_towards_camera(inner, sphere, CAP_DEG))[..., None], inner, np.nan)
+        sphere = fit_sphere(part, sphere)
+    distances = sphere.distances_mm(part)
+    form = form_of(distances)
     size = 2 * sphere.radius_mm - artefacts.sphere_diameter_mm
     lines = (
         Line(f"{name}_form_6sigma_mm", form.form_6sigma_mm, limits.sphere_form_mm),
@@ -142,7 +141,7 @@ def _sphere(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acc
     )
     x, y, z = (float(c) for c in sphere.centre_mm)
     place = {f"{name}_x_mm": x, f"{name}_y_mm": y, f"{name}_z_mm": z}
-    return Acceptance(lines, _form_figures(name, form) | place, {name: away})
+    return Acceptance(lines, _form_figures(name, form) | place, {name: distances})
 
 
 def _steps(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acceptance:
@@ -167,10 +166,10 @@ def _form_figures(name: str, form: Form) -> dict[str, float]:
 
 
 def measure_artefacts(config: SystemConfig, calibration: Calibration | None = None) -> Artefacts:
-    """Measure planes, spheres and the steps of the virtual bench of `config` about 800 mm away.
+    """Measure two planes, a sphere and steps on the virtual bench of `config`, about 800 mm away.
 
-    Light and camera are those of its scene; without a calibration that of the bench itself is taken. The plane stands
-    level, and tilted by 15 degrees; sphere and steps are the ready scenes; every shot has its own noise.
+    One plane faces the camera and one is tilted by 15 degrees; sphere and steps are built-in scenes. Light and camera
+    are those of the scene of `config`, with new noise for each shot. Without a calibration, the exact one is used.
     """
     bench = VirtualBench(config)
     known = calibration or bench.calibration()
@@ -200,13 +199,13 @@ def read_artefacts(
     sphere_diameter_mm: float,
     step_heights_mm: Sequence[float],
 ) -> Artefacts:
-    """Read measured artefacts from shapes saved as NPZ; raises `InputError` for a shape without millimetres."""
+    """Read measured artefacts from shapes saved as NPZ; raises `InputError` for an uncalibrated shape."""
     read = [tuple(Shape.load(path).points_mm for path in paths) for paths in (planes, spheres, steps)]
     return Artefacts(read[0], read[1], sphere_diameter_mm, read[2], tuple(step_heights_mm))
 
 
 def write_acceptance(path: Path, found: Acceptance) -> None:
-    """Write the deviations of every measurement as one PNG; needs matplotlib (extra `plot`)."""
+    """Write the deviation maps of all artefacts as one PNG; needs matplotlib (extra `plot`)."""
     panels = [_panel(name, image) for name, image in found.deviations_mm.items()]
     word = "accepted" if found.accepted else "not accepted"
     draw_panels(path, f"acceptance: {word}", [panels[i : i + 3] for i in range(0, len(panels), 3)])

@@ -1,11 +1,12 @@
-"""Responses of camera and projector, and crosstalk of the four channels, from evenly lit captures.
+"""Responses of camera and projectors, and crosstalk of the four channels, from evenly lit captures.
 
-What is seen of levels l (R, G, B, IR, shares of full light) under a relative exposure e is taken to be
+The camera sees levels l (R, G, B, IR, shares of full light) at a relative exposure e as
 
     captured_i = dark_i + (e (sum_j M_ij l_j ^ gamma_j + ambient_i)) ^ (1 / kappa_i),
 
-with the light M_ij of projected channel j on captured channel i. That is the virtual bench, and step 1 of the chain
-turned round (S1): dark level, camera, crosstalk, projector. Crosstalk is M with columns scaled to 1 on the diagonal.
+where M_ij is the light of projected channel j in captured channel i. The virtual bench renders by this model, and the
+decoder inverts it before (S1) holds: dark level, camera response, crosstalk, projector response. The crosstalk matrix
+is M with its columns scaled to 1 on the diagonal.
 """
 
 from __future__ import annotations
@@ -18,6 +19,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
+from quadfringe.calibration._params import (
+    AMBIENT_MAX,
+    CAMERA_PRIOR,
+    CLIPPED,
+    DARK_PRIOR,
+    ROBUST,
+    UNLIT,
+    USABLE_LEVELS_MIN,
+)
 from quadfringe.calibration.levels import CHANNELS, LevelPlan, row4
 from quadfringe.config import ChannelResponse, Matrix4, Response, Row4
 from quadfringe.errors import InputError
@@ -25,24 +35,15 @@ from quadfringe.errors import InputError
 __all__ = ["Channels", "fit_channels"]
 
 Array = NDArray[np.float64]
-CLIPPED = 0.97  # captured shares of full scale from here on are left out: noise would be cut off
-CAMERA_PRIOR = (
-    2e-3  # share of full scale that one unit of a camera exponent away from 1 costs: a camera is linear unless seen
-)
-DARK_PRIOR = 0.05  # the same for the dark level, which noise that cannot be negative lifts where a camera bends
-ROBUST = 2e-3  # misses of captures above this count less, share of full scale
-UNLIT = 0.02  # a channel whose own light stays below this share of full scale cannot be calibrated
-OFFSET_MAX = 0.45  # share of full light that room light may add
-USABLE_MIN = 3  # unsaturated levels of a ramp, black left out, that show its bend
 
 
 @dataclass(frozen=True)
 class Channels:
-    """What was found, with one standard deviation of each number, and what is left of the defects.
+    """Fitted responses and crosstalk, one standard deviation of each number, and the errors before and after.
 
-    Errors are shares of a channel's own full light, (K, 4), NaN where a capture does not count. `level_before` and
-    `level_after` compare what is seen with the projected level; `stray_before` and `stray_after` are the light of
-    other channels that a channel sees while its own projector is black.
+    Errors are shares of the full light of the channel, (K, 4), NaN for captures that were not used. `level_before` and
+    `level_after` compare the captured with the projected level; `stray_before` and `stray_after` are the light of the
+    other channels while the channel itself is projected black.
     """
 
     dark: Row4
@@ -59,7 +60,7 @@ class Channels:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Give what is left by name: the worst stray light, RMS and worst error of the levels, per cent."""
+        """Worst stray light, and RMS and worst level error, before and after, by name, per cent."""
         found = {}
         for when in ("before", "after"):
             stray, level = (getattr(self, f"{kind}_{when}") for kind in ("stray", "level"))
@@ -69,29 +70,29 @@ class Channels:
         return found
 
     def keywords(self) -> dict[str, Any]:
-        """Give what was found as fields of a `Calibration`."""
+        """Return what was fitted as the fields of a `Calibration`."""
         return {name: getattr(self, name) for name in ("dark", "response", "crosstalk", "projector_response")}
 
 
 def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,) * 4) -> Channels:
-    """Fit responses and crosstalk to `captured` (K, 4), shares of full scale, NaN where saturated (S1).
+    """Fit responses and crosstalk to the mean captured levels (K, 4), shares of full scale, NaN where saturated.
 
-    `dark` is the level without light, where the fit starts. Raises `InputError` when there are not as many captures as
-    the plan has, when a projected channel is not seen by its own camera channel, or when too few are unsaturated.
+    `dark` is the measured dark level, from which the fit starts. Raises `InputError` when captures of the plan are
+    missing, when a camera channel does not see its projected channel, or when too few captures are unsaturated.
     """
     captured = np.asarray(captured, float)
     if captured.shape != plan.levels.shape:
         raise InputError(
             f"levels: expected {len(plan.levels)} captures of four channels, got an array of shape {captured.shape}; "
-            "take every level of the plan"
+            "capture every level of the plan"
         )
     seen = np.where(captured < CLIPPED, captured, np.nan)
     _check_ramps(plan, seen - np.asarray(dark, float))
     found, deviations = _solve(plan, seen, np.asarray(dark, float))
     lit = seen - found.dark
-    own = np.diag(found.mixing)
-    crosstalk = found.mixing / own
-    offset = np.linalg.solve(crosstalk, found.ambient).clip(0.0, OFFSET_MAX)
+    full_light = np.diag(found.mixing)
+    crosstalk = found.mixing / full_light
+    offset = np.linalg.solve(crosstalk, found.ambient).clip(0.0, AMBIENT_MAX)
     known: dict[str, Any] = {
         "dark": row4(found.dark),
         "response": _responses(np.zeros(4), found.camera),
@@ -102,14 +103,14 @@ def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,
         **known,
         camera_exponent_sd=row4(deviations.camera),
         projector_exponent_sd=row4(deviations.projector),
-        crosstalk_sd=_matrix(deviations.mixing / own),
+        crosstalk_sd=_matrix(deviations.mixing / full_light),
         **_errors(plan, lit, captured, known),
     )
 
 
 @dataclass(frozen=True)
 class _Model:
-    """Exponents of camera and projector, light of projected on captured channels, room light, dark level."""
+    """Parameters of the model: exponents of camera and projector, light matrix M, ambient light and dark level."""
 
     camera: Array
     projector: Array
@@ -130,15 +131,15 @@ class _Model:
 
 
 def _solve(plan: LevelPlan, seen: Array, dark: Array) -> tuple[_Model, _Model]:
-    """Give the best model and the standard deviations of its numbers."""
+    """Return the fitted model and the standard deviations of its parameters."""
     from scipy.optimize import least_squares
 
     counts = np.isfinite(seen)
 
     def misses(numbers: Array) -> Array:
         model = _Model.of(numbers)
-        held = [CAMERA_PRIOR * (model.camera - 1), DARK_PRIOR * (model.dark - dark)]
-        return np.concatenate([(model.captured(plan) - seen)[counts], *held])
+        priors = [CAMERA_PRIOR * (model.camera - 1), DARK_PRIOR * (model.dark - dark)]
+        return np.concatenate([(model.captured(plan) - seen)[counts], *priors])
 
     start = _first_guess(plan, seen - dark, dark).numbers()
     low = np.concatenate([np.full(8, 0.2), np.full(20, -0.2), np.zeros(4)])
@@ -153,17 +154,17 @@ def _solve(plan: LevelPlan, seen: Array, dark: Array) -> tuple[_Model, _Model]:
 
 
 def _first_guess(plan: LevelPlan, lit: Array, dark: Array) -> _Model:
-    """Take the camera as linear, the brightest unsaturated level of each ramp as its light, and its bend as a power."""
+    """Start from a linear camera: the power law of each ramp, and its brightest unsaturated level as its light."""
     black = np.nan_to_num(lit[_black(plan)].mean(axis=0))
     mixing, projector = np.eye(4), np.ones(4)
     for channel in range(4):
         rows = _ramp(plan, channel)
         light = np.where(np.isfinite(lit[rows]), lit[rows] - black, np.nan)
-        level, own = plan.levels[rows, channel], light[:, channel]
-        usable = np.isfinite(own) & (own > 0.002)
-        slope, height = np.polyfit(np.log(level[usable]), np.log(own[usable]), 1)
+        level, seen = plan.levels[rows, channel], light[:, channel]
+        usable = np.isfinite(seen) & (seen > ROBUST)
+        slope, height = np.polyfit(np.log(level[usable]), np.log(seen[usable]), 1)
         projector[channel] = slope
-        top = int(np.flatnonzero(np.isfinite(own))[-1])
+        top = int(np.flatnonzero(np.isfinite(seen))[-1])
         mixing[:, channel] = np.nan_to_num(light[top]) / level[top] ** slope
         mixing[channel, channel] = np.exp(height)
     return _Model(np.ones(4), projector, mixing, black, dark)
@@ -174,7 +175,7 @@ def _black(plan: LevelPlan) -> NDArray[np.intp]:
 
 
 def _ramp(plan: LevelPlan, channel: int) -> NDArray[np.intp]:
-    """Give the captures in which this channel alone is lit, at full exposure, from dark to bright."""
+    """Return the captures that light this channel alone at full exposure, from dark to bright."""
     others = np.delete(plan.levels, channel, axis=1).any(axis=1)
     rows = np.flatnonzero((plan.levels[:, channel] > 0) & ~others & (plan.exposure == 1))
     return rows[np.argsort(plan.levels[rows, channel])]
@@ -183,44 +184,46 @@ def _ramp(plan: LevelPlan, channel: int) -> NDArray[np.intp]:
 def _check_ramps(plan: LevelPlan, lit: Array) -> None:
     black = _black(plan)
     if not black.size:
-        raise InputError("levels: no capture is black; take one with all projectors showing black")
+        raise InputError("levels: no capture is black; add one with all projectors showing black")
     for channel, name in enumerate(CHANNELS):
         ramp = lit[_ramp(plan, channel)]
         usable = np.isfinite(ramp[:, channel]).sum()
-        if usable < USABLE_MIN or np.isnan(lit[black, channel]).all():
+        if usable < USABLE_LEVELS_MIN or np.isnan(lit[black, channel]).all():
             raise InputError(
-                f"levels: {name} is saturated in all but {usable} captures of its ramp; shorten the "
-                "exposure until the brightest one stays below 97 % of full scale"
+                f"levels: {name} is saturated in all but {usable} captures of its ramp, {USABLE_LEVELS_MIN} are "
+                "needed; "
+                f"shorten the exposure until the brightest capture stays below {CLIPPED:.0%} of full scale"
             )
-        own = ramp[:, channel] - np.nanmean(lit[black, channel])
-        if np.nanmax(own) < UNLIT:
+        seen = ramp[:, channel] - np.nanmean(lit[black, channel])
+        if np.nanmax(seen) < UNLIT:
             brightest = CHANNELS[int(np.nanargmax(np.nanmax(ramp, axis=0)))]
             raise InputError(
-                f"levels: {name} hardly sees its own light ({np.nanmax(own):.1%} of full scale); the ramp of {name} is "
-                f"seen best by {brightest}: are the channels in the order red, green, blue, ir?"
+                f"levels: camera channel {name} sees only {np.nanmax(seen):.1%} of full scale while {name} is "
+                "projected, "
+                f"and {brightest} sees most of it; put the channels into the order red, green, blue, ir"
             )
 
 
 def _errors(plan: LevelPlan, lit: Array, captured: Array, known: dict[str, Any]) -> dict[str, Any]:
-    """Give level and stray errors before and after, shares of a channel's own light, through the kernel."""
+    """Return level and stray errors before and after, shares of the full light of the channel, using the kernel."""
     counts = (plan.exposure == 1)[:, None] & np.isfinite(lit)
     after = _conditioned(captured, known)
     before = np.where(counts, lit, np.nan)
     after = np.where(counts & np.isfinite(lit).all(axis=1, keepdims=True), after, np.nan)
-    # Stray light is judged as light, before the inverse of a gamma, which has no slope to speak of in the dark.
+    # Stray light is judged before the projector response is undone, because the slope of its inverse vanishes at black.
     light = _conditioned(captured, {name: known[name] for name in ("dark", "response", "crosstalk")})
     light = np.where(np.isfinite(after), light, np.nan)
     unlit = plan.levels == 0
     return {
         "level_before": _level_error(plan, before - np.nanmean(before[_black(plan)], axis=0)),
         "level_after": _level_error(plan, after),
-        "stray_before": np.where(unlit, _per_own(plan, before), np.nan),
-        "stray_after": np.where(unlit, _per_own(plan, light), np.nan),
+        "stray_before": np.where(unlit, _per_full_light(plan, before), np.nan),
+        "stray_after": np.where(unlit, _per_full_light(plan, light), np.nan),
     }
 
 
 def _conditioned(captured: Array, known: dict[str, Any]) -> Array:
-    """Condition mean intensities (K, 4) as the decoder conditions pixels."""
+    """Condition mean intensities (K, 4) as the decoder conditions pixels; returns linear light (K, 4)."""
     images = [np.ascontiguousarray(column[None], np.float32) for column in np.nan_to_num(captured).T]
     rows: dict[str, Any] = {
         name: value.rows() if isinstance(value, Response) else value for name, value in known.items()
@@ -229,8 +232,8 @@ def _conditioned(captured: Array, known: dict[str, Any]) -> Array:
     return np.stack([light[name][0] for name in CHANNELS], axis=1).astype(float)
 
 
-def _own_light(plan: LevelPlan, seen: Array) -> Array:
-    """Give what each channel sees of its own full light, by the brightest unsaturated capture of its ramp."""
+def _full_light(plan: LevelPlan, seen: Array) -> Array:
+    """Extrapolate the brightest unsaturated capture of each ramp to the full light of the channel, (4,)."""
     tops = []
     for channel in range(4):
         rows = _ramp(plan, channel)
@@ -239,12 +242,12 @@ def _own_light(plan: LevelPlan, seen: Array) -> Array:
     return np.array(tops)
 
 
-def _per_own(plan: LevelPlan, seen: Array) -> Array:
-    return np.asarray((seen - np.nanmean(seen[_black(plan)], axis=0)) / _own_light(plan, seen))
+def _per_full_light(plan: LevelPlan, seen: Array) -> Array:
+    return np.asarray((seen - np.nanmean(seen[_black(plan)], axis=0)) / _full_light(plan, seen))
 
 
 def _level_error(plan: LevelPlan, seen: Array) -> Array:
-    """Give how far lit captures are from a line through zero, shares of full light; black ones are stray light."""
+    """Return the error of lit captures against a line through zero, shares of full light; NaN for unlit channels."""
     lit = np.isfinite(seen) & (plan.levels > 0)
     found = np.full(seen.shape, np.nan)
     for channel in range(4):

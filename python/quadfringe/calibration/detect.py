@@ -1,4 +1,4 @@
-"""Where the points of a board are seen in an image, or in plain words why they are not."""
+"""Detection of a calibration board: the image points of the board, or the reason why they were not found."""
 
 from __future__ import annotations
 
@@ -10,6 +10,16 @@ from numpy.typing import NDArray
 
 from quadfringe.calibration._centres import refined_centres
 from quadfringe.calibration._grid import blobs, homography, in_grid_order, jacobians, symmetries, through
+from quadfringe.calibration._params import (
+    CONTRAST_MIN,
+    CORNERS_MIN,
+    DARK,
+    FULL,
+    MARK_MIN,
+    SATURATED_SHARE,
+    SHARP,
+    SMOOTHING_PX,
+)
 from quadfringe.calibration.targets import Target
 from quadfringe.errors import CalibrationError, InputError
 from quadfringe.io.images import full_scale as full_scale_of
@@ -17,16 +27,12 @@ from quadfringe.io.images import full_scale as full_scale_of
 __all__ = ["TargetNotFoundError", "View", "find_target"]
 
 Points = NDArray[np.float64]
-CORNERS_MIN = 8  # of a ChArUco board: less says little about a pose
-DARK, FLAT = 0.06, 0.05  # shares of full scale
-SATURATED, FULL = 0.25, 0.999  # share of the image that has this share of full scale
-SMOOTHING_PX = (1.0, 2.0, 0.5)
-SHARP = 0.08  # steepest edges, as a share of the contrast per pixel
-MARK_MIN = 0.35  # darkness of a mark, where solid ink has 1
+WHOLE = "show the whole board with its white border, and leave nothing in front of it"
+BLURRED = "no edge is sharp: focus the lens and hold the board still"
 
 
 class TargetNotFoundError(CalibrationError):
-    """A view without a usable board.
+    """The board was not found in a view, or cannot be used.
 
     `reason` is dark, saturated, low_contrast, blurred, partial, mirrored or not_found.
     """
@@ -34,10 +40,10 @@ class TargetNotFoundError(CalibrationError):
 
 @dataclass(frozen=True)
 class View:
-    """Points of a target in one image.
+    """The points of a board in one image.
 
-    `points_px` (n, 2) float64 are the images (x, y) of the points themselves, free of what perspective does to the
-    middles of rings; `ids` (n,) are their indices in `target.points_mm`; `size_px` is (width, height).
+    `points_px` (n, 2) float64 are the positions (x, y) of the board points, corrected for the perspective shift of ring
+    centres; `ids` (n,) are their indices in `target.points_mm`; `size_px` is (width, height).
     """
 
     points_px: Points
@@ -46,11 +52,11 @@ class View:
 
 
 def find_target(image: NDArray[Any], target: Target, full_scale: float | None = None) -> View:
-    """Find the points of a target in an image (H, W), or (H, W, 3) whose mean is taken; uint8, uint16 or float32.
+    """Find the points of a board in an image (H, W), or in the mean of (H, W, 3); uint8, uint16 or float32.
 
-    `full_scale` is the value of a full pixel; when absent it is 255, 65535 or 1 by dtype. Ring and circle boards must
-    be seen whole, a ChArUco board may be seen in part. Raises `TargetNotFoundError` with the reason and the cure, and
-    `InputError` for an array that is no image.
+    `full_scale` is the value of a saturated pixel; by default 255, 65535 or 1, after the dtype. Ring and circle boards
+    must be visible as a whole, a ChArUco board may be visible in part. Raises `TargetNotFoundError` with the reason and
+    the remedy, and `InputError` for an array that is no image.
 
     >>> from quadfringe.calibration.targets import raster, ring_board
     >>> board = ring_board()
@@ -59,14 +65,14 @@ def find_target(image: NDArray[Any], target: Target, full_scale: float | None = 
     (108, 2)
     """
     grey = _grey(image, full_scale)
-    _exposed(grey)
+    _check_exposure(grey)
     low, high = np.percentile(grey, (0.5, 99.5))
     stretched = np.clip((grey - low) * (255 / (high - low)), 0, 255).astype(np.uint8)
     if target.kind == "charuco":
         return _charuco(grey, stretched, target)
     ordered = _ordered(grey, stretched, target)
     if not _is_sharp(stretched):
-        raise TargetNotFoundError("blurred", f"all points are found, but {BLURRED}")
+        raise TargetNotFoundError("blurred", f"all points were found, but {BLURRED}")
     centres = refined_centres(grey, target, _turned(grey, target, ordered))
     if not np.isfinite(centres).all():
         lost = int((~np.isfinite(centres).all(axis=1)).sum())
@@ -74,37 +80,35 @@ def find_target(image: NDArray[Any], target: Target, full_scale: float | None = 
     return View(centres, np.arange(len(centres)), (grey.shape[1], grey.shape[0]))
 
 
-WHOLE = "the whole board must be in the picture, with its white border, and nothing may cover it"
-
-
 def _grey(image: NDArray[Any], full_scale: float | None) -> NDArray[np.float32]:
     if image.ndim not in (2, 3) or image.dtype.name not in ("uint8", "uint16", "float32") or image.size == 0:
         raise InputError(
-            f"expected an image (H, W) or (H, W, 3), uint8, uint16 or float32, got {image.dtype} {image.shape}"
+            f"image: expected (H, W) or (H, W, 3) of uint8, uint16 or float32, got {image.shape} of {image.dtype}"
         )
     top = float(full_scale_of(image)) if full_scale is None else full_scale
     grey = image.astype(np.float32) if image.ndim == 2 else image.mean(axis=2, dtype=np.float32)
     if not np.isfinite(grey).all():
-        raise InputError("the image has values that are not finite; give an image, not a map")
+        raise InputError("image: expected finite values, got NaN or infinity; pass a camera image, not a result map")
     return grey / np.float32(top)
 
 
-def _exposed(grey: NDArray[np.float32]) -> None:
-    """Refuse images in which no board can be seen, whatever is in them."""
+def _check_exposure(grey: NDArray[np.float32]) -> None:
+    """Raise `TargetNotFoundError` for an image too dark or too flat for any detection."""
     low, high = np.percentile(grey, (0.5, 99.5))
     if high < DARK:
         raise TargetNotFoundError(
-            "dark", f"the image is dark: its bright parts have {100 * high:.0f} % of full scale; expose longer"
+            "dark", f"the image is dark: its bright parts reach {100 * high:.0f} % of full scale; expose longer"
         )
-    if high - low < FLAT:
+    if high - low < CONTRAST_MIN:
         raise TargetNotFoundError(
             "low_contrast",
-            f"bright and dark differ by {100 * (high - low):.0f} % of full scale; more light on the board",
+            f"bright and dark parts differ by {100 * (high - low):.0f} % of full scale only; put more light on the "
+            "board",
         )
 
 
 def _ordered(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Target) -> Points:
-    """Give the blobs in grid order; noise is smoothed as far as needed and no farther, for small holes close."""
+    """Return the blobs in grid order, with as little smoothing as the noise permits, because it closes small holes."""
     import cv2
 
     most = 0
@@ -120,29 +124,26 @@ def _ordered(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Ta
 def _diagnosed(
     grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Target, count: int
 ) -> TargetNotFoundError:
-    """Say why no grid was found."""
+    """Return the error that names the likely reason why no grid was found."""
     share = float((grey >= FULL).mean())
-    if share > SATURATED:
+    if share > SATURATED_SHARE:
         return TargetNotFoundError(
             "saturated",
-            f"{100 * share:.0f} % of the image is saturated; expose shorter, or turn the board out of glare",
+            f"{100 * share:.0f} % of the image is saturated; shorten the exposure, or tilt the board out of the glare",
         )
     expected, name = target.rows * target.columns, "rings" if target.kind == "rings" else "discs"
     if not _is_sharp(stretched):
-        return TargetNotFoundError("blurred", f"{count} of {expected} {name} found, and {BLURRED}")
+        return TargetNotFoundError("blurred", f"{count} of {expected} {name} found; {BLURRED}")
     if count >= expected // 4:
         return TargetNotFoundError("partial", f"{count} of {expected} {name} found; {WHOLE}")
     return TargetNotFoundError(
         "not_found",
-        f"{count} of {expected} {name} found; is it this board ({_named(target)}), flat and in the picture?",
+        f"{count} of {expected} {name} found; show this board ({_named(target)}), flat and whole",
     )
 
 
-BLURRED = "no edge is sharp; focus the lens, hold the board still"
-
-
 def _is_sharp(stretched: NDArray[np.uint8]) -> bool:
-    """Tell whether any edges rise within some five pixels."""
+    """Return whether the steepest edges are at least as steep as `SHARP`."""
     import cv2
 
     soft = cv2.GaussianBlur(stretched, (0, 0), 1.0).astype(np.float32) / 255
@@ -155,9 +156,9 @@ def _named(target: Target) -> str:
 
 
 def _turned(grey: NDArray[np.float32], target: Target, places: Points) -> Points:
-    """Give the places in the target's own order, chosen among its symmetries by its marks.
+    """Return the places in the order of the target's points, using its marks to choose among its symmetries.
 
-    Without marks a turn by 180 degrees cannot be told: rows are then taken to run to the right.
+    Without marks, a rotation by 180 degrees is ambiguous; rows are then assumed to run to the right.
     """
     choices = [places[order] for order in symmetries(target)]
     points = target.points_mm[:, :2]
@@ -171,18 +172,18 @@ def _turned(grey: NDArray[np.float32], target: Target, places: Points) -> Points
     if darkness[best] < MARK_MIN:
         raise TargetNotFoundError(
             "not_found",
-            "the two marks in the first cells of the board are not seen; free them, or state that it has none",
+            "the two marks in the first cells of the board are not visible; uncover them, or set marks to false",
         )
     if not upright[best]:
         raise TargetNotFoundError(
             "mirrored",
-            "the board is seen mirrored; switch off the mirroring of the camera, or print it the right way round",
+            "the board appears mirrored; switch off the mirroring of the camera, or print the board unmirrored",
         )
     return choices[best]
 
 
 def _mark_darkness(grey: NDArray[np.float32], target: Target, matrix: Points) -> float:
-    """Darkness of the lighter mark, between 0 for paper and 1 for ink, as this homography places the marks."""
+    """Return the darkness of the lighter mark, from 0 for paper to 1 for ink, where this homography puts the marks."""
     outer_mm = 0.5 * (target.diameter_mm or 0.0)
     inked_mm = 0.5 * outer_mm + 0.25 * (target.hole_mm or 0.0)
     found = []
@@ -198,7 +199,7 @@ def _mark_darkness(grey: NDArray[np.float32], target: Target, matrix: Points) ->
 
 
 def _level(grey: NDArray[np.float32], matrix: Points, points: Points) -> float:
-    """Median of the image at points of the board."""
+    """Return the median of the image at points (n, 2) of the board, mm."""
     import cv2
 
     places = through(matrix, points).astype(np.float32)
@@ -214,13 +215,15 @@ def _charuco(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Ta
         _, mirrored, _, _ = detector.detectBoard(np.ascontiguousarray(stretched[:, ::-1]))
         if mirrored is not None and len(mirrored) >= CORNERS_MIN:
             raise TargetNotFoundError(
-                "mirrored", "the board is seen mirrored; switch off the mirroring of the camera, or print it again"
+                "mirrored",
+                "the board appears mirrored; switch off the mirroring of the camera, or print the board unmirrored",
             )
         seen = (0 if ids is None else len(ids), 0 if markers is None else len(markers))
         raise TargetNotFoundError(
             "partial" if seen[1] else "not_found",
-            f"{seen[0]} corners and {seen[1]} markers of a ChArUco board of {_named(target)} found, at least "
-            f"{CORNERS_MIN} corners are needed; show more of it, nearer, sharper, or check its dictionary",
+            f"{seen[0]} corners and {seen[1]} markers of a {_named(target)} board found, at least {CORNERS_MIN} "
+            "corners "
+            "are needed; show more of the board, move it nearer, focus, or check its dictionary",
         )
     chosen = ids.ravel().astype(np.intp)
     places = np.asarray(corners, np.float32).reshape(-1, 1, 2)
@@ -233,11 +236,11 @@ def _charuco(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Ta
 
 def _not_on_a_line(points: Points) -> None:
     if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1] < 1e-6:
-        raise TargetNotFoundError("partial", "all corners found lie on one line; show more of the board")
+        raise TargetNotFoundError("partial", "all corners that were found lie on one line; show more of the board")
 
 
 def _corner_window_px(target: Target, chosen: NDArray[np.intp], places: Points) -> int:
-    """Half window around a corner: most of the way to the markers beside it, at the smallest scale of the view."""
+    """Return the half window around a corner, px: most of the way to the adjacent markers, at the smallest scale."""
     matrix = homography(target.points_mm[chosen, :2], places)
     slopes = jacobians(matrix, target.points_mm[chosen, :2])
     scale = float(np.linalg.svd(slopes, compute_uv=False)[:, 1].min())

@@ -1,7 +1,7 @@
-"""How evenly a camera sees even light: vignetting, gain of single pixels, defects, and the gain that makes it even.
+"""Flat field of a camera: vignetting, pixel gain, defects, and the gain map that corrects them.
 
-Decoding does not use the gain: phase does not see what varies slowly, and single pixels are averaged over a window.
-What it would save is measured by `evaluation/flat_field.py`.
+Decoding does not apply the gain map: phase is insensitive to slow variation, and decoding windows average the gain of
+single pixels. What the correction would gain is measured by `evaluation/flat_field.py`.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import DEFECT, FLAT_LIGHT, FLAT_SHOTS_MIN, SLOW_PX
 from quadfringe.calibration.levels import CHANNELS, row4, stacked
 from quadfringe.config import Row4
 from quadfringe.data import AnyShot
@@ -19,19 +20,14 @@ from quadfringe.errors import InputError
 
 __all__ = ["FlatField", "flat_field"]
 
-SHOTS_MIN = 4
-SLOW_PX = 15.0  # what varies over more than this is vignetting and light, what varies faster is pixels
-DEFECT = 0.5  # a pixel whose gain differs from its surroundings by more than this share
-LIGHT = (0.15, 0.9)  # mean captured intensity of an evenly lit shot that can be used, share of full scale
-
 
 @dataclass(frozen=True)
 class FlatField:
-    """Gain (4, H, W) float32 that makes even light even, NaN at defective pixels; figures of R, G, B, IR in per cent.
+    """Gain map (4, H, W) float32, NaN at defective pixels, and figures of R, G, B, IR in per cent.
 
-    `vignetting` is how much darker the darkest region is than the brightest, `pixels` the standard deviation of single
-    pixels from their surroundings without their noise, `uneven` the standard deviation over the image without and with
-    the gain, in shots that the gain was not made from.
+    `vignetting` compares the darkest with the brightest region. `pixels` is the standard deviation of the pixel gain
+    from its surroundings, temporal noise excluded. `uneven` is the standard deviation over the image before and after
+    applying the gain, in shots that the gain was not computed from.
     """
 
     gain: NDArray[np.float32]
@@ -43,19 +39,21 @@ class FlatField:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Give the worst of the channels by name."""
+        """The worst channel of each figure, by name."""
         names = ("vignetting_percent", "pixels_percent", "uneven_before_percent", "uneven_after_percent")
         return {name: max(getattr(self, name)) for name in names} | {"defects_pixels": float(self.defects)}
 
 
 def flat_field(shots: Sequence[AnyShot], dark: Sequence[float] = (0.0,) * 4) -> FlatField:
-    """Give the gain of every pixel from four shots or more of an evenly lit white surface, best out of focus.
+    """Compute the gain of every pixel from at least four shots of an evenly lit white surface, best out of focus.
 
-    Every second shot makes the gain, the others judge it. Raises `InputError` for fewer shots, shots of different size,
-    and shots too dark or too bright to tell anything.
+    Every second shot gives the gain; the others judge it. Raises `InputError` for fewer shots, for shots of different
+    sizes, and for shots that are too dark or too bright.
     """
-    if len(shots) < SHOTS_MIN:
-        raise InputError(f"flat field: expected {SHOTS_MIN} shots or more of an evenly lit surface, got {len(shots)}")
+    if len(shots) < FLAT_SHOTS_MIN:
+        raise InputError(
+            f"flat field: expected {FLAT_SHOTS_MIN} shots or more of an evenly lit surface, got {len(shots)}"
+        )
     found = [_channel(stacked(shots, name) - level, name) for name, level in zip(CHANNELS, dark, strict=True)]
     figures = [row4([channel.figures[i] for channel in found]) for i in range(4)]
     gain = np.stack([channel.gain for channel in found])
@@ -72,18 +70,19 @@ class _Channel:
 def _channel(stack: NDArray[np.float64], name: str) -> _Channel:
     import cv2
 
-    made, judged = stack[::2].mean(axis=0), stack[1::2].mean(axis=0)
-    level = float(np.median(made))
-    if not LIGHT[0] <= level <= LIGHT[1]:
+    given, judged = stack[::2].mean(axis=0), stack[1::2].mean(axis=0)
+    level = float(np.median(given))
+    low_limit, high_limit = FLAT_LIGHT
+    if not low_limit <= level <= high_limit:
         raise InputError(
-            f"flat field: {name} has {level:.0%} of full scale; light the surface so that it lies between "
-            f"{LIGHT[0]:.0%} and {LIGHT[1]:.0%}"
+            f"flat field: {name} has {level:.0%} of full scale, expected {low_limit:.0%} to {high_limit:.0%}; change "
+            "the light or the exposure"
         )
-    slow = cv2.GaussianBlur(made, (0, 0), SLOW_PX, borderType=cv2.BORDER_REFLECT)
-    defective = np.abs(made / slow - 1) > DEFECT
-    gain = np.where(defective, np.nan, level / made)
-    # Noise is independent between the two halves and drops out of their product.
-    pixels = [(half / slow - 1)[~defective] for half in (made, judged)]
+    slow = cv2.GaussianBlur(given, (0, 0), SLOW_PX, borderType=cv2.BORDER_REFLECT)
+    defective = np.abs(given / slow - 1) > DEFECT
+    gain = np.where(defective, np.nan, level / given)
+    # Temporal noise is independent between the two halves, so the mean of their product does not contain it.
+    pixels = [(half / slow - 1)[~defective] for half in (given, judged)]
     shared = float(np.mean(pixels[0] * pixels[1]) - np.mean(pixels[0]) * np.mean(pixels[1]))
     low, high = np.quantile(slow, (0.001, 0.999))
     uneven = [100 * float(np.nanstd(image)) / level for image in (judged, judged * gain)]

@@ -1,4 +1,4 @@
-"""Evenly lit captures: which levels to show, the mean intensities of shots, and the dark level of a camera."""
+"""Evenly lit captures: the levels to project, the mean intensities of shots, and the dark level of a camera."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import DARK_LEVEL_MAX, HOT, LEVEL_STEPS
 from quadfringe.config import Row4
 from quadfringe.data import AnyShot
 from quadfringe.errors import InputError
@@ -16,30 +17,28 @@ __all__ = ["CHANNELS", "DarkLevel", "LevelPlan", "dark_level", "level_plan", "me
 
 Array = NDArray[np.float64]
 CHANNELS = ("red", "green", "blue", "ir")
-STEPS = 8  # levels of a ramp
-DARK_MAX = 0.2  # share of full scale that is no dark level any more
-HOT = 0.02  # share of full scale above the level from which on a pixel is hot
 
 
 @dataclass(frozen=True)
 class LevelPlan:
-    """What to show: `levels` (K, 4) of R, G, B, IR from 0 to 1, and the relative `exposure` (K,) of each capture."""
+    """The captures to take: `levels` (K, 4) of R, G, B, IR from 0 to 1, and the relative `exposure` (K,)."""
 
     levels: Array
     exposure: Array
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Give a name to each capture, as in r100_g000_b000_ir050_e100; numbers are per cent."""
+        """Name of each capture, as in r100_g000_b000_ir050_e100; the numbers are per cent."""
         words = ("r", "g", "b", "ir", "e")
         rows = np.column_stack([self.levels, self.exposure])
         return tuple("_".join(f"{w}{round(100 * v):03d}" for w, v in zip(words, row, strict=True)) for row in rows)
 
 
-def level_plan(steps: int = STEPS) -> LevelPlan:
-    """Give the captures that `fit_channels` needs: black, a ramp of each channel, and all four together.
+def level_plan(steps: int = LEVEL_STEPS) -> LevelPlan:
+    """Return the captures that `fit_channels` needs: black, a ramp of each channel, and a ramp of all four together.
 
-    The last ones, at three exposures, tell the response of the camera from that of the projector.
+    The last two captures repeat the brightest level at shorter exposures, which separates the camera response from the
+    projector response.
 
     >>> from quadfringe.calibration.levels import level_plan
     >>> level_plan(4).names[:2]
@@ -57,7 +56,7 @@ def level_plan(steps: int = STEPS) -> LevelPlan:
 
 @dataclass(frozen=True)
 class DarkLevel:
-    """Intensities without any light, shares of full scale: mean, its spread between pixels, and noise in time."""
+    """Dark intensities by channel, shares of full scale: median, spread between pixels, and temporal noise."""
 
     level: Row4
     fixed_pattern: Row4
@@ -66,20 +65,20 @@ class DarkLevel:
 
 
 def dark_level(shots: Sequence[AnyShot]) -> DarkLevel:
-    """Give the dark level of each channel from two shots or more with the lens covered.
+    """Measure the dark level of each channel from two or more shots with the lens covered.
 
-    A hot pixel is more than 2 % of full scale above the level in the mean of the shots. Raises `InputError` when there
-    is one shot only, when shots differ in size, or when they are not dark.
+    A hot pixel exceeds the level by more than 2 % of full scale in the mean of the shots. Raises `InputError` for a
+    single shot, for shots of different sizes, and for shots that are not dark.
     """
     if len(shots) < 2:
         raise InputError(f"dark level: expected two shots or more with the lens covered, got {len(shots)}")
     stacks = [stacked(shots, name) for name in CHANNELS]
     levels = [float(np.median(stack.mean(axis=0))) for stack in stacks]
-    if max(levels) > DARK_MAX:
+    if max(levels) > DARK_LEVEL_MAX:
         worst = CHANNELS[int(np.argmax(levels))]
         raise InputError(
-            f"dark level: {worst} has {max(levels):.0%} of full scale with the lens covered; put the cap on and switch "
-            "the projectors off, or lower the black level of the camera"
+            f"dark level: {worst} has {max(levels):.0%} of full scale with the lens covered, at most "
+            f"{DARK_LEVEL_MAX:.0%} are accepted; put the cap on and switch the projectors off, or lower the black level"
         )
     means = [stack.mean(axis=0) - level for stack, level in zip(stacks, levels, strict=True)]
     return DarkLevel(
@@ -91,9 +90,9 @@ def dark_level(shots: Sequence[AnyShot]) -> DarkLevel:
 
 
 def mean_levels(shot: AnyShot, share: float = 0.25) -> Array:
-    """Give the mean intensity of each channel, (4,), shares of full scale, over the middle `share` of rows and columns.
+    """Return the mean intensity of each channel, (4,), share of full scale, over the middle `share` of each axis.
 
-    A channel with a saturated pixel there is NaN: its mean is not that of the light.
+    A channel is NaN when more than one pixel in a thousand is saturated there, because its mean is then biased.
     """
     found = []
     for image in shot.channels.values():
@@ -104,13 +103,13 @@ def mean_levels(shot: AnyShot, share: float = 0.25) -> Array:
 
 
 def row4(values: Sequence[float] | Array) -> Row4:
-    """Give four numbers as a row of R, G, B, IR."""
+    """Convert four numbers to a tuple of R, G, B, IR."""
     red, green, blue, ir = (float(v) for v in values)
     return red, green, blue, ir
 
 
 def stacked(shots: Sequence[AnyShot], name: str) -> Array:
-    """Give one channel of shots, (N, H, W), shares of full scale; `InputError` when they differ in size."""
+    """Stack one channel of shots, (N, H, W), share of full scale; raises `InputError` for different sizes."""
     images = [shot.channels[name] for shot in shots]
     if len({image.shape for image in images}) > 1:
         sizes = ", ".join(sorted({f"{i.shape[1]} x {i.shape[0]}" for i in images}))

@@ -1,8 +1,8 @@
-"""Calibrations as OpenCV's FileStorage (.yml, .yaml, .xml, .json) and back: intrinsics, distortion and poses.
+"""Export and import of calibrations as OpenCV FileStorage (.yml, .yaml, .xml, .json): intrinsics, distortion, poses.
 
 Each device has `<name>_matrix` (3 x 3), `<name>_distortion` (1 x 5: k1, k2, p1, p2, k3), `<name>_size` (1 x 2: width,
-height) and, but for the camera, `R_<name>_camera` (3 x 3) and `T_<name>_camera` (3 x 1, mm) with
-P_device = R P_camera + T, as `cv2.stereoCalibrate` gives them.
+height) and, except for the camera, `R_<name>_camera` (3 x 3) and `T_<name>_camera` (3 x 1, mm) with
+P_device = R P_camera + T, as `cv2.stereoCalibrate` returns them.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ __all__ = ["SUFFIXES", "devices_from_opencv", "read_opencv", "write_opencv"]
 
 SUFFIXES = (".yml", ".yaml", ".xml", ".json")
 DEVICES = ("camera", "projector", "infrared")
-SKEW_MAX = 1e-6
+ROUNDING = 1e-6  # of matrix entries that a text file holds with fewer digits
 
 
 def write_opencv(path: Path, calibration: Calibration) -> None:
-    """Write the devices of a calibration for OpenCV, whole or not at all; the format follows the suffix."""
+    """Write the devices of a calibration for OpenCV; the suffix selects the format."""
     import cv2
 
     require_suffix(path, SUFFIXES)
@@ -55,27 +55,27 @@ def _matrices(name: str, device: Device) -> dict[str, NDArray[np.float64]]:
 
 
 def read_opencv(path: Path) -> Calibration:
-    """Read the devices that `write_opencv` or a program of one's own wrote; `infrared` may be absent.
+    """Read the devices from a file of `write_opencv` or of another program; `infrared` may be absent.
 
-    Raises `InputError` that names the file and the matrix at fault: one that is missing, of another size, with skew, or
-    distortion beyond k3, which the kernel does not know.
+    Raises `InputError` naming the file and the matrix when one is missing, has another size or skew, or when the
+    distortion has more coefficients than k3, which the kernel does not model.
     """
     import cv2
 
     require_suffix(path, SUFFIXES)
-    read_bytes(path)  # a missing file is named in our own words
+    read_bytes(path)  # raises an error that names a missing file; that of OpenCV does not
     try:
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         nodes = {key: storage.getNode(key).mat() for key in storage.root().keys()}  # noqa: SIM118 - no mapping
         storage.release()
     except (cv2.error, SystemError) as error:
-        raise InputError(f"{path}: not a readable file of OpenCV's FileStorage: {error}") from error
+        raise InputError(f"{path}: expected an OpenCV FileStorage file: {error}") from error
     matrices = {key: np.asarray(matrix, float) for key, matrix in nodes.items() if matrix is not None}
     return devices_from_opencv(matrices, str(path))
 
 
 def devices_from_opencv(matrices: dict[str, NDArray[np.float64]], source: str = "matrices") -> Calibration:
-    """Give the calibration of matrices by name; the camera is the frame, so that it needs no pose."""
+    """Build a calibration from matrices by name; the camera is the reference frame and needs no pose."""
     names = ("camera", "projector", *(("infrared",) if "infrared_matrix" in matrices else ()))
     devices: dict[str, Any] = {name: _device(name, matrices, source) for name in names}
     return Calibration(**devices)
@@ -83,7 +83,7 @@ def devices_from_opencv(matrices: dict[str, NDArray[np.float64]], source: str = 
 
 def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) -> Device:
     matrix = _matrix(f"{name}_matrix", (3, 3), matrices, source)
-    skewed = max(abs(matrix[0, 1]), np.abs(matrix[2] - (0, 0, 1)).max(), abs(matrix[1, 0])) > SKEW_MAX
+    skewed = max(abs(matrix[0, 1]), np.abs(matrix[2] - (0, 0, 1)).max(), abs(matrix[1, 0])) > ROUNDING
     if skewed:
         raise ConfigError(f"{source}: {name}_matrix: expected fx, 0, cx, 0, fy, cy, 0, 0, 1, got {matrix.tolist()}")
     size = _matrix(f"{name}_size", (1, 2), matrices, source)[0]
@@ -91,12 +91,12 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
     if distortion.size not in (4, 5):
         raise ConfigError(
             f"{source}: {name}_distortion: expected k1, k2, p1, p2 and k3, got {distortion.size} numbers; calibrate "
-            "without the rational, thin prism and tilted models"
+            "without the rational, thin prism and tilted lens models"
         )
     pose = {}
     if name != "camera":
         rotation = _matrix(f"R_{name}_camera", (3, 3), matrices, source)
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0:
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > ROUNDING or np.linalg.det(rotation) < 0:
             raise ConfigError(f"{source}: R_{name}_camera: expected a rotation matrix, got {rotation.tolist()}")
         translation = _matrix(f"T_{name}_camera", (3, 1), matrices, source)[:, 0]
         pose = {"rotation": rotation.tolist(), "translation_mm": translation.tolist()}
@@ -116,7 +116,7 @@ def _matrix(
     key: str, shape: tuple[int, int], matrices: dict[str, NDArray[np.float64]], source: str
 ) -> NDArray[np.float64]:
     if key not in matrices:
-        raise ConfigError(f"{source}: {key} is missing; there are {', '.join(sorted(matrices)) or 'no matrices'}")
+        raise ConfigError(f"{source}: {key} is missing; the file has {', '.join(sorted(matrices)) or 'no matrices'}")
     if matrices[key].size != shape[0] * shape[1]:
         raise ConfigError(f"{source}: {key}: expected {shape[0]} x {shape[1]}, got {matrices[key].shape}")
     return matrices[key].reshape(shape)

@@ -1,8 +1,8 @@
-"""A projector as an inverse camera: the projector pixel that lights each point of a board, by phase.
+"""A projector as an inverse camera: the projector pixel that lights each point of a board, from phase maps.
 
-For each pose the projector shows N-step fringes that count over its columns and over its rows, each at three fringe
-numbers. The phases give every camera pixel the projector column and row that light it, and a smooth fit around the
-image of a board point gives the projector pixel of that point.
+For each pose, the projector shows N-step fringes along its columns and along its rows, each at three fringe numbers.
+The phases give the projector column and row that light each camera pixel; a smooth fit around the image of a board
+point gives the projector pixel of that point.
 """
 
 from __future__ import annotations
@@ -15,6 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
+from quadfringe.calibration._params import (
+    FIT_RADIUS,
+    LIT_SHARE_MIN,
+    MODULATION_MIN,
+    ORDER_MARGIN_MIN,
+    PRINT_EDGE,
+    SATURATED,
+)
 from quadfringe.calibration.detect import View
 from quadfringe.config import Affine, Fringes
 from quadfringe.errors import InputError
@@ -35,20 +43,15 @@ __all__ = [
 Map = NDArray[np.float32]
 Axis = Literal["columns", "rows"]
 AXES: tuple[Axis, Axis] = ("columns", "rows")
-MODULATION_MIN = 0.02  # share of full scale
-MARGIN_MIN = 0.3  # of the fringe orders
-SATURATED = 0.999  # share of full scale
-REACH = 0.5  # of the distance to the nearest point: how far around a point the fit looks
-SHARE_MIN = 0.4  # of the pixels around a point that must be lit
-EDGE = 0.06  # change of the modulation from pixel to pixel, as a share of it, at which the edge of a print begins
 
 
 @dataclass(frozen=True)
 class StepPlan:
-    """What a projector shows at each pose: `steps` equal shifts of three fringe numbers, over columns and over rows.
+    """The images of each pose: `steps` equal phase shifts at three fringe numbers, along columns and along rows.
 
-    Eight steps leave the phase alone for a response (gamma) whose harmonics end at the sixth.
-    Raises `InputError` for fewer than four steps and ValueError for fringes that do not cover the projector.
+    With eight steps, harmonics of the response (gamma) up to the sixth do not affect the phase. `size_px` is (columns,
+    rows) of the projector. Raises `InputError` for fewer than four steps, and ValueError for fringe numbers that are
+    ambiguous over the projector.
     """
 
     fringes: Fringes = Fringes()
@@ -62,16 +65,16 @@ class StepPlan:
             _core.check_code(self.fringes.numbers, size)
 
     def shift_rad(self, step: int) -> float:
-        """Shift of a step."""
+        """Return the phase shift of a step, rad."""
         return 2 * np.pi * step / self.steps
 
 
 @dataclass(frozen=True)
 class ProjectorMap:
-    """Where each camera pixel is lit from: `column_px`, `row_px` (H, W) float32, NaN where the projector is not seen.
+    """The projector position that lights each camera pixel: `column_px`, `row_px` (H, W) float32, NaN without data.
 
-    `modulation` is the amplitude of the fringes, `background` the mean of all images, both as shares of full scale:
-    the background is the scene without fringes and with little noise, in which boards are looked for.
+    `modulation` is the fringe amplitude and `background` the mean of all images, shares of full scale. The background
+    shows the scene without fringes at low noise; boards are detected in it. `size_px` is (columns, rows).
     """
 
     column_px: Map
@@ -85,8 +88,8 @@ class ProjectorMap:
 class ProjectorPoints:
     """Projector pixels of board points: `points_px` (n, 2) float64, NaN where a point is not lit.
 
-    `slope` (n, 2, 2) is the change of the projector pixel per camera pixel, by which an error of the camera's point
-    becomes one of the projector's. `ids` (n,) are indices in `target.points_mm`; `size_px` is the projector's size.
+    `slope` (n, 2, 2) is the change of the projector pixel per camera pixel; it propagates errors of the camera point
+    to the projector pixel. `ids` (n,) are indices in `target.points_mm`; `size_px` is (columns, rows) of the projector.
     """
 
     points_px: NDArray[np.float64]
@@ -96,15 +99,15 @@ class ProjectorPoints:
 
 
 def step_image(plan: StepPlan, axis: Axis, frequency: int, step: int) -> Map:
-    """Give what the projector shows, (rows, columns) float32, linear light 0 to 1, at the places of its mirrors."""
+    """Return the projected image, (rows, columns) float32, linear light 0 to 1, sampled at the mirror positions."""
     number, shift = plan.fringes.numbers[frequency], plan.shift_rad(step)
     return _core.step_pattern(number, shift, *plan.size_px, axis=axis, layout=plan.fringes.layout)
 
 
 def projector_map(columns: Sequence[Map], rows: Sequence[Map], plan: StepPlan) -> ProjectorMap:
-    """Give the map of one pose from its stacks, three for each direction, (steps, H, W) float32 shares of full scale.
+    """Compute the map of one pose from three stacks per direction, (steps, H, W) float32, shares of full scale.
 
-    Raises `InputError` for stacks or steps that are missing and for mixed image sizes.
+    Raises `InputError` for missing stacks or steps and for mixed image sizes.
     """
     found = {axis: position_map(stacks, plan, axis) for axis, stacks in zip(AXES, (columns, rows), strict=True)}
     return joined(found["columns"], found["rows"], plan)
@@ -112,7 +115,7 @@ def projector_map(columns: Sequence[Map], rows: Sequence[Map], plan: StepPlan) -
 
 @dataclass(frozen=True)
 class Positions:
-    """Column or row that lights each camera pixel, (H, W), with modulation and background."""
+    """Column or row that lights each camera pixel, (H, W) px, NaN without data, with modulation and background."""
 
     position_px: Map
     modulation: Map
@@ -120,10 +123,10 @@ class Positions:
 
 
 def joined(columns: Positions, rows: Positions, plan: StepPlan) -> ProjectorMap:
-    """Give the map of both directions."""
+    """Combine the positions along columns and rows; raises `InputError` for different image sizes."""
     if columns.position_px.shape != rows.position_px.shape:
         raise InputError(
-            f"fringes over columns were captured at {columns.position_px.shape}, over rows at "
+            f"fringes along columns have images of {columns.position_px.shape}, fringes along rows of "
             f"{rows.position_px.shape}; all images of a calibration must have one size"
         )
     dark = np.isnan(columns.position_px) | np.isnan(rows.position_px)
@@ -133,9 +136,10 @@ def joined(columns: Positions, rows: Positions, plan: StepPlan) -> ProjectorMap:
 
 
 def position_map(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> Positions:
-    """Give the column or row that lights each pixel, from three stacks (steps, H, W).
+    """Compute the column or row that lights each pixel from three stacks (steps, H, W), shares of full scale.
 
-    The orders come from the three phases together (S4); the position is their mean, each weighted by its precision.
+    The beat ladder (S4) gives the fringe orders; the position is the mean of the three phases weighted by precision,
+    that is by the square of the fringe number.
     """
     _check_stacks(stacks, plan, axis)
     size = plan.size_px[AXES.index(axis)]
@@ -151,25 +155,25 @@ def position_map(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> Positions
     position *= size / np.square(numbers).sum()
     modulation = np.minimum.reduce(modulations)
     saturated = np.logical_or.reduce([stack.max(axis=0) >= SATURATED for stack in stacks])
-    unlit = (modulation < MODULATION_MIN) | (margin < MARGIN_MIN) | saturated
+    unlit = (modulation < MODULATION_MIN) | (margin < ORDER_MARGIN_MIN) | saturated
     position[unlit] = np.nan
     return Positions(position.astype(np.float32), modulation, np.mean(backgrounds, axis=0, dtype=np.float32))
 
 
 def _check_stacks(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> None:
     if len(stacks) != 3:
-        raise InputError(f"fringes over {axis}: expected 3 stacks, one for each fringe number, got {len(stacks)}")
+        raise InputError(f"fringes along {axis}: expected 3 stacks, one for each fringe number, got {len(stacks)}")
     shapes = [stack.shape for stack in stacks]
     for number, shape in zip(plan.fringes.numbers, shapes, strict=True):
         if len(shape) != 3 or shape[0] != plan.steps:
             have = f"{shape[0]} images" if len(shape) == 3 else f"an array of shape {shape}"
             raise InputError(
-                f"{number:g} fringes over {axis}: expected {plan.steps} steps (steps, H, W), got {have}; "
+                f"{number:g} fringes along {axis}: expected {plan.steps} steps (steps, H, W), got {have}; "
                 "capture every step"
             )
         if shape[1:] != shapes[0][1:]:
             raise InputError(
-                f"{number:g} fringes over {axis}: images of {shape[2]} x {shape[1]} pixels, the others have "
+                f"{number:g} fringes along {axis}: images of {shape[2]} x {shape[1]} pixels, the others have "
                 f"{shapes[0][2]} x {shapes[0][1]}; all images of a calibration must have one size"
             )
 
@@ -177,23 +181,23 @@ def _check_stacks(stacks: Sequence[Map], plan: StepPlan, axis: Axis) -> None:
 def projector_points(
     lit: ProjectorMap, view: View, radius_px: float | None = None, ir_registration: Affine | None = None
 ) -> ProjectorPoints:
-    """Give the projector pixels of the points of a view, by a quadratic fit to the map around each.
+    """Return the projector pixels of the points of a view, from a quadratic fit to the map around each point.
 
-    A quadratic holds what a local homography can express, and the curvature of both lenses; pixels count by the square
-    of their modulation, those at the edges of the print a hundredth of it. `radius_px` is half the distance of
-    neighbouring points when absent. `ir_registration` is the affine map from visible to infrared pixels, for a map of
-    the infrared chip. NaN where less than 40 % of the pixels around a point are lit. Raises `InputError` when map and
-    view differ in size.
+    A quadratic represents a local homography and the curvature of both lenses. Pixels are weighted by the square of
+    their modulation; those at the edges of the print get a hundredth of it. `radius_px` is the radius of the fit, by
+    default half the distance of neighbouring points. `ir_registration` is the affine map from visible to infrared
+    pixels, for a map of the infrared chip. A point is NaN when less than 40 % of the pixels around it are lit. Raises
+    `InputError` when map and view differ in size.
     """
     shape = lit.column_px.shape
     if ir_registration is None and shape != view.size_px[::-1]:
         raise InputError(
-            f"the view is {view.size_px[0]} x {view.size_px[1]}, the map {shape[1]} x {shape[0]}; "
+            f"the view has {view.size_px[0]} x {view.size_px[1]} pixels, the projector map {shape[1]} x {shape[0]}; "
             "all images of a calibration must have one size"
         )
     affine = np.array(ir_registration if ir_registration is not None else ((1.0, 0, 0), (0, 1.0, 0)))
     places = view.points_px @ affine[:, :2].T + affine[:, 2]
-    reach = REACH * _spacing_px(places) if radius_px is None else radius_px
+    reach = FIT_RADIUS * _spacing_px(places) if radius_px is None else radius_px
     points, slopes = np.full_like(places, np.nan), np.full((len(places), 2, 2), np.nan)
     weight = _weights(lit.modulation)
     for i, place in enumerate(places):
@@ -204,12 +208,12 @@ def projector_points(
 
 
 def _weights(modulation: Map) -> Map:
-    """Give the weight of each pixel: its modulation, a tenth of it at the edges of a print.
+    """Return the weight of each residual: the modulation, and a tenth of it at the edges of the print.
 
-    There a pixel sees paper and ink, and its phase is that of the paper beside it.
+    A pixel at an edge mixes paper and ink, and its phase is biased towards that of the paper.
     """
     down, right = np.gradient(modulation)
-    edge = np.hypot(down, right) > EDGE * modulation
+    edge = np.hypot(down, right) > PRINT_EDGE * modulation
     return np.where(edge, np.float32(0.1) * modulation, modulation).astype(np.float32)
 
 
@@ -219,7 +223,7 @@ def _spacing_px(places: NDArray[np.float64]) -> float:
 
 
 def _around(lit: ProjectorMap, weights: Map, place: NDArray[np.float64], reach: float) -> NDArray[np.float64] | None:
-    """Give value and slopes (2, 3) of column and row at a place; None where too little is lit."""
+    """Fit value and slopes (2, 3) of column and row at a place; None where too few pixels are lit."""
     low = np.maximum(np.floor(place - reach).astype(int), 0)
     high = np.ceil(place + reach).astype(int) + 1
     part = (slice(low[1], high[1]), slice(low[0], high[0]))
@@ -228,7 +232,7 @@ def _around(lit: ProjectorMap, weights: Map, place: NDArray[np.float64], reach: 
     dx = (low[0] + np.arange(columns) - place[0])[None, :].repeat(rows, axis=0)
     dy = (low[1] + np.arange(rows) - place[1])[:, None].repeat(columns, axis=1)
     inside = (np.hypot(dx, dy) <= reach) & np.isfinite(seen[..., 0])
-    if inside.sum() < SHARE_MIN * np.pi * reach**2:
+    if inside.sum() < LIT_SHARE_MIN * np.pi * reach**2:
         return None
     x, y, values = dx[inside] / reach, dy[inside] / reach, seen[inside]
     weight = weights[part][inside].astype(np.float64)

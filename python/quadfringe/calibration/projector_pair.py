@@ -1,6 +1,6 @@
-"""Where the infrared projector stands beside the visible one, and how well that is known (S10).
+"""The pose of the infrared projector relative to the visible one, and its uncertainty (S10).
 
-Plain arrays in, a record out; whoever calibrated both projectors may ask.
+The functions take plain arrays, so that they also serve projectors that another program calibrated.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import cv2
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from quadfringe.calibration._params import DIFFERENCE_STEP
 from quadfringe.config import Device
 from quadfringe.errors import InputError
 
@@ -19,14 +20,13 @@ __all__ = ["AXES", "PairPose", "deviated", "pair_pose"]
 
 Vector = NDArray[np.float64]
 AXES = ("rx_deg", "ry_deg", "rz_deg", "tx_mm", "ty_mm", "tz_mm")
-STEP = 1e-6  # of the central differences: rad and mm, far above rounding and far below any curvature
 
 
 @dataclass(frozen=True)
 class PairPose:
-    """T_infrared_visible: P_infrared = R P_visible + T, with R of the rotation vector `rotation_deg` (3,).
+    """The transform T_infrared_visible, P_infrared = R P_visible + T; `rotation_deg` (3,) is the rotation vector of R.
 
-    `covariance` is (6, 6) of rotation vector in degrees and translation in mm, NaN where none was given.
+    `covariance` (6, 6) belongs to the rotation vector, deg, and the translation, mm; it is NaN when none was given.
     """
 
     rotation_deg: Vector
@@ -35,7 +35,7 @@ class PairPose:
 
     @property
     def values(self) -> Vector:
-        """Rotation vector in degrees and translation in mm, (6,), in the order of `AXES`."""
+        """Rotation vector, deg, and translation, mm, (6,), in the order of `AXES`."""
         return np.concatenate([self.rotation_deg, self.translation_mm])
 
     @property
@@ -44,12 +44,13 @@ class PairPose:
         return np.sqrt(np.diag(self.covariance))
 
     def interval(self, confidence: float = 0.95) -> Vector:
-        """Least and greatest of each value, (6, 2), such that all six hold together with this confidence.
+        """Return lower and upper limits (6, 2) that contain all six values jointly with this confidence.
 
-        Bonferroni's bound, which needs no independence; raises `InputError` unless 0 < confidence < 1.
+        Uses Bonferroni's inequality, which does not need independent values. Raises `InputError` unless
+        0 < confidence < 1.
         """
         if not 0 < confidence < 1:
-            raise InputError(f"confidence: expected a share between 0 and 1, got {confidence}")
+            raise InputError(f"confidence: expected a number between 0 and 1, such as 0.95, got {confidence}")
         reach = NormalDist().inv_cdf(1 - (1 - confidence) / (2 * len(AXES))) * self.sd
         return np.stack([self.values - reach, self.values + reach], axis=1)
 
@@ -61,11 +62,12 @@ def pair_pose(
     translation_infrared_mm: ArrayLike,
     covariance: ArrayLike | None = None,
 ) -> PairPose:
-    """Give R12 = R2 R1^-1 and T12 = T2 - R12 T1 of two projectors posed in one frame (S10).
+    """Return R12 = R2 R1^-1 and T12 = T2 - R12 T1 of two projectors posed in one frame (S10).
 
-    Rotations are (3, 3) of T_projector_camera, translations (3,) mm. `covariance` is (12, 12) of the rotation vector
-    (rad) and the translation (mm) of the visible projector, then of the infrared one; it is propagated to first order.
-    Raises `InputError` for other shapes, for rotations that are none, and for a covariance that is not symmetric.
+    Rotations (3, 3) and translations (3,), mm, are those of T_projector_camera. `covariance` (12, 12) belongs to the
+    rotation vector, rad, and the translation, mm, of the visible projector, then of the infrared one; it is propagated
+    to first order. Raises `InputError` for other shapes, for matrices that are no rotations, and for a covariance that
+    is not symmetric and positive semidefinite.
 
     >>> from quadfringe.calibration.projector_pair import pair_pose
     >>> import numpy as np
@@ -83,25 +85,25 @@ def pair_pose(
     ]
     given = np.concatenate(posed)
     values = _relative(given)
-    if covariance is None:
-        spread = np.full((6, 6), np.nan)
-    else:
-        known = _array("covariance", covariance, (12, 12))
-        if not np.allclose(known, known.T, rtol=1e-6, atol=1e-15) or np.linalg.eigvalsh(known)[0] < -1e-9 * np.trace(
-            known
-        ):
-            raise InputError("covariance: expected a symmetric positive semidefinite matrix (12, 12)")
-        steps = STEP * np.eye(12)
-        slopes = np.stack([(_relative(given + s) - _relative(given - s)) / (2 * STEP) for s in steps], axis=1)
-        spread = slopes @ known @ slopes.T
+    spread = np.full((6, 6), np.nan) if covariance is None else _propagated(given, covariance)
     return PairPose(values[:3], values[3:], spread)
 
 
-def deviated(device: Device, rotation_deg: ArrayLike, translation_mm: ArrayLike) -> Device:
-    """Give the same device turned by a rotation vector (deg) and moved (mm) in its own frame.
+def _propagated(given: Vector, covariance: ArrayLike) -> Vector:
+    """Propagate the covariance (12, 12) of both poses to that of their relative pose (6, 6), to first order."""
+    known = _array("covariance", covariance, (12, 12))
+    symmetric = np.allclose(known, known.T, rtol=1e-6, atol=1e-15)
+    if not symmetric or np.linalg.eigvalsh(known)[0] < -1e-9 * np.trace(known):
+        raise InputError("covariance: expected a symmetric positive semidefinite matrix (12, 12)")
+    steps = DIFFERENCE_STEP * np.eye(12)
+    slopes = np.stack([(_relative(given + s) - _relative(given - s)) / (2 * DIFFERENCE_STEP) for s in steps], axis=1)
+    return np.asarray(slopes @ known @ slopes.T)
 
-    `pair_pose` finds both back.
-    Raises `InputError` unless both have three finite numbers.
+
+def deviated(device: Device, rotation_deg: ArrayLike, translation_mm: ArrayLike) -> Device:
+    """Return the device rotated by a rotation vector, deg, and then moved, mm, in the frame of the device.
+
+    `pair_pose` of the device and the result gives both back. Raises `InputError` unless both are three finite numbers.
     """
     turn = cv2.Rodrigues(np.radians(_array("rotation_deg", rotation_deg, (3,))))[0]
     moved = turn @ np.asarray(device.translation_mm) + _array("translation_mm", translation_mm, (3,))
@@ -110,7 +112,7 @@ def deviated(device: Device, rotation_deg: ArrayLike, translation_mm: ArrayLike)
 
 
 def _relative(posed: Vector) -> Vector:
-    """Rotation vector in degrees and translation in mm of T_infrared_visible, from both poses as (12,)."""
+    """Return rotation vector, deg, and translation, mm, of T_infrared_visible, (6,), from both poses (12,)."""
     first, second = cv2.Rodrigues(posed[:3])[0], cv2.Rodrigues(posed[6:9])[0]
     turn = second @ first.T
     return np.concatenate([np.degrees(_vector(turn)), posed[9:] - turn @ posed[3:6]])

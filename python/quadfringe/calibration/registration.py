@@ -1,4 +1,4 @@
-"""Where the infrared chip of a 2CCD camera sees what the visible chip sees: an affine map from points seen by both."""
+"""Registration of the two chips of a 2CCD camera: an affine map fitted to points that both chips see."""
 
 from __future__ import annotations
 
@@ -8,6 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import (
+    REGISTRATION_OUTLIER_SD,
+    REGISTRATION_POINTS_MIN,
+    REGISTRATION_RMS_MAX_PX,
+    REGISTRATION_SPREAD_MIN,
+)
 from quadfringe.calibration.detect import View
 from quadfringe.config import Affine
 from quadfringe.errors import DecodeError, InputError
@@ -15,17 +21,14 @@ from quadfringe.errors import DecodeError, InputError
 __all__ = ["Registration", "register_infrared", "register_views"]
 
 Array = NDArray[np.float64]
-POINTS_MIN = 12
-OUTLIER = 4.0  # robust standard deviations
-RMS_MAX_PX = 0.5  # chips that no affine map brings together better than this do not see the same points
-SPREAD_MIN = 0.1  # of the shorter side of the points' extent to its longer one
+MEDIAN_TO_RMS = 1.2  # RMS length over median length of a Gaussian in the plane: sqrt(2) / 1.1774
 
 
 @dataclass(frozen=True)
 class Registration:
-    """The map from a visible pixel (x, y, 1) to the infrared pixel (x, y), and the distances before and after, px.
+    """The affine map from visible pixel (x, y, 1) to infrared pixel (x, y), and the RMS distances before and after, px.
 
-    `shift_px` is at the middle of the points; scale and rotation are those of the nearest similarity.
+    `shift_px` is the shift at the centroid of the points; `scale` and `rotation_deg` belong to the nearest similarity.
     """
 
     ir_registration: Affine
@@ -40,17 +43,17 @@ class Registration:
 
     @property
     def figures(self) -> dict[str, float]:
-        """Give the distances and the map by name."""
+        """The distances and the parameters of the map, by name."""
         names = ("points", "left_out", "before_rms_px", "after_rms_px", "scale", "rotation_deg")
         shift = {"shift_x_px": self.shift_px[0], "shift_y_px": self.shift_px[1]}
         return {name: float(getattr(self, name)) for name in names} | shift
 
 
 def register_infrared(visible_px: Array, infrared_px: Array) -> Registration:
-    """Fit the affine map to points (n, 2) that both chips see, in the same order; NaN is no point.
+    """Fit the affine map to points (n, 2), px, that both chips see, in the same order; pairs with NaN are ignored.
 
-    Points farther off than four robust standard deviations are left out. Raises `InputError` for fewer than 12 points
-    or points nearly in a line, `DecodeError` when no affine map brings the two sets together.
+    Points more than four robust standard deviations off are left out. Raises `InputError` for fewer than 12 points or
+    points nearly on a line, and `DecodeError` when no affine map aligns the two sets.
     """
     visible, infrared = np.asarray(visible_px, float), np.asarray(infrared_px, float)
     if visible.shape != infrared.shape or visible.ndim != 2 or visible.shape[1] != 2:
@@ -63,12 +66,12 @@ def register_infrared(visible_px: Array, infrared_px: Array) -> Registration:
         affine = _fit(visible[kept], infrared[kept])
         missed = infrared - _applied(affine, visible)
         away = np.linalg.norm(missed, axis=1)
-        kept = away <= max(OUTLIER * 1.2 * float(np.median(away[kept])), 1e-6)
+        kept = away <= max(REGISTRATION_OUTLIER_SD * MEDIAN_TO_RMS * float(np.median(away[kept])), 1e-6)
     after = float(np.sqrt(np.mean(away[kept] ** 2)))
-    if after > RMS_MAX_PX or kept.sum() < POINTS_MIN:
+    if after > REGISTRATION_RMS_MAX_PX or kept.sum() < REGISTRATION_POINTS_MIN:
         raise DecodeError(
-            f"registration: the points of the two chips still lie {after:.2f} px apart; they are not the same points, "
-            "or the target moved between the captures"
+            f"registration: the points of the two chips still lie {after:.2f} px apart, at most "
+            f"{REGISTRATION_RMS_MAX_PX} are accepted; show both chips the same board, and do not move it in between"
         )
     middle = visible[kept].mean(axis=0)
     scale, rotation = _similarity(affine)
@@ -87,7 +90,7 @@ def register_infrared(visible_px: Array, infrared_px: Array) -> Registration:
 
 
 def register_views(visible: Sequence[View], infrared: Sequence[View]) -> Registration:
-    """Register the chips by a board that both saw in the same poses; raises as `register_infrared`."""
+    """Register the chips by boards that both saw in the same poses; errors as `register_infrared`."""
     seen = []
     for views in zip(visible, infrared, strict=True):
         shared = np.intersect1d(views[0].ids, views[1].ids)
@@ -114,8 +117,12 @@ def _similarity(affine: Array) -> tuple[float, float]:
 
 
 def _check_spread(points: Array) -> None:
-    if len(points) < POINTS_MIN:
-        raise InputError(f"registration: {len(points)} points are seen by both chips; {POINTS_MIN} are needed")
+    if len(points) < REGISTRATION_POINTS_MIN:
+        raise InputError(
+            f"registration: {len(points)} points are seen by both chips, {REGISTRATION_POINTS_MIN} are needed; show "
+            "the board "
+            "in more poses"
+        )
     lengths = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
-    if lengths[1] < SPREAD_MIN * lengths[0]:
-        raise InputError("registration: the points lie nearly in a line; show the target over the whole field")
+    if lengths[1] < REGISTRATION_SPREAD_MIN * lengths[0]:
+        raise InputError("registration: the points lie nearly in a line; show the board over the whole field")

@@ -1,4 +1,4 @@
-"""A calibration on the virtual bench: boards in many poses under N-step fringes, through the optics of every shot."""
+"""A calibration rehearsed on the virtual bench: a board in many poses under N-step fringes."""
 
 from __future__ import annotations
 
@@ -26,24 +26,25 @@ from quadfringe.data import AnyShot, BayerShot
 from quadfringe.decoding import stages
 from quadfringe.devices.virtual import PrintedBoard, VirtualBench
 
-__all__ = ["BoardRoom", "Rehearsal", "board_poses", "rehearse"]
+__all__ = ["Rehearsal", "VirtualBoard", "board_poses", "rehearse"]
 
+# Albedos in R, G, B, IR of office paper and of carbon black, which also absorbs infrared light.
 PAPER = (0.85, 0.85, 0.85, 0.8)
-INK = (0.06, 0.06, 0.06, 0.12)  # carbon black, which absorbs in the infrared too
-TEXEL_MM = 0.1
+INK = (0.06, 0.06, 0.06, 0.12)
+TEXEL_MM = 0.1  # side of a texel of the print: a third of a camera pixel at 800 mm
 
 
 @dataclass(frozen=True)
 class Rehearsal:
-    """A calibration of the virtual bench, with the poses that it came from."""
+    """A calibration of the virtual bench, the views it was made from, and the true poses `T_camera_board` (P, 4, 4)."""
 
     calibration: RigCalibration
     views: tuple[View, ...]
     T_camera_board: NDArray[np.float64]
 
 
-class BoardRoom:
-    """The virtual bench with a board on it; `bench` is its config, with all defects that a shot would have."""
+class VirtualBoard:
+    """A printed board in front of the virtual bench; its captures have all the defects that `config` describes."""
 
     def __init__(
         self,
@@ -58,14 +59,15 @@ class BoardRoom:
         self.target = target
 
     def photograph(self, T_camera_board: NDArray[np.float64]) -> NDArray[np.float32]:  # noqa: N803
-        """Give the board in a pose under white light, (H, W) float32, shares of full scale: the mean of R, G and B."""
+        """Render the board in a pose under white light: (H, W) float32, the mean of R, G and B, share of full scale."""
         self._bench.place(self._board, T_camera_board)
         return _planes(self._bench.expose_step(0.0, 0.0))[0]
 
     def capture(self, T_camera_board: NDArray[np.float64], plan: StepPlan) -> tuple[ProjectorMap, ProjectorMap]:  # noqa: N803
-        """Give the maps of the visible and of the infrared projector, which show their fringes one after the other.
+        """Render and decode a pose: the maps of the visible and of the infrared projector.
 
-        So crosstalk between the projectors does no harm; between the colours it changes nothing, for all show the same.
+        The projectors show their fringes one after the other, so crosstalk between them has no effect; crosstalk
+        between the colours has none either, because all colours show the same fringes.
         """
         self._bench.place(self._board, T_camera_board)
         visible, infrared = (self._map(plan, beam, i) for i, beam in enumerate(("visible", "infrared")))
@@ -88,7 +90,7 @@ class BoardRoom:
 
 
 def _planes(shot: AnyShot) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Give what the visible and the infrared chip see, shares of full scale."""
+    """Return the images of the visible and of the infrared chip, (H, W), share of full scale."""
     if isinstance(shot, BayerShot):
         light = stages.linear_light(shot)
         return np.mean([light[name] for name in ("red", "green", "blue")], axis=0, dtype=np.float32), light["ir"]
@@ -105,7 +107,7 @@ def board_poses(
     tilt_deg: float = 30.0,
     seed: int = 0,
 ) -> NDArray[np.float64]:
-    """Give T_camera_board (count, 4, 4): boards tilted to all sides in turn, at distances all over the range."""
+    """Return T_camera_board (count, 4, 4): boards tilted to all sides in turn, with distances spread over the range."""
     import cv2
 
     random = np.random.default_rng(seed)
@@ -127,11 +129,11 @@ def rehearse(
     plan: StepPlan | None = None,
     progress: Iterable[int] | None = None,
 ) -> Rehearsal:
-    """Capture the board in every pose (P, 4, 4), find it, and calibrate camera and both projectors.
+    """Capture the board in every pose (P, 4, 4), detect it, and calibrate the camera and both projectors.
 
-    The infrared chip is registered by the boards that both chips see. Raises what detection and calibration raise.
+    The boards that both chips see register the infrared chip. Raises the errors of detection and calibration.
     """
-    room = BoardRoom(config, target)
+    board = VirtualBoard(config, target)
     poses = board_poses(target) if poses is None else poses
     plan = StepPlan(config.fringes) if plan is None else plan
     views: list[View] = []
@@ -139,7 +141,7 @@ def rehearse(
     lit: list[ProjectorPoints] = []
     infrared_maps: list[ProjectorMap] = []
     for i in range(len(poses)) if progress is None else progress:
-        visible, infrared = room.capture(poses[i], plan)
+        visible, infrared = board.capture(poses[i], plan)
         views.append(find_target(visible.background, target))
         infrared_views.append(find_target(infrared.background, target))
         lit.append(projector_points(visible, views[-1]))

@@ -1,4 +1,4 @@
-"""The response (gamma) of a channel, from images of one fringe pattern in equal steps of phase."""
+"""The response (gamma) of a channel, estimated from images of one fringe pattern at equal phase steps."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ __all__ = ["EstimatedResponse", "estimate_from_files"]
 
 @dataclass(frozen=True)
 class EstimatedResponse:
-    """A response, and the kernel's figures of it by name: the numbers, and the error before and after."""
+    """An estimated response, and figures by name: its parameters, and the harmonic error before and after."""
 
     calibration: ResponseCalibration
     figures: Mapping[str, float]
@@ -32,16 +32,16 @@ def estimate_from_files(
     channels: Sequence[str] | None = None,
     base: ResponseCalibration | None = None,
 ) -> EstimatedResponse:
-    """Estimate the response of `channels` (all when None) from stacks of `steps` images that follow one another.
+    """Estimate the response of `channels` (default: all) from consecutive stacks of `steps` images.
 
-    The other channels come from `base`, linear when None. Raises `InputError` when the number of files is
-    not a multiple of `steps` or the images differ; ValueError when the stacks show no fringes, are out of order,
-    too dark or saturated.
+    The other channels are taken from `base` (default: linear). Raises `InputError` when the number of files is not a
+    multiple of `steps` or when the images differ in size or type, and ValueError when the stacks show no fringes, are
+    out of order, too dark or saturated.
     """
     if not files or len(files) % steps:
         raise InputError(
-            f"{len(files)} files are no whole number of stacks of {steps} steps; give the images of each "
-            "stack in the order of their shifts, and no others"
+            f"expected a multiple of {steps} files (steps of a stack), got {len(files)}; give the images of each stack "
+            "in the order of their shifts, and no others"
         )
     images = _read_alike(files)
     figures = _core.estimate_response([np.stack(images[i : i + steps]) for i in range(0, len(files), steps)])
@@ -56,7 +56,7 @@ def estimate_from_files(
 
 
 def _read_alike(files: Sequence[Path]) -> list[NDArray[np.float32]]:
-    """Read images as fractions of full scale; all must have one size and type."""
+    """Read images, share of full scale; raises `InputError` unless all have one size and type."""
     first = read_grey(files[0])
     found = []
     for path in files:
@@ -64,7 +64,7 @@ def _read_alike(files: Sequence[Path]) -> list[NDArray[np.float32]]:
         if (image.shape, image.dtype) != (first.shape, first.dtype):
             raise InputError(
                 f"{path}: {image.shape} {image.dtype}, but {files[0]} is {first.shape} {first.dtype}; "
-                "all images of a capture must be alike"
+                "all images of a capture must have one size and type"
             )
         found.append(image.astype(np.float32) / full_scale(image))
     return found

@@ -1,7 +1,7 @@
-"""Planes and spheres through measured points, and the steps between planes: what an instrument is judged by.
+"""Planes, spheres and steps fitted to measured points, for the acceptance test of an instrument.
 
-Terms follow VDI/VDE 2634, part 2: form is the range of the distances of measured points from the fitted surface, after
-three points in a thousand, the worst, may be left out; size is the measured diameter minus the calibrated one.
+Terms follow VDI/VDE 2634 part 2: the form error is the range of the distances of the measured points from the fitted
+surface without the worst three of a thousand; the size error is the measured minus the calibrated diameter.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import FIT_POINTS_MIN, SPHERE_SIZE_REACH
 from quadfringe.errors import InputError
 
 __all__ = [
@@ -30,21 +31,19 @@ __all__ = [
 
 Array = NDArray[np.float64]
 Points = NDArray[np.floating]
-LEFT_OUT = 0.003  # share of points that VDI/VDE 2634 lets be left out
+LEFT_OUT = 0.003  # share of points that VDI/VDE 2634 allows to leave out
 CUT_SIGMA = 3.0  # half the 6 sigma band
-POINTS_MIN = 100
-SIZE_REACH = 0.05  # share by which a sphere that is looked for may differ from its calibrated diameter
 
 
 @dataclass(frozen=True)
 class Plane:
-    """The plane normal . P = offset_mm; the unit normal points to the camera."""
+    """The plane normal . P = offset_mm; the unit normal (3,) points to the camera."""
 
     normal: Array
     offset_mm: float
 
     def distances_mm(self, xyz_mm: Points) -> Array:
-        """Give signed distances (...) of points (..., 3), positive on the side of the camera."""
+        """Return the signed distances (...), mm, of points (..., 3), positive on the side of the camera."""
         return np.asarray(xyz_mm, float) @ self.normal - self.offset_mm
 
 
@@ -56,16 +55,17 @@ class Sphere:
     radius_mm: float
 
     def distances_mm(self, xyz_mm: Points) -> Array:
-        """Give distances (...) of points (..., 3) from the surface, positive outside."""
+        """Return the distances (...), mm, of points (..., 3) from the surface, positive outside."""
         return np.asarray(np.linalg.norm(np.asarray(xyz_mm, float) - self.centre_mm, axis=-1) - self.radius_mm)
 
 
 @dataclass(frozen=True)
 class Form:
-    """How points lie about a fitted surface.
+    """Statistics of the distances of points from a fitted surface.
 
-    `sigma_mm` is their standard deviation. `form_mm` is the range with the worst 3 of 1000 points left out (VDI/VDE
-    2634), `form_6sigma_mm` the range of the points inside the band of +-3 sigma, `range_mm` that of all.
+    `sigma_mm` is their standard deviation, `form_mm` their range without the worst 3 of 1000 points (VDI/VDE 2634),
+    `form_6sigma_mm` the range of the points within +-3 sigma, `range_mm` the range of all points, and `cut_percent` the
+    share of points outside +-3 sigma.
     """
 
     points: int
@@ -77,10 +77,10 @@ class Form:
 
 
 def form_of(distances_mm: Points) -> Form:
-    """Give the form of distances from a fitted surface; NaN is no point. Raises `InputError` below 100 points."""
+    """Return the form of distances from a fitted surface; NaN is ignored. Raises `InputError` below 100 points."""
     found = np.sort(_finite(distances_mm))
-    if found.size < POINTS_MIN:
-        raise InputError(f"form: {found.size} points; at least {POINTS_MIN} are needed for a form error")
+    if found.size < FIT_POINTS_MIN:
+        raise InputError(f"form: {found.size} points; at least {FIT_POINTS_MIN} are needed for a form error")
     sigma = float(found.std())
     inside = found[np.abs(found - found.mean()) <= CUT_SIGMA * sigma]
     by_size = np.sort(np.abs(found - np.median(found)))
@@ -96,7 +96,7 @@ def form_of(distances_mm: Points) -> Form:
 
 
 def fit_plane(xyz_mm: Points) -> Plane:
-    """Fit a plane by total least squares to points (..., 3); NaN is no point. Raises `InputError` below 100 points."""
+    """Fit a plane by total least squares to points (..., 3); NaN is ignored. Raises `InputError` below 100 points."""
     points = _points(xyz_mm, "plane")
     centre = points.mean(axis=0)
     normal = np.linalg.eigh(np.cov((points - centre).T))[1][:, 0]
@@ -105,9 +105,9 @@ def fit_plane(xyz_mm: Points) -> Plane:
 
 
 def fit_sphere(xyz_mm: Points, guess: Sphere | None = None) -> Sphere:
-    """Fit a sphere of free radius by least squares of distances; NaN is no point. Raises `InputError` below 100 points.
+    """Fit a sphere by least squares of the distances (Gauss-Newton); NaN is ignored.
 
-    Without a guess it starts from the sphere of least squares in |P|^2.
+    Without a guess, the iteration starts from the linear least-squares sphere. Raises `InputError` below 100 points.
     """
     points = _points(xyz_mm, "sphere")
     shift = points.mean(axis=0)
@@ -130,9 +130,9 @@ def fit_sphere(xyz_mm: Points, guess: Sphere | None = None) -> Sphere:
 
 
 def dominant_plane(xyz_mm: Points, band_mm: float = 0.5, trials: int = 2000, seed: int = 0) -> Plane:
-    """Give the plane that most points (..., 3) lie within `band_mm` of, fitted to these points.
+    """Find the plane with most points (..., 3) within `band_mm`, and fit it to these points (RANSAC).
 
-    Of so many `trials` one has its three points on a plane that holds a fifth of all (chance of none: 1e-7).
+    With 2000 trials, a plane that holds a fifth of all points is missed with probability (1 - 0.2^3)^2000 = 1e-7.
     """
     points = _points(xyz_mm, "plane")
     random = np.random.default_rng(seed)
@@ -156,9 +156,9 @@ def dominant_plane(xyz_mm: Points, band_mm: float = 0.5, trials: int = 2000, see
 def dominant_sphere(
     xyz_mm: Points, diameter_mm: float, band_mm: float = 0.5, trials: int = 400, seed: int = 0
 ) -> Sphere:
-    """Give the sphere of about the diameter (within 5 %) that most points (..., 3) lie within `band_mm` of.
+    """Find the sphere of about this diameter (within 5 %) with most points (..., 3) within `band_mm` (RANSAC).
 
-    Raises `InputError` when fewer than 100 points lie on one.
+    Raises `InputError` when fewer than 100 points lie on such a sphere.
     """
     points = _points(xyz_mm, "sphere")
     random = np.random.default_rng(seed)
@@ -170,13 +170,15 @@ def dominant_sphere(
         if len(near) < 4:
             continue
         trial = _sphere_through(near[random.choice(len(near), 4, replace=False)])
-        if trial is None or abs(2 * trial.radius_mm / diameter_mm - 1) > SIZE_REACH:
+        if trial is None or abs(2 * trial.radius_mm / diameter_mm - 1) > SPHERE_SIZE_REACH:
             continue
         count = int(np.count_nonzero(np.abs(trial.distances_mm(sample)) < band_mm))
         if count > most:
             best, most = trial, count
-    if best is None or np.count_nonzero(np.abs(best.distances_mm(points)) < band_mm) < POINTS_MIN:
-        raise InputError(f"sphere: no sphere of about {diameter_mm:g} mm diameter is among {len(points)} points")
+    if best is None or np.count_nonzero(np.abs(best.distances_mm(points)) < band_mm) < FIT_POINTS_MIN:
+        raise InputError(
+            f"sphere: found no sphere of about {diameter_mm:g} mm diameter in {len(points)} points; check the diameter"
+        )
     found = best
     for _ in range(3):
         found = fit_sphere(points[np.abs(found.distances_mm(points)) < band_mm], found)
@@ -184,7 +186,7 @@ def dominant_sphere(
 
 
 def cap_towards_camera(xyz_mm: Points, sphere: Sphere, within_deg: float) -> NDArray[np.bool_]:
-    """Tell which points (..., 3) see the camera, at the origin, within an angle of the normal of the sphere."""
+    """Return which points (..., 3) the camera, at the origin, sees within this angle of the surface normal."""
     xyz = np.asarray(xyz_mm, float)
     outward = xyz - sphere.centre_mm
     lengths = np.linalg.norm(outward, axis=-1) * np.linalg.norm(xyz, axis=-1)
@@ -193,9 +195,9 @@ def cap_towards_camera(xyz_mm: Points, sphere: Sphere, within_deg: float) -> NDA
 
 @dataclass(frozen=True)
 class StepsResult:
-    """Heights of flat tops over the base, mm, in the order of the nominal ones, and how many points each has.
+    """Heights of flat tops above the base, mm, in the order of the nominal heights, with the points of each.
 
-    `height_mm` is the map (H, W) of heights over the base.
+    `base` is the form of the base plane; `height_mm` (H, W) is the map of heights above it, NaN without data.
     """
 
     nominal_mm: tuple[float, ...]
@@ -206,23 +208,26 @@ class StepsResult:
 
     @property
     def errors_mm(self) -> tuple[float, ...]:
-        """Measured minus nominal."""
+        """Measured minus nominal heights, mm."""
         return tuple(m - n for m, n in zip(self.measured_mm, self.nominal_mm, strict=True))
 
 
 def measure_steps(
     xyz_mm: Points, heights_mm: Sequence[float], reach_mm: float = 1.0, margin_px: int = 4
 ) -> StepsResult:
-    """Measure flat tops parallel to a base plane, in a map (H, W, 3) that shows more of the base than of any top.
+    """Measure flat tops parallel to a base plane in a map (H, W, 3), mm, that shows more of the base than of any top.
 
-    A top is what lies within `reach_mm` of a nominal height and at least `margin_px` pixels away from everything else;
+    A top consists of the pixels within `reach_mm` of a nominal height and at least `margin_px` pixels from all others;
     its height is the mean distance from the base. Raises `InputError` when a top has fewer than 100 points, or when two
-    nominal heights are nearer to one another than twice the reach.
+    nominal heights, or one and 0, are closer than twice the reach.
     """
     nominal = [float(h) for h in heights_mm]
     apart = np.diff(np.sort(np.unique([0.0, *nominal])))
     if not nominal or apart.min(initial=np.inf) < 2 * reach_mm:
-        raise InputError(f"steps: nominal heights {nominal} mm must be {2 * reach_mm:g} mm apart from each other and 0")
+        raise InputError(
+            f"steps: expected nominal heights at least {2 * reach_mm:g} mm apart from each other and from 0, got "
+            f"{nominal}"
+        )
     base = dominant_plane(xyz_mm)
     height = base.distances_mm(xyz_mm)
     base_points = _inner(np.abs(height) < reach_mm, margin_px)
@@ -231,8 +236,11 @@ def measure_steps(
     measured, counts = [], []
     for h in nominal:
         top = height[_inner(np.abs(height - h) < reach_mm, margin_px)]
-        if top.size < POINTS_MIN:
-            raise InputError(f"steps: {top.size} points lie near {h:g} mm; expected a flat top of that height")
+        if top.size < FIT_POINTS_MIN:
+            raise InputError(
+                f"steps: {top.size} points lie near {h:g} mm, at least {FIT_POINTS_MIN} are needed; check the nominal "
+                "heights"
+            )
         measured.append(float(top.mean()))
         counts.append(int(top.size))
     return StepsResult(tuple(nominal), tuple(measured), tuple(counts), form_of(height[base_points]), height)
@@ -246,7 +254,7 @@ def _inner(region: NDArray[np.bool_], margin_px: int) -> NDArray[np.bool_]:
 
 
 def _sphere_through(four: Array) -> Sphere | None:
-    """Give the sphere through four points (4, 3); None when they lie nearly in a plane."""
+    """Return the sphere through four points (4, 3); None when they are nearly coplanar."""
     first = four[0]
     away = four[1:] - first
     if abs(np.linalg.det(away)) < 1e-3 * np.prod(np.linalg.norm(away, axis=1)):
@@ -263,6 +271,6 @@ def _finite(values: Points) -> Array:
 def _points(xyz_mm: Points, what: str) -> Array:
     points = np.asarray(xyz_mm, float).reshape(-1, 3)
     points = points[np.isfinite(points).all(axis=1)]
-    if len(points) < POINTS_MIN:
-        raise InputError(f"{what}: {len(points)} points; at least {POINTS_MIN} are needed for a fit")
+    if len(points) < FIT_POINTS_MIN:
+        raise InputError(f"{what}: {len(points)} points; at least {FIT_POINTS_MIN} are needed for a fit")
     return np.asarray(points)

@@ -1,4 +1,4 @@
-"""Calibration boards: rings as published, circle grids, ChArUco; what is printed and where its points lie.
+"""Calibration boards: rings as in the paper, circle grids and ChArUco; their points and their print.
 
 The frame of a board has x to the right, y down and z away from the viewer, in mm; the origin is its first point.
 
@@ -33,14 +33,14 @@ __all__ = [
 ]
 
 Count = Annotated[int, Field(ge=3, le=100)]
-MARK_DIAMETER = 0.22  # of the pitch: small enough never to be taken for a point
-MARGIN = 0.75  # of the pitch, from the outer points to the border of the print
+MARK_DIAMETER = 0.22  # of the pitch: well below the smallest ring or disc, so that no mark is taken for a point
+MARGIN = 0.75  # of the pitch, from the outer points to the border of the print: white that detection needs
 DICTIONARIES = ("DICT_4X4_250", "DICT_5X5_250", "DICT_6X6_250", "DICT_7X7_250")
 
 
 @dataclass(frozen=True)
 class Disc:
-    """A filled circle on a board, mm; paper instead of ink when `ink` is false."""
+    """A filled circle on a board, mm; without ink (paper) when `ink` is false."""
 
     x_mm: float
     y_mm: float
@@ -50,7 +50,7 @@ class Disc:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """A filled rectangle on a board, from its upper left corner, mm; paper instead of ink when `ink` is false."""
+    """A filled rectangle on a board, placed by its upper left corner, mm; without ink (paper) when `ink` is false."""
 
     x_mm: float
     y_mm: float
@@ -62,9 +62,9 @@ class Rectangle:
 class Target(Model):
     """A calibration board.
 
-    `rows` and `columns` count rings or discs, and the squares of a ChArUco board; in an asymmetric grid every second
-    row is moved by half a pitch. `pitch_mm` is the distance of neighbours in a row, or the side of a square.
-    `marks` are two dots in the first two cells, which tell how the board is turned and whether it is seen mirrored.
+    `rows` and `columns` count rings or discs, or the squares of a ChArUco board; in an asymmetric grid every second
+    row is offset by half a pitch. `pitch_mm` is the distance of neighbours in a row, or the side of a square. `marks`
+    prints two dots in the first two cells, which show the orientation of the board and whether it is mirrored.
     """
 
     kind: Literal["rings", "circles", "asymmetric", "charuco"]
@@ -97,7 +97,7 @@ class Target(Model):
 
     @cached_property
     def points_mm(self) -> NDArray[np.float64]:
-        """Points of the board, (N, 3), row by row."""
+        """Points of the board, (N, 3), mm, row by row."""
         if self.kind == "charuco":
             x, y = np.meshgrid(np.arange(self.columns - 1.0), np.arange(self.rows - 1.0))
         else:
@@ -108,20 +108,20 @@ class Target(Model):
 
     @cached_property
     def area_mm(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Upper left and lower right corner (x, y) of the print with its white border."""
+        """Upper left and lower right corner (x, y), mm, of the print with its white border."""
         margin = (1.5 if self.kind == "charuco" else MARGIN) * self.pitch_mm
         low, high = self.points_mm[:, :2].min(axis=0) - margin, self.points_mm[:, :2].max(axis=0) + margin
         return (float(low[0]), float(low[1])), (float(high[0]), float(high[1]))
 
     @property
     def size_mm(self) -> tuple[float, float]:
-        """Width and height of the print."""
+        """Width and height of the print, mm."""
         (left, top), (right, bottom) = self.area_mm
         return right - left, bottom - top
 
     @property
     def mark_points_mm(self) -> NDArray[np.float64]:
-        """Middles of the first two cells, where the marks are, (2, 2)."""
+        """Centres of the two marks in the first two cells, (2, 2), mm."""
         half = 0.5 * self.pitch_mm
         if self.kind == "asymmetric":
             return np.array([[half, 0.0], [half + self.pitch_mm, 0.0]])
@@ -129,11 +129,11 @@ class Target(Model):
 
     @property
     def mark_mm(self) -> float:
-        """Diameter of a mark."""
+        """Diameter of a mark, mm."""
         return MARK_DIAMETER * self.pitch_mm * (0.6 if self.kind == "asymmetric" else 1.0)
 
     def charuco(self) -> Any:
-        """Give OpenCV's board of a ChArUco target."""
+        """Return the OpenCV board of a ChArUco target."""
         import cv2
 
         dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, self.dictionary))
@@ -149,7 +149,7 @@ def ring_board(
     hole_mm: float | None = None,
     marks: bool = True,
 ) -> Target:
-    """Give the board of the paper, 9 x 12 rings; absent diameters are 0.6 and 0.3 of the pitch."""
+    """Return a ring board, by default that of the paper, 9 x 12 rings; default diameters: 0.6 and 0.3 of the pitch."""
     outer_mm = 0.6 * pitch_mm if diameter_mm is None else diameter_mm
     hole_mm = 0.5 * outer_mm if hole_mm is None else hole_mm
     return _target(
@@ -160,7 +160,7 @@ def ring_board(
 def circle_grid(
     rows: int = 9, columns: int = 12, pitch_mm: float = 20.0, diameter_mm: float | None = None, marks: bool = True
 ) -> Target:
-    """Give a symmetric grid of discs; an absent diameter is half the pitch."""
+    """Return a symmetric grid of discs; default diameter: half the pitch."""
     diameter_mm = 0.5 * pitch_mm if diameter_mm is None else diameter_mm
     return _target(kind="circles", rows=rows, columns=columns, pitch_mm=pitch_mm, diameter_mm=diameter_mm, marks=marks)
 
@@ -168,9 +168,9 @@ def circle_grid(
 def asymmetric_grid(
     rows: int = 11, columns: int = 6, pitch_mm: float = 32.0, diameter_mm: float | None = None, marks: bool = True
 ) -> Target:
-    """Give a grid of discs whose odd rows are moved by half a pitch; an absent diameter is 0.36 of the pitch.
+    """Return a grid of discs whose odd rows are offset by half a pitch; default diameter: 0.36 of the pitch.
 
-    The distance of rows is half a pitch; OpenCV calls this pattern (columns, rows).
+    Rows are half a pitch apart. The pattern size of OpenCV for this board is (columns, rows).
     """
     diameter_mm = 0.36 * pitch_mm if diameter_mm is None else diameter_mm
     return _target(
@@ -185,7 +185,7 @@ def charuco_board(
     marker_mm: float | None = None,
     dictionary: str = "DICT_4X4_250",
 ) -> Target:
-    """Give a ChArUco board, which may be seen in part; an absent marker is 0.75 of a square."""
+    """Return a ChArUco board, which may be partly out of view; default marker: 0.75 of a square."""
     marker_mm = 0.75 * pitch_mm if marker_mm is None else marker_mm
     return _target(
         kind="charuco", rows=rows, columns=columns, pitch_mm=pitch_mm, marker_mm=marker_mm, dictionary=dictionary
@@ -197,7 +197,7 @@ def _target(**values: Any) -> Target:
 
 
 def drawing(target: Target) -> list[Disc | Rectangle]:
-    """Give what is printed, in the order in which it is laid down."""
+    """Return the printed shapes in drawing order."""
     if target.kind == "charuco":
         return [*_squares(target), *_markers(target)]
     outer = [Disc(float(x), float(y), target.diameter_mm or 0.0) for x, y, _ in target.points_mm]
@@ -207,7 +207,7 @@ def drawing(target: Target) -> list[Disc | Rectangle]:
 
 
 def _squares(target: Target) -> list[Disc | Rectangle]:
-    """Black squares; the first point lies between the first four squares, of which the first is black."""
+    """Return the black squares; the first point lies at the inner corner of the first square, which is black."""
     side = target.pitch_mm
     places = ((c, r) for r in range(target.rows) for c in range(target.columns) if (r + c) % 2 == 0)
     return [Rectangle((c - 1) * side, (r - 1) * side, side, side) for c, r in places]
@@ -230,7 +230,7 @@ def _markers(target: Target) -> list[Disc | Rectangle]:
 
 
 def _runs(bits: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
-    """Give row, first column and length of the runs of set bits."""
+    """Return row, first column and length of each run of set bits."""
     padded = np.pad(bits.astype(np.int8), ((0, 0), (1, 1)))
     change = np.diff(padded, axis=1)
     starts, ends = np.argwhere(change == 1), np.argwhere(change == -1)
@@ -238,10 +238,10 @@ def _runs(bits: NDArray[np.bool_]) -> list[tuple[int, int, int]]:
 
 
 def raster(target: Target, texel_mm: float = 0.1) -> NDArray[np.float32]:
-    """Give the share of ink of each texel, (rows, columns) float32, 0 to 1, over `target.area_mm`.
+    """Return the ink coverage of each texel, (rows, columns) float32, 0 to 1, over `target.area_mm`.
 
-    The centre of the first texel lies half a texel inside the upper left corner. Edges are smooth, so that they lie
-    where they belong to a small part of a texel.
+    The centre of the first texel lies half a texel inside the upper left corner. Edges are anti-aliased, which places
+    them to a small fraction of a texel.
     """
     (left, top), _ = target.area_mm
     width, height = (round(s / texel_mm) for s in target.size_mm)
@@ -268,7 +268,7 @@ def _extent(item: Disc | Rectangle) -> tuple[tuple[float, float], tuple[float, f
 def _covered(
     item: Disc | Rectangle, x: NDArray[np.float64], y: NDArray[np.float64], texel_mm: float
 ) -> NDArray[np.float32]:
-    """Share of each texel that the item covers, (rows, columns)."""
+    """Return the share of each texel that the item covers, (rows, columns)."""
     if isinstance(item, Disc):
         distance = np.hypot(x - item.x_mm, (y - item.y_mm)[:, None])
         covered = np.clip(0.5 + (0.5 * item.diameter_mm - distance) / texel_mm, 0, 1)

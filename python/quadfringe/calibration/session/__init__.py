@@ -1,8 +1,7 @@
-"""The guided calibration: what to capture, what is missing, what came of it, in plain words.
+"""The guided calibration of a bench: it lists the captures, says what is missing, and makes one `Calibration`.
 
-A thin layer over `quadfringe.calibration`: captures come from a folder, which camera and
-projectors fill, or from the virtual bench; every step calls the
-functions there, and one `Calibration` with the record of every step comes out.
+The captures come from a folder, which `take_captures` fills from the camera and the projectors, or from the virtual
+bench. Every step calls functions of `quadfringe.calibration`; the result keeps a record of every step.
 """
 
 from quadfringe.calibration.session.acquisition import take_captures

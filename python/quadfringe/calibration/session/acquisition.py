@@ -1,4 +1,4 @@
-"""Captures of a session from the camera and the projectors of a system, into its folder."""
+"""Take the captures of a session with the camera and the projectors of a system, into its folder."""
 
 from __future__ import annotations
 
@@ -28,9 +28,10 @@ from quadfringe.scanner import Scanner, open_system
 
 __all__ = ["Hands", "take_captures"]
 
+# Called with step, name and camera: puts the object of a capture in place, and returns when it is still.
 Hands = Callable[[str, str, Camera], None]
-TRIES = 3  # of a pose in which the board is not found
-SETTLED_S = 0.1  # a display shows an image some frames after it was drawn
+TRIES = 3  # attempts at a pose in which the board is not found
+SETTLED_S = 0.1  # six frames at 60 Hz: a display shows an image up to a few frames after it was drawn
 
 
 def take_captures(
@@ -40,13 +41,13 @@ def take_captures(
     steps: Iterable[str] = STEP_NAMES,
     say: Callable[[str], None] = lambda _: None,
 ) -> list[Path]:
-    """Take every capture of these steps that the session in `folder` lacks; returns the folders written.
+    """Take the missing captures of these steps for the session in `folder`; returns the folders written.
 
-    `hands(step, name, camera)` puts what a capture is of before the camera, and returns when it stands still: a person
-    that is asked, or the virtual bench. A pose in which the board is not found is said to be so, and taken again.
-    What is there is kept, so that an interrupted session goes on where it was; a capture is written whole or not at
-    all. Raises `ConfigError` when the system cannot show or expose what the session asks for, `InputError` when
-    the camera's bits or mosaic are not those of the session, `CalibrationError` when a board is not found three times.
+    `hands(step, name, camera)` puts the object of a capture in front of the camera and returns when it is still: a
+    prompt to a person, or the virtual bench. A pose in which the board is not found is reported and repeated. Existing
+    captures are kept, so that the call continues an interrupted session; a capture is complete or does not exist.
+    Raises `ConfigError` when the system cannot project or expose what the session needs, `InputError` when bit depth or
+    mosaic of the camera differ from the session, and `CalibrationError` when a board is not found three times.
 
     >>> from quadfringe.calibration.session.acquisition import take_captures
     >>> take_captures(load_system(Path("system.toml")), Path("session"), hands)  # doctest: +SKIP
@@ -57,7 +58,7 @@ def take_captures(
         wanted = [name for name in captures.session.captures(step_named(step).name) if _lacks(captures, step, name)]
         by_exposure: dict[float, list[str]] = {}
         for name in wanted:
-            by_exposure.setdefault(light_of(captures.session, step, name)[1], []).append(name)
+            by_exposure.setdefault(light_of(captures.session, step, name).share, []).append(name)
         for exposure, names in by_exposure.items():
             with open_system(exposed(config, exposure)) as scanner:
                 for name in names:
@@ -67,15 +68,15 @@ def take_captures(
 
 
 def exposed(config: SystemConfig, share: float) -> SystemConfig:
-    """Give the system at a share of its exposure; raises `ConfigError` when that cannot be set."""
+    """Return the system at a share of its exposure; raises `ConfigError` when that cannot be set."""
     capture = config.capture
     if isinstance(capture, ReplayConfig):
-        raise ConfigError("capture: a recording cannot be put under other light; name a camera")
-    changes: dict[str, Any] = {"calibration": None}  # it is to be made
+        raise ConfigError("capture: a recording cannot be taken again under other light; name a camera")
+    changes: dict[str, Any] = {"calibration": None}  # it does not exist yet
     if isinstance(capture, VirtualConfig):
         gain = tuple(share * one for one in config.scene.gain or (1.0,) * 4)
         changes["scene"] = config.scene.model_copy(update={"gain": gain})
-        # Then every shot has noise of its own.
+        # A frame rate gives each shot new noise.
         changes["capture"] = capture.model_copy(update={"frame_rate_hz": capture.frame_rate_hz or 1.0})
     elif share != 1:
         changes["capture"] = _shorter(capture, share)
@@ -88,9 +89,14 @@ def _shorter(capture: AravisConfig, share: float) -> AravisConfig:
 
     chips = {name: getattr(capture, name) for name in ("visible", "infrared")}
     if capture.exposure_us is None and any(chip.exposure_us is None for chip in chips.values()):
-        raise ConfigError("capture.exposure_us: state it; a calibration takes some levels at a part of the exposure")
-    own = {name: chip.model_copy(update={"exposure_us": times(chip.exposure_us)}) for name, chip in chips.items()}
-    return capture.model_copy(update={"exposure_us": times(capture.exposure_us), **own})
+        raise ConfigError(
+            "capture.exposure_us: missing; set it, because a calibration takes some levels at a fraction of the "
+            "exposure"
+        )
+    chips_changed = {
+        name: chip.model_copy(update={"exposure_us": times(chip.exposure_us)}) for name, chip in chips.items()
+    }
+    return capture.model_copy(update={"exposure_us": times(capture.exposure_us), **chips_changed})
 
 
 def _lacks(captures: FolderCaptures, step: str, name: str) -> bool:
@@ -100,14 +106,14 @@ def _lacks(captures: FolderCaptures, step: str, name: str) -> bool:
 def _taken(
     captures: FolderCaptures, step: str, name: str, scanner: Scanner, hands: Hands, say: Callable[[str], None]
 ) -> Path:
-    """Take one capture, beside its place until it is whole and good."""
+    """Take one capture in a temporary folder; move it to its place when it is complete and good."""
     place = folder_for(captures.folder / step) / name
     part = place.with_name(f"{name}.part")
     for left in reversed(range(TRIES)):
         shutil.rmtree(part, ignore_errors=True)
         hands(step, name, scanner.camera)
         if step != "poses":
-            shot = _shown(scanner, light_of(captures.session, step, name)[0])
+            shot = _shown(scanner, light_of(captures.session, step, name).light)
             _check_shot(captures.session, shot)
             write_shot(folder_for(part), shot)
             break
@@ -124,7 +130,7 @@ def _taken(
         except CalibrationError as error:
             if not left:
                 raise CalibrationError(error.reason, f"pose {name}: {error}") from error
-            say(f"  the board is not found: {error}; take this pose again")
+            say(f"  the board was not found: {error}; place it again for another attempt")
     shutil.rmtree(place, ignore_errors=True)
     part.replace(place)
     return place
@@ -138,19 +144,20 @@ def _shown(scanner: Scanner, light: Light) -> AnyShot:
 
 
 def _check_shot(session: Session, shot: AnyShot) -> None:
-    """Refuse shots that the settings of the session would read back as something else."""
+    """Raise `InputError` for a shot that the settings of the session would misread."""
     pattern = shot.bayer if isinstance(shot, BayerShot) else None
     bits = round(np.log2(shot.full_scale_value + 1))
     meant = session.bits or (16 if shot.images["ir"].dtype == np.uint16 else bits)
     if (pattern, bits) != (session.bayer, meant):
         raise InputError(
-            f"{FILE}: bits is {session.bits or 'absent'} and bayer {session.bayer or 'absent'}, the camera delivers "
-            f"{bits} bits and {pattern or 'whole planes'}; write there what it delivers"
+            f"{FILE}: bits is {session.bits or 'absent'} and bayer {session.bayer or 'absent'}, but the camera "
+            "delivers "
+            f"{bits} bits and {pattern or 'full colour planes'}; set them to what the camera delivers"
         )
 
 
 def _grey(shot: AnyShot, beam: str) -> NDArray[Any]:
-    """Give what a chip saw of one step: its colours all show the same, and green stands for them."""
+    """Return the image of a chip in one step; all colours show the same fringes, so green represents them."""
     if beam == "infrared":
         return shot.images["ir"]
     if isinstance(shot, BayerShot):

@@ -1,10 +1,10 @@
-"""Where the captures of a session come from: a folder of images, or anything else that gives shots by name."""
+"""The captures of a session: read from a folder of images, or from any object that returns shots by name."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,43 +17,46 @@ from quadfringe.devices.light import Levels, Light, Step
 from quadfringe.errors import InputError
 from quadfringe.io.images import full_scale, read_grey
 
-__all__ = ["Captures", "FolderCaptures", "light_of", "pose_light", "pose_maps"]
+__all__ = ["Captures", "Exposure", "FolderCaptures", "light_of", "pose_light", "pose_maps"]
 
-FLAT_LEVEL = 0.6  # of full light, out of focus
+# Projected level of the flat field, share of full light: a white surface then reaches about half of full scale.
+FLAT_LEVEL = 0.6
 
 
 class Captures(Protocol):
-    """Gives the captures of a session by step and name; a capture that is not there is an `InputError`."""
+    """Returns the captures of a session by step and name; raises `InputError` for a missing capture."""
 
     session: Session
 
     def missing(self, step: str) -> list[str]:
-        """Give the names of the captures of a step that are not there."""
+        """Return the names of the missing captures of a step."""
 
     def shot(self, step: str, name: str) -> AnyShot:
-        """Give one shot."""
+        """Return one shot."""
 
     def pose(self, name: str) -> dict[str, ProjectorMap]:
-        """Give the projector maps of one pose of the board, by projector."""
+        """Return the projector maps of one pose of the board, by projector."""
 
 
 class FolderCaptures:
-    """The captures in a folder with `session.json`; raises `InputError` when there is none.
+    """The captures in a folder with `session.json`; raises `InputError` when that file is missing.
 
-    `rig` is the bench that is to be calibrated; a session of another one is refused.
+    `rig` is the name of the bench to calibrate; the session of another bench raises `InputError`.
     """
 
     def __init__(self, folder: Path, rig: str | None = None) -> None:
         if not (folder / FILE).is_file():
-            raise InputError(f"{folder}: no {FILE}; make it with quadfringe calibrate plan {folder}")
+            raise InputError(f"{folder}: no {FILE}; create it with quadfringe calibrate plan {folder}")
         self.folder = folder
         self.session = Session.load(folder / FILE)
         if rig is not None and rig != self.session.rig:
-            raise InputError(f"{folder}: captures of {self.session.rig!r}, not of {rig!r}; one rig, one session")
+            raise InputError(
+                f"{folder}: captures of {self.session.rig!r}, not of {rig!r}; use one folder for each bench"
+            )
         self._size: tuple[int, ...] | None = None
 
     def missing(self, step: str) -> list[str]:
-        """Give the captures whose folder, or whose images, are not there; a pose says which images it lacks."""
+        """Return the captures without folder or images; a pose that lacks only some images lists them."""
         names = self.session.captures(step)
         if step != "poses":
             return [name for name in names if not _has_images(self.folder / step / name)]
@@ -65,7 +68,7 @@ class FolderCaptures:
         return found
 
     def lacking_images(self, pose: str) -> list[str]:
-        """Give the fringe images that a pose lacks, such as visible/columns_36_0."""
+        """Return the names of the missing fringe images of a pose, such as visible/columns_36_0."""
         return [image for image in self.session.pose_images() if _file(self.folder / "poses" / pose, image) is None]
 
     def shot(self, step: str, name: str) -> AnyShot:
@@ -92,25 +95,32 @@ class FolderCaptures:
         self._size = self._size or image.shape
         if image.shape != self._size:
             raise InputError(
-                f"{name}: {image.shape[1]} x {image.shape[0]} pixels, the captures before have {self._size[1]} x "
-                f"{self._size[0]}; all captures of a session must be of one camera and one size"
+                f"{name}: {image.shape[1]} x {image.shape[0]} pixels, the captures before it have {self._size[1]} x "
+                f"{self._size[0]}; take all captures of a session with one camera at one image size"
             )
 
 
-def light_of(session: Session, step: str, name: str) -> tuple[Light, float]:
-    """Give what the projectors show for a capture that is one shot, and its relative exposure."""
+class Exposure(NamedTuple):
+    """The projected light of a capture, and the exposure relative to that of the system."""
+
+    light: Light
+    share: float
+
+
+def light_of(session: Session, step: str, name: str) -> Exposure:
+    """Return the projected light and the relative exposure of a capture that is one shot."""
     if step == "levels":
         plan = session.level_plan
         row = plan.names.index(name)
         red, green, blue, ir = plan.levels[row].tolist()
-        return Levels((red, green, blue, ir)), float(plan.exposure[row])
+        return Exposure(Levels((red, green, blue, ir)), float(plan.exposure[row]))
     if step in ("dark", "flat"):
-        return Levels((FLAT_LEVEL if step == "flat" else 0.0,) * 4), 1.0
-    return session.fringes, 1.0
+        return Exposure(Levels((FLAT_LEVEL if step == "flat" else 0.0,) * 4), 1.0)
+    return Exposure(session.fringes, 1.0)
 
 
 def pose_light(session: Session, image: str) -> Step:
-    """Give what the projectors show for an image of a pose, such as visible/columns_36_0."""
+    """Return the projected light of an image of a pose, such as visible/columns_36_0."""
     beam, _, name = image.partition("/")
     axis, number, step = name.split("_")
     shift_rad = session.step_plan.shift_rad(int(step))
@@ -118,7 +128,7 @@ def pose_light(session: Session, image: str) -> Step:
 
 
 def pose_maps(session: Session, image: Callable[[str], NDArray[np.float32]]) -> dict[str, ProjectorMap]:
-    """Give the projector maps of a pose, by projector; `image` gives one by its name, (H, W) shares of full scale."""
+    """Compute the projector maps of a pose; `image` returns an image by its name, (H, W), share of full scale."""
     plan = session.step_plan
     found = {}
     for beam in session.beams:

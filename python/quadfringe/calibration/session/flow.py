@@ -1,4 +1,4 @@
-"""From the captures of a session to one calibration: the steps in order, each said in plain words."""
+"""From the captures of a session to one calibration: the steps in order, each reported in plain words."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from quadfringe.data import Calibration, CalibrationRecord
 
 __all__ = ["Guided", "guide"]
 
-SOME = 6  # names of missing captures that are told
+LISTED = 6  # missing captures that are listed by name; the others are counted
 
 
 @dataclass(frozen=True)
 class Guided:
-    """What came of a session: all outcomes, and the captures that are missing by step.
+    """The result of a guided calibration: the outcome of every step, and the missing captures by step.
 
-    `calibration` is None when a step that it needs lacks captures.
+    `calibration` is None when a needed step lacks captures.
     """
 
     calibration: Calibration | None
@@ -32,19 +32,19 @@ class Guided:
 
     @property
     def good(self) -> bool:
-        """Whether there is a calibration and every step that was done is good."""
+        """Whether there is a calibration and every completed step is good."""
         return self.calibration is not None and all(outcome.step.good for outcome in self.outcomes)
 
     def outcome(self, name: str) -> Outcome | None:
-        """Give the outcome of a step; None when it was not done."""
+        """Return the outcome of a step; None when the step was not done."""
         return next((outcome for outcome in self.outcomes if outcome.step.name == name), None)
 
 
 def guide(captures: Captures, say: Callable[[str], None] = lambda _: None) -> Guided:
-    """Do every step whose captures are there, and `say` what to do, what is missing and what came of it.
+    """Do every step whose captures exist; `say` receives what to do, what is missing and what was found.
 
-    Raises `InputError` for captures that cannot be used, `CalibrationError` for those that no calibration can be
-    trusted from. Nothing is written.
+    Raises `InputError` for captures that cannot be read, and `CalibrationError` for captures that do not give a
+    trustworthy calibration. Writes no file.
     """
     walk = _Walk(captures, say)
     for step in STEPS:
@@ -53,7 +53,7 @@ def guide(captures: Captures, say: Callable[[str], None] = lambda _: None) -> Gu
 
 
 class _Walk:
-    """The state of a session on its way through the steps."""
+    """The state of a session while its steps are done."""
 
     def __init__(self, captures: Captures, say: Callable[[str], None]) -> None:
         self.captures, self.say = captures, say
@@ -62,17 +62,17 @@ class _Walk:
         self.fields: dict[str, Any] = {}
 
     def take(self, step: Step) -> None:
-        """Do a step, or say what it lacks."""
+        """Do a step, or report what it lacks."""
         lacks = tuple(self.captures.missing(step.name))
         self.say(f"{step.name}: {step.title}")
         if lacks:
             self.missing[step.name] = lacks
-            more = f" and {len(lacks) - SOME} more" if len(lacks) > SOME else ""
-            need = "needed" if step.needed else "may be left out"
-            self.say(f"  missing ({need}): {', '.join(lacks[:SOME])}{more}\n  {step.how}")
+            more = f" and {len(lacks) - LISTED} more" if len(lacks) > LISTED else ""
+            need = "needed" if step.needed else "optional"
+            self.say(f"  missing ({need}): {', '.join(lacks[:LISTED])}{more}\n  {step.how}")
             return
         if step.name in ("planes", "acceptance") and self.calibration() is None:
-            self.say("  waits for the steps before")
+            self.say("  needs the calibration of the steps before; take their captures first")
             return
         for outcome in self._outcomes(step.name):
             self.outcomes.append(outcome)
@@ -106,7 +106,7 @@ class _Walk:
         return rest if registered is None else [registered, *rest]
 
     def calibration(self) -> Calibration | None:
-        """Give the calibration as far as it is known; None while a needed step is missing."""
+        """Return the calibration from the completed steps; None while a needed step is missing."""
         done = {outcome.step.name for outcome in self.outcomes}
         if not {step.name for step in STEPS if step.needed} <= done:
             return None

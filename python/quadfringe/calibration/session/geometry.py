@@ -1,4 +1,4 @@
-"""The steps of the guided calibration that look at geometry: poses of the board, registration, heights, acceptance."""
+"""Geometric steps of the guided calibration: board poses, registration, heights, acceptance."""
 
 from __future__ import annotations
 
@@ -8,6 +8,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration._params import (
+    COVERAGE_GRID,
+    COVERAGE_MIN,
+    HEIGHTS_AGREE_MAX_MM,
+    REGISTERED_MAX_PX,
+    REPROJECTION_MAX_PX,
+)
 from quadfringe.calibration.acceptance import Artefacts, accept
 from quadfringe.calibration.bundle import Pose, RigCalibration, calibrate_rig
 from quadfringe.calibration.detect import View, find_target
@@ -24,15 +31,10 @@ __all__ = ["acceptance", "planes", "poses", "registration"]
 
 Array = NDArray[np.float64]
 Maps = Mapping[str, dict[str, ProjectorMap]]
-REPROJECTION_MAX_PX = 0.3
-COVERED_MIN = 0.5  # of a 4 x 4 grid over the image
-COARSE = 4
-AGREE_MAX_MM = 0.1
-REGISTERED_MAX_PX = 0.2
 
 
 def registration(captures: Captures, maps: Maps) -> Outcome:
-    """Where the infrared chip sees what the visible chip sees, from the board of all poses."""
+    """Register the infrared chip to the visible chip, from the board in all poses."""
     target = captures.session.target
     found = register_views(
         *(
@@ -42,7 +44,11 @@ def registration(captures: Captures, maps: Maps) -> Outcome:
     )
     problems = []
     if found.after_rms_px > REGISTERED_MAX_PX:
-        problems.append(f"the chips still lie {found.after_rms_px:.2f} px apart; focus both, and keep the board still")
+        problems.append(
+            f"the chips still lie {found.after_rms_px:.2f} px apart, at most {REGISTERED_MAX_PX} are accepted; focus "
+            "both, "
+            "and keep the board still"
+        )
     good = (
         f"the infrared image is shifted by {found.shift_px[0]:+.2f}, {found.shift_px[1]:+.2f} px, turned by "
         f"{found.rotation_deg:+.3f} degrees and scaled by {found.scale:.5f}; {found.before_rms_px:.2f} px apart "
@@ -53,7 +59,7 @@ def registration(captures: Captures, maps: Maps) -> Outcome:
 
 
 def poses(captures: Captures, maps: Maps, registered: Registration | None) -> Outcome:
-    """Camera, projectors and all poses of the board, in one fit."""
+    """Adjust camera, projectors and all board poses in one fit."""
     session = captures.session
     affine = None if registered is None else registered.ir_registration
     observed = []
@@ -75,19 +81,19 @@ def poses(captures: Captures, maps: Maps, registered: Registration | None) -> Ou
     means = ", ".join(f"{name} {fit.mean_px:.3f} px" for name, fit in fits.items())
     good = f"mean reprojection error: {means}; the board covered {figures['covered_percent']:.0f} % of the image"
     lost = sum(fit.left_out for fit in fits.values())
-    good += f"; {lost} wrong points were left out" if lost else ""
+    good += f"; {lost} outliers were left out" if lost else ""
     step = record("poses", tuple(maps), figures, problems, good, _observations(rig, observed))
     fields = {name: fit.device for name, fit in fits.items()}
     return Outcome(step, fields, {"rig": rig, "observed": observed, "covered": covered})
 
 
 def coverage(views: list[View]) -> NDArray[np.intp]:
-    """Count the board points of all views in a grid of 4 x 4 fields over the image."""
+    """Count the board points of all views in the fields of a 4 x 4 grid over the image."""
     width, height = views[0].size_px
     points = np.concatenate([view.points_px for view in views])
-    counts = np.histogram2d(points[:, 1], points[:, 0], bins=COARSE, range=((-0.5, height - 0.5), (-0.5, width - 0.5)))[
-        0
-    ]
+    counts = np.histogram2d(
+        points[:, 1], points[:, 0], bins=COVERAGE_GRID, range=((-0.5, height - 0.5), (-0.5, width - 0.5))
+    )[0]
     return np.asarray(counts, np.intp)
 
 
@@ -100,19 +106,21 @@ def _view(lit: ProjectorMap, target: Any, words: str) -> View:
 
 def _pose_problems(figures: Mapping[str, float], covered: NDArray[np.intp]) -> list[str]:
     problems = [
-        f"{name[: -len('_mean_px')]} misses by {value:.2f} px in the mean; did a pose move during its capture?"
+        f"{name[: -len('_mean_px')]} has a mean reprojection error of {value:.2f} px, at most {REPROJECTION_MAX_PX} "
+        "are accepted; "
+        "take poses again in which the board moved"
         for name, value in figures.items()
         if name.endswith("_mean_px") and value > REPROJECTION_MAX_PX
     ]
-    if (covered > 0).mean() < COVERED_MIN:
+    if (covered > 0).mean() < COVERAGE_MIN:
         rows, columns = ("top", "upper", "lower", "bottom"), ("left", "centre left", "centre right", "right")
         empty = [f"{rows[y]} {columns[x]}" for y, x in zip(*np.nonzero(covered == 0), strict=True)]
-        problems.append(f"the board was never seen at: {', '.join(empty[:6])}; add poses there")
+        problems.append(f"the board was never seen in these fields: {', '.join(empty[:6])}; add poses there")
     return problems
 
 
 def _observations(rig: RigCalibration, observed: list[Pose]) -> dict[str, Any]:
-    """Keep what was fitted, so that a calibration can be made again from its own file."""
+    """Return the observations, so that the calibration can be repeated from its file."""
     found = {}
     for i, pose in enumerate(observed):
         seen = {"ids": pose.view.ids.tolist(), "camera_px": np.round(pose.view.points_px, 4).tolist()}
@@ -125,7 +133,7 @@ def _observations(rig: RigCalibration, observed: list[Pose]) -> dict[str, Any]:
 
 
 def planes(captures: Captures, calibration: Calibration) -> Outcome:
-    """Height from phase by a polynomial for each pixel, and how it agrees with triangulation on the same shots."""
+    """Fit height polynomials of phase per pixel, and compare them with triangulation on the same shots."""
     session = captures.session
     names = session.captures("planes")
     shapes = _decoded(captures, "planes", names, calibration)
@@ -137,10 +145,10 @@ def planes(captures: Captures, calibration: Calibration) -> Outcome:
     figures = {f"agreement_{name}": float(value) for name, value in vars(agreement).items()}
     figures["polynomial_rms_mm"] = float(np.sqrt(np.mean(np.square(found.residual_rms_mm))))
     problems = []
-    if agreement.rms_mm > AGREE_MAX_MM:
+    if agreement.rms_mm > HEIGHTS_AGREE_MAX_MM:
         problems.append(
             f"polynomial and triangulation differ by {agreement.rms_mm:.3f} mm RMS, {agreement.scale_percent:+.3f} % "
-            "in scale; compare the travel of the stage with the pitch of the board: one of them is not what was stated"
+            "in scale; measure the travel of the stage and the pitch of the board: one of them differs from its setting"
         )
     words = f"{agreement.rms_mm:.3f} mm RMS ({agreement.scale_percent:+.4f} % in scale)"
     good = f"polynomial and triangulation agree within {words}"
@@ -157,12 +165,13 @@ def acceptance(captures: Captures, calibration: Calibration) -> Outcome:
     found = accept(artefacts)
     figures = {line.name: line.value_mm for line in found.lines} | dict(found.figures)
     problems = [
-        f"{line.name} is {line.value_mm:.3f} mm, accepted are {line.limit_mm:g} mm"
+        f"{line.name} is {line.value_mm:.3f} mm, the limit is {line.limit_mm:g} mm"
         for line in found.lines
         if not line.accepted
     ]
     worst = max(found.lines, key=lambda line: abs(line.value_mm) / line.limit_mm)
-    good = f"all limits kept; the nearest is {worst.name} with {worst.value_mm:.3f} of {worst.limit_mm:g} mm"
+    figure = f"{worst.name}, {worst.value_mm:.3f} of {worst.limit_mm:g} mm"
+    good = f"all figures are within their limits; the closest is {figure}"
     return Outcome(record("acceptance", names, figures, problems, good), {}, {"acceptance": found})
 
 
@@ -182,6 +191,6 @@ def _decoded(captures: Captures, step: str, names: tuple[str, ...], calibration:
 
 
 def height_calibration(outcome: Outcome) -> HeightCalibration | None:
-    """Give the per-pixel polynomials of `planes`, which have a file of their own."""
+    """Return the per-pixel polynomials of the step `planes`, which are saved to a separate file."""
     heights = outcome.details.get("heights")
     return heights if isinstance(heights, HeightCalibration) else None

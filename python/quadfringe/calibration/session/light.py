@@ -1,9 +1,10 @@
-"""The steps of the guided calibration that look at light: dark level, levels, flat field."""
+"""Photometric steps of the guided calibration: dark level, responses and crosstalk, flat field."""
 
 from __future__ import annotations
 
 import numpy as np
 
+from quadfringe.calibration._params import HOT_PIXELS_MAX, LEFT_MAX_PERCENT, SESSION_DARK_MAX, UNEVEN_MAX_PERCENT
 from quadfringe.calibration.channels import fit_channels
 from quadfringe.calibration.flat import flat_field
 from quadfringe.calibration.levels import dark_level, mean_levels
@@ -12,14 +13,9 @@ from quadfringe.calibration.session.outcome import Outcome, record
 
 __all__ = ["dark", "flat", "levels"]
 
-DARK_MAX = 0.1  # share of full scale
-HOT_MAX = 500
-LEFT_MAX_PERCENT = 0.5  # of full scale, after response and crosstalk are undone
-UNEVEN_MAX_PERCENT = 5.0
-
 
 def dark(captures: Captures) -> Outcome:
-    """Dark level of each channel, from shots with the lens covered."""
+    """Measure the dark level of each channel, from shots with the lens covered."""
     names = captures.session.captures("dark")
     found = dark_level([captures.shot("dark", name) for name in names])
     figures = {
@@ -29,16 +25,19 @@ def dark(captures: Captures) -> Outcome:
         "hot_pixels": float(found.hot_pixels),
     }
     problems = []
-    if max(found.level) > DARK_MAX:
-        problems.append(f"the camera is not dark: {max(found.level):.1%} of full scale; lower its black level")
-    if found.hot_pixels > HOT_MAX:
+    if max(found.level) > SESSION_DARK_MAX:
+        problems.append(
+            f"the dark level is {max(found.level):.1%} of full scale; cover the lens, or lower the black level of the "
+            "camera"
+        )
+    if found.hot_pixels > HOT_PIXELS_MAX:
         problems.append(f"{found.hot_pixels} hot pixels; let the camera cool, or shorten the exposure")
     good = f"dark at {figures['level_percent']:.2f} % of full scale, noise {figures['noise_percent']:.2f} %"
     return Outcome(record("dark", names, figures, problems, good), {"dark": found.level}, {"dark": found})
 
 
 def levels(captures: Captures, dark_row: tuple[float, ...]) -> Outcome:
-    """Responses of camera and projectors and the crosstalk between channels, from evenly lit shots."""
+    """Fit the responses of camera and projectors and the crosstalk between channels, from evenly lit shots."""
     plan = captures.session.level_plan
     seen = np.array([mean_levels(captures.shot("levels", name)) for name in plan.names])
     found = fit_channels(plan, seen, dark_row)
@@ -46,13 +45,14 @@ def levels(captures: Captures, dark_row: tuple[float, ...]) -> Outcome:
     problems = []
     if figures["stray_after_percent"] > LEFT_MAX_PERCENT:
         problems.append(
-            f"channels still see {figures['stray_after_percent']:.2f} % of one another's light; hold board and room "
-            "light still while the levels are taken, and take them again"
+            f"channels still see {figures['stray_after_percent']:.2f} % of the light of other channels; keep the board "
+            "and the room light constant, and take the levels again"
         )
     if figures["level_rms_after_percent"] > LEFT_MAX_PERCENT:
         problems.append(
-            f"levels still err by {figures['level_rms_after_percent']:.2f} % of full scale; the light may not be "
-            "steady, or the projector bends otherwise than by a power: switch its gamma table off"
+            f"levels still err by {figures['level_rms_after_percent']:.2f} % of full scale; keep the light constant, "
+            "and "
+            "switch off the gamma table of the projector, whose response is otherwise no power law"
         )
     before, after = figures["level_rms_before_percent"], figures["level_rms_after_percent"]
     good = (
@@ -64,14 +64,16 @@ def levels(captures: Captures, dark_row: tuple[float, ...]) -> Outcome:
 
 
 def flat(captures: Captures, dark_row: tuple[float, ...]) -> Outcome:
-    """How evenly the camera sees even light; decoding does not need it, a look at the lens does."""
+    """Measure the flat field of the camera; decoding does not need it, but it shows faults of lens and chip."""
     names = captures.session.captures("flat")
     found = flat_field([captures.shot("flat", name) for name in names], dark_row)
     figures = found.figures
     problems = []
     if figures["uneven_after_percent"] > UNEVEN_MAX_PERCENT:
         problems.append(
-            f"light is uneven by {figures['uneven_after_percent']:.1f} % even after correction: it flickers"
+            f"the light is uneven by {figures['uneven_after_percent']:.1f} % after correction, so it flickers; use "
+            "light that "
+            "does not, or an exposure of whole periods"
         )
     before, after = figures["uneven_before_percent"], figures["uneven_after_percent"]
     good = (

@@ -1,4 +1,4 @@
-"""What a step of the guided calibration gives: its part of the calibration, its record, and what to draw."""
+"""The outcome of a step of the guided calibration: calibration fields, record, and data for its picture."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ __all__ = ["Outcome", "record"]
 
 @dataclass(frozen=True)
 class Outcome:
-    """Fields of the `Calibration` that a step gives, its record, and the records that its pictures are drawn from."""
+    """The record of a step, the `Calibration` fields that it determines, and the data for its picture."""
 
     step: CalibrationStep
     fields: Mapping[str, Any] = field(default_factory=dict)
@@ -28,7 +28,7 @@ def record(
     good: str,
     settings: Mapping[str, Any] | None = None,
 ) -> CalibrationStep:
-    """Give the record of a step: good with the words for it, or not good with its problems."""
+    """Make the record of a step: good with the text `good`, or not good with its problems."""
     rounded = {name: float(f"{value:.6g}") for name, value in figures.items()}
     verdict = "; ".join(problems) if problems else good
     return CalibrationStep(

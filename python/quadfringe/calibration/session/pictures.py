@@ -1,4 +1,4 @@
-"""The pictures of a guided calibration: levels before and after, coverage and residuals, heights, acceptance."""
+"""Pictures of a guided calibration: level errors before and after, coverage and residuals, heights, acceptance."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from quadfringe.files import atomic, folder_for
 __all__ = ["write_pictures"]
 
 COLOURS = ("tab:red", "tab:green", "tab:blue", "tab:gray")
-ARROW = 0.1  # greatest length of an arrow, share of the width of the image
+ARROW = 0.1  # largest length of a residual arrow, share of the image width
 
 
 def write_pictures(folder: Path, guided: Guided) -> list[Path]:
-    """Write one PNG for each step that has something to show; needs matplotlib (extra `plot`)."""
+    """Write one PNG for each step that has a picture; return the paths. Needs matplotlib (extra `plot`)."""
     require("matplotlib", "plot")
     folder_for(folder)
     drawers: dict[str, Callable[[Any, Outcome], None]] = {
@@ -81,7 +81,7 @@ def _registration(figure: Any, outcome: Outcome) -> None:
     left.hist(away, bins=40, color="tab:purple")
     left.set(xlabel="distance after registration, px", ylabel="points")
     right.plot(*found.residuals_px.T, ".", ms=2, color="tab:purple")
-    right.set(xlabel="x, px", ylabel="y, px", title="what is left", aspect="equal")
+    right.set(xlabel="x, px", ylabel="y, px", title="residuals", aspect="equal")
 
 
 def _poses(figure: Any, outcome: Outcome) -> None:
@@ -117,5 +117,5 @@ def _planes(figure: Any, outcome: Outcome) -> None:
     left.set(xlabel="height of the plane, mm", ylabel="polynomial minus triangulation, mm")
     worst = int(np.argmax(np.abs(found.heights_mm)))
     drawn = right.imshow(polynomial[worst] - triangulated[worst], cmap="coolwarm", vmin=-0.1, vmax=0.1)
-    right.set_title(f"the same at {found.heights_mm[worst]:g} mm", fontsize=10)
+    right.set_title(f"difference at {found.heights_mm[worst]:g} mm", fontsize=10)
     figure.colorbar(drawn, ax=right, shrink=0.8, label="mm")

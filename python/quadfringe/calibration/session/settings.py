@@ -1,4 +1,4 @@
-"""What a calibration session consists of: its settings, and every capture by name.
+"""A calibration session: its settings, its steps, and the name of every capture.
 
 A session is a folder with `session.json` and one folder for each capture, such as `levels/r050_g000_b000_ir000_e100`
 with red.png, green.png, blue.png and ir.png, as `quadfringe calibrate plan` lists them.
@@ -28,7 +28,7 @@ FILE = "session.json"
 
 @dataclass(frozen=True)
 class Step:
-    """One step of a session: what it is for, what a person has to do, and whether a calibration needs it."""
+    """One step of a session: name, title, instructions for a person, and whether a calibration needs it."""
 
     name: str
     title: str
@@ -46,35 +46,35 @@ STEPS = (
     Step(
         "levels",
         "responses and crosstalk",
-        "Put a white, matt board where you will measure, so that it fills the middle of the image. Show each channel "
-        "evenly lit at the level in the name (per cent of red, green, blue, infrared), with the exposure e of it.",
+        "Put a white, matt board where you will measure, so that it fills the middle of the image. Project uniform "
+        "light at the levels in the name (per cent of red, green, blue, infrared), with the exposure e (per cent).",
         True,
     ),
     Step(
         "flat",
         "flat field",
-        "Leave the white board, turn the lens out of focus, and light all channels evenly to about half of full scale.",
+        "Leave the white board, defocus the lens, and light all channels uniformly to about half of full scale.",
         False,
     ),
     Step(
         "poses",
         "camera, projectors and their poses",
-        "Put the calibration board into the light of both projectors. Keep it still while every fringe image of a pose "
-        "is taken: one projector shows it, the other is black. Tilt it to all four sides by 20 to 40 degrees, put it "
-        "nearer and farther, and into the corners of the image.",
+        "Hold the calibration board in the light of both projectors, and keep it still during all fringe images of a "
+        "pose; one projector shows them while the other is black. Tilt it to all four sides by 20 to 40 degrees, move "
+        "it nearer and farther, and into the corners of the image.",
         True,
     ),
     Step(
         "planes",
         "height from phase",
-        "Put the white board on a stage, facing the camera, at the heights in the names (mm, towards the camera), and "
-        "take one shot with the measuring fringes at each.",
+        "Mount the white board on a stage, facing the camera. Move it to the heights in the names (mm, towards the "
+        "camera), and take one shot of the measuring fringes at each.",
         False,
     ),
     Step(
         "acceptance",
         "acceptance",
-        "Measure the plane, the sphere and the steps with the measuring fringes: plane_1, sphere_1, steps_1.",
+        "Take one shot of the measuring fringes on the plane, the sphere and the steps: plane_1, sphere_1, steps_1.",
         False,
     ),
 )
@@ -83,7 +83,7 @@ STEP_NAMES = tuple(step.name for step in STEPS)
 
 
 def step_named(name: str) -> Step:
-    """Give a step; `InputError` that lists them all when there is none of that name."""
+    """Return a step by name; raises `InputError` listing all steps for an unknown name."""
     for step in STEPS:
         if step.name == name:
             return step
@@ -91,10 +91,10 @@ def step_named(name: str) -> Step:
 
 
 class Session(Stored):
-    """Settings of a session; what is absent is that of the published bench.
+    """Settings of a session; the defaults are those of the published bench.
 
-    `rig` names the bench, and a session whose captures come from another one is refused. `distance_mm` is how far the
-    board of the first pose stood from the camera, roughly. `bits` are those in use in 16-bit files.
+    `rig` is the name of the bench. `distance_mm` is the approximate distance of the first board from the camera, the
+    only check of its size. `bits` are the significant bits of 16-bit files.
     """
 
     schema_version: Literal[1] = 1
@@ -118,7 +118,7 @@ class Session(Stored):
 
     @property
     def level_plan(self) -> LevelPlan:
-        """The evenly lit captures."""
+        """The captures under uniform light."""
         return level_plan(self.level_steps)
 
     @property
@@ -128,11 +128,11 @@ class Session(Stored):
 
     @property
     def beams(self) -> tuple[str, ...]:
-        """Projectors that are calibrated."""
+        """The projectors to calibrate."""
         return BEAMS if self.infrared else BEAMS[:1]
 
     def captures(self, step: str) -> tuple[str, ...]:
-        """Give the names of the captures of a step, in the order in which they are taken; a pose counts as one."""
+        """Return the names of the captures of a step in the order of taking them; a pose is one capture."""
         names = {
             "dark": tuple(_numbered(self.dark_shots)),
             "levels": self.level_plan.names,
@@ -144,7 +144,7 @@ class Session(Stored):
         return names[step_named(step).name]
 
     def pose_images(self) -> tuple[str, ...]:
-        """Give the names of the images of one pose, such as visible/columns_36_0."""
+        """Return the names of the images of one pose, such as visible/columns_36_0."""
         numbers = self.fringes.numbers
         return tuple(
             f"{beam}/{axis}_{number:g}_{step}"

@@ -1,4 +1,4 @@
-"""The captures of a session on the virtual bench: the whole guided calibration without hardware."""
+"""Captures of a session rendered by the virtual bench: the guided calibration without hardware."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ from quadfringe.io.images import write_image
 
 __all__ = ["VirtualCaptures", "virtual_session"]
 
-BOARD_MM = 800.0  # where the white board stands
-LEVEL = (0.0, 0.0, -1.0)
-TILTED = (0.2588, 0.0, -0.9659)  # normal of the plane of the acceptance test
+BOARD_MM = 800.0  # depth of the white board: the reference plane of the published bench
+LEVEL = (0.0, 0.0, -1.0)  # normal of a plane that faces the camera
+TILTED = (0.2588, 0.0, -0.9659)  # normal of the plane of the acceptance test, tilted by 15 degrees
 
 
 def virtual_session(config: SystemConfig, poses: int = 12) -> Session:
-    """Give the session of a virtual bench."""
+    """Return the session settings of a virtual bench."""
     bench = VirtualBench(config).resolved(config)
     assert bench.projector is not None
     size = (bench.projector.width_px, bench.projector.height_px)
@@ -40,14 +40,14 @@ def virtual_session(config: SystemConfig, poses: int = 12) -> Session:
 
 
 class VirtualCaptures:
-    """Renders every capture when it is asked for; the same name is the same image, noise included.
+    """Renders each capture on demand; the same name always gives the same image, noise included.
 
-    The bench of `config` gives devices, light and camera; what stands on it is put there as the step asks.
+    `config` describes devices, light and camera; each step puts its object in front of the camera.
     """
 
     def __init__(self, config: SystemConfig, session: Session | None = None) -> None:
         if config.scene.bayer is not None and config.scene.demosaic is None:
-            raise InputError("scene.bayer: the rehearsal of a calibration takes whole planes; set scene.demosaic")
+            raise InputError("scene.bayer: a rehearsed calibration needs full colour planes; set scene.demosaic too")
         bits = None if config.scene.bit_depth == 8 else config.scene.bit_depth
         self.session = (session or virtual_session(config)).model_copy(update={"bits": bits})
         self._config = config
@@ -59,7 +59,7 @@ class VirtualCaptures:
         self._board = PrintedBoard(raster(target, TEXEL_MM), TEXEL_MM, target.area_mm, PAPER, INK)
 
     def missing(self, step: str) -> list[str]:
-        """Nothing is ever missing on a bench that renders."""
+        """Return no names: every capture can be rendered."""
         self.session.captures(step)
         return []
 
@@ -70,12 +70,12 @@ class VirtualCaptures:
         return self._bench.expose(seed=seed, exposure=exposure)
 
     def pose(self, name: str) -> dict[str, ProjectorMap]:
-        """Render the fringes of one pose of the board, and decode them as those of a folder are."""
+        """Render the fringe images of one pose of the board, and decode them like those of a folder."""
         self._place(self._bench, "poses", name)
         return pose_maps(self.session, lambda image: np.asarray(self._fringes(image) / self._full_scale, np.float32))
 
     def write(self, folder: Path, steps: Iterable[str] = STEP_NAMES) -> list[Path]:
-        """Write session.json and the captures of these steps as a camera would; returns the folders of captures."""
+        """Write session.json and the captures of these steps as image files; return the folders of the captures."""
         self.session.save(folder_for(folder) / FILE)
         written = []
         for step in steps:
@@ -96,7 +96,7 @@ class VirtualCaptures:
             write_image(folder / f"{image}.png", self._fringes(image))
 
     def _fringes(self, image: str) -> NDArray[Any]:
-        """Render one fringe image of the pose that stands there; the green channel stands for the visible ones."""
+        """Render one fringe image of the current pose; the green channel represents the visible ones."""
         light = pose_light(self.session, image)
         beam = light.beam
         shot = self._bench.expose_step(light.number, light.shift_rad, light.axis, beam)
@@ -107,14 +107,14 @@ class VirtualCaptures:
         return float(2**self._config.scene.bit_depth - 1)
 
     def _arrange(self, step: str, name: str) -> float:
-        """Put the right thing under the right light, and give the relative exposure."""
+        """Set up object and light of a capture; return its relative exposure."""
         self._place(self._bench, step, name)
         light, exposure = light_of(self.session, step, name)
         VirtualProjector(self._bench).show(light)
         return exposure
 
     def _place(self, bench: VirtualBench, step: str, name: str) -> None:
-        """Put what a capture is of before a bench."""
+        """Put the object of a capture in front of the camera of a bench."""
         bench.capped = step == "dark"
         if step == "poses":
             bench.place(self._board, self._poses[name])
@@ -127,6 +127,6 @@ class VirtualCaptures:
             bench.place_plane((0.0, 0.0, BOARD_MM - height_mm), LEVEL)
 
     def hands(self, step: str, name: str, camera: Camera) -> None:
-        """Be the person of `take_captures` on a virtual bench."""
+        """Place the objects for `take_captures` on a virtual bench, in place of a person."""
         assert isinstance(camera, VirtualCamera)
         self._place(camera.bench, step, name)
