@@ -163,7 +163,7 @@ def test_what_is_missing_is_said_and_nothing_written(folder: Path, tmp_path: Pat
 
 def test_folders_at_fault_are_explained(folder: Path, tmp_path: Path) -> None:
     out = ("--out", tmp_path / "c.json")
-    assert "no session.json; make it" in run("run", "--captures", tmp_path, *out).stderr
+    assert "no session.json; create it" in run("run", "--captures", tmp_path, *out).stderr
     other = run("run", "--captures", folder, "--rig", "bench 2", *out)
     assert (other.exit_code, "captures of 'virtual bench', not of 'bench 2'" in other.stderr) == (2, True)
     mixed = tmp_path / "mixed"
@@ -171,7 +171,7 @@ def test_folders_at_fault_are_explained(folder: Path, tmp_path: Path) -> None:
     for name in ("red", "green", "blue", "ir"):
         write_image(mixed / "dark" / "02" / f"{name}.png", np.zeros((10, 12), np.uint8))
     refused = run("run", "--captures", mixed, *out)
-    assert (refused.exit_code, "12 x 10 pixels, the captures before have 512 x 384" in refused.stderr) == (2, True)
+    assert (refused.exit_code, "12 x 10 pixels, the captures before it have 512 x 384" in refused.stderr) == (2, True)
     (mixed / "levels" / "r000_g000_b000_ir000_e100" / "ir.png").unlink()
     shutil.rmtree(mixed / "dark")
     lacking = run("run", "--captures", mixed, *out)
@@ -230,7 +230,7 @@ def test_a_pose_is_taken_until_the_board_is_seen_and_the_rest_later(tmp_path: Pa
     with pytest.raises(KeyboardInterrupt):
         take_captures(CONFIG, folder, person, ("poses",), said.append)
     assert asked == ["01", "01", "02"]
-    assert "the board is not found" in said[1]
+    assert "the board was not found" in said[1]
     seen = FolderCaptures(folder)
     assert seen.missing("poses") == ["02", "03", "04"]
     for beam, expected in bench.pose("01").items():
@@ -258,9 +258,9 @@ def test_what_a_system_cannot_show_or_expose_is_said() -> None:
     assert isinstance(shorter, AravisConfig)
     assert shorter.exposure_us == 2000
     assert exposed(SystemConfig(capture=AravisConfig()), 1.0).capture == AravisConfig()
-    with pytest.raises(ConfigError, match=r"capture\.exposure_us: state it"):
+    with pytest.raises(ConfigError, match=r"capture\.exposure_us: missing; set it"):
         exposed(SystemConfig(capture=AravisConfig()), 0.25)
-    with pytest.raises(ConfigError, match="a recording cannot be put under other light"):
+    with pytest.raises(ConfigError, match="a recording cannot be taken again under other light"):
         exposed(SystemConfig(capture=ReplayConfig(file=Path("take.h5"))), 1.0)
     with pytest.raises(ConfigError, match="name them under"):
         ExternalLight().show(Levels((0.0,) * 4))
