@@ -103,7 +103,7 @@ def main() -> None:
         "numpy_float32": numpy_contender(shot, calibration, np.float32),
         "numpy_float64": numpy_contender(shot, calibration, np.float64),
     }
-    for method in ("published", "best"):
+    for method in ("published", "joint"):
         for threads in (1, 2):
             contenders[f"{method}_{threads}_threads"] = product_contender(
                 shot, config, calibration, method=method, threads=threads

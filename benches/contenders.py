@@ -88,7 +88,7 @@ def timed(run: Callable[[], object]) -> Callable[[], float]:
 
 def product(bench: Bench) -> list[Contender]:
     found = []
-    for method in ("published", "best"):
+    for method in ("published", "joint"):
         for threads in sorted({1, usable_cores()}):
             run = product_contender(bench.shot, bench.config, bench.calibration, method=method, threads=threads)
             name = f"{method}_{threads}_threads"
@@ -141,7 +141,7 @@ def floor(stack: ExitStack) -> list[Contender]:
     found = []
     for threads in sorted({1, usable_cores()}):
         process = stack.enter_context(FloorProcess(program, threads))
-        for name, gives in (("floor", "bytes"), ("published", "X, Y, Z"), ("best", "X, Y, Z")):
+        for name, gives in (("floor", "bytes"), ("published", "X, Y, Z"), ("joint", "X, Y, Z")):
             label = f"{'floor' if name == 'floor' else f'kernel_{name}'}_{threads}_threads"
             found.append(Contender(label, ONE_SHOT, gives, threads, lambda p=process, n=name: p.time_ms(n)))
     return found

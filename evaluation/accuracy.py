@@ -36,7 +36,7 @@ from quadfringe.evaluation.efficiency import Images, efficiency
 from quadfringe.evaluation.machine import described
 from quadfringe.evaluation.reproduce import WIDTH_PX, inside
 
-METHODS = ("published", "best")
+METHODS = ("published", "joint")
 NOISE = 0.03
 SEEDS = (1, 2, 3)
 FRINGE_PX = 28

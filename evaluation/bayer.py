@@ -27,7 +27,7 @@ from quadfringe.evaluation import scoring
 
 SURFACES = ("steps", "face", "peaks")
 NOISES = (0.0, 0.03)
-METHODS = ("best", "published")
+METHODS = ("joint", "published")
 WAYS: dict[str, dict[str, str]] = {
     "full": {},
     "mosaic": {"bayer": "rggb"},

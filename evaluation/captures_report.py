@@ -61,7 +61,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--data", type=Path, default=scenes.data_folder())
     parser.add_argument("--json", type=Path, help="write the figures here")
-    parser.add_argument("--method", choices=["published", "best"])
+    parser.add_argument("--method", choices=["published", "joint"])
     options = parser.parse_args()
     settings = {} if options.method is None else {"method": options.method}
     scores = capture_scores(options.data, settings) | render_scores(options.data, settings)

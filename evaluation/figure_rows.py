@@ -87,7 +87,7 @@ PAIR_CORRECTION = (
     ("infrared_after_rms_rad_row130", "the same with a pre-deformed image, rad (published 0.031)", "pair.rms_rad"),
     ("infrared_after_rms_rad", "the same over the field, rad", "pair.rms_rad"),
     ("after_rms_rad", "unwrapped phase against one projector, published method, rad", "pair.rms_rad"),
-    ("after_best_rms_rad", "unwrapped phase against one projector, best method, rad", "pair.rms_rad"),
+    ("after_joint_rms_rad", "unwrapped phase against one projector, joint method, rad", "pair.rms_rad"),
     ("after_wrong_order_percent", "wrong orders after the correction, %", "pair.wrong_order_percent"),
 )
 PAIR_DEPTH = tuple(
@@ -159,11 +159,11 @@ BAYER = (
     ("peaks_noise_0_percent_published_full_phase_rms_rad", "peaks, published method, all colours: phase RMS, rad", ""),
     ("peaks_noise_0_percent_published_mosaic_phase_rms_rad", "the same from a raw mosaic, rad", ""),
     ("peaks_noise_0_percent_published_bilinear_phase_rms_rad", "the same from bilinear planes, rad", ""),
-    ("face_noise_3_percent_best_full_phase_rms_rad", "face, 3 % noise, all colours: phase RMS, rad", ""),
-    ("face_noise_3_percent_best_mosaic_phase_rms_rad", "the same from a raw mosaic, rad", ""),
-    ("face_noise_3_percent_best_bilinear_phase_rms_rad", "the same from bilinear planes, rad", ""),
-    ("steps_noise_3_percent_best_mosaic_wrong_pixels", "steps, 3 % noise, raw mosaic: wrong orders, lit pixels", ""),
-    ("steps_noise_3_percent_best_mosaic_returned_percent", "the same: lit pixels returned, %", ""),
+    ("face_noise_3_percent_joint_full_phase_rms_rad", "face, 3 % noise, all colours: phase RMS, rad", ""),
+    ("face_noise_3_percent_joint_mosaic_phase_rms_rad", "the same from a raw mosaic, rad", ""),
+    ("face_noise_3_percent_joint_bilinear_phase_rms_rad", "the same from bilinear planes, rad", ""),
+    ("steps_noise_3_percent_joint_mosaic_wrong_pixels", "steps, 3 % noise, raw mosaic: wrong orders, lit pixels", ""),
+    ("steps_noise_3_percent_joint_mosaic_returned_percent", "the same: lit pixels returned, %", ""),
 )
 CALIBRATION = (
     ("ring_centre_rms_px", "centres of rings, RMS, px", "calibration.ring_centre_rms_px"),
@@ -191,20 +191,20 @@ ACCEPTANCE = (
     ("steps_1_50mm_error_mm", "the same: step of 50 mm, mm", "acceptance.step_mm"),
 )
 PRINTS = (
-    ("best_peaks_phase_rms_all_rad", "peaks, 3 % noise, white: phase RMS, rad", "textures.white_rms_rad"),
-    ("best_peaks_shades_phase_rms_all_rad", "the same with coloured shades, rad", "textures.shades_rms_rad"),
+    ("joint_peaks_phase_rms_all_rad", "peaks, 3 % noise, white: phase RMS, rad", "textures.white_rms_rad"),
+    ("joint_peaks_shades_phase_rms_all_rad", "the same with coloured shades, rad", "textures.shades_rms_rad"),
     (
-        "best_peaks_patches_phase_rms_all_rad",
+        "joint_peaks_patches_phase_rms_all_rad",
         "the same with coloured squares of 20 mm, rad",
         "textures.patches_rms_rad",
     ),
-    ("best_peaks_patches_phase_median_rad", "the same, median, rad", "textures.patches_median_rad"),
+    ("joint_peaks_patches_phase_median_rad", "the same, median, rad", "textures.patches_median_rad"),
     (
-        "best_peaks_printed_phase_rms_all_rad",
+        "joint_peaks_printed_phase_rms_all_rad",
         "the same with shades and sharp random colours, rad",
         "textures.printed_rms_rad",
     ),
-    ("best_peaks_printed_phase_median_rad", "the same, median, rad", "textures.printed_median_rad"),
+    ("joint_peaks_printed_phase_median_rad", "the same, median, rad", "textures.printed_median_rad"),
 )
 SPEED = (
     ("numpy_float64_ms", "published chain in plain NumPy, float64, 1024 x 768, u8 to X, Y, Z, ms", ""),
@@ -212,7 +212,7 @@ SPEED = (
     ("published_2_threads_ms", "published method, 2 threads, same run, ms", ""),
     ("published_2_threads_times_numpy_float64", "published method: times as fast as NumPy in float64", "35"),
     ("published_2_threads_times_numpy_float32", "published method: times as fast as NumPy in float32", "35"),
-    ("best_2_threads_ms", "best method, 2 threads, same run, ms", ""),
+    ("joint_2_threads_ms", "joint method, 2 threads, same run, ms", ""),
 )
 CAMERA = (
     ("wire_lost_shots", "two cameras on loopback GigE Vision at 30 fps, 60 s: shots lost of 1800", "0"),

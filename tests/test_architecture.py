@@ -51,6 +51,29 @@ def test_folders_do_not_import_each_other(path: Path) -> None:
     assert not list(path_changes(tree)), "sys.path is not changed by hand"
 
 
+def asserted_times(tree: ast.AST) -> Iterator[int]:
+    """Give the lines of assertions that a duration is short: they would fail on a machine with other load."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Assert):
+            for compared in (part for part in ast.walk(node.test) if isinstance(part, ast.Compare)):
+                short = isinstance(compared.ops[0], ast.Lt | ast.LtE) and isinstance(compared.left, ast.BinOp)
+                if short and any(
+                    clock in ast.unparse(compared.left) for clock in ("monotonic", "perf_counter", "time.time")
+                ):
+                    yield compared.lineno
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "tests").rglob("*.py")), ids=lambda path: path.name)
+def test_no_test_depends_on_speed(path: Path) -> None:
+    assert not list(asserted_times(ast.parse(path.read_text()))), "speed is measured in benches/"
+
+
+def test_planted_times_are_found() -> None:
+    assert list(asserted_times(ast.parse("assert time.monotonic() - start < 2.0"))) == [1]
+    assert list(asserted_times(ast.parse("assert time.monotonic() - start > 0.4"))) == []
+    assert list(asserted_times(ast.parse("assert time.monotonic() < deadline"))) == []
+
+
 def test_planted_imports_are_found() -> None:
     assert foreign("tests", ast.parse("import peers")) == {"peers"}
     assert foreign("benches", ast.parse("from support.sizes import line_count")) == {"support"}

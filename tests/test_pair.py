@@ -109,7 +109,7 @@ def test_the_corrected_pair_is_as_good_as_one_projector(correction: Figures) -> 
     hold("pair.deviated_rms_rad", correction["before_rms_rad"])
     hold("pair.deviated_wrong_order_percent", correction["before_wrong_order_percent"])
     hold("pair.wrong_order_percent", correction["after_wrong_order_percent"])
-    for kind in ("after_rms_rad", "after_best_rms_rad", "infrared_after_rms_rad"):
+    for kind in ("after_rms_rad", "after_joint_rms_rad", "infrared_after_rms_rad"):
         hold("pair.rms_rad", [correction[kind], correction[f"{kind}_row130"]])
 
 

@@ -6,7 +6,7 @@
 //!
 //! ```text
 //! cargo bench -p quadfringe --bench floor                medians of 30 rounds in ms, as JSON
-//! cargo bench -p quadfringe --bench floor -- --serve     a line `floor`, `published` or `best` in, its time in ms out
+//! cargo bench -p quadfringe --bench floor -- --serve     a line `floor`, `published` or `joint` in, its time in ms out
 //! RAYON_NUM_THREADS=1 cargo bench ...                    one thread
 //! ```
 
@@ -30,7 +30,7 @@ const ROUNDS: usize = 30;
 /// Systems take some time to give threads that slept a core each.
 const WARM: Duration = Duration::from_millis(100);
 const FLOATS_PER_PIXEL: usize = 8;
-const NAMES: [&str; 3] = ["floor", "published", "best"];
+const NAMES: [&str; 3] = ["floor", "published", "joint"];
 
 /// Row transforms and output bytes, without any decoding between them.
 struct Floor {

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 Record = dict[str, Any]
-METHODS = ("published", "best")
+METHODS = ("published", "joint")
 
 
 def measured(*command: str) -> Record:

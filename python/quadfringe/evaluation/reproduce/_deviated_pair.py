@@ -36,7 +36,7 @@ __all__ = [
 
 Map = NDArray[np.float32]
 Vector3 = tuple[float, float, float]
-Method = Literal["published", "best"]
+Method = Literal["published", "joint"]
 Unwrapping = Literal["coaxial", "pair"]
 
 FRINGES = Fringes()

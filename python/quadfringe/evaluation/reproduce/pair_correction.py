@@ -66,8 +66,8 @@ def pair_correction(
     for name in CASES[1:]:
         off = errors[name] - errors["single"]
         figures[f"{name}_rms_rad"], figures[f"{name}_rms_rad_row{ROW}"] = rms(off), rms(off[row])
-    off = decoded(shots["after"], "best") - decoded(shots["single"], "best")
-    figures["after_best_rms_rad"], figures[f"after_best_rms_rad_row{ROW}"] = rms(off), rms(off[row])
+    off = decoded(shots["after"], "joint") - decoded(shots["single"], "joint")
+    figures["after_joint_rms_rad"], figures[f"after_joint_rms_rad_row{ROW}"] = rms(off), rms(off[row])
     infrared = {name: shots[name].apart_rad if name == "before" else infrared_error_rad(shots[name]) for name in CASES}
     for name in CASES:
         figures[f"infrared_{name}_rms_rad"] = rms(infrared[name])
