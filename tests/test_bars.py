@@ -119,8 +119,10 @@ def test_kernel_bars_are_found() -> None:
             share > 0.96 && found.lit > 7,
             "{share}"
         );
+    hold_shares(Method::Joint, &["face"], [0.06, 0.1], [0.04, 0.02]);
     """
     expected = ["found.phase_rms_rad < 0.005", "found.wrong_share() <= 2e-3", "share > 0.96 && found.lit > 7"]
+    expected.append('hold_shares(Method::Joint, &["face"], [0.06, 0.1], [0.04, 0.02])')
     assert list(rust_bars(source)) == expected
 
 

@@ -10,6 +10,7 @@ ROUNDING = 1e-3  # smaller limits are tolerances of arithmetic, not accuracy bar
 ACCURACY = re.compile(r"(_rad|_percent|_mm|_px|_deg)\b|rms|median|exponent|uncertain|share|error|wrong|returned")
 TOLERANCES = {"abs", "rel", "atol", "rtol"}
 RUST_ASSERT = re.compile(r"\b(?:prop_)?assert!\((.*?)(?:,\s*\"|\);)", re.DOTALL)
+RUST_HOLD = re.compile(r"^    (hold_\w+\(.*?\));", re.DOTALL | re.MULTILINE)  # a helper with the limits as arguments
 RUST_LIMIT = re.compile(r"[<>]=? ?[^<>=&|;]*?\b\d[\d_]*(?:\.\d+)?(?:e-?\d+)?")
 
 
@@ -87,6 +88,7 @@ def rust_bars(source: str) -> Iterator[str]:
         limit = RUST_LIMIT.search(condition)
         if limit and ACCURACY.search(condition) and _largest(limit[0]) >= ROUNDING:
             yield condition
+    yield from (" ".join(found[1].split()) for found in RUST_HOLD.finditer(source))
 
 
 def _largest(text: str) -> float:
