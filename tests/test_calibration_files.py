@@ -85,7 +85,10 @@ def test_opencv_projects_as_the_kernel_does(calibration: Calibration, tmp_path: 
 
 def test_foreign_files_are_explained(calibration: Calibration, tmp_path: Path) -> None:
     (tmp_path / "text.yml").write_text("no storage")
-    for name, reason in (("text.yml", "camera_matrix is missing|expected an OpenCV FileStorage"), ("none.yml", "No such file")):
+    for name, reason in (
+        ("text.yml", "camera_matrix is missing|expected an OpenCV FileStorage"),
+        ("none.yml", "No such file"),
+    ):
         with pytest.raises(InputError, match=reason):
             read_opencv(tmp_path / name)
     matrices = {

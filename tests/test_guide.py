@@ -262,7 +262,7 @@ def test_what_a_system_cannot_show_or_expose_is_said() -> None:
         exposed(SystemConfig(capture=AravisConfig()), 0.25)
     with pytest.raises(ConfigError, match="a recording cannot be taken again under other light"):
         exposed(SystemConfig(capture=ReplayConfig(file=Path("take.h5"))), 1.0)
-    with pytest.raises(ConfigError, match="name them under"):
+    with pytest.raises(ConfigError, match="name both under"):
         ExternalLight().show(Levels((0.0,) * 4))
     with pytest.raises(ValueError, match="from 0 to 1"):
         light_images(Levels((2.0, 0.0, 0.0, 0.0)), (912, 1140))

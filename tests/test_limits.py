@@ -64,7 +64,6 @@ TO_DO = {
     "crates/quadfringe/src/joint/validity/propagate.rs::settle",
     "crates/quadfringe/src/joint/validity/regrow.rs::run",
     "crates/quadfringe/src/published/mod.rs::run",
-    "python/quadfringe/devices/emulator/_registers.py::_nodes",
 }
 
 

@@ -72,7 +72,7 @@ def test_a_camera_that_vanishes(emulator: Emulator, camera: AravisCamera) -> Non
 
 def test_a_silent_camera(emulator: Emulator, camera: AravisCamera) -> None:
     emulator.order("silent", 1)
-    with pytest.raises(ShotTimeoutError, match="no shot within 1 s: it answers and sends nothing"):
+    with pytest.raises(ShotTimeoutError, match="no shot within 1 s: it answers but sends no frames"):
         camera.snap(1.0)
     emulator.order("silent", 0)
     right(camera, 10)

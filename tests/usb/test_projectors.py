@@ -57,7 +57,7 @@ def test_the_pair_shows_its_fringes(screen: Screen, system: Path) -> None:
         for one in (pair.visible, pair.infrared):
             assert one.device.status()["running"]
         assert pair.infrared.device.led_drive() == (40, 0, 0)
-        with pytest.raises(ValueError, match=r"flash image 2 has fringes 36 35 30 .*asked for 49 48 42"):
+        with pytest.raises(ValueError, match=r"flash image 2 holds fringes 36 35 30 .*not 49 48 42"):
             pair.show(Fringes(numbers=(49, 48, 42)))
         pair.pause()
         pair.start()

@@ -1,4 +1,4 @@
-"""What a system is made of: a projector that shows fringes and a camera that takes shots of them."""
+"""The devices of a system: the protocols of camera and projector, and how they are opened."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ __all__ = [
 
 Keep = Literal["latest", "all"]
 
-# Where each kind of `[capture]` is implemented: a module with `open_devices`. A recording that is played back stands
-# above the devices and is loaded by name.
+# The module with `open_devices` for each kind of `[capture]`. The replay of recordings belongs to a higher layer, so it
+# is imported by name.
 CAMERAS = {
     "virtual": "quadfringe.devices.virtual",
     "aravis": "quadfringe.devices.aravis",
@@ -39,24 +39,26 @@ CAMERAS = {
 
 
 class Projector(Protocol):
-    """Shows a composite colour image and an infrared one, at one instant: the fringes of a shot, or other light."""
+    """Shows a composite colour image and an infrared image at the same time: the fringes of a shot, or other light."""
 
     def show(self, light: Light) -> None:
-        """Project this light until told otherwise; ValueError for fringes that cannot number the field.
+        """Project this light until the next call.
 
-        Levels and single steps are what a calibration asks for; ValueError when this projector cannot show them.
+        Raises ValueError for fringe numbers that are ambiguous over the projector width, and for levels and single
+        steps, the light of a calibration, when this projector cannot show them.
         """
 
     def close(self) -> None:
-        """Release the device; closing twice is allowed."""
+        """Release the device; further calls do nothing."""
 
 
 @dataclass(frozen=True)
 class ChipStatistics:
-    """Frames of one chip: whole ones, and what became of the others.
+    """Counts of the frames of one chip.
 
-    `damaged` frames were refused: incomplete, or of another size or format than agreed; `missed` is by how much the
-    device's own numbers jumped; `unpaired` frames were whole and had no partner of the same instant.
+    `frames` arrived complete; `damaged` frames were rejected, because they were incomplete or had a wrong size or
+    format; `missed` counts gaps in the frame numbers of the device; `unpaired` frames were complete, but the other chip
+    sent none of the same instant.
     """
 
     frames: int = 0
@@ -67,7 +69,7 @@ class ChipStatistics:
 
 @dataclass(frozen=True)
 class CameraStatistics:
-    """What a camera did since it was opened: complete shots, those that nobody took in time, and frames by chip."""
+    """Counts since the camera was opened: complete shots, shots dropped because nothing took them, frames by chip."""
 
     shots: int = 0
     dropped: int = 0
@@ -75,53 +77,53 @@ class CameraStatistics:
 
     @property
     def damaged(self) -> int:
-        """Frames that were refused, of all chips."""
+        """Rejected frames of all chips."""
         return sum(chip.damaged for chip in self.chips.values())
 
     @property
     def missed(self) -> int:
-        """Frame numbers that were skipped, of all chips."""
+        """Skipped frame numbers of all chips."""
         return sum(chip.missed for chip in self.chips.values())
 
     @property
     def unpaired(self) -> int:
-        """Whole frames without a partner, of all chips."""
+        """Complete frames of all chips without a partner."""
         return sum(chip.unpaired for chip in self.chips.values())
 
 
 class Camera(Protocol):
     """Takes four channels in one exposure: as four images, or as a raw mosaic and an infrared image.
 
-    What the camera did is a `CameraError`; asked again after one, it connects anew. A closed camera is a ValueError.
+    Raises `CameraError` for faults of the camera; the next call after one reconnects. Raises ValueError when closed.
     """
 
     @property
     def name(self) -> str:
-        """Which camera this is, for people."""
+        """Name of the camera, for messages."""
 
     @property
     def paced(self) -> bool:
-        """Whether shots come at the camera's own pace; otherwise they are made when asked for, and none is lost."""
+        """Whether the camera sets the pace of the shots; otherwise shots are made on demand and none is lost."""
 
     @property
     def calibration(self) -> Calibration | None:
-        """What the camera knows of its bench; None when it knows nothing."""
+        """Calibration of the bench, if the camera knows it, as the virtual one does; otherwise None."""
 
     def snap(self, timeout_s: float | None = None) -> AnyShot:
-        """Take one shot, exposed after this call."""
+        """Take one shot that is exposed after this call; `timeout_s` overrides the longest wait of the camera, s."""
 
     def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:
-        """Take shots until `count` or until the iterator is closed; one stream at a time.
+        """Yield `count` shots, or shots until the iterator is closed; only one stream can be open.
 
-        "latest" gives the newest shot there is; "all" gives them in order out of a queue. Both drop the oldest when
-        nobody takes them in time, and count that.
+        `keep="latest"` yields the newest shot; `keep="all"` yields them in order from a queue. Both drop and count the
+        oldest shot when the shots are not taken in time.
         """
 
     def statistics(self) -> CameraStatistics:
-        """Give the counts since the camera was opened; from any thread."""
+        """Return the counts since the camera was opened; safe to call from any thread."""
 
     def close(self) -> None:
-        """Release the device; closing twice is allowed."""
+        """Release the device; further calls do nothing."""
 
     def __enter__(self) -> Self: ...
 
@@ -134,22 +136,22 @@ class Camera(Protocol):
 
 
 class ExternalLight:
-    """Fringes that somebody else shows, or that were shown when a recording was made."""
+    """A projector outside the system: its fringes are shown by other means, or were shown during a recording."""
 
     def show(self, light: Light) -> None:
-        """Trust that these fringes are there; raises `ConfigError` for the changing light of a calibration."""
+        """Do nothing for fringes; raise `ConfigError` for the light of a calibration, which nothing would show."""
         if not isinstance(light, Fringes):
             raise ConfigError(
-                "no projector of this system can show the light of a calibration: name them under [projectors]"
+                "this system has no projector to show the light of a calibration; name both under [projectors]"
             )
 
     def close(self) -> None:
-        """Nothing to release."""
+        """Do nothing."""
 
 
 @dataclass(frozen=True)
 class Devices:
-    """The devices of a system, and its settings with what the devices made of them."""
+    """The opened devices of a system, and its settings as the devices accepted them."""
 
     camera: Camera
     projector: Projector
@@ -157,16 +159,16 @@ class Devices:
 
 
 def open_devices(config: SystemConfig) -> Devices:
-    """Open camera and projector of a system; the module of the capture's kind knows how.
+    """Open camera and projector of a system, with the module for its kind of capture.
 
-    Raises `ConfigError` for devices that do not go together, OSError when one cannot be opened.
+    Raises `ConfigError` for devices that cannot be combined, and OSError when one cannot be opened.
     """
     devices: Devices = import_module(CAMERAS[config.capture.kind]).open_devices(config)
     return devices
 
 
 def open_camera(word: str) -> Camera:
-    """Open a camera alone by a word: "virtual:", "aravis:NAME" (or "aravis:" for the only one), "replay:FILE".
+    """Open a camera without a system file: "virtual:", "aravis:NAME", "aravis:" for the only camera, "replay:FILE".
 
     >>> from quadfringe.devices import open_camera
     >>> with open_camera("virtual:") as camera:
@@ -179,10 +181,10 @@ def open_camera(word: str) -> Camera:
 
 
 def open_projector(config: SystemConfig) -> Projector:
-    """Open the projectors of a system: those of its `projectors`, or of a virtual bench when there are none.
+    """Open the projectors of a system: those under `projectors`, else those of the virtual bench.
 
-    With a camera other than the virtual one, the light without `projectors` is somebody else's.
-    Raises OSError when a device cannot be opened, ValueError when it cannot do what the settings ask.
+    With a real camera and no `projectors`, the fringes are shown by other means (`ExternalLight`). Raises OSError when
+    a device cannot be opened, and ValueError when it does not support the settings.
     """
     if config.projectors is not None:
         from quadfringe.devices.lightcrafter import CoaxialPair

@@ -1,4 +1,4 @@
-"""A queue between two paces: bounded, drops its oldest item when full, and counts what it dropped."""
+"""A bounded queue between two threads that drops its oldest item when full, and counts the dropped items."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ Item = TypeVar("Item")
 
 
 class EndOfQueue(Exception):  # noqa: N818 - the end, not an error
-    """Nothing waits and nothing will come."""
+    """The queue is empty and has ended."""
 
 
 @dataclass(frozen=True)
 class QueueStatistics:
-    """How many items wait, how many were taken out, how many were dropped."""
+    """Numbers of items that wait, that were taken, and that were dropped."""
 
     waiting: int
     passed: int
@@ -27,7 +27,7 @@ class QueueStatistics:
 
 
 class DroppingQueue(Generic[Item]):
-    """Items in order from one thread to another; at most `length` wait.
+    """A queue of at most `length` items between two threads, first in, first out.
 
     >>> queue = DroppingQueue(2)
     >>> for number in range(5):
@@ -45,7 +45,7 @@ class DroppingQueue(Generic[Item]):
         self._passed = self._dropped = 0
 
     def put(self, item: Item, *, wait: bool = False) -> None:
-        """Add an item; when full, drop the oldest, or wait for room. After the end the item is ignored."""
+        """Add an item. A full queue drops its oldest item, or with `wait` blocks; an ended queue ignores the item."""
         with self._changed:
             while wait and len(self._items) >= self._length and not self._ended:
                 self._changed.wait()
@@ -58,7 +58,7 @@ class DroppingQueue(Generic[Item]):
             self._changed.notify_all()
 
     def get(self, timeout_s: float | None = None) -> Item:
-        """Take the oldest item; TimeoutError when none comes in time, and after the end its error or `EndOfQueue`."""
+        """Take the oldest item; raise TimeoutError when none arrives in time, and after the end the error of `end`."""
         deadline = None if timeout_s is None else monotonic() + timeout_s
         with self._changed:
             while not self._items:
@@ -66,7 +66,7 @@ class DroppingQueue(Generic[Item]):
                     raise self._error or EndOfQueue
                 left = None if deadline is None else deadline - monotonic()
                 if left is not None and left <= 0:
-                    raise TimeoutError(f"nothing came within {timeout_s:g} s")
+                    raise TimeoutError(f"no item arrived within {timeout_s:g} s")
                 self._changed.wait(left)
             item = self._items.popleft()
             self._passed += 1
@@ -74,7 +74,7 @@ class DroppingQueue(Generic[Item]):
             return item
 
     def end(self, error: BaseException | None = None, *, discard: bool = False) -> None:
-        """Let nothing in any more; what waits can still be taken, unless discarded. The first end counts."""
+        """Accept no more items; waiting items can still be taken unless `discard`. Only the first call counts."""
         with self._changed:
             if not self._ended:
                 self._ended, self._error = True, error
@@ -83,6 +83,6 @@ class DroppingQueue(Generic[Item]):
             self._changed.notify_all()
 
     def statistics(self) -> QueueStatistics:
-        """Give the counts, from any thread."""
+        """Return the counts; safe to call from any thread."""
         with self._changed:
             return QueueStatistics(len(self._items), self._passed, self._dropped)

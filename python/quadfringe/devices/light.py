@@ -1,4 +1,4 @@
-"""The images that projectors show."""
+"""The light that projectors show, and the images for it."""
 
 from __future__ import annotations
 
@@ -21,16 +21,17 @@ __all__ = ["Levels", "Light", "Predeformation", "Step", "light_images", "predefo
 
 @dataclass(frozen=True)
 class Levels:
-    """Even light: each channel (R, G, B, IR) at a level of its own from 0 to 1."""
+    """Uniform light, one level from 0 to 1 for each channel (R, G, B, IR)."""
 
     levels: Row4
 
 
 @dataclass(frozen=True)
 class Step:
-    """One step of an N-step capture: the same fringes in all channels of one projector, while the other is black.
+    """One step of an N-step capture: the same fringes in all channels of one projector, with the other black.
 
-    Fringes count over "columns" or "rows"; the `beam` is "visible" or "infrared", the mirrors "regular" or "diamond".
+    `number` is the fringe number along `axis`, "columns" or "rows"; `beam` is the projector, "visible" or "infrared";
+    `layout` is the mirror layout, "regular" or "diamond".
     """
 
     number: float
@@ -40,14 +41,15 @@ class Step:
     layout: str = "regular"
 
 
-Light = Fringes | Levels | Step  # of a shot, or of a calibration
+Light = Fringes | Levels | Step  # the light of a shot, or of a calibration
 
 
 @dataclass(frozen=True)
 class Predeformation:
-    """What makes up for an infrared projector that is not coaxial: both calibrated projectors and the plane (S11).
+    """Pre-deformation of the infrared pattern for projectors that are not coaxial (S11).
 
-    Exact on the plane at depth `z_mm`; where the centres of the projectors differ it drifts with depth.
+    It is exact on the plane at depth `z_mm`; when the projector centres differ, the error grows with the distance from
+    that plane.
     """
 
     visible: Device
@@ -55,20 +57,22 @@ class Predeformation:
     z_mm: float
 
     def light(self, fringe_number: float, layout: str) -> NDArray[np.float32]:
-        """Give the infrared image, (H, W), linear light from 0 to 1; mirrors that miss the plane are dark."""
+        """Return the infrared image, (H, W), linear light from 0 to 1; mirrors that do not light the plane are dark."""
         pair = (core_device(self.visible), core_device(self.infrared))
         return _core.predeform(*pair, fringe_number, z_mm=self.z_mm, layout=layout)
 
 
 def predeformation(fringes: Fringes, calibration: Calibration | None) -> Predeformation | None:
-    """Give the pre-deformation that these fringes ask for; None when they ask for none.
+    """Return the pre-deformation of these fringes; None when `predeformed_z_mm` is not set.
 
-    Raises `InputError` when they do and the calibration does not know both projectors.
+    Raises `InputError` when it is set and the calibration lacks one of the projectors.
     """
     if fringes.predeformed_z_mm is None:
         return None
     if calibration is None or calibration.infrared is None:
-        raise InputError("predeformed_z_mm needs a calibration with both projectors: one that has an `infrared` device")
+        raise InputError(
+            "predeformed_z_mm: needs a calibration of both projectors; give one that has an `infrared` device"
+        )
     return Predeformation(calibration.projector, calibration.infrared, fringes.predeformed_z_mm)
 
 
@@ -78,10 +82,10 @@ def projector_images(
     layout: str,
     deformed: Predeformation | None = None,
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Give the composite colour image (H, W, 3) and the infrared image (H, W), uint8; `size_px` is (W, H).
+    """Return the composite colour image (H, W, 3) and the infrared image (H, W), uint8; `size_px` is (W, H).
 
-    Raises ValueError when the joint range of the fringes does not cover the width, and when the projectors of a
-    pre-deformation have another size.
+    Raises ValueError when the ambiguity range of the fringe numbers does not cover the width, and when the projectors
+    of a pre-deformation have another size.
     """
     _core.check_code(fringes, size_px[0])
     red, green, blue, ir = (
@@ -91,8 +95,8 @@ def projector_images(
         for device in (deformed.visible, deformed.infrared):
             if (device.width_px, device.height_px) != size_px:
                 raise InputError(
-                    f"the calibration is for projectors of {device.width_px} x {device.height_px} mirrors, "
-                    f"the images have {size_px[0]} x {size_px[1]}"
+                    f"calibration: expected projectors of {size_px[0]} x {size_px[1]} mirrors, got {device.width_px} x "
+                    f"{device.height_px}; use the calibration of these projectors"
                 )
         ir = deformed.light(fringes[2], layout)
     return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
@@ -101,9 +105,9 @@ def projector_images(
 def light_images(
     light: Light, size_px: tuple[int, int], deformed: Predeformation | None = None
 ) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Give the colour image (H, W, 3) and the infrared image (H, W), uint8, of any light; `size_px` is (W, H).
+    """Return the colour image (H, W, 3) and the infrared image (H, W), uint8, of any light; `size_px` is (W, H).
 
-    Raises ValueError as `projector_images`, and for levels that are not from 0 to 1.
+    Raises ValueError as `projector_images`, and for levels outside 0 to 1.
 
     >>> from quadfringe.devices.light import Levels, light_images
     >>> visible, infrared = light_images(Levels((1.0, 0.0, 0.0, 0.5)), (912, 1140))
@@ -125,5 +129,5 @@ def light_images(
 
 
 def eight_bit(light: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Give linear light from 0 to 1 as the levels that a projector takes."""
+    """Quantise linear light from 0 to 1 to 8 bit."""
     return np.round(light * 255).astype(np.uint8)

@@ -1,8 +1,8 @@
-"""The projectors of a real bench: LightCrafter 4500s, by HDMI or from flash, and the coaxial pair as one projector.
+"""The projectors of a real bench: LightCrafter 4500 projectors, with patterns from HDMI or flash memory.
 
-`LightCrafter` is one projector with all its commands; `PatternProjector` shows fringes on one, whichever way they reach
-it; `CoaxialPair` is what a scanner asks for fringes. All of them are context managers. What the caller chose wrongly is
-a ValueError; what a device did is an OSError (PermissionError, TimeoutError, ConnectionError, FileNotFoundError).
+`LightCrafter` is one projector with all its commands; `PatternProjector` shows fringes on one projector by either
+route; `CoaxialPair` is the `Projector` of a scanner. All are context managers. Bad arguments raise ValueError; device
+faults raise OSError (PermissionError, TimeoutError, ConnectionError, FileNotFoundError).
 """
 
 from __future__ import annotations
@@ -43,14 +43,15 @@ __all__ = [
     "udev_rule",
 ]
 
+# Facts of the LightCrafter 4500.
 SIZE_PX = (912, 1140)  # columns and rows of the mirror array
-FLASH_DEPTH = 8
-FLASH_EXPOSURE_US = 8333  # the shortest of 8 bit
-COLOURS = ("g", "r", "b")  # in the order of the bit planes
+FLASH_DEPTH = 8  # bits of a pattern in flash memory
+FLASH_EXPOSURE_US = 8333  # shortest exposure of an 8-bit pattern
+COLOURS = ("g", "r", "b")  # LED of each group of bit planes of a 24-bit image, in their order
 
 
 class PatternProjector:
-    """One LightCrafter 4500 that shows fringes by the route of its settings; close it, or use it in a `with` block."""
+    """One LightCrafter 4500 that shows patterns from HDMI or flash; close it, or use it in a `with` block."""
 
     def __init__(self, config: ProjectorConfig, *, colour: bool) -> None:
         self.config = config
@@ -61,14 +62,14 @@ class PatternProjector:
             self.device = opened.enter_context(open_device(config))
             _set_up(self.device, config)
             if config.hdmi is not None:
-                # HDMI data would take a projector that shows patterns back to video: the window comes first.
+                # The window must exist first: HDMI data would switch a projector in pattern mode back to video mode.
                 self._window = opened.enter_context(PatternWindow(config.hdmi.output))
             self._opened = opened.pop_all()
 
     def show(self, light: Light, image: NDArray[np.uint8]) -> None:
-        """Show this light, whose image is (1140, 912) or (1140, 912, 3) uint8, until told otherwise.
+        """Show this light until the next call; `image` is its image, (1140, 912) or (1140, 912, 3) uint8.
 
-        From flash it must be the fringes that are in it: ValueError otherwise.
+        Raises ValueError when the patterns come from flash memory and it holds other fringes.
         """
         if self._window is not None:
             self._window.show(_as_colour(image))
@@ -80,11 +81,12 @@ class PatternProjector:
 
     def _check_flash(self, light: Light) -> None:
         flash = self.config.flash
-        assert flash is not None  # one of the two routes is there
+        assert flash is not None  # settings have either an HDMI or a flash route
         if flash.fringes != light:
             raise ValueError(
-                f"projector at {self.device.port}: flash image {flash.image} has fringes "
-                f"{_named(flash.fringes)}, asked for {_named(light)}; write them to flash, or use hdmi"
+                f"projector at {self.device.port}: flash image {flash.image} holds fringes {_named(flash.fringes)}, "
+                "not "
+                f"{_named(light)}; write these to flash, or use hdmi"
             )
         self.device.check_flash(flash.image + 1, flash.firmware_tag)
 
@@ -96,7 +98,7 @@ class PatternProjector:
                 self._patterns(depth), config.hdmi.frame_rate_hz, config.exposure_us or longest_us
             )
         assert config.flash is not None
-        # A grey pattern is shown for as long as the three colours of its neighbour.
+        # The grey pattern lasts as long as the three colours of the other projector together.
         default_us = FLASH_EXPOSURE_US if self._colour else len(COLOURS) * FLASH_EXPOSURE_US
         return PatternSequence.from_flash(
             config.flash.image, self._patterns(FLASH_DEPTH), config.exposure_us or default_us
@@ -108,13 +110,13 @@ class PatternProjector:
         return [Pattern(number, depth, led) for number, led in enumerate(COLOURS)]
 
     def start(self) -> None:
-        """Go on after a pause or a stop; after an error, `show` loads the patterns again."""
+        """Resume after a pause or a stop; after an error, `show` loads the patterns again."""
         playing, self._playing = self._playing, False
         self.device.start()
         self._playing = playing
 
     def pause(self) -> None:
-        """Hold the current pattern."""
+        """Freeze the current pattern."""
         self.device.pause()
 
     def stop(self) -> None:
@@ -122,12 +124,12 @@ class PatternProjector:
         self.device.stop()
 
     def release(self) -> None:
-        """Release the projector, which goes on showing what is in flash."""
+        """Release the projector without stopping it: it keeps showing the patterns in flash memory."""
         self._playing = False
         self.close()
 
     def close(self) -> None:
-        """Stop showing and release projector and window; closing twice is allowed."""
+        """Stop showing and release projector and window; further calls do nothing."""
         with self._opened:
             if self._playing:
                 self._playing = False
@@ -141,9 +143,9 @@ class PatternProjector:
 
 
 class CoaxialPair:
-    """The visible and the infrared projector as one: shows the four fringe images of a shot.
+    """The visible and the infrared projector as one `Projector`: shows the four fringe images of a shot.
 
-    Pre-deformed fringes need the calibration of both.
+    Pre-deformed fringes need the calibration of both projectors.
 
     >>> from quadfringe.devices.lightcrafter import CoaxialPair
     >>> with CoaxialPair(config.projectors) as pair:  # doctest: +SKIP
@@ -158,10 +160,10 @@ class CoaxialPair:
             self._opened = opened.pop_all()
 
     def show(self, light: Light) -> None:
-        """Show this light until told otherwise.
+        """Show this light until the next call.
 
-        ValueError for fringes that cannot number the field, are not in flash, or are pre-deformed while the calibration
-        does not know both projectors. The light of a calibration needs HDMI.
+        Raises ValueError for fringe numbers that are ambiguous over the projector, for light that is not in flash
+        memory (that of a calibration needs HDMI), and for a pre-deformation without a calibration of both projectors.
         """
         deformed = predeformation(light, self._calibration) if isinstance(light, Fringes) else None
         visible, infrared = light_images(light, SIZE_PX, deformed)
@@ -169,28 +171,28 @@ class CoaxialPair:
         self.infrared.show(light, infrared)
 
     def start(self) -> None:
-        """Go on after a pause or a stop."""
+        """Resume after a pause or a stop."""
         self.visible.start()
         self.infrared.start()
 
     def pause(self) -> None:
-        """Hold the current patterns."""
+        """Freeze the current patterns."""
         self.visible.pause()
         self.infrared.pause()
 
     def stop(self) -> None:
-        """Show nothing, also on the other one when one fails."""
+        """Show nothing; stops the second projector even when the first one fails."""
         with ExitStack() as other:
             other.callback(self.infrared.stop)
             self.visible.stop()
 
     def release(self) -> None:
-        """Release both, which go on showing what is in flash."""
+        """Release both without stopping them: they keep showing the patterns in flash memory."""
         self.visible.release()
         self.infrared.release()
 
     def close(self) -> None:
-        """Stop and release both, also when one fails; closing twice is allowed."""
+        """Stop and release both, also when one fails; further calls do nothing."""
         self._opened.close()
 
     def __enter__(self) -> Self:
@@ -201,7 +203,7 @@ class CoaxialPair:
 
 
 def open_device(config: ProjectorConfig) -> LightCrafter:
-    """Open the projector of these settings, with its light engine; nothing is sent."""
+    """Open the projector of these settings with its light engine; send it nothing."""
     return LightCrafter(
         config.port,
         light=config.light,
@@ -219,7 +221,7 @@ def _set_up(device: LightCrafter, config: ProjectorConfig) -> None:
 
 
 def _depth_and_exposure(count: int, route: HdmiRoute) -> tuple[int, int]:
-    """Give the most bits that `count` patterns in a frame may have, 8 or 7, and the exposure of each in us."""
+    """Return the depth, 8 or 7 bit, at which `count` patterns fit a frame, and the longest exposure of each, us."""
     try:
         return 8, exposure_in_frame_us(count, 8, route.frame_rate_hz)
     except ValueError:

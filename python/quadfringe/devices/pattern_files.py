@@ -1,4 +1,4 @@
-"""The images that projectors show, as files."""
+"""Write the images that projectors show to files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def write_patterns(
     layout: str,
     deformed: Predeformation | None = None,
 ) -> list[Path]:
-    """Write visible.png and infrared.png into `folder`, the latter pre-deformed or not; returns their paths."""
+    """Write visible.png and infrared.png into `folder` and return their paths; `deformed` pre-deforms the latter."""
     visible, infrared = projector_images(fringes, size_px, layout, deformed)
     folder_for(folder)
     paths = [folder / "visible.png", folder / "infrared.png"]

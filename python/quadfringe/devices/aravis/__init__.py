@@ -1,11 +1,11 @@
-"""Cameras of GenICam through Aravis: a visible and an infrared chip, exposed together, as one camera; or one chip.
+"""GenICam cameras through Aravis: a visible and an infrared chip exposed together as one camera, or one chip.
 
 >>> from quadfringe.devices import open_camera
 >>> with open_camera("aravis:AD-080GE") as camera:      # doctest: +SKIP
 ...     shot = camera.snap()
 
-Needs the extra `aravis` and the Debian packages that the error without them names. `quadfringe.devices.emulator`
-is a camera on the wire for those who have none.
+Needs the extra `aravis` and Debian packages; the error raised without them names both. `quadfringe.devices.emulator`
+emulates such a camera on the network.
 """
 
 from __future__ import annotations

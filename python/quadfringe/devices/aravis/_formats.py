@@ -1,4 +1,4 @@
-"""Pixel formats of GenICam: what the bytes of a frame are."""
+"""Pixel formats of GenICam, and the conversion of a frame's bytes to pixels."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ __all__ = ["FORMATS", "PixelFormat", "format_named"]
 
 @dataclass(frozen=True)
 class PixelFormat:
-    """A format of the naming convention: its code, bits in use, and whether two pixels share three bytes."""
+    """A format of the GenICam pixel format naming convention; `packed` formats hold two pixels in three bytes."""
 
     name: str
     code: int
@@ -27,15 +27,15 @@ class PixelFormat:
 
     @property
     def full_scale(self) -> float:
-        """The value of a full pixel."""
+        """Value of a saturated pixel."""
         return float(2**self.bits - 1)
 
     def payload(self, width: int, height: int) -> int:
-        """Give the bytes of a frame."""
+        """Return the number of bytes of a frame."""
         return width * height * (self.code >> 16 & 0xFF) // 8
 
     def pixels(self, data: NDArray[np.uint8], width: int, height: int) -> NDArray[Any]:
-        """Give the pixels (H, W), or (H, W, 3) of a colour image, uint8 or uint16; a view unless they are packed.
+        """Return the pixels (H, W), or (H, W, 3) of a colour image, uint8 or uint16; a view unless packed.
 
         >>> FORMATS["Mono12Packed"].pixels(np.array([0x12, 0x43, 0x56], np.uint8), 2, 1)
         array([[291, 1380]], dtype=uint16)
@@ -49,7 +49,7 @@ class PixelFormat:
 
 
 def _unpacked(data: NDArray[np.uint8], bits: int) -> NDArray[np.uint16]:
-    """Undo the packing of GigE Vision: high bits, low bits of the first (lower half) and the second, high bits."""
+    """Undo the packing of GigE Vision: high bits, low bits of both (first in the lower half), high bits."""
     triples = data.reshape(-1, 3)
     low = np.uint16(bits - 8)
     out = np.empty((len(triples), 2), np.uint16)
@@ -79,8 +79,8 @@ ALIASES = {"RGB8Packed": "RGB8"}
 
 
 def format_named(name: str) -> PixelFormat:
-    """Give the format of this name; raises `CameraError` that lists those that are known."""
+    """Return the format of this name; raises `CameraError` listing the supported formats."""
     known = FORMATS.get(ALIASES.get(name, name))
     if known is None:
-        raise CameraError(f"pixel format {name} is not known here; set pixel_format to one of {', '.join(FORMATS)}")
+        raise CameraError(f"pixel format {name} is not supported; set pixel_format to one of {', '.join(FORMATS)}")
     return known

@@ -1,9 +1,9 @@
-"""Which frames of two chips were exposed at the same instant, told from two clocks that know nothing of each other.
+"""Match the frames of two chips that were exposed at the same instant, from two unsynchronised device clocks.
 
-A device clock has any offset and drifts by up to 100 ppm; frame numbers start anywhere and jump. What holds is that a
-frame arrives after its exposure, later by a delay that has a minimum. So the running minimum of arrival minus device
-time maps each clock to the host's, as well as the delays are alike; that is enough to tell one exposure from the next.
-From then on pairs are told by the device clocks alone: their difference within a pair creeps, and never jumps.
+A device clock has an arbitrary offset and drifts by up to 100 ppm; frame numbers start anywhere and may jump. A frame
+arrives after its exposure with a delay that has a minimum, so the running minimum of arrival minus device time maps
+each device clock to the host clock, up to the difference of the minimal delays. That suffices to tell one exposure
+from the next. Afterwards frames are matched by the device clocks alone, whose difference drifts but never jumps.
 """
 
 from __future__ import annotations
@@ -18,22 +18,23 @@ from quadfringe.data import FrameStamp
 
 __all__ = ["Clock", "FrameMatcher", "FrameNumbers", "SingleChip", "Stamped"]
 
-WINDOW = 256  # frames that the running minimum looks back: 50 ppm make 0.4 ms of it at 30 Hz
-CALM = 8  # frames in a row that come evenly, within this share of a period: then nothing holds the host up
-EVEN = 0.25
-MANY = 32  # or so many frames, one of which came without delay
-PENDING = 64  # frames of one chip that may wait for the other
-DRIFT = 2e-4  # how fast the clocks may part while no pair is seen: twice the 100 ppm of a bad pair of crystals
-FRESH_NS = 1_000_000_000  # a difference that was not seen for so long is taken anew from the first pair
-MISSES = 8  # frames without a partner after which the difference is not believed any more
-GAIN = 0.1  # how fast the difference of the clocks is followed
-SHORT_IDS = 65535  # ids of GigE Vision without extended ids run from 1 to here, and then from 1 again
+# Checked by pytest tests/test_frame_matching.py against exposure numbers that the matcher never sees.
+WINDOW = 256  # frames of the running minimum: over them a drift of 50 ppm adds 0.4 ms at 30 Hz
+CALM = 8  # consecutive frames whose delays agree within EVEN: the host is then keeping up
+EVEN = 0.25  # share of a frame period
+MANY = 32  # frames after which one without delay is assumed among them, however unevenly they arrive
+PENDING = 64  # frames of one chip that may wait for a partner: two seconds at 30 Hz
+DRIFT = 2e-4  # relative rate at which the clocks may part while no match is seen: twice the 100 ppm of a poor crystal
+FRESH_NS = 1_000_000_000  # age, ns, above which a clock difference is replaced, not smoothed, by the next match
+MISSES = 8  # consecutive frames without a partner after which the clock difference is discarded
+GAIN = 0.1  # share by which each match corrects the clock difference: more follows drift, less averages jitter
+SHORT_IDS = 65535  # GigE Vision ids without extension run from 1 to this value and then from 1 again
 
 Item = TypeVar("Item")
 
 
 class FrameNumbers:
-    """Device ids as numbers that grow for ever, and how many were skipped.
+    """Converts device ids to numbers that never wrap around, and counts skipped ones.
 
     >>> numbers = FrameNumbers()
     >>> [numbers(id) for id in (65533, 65534, 2, 3)], numbers.missed
@@ -46,10 +47,10 @@ class FrameNumbers:
         self._number = 0
 
     def __call__(self, id: int) -> int:  # noqa: A002 - what GigE Vision calls it
-        """Give the number of the frame with this id."""
+        """Return the number of the frame with this id."""
         if self._last is not None:
             step = id - self._last if id > self._last else id - self._last + SHORT_IDS
-            # An id that goes back by little is a device that began anew, not one that skipped tens of thousands.
+            # A small step back means that the device restarted, not that it skipped tens of thousands of frames.
             step = step if 0 < step < SHORT_IDS // 2 else 1
             self.missed += step - 1
             self._number += step
@@ -58,28 +59,28 @@ class FrameNumbers:
 
 
 class Clock:
-    """One device clock on the host's: the running minimum of arrival minus device time."""
+    """Offset of one device clock to the host clock: the running minimum of arrival minus device time."""
 
     def __init__(self) -> None:
-        self._falling: deque[tuple[int, int]] = deque()  # frame and offset: those that may become the minimum
+        self._falling: deque[tuple[int, int]] = deque()  # frame number and offset of the candidates for the minimum
         self._recent: deque[int] = deque(maxlen=CALM)
         self._frames = 0
 
     @property
     def offset_ns(self) -> int:
-        """Host time minus device time, with the shortest delay of a frame in it."""
+        """Host time minus device time, plus the shortest delay of a frame."""
         return self._falling[0][1]
 
     def settled(self, period_ns: float) -> bool:
-        """Whether the minimum can be believed to a part of the period: frames came evenly, or there were many.
+        """Return whether the minimum is accurate to a fraction of the period: frames came evenly, or there were many.
 
-        A host that is held up, or catches up, sees them come unevenly, and its shortest delay may be long.
+        On a host that is delayed or catching up, frames arrive unevenly and the shortest delay may be long.
         """
         calm = len(self._recent) == CALM and max(self._recent) - min(self._recent) <= EVEN * period_ns
         return calm or self._frames >= MANY
 
     def see(self, stamp: FrameStamp) -> None:
-        """Look at one more frame."""
+        """Add the stamp of a frame."""
         offset = stamp.arrival_ns - stamp.device_ns
         self._recent.append(offset)
         while self._falling and self._falling[-1][1] >= offset:
@@ -100,22 +101,22 @@ class Stamped(Generic[Item]):
 
 
 class SingleChip(Generic[Item]):
-    """The frames of one chip as they come, numbered and counted as `FrameMatcher` does it; nothing waits."""
+    """The frames of one chip without matching, numbered and counted as by `FrameMatcher`."""
 
     def __init__(self) -> None:
         self.unpaired, self.missed = [0], [0]
         self._clock = Clock()
         self.begin()
 
-    def begin(self, *, sole: bool = False, pending: int = PENDING) -> None:  # noqa: ARG002 - there is nothing to match
-        """Start a run: ids may begin anew."""
+    def begin(self, *, sole: bool = False, pending: int = PENDING) -> None:  # noqa: ARG002 - one chip needs no matching
+        """Start a run; ids may start again."""
         self._numbers = FrameNumbers()
 
     def end(self) -> None:
-        """Nothing waits."""
+        """Do nothing: no frame waits."""
 
     def push(self, chip: int, stamp: FrameStamp, item: Item) -> list[tuple[Stamped[Item], ...]]:
-        """Take a frame and give it back."""
+        """Return the frame as a match of one."""
         before = self._numbers.missed
         number = self._numbers(stamp.id)
         self.missed[chip] += self._numbers.missed - before
@@ -129,29 +130,29 @@ class SingleChip(Generic[Item]):
 
 
 class FrameMatcher(Generic[Item]):
-    """Matches the frames of two chips that are exposed together; feed it frames in the order of their arrival.
+    """Matches the frames of two chips that are exposed together; takes frames in the order of their arrival.
 
-    Until both clocks have settled frames wait, 8 of each chip as a rule. `begin` starts a run of the camera; the clocks
-    are remembered from one run to the next.
+    Frames wait until both clocks have settled, usually after 8 frames of each chip. `begin` starts a run of the camera;
+    the clock offsets are kept from one run to the next.
     """
 
     def __init__(self, tolerance_ns: float) -> None:
         self.unpaired = [0, 0]
         self.missed = [0, 0]
         self._tolerance = tolerance_ns
-        self._believed: tuple[int, int] | None = None  # offsets of the clocks when their difference was found
-        self._difference: float | None = None  # clock of chip 0 minus that of chip 1, within a pair
-        self._agreed_at = 0  # device time of chip 0 when it was last seen
+        self._believed: tuple[int, int] | None = None  # clock offsets when their difference was determined
+        self._difference: float | None = None  # clock of chip 0 minus clock of chip 1, within a match
+        self._agreed_at = 0  # device time of chip 0 at the last match
         self._host_offset_ns = 0
-        self._period = 0  # least time between two exposures
+        self._period = 0  # shortest time between two exposures
         self._waiting: tuple[deque[Stamped[Item]], deque[Stamped[Item]]] = (deque(), deque())
         self._forget()
         self.begin()
 
     def begin(self, *, sole: bool = False, pending: int = PENDING) -> None:
-        """Start a run: ids may begin anew, and `pending` frames of a chip may wait for the other.
+        """Start a run; ids may start again, and up to `pending` frames of a chip wait for the other chip.
 
-        With `sole` the first two frames answer one trigger and are a pair, whatever the clocks say.
+        With `sole`, the first frames of both chips answer one trigger and match, whatever the clocks say.
         """
         self.end()
         self._pending = pending
@@ -159,21 +160,21 @@ class FrameMatcher(Generic[Item]):
         self._numbers = (FrameNumbers(), FrameNumbers())
 
     def end(self) -> None:
-        """Count what still waits; nothing follows."""
+        """End the run: count the waiting frames as unpaired."""
         for chip, queue in enumerate(self._waiting):
             self.unpaired[chip] += len(queue)
             queue.clear()
 
     def push(self, chip: int, stamp: FrameStamp, item: Item) -> list[tuple[Stamped[Item], Stamped[Item]]]:
-        """Take a frame of chip 0 or 1; give the pairs that are complete now, and drop what has no partner."""
+        """Take a frame of chip 0 or 1; return the complete matches, and drop frames without a partner."""
         numbers = self._numbers[chip]
         before = numbers.missed
         self._waiting[chip].append(Stamped(stamp, numbers(stamp.id), item))
         self.missed[chip] += numbers.missed - before
-        self._look_at_clock(chip, stamp)
+        self._update_clock(chip, stamp)
         while len(self._waiting[chip]) > self._pending:
             self._give_up(chip)
-        if self._difference is None and not self._agree():
+        if self._difference is None and not self._find_difference():
             return []
         return self._matches()
 
@@ -182,8 +183,8 @@ class FrameMatcher(Generic[Item]):
         """Host time minus the device time of chip 0."""
         return self._host_offset_ns
 
-    def _look_at_clock(self, chip: int, stamp: FrameStamp) -> None:
-        """Forget the difference when a delay far below those that it was found by tells that it was wrong."""
+    def _update_clock(self, chip: int, stamp: FrameStamp) -> None:
+        """Update a clock; discard the clock difference when a much shorter delay shows that it was wrong."""
         self._clocks[chip].see(stamp)
         if chip == 0:
             self._host_offset_ns = self._clocks[0].offset_ns
@@ -197,8 +198,8 @@ class FrameMatcher(Generic[Item]):
         self._misses = 0
         self._clocks = (Clock(), Clock())
 
-    def _agree(self) -> bool:
-        """Find the difference of the clocks, once both can be believed."""
+    def _find_difference(self) -> bool:
+        """Determine the clock difference once both clocks have settled; return whether it is known."""
         first, second = self._waiting
         if not (first and second):
             return False
@@ -222,7 +223,7 @@ class FrameMatcher(Generic[Item]):
             apart = first[0].stamp.device_ns - second[0].stamp.device_ns - self._difference
             since = abs(first[0].stamp.device_ns - self._agreed_at)
             if not self._sole and DRIFT * since > self._period / 4:
-                # The clocks may have parted by so much that another exposure lies nearer.
+                # The clocks may have drifted so far that another exposure is nearer.
                 self._forget()
             elif abs(apart) <= self._tolerance + DRIFT * since:
                 self._difference += apart if since > FRESH_NS else GAIN * apart
@@ -250,9 +251,9 @@ def _least_step(*streams: list[int]) -> int:
 
 
 def _difference(first: list[int], second: list[int], *, guess: float, reach: float) -> float | None:
-    """Give the difference of the clocks that two frames have and that lies nearest to `guess`, within `reach`.
+    """Return the clock difference of two frames that is nearest to `guess`, or None beyond `reach`.
 
-    Exposures are twice the reach apart at least, and delays of the chips differ by less, so that the nearest is right.
+    Exposures are at least twice the reach apart and the chip delays differ by less, so the nearest one is correct.
     """
     nearest = min((a - b for a in first for b in second), key=lambda difference: abs(difference - guess))
     return float(nearest) if abs(nearest - guess) < reach else None

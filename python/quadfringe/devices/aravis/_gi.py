@@ -1,7 +1,7 @@
-"""Aravis through GObject introspection: the only place that knows it, behind a dozen calls.
+"""The only module that calls Aravis, through GObject introspection.
 
-Two rules hold here. No Python runs in a thread of Aravis, because it would wait for the interpreter while frames
-are lost: no signals, no callbacks. And every call that can fail turns a GLib error into a `CameraError`.
+Two rules: no Python runs in a thread of Aravis (no signals, no callbacks), because that thread would wait for the
+interpreter while frames are lost; and every call that can fail turns a GLib error into a `CameraError`.
 """
 
 from __future__ import annotations
@@ -29,10 +29,9 @@ INSTALL = (
     "  apt-get install --no-install-recommends gir1.2-aravis-0.8 libgirepository1.0-dev libcairo2-dev pkg-config gcc\n"
     '  pip install "quadfringe[aravis]"'
 )
-GVCP_PORT = 3956
-CONTROL_PRIVILEGE = 0x0A00
-PING_S, PINGS = 0.3, 5
-HEADERS = 28 + 8  # of IP, UDP and GVSP, in every packet
+GVCP_PORT = 3956  # GigE Vision standard
+CONTROL_PRIVILEGE = 0x0A00  # address of the control privilege register, GigE Vision standard
+PING_S, PINGS = 0.3, 5  # wait for an answer, s, and attempts: 1.5 s, well below the 5 s after which Aravis gives up
 logger = logging.getLogger(__name__)
 
 
@@ -51,7 +50,7 @@ def _aravis() -> Any:
 
 @contextmanager
 def _translated(what: str) -> Iterator[None]:
-    """Turn what GLib says into a `CameraError` that tells what was tried."""
+    """Turn a GLib error into a `CameraError` that says what was attempted."""
     from gi.repository import GLib
 
     try:
@@ -66,7 +65,7 @@ def _translated(what: str) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Found:
-    """A device that answered: `where` opens it, the rest is for people."""
+    """A device that answered: `where` opens it; vendor, model and serial number are for messages."""
 
     where: str
     vendor: str
@@ -75,7 +74,7 @@ class Found:
 
     @property
     def name(self) -> str:
-        """The camera that the device belongs to, without the suffix of a chip."""
+        """Name of the camera that the device belongs to, without the chip suffix of the model."""
         return f"{self.vendor} {self.model.partition('_#')[0]} {self.serial}".strip() or self.where
 
     def __str__(self) -> str:
@@ -83,7 +82,7 @@ class Found:
 
 
 def found() -> list[Found]:
-    """Look for devices on every interface."""
+    """Search every network interface and USB for devices."""
     aravis = _aravis()
     aravis.update_device_list()
     devices = []
@@ -96,7 +95,7 @@ def found() -> list[Found]:
 
 
 class Device:
-    """One device and its features. Its streams have to be closed first."""
+    """One device and its features; close its streams before it."""
 
     def __init__(self, where: str) -> None:
         aravis = _aravis()
@@ -106,23 +105,23 @@ class Device:
         self._device = self._camera.get_device()
         self.ethernet = bool(self._camera.is_gv_device())
         if self.ethernet:
-            # The stream must not change the size of packets behind our back after buffers were made for it.
+            # Otherwise the stream may change the packet size after its buffers were allocated.
             self._camera.gv_set_packet_size_adjustment(aravis.GvPacketSizeAdjustment.NEVER)
-            # Packet sockets need privileges, and on loopback they see every packet twice.
+            # Packet sockets need privileges, and receive every packet twice on the loopback interface.
             self._camera.gv_set_stream_options(aravis.GvStreamOption.PACKET_SOCKET_DISABLED)
 
     @property
     def controlled(self) -> bool:
-        """Whether this program, and no other, may set features."""
+        """Whether this program has exclusive control of the device."""
         return not self.ethernet or bool(self._device.is_controller())
 
     def has(self, name: str) -> bool:
-        """Whether the device has this feature, and it can be used now."""
+        """Return whether the device has this feature and it is available now."""
         with _translated(name):
             return bool(self._device.is_feature_available(name))
 
     def get(self, name: str) -> Any:
-        """Read a feature: a bool, a number, or the name of an entry."""
+        """Read a feature: a bool, a number, or the name of an enumeration entry."""
         aravis = _aravis()
         with _translated(f"reading {name}"):
             node = self._device.get_feature(name)
@@ -137,12 +136,12 @@ class Device:
             return self._device.get_integer_feature_value(name)
 
     def set(self, name: str, value: bool | int | float | str) -> None:
-        """Write a feature; a command is executed by any value."""
+        """Write a feature; any value executes a command."""
         aravis = _aravis()
         with _translated(f"setting {name} to {value!r}"):
             node = self._device.get_feature(name)
             if node is None:
-                raise CameraError(f"camera at {self.where}: no feature {name}")
+                raise CameraError(f"camera at {self.where} has no feature {name}; leave it out, or check its spelling")
             if isinstance(node, aravis.GcCommand):
                 self._device.execute_command(name)
             elif isinstance(value, str):
@@ -155,7 +154,7 @@ class Device:
                 self._device.set_integer_feature_value(name, round(value))
 
     def set_packets(self, channel: int, size: int | None, delay_ns: int | None) -> int:
-        """Set the packets of a stream channel, 0 or None bytes for the largest that gets through; gives their size."""
+        """Set packet size and delay of a stream channel; size 0 or None takes the largest that arrives. Return it."""
         if not self.ethernet:
             return 0
         with _translated(f"camera at {self.where}: packets of stream {channel}"):
@@ -170,18 +169,18 @@ class Device:
             return int(self._camera.gv_get_packet_size())
 
     def channels(self) -> int:
-        """Give the number of stream channels."""
+        """Return the number of stream channels."""
         return int(self._camera.gv_get_n_stream_channels()) if self.ethernet else 1
 
     def stream(self, channel: int, payload: int, buffers: int, period_us: float) -> Stream:
-        """Open a stream channel with a pool of buffers; set features and packets before."""
+        """Open a stream channel with a pool of buffers; call it after setting features and packets."""
         with _translated(f"camera at {self.where}: stream {channel}"):
             if channel:
                 self._camera.gv_select_stream_channel(channel)
             return Stream(self._camera.create_stream(None, None), payload, buffers, period_us, self.ethernet)
 
     def answers(self) -> bool:
-        """Whether the device answers within 1.5 s and still obeys this program; Aravis itself finds out after 5 s."""
+        """Return whether the device answers within 1.5 s and is still controlled; Aravis itself notices after 5 s."""
         if not self.ethernet:
             return True
         question = struct.pack(">BBHHHI", 0x42, 1, 0x0080, 4, 1, CONTROL_PRIVILEGE)
@@ -193,49 +192,49 @@ class Device:
                     answer = wire.recv(64)
                 except OSError:
                     continue
-                # A device with exclusive access refuses the question and is there all the same.
+                # A device under exclusive access refuses to answer this, but it is reachable.
                 return len(answer) < 12 or bool(struct.unpack_from(">I", answer, 8)[0] & 3)
         return False
 
     def give_up(self) -> list[Any]:
-        """Give what has to be dropped, after the streams, for the device to be free; nothing can be called then."""
+        """Return the objects to drop, after the streams, to free the device; the device is unusable afterwards."""
         return [self.__dict__.pop(name) for name in ("_device", "_camera") if name in self.__dict__]
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """A buffer that came back full, or failed."""
+    """A buffer that the stream has filled, or failed to fill."""
 
     held: Any
     array: NDArray[np.uint8]
 
     @property
     def status(self) -> str:
-        """The word success, or what went wrong."""
+        """The word success, or the reason of the failure."""
         return str(self.held.get_status().value_nick)
 
     @property
     def received(self) -> int:
-        """Bytes that came; asked in C, because the binding would copy them all to tell how many."""
+        """Received bytes; read through C, because the binding would copy all of them to count them."""
         size = ctypes.c_size_t()
         _library().arv_buffer_get_data(_pointer(self.held), ctypes.byref(size))
         return size.value
 
     @property
     def times(self) -> tuple[int, int, int]:
-        """The device's number of the frame, the device's clock, and the host's when the first packet came, ns."""
+        """Frame id of the device, device clock, and host clock at the arrival of the first packet, ns."""
         held = self.held
         return held.get_frame_id(), held.get_timestamp(), held.get_system_timestamp()
 
     @property
     def image(self) -> tuple[int, int, int]:
-        """Pixel format, width and height as they were announced."""
+        """Pixel format, width and height as announced by the frame."""
         held = self.held
         return held.get_image_pixel_format(), held.get_image_width(), held.get_image_height()
 
 
 class Stream:
-    """One stream channel: Aravis fills buffers in a thread of its own, we pop and push them."""
+    """One stream channel: a thread of Aravis fills the buffers that this class pushes and pops."""
 
     def __init__(self, stream: Any, payload: int, buffers: int, period_us: float, ethernet: bool) -> None:
         self._stream = stream
@@ -244,7 +243,7 @@ class Stream:
         for _ in range(buffers):
             array = np.empty(payload, np.uint8)
             held = _aravis().Buffer.new(payload, array.ctypes.data)
-            held.array = array  # the memory lives as long as the buffer
+            held.array = array  # keeps the memory alive as long as the buffer
             stream.push_buffer(held)
 
     def _keep_packets(self, payload: int, period_us: float) -> None:
@@ -257,26 +256,26 @@ class Stream:
         allowed = int(Path("/proc/sys/net/core/rmem_max").read_text())
         if allowed < 2 * payload:
             logger.warning(
-                "the kernel limits socket buffers to %d kB, two frames have %d kB: frames will be lost; "
-                "as root: sysctl -w net.core.rmem_max=%d",
+                "the kernel limits socket buffers to %d kB, but two frames need %d kB, so frames will be lost; "
+                "run as root: sysctl -w net.core.rmem_max=%d",
                 allowed >> 10,
                 2 * payload >> 10,
                 wanted,
             )
 
     def pop(self, timeout_s: float) -> Buffer | None:
-        """Take the next buffer, full or failed; None when none comes in time. The interpreter is free meanwhile."""
+        """Take the next buffer, filled or failed; None when none comes in time. Waits without the interpreter lock."""
         held = self._stream.timeout_pop_buffer(round(timeout_s * 1e6))
         return None if held is None else Buffer(held, held.array)
 
     def push(self, buffer: Buffer) -> None:
-        """Give a buffer back to be filled again; one that comes late finds its stream closed, and is freed."""
+        """Return a buffer to be filled again; after the stream has closed, the buffer is freed instead."""
         stream = self.__dict__.get("_stream")
         if stream is not None:
             stream.push_buffer(buffer.held)
 
     def give_up(self) -> list[Any]:
-        """Give what has to be dropped for the stream to end. Buffers that come back then are freed."""
+        """Return the objects to drop to end the stream; buffers that are pushed later are freed."""
         return [self.__dict__.pop("_stream")] if "_stream" in self.__dict__ else []
 
 

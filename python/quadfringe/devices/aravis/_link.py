@@ -1,4 +1,4 @@
-"""An open camera: devices set up, streams ready, and while it runs frames made shots, or images of one chip."""
+"""The connection to a camera: sets up its devices and streams, and turns frames into shots."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, Cam
 
 __all__ = ["Link"]
 
-RETRY_S = 0.2
+RETRY_S = 0.2  # pause between attempts to connect
 
 
 class Link:
-    """The connection to both chips of a camera, or one. What is not right raises a `CameraError`; nothing stays open.
+    """The connection to one or both chips of a camera; raises `CameraError`, and then closes what it opened.
 
-    `patience_s` is how long a camera that is busy or missing is asked again: one that was lost boots, or is still held
-    by the connection before, for 3 s.
+    `patience_s` is how long a busy or missing camera is retried: after a loss, the camera may be booting, or holds the
+    previous connection until its heartbeat expires after 3 s.
     """
 
     def __init__(self, config: AravisConfig, chips: Sequence[str], *, patience_s: float) -> None:
@@ -58,51 +58,55 @@ class Link:
             self._devices[where] = Device(where)
             if not self._devices[where].controlled:
                 raise CameraBusyError(
-                    f"camera at {where} is controlled by another program; close that one. A program that was killed "
-                    "is let go of after 3 s"
+                    f"camera at {where} is controlled by another program; close that program (the camera forgets a "
+                    "killed "
+                    "one after 3 s)"
                 )
         return tuple(profiles.introduced(place, self._devices[place.where], config.profile) for place in found_at)
 
     def device(self, chip: int) -> Device:
-        """Give the device of a chip."""
+        """Return the device of a chip."""
         return self._devices[self.places[chip].where]
 
     def _set_up(self, config: AravisConfig) -> AravisConfig:
-        """Set features, then packets, then the streams with their buffers: in this order, or pixels come out wrong."""
+        """Set features, then packets, then streams: a buffer is sized by the format, and a stream by its packets."""
         for name, value in config.features.items():
             having = [device for device in self._devices.values() if device.has(name)]
             if not having:
-                raise CameraError(f"features: no device of the camera has {name}, or it cannot be used now")
+                raise CameraError(
+                    f"features: no device of the camera has {name}, or it is locked now; leave it out, or check its "
+                    "spelling"
+                )
             for device in having:
                 device.set(name, value)
-        taken, agreed = {}, []
+        accepted, agreed = {}, []
         settings = dict(zip(CHIPS, (config.visible, config.infrared), strict=True))
         for n, (chip, place) in enumerate(zip(self.chips, self.places, strict=True)):
-            taken[chip] = profiles.set_chip(self.device(n), place, settings[chip], config.exposure_us)
+            accepted[chip] = profiles.set_chip(self.device(n), place, settings[chip], config.exposure_us)
             agreed.append(_agreed(self.device(n)))
-            taken[chip]["pixel_format"] = agreed[n].format.name
+            accepted[chip]["pixel_format"] = agreed[n].format.name
         if len(agreed) == len(CHIPS):
             _check(*agreed)
         for where, device in self._devices.items():
             profiles.set_trigger(device, next(place for place in self.places if place.where == where), config)
-        exposures_us = [float(chip.get("exposure_us", 0.0)) for chip in taken.values()]
+        exposures_us = [float(chip.get("exposure_us", 0.0)) for chip in accepted.values()]
         self.period_us = max(profiles.period_us(device, exposures_us) for device in self._devices.values())
         for n, place in enumerate(self.places):
             device = self.device(n)
             if place.stream >= device.channels():
                 raise CameraError(
-                    f"camera at {place.where} has {device.channels()} stream channel(s), and the {self.chips[n]} chip "
-                    f"is said to be number {place.stream}, counted from 0; a camera of one chip is a `ChipCamera`, "
-                    "`quadfringe camera snap --chip visible`"
+                    f"camera at {place.where} has {device.channels()} stream channel(s), but the {self.chips[n]} chip "
+                    f"needs number {place.stream}, counted from 0; for a camera with one chip use `ChipCamera` or "
+                    "quadfringe camera snap --chip visible"
                 )
             device.set_packets(place.stream, config.packet_size, config.packet_delay_ns)
             stream = device.stream(place.stream, agreed[n].payload, config.buffers, self.period_us)
             self.readers.append(ChipReader(stream, agreed[n]))
-        return profiles.resolved(config, taken)
+        return profiles.resolved(config, accepted)
 
     def start(self, deliver: Callable[[Any], None], *, borrow: bool) -> None:
-        """Start a run: readers first, then the chips, the one that triggers the other last."""
-        # What waits for its partner holds buffers only when they are borrowed.
+        """Start a run: the readers first, then the chips; the chip that triggers the other starts last."""
+        # A waiting frame occupies a receive buffer only when buffers are borrowed.
         pending = {"pending": max(self.config.buffers // 3, 2)} if borrow else {}
         self.matcher.begin(sole=self.config.trigger == "software", **pending)
         self._running = True
@@ -134,15 +138,15 @@ class Link:
 
     @property
     def name(self) -> str:
-        """Which camera this is, for people."""
+        """Name of the camera, for messages."""
         return self.places[0].name
 
     def trigger(self) -> None:
-        """Ask for one exposure."""
+        """Trigger one exposure."""
         profiles.trigger(self.device(0))
 
     def stop(self, *, lost: bool = False) -> None:
-        """End the run; a camera that is lost is not told, because that takes seconds."""
+        """End the run; send no command to a lost camera, because its timeout takes seconds."""
         if not self._running:
             return
         self._running = False
@@ -156,19 +160,20 @@ class Link:
         self.matcher.end()
 
     def lost(self, silent_s: float) -> CameraLostError | None:
-        """Ask the devices of chips that have been silent for so long; give the error of one that does not answer."""
+        """Ping the devices of chips silent for `silent_s`; return the error of one that does not answer."""
         now = time.monotonic()
         for n, reader in enumerate(self.readers):
             device = self.device(n)
             if now - reader.heard > silent_s and not (device.answers() and device.controlled):
                 return CameraLostError(
-                    f"camera at {device.where} ({self.chips[n]} chip) no longer answers: power, cable or network, or "
-                    "another program took it over; asked again, it is connected anew"
+                    f"camera at {device.where} ({self.chips[n]} chip) no longer answers: check power, cable and "
+                    "network, "
+                    "and that no other program took it over; the next call reconnects"
                 )
         return None
 
     def forget(self, *, lost: bool = False) -> None:
-        """Close streams and devices; for one that is lost Aravis waits for seconds, which then nobody has to."""
+        """Close streams and devices; a thread closes those of a lost camera, because Aravis waits for seconds."""
         held = [part for device in self._devices.values() for part in device.give_up()]
         held += [part for reader in self.readers for part in reader.give_up()]
         self.readers.clear()
@@ -176,7 +181,7 @@ class Link:
         if lost:
             threading.Thread(target=held.clear, name="closing a camera").start()
         else:
-            held.clear()  # from the end: streams before the devices that they use
+            held.clear()  # drops the streams, which are last, before the devices that they use
 
 
 def _patiently(connect: Callable[[], tuple[Place, ...]], patience_s: float) -> tuple[Place, ...]:
@@ -197,10 +202,10 @@ def _agreed(device: Device) -> Agreed:
 def _check(visible: Agreed, infrared: Agreed) -> None:
     if visible.format.bayer is None and visible.format.colours != 3:
         raise CameraError(
-            f"visible chip: pixel format {visible.format.name} has no colours; set a Bayer format or RGB8"
+            f"visible chip: expected a colour format, got {visible.format.name}; set a Bayer format or RGB8"
         )
     if infrared.format.bayer is not None or infrared.format.colours != 1:
-        raise CameraError(f"infrared chip: pixel format {infrared.format.name}; set a Mono format")
+        raise CameraError(f"infrared chip: expected a monochrome format, got {infrared.format.name}; set a Mono format")
     if visible.format.bits != infrared.format.bits:
         raise CameraError(
             f"visible {visible.format.name} and infrared {infrared.format.name} have different full scales; set "

@@ -1,4 +1,4 @@
-"""What a camera is made of and how its features are called: the JAI AD-080GE and its family, and GenICam in general."""
+"""Device layout and feature names of cameras: the JAI AD-080GE family, and GenICam in general."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ __all__ = [
 
 CHIPS = ("visible", "infrared")
 JAI_MODEL = re.compile(r"(AD-\d+GE)_#([01])$")
-JAI_LEAST_US, JAI_STEP_US, JAI_STEPS = 20.0, 42.07, 792
+JAI_LEAST_US, JAI_STEP_US, JAI_STEPS = 20.0, 42.07, 792  # exposure is 20 us plus a number of steps: manual of JAI
 JAI_EXPOSURES = ("JAIExposureTimeRaw", "ExposureTimeRaw")
 EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
 GAINS = ("Gain", "GainRaw")
@@ -39,7 +39,7 @@ IP = re.compile(r"\d+\.\d+\.\d+\.\d+")
 
 @dataclass(frozen=True)
 class Place:
-    """Where the frames of a chip come from: a device, one of its stream channels, one of its sources."""
+    """The origin of the frames of a chip: a device, its stream channel and its source; and the name of the camera."""
 
     where: str
     stream: int
@@ -49,15 +49,15 @@ class Place:
 
 
 def matching(name: str, devices: Iterable[Found]) -> list[Found]:
-    """Give the devices whose vendor, model, serial number or address contain this name."""
+    """Return the devices whose vendor, model, serial number or address contains this name."""
     return [device for device in devices if name.casefold() in str(device).casefold()]
 
 
 def places(config: AravisConfig, look: Callable[[], Sequence[Found]]) -> tuple[Place, Place]:
-    """Find the visible and the infrared chip; raises `CameraNotFoundError` that lists what answered.
+    """Find the visible and the infrared chip; raises `CameraNotFoundError` listing the devices that answered.
 
-    The short name of a JAI camera is that of two devices with one serial number: the suffix of the model tells the
-    visible one, #0, from the infrared one, #1. A camera with one device has its chips on stream channels 0 and 1.
+    A JAI camera consists of two devices with one serial number; the suffix of the model is #0 for the visible and #1
+    for the infrared chip. A camera with one device has its chips on stream channels 0 and 1.
     """
     chips = (config.visible, config.infrared)
     named = [chip.device or config.device for chip in chips]
@@ -70,7 +70,9 @@ def places(config: AravisConfig, look: Callable[[], Sequence[Found]]) -> tuple[P
     same = found[0].where == found[1].where
     streams = [chip.stream if chip.stream is not None else int(same and n) for n, chip in enumerate(chips)]
     if same and streams[0] == streams[1] and config.visible.source == config.infrared.source:
-        raise CameraNotFoundError(f"{found[0]}: both chips are stream {streams[0]} of it; they have to differ")
+        raise CameraNotFoundError(
+            f"{found[0]}: both chips use stream {streams[0]}; set a different `stream` or `source` for each"
+        )
     first, second = (
         Place(device.where, stream, chip.source, config.profile == "jai-ad-080ge", device.name)
         for device, stream, chip in zip(found, streams, chips, strict=True)
@@ -79,10 +81,10 @@ def places(config: AravisConfig, look: Callable[[], Sequence[Found]]) -> tuple[P
 
 
 def place(config: AravisConfig, chip: str, look: Callable[[], Sequence[Found]]) -> Place:
-    """Find one chip; raises `CameraNotFoundError` that lists what answered.
+    """Find one chip; raises `CameraNotFoundError` listing the devices that answered.
 
-    Of a JAI camera it is the device with its suffix, of another one the stream channel that `places` would give it; a
-    chip with a `device` of its own is stream channel 0 of that.
+    On a JAI camera, the chip is the device with its suffix; on another camera, the stream channel that `places` would
+    assign. A chip with a separate `device` is stream channel 0 of that device.
     """
     index = CHIPS.index(chip)
     settings = (config.visible, config.infrared)[index]
@@ -92,15 +94,15 @@ def place(config: AravisConfig, chip: str, look: Callable[[], Sequence[Found]]) 
     if settings.device is None and len(fit) == 2 and _twins(*fit):
         found, stream = sorted(fit, key=lambda device: device.model)[index], 0
     else:
-        own = settings.device is not None and config.visible.device != config.infrared.device
-        found, stream = _one(name, devices), 0 if own else index
+        separate = settings.device is not None and config.visible.device != config.infrared.device
+        found, stream = _one(name, devices), 0 if separate else index
     if settings.stream is not None:
         stream = settings.stream
     return Place(found.where, stream, settings.source, config.profile == "jai-ad-080ge", found.name)
 
 
 def introduced(place: Place, device: Device, profile: str | None) -> Place:
-    """Give the place with what the opened device says of itself: who it is, and whether it is a JAI camera."""
+    """Complete the place with the name that the opened device reports, and whether it is a JAI camera."""
     vendor, model = (str(device.get(f"Device{part}Name")) for part in ("Vendor", "Model"))
     serial = next((str(device.get(name)) for name in ("DeviceSerialNumber", "DeviceID") if device.has(name)), "")
     jai = JAI_MODEL.search(model) is not None if profile is None else place.jai
@@ -115,12 +117,12 @@ def _one(name: str, devices: Sequence[Found]) -> Found:
     if len(fit) == 1:
         return fit[0]
     if not fit and IP.fullmatch(name):
-        return Found(name, "", "", "")  # an address that no broadcast reaches is asked directly
+        return Found(name, "", "", "")  # no broadcast reaches this address, so it is opened directly
     raise _not_one(name, fit, devices)
 
 
 def _both(name: str, infrared: str | None, devices: Sequence[Found]) -> list[Found]:
-    """Find the devices of both chips by one name, and the infrared one by its own if it has one."""
+    """Find the devices of both chips by one name, or the infrared one by the name `infrared`."""
     fit = matching(name, devices)
     if IP.fullmatch(name):
         fit = [device for device in fit if device.where == name] or fit
@@ -135,8 +137,9 @@ def _both(name: str, infrared: str | None, devices: Sequence[Found]) -> list[Fou
         return sorted(fit, key=lambda device: device.model)
     if len(fit) == 1 and JAI_MODEL.search(fit[0].model):
         raise CameraNotFoundError(
-            f"{fit[0]} is one chip of two, and the other one does not answer; check its link, and name the camera "
-            "without the suffix of a chip"
+            f"{fit[0]} is one of two chips, and the other does not answer; check its cable, and name the camera "
+            "without "
+            "a chip suffix"
         )
     if len(fit) == 1:
         return [fit[0], fit[0]]
@@ -144,7 +147,7 @@ def _both(name: str, infrared: str | None, devices: Sequence[Found]) -> list[Fou
 
 
 def _twins(first: Found, second: Found) -> bool:
-    """Whether two devices are the chips of one JAI camera."""
+    """Return whether two devices are the chips of one JAI camera."""
     models = JAI_MODEL.search(first.model), JAI_MODEL.search(second.model)
     if models[0] is None or models[1] is None or first.serial != second.serial:
         return False
@@ -155,7 +158,7 @@ def _not_one(name: str, fit: Sequence[Found], devices: Sequence[Found]) -> Camer
     wanted = f"the name {name!r}" if name else "no name"
     listed = "\n".join(f"  {device}" for device in (fit or devices)) or "  none"
     if fit:
-        return CameraNotFoundError(f"{wanted} fits several cameras; give a serial number or an address:\n{listed}")
+        return CameraNotFoundError(f"{wanted} fits several cameras; use a serial number or an address:\n{listed}")
     return CameraNotFoundError(
         f"no camera answers to {wanted}; check power, cable and network, and that the host has an address in the "
         f"camera's subnet. Cameras that answer:\n{listed}"
@@ -163,7 +166,7 @@ def _not_one(name: str, fit: Sequence[Found], devices: Sequence[Found]) -> Camer
 
 
 def exposure_steps(exposure_us: float) -> int:
-    """Give the number of steps of a JAI camera for an exposure, 20 us and n times 42.07 us.
+    """Return the number of exposure steps n of a JAI camera; the exposure is 20 us plus n times 42.07 us.
 
     >>> exposure_steps(20.0), exposure_steps(10_000.0)
     (0, 237)
@@ -176,10 +179,10 @@ def exposure_steps(exposure_us: float) -> int:
 
 
 def set_chip(device: Device, place: Place, chip: ChipConfig, exposure_us: float | None) -> dict[str, Any]:
-    """Set format, exposure and gain; give what the camera made of it, by the names of `ChipConfig`."""
+    """Set format, exposure and gain; return the values that the camera accepted, by the names of `ChipConfig`."""
     if place.source is not None:
         device.set("SourceSelector", place.source)
-    taken: dict[str, Any] = {"device": place.where, "stream": place.stream, "source": place.source}
+    accepted: dict[str, Any] = {"device": place.where, "stream": place.stream, "source": place.source}
     if chip.pixel_format is not None:
         device.set("PixelFormat", chip.pixel_format)
     wanted_us = chip.exposure_us if chip.exposure_us is not None else exposure_us
@@ -187,24 +190,26 @@ def set_chip(device: Device, place: Place, chip: ChipConfig, exposure_us: float 
     if raw is not None:
         if wanted_us is not None:
             device.set(raw, exposure_steps(wanted_us))
-        taken["exposure_us"] = JAI_LEAST_US + JAI_STEP_US * int(device.get(raw))
+        accepted["exposure_us"] = JAI_LEAST_US + JAI_STEP_US * int(device.get(raw))
     elif (name := _first(device, EXPOSURES)) is not None:
         if wanted_us is not None:
             device.set(name, JAI_LEAST_US + JAI_STEP_US * exposure_steps(wanted_us) if place.jai else wanted_us)
-        taken["exposure_us"] = float(device.get(name))
+        accepted["exposure_us"] = float(device.get(name))
     elif wanted_us is not None:
-        raise CameraError(f"camera at {place.where} has none of {', '.join(EXPOSURES)}; set the exposure by `features`")
+        raise CameraError(
+            f"camera at {place.where} has none of {', '.join(EXPOSURES)}; set the exposure under `features`"
+        )
     if (name := _first(device, GAINS)) is not None:
         if chip.gain is not None:
             device.set(name, chip.gain)
-        taken["gain"] = float(device.get(name))
+        accepted["gain"] = float(device.get(name))
     elif chip.gain is not None:
-        raise CameraError(f"camera at {place.where} has none of {', '.join(GAINS)}; set the gain by `features`")
-    return taken
+        raise CameraError(f"camera at {place.where} has none of {', '.join(GAINS)}; set the gain under `features`")
+    return accepted
 
 
 def set_trigger(device: Device, place: Place, config: AravisConfig) -> None:
-    """Set what starts an exposure, and that both chips of a JAI camera follow it."""
+    """Set the trigger of exposures, and synchronise both chips of a JAI camera."""
     if place.jai and device.has("SyncMode"):
         device.set("SyncMode", "Sync")
     if device.has("AcquisitionMode"):
@@ -214,30 +219,32 @@ def set_trigger(device: Device, place: Place, config: AravisConfig) -> None:
     if device.has("TriggerMode"):
         device.set("TriggerMode", "Off" if config.trigger == "free" else "On")
     elif config.trigger != "free":
-        raise CameraError(f'camera at {place.where} has no TriggerMode; it runs freely: trigger = "free"')
+        raise CameraError(f'camera at {place.where} has no TriggerMode, so it only runs freely; set trigger = "free"')
     if config.trigger != "free":
         device.set("TriggerSource", "Software" if config.trigger == "software" else config.trigger)
     if config.frame_rate_hz is not None and config.trigger == "free":
         name = _first(device, RATES)
         if name is None:
-            raise CameraError(f"camera at {place.where} has none of {', '.join(RATES)}; leave frame_rate_hz out")
+            raise CameraError(f"camera at {place.where} has none of {', '.join(RATES)}; remove frame_rate_hz")
         if device.has("AcquisitionFrameRateEnable"):
             device.set("AcquisitionFrameRateEnable", True)
         device.set(name, config.frame_rate_hz)
 
 
 def period_us(device: Device, exposures_us: Iterable[float]) -> float:
-    """Give the time from one exposure to the next, as far as the camera says."""
+    """Return the shortest time between exposures, us, from the frame rate and the exposure times."""
     name = _first(device, RATES)
     rate_hz = float(device.get(name)) if name is not None else 0.0
     return max([1e6 / rate_hz if rate_hz > 0 else 0.0, *exposures_us])
 
 
 def trigger(device: Device) -> None:
-    """Ask for one exposure of both chips."""
+    """Trigger one exposure of both chips."""
     name = _first(device, SOFTWARE_TRIGGERS)
     if name is None:
-        raise CameraError(f"camera at {device.where} has none of {', '.join(SOFTWARE_TRIGGERS)}: no software trigger")
+        raise CameraError(
+            f"camera at {device.where} has none of {', '.join(SOFTWARE_TRIGGERS)}; choose another trigger"
+        )
     device.set(name, 1)
 
 
@@ -245,7 +252,7 @@ def _first(device: Device, names: Iterable[str]) -> str | None:
     return next((name for name in names if device.has(name)), None)
 
 
-def resolved(config: AravisConfig, taken: Mapping[str, Mapping[str, Any]]) -> AravisConfig:
-    """Give the settings with what the camera made of them."""
-    chips = {chip: ChipConfig.model_validate(dict(values)) for chip, values in taken.items()}
+def resolved(config: AravisConfig, accepted: Mapping[str, Mapping[str, Any]]) -> AravisConfig:
+    """Return the settings with the values that the camera accepted."""
+    chips = {chip: ChipConfig.model_validate(dict(values)) for chip, values in accepted.items()}
     return config.model_copy(update={"exposure_us": None, **chips})

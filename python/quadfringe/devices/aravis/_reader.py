@@ -1,4 +1,4 @@
-"""One chip's frames: a thread that takes buffers from the wire, refuses what is not as agreed, and gives them back."""
+"""The frames of one chip: a thread takes buffers from the stream, rejects faulty frames and returns the buffers."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from quadfringe.devices.aravis._gi import Buffer, Stream
 
 __all__ = ["Agreed", "ChipReader", "Frame"]
 
-POP_S = 0.05
-DRAIN_S = 0.02
+POP_S = 0.05  # wait for a buffer: the longest time that stopping takes
+DRAIN_S = 0.02  # wait for late buffers at the end of a run
 
 
 @dataclass(frozen=True)
 class Agreed:
-    """What every frame of a chip has to be."""
+    """Format and size that every frame of a chip must have."""
 
     format: PixelFormat
     width: int
@@ -31,11 +31,11 @@ class Agreed:
 
     @property
     def payload(self) -> int:
-        """Bytes of a frame."""
+        """Number of bytes of a frame."""
         return self.format.payload(self.width, self.height)
 
     def fault(self, buffer: Buffer) -> str | None:
-        """Say what is wrong with a buffer. "Success" alone says little: it may be short, of another size, or both."""
+        """Return what is wrong with a buffer, or None; one with status "success" may still be short."""
         if buffer.status != "success":
             return f"incomplete ({buffer.status})"
         code, width, height = buffer.image
@@ -50,14 +50,14 @@ class Agreed:
 
 @dataclass(frozen=True)
 class Frame:
-    """A whole frame: pixels (H, W) or (H, W, 3)."""
+    """A complete frame: pixels (H, W) or (H, W, 3)."""
 
     stamp: FrameStamp
     pixels: NDArray[Any]
 
 
 class _Loan:
-    """A buffer's memory as the base of arrays; when the last of them is gone the buffer is filled again."""
+    """The memory of a buffer as the base of arrays; the buffer returns to the stream when the last one is dropped."""
 
     def __init__(self, stream: Stream, buffer: Buffer) -> None:
         self._stream, self._buffer = stream, buffer
@@ -70,22 +70,22 @@ class _Loan:
 
 
 class ChipReader:
-    """Reads one chip; every whole frame goes to `deliver`, in the reader's thread.
+    """Reads one chip; passes every complete frame to `deliver` in the thread of the reader.
 
-    Pixels are the caller's own, or, borrowed, the memory of a buffer that goes back to the wire with its last array.
+    The pixels are a copy, or with `borrow` a read-only view of a receive buffer.
     """
 
     def __init__(self, stream: Stream, agreed: Agreed) -> None:
         self.agreed = agreed
         self.frames = self.damaged = 0
-        self.fault: str | None = None  # of the last frame that was refused
-        self.heard = 0.0  # when the last frame came, whole or not
+        self.fault: str | None = None  # of the last rejected frame
+        self.heard = 0.0  # when the last frame arrived, complete or not
         self._stream = stream
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
 
     def start(self, deliver: Callable[[Frame], None], *, borrow: bool) -> None:
-        """Begin a run; frames of an earlier one are thrown away."""
+        """Start a run; discard frames of an earlier one."""
         self._drain()
         self.heard = time.monotonic()
         self._stopping.clear()
@@ -125,11 +125,11 @@ class ChipReader:
                 self._stream.push(buffer)
 
     def quit(self) -> None:
-        """Let the thread end; `stop` waits for it."""
+        """Ask the thread to end; `stop` waits for it."""
         self._stopping.set()
 
     def stop(self) -> None:
-        """End the run, with the frames that were on their way."""
+        """End the run and discard frames that still arrive."""
         self.quit()
         if self._thread is not None:
             self._thread.join()
@@ -141,5 +141,5 @@ class ChipReader:
             self._stream.push(buffer)
 
     def give_up(self) -> list[Any]:
-        """Give what has to be dropped for the stream to end; borrowed arrays stay valid."""
+        """Return the objects to drop to end the stream; borrowed arrays stay valid."""
         return self._stream.give_up()

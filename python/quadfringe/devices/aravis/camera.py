@@ -1,4 +1,4 @@
-"""The camera that users hold: snap, stream, counts, and errors that say what to look at."""
+"""The camera classes for users: snap, stream, counts, and errors that name the likely cause."""
 
 from __future__ import annotations
 
@@ -21,15 +21,18 @@ from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, Un
 
 __all__ = ["AravisCamera", "ChipCamera", "open_devices"]
 
-LENGTH = {"latest": 1, "all": 64}
+LENGTH = {"latest": 1, "all": 64}  # shots that wait: with "all" two seconds at 30 Hz
+# How long a busy or missing camera is retried, s: at first briefly, after a loss longer than the 3 s heartbeat for
+# which
+# the camera still holds the lost connection.
 FIRST_PATIENCE_S, AGAIN_PATIENCE_S = 1.0, 5.0
-LOOK_S = 0.25  # how often a wait looks whether the camera is still there
-SILENT_S = 0.5  # a chip that says nothing for so long is asked
+LOOK_S = 0.25  # interval at which a waiting call checks that the camera still answers
+SILENT_S = 0.5  # a chip that has sent nothing for this time is pinged
 Item = TypeVar("Item", bound=AnyShot | ChipImage)
 
 
 class _Running(Generic[Item]):
-    """What a camera of two chips and one chip alone have in common: everything but what comes out."""
+    """What a camera of two chips and a single chip have in common: everything except the type of the result."""
 
     paced = True
 
@@ -43,16 +46,16 @@ class _Running(Generic[Item]):
         self._closed = False
         self._last_id = 0
         self._queue: DroppingQueue[Item] = DroppingQueue(1)
-        self._earlier = (0, 0)  # shots and dropped ones of the runs before
-        self._before = {chip: ChipStatistics() for chip in chips}  # of links that were lost
+        self._earlier = (0, 0)  # delivered and dropped shots of earlier runs
+        self._before = {chip: ChipStatistics() for chip in chips}  # of lost connections
 
     def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> Item:
-        """Take one shot that is exposed after this call; raises a `CameraError` when none comes in time."""
-        with self._run("all", borrow) as (link, queue):  # the first shot, and no newer one
+        """Take one shot that is exposed after this call; raises a `CameraError` when none arrives in time."""
+        with self._run("all", borrow) as (link, queue):  # the first shot and no later one
             return self._next(link, queue, timeout_s)
 
     def stream(self, count: int | None = None, *, keep: Keep = "latest", borrow: bool = False) -> Iterator[Item]:
-        """Take shots until `count` or until the iterator is closed; raises a `CameraError` when they cease to come."""
+        """Yield `count` shots, or until the iterator is closed; raises `CameraError` when none arrives in time."""
         with self._run(keep, borrow) as (link, queue):
             for _ in numbers() if count is None else range(count):
                 yield self._next(link, queue, None)
@@ -60,18 +63,18 @@ class _Running(Generic[Item]):
     @contextmanager
     def _run(self, keep: Keep, borrow: bool) -> Iterator[tuple[Link, DroppingQueue[Item]]]:
         if not self._in_use.acquire(blocking=False):
-            raise ValueError(f"camera at {self.name}: a stream runs already; close it first")
+            raise ValueError(f"camera at {self.name} already streams; close that stream first")
         try:
             link = self._connected()
             length = min(LENGTH[keep], max(link.config.buffers // 3, 1)) if borrow else LENGTH[keep]
             self._earlier = self._counts()
             self._queue, self._first_id = DroppingQueue(length), self._last_id + 1
             try:
-                _check_there(link, 0.0)
+                _check_connected(link, 0.0)
                 link.start(self._queue.put, borrow=borrow)
                 yield link, self._queue
             except ShotTimeoutError:
-                raise  # the camera is there
+                raise  # the camera is still connected
             except CameraError as error:
                 lost = isinstance(error, CameraLostError)
                 link.stop(lost=lost)
@@ -107,8 +110,8 @@ class _Running(Generic[Item]):
                 shot = queue.get(min(max(left_s, 0.0), LOOK_S))
             except TimeoutError:
                 if self._closed:
-                    raise ValueError(f"camera at {self.name} was closed while a shot was awaited") from None
-                _check_there(link, SILENT_S)
+                    raise ValueError(f"camera at {self.name} was closed during a wait for a shot") from None
+                _check_connected(link, SILENT_S)
                 if left_s <= 0:
                     raise self._diagnosis(link, before, timeout_s) from None
                 continue
@@ -117,23 +120,27 @@ class _Running(Generic[Item]):
             return replace(shot, stamp=replace(shot.stamp, id=self._last_id))
 
     def _diagnosis(self, link: Link, before: dict[str, ChipStatistics], timeout_s: float) -> CameraError:
-        """Say why there was no shot in time."""
+        """Return the error that names the likely reason why no shot arrived in time."""
         now = self._chips()
         chips = self._chip_names
         came = {chip: now[chip].frames - before[chip].frames for chip in chips}
         head = f"camera at {self.name}: no shot within {timeout_s:g} s: "
         for chip, reader in zip(chips, link.readers, strict=True):
             if not came[chip] and now[chip].damaged > before[chip].damaged:
-                return WrongFrameError(f"{head}frames of the {chip} chip are refused, the last one: {reader.fault}")
+                return WrongFrameError(f"{head}frames of the {chip} chip were rejected, the last one: {reader.fault}")
         if all(came.values()):
-            return UnpairedError(f"{head}frames of both chips came, none of the same instant; are the chips in sync?")
+            return UnpairedError(
+                f"{head}frames of both chips arrived, but none of the same instant; synchronise the chips"
+            )
         if any(came.values()):
             there, missing = sorted(chips, key=lambda chip: -came[chip])
-            return UnpairedError(f"{head}frames of the {there} chip came, none of the {missing} chip")
+            return UnpairedError(
+                f"{head}frames of the {there} chip arrived, but none of the {missing} chip; check its cable"
+            )
         trigger = link.config.trigger
-        cause = "it runs freely" if trigger == "free" else f"it waits for its trigger, {trigger}"
+        cause = "it runs freely" if trigger == "free" else f"it waits for trigger {trigger}"
         return ShotTimeoutError(
-            f"{head}it answers and sends nothing ({cause}); check trigger, firewall and packet size"
+            f"{head}it answers but sends no frames ({cause}); check trigger, firewall and packet size"
         )
 
     def _chips(self) -> dict[str, ChipStatistics]:
@@ -152,7 +159,7 @@ class _Running(Generic[Item]):
         return chips
 
     def statistics(self) -> CameraStatistics:
-        """Give the counts since the camera was opened; from any thread."""
+        """Return the counts since the camera was opened; safe to call from any thread."""
         return CameraStatistics(*self._counts(), self._chips())
 
     def _counts(self) -> tuple[int, int]:
@@ -160,7 +167,7 @@ class _Running(Generic[Item]):
         return self._earlier[0] + now.passed + now.dropped, self._earlier[1] + now.dropped
 
     def close(self) -> None:
-        """Stop and release the camera; closing twice is allowed."""
+        """Stop and release the camera; further calls do nothing."""
         self._closed = True
         if self._link is not None:
             self._link.stop()
@@ -176,9 +183,10 @@ class _Running(Generic[Item]):
 class AravisCamera(_Running[AnyShot]):
     """A GenICam camera with two chips; close it, or use it in a `with` block.
 
-    Shots own their pixels. With `borrow` (of `snap` and `stream`) unpacked ones are the memory that the wire filled,
-    read-only and without a copy; it goes back when the last array is dropped, and shots that are kept starve the wire.
-    Raises `CameraNotFoundError`, `CameraBusyError`, or another `CameraError` that says what the camera refused.
+    Shots hold copies of the pixels. With `borrow` (of `snap` and `stream`), shots in unpacked formats are read-only
+    views of the receive buffers; a buffer returns to the stream when its last array is dropped, so keeping many such
+    shots stalls the stream. Raises `CameraNotFoundError`, `CameraBusyError`, or another `CameraError` that says what
+    the camera rejected.
     """
 
     def __init__(self, config: AravisConfig | None = None) -> None:
@@ -186,15 +194,15 @@ class AravisCamera(_Running[AnyShot]):
 
     @property
     def calibration(self) -> Calibration | None:
-        """A camera knows nothing of its bench."""
+        """None: a real camera does not know its bench."""
         return None
 
 
 class ChipCamera(_Running[ChipImage]):
-    """One chip of a GenICam camera, or any GenICam camera that has but one; settings and errors as `AravisCamera`.
+    """One chip of a GenICam camera, or a GenICam camera with one chip; settings and errors as `AravisCamera`.
 
-    To focus, to look at one chip while the other is missing, or for an ordinary camera. `chip` says which of the
-    settings holds, and which device or stream channel is meant where a name fits both chips.
+    Use it to focus, while the other chip is missing, or for an ordinary camera. `chip` selects the settings, and the
+    device or stream channel where a name fits both chips.
 
     >>> from quadfringe.config.cameras import AravisConfig
     >>> from quadfringe.devices.aravis import ChipCamera
@@ -207,14 +215,14 @@ class ChipCamera(_Running[ChipImage]):
         super().__init__(config, (chip,))
 
 
-def _check_there(link: Link, silent_s: float) -> None:
+def _check_connected(link: Link, silent_s: float) -> None:
     lost = link.lost(silent_s)
     if lost is not None:
         raise lost from None
 
 
 def open_devices(config: SystemConfig) -> Devices:
-    """Open the camera of `capture`, and the projectors of the system if it has any."""
+    """Open the camera of `capture`, and the projectors of the system."""
     assert isinstance(config.capture, AravisConfig)
     camera = AravisCamera(config.capture)
     try:

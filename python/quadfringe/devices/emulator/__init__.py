@@ -1,8 +1,8 @@
-"""A camera with two chips on the wire of GigE Vision, for tests, demonstrations and cameras that are not there yet.
+"""An emulated GigE Vision camera with two chips, for tests, demonstrations, and work before a camera arrives.
 
-It runs in a process of its own and answers on two addresses of the loopback interface, as a JAI AD-080GE does with two
-devices of one serial number, or as one device with two stream channels. It shows frames of yours, obeys triggers, sends
-lost packets again, and fails in the ways that cameras fail.
+It runs in a separate process and answers on two addresses of the loopback interface, like a JAI AD-080GE with two
+devices of one serial number, or as one device with two stream channels. It sends frames from a file or a test pattern,
+obeys triggers, resends lost packets, and simulates the faults of real cameras (`Faults`).
 
 >>> from quadfringe.devices.emulator import Emulator
 >>> with Emulator() as camera:  # doctest: +SKIP
@@ -26,9 +26,10 @@ SERIAL = "E000001"
 
 
 def keep_pace() -> None:
-    """Let threads that this one starts go before other programs, where that is allowed, as a camera exposes on time.
+    """Give the threads that this thread starts real-time priority, where that is permitted.
 
-    They send a few milliseconds in a second; a busy host that makes them wait would be measured as a bad camera.
+    A real camera exposes on time; without priority, a busy host would make the emulated one late. The threads are busy
+    for only a few milliseconds per second.
     """
     with suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(1))
@@ -37,10 +38,10 @@ def keep_pace() -> None:
 class Emulator:
     """The process of an emulated camera; it ends with the `with` block.
 
-    `frames` is an NPZ file with `visible` and `infrared` as `FileFrames` has them, which are shown in turn; without it
-    the test pattern of `size_px` (width, height) is. `clock` is by how many seconds and ppm the second chip's clock
-    differs from the first one's. With `model="two-streams"` one device sends both chips.
-    Raises OSError when the addresses are taken or missing.
+    `frames` is an NPZ file with the arrays `visible` and `infrared` of `FileFrames`, sent in turn; without it, a test
+    pattern of `size_px` (width, height) is sent. `clock` is the offset, s, and the drift, ppm, of the clock of the
+    second chip against the first. With `model="two-streams"`, one device sends both chips. Raises OSError when the
+    addresses are in use or missing.
     """
 
     def __init__(
@@ -71,9 +72,9 @@ class Emulator:
         self._answer()
 
     def order(self, *words: object) -> str:
-        """Tell the camera what: a fault of `Faults` and its value, "line" for a trigger pulse, "reset".
+        """Send an order and return the answer: a fault of `Faults` with its value, "line" (a trigger pulse), "reset".
 
-        "sent" answers with the frames of each chip, "busy" with the processor seconds that the camera took.
+        The order "sent" returns the number of frames of each chip, "busy" the processor time of the camera in seconds.
         """
         assert self._process.stdin is not None
         print(*words, file=self._process.stdin, flush=True)
@@ -84,11 +85,13 @@ class Emulator:
         answer = self._process.stdout.readline().strip()
         if not answer or answer.startswith("error"):
             self.close()
-            raise OSError(f"the emulated camera: {answer.removeprefix('error: ') or 'it ended; see its message'}")
+            raise OSError(
+                f"the emulated camera: {answer.removeprefix('error: ') or 'its process ended; see its message'}"
+            )
         return answer
 
     def close(self) -> None:
-        """End the process; closing twice is allowed."""
+        """End the process; further calls do nothing."""
         self._process.kill()
         self._process.wait()
         for pipe in (self._process.stdin, self._process.stdout):

@@ -1,4 +1,4 @@
-"""The process of an emulated camera: orders come on stdin, one a line, and each is answered on stdout."""
+"""The process of an emulated camera: it reads one order per line from stdin and answers each on stdout."""
 
 from __future__ import annotations
 

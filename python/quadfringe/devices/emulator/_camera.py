@@ -1,4 +1,4 @@
-"""The emulated camera: one exposure clock, two chips, each sent on a stream channel of its own."""
+"""The emulated camera: one exposure clock and two chips, each with a separate stream channel."""
 
 from __future__ import annotations
 
@@ -21,29 +21,29 @@ IP_UDP_HEADER, GVSP_HEADER = 28, 8
 LEADER, TRAILER, PAYLOAD = 1, 2, 3
 SHORT_IDS = 65535
 FIRE_TEST = 1 << 31
-KEPT = 8  # blocks that can be sent again
+KEPT = 8  # frames whose packets can be resent
 
 
 @dataclass
 class Faults:
-    """What goes wrong, until told otherwise. Shares are probabilities; the random numbers have a fixed seed."""
+    """The simulated faults, which persist until reset; shares are probabilities with a fixed random seed."""
 
-    lost_packets: float = 0.0  # share of packets that are not sent; those asked for again are
-    lost_frames: float = 0.0  # share of frames of each chip that are not sent at all, nor counted
-    skipped_ids: float = 0.0  # share of frames after which an id is passed over
-    deaf: bool = False  # packets are not sent again
+    lost_packets: float = 0.0  # share of packets that are not sent at first; a resend delivers them
+    lost_frames: float = 0.0  # share of frames of each chip that are neither sent nor counted
+    skipped_ids: float = 0.0  # share of frames after which one id is skipped
+    deaf: bool = False  # resend requests are ignored
     silent: bool = False  # no frames from either chip
     silent_chip: int = -1  # no frames from this chip
-    wrong_size: bool = False  # frames have half the lines that the registers say
+    wrong_size: bool = False  # frames have half the lines of the Height register
     wrong_format: bool = False  # frames are announced in another pixel format of the same size
-    short: bool = False  # frames of the announced size lack their last packets, and their ends do not say so
-    packet_size: int = 0  # packets of another size than the register says
-    gone: bool = False  # no answers and no frames, as without power
+    short: bool = False  # the last packets of each frame are missing, and the trailer does not say so
+    packet_size: int = 0  # packet size in place of that of the register, bytes
+    gone: bool = False  # no answers and no frames, as if without power
 
 
 @dataclass
 class Chip:
-    """One chip: its device, stream channel, clock and place in the exposure."""
+    """One chip: its device, stream channel and clock."""
 
     index: int
     control: Control
@@ -62,19 +62,19 @@ class Chip:
 
     @property
     def target(self) -> tuple[str, int]:
-        """Where frames go."""
+        """Address that frames are sent to."""
         return socket.inet_ntoa(struct.pack(">I", self.register(0x18))), self.register(0x0) & 0xFFFF
 
     def device_ns(self, instant_ns: int) -> int:
-        """Give what the device's clock says."""
+        """Return the device clock at an instant, ns."""
         return int(instant_ns * (1 + self.clock_drift_ppm * 1e-6) + self.clock_offset_s * 1e9)
 
 
 class EmulatedCamera:
-    """Two chips that expose together, as a JAI AD-080GE does while SyncMode is Sync.
+    """Two chips that expose together, like a JAI AD-080GE with SyncMode Sync.
 
-    `devices` has one identity for each chip, or one with two stream channels for both. Nothing but the wire reaches
-    the outside; `order` is what the process that runs the camera is told.
+    `devices` has one identity for each chip, or one with two stream channels for both. The camera communicates through
+    the network only, except for `order`, which the process that runs it calls.
     """
 
     def __init__(self, devices: list[Identity], source: Source, *, clocks: tuple[float, float] = (0.0, 0.0)) -> None:
@@ -93,7 +93,7 @@ class EmulatedCamera:
         threading.Thread(target=self._expose, name="exposures", daemon=True).start()
 
     def _reset(self) -> None:
-        """Be as after power-on, and fail no more."""
+        """Return to the state after power-on, without faults."""
         self.faults = Faults()
         for control in self._controls:
             control.answering = True
@@ -126,7 +126,7 @@ class EmulatedCamera:
         def resend(block: int, first: int, last: int) -> None:
             if self.faults.deaf:
                 return
-            # Aravis names stream channel 0 whichever it means: the chips of the device are all asked.
+            # Aravis requests stream channel 0 for every channel, so all chips of the device are searched for the frame.
             for chip in (chip for chip in self.chips if chip.control is self._controls[device]):
                 for known, packets in tuple(chip.kept):
                     if known == block:
@@ -136,7 +136,7 @@ class EmulatedCamera:
         return resend
 
     def order(self, words: list[str]) -> str:
-        """Do what a line says: a fault and its value, "line" (a trigger pulse), "sent", "busy", "reset"."""
+        """Execute an order: a fault and its value, "line" (a trigger pulse), "sent", "busy" or "reset"."""
         if words == ["line"]:
             self._asked.release()
         elif words == ["reset"]:
@@ -157,7 +157,7 @@ class EmulatedCamera:
         return "ok"
 
     def _expose(self) -> None:
-        """Expose at the pace of the first chip, or when triggered; a late host makes exposures late, and none less."""
+        """Expose at the frame rate of the first chip, or when triggered; a busy host delays but never skips one."""
         due_ns = time.monotonic_ns()
         while True:
             control = self._controls[0]

@@ -25,7 +25,7 @@ Resend = Callable[[int, int, int], None]
 
 @dataclass(frozen=True)
 class Identity:
-    """What a device tells of itself."""
+    """How a device identifies itself, and its pixel formats and number of stream channels."""
 
     vendor: str
     model: str
@@ -36,7 +36,7 @@ class Identity:
 
 
 class Control:
-    """Registers behind GVCP; `written` is called after a register of a stream or feature was written."""
+    """Registers behind GVCP; calls `written` after a register of a stream or a feature was written."""
 
     def __init__(self, who: Identity, written: Callable[[int, int], None], resend: Resend) -> None:
         self.who = who
@@ -49,7 +49,7 @@ class Control:
         self._fill()
         self._lock = threading.Lock()
         self._socket = _bound(who.ip)
-        # A search goes to the broadcast address, which a socket with an address of its own does not hear.
+        # Discovery uses the broadcast address, which a socket bound to one address does not receive.
         for ear in (self._socket, _bound("255.255.255.255")):
             threading.Thread(target=self._serve, args=(ear,), name=f"control {who.ip}", daemon=True).start()
 
@@ -78,11 +78,11 @@ class Control:
         return value
 
     def __setitem__(self, address: int, value: int) -> None:
-        """Set a register from inside."""
+        """Set a register, without calling `written`."""
         struct.pack_into(">I", self._memory, address, value & 0xFFFFFFFF)
 
     def feature(self, name: str) -> int:
-        """Read a feature of the camera."""
+        """Read the register of a feature."""
         return self[FEATURES[name]]
 
     def _serve(self, ear: socket.socket) -> None:
@@ -141,12 +141,12 @@ class Control:
         self._written(address, value)
 
     def _expire(self) -> None:
-        """Let a controller go that has not been heard for the time of the heartbeat, and stop what it started."""
+        """Release a controller that has been silent for the heartbeat time, and stop its acquisition."""
         if self.controller is not None and time.monotonic() - self._heard > self[HEARTBEAT] / 1000:
             self.release()
 
     def release(self) -> None:
-        """Forget the controller."""
+        """Release the controller and stop its acquisition."""
         self.controller = None
         self[CCP] = 0
         self[FEATURES["Acquisition"]] = 0

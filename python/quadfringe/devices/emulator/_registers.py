@@ -1,6 +1,6 @@
-"""Registers of the emulated camera, and the GenICam file that names them.
+"""Registers of the emulated camera, and the GenICam file that describes them.
 
-Addresses below 0x10000 are those of the GigE Vision standard; the others are the camera's own.
+Addresses below 0x10000 follow the GigE Vision standard; the others belong to this camera.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def _enumeration(name: str, entries: dict[str, int], selector: str | None = None
 
 
 def _choice(name: str, only: str) -> str:
-    """Give an enumeration that has no choice."""
+    """Return an enumeration with a single entry."""
     entry = f'<EnumEntry Name="{only}"><Value>0</Value></EnumEntry>'
     return f'<Enumeration Name="{name}">{entry}<Value>0</Value></Enumeration>'
 
@@ -93,7 +93,19 @@ def _float(name: str, register: str, to_register: str, from_register: str, least
 
 
 def _nodes(formats: list[str], sources: int) -> dict[str, str]:
-    """Give what users see, by name, each with the nodes behind it."""
+    """Return the nodes of every feature, by the name of the feature."""
+    return _identity_nodes() | _image_nodes(formats, sources) | _acquisition_nodes() | _exposure_nodes()
+
+
+def _identity_nodes() -> dict[str, str]:
+    return {
+        "DeviceVendorName": _text("DeviceVendorName", 0x48, 32),
+        "DeviceModelName": _text("DeviceModelName", 0x68, 32),
+        "DeviceID": _text("DeviceID", 0xD8, 16),
+    }
+
+
+def _image_nodes(formats: list[str], sources: int) -> dict[str, str]:
     selector = "SourceSelector" if sources > 1 else None
     choice = {} if selector is None else {selector: _enumeration(selector, {f"Source{n}": n for n in range(sources)})}
     known = {name: PIXEL_FORMATS[name] for name in formats}
@@ -103,15 +115,17 @@ def _nodes(formats: list[str], sources: int) -> dict[str, str]:
         for short, name in (("W", "Width"), ("H", "Height"), ("P", "PixelFormat"))
     )
     return choice | {
-        "DeviceVendorName": _text("DeviceVendorName", 0x48, 32),
-        "DeviceModelName": _text("DeviceModelName", 0x68, 32),
-        "DeviceID": _text("DeviceID", 0xD8, 16),
         "SensorWidth": _integer("SensorWidth", 0, 65536, access="RO"),
         "SensorHeight": _integer("SensorHeight", 0, 65536, access="RO"),
         "Width": _integer("Width", 8, "SensorWidth", 8),
         "Height": _integer("Height", 8, "SensorHeight"),
         "PixelFormat": _enumeration("PixelFormat", known, selector),
         "PayloadSize": f'<IntSwissKnife Name="PayloadSize">{variables}{payload}</IntSwissKnife>',
+    }
+
+
+def _acquisition_nodes() -> dict[str, str]:
+    return {
         "AcquisitionMode": _choice("AcquisitionMode", "Continuous"),
         "AcquisitionStart": _command("AcquisitionStart", "Acquisition", 1) + _register("Acquisition"),
         "AcquisitionStop": _command("AcquisitionStop", "Acquisition", 0),
@@ -123,6 +137,12 @@ def _nodes(formats: list[str], sources: int) -> dict[str, str]:
         "TriggerMode": _enumeration("TriggerMode", {"Off": 0, "On": 1}),
         "TriggerSource": _enumeration("TriggerSource", {"Line5": 0, "Software": 1, "PulseGenerator0": 2}),
         "SoftwareTrigger0": _command("SoftwareTrigger0", "SoftwareTrigger0", 1) + _register("SoftwareTrigger0"),
+        "SyncMode": _enumeration("SyncMode", {"Sync": 0, "Async": 1}),
+    }
+
+
+def _exposure_nodes() -> dict[str, str]:
+    return {
         "ExposureTimeRaw": _integer("ExposureTimeRaw", 0, 792),
         "ExposureTimeAbs": _float(
             "ExposureTimeAbs",
@@ -133,12 +153,11 @@ def _nodes(formats: list[str], sources: int) -> dict[str, str]:
             33340,
         ),
         "GainRaw": _integer("GainRaw", 0, 400),
-        "SyncMode": _enumeration("SyncMode", {"Sync": 0, "Async": 1}),
     }
 
 
 def genicam(formats: list[str], sources: int = 1) -> bytes:
-    """Give the GenICam file of one device with these pixel formats, for each of its sources."""
+    """Return the GenICam file of one device with these pixel formats and number of sources."""
     nodes = _nodes(formats, sources)
     root = "".join(f"<pFeature>{name}</pFeature>" for name in nodes)
     head = (

@@ -1,4 +1,4 @@
-"""What the emulated chips see: frames of yours from a file, or a test pattern that tells exposure and chip."""
+"""The images of the emulated chips: frames from a file, or a test pattern that encodes the exposure number."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ NAMES = {value: name for name, value in PIXEL_FORMATS.items()}
 
 
 class Source(Protocol):
-    """Gives the pixels of chip 0 (visible) or 1 (infrared) at an exposure."""
+    """Returns the pixels of chip 0 (visible) or 1 (infrared) at an exposure."""
 
     shape: tuple[int, int]
 
     def frame(self, chip: int, exposure: int, bits: int) -> NDArray[Any]:
-        """Pixels (H, W), or (H, W, 3) of a colour image, as unsigned integers of `bits` bits."""
+        """Return pixels (H, W), or (H, W, 3) of a colour image, as unsigned integers of `bits` bits."""
 
 
 class TestPattern:
-    """Noise that goes on with every exposure; the first two pixels hold the exposure's number modulo 65536.
+    """Noise that changes with every exposure; the first two pixels hold the exposure number modulo 65536.
 
     >>> from quadfringe.devices.emulator.frames import TestPattern
     >>> frame = TestPattern((48, 64)).frame(0, 700, 8)
@@ -41,7 +41,7 @@ class TestPattern:
         self._bytes = [(noise >> np.uint16(8)).astype(np.uint8) for noise in self._noise]
 
     def frame(self, chip: int, exposure: int, bits: int) -> NDArray[Any]:
-        """Give the pattern of a chip at an exposure."""
+        """Return the pattern of a chip at an exposure."""
         step = exposure * 40503 & (1 << bits) - 1
         frame: NDArray[Any]
         if bits == 8:
@@ -53,12 +53,12 @@ class TestPattern:
 
     @staticmethod
     def exposure(frame: NDArray[Any]) -> int:
-        """Read the number of the exposure modulo 65536."""
+        """Decode the exposure number modulo 65536."""
         return int(frame[0, 0]) + 256 * int(frame[0, 1])
 
 
 class FileFrames:
-    """Frames of an NPZ file with `visible` (N, H, W) or (N, H, W, 3) and `infrared` (N, H, W), shown in turn."""
+    """Frames of an NPZ file with `visible` (N, H, W) or (N, H, W, 3) and `infrared` (N, H, W), sent in turn."""
 
     def __init__(self, file: Path) -> None:
         with np.load(file) as stored:
@@ -66,13 +66,13 @@ class FileFrames:
         self.shape = self._chips[1].shape[1:3]
 
     def frame(self, chip: int, exposure: int, bits: int) -> NDArray[Any]:
-        """Give the frame whose turn it is; 8-bit frames are stretched to deeper formats."""
+        """Return the frame of an exposure; 8-bit frames are scaled to deeper formats."""
         frame: NDArray[Any] = self._chips[chip][exposure % len(self._chips[chip])]
         return frame if bits == 8 or frame.dtype != np.uint8 else frame.astype(np.uint16) << (bits - 8)
 
 
 def packed(source: Source, chip: int, exposure: int, pixel_format: int, size_px: tuple[int, int]) -> memoryview[int]:
-    """Give the payload of a frame of `size_px` (width, height) in a pixel format of GigE Vision; not always a copy."""
+    """Return the payload of a frame of `size_px` (width, height) in a GigE Vision pixel format; possibly a view."""
     name = NAMES[pixel_format]
     bits = int("".join(letter for letter in name if letter.isdigit()))
     frame = source.frame(chip, exposure, bits)[: size_px[1], : size_px[0]]
