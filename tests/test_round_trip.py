@@ -1,11 +1,11 @@
-"""decode(simulate(h)) gives h back, whatever the rig."""
+"""Decoding a simulated surface gives the surface back, for random rigs."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given, seed, settings
 from hypothesis import strategies as st
 from support.bars import hold, tolerance
 
@@ -24,10 +24,14 @@ codes = st.sampled_from([(36.0, 35.0, 30.0), (25.0, 24.0, 20.0), (28.25, 27.3, 2
 
 @st.composite
 def projectors(draw: st.DrawFn) -> Device:
-    """Draw a projector 10 to 22 degrees beside the camera that lights the whole field through some lens."""
+    """Draw a projector at 10 to 22 degrees to the camera that lights the whole field, with lens distortion."""
     angle = math.radians(draw(st.floats(10, 22))) * draw(st.sampled_from([1, -1]))
     distance_mm = draw(st.floats(600, 1500))
     columns = draw(st.sampled_from([912, 1280, 1920]))
+    return projector_at(angle, distance_mm, columns, draw(st.floats(-0.1, 0.1)))
+
+
+def projector_at(angle: float, distance_mm: float, columns: int, k1: float = 0.0) -> Device:
     sine, cosine = math.sin(angle), math.cos(angle)
     focal = columns / (1.3 * FIELD_MM) * distance_mm
     return Device(
@@ -35,7 +39,7 @@ def projectors(draw: st.DrawFn) -> Device:
         height_px=columns,
         focal_px=(focal, focal),
         centre_px=((columns - 1) / 2, (columns - 1) / 2),
-        distortion=(draw(st.floats(-0.1, 0.1)), 0.0, 0.0, 0.0, 0.0),
+        distortion=(k1, 0.0, 0.0, 0.0, 0.0),
         rotation=((cosine, 0.0, sine), (0.0, 1.0, 0.0), (-sine, 0.0, cosine)),
         translation_mm=(-DEPTH_MM * sine, 0.0, distance_mm - DEPTH_MM * cosine),
     )
@@ -49,11 +53,9 @@ CAMERA = Device(
 )
 
 
-@settings(max_examples=25, deadline=None, derandomize=True, suppress_health_check=[HealthCheck.too_slow])
-@given(surface=surfaces, numbers=codes, projector=projectors(), noise=st.sampled_from([0.0, 0.01]))
-def test_simulated_shapes_come_back(
+def measured(
     surface: str, numbers: tuple[float, float, float], projector: Device, noise: float
-) -> None:
+) -> tuple[qf.Shape, qf.Truth]:
     config = qf.SystemConfig(
         camera=CAMERA,
         projector=projector,
@@ -64,16 +66,35 @@ def test_simulated_shapes_come_back(
         shot = scanner.grab()
         shape = scanner.decode(shot)
     assert shot.truth is not None
-    found = compare(shape, shot.truth, projector.width_px / numbers[0])
+    return shape, shot.truth
+
+
+@seed(0)  # a fixed one: derandomize draws other examples after every edit of the function
+@settings(max_examples=25, deadline=None, database=None, suppress_health_check=[HealthCheck.too_slow])
+@given(surface=surfaces, numbers=codes, projector=projectors(), noise=st.sampled_from([0.0, 0.01]))
+def test_simulated_shapes_come_back(
+    surface: str, numbers: tuple[float, float, float], projector: Device, noise: float
+) -> None:
+    shape, truth = measured(surface, numbers, projector, noise)
+    found = compare(shape, truth, projector.width_px / numbers[0])
     hold("random_rigs.returned_percent", found.returned_percent)
-    smooth = np.isfinite(shot.truth.column_px) & ~shot.truth.edge & shape.returned
+    smooth = np.isfinite(truth.column_px) & ~truth.edge & shape.returned
     half_fringe_px = projector.width_px / numbers[0] / 2
-    wrong = np.abs(shape.column_px - shot.truth.column_px)[smooth] > half_fringe_px
+    wrong = np.abs(shape.column_px - truth.column_px)[smooth] > half_fringe_px
     hold("random_rigs.wrong_share", wrong.mean())
     hold("random_rigs.depth_median_mm", np.nanmedian(np.abs(found.depth_error_mm)))
 
 
-@settings(max_examples=10, deadline=None, derandomize=True)
+def test_steps_about_as_wide_as_a_fringe_lose_more() -> None:
+    """The weakest rig that was ever drawn: wide fringes, a small angle, and steps."""
+    numbers, projector = (25.0, 24.0, 20.0), projector_at(math.radians(10), 942.0, 912)
+    shape, truth = measured("steps", numbers, projector, 0.0)
+    found = compare(shape, truth, projector.width_px / numbers[0])
+    hold("random_rigs.weakest_returned_percent", found.returned_percent)
+
+
+@seed(0)
+@settings(max_examples=10, deadline=None, database=None)
 @given(projector=projectors())
 def test_points_lie_where_the_camera_sees_them(projector: Device) -> None:
     """X, Y, Z of each pixel project back onto it, and onto the decoded column of the projector."""
