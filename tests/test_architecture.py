@@ -1,4 +1,4 @@
-"""Where Python code may stand, and what may import what; import-linter checks the packages themselves."""
+"""Python imports between folders, and the size of the package; import-linter checks imports within it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The ledger of accuracy bars is complete: every limit of a test stands in it, and every entry is used."""
+"""The ledger of accuracy bars is complete: it holds every limit of a test, and tests use every entry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Many shots on many processes: the same files however often the work was interrupted."""
+"""Batch decoding on several processes gives the same files, also after interruptions."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ SHOTS, BLACK = 6, 3
 
 @pytest.fixture(scope="module")
 def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Shots with noise of their own, one of them without infrared light."""
+    """Shots with different noise, one of them without infrared light."""
     path = tmp_path_factory.mktemp("takes") / "take.h5"
     with qf.open(SYSTEM) as scanner, Recorder(path, scanner.config, scanner.calibration) as recorder:
         shot = scanner.grab()
@@ -44,7 +44,7 @@ def take(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def whole(take: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What a run without interruption writes, on one process."""
+    """The files of an uninterrupted run on one process."""
     out = tmp_path_factory.mktemp("whole")
     outcomes = {o.shot: o for o in decode_recordings([take], out, workers=1)}
     assert sorted(outcomes) == list(range(SHOTS))

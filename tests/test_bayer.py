@@ -1,4 +1,4 @@
-"""Raw mosaics of a Bayer chip: records, files, decoding, and what is said when something does not fit."""
+"""Raw mosaics of a Bayer chip: records, files, decoding, and error messages."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def grab(**scene: Any) -> qf.BayerShot:
 
 
 def mosaic(planes: list[Image], pattern: str) -> Image:
-    """Give what a chip sees of red, green, blue."""
+    """Give the raw image of a Bayer chip from red, green and blue planes."""
     raw = planes[1].copy()
     row, column = divmod(pattern.index("r"), 2)
     raw[row::2, column::2] = planes[0][row::2, column::2]

@@ -1,4 +1,4 @@
-"""The border to the kernel: what goes in, what comes out, and which error is raised."""
+"""The compiled module: arguments, results and errors."""
 
 from __future__ import annotations
 
@@ -156,7 +156,7 @@ def test_one_decoder_serves_several_threads(images: Four, threads: int | None) -
     def decode() -> None:
         found.extend(plan.decode(*shot) for _ in range(10))
 
-    # A thread of the decoder that waited for the shot it is working on would wait for ever.
+    # A thread of the decoder that waits for the shot in progress would deadlock.
     workers = [threading.Thread(target=decode, daemon=True) for _ in range(4)]
     for worker in workers:
         worker.start()

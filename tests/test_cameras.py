@@ -1,4 +1,4 @@
-"""Cameras without a wire: which devices are meant, what their bytes are, and what is said when the extra is missing."""
+"""Cameras without hardware: names of devices, pixel formats, and the message when the extra is missing."""
 
 from __future__ import annotations
 

@@ -58,7 +58,7 @@ def test_command_line_decodes_a_capture(scene: scoring.Scene, response_file: Pat
             assert maps[name].dtype == np.float32
         returned = np.isfinite(maps["phase_rad"])
         order = np.floor(maps["phase_rad"][returned] / (2 * np.pi))
-        assert (np.abs(maps["order"][returned] - order) <= 1).all()  # equal but for rounding
+        assert (np.abs(maps["order"][returned] - order) <= 1).all()  # equal except for rounding
         assert "xyz_mm" not in maps
 
 
@@ -76,7 +76,7 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
         wrong = np.abs(shape.phase_rad - scene.phase_rad)[seen] >= np.pi
         probability = shape.wrong_order_probability[seen]
         assert wrong.sum() <= probability.sum()
-        # A bound that says something: most of the object is surely known, and hardly any of that is wrong.
+        # The bound is useful: most of the object has a small probability, and hardly any of those pixels is wrong.
         sure = probability < 0.01
         hold("captures.sure_of_object", np.count_nonzero(sure) / np.count_nonzero(scene.scored))
         known = isinstance(response, ResponseCalibration)
@@ -121,7 +121,7 @@ def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file
     raw, linear = (scoring.score(scene, phase_rad) for phase_rad in phases_rad)
     hold("captures.response_gain_percent", linear.right_percent - raw.right_percent)
     hold("captures.phase_of_uncorrected", linear.right_phase_rms_rad / raw.right_phase_rms_rad)
-    # The pixels that only linear light gives back, at steep rims, are the worst of all.
+    # The pixels that are returned only with linear light lie at steep rims and have the largest errors.
     off_rad = [np.abs(phase_rad - scene.phase_rad) for phase_rad in phases_rad]
     both = scene.scored & (off_rad[0] < np.pi) & (off_rad[1] < np.pi)
     before, after = (scoring.rms(off[both]) for off in off_rad)

@@ -1,4 +1,4 @@
-"""The command line as others script it: options, keys, exit statuses, nothing half-written."""
+"""The command line as scripts use it: options, keys, exit statuses, complete files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Settings: one TOML, everything wrong in it named at once."""
+"""Settings: one TOML file, and one report of all its errors."""
 
 from __future__ import annotations
 

@@ -77,7 +77,7 @@ def test_exchanged_channels_are_told() -> None:
 
 
 def test_a_pair_that_has_drifted_is_told() -> None:
-    """Half a millimetre is told; at one and a half all orders are wrong, which no margin shows."""
+    """Half a millimetre is reported; at one and a half all orders are wrong, and the margin does not show it."""
     with qf.open(SystemConfig(camera=SMALL, scene=SceneConfig(surface="peaks", noise=0.01))) as scanner:
         config = scanner.config
     assert config.projector is not None
@@ -140,7 +140,7 @@ def test_the_command_line_says_it(tmp_path: Path) -> None:
     assert "quadfringe calibrate response" in run.stdout
     told = {one["name"]: one for one in json.loads((tmp_path / "d.json").read_text())["findings"]}
     assert told["response"]["grade"] == "fault"
-    # Under room light the exponent alone does not make the light linear, however well it is known.
+    # Under room light the exponent alone does not make the light linear, even if it is exact.
     lit = CliRunner().invoke(app, ["doctor", str(tmp_path), str(tmp_path / "c.json")])
     assert "estimate it again" in lit.stdout
     dark, _ = shot_of(projector_exponent=2.0, ambient=(0.0,) * 4)

@@ -20,7 +20,7 @@ BOX_PX = 5
 
 
 def least_squares(images: measure.Images, size_px: int) -> NDArray[np.float64]:
-    """One Gauss-Newton step from the truth in a square window: as good as any estimator of this window can be."""
+    """One Gauss-Newton step from the truth in a square window: the optimum for this window."""
     slopes = [
         -measure.MODULATION * k * np.sin(k * PHASE_RAD + s) for k, s in zip(RATIOS, measure.SHIFTS_RAD, strict=True)
     ]

@@ -1,4 +1,4 @@
-"""Pairing: the truth is the number of the exposure, which the matcher never sees."""
+"""Matching of frames: the truth is the number of the exposure, which the matcher does not use."""
 
 from __future__ import annotations
 

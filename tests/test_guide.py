@@ -1,4 +1,4 @@
-"""The guided calibration: the whole way on the virtual bench and from a folder, and what it says when captures lack."""
+"""The guided calibration on the virtual bench and from a folder, and its messages when captures are missing."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ CONFIG = SystemConfig(
     camera=CAMERA,
     scene=SceneConfig.model_validate(
         {
-            "noise": 0.002,  # with a quarter of the pixels 1 % is beyond the limits of acceptance
+            "noise": 0.002,  # with a quarter of the pixels, 1 % fails the acceptance
             "bit_depth": 12,
             "gain": 0.75,
             "blur_px": 0.5,

@@ -1,4 +1,4 @@
-"""The moving hand: recording, PLY of every instant and movie; over the wire it is filmed in tests/camera."""
+"""The moving hand: recording, PLY of every instant and movie; tests/camera record it over GigE Vision."""
 
 from __future__ import annotations
 

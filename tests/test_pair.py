@@ -1,4 +1,4 @@
-"""The pair of projectors: its pose, its correction, and unwrapping that knows both."""
+"""The pair of projectors: its pose, its correction, and unwrapping with both calibrations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From stacks of stepped fringes to maps of projector pixels, and from those to the projector pixels of points."""
+"""Maps of projector pixels from stacks of stepped fringes, and projector pixels of points from these maps."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from quadfringe.errors import InputError
 
 
 def flat_map(width: int = 200, height: int = 150) -> ProjectorMap:
-    """A map that bends as perspective and lenses bend it."""
+    """A map with the bends of perspective and lenses."""
     y, x = np.mgrid[:height, :width].astype(np.float64)
     column = 300 + 0.6 * x + 0.02 * y + 1e-4 * (x - 80) ** 2
     row = 400 - 0.01 * x + 0.7 * y - 2e-4 * x * y
@@ -42,7 +42,7 @@ def test_projector_points_follow_bent_maps_and_registration() -> None:
         atol=tolerance("projector_map.points_px"),
     )
     np.testing.assert_allclose(found.slope[:3, 1, 1], 0.7 - 2e-4 * x, atol=1e-4)
-    assert np.isnan(found.points_px[3]).all()  # too little around it
+    assert np.isnan(found.points_px[3]).all()  # too few pixels around it
     moved = projector_points(flat_map(), view, radius_px=15, ir_registration=((1.0, 0.0, 2.0), (0.0, 1.0, -1.0)))
     there = replace(view, points_px=view.points_px + np.array((2.0, -1.0)))
     np.testing.assert_allclose(moved.points_px, projector_points(flat_map(), there, radius_px=15).points_px)
@@ -51,7 +51,7 @@ def test_projector_points_follow_bent_maps_and_registration() -> None:
 
 
 def stacks(plan: StepPlan, axis: Any) -> list[NDArray[np.float32]]:
-    """What a camera sees that looks at the mirrors one to one."""
+    """Images of a camera whose pixels are the mirrors of the projector."""
     return [
         np.stack([0.05 + 0.9 * step_image(plan, axis, f, step) for step in range(plan.steps)]).astype(np.float32)
         for f in range(3)

@@ -1,4 +1,4 @@
-"""`record`, `recover`, `live` and `batch` as others script them."""
+"""The commands `record`, `recover`, `live` and `batch`."""
 
 from __future__ import annotations
 

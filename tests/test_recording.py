@@ -1,4 +1,4 @@
-"""Takes: what was reported as written is readable, whatever happens to the writer, the disk or the file."""
+"""Recordings: shots reported as written are readable, also after faults of the writer, the disk or the file."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def test_nothing_reported_is_lost_when_the_writer_is_killed(tmp_path: Path) -> N
             assert not take.closed_in_order
             assert all(whole(shot, number) for number, shot in enumerate(take))
         assert recover(path, tmp_path / f"whole{run}.h5").shots >= reported
-        with h5py.File(tmp_path / f"whole{run}.h5") as file:  # as any program opens it
+        with h5py.File(tmp_path / f"whole{run}.h5") as file:  # as other programs open it
             assert len(file["red"]) >= reported
 
 
@@ -221,7 +221,7 @@ def test_replay_at_full_speed_gives_every_shot_once(take: Path) -> None:
 
 
 class Clock:
-    """A clock that goes on when somebody waits; it stands in for the event that ends a wait too."""
+    """A clock that advances with each wait; it also replaces the event that ends a wait."""
 
     def __init__(self) -> None:
         self.now_s = 100.0
@@ -249,7 +249,7 @@ def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(
         begin_s = clock.now_s
         stream = camera.stream(keep=keep)  # type: ignore[arg-type]
         came = [next(stream).id]
-        clock.now_s += 0.1  # three periods in which nobody takes a shot
+        clock.now_s += 0.1  # three periods in which no shot is taken
         came += [shot.id for shot in stream]
         assert came == ids
         assert clock.now_s - begin_s == pytest.approx(9 * 0.030)

@@ -1,4 +1,4 @@
-"""Records: what is saved is what is read back."""
+"""Records survive saving and loading."""
 
 from __future__ import annotations
 

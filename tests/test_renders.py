@@ -1,4 +1,4 @@
-"""Renders of another program with rig and exact truth: geometry and phase judged from outside."""
+"""Renders of an independent program, with rig and exact truth: geometry and phase."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
 
 @pytest.mark.parametrize("layout", ["regular", "diamond"])
 def test_the_bars_hold_on_the_bench(layout: str) -> None:
-    """A camera of half the size: the whole of `evaluation/calibration.py` in a fraction of its time."""
+    """`evaluation/calibration.py` with a camera of half the size, in a fraction of the time."""
     figures = bench.measured(bench.bench_system(layout, camera_scale=0.5), poses=7, steps=5)
     for name in FIGURES:
         hold(f"calibration.{name}", figures[name])
@@ -56,7 +56,7 @@ def points_of(device: Any, points_mm: NDArray[np.float64]) -> NDArray[np.float64
 
 
 def simulated(places: NDArray[np.float64], seed: int, sd_px: float = POINT_SD_PX) -> list[Pose]:
-    """Points as detection gives them: an error of the camera's point is in the projectors' points too."""
+    """Points as detection gives them: the projectors' points contain the error of the camera's point."""
     random = np.random.default_rng(seed)
     ids, found = np.arange(len(BOARD.points_mm)), []
     for place in places:
@@ -94,7 +94,7 @@ def test_stated_uncertainties_are_those_of_repeated_calibrations(places: NDArray
         ]
         off.append(np.concatenate([error / done.pair.sd, *lens]))
     off = np.array(off)
-    # 120 numbers of unit variance that hang together by tens: their mean square within a factor of two.
+    # 120 numbers of unit variance, correlated in tens: their mean square within a factor of two.
     hold("calibration.mean_square_in_sd", np.square(off).mean())
     hold("calibration.inside_95", (np.abs(off) < 1.96).mean())
 

@@ -25,7 +25,7 @@ FLAT = Shape(*[np.zeros((2, 2), np.float32)] * 4)
 
 
 class ScriptedCamera:
-    """Gives shots at a pace, and raises what is in its place in the script."""
+    """A camera that gives shots at a fixed rate and raises the errors of a script."""
 
     name = "scripted"
     calibration = None

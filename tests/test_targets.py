@@ -1,4 +1,4 @@
-"""Boards: what is printed, and where it is found in images of the virtual bench."""
+"""Boards: printed files, and detection in images of the virtual bench."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ def test_own_centres_beat_the_blobs_of_opencv(tilt: str) -> None:
 
 
 def test_the_middle_of_a_ring_is_not_the_middle_of_its_image() -> None:
-    """Nearly without noise: taking the perspective off is what makes the difference."""
+    """Nearly without noise, so that the correction of the perspective makes the difference."""
     image, truth = seen("circles", TILTS["45 degrees about x"], noise=1e-4, bit_depth=16)
     target = BOARDS["circles"]
     from quadfringe.calibration import _centres as centres
@@ -224,7 +224,7 @@ def test_boards_that_cannot_be_drawn_are_refused() -> None:
 
 @pytest.mark.parametrize("kind", BOARDS)
 def test_printed_boards_are_to_scale(kind: str, tmp_path: Path) -> None:
-    """The picture of the file, measured by detection: every point in its place on paper."""
+    """Detection in the rasterised file finds every point in its place on paper."""
     done = CliRunner().invoke(app, ["target", kind, "--out", str(tmp_path / "b.png"), "--dpi", "150", "--page", "a3"])
     assert done.exit_code == 0, done.output
     target = Target.model_validate(json.loads((tmp_path / "b.json").read_text()))

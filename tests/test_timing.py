@@ -1,4 +1,4 @@
-"""`quadfringe bench`: what it measures is what it says, and scripts can read it."""
+"""`quadfringe bench`: consistent figures, in a form that scripts can read."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Shots that cannot be trusted are refused with their likely cause; sound ones pass."""
+"""The verdict refuses shots that cannot be trusted and names the likely cause; sound shots pass."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The 2CCD camera over a real GigE Vision wire: formats, triggers, buffers, settings that are read back."""
+"""The 2CCD camera over GigE Vision: formats, triggers, buffers, settings that are read back."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_one_chip_of_two_streams() -> None:
 
 
 def test_a_camera_of_one_chip() -> None:
-    """Aravis' own fake cameras: one device, one stream, features named otherwise than those of ours."""
+    """The fake cameras of Aravis: one device, one stream, and other feature names than the emulator."""
     with fake_twin(SIZE_PX, 30.0) as fakes:
         device = fakes.capture.infrared.device
         assert device is not None
@@ -112,7 +112,7 @@ def test_a_camera_of_one_chip() -> None:
 
 
 def test_a_camera_that_is_not_on_a_network() -> None:
-    """The simulated device of Aravis stands for USB3 Vision: no packets, no addresses, no controller."""
+    """The simulated device of Aravis represents USB3 Vision: no packets, no addresses, no controller."""
     from gi.repository import Aravis
 
     Aravis.enable_interface("Fake")

@@ -29,7 +29,7 @@ def right(camera: AravisCamera, count: int) -> list[int]:
 
 
 def rest(stream: Iterator[AnyShot]) -> None:
-    """Take what still comes; all of it is right."""
+    """Take the remaining shots; all of them are right."""
     for shot in stream:
         checked_exposure(shot)
 
@@ -103,7 +103,7 @@ def test_a_wrong_frame(emulator: Emulator, camera: AravisCamera, fault: str, rea
 
 
 def test_a_short_frame_of_the_right_size(emulator: Emulator, camera: AravisCamera) -> None:
-    """Aravis calls a frame a success whose payload is too short for its size."""
+    """Aravis reports success for a frame whose payload is too short for its size."""
     emulator.order("short", 1)
     with pytest.raises(WrongFrameError, match=r"bytes instead of|incomplete"):
         camera.snap(2.0)
@@ -112,7 +112,7 @@ def test_a_short_frame_of_the_right_size(emulator: Emulator, camera: AravisCamer
 
 
 def test_packets_of_another_size_than_agreed(emulator: Emulator, camera: AravisCamera) -> None:
-    """Aravis puts such packets at wrong places, and calls the frame a success."""
+    """Aravis puts such packets at wrong places and reports success."""
     stream = camera.stream(keep="all")
     checked_exposure(next(stream))
     emulator.order("packet_size", 1000)

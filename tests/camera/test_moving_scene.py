@@ -1,4 +1,4 @@
-"""The moving hand over the wire of GigE Vision: every pixel arrives, and what arrives is recorded."""
+"""The moving hand over GigE Vision: every pixel arrives and is recorded."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ def emulated(emulator: Emulator, visible: str | None = None, infrared: str | Non
         name: ChipConfig(device=address, pixel_format=chosen)  # type: ignore[arg-type]
         for name, address, chosen in zip(("visible", "infrared"), emulator.addresses, (visible, infrared), strict=True)
     }
-    # A busy machine may take long until frames come evenly, or at all.
+    # On a busy machine it may take long until the first frames arrive.
     return AravisConfig(**chips, **({"timeout_s": 10.0} | more))
 
 

@@ -1,4 +1,4 @@
-"""The live view in a real browser: Debian's chromium without a screen, in software.
+"""The live view in a real browser: headless chromium with software rendering.
 
 `make test-live` installs it and runs these tests; plain pytest leaves this folder out.
 """

@@ -49,7 +49,7 @@ def system(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @contextmanager
 def live(system: Path, **settings: Any) -> Iterator[tuple[Viewer, Recorder]]:
-    """A scanner that measures without pause, its page and its recorder, until the block ends."""
+    """A scanner that measures continuously, its page and its recorder, until the block ends."""
     with qf.open(system) as scanner, Viewer(port=8230, **settings) as viewer:
         recorder = Recorder(system.parent / f"{time.time_ns()}.h5", scanner.config, scanner.calibration)
         with recorder, scanner.stream(taps={"record": recorder.write}) as stream:
@@ -63,7 +63,7 @@ def live(system: Path, **settings: Any) -> Iterator[tuple[Viewer, Recorder]]:
 
 
 def until(what: Callable[[], Any], why: str) -> Any:
-    """Ask until there is an answer; fail when patience ends."""
+    """Repeat a question until there is an answer; fail after a time limit."""
     end = time.monotonic() + PATIENCE_S
     while time.monotonic() < end:
         if (answer := what()) is not None:
@@ -134,7 +134,7 @@ def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
     seen = {}
     for colouring in ("texture", "height", "quality"):
         with Viewer(port=8235, colouring=colouring) as viewer:  # type: ignore[arg-type]
-            viewer.show(measured)  # nobody looks yet
+            viewer.show(measured)  # before any page is open
             page = browser.new_page(viewport={"width": 1280, "height": 800})
             page.goto(viewer.url)
             image = until(lambda page=page: still_shape_on(page), "no shape")
@@ -156,7 +156,7 @@ def test_only_this_machine_is_served_unless_asked() -> None:
         assert f"00000000:{port:04X}" not in listening
         with socket.create_connection(("127.0.0.1", port), timeout=5) as guest:
             guest.shutdown(socket.SHUT_WR)
-            while guest.recv(4096):  # until the server, too, has closed: its event loop ends with the viewer
+            while guest.recv(4096):  # until the server has closed: its event loop ends with the viewer
                 pass
     with pytest.raises(OSError, match=r".*"), socket.create_connection(("127.0.0.1", port), timeout=1):
         pass

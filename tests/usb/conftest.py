@@ -1,4 +1,4 @@
-"""Tests behind the testbed: `make test-usb` starts it, and plain pytest leaves this folder out."""
+"""Tests in the umockdev testbed: `make test-usb` starts it; plain pytest leaves this folder out."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ if TESTBED not in os.environ:
 
 @pytest.fixture(scope="session")
 def order() -> Iterator[Order]:
-    """Give orders to the testbed: a port, then what happens there."""
+    """Send orders to the testbed: a port and an event."""
     with socket.socket(socket.AF_UNIX) as wire:
         wire.connect(os.environ[TESTBED])
         answers = wire.makefile()
@@ -49,7 +49,7 @@ def power_on(order: Order) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def screen(tmp_path_factory: pytest.TempPathFactory) -> Screen:
-    """An X server of 912 x 1140, in the environment of this process from now on.
+    """An X server of 912 x 1140; DISPLAY names it for the rest of this process.
 
     It ends with its last client, this process: Xlib would end the process if the server went first.
     """

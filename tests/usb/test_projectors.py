@@ -1,4 +1,4 @@
-"""Every projector keeps one contract; the pair of a system file shows its fringes, whichever way they reach it."""
+"""Every projector keeps the protocol; the pair of a system file shows its fringes by HDMI and from flash."""
 
 from __future__ import annotations
 
