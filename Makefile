@@ -10,7 +10,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
-KERNEL := $(shell find crates -name '*.rs' -o -name Cargo.toml 2>/dev/null) Cargo.toml
+KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
 .PHONY: demo test test-usb test-camera test-live fuzz coverage figures evaluation bench rust python stubs format bench peers clean
 
@@ -19,17 +19,21 @@ demo: $(STAMPS)/built
 
 test: rust python test-usb test-camera test-live
 
+# One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
+# only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
+CARGO_ALL := --package quadfringe --package lightcrafter --all-features
+# `cargo test` builds examples and programs here.
+BUILT := $(or $(CARGO_TARGET_DIR),target)/debug
+# These two tests start a umockdev testbed and an X server, which scripts/set-up installs; test-usb runs them.
+TESTBEDS := under_umockdev under_xvfb
+
 rust: $(STAMPS)/tools
 	cargo fmt --all --check
-	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets -- -D warnings
-	cargo clippy --package lightcrafter --all-targets --all-features -- -D warnings
-	cargo test
-	cargo test --package lightcrafter --no-default-features --features emulator
-	for example in crates/quadfringe/examples/*.rs; do \
-		cargo run --release --quiet --package quadfringe --example "$$(basename "$$example" .rs)"; done
-	cargo run --quiet --package lightcrafter --features emulator --example one_image
-	RUSTDOCFLAGS="-D warnings" cargo doc --package quadfringe --no-deps --quiet
-	RUSTDOCFLAGS="-D warnings" cargo doc --package lightcrafter --all-features --no-deps --quiet
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --all-features -- -D warnings
+	cargo clippy --package lightcrafter --all-targets --no-default-features --features emulator -- -D warnings
+	cargo test $(CARGO_ALL) -- $(TESTBEDS:%=--skip %)
+	for example in crates/*/examples/*.rs; do $(BUILT)/examples/"$$(basename "$$example" .rs)"; done
+	RUSTDOCFLAGS="-D warnings" cargo doc $(CARGO_ALL) --no-deps --quiet
 
 python: $(STAMPS)/built stubs
 	$(BIN)/ruff check .
@@ -45,10 +49,10 @@ stubs: $(STAMPS)/built
 # under Xvfb.
 test-usb: $(STAMPS)/built
 	scripts/set-up testbed
-	cargo test --package lightcrafter --all-features --lib --test libusb --test window
-	cargo run --quiet --package lightcrafter --no-default-features --features testbed --bin lightcrafter-testbed -- $(BIN)/pytest tests/usb
+	cargo test $(CARGO_ALL) --test libusb --test window
+	$(BUILT)/lightcrafter-testbed $(BIN)/pytest tests/usb
 
-# Two cameras on the wire of GigE Vision, in a network of its own that has nothing but the loopback interface.
+# Two cameras over GigE Vision, in a network namespace that has only the loopback interface.
 test-camera: $(STAMPS)/camera
 	if scripts/loopback true; then \
 		scripts/loopback $(BIN)/pytest tests/camera && \
@@ -60,12 +64,12 @@ $(STAMPS)/camera: $(STAMPS)/built
 	$(BIN)/pip install --quiet --disable-pip-version-check "PyGObject>=3.42,<3.52"
 	touch $@
 
-# The live view in Debian's chromium without a screen.
+# The live view in headless chromium.
 test-live: $(STAMPS)/built
 	scripts/set-up browser
 	QUADFRINGE_BROWSER=1 $(BIN)/pytest tests/live
 
-# Any bytes to the decoders, the driver and the emulator, on the stable compiler: libFuzzer with LLVM's counters.
+# Random bytes to the decoders, the driver and the emulator: libFuzzer on the stable compiler, with LLVM's counters.
 FUZZ_SECONDS ?= 300
 FUZZ := crates/lightcrafter/fuzz
 COUNTERS := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
@@ -77,12 +81,12 @@ fuzz:
 	RUSTFLAGS="$(COUNTERS)" cargo run --release --quiet --manifest-path $(FUZZ)/Cargo.toml --target $(FUZZ_HOST) -- \
 		$(FUZZ)/corpus -artifact_prefix=$(FUZZ)/artifacts/ -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -print_final_stats=1
 
-# Lines of the crate lightcrafter that its tests run; fails below 90 %.
+# Share of the lines of the crate lightcrafter that its tests run; fails below 90 %.
 coverage:
 	scripts/set-up testbed
 	scripts/coverage
 
-# Pictures and figures of the README; nothing in it is drawn or typed by hand.
+# Pictures and figures of the README.
 figures: $(STAMPS)/built
 	$(BIN)/python docs/draw_pictures.py
 	$(BIN)/python evaluation/figures.py
@@ -91,13 +95,13 @@ figures: $(STAMPS)/built
 evaluation: $(STAMPS)/built
 	$(BIN)/python evaluation/results.py
 
-# Times, memory and other packages into benches/RESULTS.md; let the machine do nothing else meanwhile.
+# Times, memory and other packages into benches/RESULTS.md; run it on an idle machine.
 bench: $(STAMPS)/peers
 	$(BIN)/python benches/results.py
 
 peers: $(STAMPS)/peers
 
-# Fringes asks for another OpenCV wheel than ours, and two of them in one environment overwrite each other.
+# Fringes requires another OpenCV wheel than quadfringe; two of them in one environment overwrite each other.
 $(STAMPS)/peers: $(STAMPS)/built benches/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps "Fringes>=2.1,<3"
@@ -113,7 +117,7 @@ $(STAMPS)/tools: pyproject.toml scripts/set-up
 	mkdir -p $(STAMPS)
 	touch $@
 
-# An editable install: Python changes need nothing, Rust changes rebuild here, always optimised.
+# An editable install: Python changes take effect at once, Rust changes rebuild here, always optimised.
 $(STAMPS)/built: $(STAMPS)/tools $(KERNEL)
 	@echo "building the kernel and installing the package (some minutes the first time)"
 	PIP_QUIET=1 PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --extras test
