@@ -1,28 +1,23 @@
-//! Whether the channels agree: what noise does not explain of the difference between the phase by R and B and that by G and IR.
+//! Step 9: whether the channels agree. The difference between the phase of R with B and that of G with IR, beyond noise.
 //!
-//! All four channels measure the same column. Where backgrounds, modulations or albedo are wrong - beside edges, at the border of
-//! the image, on coloured prints, on a surface that moves - each pair is off in a way of its own, and the mean of both by
-//! about half of what they differ by.
+//! All four channels measure the same column. Where offsets, amplitudes or albedo are wrong (near edges, at the border of the
+//! image, on textured or moving surfaces) the error of each pair is different, and the mean of both is off by about half of what
+//! they differ by.
 
-use super::cells::{CellMaps, CellWork, RowMaps, kernel};
-use super::photometry::{Backgrounds, carriers};
-use super::scene::Scene;
+use super::cells::{CellMaps, CellWindow, CellWork, RowMaps, kernel};
+use super::model::{FringeRows, carriers};
+use super::params::uncertainty::{
+    PAIR_EXCESS_MAX_RAD2, PAIR_NEIGHBOURHOOD, PAIR_SAMPLED_ROWS, PAIR_SHARE_MIN, PAIR_WINDOW,
+};
+use super::photometry::Photometry;
+use super::scene::{PhaseMap, Scene};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 
-/// Width (sigma) in fringe periods of the windows that give a phase of each pair.
-const WINDOW: f32 = 0.125;
-/// Width (sigma) in fringe periods of the surroundings over which their squared differences are averaged.
-const SURROUNDINGS: f32 = 0.4;
-/// Rows of pixels that stand for a row of cells.
-const SAMPLED_ROWS: usize = 2;
-/// Least share of the information that a pair must have to be asked.
-const SHARE_MIN: f32 = 0.02;
-
-/// Variance of the phase by what the pairs disagree on, cell by cell, and working maps.
+/// Variance of the phase by the disagreement of the two pairs, on the cells, with working maps.
 #[derive(Debug)]
-pub(crate) struct Agreement {
+pub(super) struct Agreement {
     variance: CellMaps,
     excess: CellMaps,
     sums: CellMaps,
@@ -41,41 +36,53 @@ impl Default for Agreement {
 }
 
 impl Agreement {
-    /// Ask a final absolute phase in rad; intensities have the standard deviation `noise`, `modulation` is 0 where there is no
-    /// light, `ratios` are the fringe numbers over the first.
+    /// Measure the disagreement at a final absolute phase. `ratios` are the fringe numbers over the first, `noise` is the standard
+    /// deviation of the intensities in linear light.
     pub fn measure(
         &mut self,
         scene: &Scene<'_>,
-        (ratios, noise): ([f32; 3], f32),
-        backgrounds: &Backgrounds,
-        phase: &[f32],
-        modulation: &[f32],
+        ratios: [f32; 3],
+        noise: f32,
+        photometry: &Photometry,
+        map: PhaseMap<'_>,
     ) {
-        let grid = scene.grid;
-        let sigma = scene.cells(WINDOW);
-        // Sum of squares of the weights of the window, along rows times along columns.
+        let sigma = scene.cells(PAIR_WINDOW);
+        // Sum of the squared weights of the window, along rows times along columns.
         let share = kernel(sigma).iter().map(|weight| weight * weight).sum::<f32>().powi(2);
         let variance = noise * noise * share;
-        let Self { excess, sums, slots, variance: out, .. } = self;
-        grid.window_sums::<4, RowMaps>(
-            (sigma, SAMPLED_ROWS),
-            slots,
-            sums,
-            excess,
+        scene.grid.window_sums::<4, RowMaps>(
+            CellWindow { sigma_cells: sigma, sampled_rows: PAIR_SAMPLED_ROWS },
+            &self.slots,
+            &mut self.sums,
+            &mut self.excess,
             |maps, y, sums| {
-                // Among many a pixel finds backgrounds that agree; what it left says how much is to be doubted.
-                let model = backgrounds.sample_own(scene, y, maps);
-                let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
-                add_pairs(model, pixels, scene.rows(y), ratios, sums);
+                // Offsets and amplitudes of the place of each pixel: those that it has chosen among many were chosen to agree.
+                let fringes = photometry.sample_in_place(scene, y, maps);
+                let pixels = PixelRows {
+                    phase: scene.row(map.phase, y),
+                    modulation: scene.row(map.modulation, y),
+                    usable: scene.row(scene.usable, y),
+                };
+                add_pairs(&fringes, &pixels, scene.rows(y), ratios, sums);
             },
-            |_, sums, out| disagree(sums, variance, out),
+            |_, [numerator, information, other_numerator, other_information], out| {
+                let pair = Pair { numerator, information };
+                let other = Pair { numerator: other_numerator, information: other_information };
+                excess(pair, other, variance, out);
+            },
         );
+        self.average(scene);
+    }
+
+    /// Mean excess over the neighbourhood.
+    fn average(&mut self, scene: &Scene<'_>) {
+        let Self { variance, excess, sums, slots } = self;
         let excess = &*excess;
-        grid.smooth::<2, RowMaps>(
-            scene.cells(SURROUNDINGS),
+        scene.grid.smooth::<2, RowMaps>(
+            scene.cells(PAIR_NEIGHBOURHOOD),
             slots,
             sums,
-            out,
+            variance,
             |row, k| Some(excess.line(row, k)),
             |_, [weight, excess], out| {
                 for (out, (weight, excess)) in out.iter_mut().zip(weight.iter().zip(excess)) {
@@ -92,58 +99,73 @@ impl Agreement {
     }
 }
 
-/// Adds, for R with B and for G with IR, what the intensities still say about the phase, and how much they know of it with the
-/// albedo eliminated.
+/// One row of pixels.
+struct PixelRows<'a> {
+    phase: &'a [f32],
+    modulation: &'a [f32],
+    usable: &'a [f32],
+}
+
+/// Normal equations of a phase step by one pair of channels, cell by cell: the step is numerator over information.
+#[derive(Clone, Copy)]
+struct Pair<'a> {
+    numerator: &'a [f32],
+    information: &'a [f32],
+}
+
+/// Adds numerator and information of R with B and of G with IR, the albedo eliminated.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_pairs(
-    model: [&[f32]; 8],
-    pixels: [&[f32]; 3],
+    fringes: &FringeRows,
+    pixels: &PixelRows,
     light: [&[f32]; 4],
     ratios: [f32; 3],
     sums: &mut [[Lanes; 4]],
 ) {
-    let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
+    let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
+    let (offset, amplitude, light) =
+        (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
-        let (model, light) = (take(&model, i), take(&light, i));
+        let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios, 0.0);
+            let carriers = carriers(phase[x], ratios, 0.0);
             let (mut mm, mut ms) = (1e-9f32, 0.0f32);
-            let (mut seen, mut known, mut mixed) = ([0.0f32; 2], [0.0f32; 2], [0.0f32; 2]);
+            let (mut ds, mut dd, mut dm) = ([0.0f32; 2], [0.0f32; 2], [0.0f32; 2]);
             for c in 0..4 {
-                let (a, b) = (model[2 * c][x], model[2 * c + 1][x]);
-                let (m, d) = (a + b * cosines[c], b * derivatives[c]);
+                let (a, b) = (offset[c][x], amplitude[c][x]);
+                let (m, d) = (a + b * carriers.cosine[c], b * carriers.derivative[c]);
                 mm += m * m;
                 ms += m * light[c][x];
-                seen[c % 2] += d * light[c][x];
-                known[c % 2] += d * d;
-                mixed[c % 2] += d * m;
+                ds[c % 2] += d * light[c][x];
+                dd[c % 2] += d * d;
+                dm[c % 2] += d * m;
             }
             let albedo = ms / mm;
             let weight = if modulation[x] > 0.0 { usable[x] * albedo } else { 0.0 };
             for k in 0..2 {
-                terms[2 * k][x] = weight * (seen[k] - albedo * mixed[k]);
-                terms[2 * k + 1][x] = weight * albedo * (known[k] - mixed[k] * mixed[k] / mm);
+                terms[2 * k][x] = weight * (ds[k] - albedo * dm[k]);
+                terms[2 * k + 1][x] = weight * albedo * (dd[k] - dm[k] * dm[k] / mm);
             }
         }
         add(sums, &terms);
     }
 }
 
-/// Weight, and what the squared difference of the pairs is above that of noise, as a variance of the mean of both.
-fn disagree([seen, known, other_seen, other_known]: [&[f32]; 4], variance: f32, out: &mut [f32]) {
-    let columns = seen.len();
+/// Weight of every cell, then the squared difference between the pairs above that of noise, as a variance of their mean.
+fn excess(pair: Pair<'_>, other: Pair<'_>, variance: f32, out: &mut [f32]) {
+    let columns = pair.numerator.len();
     for i in 0..columns {
-        let (own, other) = (known[i], other_known[i]);
-        let whole = own + other;
-        let asked = whole > 1e-9 && own.min(other) > SHARE_MIN * whole;
+        let (first, second) = (pair.information[i], other.information[i]);
+        let whole = first + second;
+        let counts = whole > 1e-9 && first.min(second) > PAIR_SHARE_MIN * whole;
         (out[i], out[columns + i]) = (0.0, 0.0);
-        if asked {
-            let apart = seen[i] / own - other_seen[i] / other;
-            let by_noise = variance * (1.0 / own + 1.0 / other);
-            let shares = (own * own + other * other) / (2.0 * whole * whole);
-            (out[i], out[columns + i]) = (1.0, shares * (apart * apart - by_noise).min(1.0));
+        if counts {
+            let apart = pair.numerator[i] / first - other.numerator[i] / second;
+            let by_noise = variance * (1.0 / first + 1.0 / second);
+            let shares = (first * first + second * second) / (2.0 * whole * whole);
+            (out[i], out[columns + i]) = (1.0, shares * (apart * apart - by_noise).min(PAIR_EXCESS_MAX_RAD2));
         }
     }
 }

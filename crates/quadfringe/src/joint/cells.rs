@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 /// Cells of `step` x `step` pixels over an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Grid {
+pub(super) struct Grid {
     pub height: usize,
     pub width: usize,
     /// Length of a padded row of pixels.
@@ -21,9 +21,18 @@ pub(crate) struct Grid {
     pub columns: usize,
 }
 
+/// A window over cells.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct CellWindow {
+    /// Width (sigma of a Gaussian) in cells.
+    pub sigma_cells: f32,
+    /// Rows of pixels that stand for a row of cells, at most.
+    pub sampled_rows: usize,
+}
+
 /// Working memory of one task that sums up rows of cells.
 #[derive(Debug, Default)]
-pub(crate) struct CellWork {
+pub(super) struct CellWork {
     columns: Vec<Lanes>,
     spare: Vec<f32>,
     total: Vec<f32>,
@@ -86,7 +95,7 @@ impl Grid {
     /// cells with its number and fills its row of `out`.
     pub fn window_sums<const N: usize, S: Default + Send>(
         &self,
-        (sigma, most): (f32, usize),
+        CellWindow { sigma_cells: sigma, sampled_rows: most }: CellWindow,
         slots: &Slots<(S, CellWork)>,
         sums: &mut CellMaps,
         out: &mut CellMaps,
@@ -186,7 +195,7 @@ impl Grid {
 
 /// Several maps on the cells, kept row of cells by row of cells.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct CellMaps {
+pub(super) struct CellMaps {
     columns: usize,
     count: usize,
     data: Vec<f32>,
@@ -241,7 +250,7 @@ impl CellMaps {
 
 /// Slow maps interpolated along one row of pixels.
 #[derive(Debug, Default)]
-pub(crate) struct RowMaps {
+pub(super) struct RowMaps {
     mix: Vec<f32>,
     rows: Vec<Vec<f32>>,
 }
@@ -308,7 +317,7 @@ fn fold_by<const S: usize>(k: usize, vectors: &[Lanes], count: usize, line: &mut
 
 /// Linear interpolation between centres of cells `step` pixels wide, up to 64; `mix` has one cell more on each side.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
+pub(super) fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
     match step {
         1 => out.copy_from_slice(&mix[1..=out.len()]),
         2 => spread_by::<2>(mix, out),
@@ -343,7 +352,7 @@ fn spread_by<const S: usize>(mix: &[f32], out: &mut [f32]) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn blend(above: &[f32], below: &[f32], weight: f32, out: &mut [f32]) {
+pub(super) fn blend(above: &[f32], below: &[f32], weight: f32, out: &mut [f32]) {
     for ((out, a), b) in out.iter_mut().zip(above).zip(below) {
         *out = a + (b - a) * weight;
     }
@@ -380,7 +389,7 @@ fn smooth_line(kernel: &[f32], line: &mut [f32], spare: &mut Vec<f32>) {
 }
 
 /// A Gaussian cut at three sigma; one tap for a sigma of 0.
-pub(crate) fn kernel(sigma: f32) -> Vec<f32> {
+pub(super) fn kernel(sigma: f32) -> Vec<f32> {
     if sigma <= 0.0 {
         return vec![1.0];
     }

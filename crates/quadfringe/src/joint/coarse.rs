@@ -1,222 +1,199 @@
-//! All that needs surroundings: light, beats, orders, backgrounds. It runs on an image whose fringes are no wider than
-//! they have to be, and guides the pixels of the full one.
+//! Steps 2 to 6 on the coarse level: light, beats, orders and photometry, which all need a neighbourhood. Its fringes are no wider than
+//! the steps need, and its result is where the phase of the full image starts.
 
+use super::illumination::LitMask;
+use super::local_fit::{LocalFit, PixelMaps};
+use super::noise::noise_of_phase;
 use super::orders::{Orders, Wrapped};
-use super::params::{BEND_MAX, MISFIT_MAX};
+use super::params::photometry as params;
+use super::phase::{FitRows, PhaseFit, PhaseModel};
+use super::photometry::{Photometry, PhotometryFit};
 use super::pyramid::Level;
+use super::residuals::Residuals;
+use super::scene::{PhaseMap, ScaledGrid, Scene, Scratch};
+use super::slopes::Slopes;
+use super::smooth::mark_discontinuities;
+use super::window::Window;
 use crate::FringeCode;
-use crate::decode::options::Options;
-use crate::joint::cells::Grid;
-use crate::joint::illumination::LightFinder;
-use crate::joint::local_fit::{LocalFit, PixelMaps};
-use crate::joint::phase::{Found, Joint};
-use crate::joint::photometry::{Backgrounds, Fit};
-use crate::joint::residuals::Residuals;
-use crate::joint::scene::{Scene, around};
-use crate::joint::slopes::Slopes;
-use crate::joint::window::{Window, noise};
-use multiversion::multiversion;
-use rayon::prelude::*;
 
-/// Further rounds of backgrounds and phase: on a print, where windows see several colours, and elsewhere.
-const PRINT_ROUNDS: usize = 3;
-const ROUNDS: usize = 2;
-/// Share of the lit pixels beside edges of colours that makes a print.
-const PRINTED: f32 = 0.03;
-/// How much backgrounds believe the phase of a wide window, next to what the light says of it.
-const TRUST: f32 = 0.08;
-/// Share of such a window that has to be lit: where an edge cuts it the mean lies aside. On a print, whose colours tear the phase
-/// everywhere, it would leave too little.
-const LIT_MIN: f32 = 0.9;
-/// The same where channels were seen one after another: with more, the ripple of slow motion goes sooner, but what moves too fast
-/// to be told passes for something slower.
-const MOVING_TRUST: f32 = 0.01;
-
-/// What is known of a shot with the help of surroundings.
-pub(super) struct Guide {
+/// What is known of a shot with the help of neighbourhoods, and the steps that find it.
+pub(super) struct CoarseLevel {
     /// Absolute phase of every pixel in rad.
     pub phase: Vec<f32>,
     /// Modulation of R and B in linear light, 0 where there is no light.
     pub modulation: Vec<f32>,
-    /// 1 beside tears of the surface, shadows and borders.
-    pub torn: Vec<f32>,
-    /// Standard deviation of the intensities.
+    /// 1 near discontinuities of the surface, shadows and borders.
+    pub discontinuities: Vec<f32>,
+    /// Modulation where a pixel and its neighbours lie on one smooth, lit surface, 0 elsewhere.
+    smooth_modulation: Vec<f32>,
+    /// Wrapped phase of R and B until orders are known; then squared residuals, and within a refit the phase of the wide window.
+    work: Vec<f32>,
+    /// Standard deviation of the intensities in linear light.
     pub noise: f32,
-    pub finder: LightFinder,
+    /// Noise over the mean modulation of lit pixels.
+    relative_noise: f32,
+    /// Whether the surface is textured: enough pixels take offsets and amplitudes from another place.
+    pub textured: bool,
+    pub lit_mask: LitMask,
+    fit: LocalFit,
     pub slopes: Slopes,
     pub orders: Orders,
-    pub backgrounds: Backgrounds,
-    pub joint: Joint,
+    pub photometry: Photometry,
+    pub phase_fit: PhaseFit,
     pub residuals: Residuals,
-    /// Whether there are edges of colours.
-    pub printed: bool,
-    wrapped: Vec<f32>,
-    sound: Vec<f32>,
-    fit: LocalFit,
 }
 
-impl Guide {
+impl CoarseLevel {
     pub fn new(code: &FringeCode) -> Self {
         Self {
             phase: Vec::new(),
             modulation: Vec::new(),
-            torn: Vec::new(),
+            discontinuities: Vec::new(),
+            smooth_modulation: Vec::new(),
+            work: Vec::new(),
             noise: 0.0,
-            finder: LightFinder::default(),
+            relative_noise: 0.0,
+            textured: false,
+            lit_mask: LitMask::default(),
+            fit: LocalFit::default(),
             slopes: Slopes::default(),
             orders: Orders::new(code),
-            backgrounds: Backgrounds::new(),
-            joint: Joint::default(),
+            photometry: Photometry::new(),
+            phase_fit: PhaseFit::default(),
             residuals: Residuals::default(),
-            printed: false,
-            wrapped: Vec::new(),
-            sound: Vec::new(),
-            fit: LocalFit::default(),
         }
     }
 
-    /// Decode `level`, whose light may reach `blur_px` pixels into a shadow, up to the first round of the joint fit. What two
-    /// `lent` planes held is lost.
-    pub fn run(
+    /// Step 2: the mask of lit pixels, which restricts the level. Interpolated light may reach `reach_px` pixels into a shadow.
+    pub fn find_light(
         &mut self,
         level: &mut Level,
-        (grid, period_px, factor): (&Grid, f64, usize),
-        blur_px: usize,
-        ratios: [f32; 3],
-        options: &Options,
-        [lent, more]: [&mut [f32]; 2],
+        grid: ScaledGrid<'_>,
+        reach_px: usize,
+        modulation_min: f32,
+        scratch: Scratch<'_>,
     ) {
-        let planes =
-            [&mut self.phase, &mut self.modulation, &mut self.wrapped, &mut self.torn, &mut self.sound];
+        let planes = [
+            &mut self.phase,
+            &mut self.modulation,
+            &mut self.work,
+            &mut self.discontinuities,
+            &mut self.smooth_modulation,
+        ];
         for plane in planes {
-            plane.resize(grid.pixels(), 0.0);
+            plane.resize(grid.grid.pixels(), 0.0);
         }
         let light = level.light.each_ref().map(Vec::as_slice);
-        let finder = &mut self.finder;
-        finder.find(grid, light, (period_px, 2.0 * options.modulation_min), &mut self.modulation);
-        finder.shrink(grid, blur_px, lent, &mut self.modulation);
-        level.restrict(grid, &self.modulation);
-        let scene = level.scene(grid, period_px, factor);
+        // The range of a fringe is twice its modulation.
+        self.lit_mask.find(grid, light, 2.0 * modulation_min, &mut self.modulation);
+        self.lit_mask.erode(grid.grid, reach_px, scratch.first, &mut self.modulation);
+        level.restrict(grid.grid, &self.modulation);
+    }
 
-        // 2. Two-step phase of R and B (S2), beats of G and IR against it (S3).
-        let maps = PixelMaps { phase: &mut self.wrapped, modulation: &mut self.modulation };
-        self.fit.run(&scene, &level.lit, options.modulation_min, maps);
-        self.noise = noise(&scene, &self.wrapped, &self.modulation);
-        let relative_noise = relative(self.noise, &self.modulation);
-        self.slopes.measure(&scene, &self.wrapped, &self.modulation);
+    /// Step 3: wrapped phase of R and B (S2), beats of G and IR against it (S3), noise and slopes.
+    pub fn fit_fringes(&mut self, scene: &Scene<'_>, lit: &[f32], modulation_min: f32) {
+        let maps = PixelMaps { phase: &mut self.work, modulation: &mut self.modulation };
+        self.fit.run(scene, lit, modulation_min, maps);
+        let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
+        self.noise = noise_of_phase(scene, map);
+        self.relative_noise = relative(self.noise, &self.modulation);
+        self.slopes.measure(scene, map);
+    }
 
-        // 3. Fringe orders: by beats from windows and by what every pixel sees itself (S4).
-        let known = Wrapped {
-            phase: &self.wrapped,
-            modulation: &self.modulation,
-            fit: &self.fit,
-            backgrounds: None,
-            slopes: &self.slopes,
-        };
-        self.orders.choose(&scene, &known, &mut self.phase);
-        self.backgrounds.start(&scene, &self.fit, &self.slopes, ratios);
-        let fit = Fit { misfit_max: MISFIT_MAX, relative_noise, rows: 2, trust: 0.0, lit_min: 0.0 };
-        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.modulation], &self.slopes, &fit);
-        let known = Wrapped { backgrounds: Some(&self.backgrounds), ..known };
-        self.orders.choose(&scene, &known, &mut self.phase);
+    /// Step 4: fringe orders (S4), by offsets and amplitudes of the local fit, and once more by those that follow from these orders.
+    pub fn choose_orders(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
+        let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
+        let wrapped = Wrapped { map, fit: &self.fit, photometry: None, slopes: &self.slopes };
+        self.orders.choose(scene, &wrapped, &mut self.phase);
+        self.photometry.start(scene, &self.fit, &self.slopes, ratios);
+        let fit = PhotometryFit { sampled_rows: params::FIRST_SAMPLED_ROWS, ..self.free_fit() };
+        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        self.photometry.fit(scene, ratios, map, &self.slopes, &fit);
+        let wrapped = Wrapped { photometry: Some(&self.photometry), ..wrapped };
+        self.orders.choose(scene, &wrapped, &mut self.phase);
+    }
 
-        // 4. All four channels measure the same column.
-        let fit = Fit { rows: 4, ..fit };
-        self.printed = false;
-        self.measure(&scene, ratios, [&mut *lent, &mut *more]);
-        self.backgrounds.fit(&scene, ratios, [&self.phase, &self.sound], &self.slopes, &fit);
-        // What motion makes of the light is not to be explained by other backgrounds.
-        if options.channel_instants_us.is_some() {
-            self.refit(&scene, ratios, &Fit { trust: MOVING_TRUST, ..fit }, [&mut *lent, &mut *more]);
-            self.measure(&scene, ratios, [lent, more]);
-            self.slopes.refine(&scene, &self.phase, &self.sound);
-            return;
-        }
-        self.choose(&scene, ratios);
-        for round in 0..PRINT_ROUNDS {
-            if !self.printed && round >= ROUNDS {
-                break;
+    /// Steps 5 and 6 in turns: offset and amplitude of every channel, and the phase from all four channels with them.
+    pub fn refine(&mut self, scene: &Scene<'_>, ratios: [f32; 3], moving: bool, mut scratch: Scratch<'_>) {
+        self.textured = false;
+        self.fit_phase(scene, ratios, scratch.lend());
+        let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
+        self.photometry.fit(scene, ratios, map, &self.slopes, &self.free_fit());
+        if moving {
+            // Other offsets and amplitudes must not explain what motion does to the light.
+            let fit = PhotometryFit { phase_trust: params::MOVING_PHASE_TRUST, ..self.free_fit() };
+            self.refit(scene, ratios, &fit, scratch.lend());
+            self.fit_phase(scene, ratios, scratch);
+        } else {
+            self.choose_places(scene, ratios);
+            for round in 0..params::TEXTURED_ROUNDS {
+                if !self.textured && round >= params::ROUNDS {
+                    break;
+                }
+                let lit_share_min = if self.textured { 0.0 } else { params::LIT_SHARE_MIN };
+                let fit =
+                    PhotometryFit { phase_trust: params::PHASE_TRUST, lit_share_min, ..self.free_fit() };
+                self.refit(scene, ratios, &fit, scratch.lend());
+                if self.textured {
+                    self.choose_places(scene, ratios);
+                }
+                self.fit_phase(scene, ratios, scratch.lend());
             }
-            let lit_min = if self.printed { 0.0 } else { LIT_MIN };
-            self.refit(&scene, ratios, &Fit { trust: TRUST, lit_min, ..fit }, [&mut *lent, &mut *more]);
-            if self.printed {
-                self.choose(&scene, ratios);
-            }
-            self.measure(&scene, ratios, [&mut *lent, &mut *more]);
         }
-        // The phase of a print still follows its colours, and its slopes would too.
-        if !self.printed {
-            self.slopes.refine(&scene, &self.phase, &self.sound);
+        // The phase of a textured surface still follows the texture, and its slopes would too.
+        if moving || !self.textured {
+            self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
         }
     }
 
-    /// Phase by the backgrounds as they are, and its tears; what is missed goes where the wrapped phase was.
-    fn measure(&mut self, scene: &Scene<'_>, ratios: [f32; 3], lent: [&mut [f32]; 2]) {
+    /// A fit of the photometry that does not trust the phase.
+    fn free_fit(&self) -> PhotometryFit {
+        PhotometryFit {
+            misfit_max: params::MISFIT_MAX,
+            relative_noise: self.relative_noise,
+            sampled_rows: params::SAMPLED_ROWS,
+            phase_trust: 0.0,
+            lit_share_min: 0.0,
+        }
+    }
+
+    /// Step 6 on the coarse level: phase by the present photometry, squared residuals and discontinuities.
+    fn fit_phase(&mut self, scene: &Scene<'_>, ratios: [f32; 3], scratch: Scratch<'_>) {
         let mut window = Window::new(scene, &self.slopes, &self.modulation, self.noise).near();
-        if self.printed {
+        if self.textured {
             window = window.loosened(&self.residuals);
         }
-        let misfit = self.wrapped.chunks_exact_mut(scene.grid.stride).collect();
-        let mut found = Found { misfit, ..Found::nothing(scene.grid.height) };
-        self.joint.step(scene, (&self.backgrounds, ratios), &window, &mut self.phase, lent, &mut found);
-        self.find_tears(scene.grid);
+        let squared_residual = self.work.chunks_exact_mut(scene.grid.stride).collect();
+        let mut found = FitRows { squared_residual, ..FitRows::none(scene.grid.height) };
+        let model = PhaseModel { scene, photometry: &self.photometry, ratios, window };
+        self.phase_fit.step(model, &mut self.phase, scratch, &mut found);
+        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        mark_discontinuities(scene.grid, map, &mut self.discontinuities, &mut self.smooth_modulation);
     }
 
-    /// Backgrounds by the phase of a wide window, which follows the surface and not what wrong backgrounds make of it.
-    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 3], fit: &Fit, lent: [&mut [f32]; 2]) {
-        self.residuals.measure(scene, &self.wrapped, &self.modulation);
-        self.slopes.measure(scene, &self.phase, &self.sound);
+    /// Step 5: photometry by the phase of a wide window, which follows the surface and not the errors of wrong photometry.
+    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 3], fit: &PhotometryFit, scratch: Scratch<'_>) {
+        self.residuals.measure(scene, &self.work, &self.modulation);
+        self.slopes.measure(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
         let window = Window::new(scene, &self.slopes, &self.modulation, self.noise).wide();
         let window = window.loosened(&self.residuals);
-        self.wrapped.copy_from_slice(&self.phase);
-        let found = &mut Found::nothing(scene.grid.height);
-        self.joint.step(scene, (&self.backgrounds, ratios), &window, &mut self.wrapped, lent, found);
-        self.backgrounds.fit(scene, ratios, [&self.wrapped, &self.sound], &self.slopes, fit);
+        self.work.copy_from_slice(&self.phase);
+        let model = PhaseModel { scene, photometry: &self.photometry, ratios, window };
+        self.phase_fit.step(model, &mut self.work, scratch, &mut FitRows::none(scene.grid.height));
+        let map = PhaseMap { phase: &self.work, modulation: &self.smooth_modulation };
+        self.photometry.fit(scene, ratios, map, &self.slopes, fit);
     }
 
-    /// Lets every pixel of an object of several colours take the backgrounds of the side that explains it, and notes
-    /// whether enough of them moved for a print.
-    fn choose(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
-        let pixels = [self.phase.as_slice(), &self.modulation];
-        self.printed = self.backgrounds.choose(scene, ratios, pixels, &self.slopes, self.noise) > PRINTED;
-    }
-
-    fn find_tears(&mut self, grid: &Grid) {
-        let Self { phase, modulation, torn, sound, .. } = self;
-        let out = torn.par_chunks_mut(grid.stride).zip(sound.par_chunks_mut(grid.stride)).enumerate();
-        out.for_each(|(y, (torn, sound))| {
-            let near = around(y, grid.height);
-            let [phases, lights] =
-                [&*phase, &*modulation].map(|plane| near.map(|y| &plane[y * grid.stride..][..grid.stride]));
-            tears(phases, lights, grid.width, torn, sound);
-        });
+    /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains it best. Enough pixels that
+    /// take them from another place make a textured surface.
+    fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
+        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        let moved = self.photometry.choose_places(scene, ratios, map, &self.slopes, self.noise);
+        self.textured = moved > params::TEXTURED_SHARE;
     }
 }
 
-/// `torn` is 1 where a pixel and its neighbours are not one lit surface; `sound` is the modulation elsewhere.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn tears(phase: [&[f32]; 3], light: [&[f32]; 3], width: usize, torn: &mut [f32], sound: &mut [f32]) {
-    torn.fill(1.0);
-    sound.fill(0.0);
-    let n = width - 2;
-    let [a, b, c] = phase.map(|row| [0, 1, 2].map(|k| &row[k..k + n]));
-    let lit = light.map(|row| [0, 1, 2].map(|k| &row[k..k + n]));
-    let (torn, sound) = (&mut torn[1..=n], &mut sound[1..=n]);
-    for x in 0..n {
-        let twice = 2.0 * b[1][x];
-        let bend = |p: f32, q: f32| (p + q - twice).abs();
-        let upper = |p: f32, q: f32| if p > q { p } else { q };
-        let lower = |p: f32, q: f32| if p < q { p } else { q };
-        let straight = upper(bend(b[0][x], b[2][x]), bend(a[1][x], c[1][x]));
-        let diagonal = upper(bend(a[0][x], c[2][x]), bend(a[2][x], c[0][x]));
-        let dark = lit.map(|row| lower(lower(row[0][x], row[1][x]), row[2][x]));
-        let least = lower(lower(dark[0], dark[1]), dark[2]);
-        let whole = (upper(straight, diagonal) < BEND_MAX) & (least > 0.0);
-        (torn[x], sound[x]) = if whole { (0.0, lit[1][1][x]) } else { (1.0, 0.0) };
-    }
-}
-
-/// Noise over the mean modulation of what is lit.
+/// Noise over the mean modulation of lit pixels.
 fn relative(noise: f32, modulation: &[f32]) -> f32 {
     let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
     let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));

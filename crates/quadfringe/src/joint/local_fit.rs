@@ -1,34 +1,26 @@
-//! Local least squares: phase, backgrounds, modulations and beats without a carrier to choose.
+//! Step 3: local least squares for wrapped phase (S2), offset and amplitude of every channel, and beats (S3), without a carrier.
 //!
 //! In a window of about a fringe every channel is `I = rho (a + p cos(Phi) + q sin(Phi))`, with `Phi` the phase of R
 //! and B and `rho` the albedo of the pixel. R and B give `Phi` pixel by pixel; G and IR have nearly the same carrier,
 //! so that `p - i q = b exp(i (Phi_c - Phi))` is their *beat* against it, six to thirty times slower than a fringe.
-//! No direction, no band and no slope is preferred, which a Fourier filter along rows must do. Sums are kept once per
-//! cell of a sixth of a fringe.
+//! Unlike a Fourier filter along rows, the fit prefers no direction, no band and no slope. Sums are kept once per cell.
 
-use super::cells::{CellMaps, CellWork, RowMaps};
-use super::scene::{Scene, around};
+use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::model::{CellFringes, FringeRows};
+use super::neighbours::{around, binomial};
+use super::params::local_fit::{CONTRAST_MIN, FIRST_WINDOW, RIDGE, SAMPLED_ROWS, SPREAD_MIN, WINDOW};
+use super::scene::Scene;
 use crate::parallel::angle::atan2;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Width (sigma) of the first window, which has to average whole fringes away.
-const FIRST_WINDOW: f32 = 0.5;
-/// Rows of pixels that stand for a row of cells: neighbours tell nearly the same, and the window holds hundreds.
-const SAMPLED_ROWS: usize = 2;
-/// Ridge of the normal equations relative to the weight in the window.
-const RIDGE: f32 = 1e-3;
 /// Sums of one cell: w, wc, ws, wcc, wcs, then w I, w I c, w I s of R, G, B, IR.
 const SUMS: usize = 17;
-/// Least contrast (modulation over background) of light that comes from the projector.
-const CONTRAST_MIN: f32 = 0.1;
-/// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 when B repeats R.
-const SPREAD_MIN: f32 = 0.02;
 
-/// Maps of the fit on the cells. Of R and B: background and modulation, four maps that stand side by side; then of all
-/// channels what the model `a + p cos + q sin` needs; then strengths.
+/// Maps of the fit on the cells. Of R and B: offset and amplitude, four maps in a row; then of all channels what the model
+/// `a + p cos + q sin` needs; then the least amplitude and the mean amplitude of R and B.
 mod map {
     pub const TWO_STEP: usize = 0;
     pub const P_R: usize = 4;
@@ -41,9 +33,9 @@ mod map {
     pub const COUNT: usize = 18;
 }
 
-/// What the fit knows on the cells, and its working maps.
+/// Results of the fit on the cells, and its working maps.
 #[derive(Debug)]
-pub(crate) struct LocalFit {
+pub(super) struct LocalFit {
     start: CellMaps,
     maps: CellMaps,
     sums: CellMaps,
@@ -52,7 +44,7 @@ pub(crate) struct LocalFit {
 
 /// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, and their modulation in linear light (0 where
 /// nothing can be measured).
-pub(crate) struct PixelMaps<'a> {
+pub(super) struct PixelMaps<'a> {
     pub phase: &'a mut [f32],
     pub modulation: &'a mut [f32],
 }
@@ -79,10 +71,13 @@ struct Rows {
     albedo_smooth: Vec<f32>,
 }
 
-impl LocalFit {
-    /// Width (sigma) of the fitting window in fringe periods: shorter follows edges, longer averages noise.
-    pub const WINDOW: f32 = 0.3;
+/// Beats of G and of IR against R and B in a row of cells: `cosine - i sine` is the phasor of each.
+pub(super) struct Beats<'a> {
+    pub cosine: [&'a [f32]; 2],
+    pub sine: [&'a [f32]; 2],
+}
 
+impl LocalFit {
     /// Fit a scene with fringes in any direction. `lit` is 1 where light of the projector falls; `least` is the least
     /// modulation that counts.
     pub fn run(&mut self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
@@ -91,29 +86,33 @@ impl LocalFit {
         self.phase(scene, lit, least, out);
     }
 
-    /// Backgrounds and modulations at row `y`: a, b of R, of G, of B, of IR.
-    pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut [RowMaps; 2]) -> [&'a [f32]; 8] {
+    /// Offsets and amplitudes at row `y`.
+    pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut [RowMaps; 2]) -> FringeRows<'a> {
         let [first, second] = maps;
         let [a_r, b_r, a_b, b_b] = first.sample(scene.grid, &self.maps, map::TWO_STEP, y);
         let [a_g, _, _, a_ir, _, _, b_g, b_ir] = second.sample(scene.grid, &self.maps, map::A_G, y);
-        [a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir]
+        FringeRows { offset: [a_r, a_g, a_b, a_ir], amplitude: [b_r, b_g, b_b, b_ir] }
     }
 
-    /// Background and modulation of all channels in one cell.
-    pub fn cell(&self, row: usize, column: usize) -> [[f32; 2]; 4] {
-        let numbers = [[0, 1], [map::A_G, map::B_G], [2, 3], [map::A_IR, map::B_IR]];
-        numbers.map(|pair| pair.map(|k| self.maps.line(row, k)[column]))
+    /// Offsets and amplitudes in one cell.
+    pub fn cell(&self, row: usize, column: usize) -> CellFringes {
+        let value = |k: usize| self.maps.line(row, k)[column];
+        CellFringes {
+            offset: [0, map::A_G, 2, map::A_IR].map(value),
+            amplitude: [1, map::B_G, 3, map::B_IR].map(value),
+        }
     }
 
-    /// Beats of G and of IR against R and B in a row of cells: real and negative imaginary part of each.
-    pub fn beats(&self, row: usize) -> [&[f32]; 4] {
-        [map::A_G + 1, map::A_G + 2, map::A_IR + 1, map::A_IR + 2].map(|k| self.maps.line(row, k))
+    /// Beats in a row of cells.
+    pub fn beats(&self, row: usize) -> Beats<'_> {
+        let [g, ir] = [map::A_G, map::A_IR].map(|first| [1, 2].map(|k| self.maps.line(row, first + k)));
+        Beats { cosine: [g[0], ir[0]], sine: [g[1], ir[1]] }
     }
 
     /// Mean and amplitude of R and B in a window that holds whole fringes.
     fn start(&mut self, scene: &Scene<'_>) {
         scene.grid.window_sums::<5, Rows>(
-            (scene.cells(FIRST_WINDOW), SAMPLED_ROWS),
+            CellWindow { sigma_cells: scene.cells(FIRST_WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.start,
@@ -136,7 +135,7 @@ impl LocalFit {
     fn solve(&mut self, scene: &Scene<'_>) {
         let start = &self.start;
         scene.grid.window_sums::<SUMS, Rows>(
-            (scene.cells(Self::WINDOW), SAMPLED_ROWS),
+            CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.maps,
@@ -222,7 +221,7 @@ fn add_squares(usable: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
     }
 }
 
-/// Unit phasor of R and B for backgrounds and modulations `a_r, b_r, a_b, b_b`: (R / rho - a) / b times rho b_r b_b, as
+/// Unit phasor of R and B for offsets and amplitudes `a_r, b_r, a_b, b_b`: (R / rho - a) / b times rho b_r b_b, as
 /// only the direction counts.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn two_step(maps: [&[f32]; 4], albedo: Option<&[f32]>, light: [&[f32]; 4], cos: &mut [f32], sin: &mut [f32]) {
@@ -336,22 +335,6 @@ fn relative_albedo(model: [[&[f32]; 3]; 4], phasor: [&[f32]; 2], light: [&[f32];
             let albedo = sum[x] / norm[x];
             out[x] = if albedo > 1e-4 { albedo } else { 1e-4 };
         }
-    }
-}
-
-/// [1 2 1] / 4 in both directions; borders repeat.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(crate) fn binomial(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut [f32]) {
-    spare.resize(width + 2, 0.0);
-    let [a, b, c] = rows.map(|row| &row[..width]);
-    let middle = &mut spare[1..=width];
-    for x in 0..width {
-        middle[x] = 0.25 * (a[x] + 2.0 * b[x] + c[x]);
-    }
-    (spare[0], spare[width + 1]) = (spare[1], spare[width]);
-    let [left, middle, right] = [0, 1, 2].map(|k| &spare[k..k + width]);
-    for (x, out) in out[..width].iter_mut().enumerate() {
-        *out = 0.25 * (left[x] + 2.0 * middle[x] + right[x]);
     }
 }
 

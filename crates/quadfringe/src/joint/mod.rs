@@ -1,11 +1,32 @@
-//! The best chain: a guide that uses surroundings, a joint fit of every pixel, and a judgement of each.
+//! The joint method, the default. THE RECIPE: from the images of one exposure to absolute phase and millimetres.
+//!
+//! ```text
+//! 1  linear light                                                        (S1)  condition
+//! 2  fringe period; mask of lit pixels; noise                                  stages::carrier, illumination, noise
+//! 3  coarse level: wrapped phase, beats of G and IR by a local fit   (S2, S3)  pyramid, local_fit, slopes
+//! 4  fringe orders by semi-global matching                               (S4)  orders
+//! 5  photometry: offset and amplitude of every channel                         photometry
+//! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample
+//! 7  motion between the channels (optional)                                    motion
+//! 8  validity: doubtful pixels become no data                                  validity
+//! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement, validity::propagate
+//! 10 heights                                                             (S7)  decode::output, height
+//! ```
+//!
+//! The steps share the model of the intensities (`model`), a grid of cells for what varies slowly (`cells`), and tuned numbers
+//! (`params`). `docs/method/joint.md` derives them under the same numbers.
 
 mod agreement;
 mod cells;
 mod coarse;
 mod illumination;
+mod light;
 mod local_fit;
+mod memory;
+mod model;
 mod motion;
+mod neighbours;
+mod noise;
 mod orders;
 mod params;
 mod phase;
@@ -14,123 +35,76 @@ mod pyramid;
 mod residuals;
 mod scene;
 mod slopes;
+mod smooth;
 mod uncertainty;
 mod validity;
 mod window;
 
 use crate::condition::{Plan, Sample};
 use crate::decode::options::Options;
-use crate::decode::output::{Decoded, Finish, hole_unless};
+use crate::decode::output::{Decoded, Finish};
 use crate::parallel::lanes::LANES;
-use crate::stages::carrier;
 use crate::{FringeCode, Shot};
 use agreement::Agreement;
 use cells::{Grid, RowMaps};
-use coarse::Guide;
-use motion::{Instants, Motion};
-use multiversion::multiversion;
-use ndarray::{Array2, ArrayView2, s};
-use phase::Found;
-use photometry::Backgrounds;
-use pyramid::Level;
-use pyramid::upsample::{Expander, FACTOR_MAX};
+use coarse::CoarseLevel;
+use light::{fringe_period_px, linear_light};
+use memory::OutputMemory;
+use motion::{Motion, Timing};
+use params::motion::ROUNDS;
+use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
+use phase::{FitRows, PhaseModel};
+use pyramid::{Level, Levels, Pyramid, Upsampler};
 use rayon::prelude::*;
-use scene::Scene;
+use scene::{Frame, PhaseMap, ScaledGrid, Scene};
 use uncertainty::PhaseNoise;
-use validity::{Findings, Judge};
+use validity::{PixelFit, Validity};
 use window::Window;
 
-/// Cells in a fringe period, at least.
-const CELLS: f64 = 3.4;
-/// Pixels in a fringe period of the image that guides, at least.
-const GUIDE_PERIOD_PX: f64 = 6.0;
-/// Pixels that interpolated light reaches into a shadow.
-const MOSAIC_BLUR_PX: usize = 1;
-/// Times that the light of a moving surface is brought to one instant and decoded again.
-const MOTION_ROUNDS: usize = 3;
-
+/// A decoder by the joint method: the results of its steps, and their working memory.
 pub(crate) struct Joint {
     shape: [usize; 2],
+    /// Length of a padded row of pixels.
     stride: usize,
+    /// Fringe numbers over the first.
     ratios: [f32; 3],
-    full: Level,
-    shrunk: Level,
-    guide: Guide,
-    expander: Expander,
+    pyramid: Pyramid,
+    coarse: CoarseLevel,
+    upsampler: Upsampler,
+    /// Absolute phase of every pixel in rad.
     phase: Vec<f32>,
+    /// Modulation of R and B in linear light, 0 where there is no light.
     modulation: Vec<f32>,
-    agreement: Agreement,
-    /// Probability that the order of a node is another one.
-    another: Vec<f32>,
     motion: Motion,
-    /// Light as it was seen, when it has to be brought to one instant.
-    seen: [Vec<f32>; 4],
-    judge: Judge,
-    /// Two working planes, when the maps have none to lend.
-    own: Vec<f32>,
-}
-
-/// Memory of maps that have not been written yet.
-struct Unwritten<'a> {
-    /// Two working planes that steps use one after the other, in the map of points.
-    lent: [&'a mut [f32]; 2],
-    /// What the joint fit finds: modulation in its own map, misfit in that of probabilities, information in that of
-    /// uncertainty.
-    found: Found<'a>,
-}
-
-impl<'a> Unwritten<'a> {
-    fn new(out: &'a mut Decoded, own: &'a mut Vec<f32>, pixels: usize) -> Self {
-        let width = out.phase_rad.ncols();
-        let rows = |map: &'a mut Array2<f32>| {
-            map.as_slice_mut().expect("checked layout").chunks_exact_mut(width).collect::<Vec<_>>()
-        };
-        let uncertainty = out.uncertainty_mm.as_mut().or(out.uncertainty_rad.as_mut()).expect("checked");
-        let planes = match &mut out.xyz_mm {
-            Some(xyz) if xyz.len() >= 2 * pixels => {
-                &mut xyz.as_slice_mut().expect("checked layout")[..2 * pixels]
-            }
-            _ => {
-                own.resize(2 * pixels, 0.0);
-                own.as_mut_slice()
-            }
-        };
-        let (first, second) = planes.split_at_mut(pixels);
-        let found = Found {
-            misfit: rows(&mut out.wrong_order_probability),
-            modulation: rows(&mut out.modulation),
-            information: rows(uncertainty),
-        };
-        Self { lent: [first, second], found }
-    }
-
-    fn lent(&mut self) -> [&mut [f32]; 2] {
-        self.lent.each_mut().map(|plane| &mut **plane)
-    }
+    /// Light as captured, when motion is compensated.
+    captured: [Vec<f32>; 4],
+    validity: Validity,
+    agreement: Agreement,
+    /// Probability of a wrong order, node by node.
+    wrong_order: Vec<f32>,
+    /// Working planes, when the result has no map of points to lend.
+    spare: Vec<f32>,
 }
 
 impl Joint {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
         let stride = shape[1].next_multiple_of(FACTOR_MAX * LANES);
-        let mut full = Level::default();
-        full.resize(stride * shape[0]);
         let numbers = code.numbers();
         Self {
             shape,
             stride,
             ratios: numbers.map(|n| (n / numbers[0]) as f32),
-            full,
-            shrunk: Level::default(),
-            guide: Guide::new(code),
-            expander: Expander::default(),
+            pyramid: Pyramid::new(stride * shape[0]),
+            coarse: CoarseLevel::new(code),
+            upsampler: Upsampler::default(),
             phase: Vec::new(),
             modulation: Vec::new(),
-            agreement: Agreement::default(),
-            another: Vec::new(),
             motion: Motion::default(),
-            seen: Default::default(),
-            judge: Judge::default(),
-            own: Vec::new(),
+            captured: Default::default(),
+            validity: Validity::default(),
+            agreement: Agreement::default(),
+            wrong_order: Vec::new(),
+            spare: Vec::new(),
         }
     }
 
@@ -142,232 +116,176 @@ impl Joint {
         finish: &Finish<'_>,
         out: &mut Decoded,
     ) {
-        // 1. Linear light (S1).
-        self.condition(plan, shot);
-        let period_px = options.period_px.unwrap_or_else(|| period_px(&self.full.light[0], self.shape));
-        let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS);
-        let blur_px = if shot.mosaic().is_some() { MOSAIC_BLUR_PX } else { 0 };
-
-        // 2. to 4. From light to the absolute phase of every pixel.
+        // 1. Linear light of the four channels (S1).
+        linear_light(plan, shot, self.shape, &mut self.pyramid.full);
+        // 2. The fringe period scales all windows, cells and the coarse level.
+        let red = &self.pyramid.full.light[0];
+        let period_px = options.period_px.unwrap_or_else(|| fringe_period_px(red, self.shape));
+        let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS_PER_PERIOD);
+        let coarse_grid = grid.shrunk(pyramid::factor(period_px, &grid));
+        let frame = Frame::new(&grid, &coarse_grid, period_px, shot.mosaic().is_some());
+        // 2. to 6. Absolute phase.
+        let mut spare = std::mem::take(&mut self.spare);
+        let mut memory = OutputMemory::new(out, &mut spare, grid.pixels());
         let instants = options.channel_instants_us.map(|instants| instants.map(|t| 1e-6 * t));
-        let image = (&grid, period_px, factor(period_px, &grid));
-        let mut own = std::mem::take(&mut self.own);
-        let mut unwritten = Unwritten::new(out, &mut own, grid.pixels());
-        match instants {
-            None => self.measure(image, blur_px, options, &mut unwritten),
-            Some(instants) => self.measure_moving(image, instants, blur_px, options, &mut unwritten),
-        }
-        self.own = own;
-
-        // 5. What is not sure is no data.
-        let scene = self.full.scene(&grid, period_px, 1);
-        let Guide { noise, backgrounds, orders, .. } = &mut self.guide;
-        let own = [&out.wrong_order_probability, &out.modulation];
-        let findings = Findings {
-            phase: &self.phase,
-            modulation: &self.modulation,
-            own: own.map(|map| map.as_slice().expect("checked layout")),
-            noise: *noise,
-            orders,
-            quality_min: options.quality_min,
-        };
-        self.judge.run(&scene, &findings, out.quality.as_slice_mut().expect("checked layout"));
+        self.absolute_phase(&frame, options, &mut memory);
+        // 7. Motion between the channels.
         if let Some(instants) = instants {
-            self.motion.rule_out(&scene, instants, &mut self.judge.sure);
+            self.compensate_motion(&frame, Timing { instants, ratios: self.ratios }, options, &mut memory);
         }
-
-        // 6. How sure the rest is.
-        let noise = *noise;
-        self.agreement.measure(&scene, (self.ratios, noise), backgrounds, &self.phase, &self.modulation);
-        orders.another(&scene, &mut self.another);
-        let window = Window::new(&scene, &self.guide.slopes, &self.modulation, noise);
-        self.write(&scene, &PhaseNoise::new(noise, window.share()), finish, out);
+        self.spare = spare;
+        // 8. Validity.
+        self.validate(&frame, instants, options.quality_min, out);
+        // 9. Uncertainty of the phase, and the probability of a wrong order.
+        let noise = self.uncertainty(&frame);
+        // 10. Heights (S7).
+        self.write(&frame, &noise, finish, out);
+        // 9. again: components settle doubtful orders, after step 10 has marked what lies outside the projector's image.
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
-        let maps = maps.map(|map| map.as_slice_mut().expect("checked layout"));
-        self.judge.settle(&grid, &self.phase, maps);
+        let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
+        self.validity.propagate(&grid, &self.phase, wrong_order, quality);
     }
 
-    /// Absolute phase of every pixel. Where light falls, beats, fringe orders and backgrounds come from an image of `factor` times
-    /// fewer pixels along a side.
-    fn measure(
-        &mut self,
-        (grid, period_px, factor): (&Grid, f64, usize),
-        blur_px: usize,
-        options: &Options,
-        unwritten: &mut Unwritten<'_>,
-    ) {
-        let lent = unwritten.lent();
-        if factor == 1 {
-            self.guide.run(&mut self.full, (grid, period_px, 1), blur_px, self.ratios, options, lent);
-            std::mem::swap(&mut self.phase, &mut self.guide.phase);
-            std::mem::swap(&mut self.modulation, &mut self.guide.modulation);
-        } else {
-            let coarse = grid.shrunk(factor);
-            self.shrunk.shrink(&self.full, [&coarse, grid], factor);
-            let how = (&coarse, period_px / factor as f64, factor);
-            self.guide.run(&mut self.shrunk, how, blur_px.div_ceil(factor), self.ratios, options, lent);
-            self.expand([&coarse, grid], period_px, blur_px, unwritten.lent());
-        }
-        // All four channels measure the same column.
-        let scene = self.full.scene(grid, period_px, 1);
-        let Guide { slopes, noise, backgrounds, joint, residuals, printed, .. } = &mut self.guide;
-        let window = Window::new(&scene, slopes, &self.modulation, *noise);
-        let Unwritten { lent: [first, second], found } = unwritten;
-        let mut step =
-            |backgrounds: &Backgrounds, window: Window<'_>, phase: &mut [f32], found: &mut Found<'_>| {
-                joint.step(
-                    &scene,
-                    (backgrounds, self.ratios),
-                    &window,
-                    phase,
-                    [&mut *first, &mut *second],
-                    found,
-                );
-            };
-        if !*printed {
-            step(backgrounds, window, &mut self.phase, found);
+    /// Steps 2 to 6.
+    fn absolute_phase(&mut self, frame: &Frame<'_>, options: &Options, memory: &mut OutputMemory<'_>) {
+        let Self { pyramid, coarse, ratios, .. } = self;
+        let moving = options.channel_instants_us.is_some();
+        pyramid.shrink(frame);
+        let level = &mut pyramid.coarse;
+        // 2. Mask of lit pixels.
+        coarse.find_light(
+            level,
+            frame.coarse,
+            frame.coarse_reach_px(),
+            options.modulation_min,
+            memory.scratch.lend(),
+        );
+        // 3. Coarse level: wrapped phase of R and B (S2), beats of G and IR (S3).
+        let scene = level.scene(frame.coarse);
+        coarse.fit_fringes(&scene, &level.lit, options.modulation_min);
+        // 4. Fringe orders (S4).
+        coarse.choose_orders(&scene, *ratios);
+        // 5. Photometry, and 6. phase from all four channels, in turns.
+        coarse.refine(&scene, *ratios, moving, memory.scratch.lend());
+        pyramid.restore(frame);
+        // 6. Phase at full resolution.
+        self.upsample(frame, memory);
+        self.fit_phase(frame, memory);
+    }
+
+    /// Step 6: phase and modulation of every pixel, from those of the coarse level.
+    fn upsample(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
+        let (grid, coarse) = (frame.full.grid, &mut self.coarse);
+        if frame.coarse.factor == 1 {
+            std::mem::swap(&mut self.phase, &mut coarse.phase);
+            std::mem::swap(&mut self.modulation, &mut coarse.modulation);
             return;
         }
-        // What is missed is judged by backgrounds that windows agree on: a colour of its own explains a pixel whatever its order.
-        let mut missed = Found { misfit: std::mem::take(&mut found.misfit), ..Found::nothing(grid.height) };
-        step(backgrounds, window.wide(), &mut self.phase, &mut missed);
-        backgrounds.colour(&scene, self.ratios, [&self.phase, &self.modulation], slopes, *noise);
-        found.misfit = Found::nothing(grid.height).misfit;
-        // Without colours it is shape that the model misses, and that is not to be averaged away.
-        step(backgrounds, window.loosened(residuals), &mut self.phase, found);
-    }
-
-    /// The same for channels that were seen at different `instants`: what moves is brought to one instant and decoded again.
-    fn measure_moving(
-        &mut self,
-        image: (&Grid, f64, usize),
-        instants: Instants,
-        blur_px: usize,
-        options: &Options,
-        unwritten: &mut Unwritten<'_>,
-    ) {
-        let (grid, period_px, _) = image;
-        let how = (self.ratios, instants);
-        self.seen.clone_from(&self.full.light);
-        for round in 0..=MOTION_ROUNDS {
-            self.measure(image, blur_px, options, unwritten);
-            let scene = self.full.scene(grid, period_px, 1);
-            if round == 0 {
-                self.motion.rest(&scene);
-            }
-            if round == MOTION_ROUNDS {
-                break;
-            }
-            let backgrounds = &self.guide.backgrounds;
-            self.motion.measure(&scene, how, backgrounds, &self.phase, &self.modulation);
-            let Level { light, usable, .. } = &mut self.full;
-            let seen = self.seen.each_ref().map(Vec::as_slice);
-            let seen = Scene { light: seen, usable, grid, period_px, factor: 1 };
-            let light = light.each_mut().map(Vec::as_mut_slice);
-            self.motion.settle(&seen, how, backgrounds, &self.phase, light);
-        }
-    }
-
-    /// From the guide to every pixel.
-    fn expand(
-        &mut self,
-        [coarse, grid]: [&Grid; 2],
-        period_px: f64,
-        blur_px: usize,
-        [lent, found]: [&mut [f32]; 2],
-    ) {
         for plane in [&mut self.phase, &mut self.modulation] {
             plane.resize(grid.pixels(), 0.0);
         }
-        let guide = &mut self.guide;
-        let finder = &mut guide.finder;
-        finder.refind(grid, self.full.light.each_ref().map(Vec::as_slice), found);
-        guide.noise = finder.noise;
-        finder.shrink(grid, blur_px, lent, found);
-        self.full.restrict(grid, found);
-        let factor = grid.step / coarse.step;
-        let shrunk = self.shrunk.scene(coarse, period_px / factor as f64, factor);
-        let scenes = [&shrunk, &self.full.scene(grid, period_px, 1)];
-        let out = [self.phase.as_mut_slice(), &mut self.modulation];
-        self.expander.run(scenes, guide, self.ratios, &self.full.lit, out);
+        let (scratch, lit) = (&mut *memory.scratch.first, &mut *memory.scratch.second);
+        let light = self.pyramid.full.light.each_ref().map(Vec::as_slice);
+        coarse.lit_mask.find_again(grid, light, lit);
+        coarse.noise = coarse.lit_mask.noise;
+        coarse.lit_mask.erode(grid, frame.reach_px, scratch, lit);
+        self.pyramid.full.restrict(grid, lit);
+        let [coarse_scene, scene] = self.pyramid.scenes(frame);
+        let lit = &self.pyramid.full.lit;
+        let levels = Levels { coarse: &coarse_scene, fine: &scene, found: coarse, ratios: self.ratios, lit };
+        self.upsampler.run(levels, &mut self.phase, &mut self.modulation);
     }
 
-    /// Planes of linear light; `lit` is 0 for glare and for what one chip does not see, `usable` for pixels that are saturated.
-    fn condition<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
-        let ([_, width], stride) = (self.shape, self.stride);
-        let Level { light, lit, usable } = &mut self.full;
-        let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
-        let saturation = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));
-        let rows = red.zip(green).zip(blue.zip(infrared)).zip(saturation).enumerate();
-        rows.for_each_init(
-            || (vec![false; width], vec![false; width]),
-            |(unsaturated, glare), (y, (((red, green), (blue, infrared)), (usable, lit)))| {
-                let rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
-                let masks = [&mut usable[..width], &mut lit[..width]];
-                condition_row(plan, shot, y, [unsaturated, glare], rows, masks);
-            },
-        );
+    /// Step 6 at full resolution.
+    fn fit_phase(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
+        let (scene, ratios) = (self.pyramid.full.scene(frame.full), self.ratios);
+        let CoarseLevel { slopes, noise, photometry, phase_fit, residuals, textured, .. } = &mut self.coarse;
+        let window = Window::new(&scene, slopes, &self.modulation, *noise);
+        let OutputMemory { scratch, found } = memory;
+        if !*textured {
+            let model = PhaseModel { scene: &scene, photometry, ratios, window };
+            return phase_fit.step(model, &mut self.phase, scratch.lend(), found);
+        }
+        // Residuals for step 8 come from the illumination of windows: with an albedo for every pixel any order would fit.
+        let squared_residual = std::mem::take(&mut found.squared_residual);
+        let mut residuals_only = FitRows { squared_residual, ..FitRows::none(frame.full.grid.height) };
+        let model = PhaseModel { scene: &scene, photometry, ratios, window: window.wide() };
+        phase_fit.step(model, &mut self.phase, scratch.lend(), &mut residuals_only);
+        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        photometry.estimate_albedo(&scene, ratios, map, slopes, *noise);
+        found.squared_residual = FitRows::none(frame.full.grid.height).squared_residual;
+        // The wide window averaged errors of the texture; the narrow one follows the shape.
+        let model = PhaseModel { scene: &scene, photometry, ratios, window: window.loosened(residuals) };
+        phase_fit.step(model, &mut self.phase, scratch.lend(), found);
     }
 
-    fn write(&self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
+    /// Step 7: estimates the motion, brings the light to one instant and repeats steps 2 to 6.
+    fn compensate_motion(
+        &mut self,
+        frame: &Frame<'_>,
+        timing: Timing,
+        options: &Options,
+        memory: &mut OutputMemory<'_>,
+    ) {
+        self.captured.clone_from(&self.pyramid.full.light);
+        self.motion.reset(&self.pyramid.full.scene(frame.full));
+        for _ in 0..ROUNDS {
+            let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+            let (level, photometry) = (&mut self.pyramid.full, &self.coarse.photometry);
+            self.motion.measure(&level.scene(frame.full), timing, photometry, map);
+            let Level { light, usable, .. } = level;
+            let ScaledGrid { grid, period_px, factor } = frame.full;
+            let captured = self.captured.each_ref().map(Vec::as_slice);
+            let scene = Scene { light: captured, usable, grid, period_px, factor };
+            let light = light.each_mut().map(Vec::as_mut_slice);
+            self.motion.compensate(&scene, timing, photometry, &self.phase, light);
+            self.absolute_phase(frame, options, memory);
+        }
+    }
+
+    /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.
+    fn validate(
+        &mut self,
+        frame: &Frame<'_>,
+        instants: Option<[f32; 4]>,
+        quality_min: f32,
+        out: &mut Decoded,
+    ) {
+        let scene = self.pyramid.full.scene(frame.full);
+        let pixel = PixelFit {
+            squared_residual: out.wrong_order_probability.as_slice().expect("checked layout"),
+            modulation: out.modulation.as_slice().expect("checked layout"),
+        };
+        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        let quality = out.quality.as_slice_mut().expect("checked layout");
+        let limits = validity::Limits { noise: self.coarse.noise, quality_min };
+        self.validity.run(&scene, map, pixel, &self.coarse.orders, limits, quality);
+        if let Some(instants) = instants {
+            self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid);
+        }
+    }
+
+    /// Step 9, except for what depends on connected components.
+    fn uncertainty(&mut self, frame: &Frame<'_>) -> PhaseNoise {
+        let scene = self.pyramid.full.scene(frame.full);
+        let CoarseLevel { noise, photometry, orders, slopes, .. } = &self.coarse;
+        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        self.agreement.measure(&scene, self.ratios, *noise, photometry, map);
+        orders.wrong_order_probability(&scene, &mut self.wrong_order);
+        PhaseNoise::new(*noise, Window::new(&scene, slopes, &self.modulation, *noise).share())
+    }
+
+    /// Steps 9 and 10, row by row: the maps of the result.
+    fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
+        let scene = self.pyramid.full.scene(frame.full);
         let grid = scene.grid;
         out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
             let at = y * grid.stride..y * grid.stride + grid.width;
-            sure_only(&self.judge.sure[at.clone()], &self.phase[at], row.phase);
-            let disagreement = self.agreement.row(scene, y, maps);
-            noise.row(disagreement, row.sigma);
-            let nodes = &self.another[y / grid.step * grid.columns..];
+            validity::copy_valid(&self.validity.valid[at.clone()], &self.phase[at], row.phase);
+            noise.deviations(self.agreement.row(&scene, y, maps), row.sigma);
+            let nodes = &self.wrong_order[y / grid.step * grid.columns..];
             row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
             finish.row(y, &mut row);
         });
     }
-}
-
-/// Light of one row, and which pixels may take part in a fit and may be lit.
-#[multiversion(targets("x86_64+avx2"))]
-fn condition_row<T: Sample>(
-    plan: &Plan,
-    shot: &Shot<'_, T>,
-    y: usize,
-    [unsaturated, glare]: [&mut [bool]; 2],
-    mut rows: [&mut [f32]; 4],
-    [usable, lit]: [&mut [f32]; 2],
-) {
-    plan.saturation_row(shot, y, unsaturated, glare);
-    plan.row(shot, y, &mut rows);
-    let [.., infrared] = rows;
-    // A pixel that the infrared chip does not see takes no part in any fit.
-    let masks = usable.iter_mut().zip(lit).zip(unsaturated.iter().zip(glare.iter()));
-    for (infrared, ((usable, lit), (unsaturated, glare))) in infrared.iter().zip(masks) {
-        let seen = infrared.is_finite();
-        *usable = if seen & *unsaturated { 1.0 } else { 0.0 };
-        *lit = if seen & !*glare { 1.0 } else { 0.0 };
-    }
-    plan.continue_infrared(y, infrared);
-}
-
-/// The phase where it is sure.
-#[multiversion(targets("x86_64+avx2"))]
-fn sure_only(sure: &[u8], phase: &[f32], out: &mut [f32]) {
-    for (out, (sure, phase)) in out.iter_mut().zip(sure.iter().zip(phase)) {
-        *out = *phase + hole_unless(*sure != 0);
-    }
-}
-
-/// How many times fewer pixels along a side still show the fringes.
-fn factor(period_px: f64, grid: &Grid) -> usize {
-    let mut factor = 1;
-    while factor < FACTOR_MAX.min(grid.step) && period_px >= 2.0 * GUIDE_PERIOD_PX * factor as f64 {
-        factor *= 2;
-    }
-    factor
-}
-
-/// Fringe period across the fringes, from the red image; a sixteenth of the image when nothing stands out.
-fn period_px(red: &[f32], [height, width]: [usize; 2]) -> f64 {
-    let stride = red.len() / height;
-    let red = ArrayView2::from_shape((height, stride), red).expect("a plane is whole");
-    let found = carrier(red.slice(s![.., ..width])).period_px();
-    let shorter = width.min(height) as f64;
-    if found.is_finite() { found.clamp(4.0, shorter.max(8.0)) } else { width as f64 / 16.0 }
 }

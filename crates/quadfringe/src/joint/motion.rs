@@ -1,40 +1,36 @@
-//! Motion between the colours: a projector that shows R, G and B one after another inside a frame lets each channel see the
-//! surface at an instant of its own.
+//! Step 7: motion between the colours. A projector that shows R, G and B one after another inside a frame lets each channel see the
+//! surface at a different instant.
 //!
 //! While the phase at a pixel changes by `v` per unit of time, channel c, seen at the instant `t_c`, is
-//! `I_c = rho (a_c + b_c cos(k_c (Phi + v t_c) + delta_c))`. R and B leave quadrature - their circle becomes an ellipse, and the
-//! phase gets a ripple of two waves in a fringe - and G and IR run ahead of both or fall behind. Of the four intensities of a
-//! pixel two are left when phase and albedo are projected out, and those tell `v` over a window. With it, every plane is
-//! brought to the instant 0 by what its model says that motion has changed.
+//! `I_c = rho (A_c + B_c cos(k_c (Phi + v t_c) + delta_c))`. R and B leave quadrature: their circle becomes an ellipse, and the
+//! phase gets a ripple of two waves in a fringe. G and IR run ahead of both or fall behind. When phase and albedo are projected out,
+//! two of the four intensities of a pixel remain, and they give `v` over a window. With it, every plane is brought to the instant
+//! 0 by the change that the model predicts.
 
-use super::cells::{CellMaps, CellWork, RowMaps};
-use super::photometry::{Backgrounds, carriers};
-use super::scene::Scene;
+use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::model::{FringeRows, carriers};
+use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
+use super::photometry::Photometry;
+use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Width (sigma) of the window in fringe periods: motion varies slowly over a surface.
-const WINDOW: f32 = 0.5;
-/// Rows of pixels that stand for a row of cells.
-const SAMPLED_ROWS: usize = 4;
+/// When and how the channels saw the surface.
+#[derive(Clone, Copy)]
+pub(super) struct Timing {
+    /// Instants of R, G, B, IR in any unit of time; 0 is the instant of the result.
+    pub instants: [f32; 4],
+    /// Fringe numbers over the first.
+    pub ratios: [f32; 3],
+}
 
-/// What a step is multiplied by. Backgrounds and phase were fitted as if nothing moved, and have taken up about half of what motion
-/// does to the light, so that a plain step goes half of the way; any gain below 4 converges.
-const GAIN: f32 = 2.0;
-
-/// Greatest turn of B against R, rad; a quarter of a fringe is 1.57.
-const TURN_MAX: f32 = 0.75;
-
-/// Instants of the four channels, in any unit of time; 0 is the instant that everything is brought to.
-pub(crate) type Instants = [f32; 4];
-
-/// Velocity of the phase, cell by cell, and its working maps.
+/// Velocity of the phase on the cells, with working maps.
 #[derive(Debug)]
-pub(crate) struct Motion {
-    /// Phase of the first fringe number per unit of time.
+pub(super) struct Motion {
+    /// Change of the phase of R and B in rad per unit of time.
     velocity: CellMaps,
     change: CellMaps,
     sums: CellMaps,
@@ -53,35 +49,31 @@ impl Default for Motion {
 }
 
 impl Motion {
-    /// Forget the last shot.
-    pub fn rest(&mut self, scene: &Scene<'_>) {
+    /// Start a new shot with a velocity of 0.
+    pub fn reset(&mut self, scene: &Scene<'_>) {
         self.velocity.fill::<1>(scene.grid, |_, [line]| line.fill(0.0));
     }
 
-    /// Add to the velocity what light that was settled by it still shows; `phase` is absolute, `modulation` 0 where there is no
-    /// light. A step of Gauss and Newton.
-    pub fn measure(
-        &mut self,
-        scene: &Scene<'_>,
-        (ratios, instants): ([f32; 3], Instants),
-        backgrounds: &Backgrounds,
-        phase: &[f32],
-        modulation: &[f32],
-    ) {
+    /// Add to the velocity what compensated light still shows of it, by a step of Gauss and Newton at an absolute phase.
+    pub fn measure(&mut self, scene: &Scene<'_>, timing: Timing, photometry: &Photometry, map: PhaseMap<'_>) {
         let grid = scene.grid;
         grid.window_sums::<2, [RowMaps; 2]>(
-            (scene.cells(WINDOW), SAMPLED_ROWS),
+            CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.change,
             |maps, y, sums| {
-                let model = backgrounds.sample(scene, y, &mut maps[0]);
-                let pixels = [phase, modulation, scene.usable].map(|plane| scene.row(plane, y));
-                add_motion(model, pixels, scene.rows(y), (ratios, instants), sums);
+                let fringes = photometry.sample(scene, y, &mut maps[0]);
+                let pixels = PixelRows {
+                    phase: scene.row(map.phase, y),
+                    modulation: scene.row(map.modulation, y),
+                    usable: scene.row(scene.usable, y),
+                };
+                add_motion(&fringes, &pixels, scene.rows(y), timing, sums);
             },
-            |_, [seen, known], out| {
-                let found = out.iter_mut().zip(seen.iter().zip(known));
-                found.for_each(|(out, (seen, known))| *out = seen / known.max(1e-9));
+            |_, [numerator, information], out| {
+                let found = out.iter_mut().zip(numerator.iter().zip(information));
+                found.for_each(|(out, (numerator, information))| *out = numerator / information.max(1e-9));
             },
         );
         let (before, change) = (std::mem::take(&mut self.velocity), &self.change);
@@ -91,12 +83,12 @@ impl Motion {
         });
     }
 
-    /// Bring the light of a scene, as it was seen, to the instant 0.
-    pub fn settle(
+    /// Bring the light of a scene, as it was captured, to the instant 0.
+    pub fn compensate(
         &self,
         scene: &Scene<'_>,
-        (ratios, instants): ([f32; 3], Instants),
-        backgrounds: &Backgrounds,
+        timing: Timing,
+        photometry: &Photometry,
         phase: &[f32],
         out: [&mut [f32]; 4],
     ) {
@@ -106,92 +98,128 @@ impl Motion {
         rows.for_each_init(
             || self.slots.take(),
             |slot, (y, ((red, green), (blue, infrared)))| {
-                let [models, velocities] = &mut slot.0;
-                let model = backgrounds.sample(scene, y, models);
+                let [fringes, velocities] = &mut slot.0;
+                let fringes = photometry.sample(scene, y, fringes);
                 let [velocity] = velocities.sample(grid, &self.velocity, 0, y);
-                let pixels = [scene.row(phase, y), velocity];
-                bring(model, pixels, scene.rows(y), (ratios, instants), [red, green, blue, infrared]);
+                let moving = MovingRow { phase: scene.row(phase, y), velocity };
+                compensate_row(&fringes, &moving, scene.rows(y), timing, [red, green, blue, infrared]);
             },
         );
     }
 
-    /// Takes from `sure` what moves too fast: where R and B have turned against each other by nearly a quarter of a fringe
-    /// they show the same, and nothing tells how fast it was.
-    pub fn rule_out(&self, scene: &Scene<'_>, [red, _, blue, _]: Instants, sure: &mut [u8]) {
+    /// Removes from `valid` pixels that move too fast: where R and B have turned against each other by nearly a quarter of a fringe
+    /// they show the same, and the velocity is ambiguous.
+    pub fn invalidate_fast(&self, scene: &Scene<'_>, [red, _, blue, _]: [f32; 4], valid: &mut [u8]) {
         let grid = scene.grid;
         let most = TURN_MAX / (blue - red).abs().max(f32::MIN_POSITIVE);
-        sure.par_chunks_mut(grid.stride).enumerate().for_each_init(
+        valid.par_chunks_mut(grid.stride).enumerate().for_each_init(
             || self.slots.take(),
-            |slot, (y, sure)| {
+            |slot, (y, valid)| {
                 let [velocity] = slot.0[0].sample(grid, &self.velocity, 0, y);
-                sure.iter_mut().zip(velocity).for_each(|(sure, v)| *sure &= u8::from(v.abs() <= most));
+                valid.iter_mut().zip(velocity).for_each(|(valid, v)| *valid &= u8::from(v.abs() <= most));
             },
         );
     }
 }
 
-/// Adds what every pixel sees of the motion, and how well it sees it: the derivative of its intensities by the velocity, less
-/// what phase and albedo would explain of it.
+/// One row of pixels.
+struct PixelRows<'a> {
+    phase: &'a [f32],
+    modulation: &'a [f32],
+    usable: &'a [f32],
+}
+
+/// One row of a moving phase: rad, and rad per unit of time.
+struct MovingRow<'a> {
+    phase: &'a [f32],
+    velocity: &'a [f32],
+}
+
+/// Adds numerator and information of a step of the velocity.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_motion(
-    model: [&[f32]; 8],
-    pixels: [&[f32]; 3],
+    fringes: &FringeRows,
+    pixels: &PixelRows,
     light: [&[f32]; 4],
-    (ratios, instants): ([f32; 3], Instants),
+    timing: Timing,
     sums: &mut [[Lanes; 2]],
 ) {
-    let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
+    let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
+    let (offset, amplitude, light) =
+        (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
-        let (model, light) = (take(&model, i), take(&light, i));
+        let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios, 0.0);
-            let (mut m, mut d, mut q) = ([0.0f32; 4], [0.0f32; 4], [0.0f32; 4]);
-            let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
-            let (mut mq, mut dq, mut ms) = (0.0f32, 0.0f32, 0.0f32);
+            let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
+            let carriers = carriers(phase[x], timing.ratios, 0.0);
             for c in 0..4 {
-                let (a, b) = (model[2 * c][x], model[2 * c + 1][x]);
-                (m[c], d[c]) = (a + b * cosines[c], b * derivatives[c]);
-                q[c] = instants[c] * d[c];
-                mm += m[c] * m[c];
-                md += m[c] * d[c];
-                dd += d[c] * d[c];
-                mq += m[c] * q[c];
-                dq += d[c] * q[c];
-                ms += m[c] * light[c][x];
+                let (a, b) = (offset[c][x], amplitude[c][x]);
+                (m[c], d[c]) = (a + b * carriers.cosine[c], b * carriers.derivative[c]);
             }
-            let determinant = mm * dd - md * md;
-            let inverse = 1.0 / if determinant > 1e-12 { determinant } else { 1e-12 };
-            let (albedo_part, phase_part) = ((dd * mq - md * dq) * inverse, (mm * dq - md * mq) * inverse);
-            let albedo = ms / mm;
-            let (mut seen, mut known) = (0.0f32, 0.0f32);
-            for c in 0..4 {
-                let rest = q[c] - albedo_part * m[c] - phase_part * d[c];
-                seen += rest * light[c][x];
-                known += rest * rest;
-            }
-            let weight = if modulation[x] > 0.0 { usable[x] * albedo } else { 0.0 };
-            (terms[0][x], terms[1][x]) = (weight * seen, weight * albedo * known);
+            let seen = light.map(|light| light[x]);
+            let weight = if modulation[x] > 0.0 { usable[x] } else { 0.0 };
+            let found = motion_terms(m, d, seen, timing.instants, weight);
+            (terms[0][x], terms[1][x]) = (found.numerator, found.information);
         }
         add(sums, &terms);
     }
 }
 
-/// Light of a row less what motion has added to it.
+/// A step of the velocity by one pixel: numerator over information.
+struct MotionTerms {
+    numerator: f32,
+    information: f32,
+}
+
+/// Terms of one pixel: the derivative of its intensities with respect to the velocity, less the part that
+/// phase and albedo would explain. `m` is the model for an albedo of 1, `d` its derivative with respect to the phase.
+#[inline(always)]
+fn motion_terms(m: [f32; 4], d: [f32; 4], light: [f32; 4], instants: [f32; 4], usable: f32) -> MotionTerms {
+    let mut q = [0.0f32; 4];
+    let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
+    let (mut mq, mut dq, mut ms) = (0.0f32, 0.0f32, 0.0f32);
+    for c in 0..4 {
+        q[c] = instants[c] * d[c];
+        mm += m[c] * m[c];
+        md += m[c] * d[c];
+        dd += d[c] * d[c];
+        mq += m[c] * q[c];
+        dq += d[c] * q[c];
+        ms += m[c] * light[c];
+    }
+    let determinant = mm * dd - md * md;
+    let inverse = 1.0 / if determinant > 1e-12 { determinant } else { 1e-12 };
+    let (albedo_part, phase_part) = ((dd * mq - md * dq) * inverse, (mm * dq - md * mq) * inverse);
+    let albedo = ms / mm;
+    let (mut numerator, mut information) = (0.0f32, 0.0f32);
+    for c in 0..4 {
+        let rest = q[c] - albedo_part * m[c] - phase_part * d[c];
+        numerator += rest * light[c];
+        information += rest * rest;
+    }
+    let weight = if usable > 0.0 { usable * albedo } else { 0.0 };
+    MotionTerms { numerator: weight * numerator, information: weight * albedo * information }
+}
+
+/// Light of a row less the change by motion.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn bring(
-    model: [&[f32]; 8],
-    pixels: [&[f32]; 2],
+fn compensate_row(
+    fringes: &FringeRows,
+    moving: &MovingRow,
     light: [&[f32]; 4],
-    ([_, second, third], instants): ([f32; 3], Instants),
+    Timing { ratios: [_, second, third], instants }: Timing,
     out: [&mut [f32]; 4],
 ) {
-    let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
+    let pixels = [moving.phase, moving.velocity].map(lanes);
+    let (offset, amplitude, light) =
+        (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
     let factors = [1.0, second, 1.0, third];
     for i in 0..pixels[0].len() {
-        let (model, mut found, [phase, velocity]) = (take(&model, i), take(&light, i), take(&pixels, i));
+        let (offset, amplitude, mut found) = (take(&offset, i), take(&amplitude, i), take(&light, i));
+        let [phase, velocity] = take(&pixels, i);
         for x in 0..LANES {
             let mut change = [0.0f32; 4];
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
@@ -201,10 +229,10 @@ fn bring(
                     if c == 2 { -s } else { c_ }
                 };
                 let moved = fringe(phase[x] + velocity[x] * instants[c]);
-                change[c] = model[2 * c + 1][x] * (moved - fringe(phase[x]));
-                let own = model[2 * c][x] + model[2 * c + 1][x] * moved;
-                top += own * found[c][x];
-                bottom += own * own;
+                change[c] = amplitude[c][x] * (moved - fringe(phase[x]));
+                let model = offset[c][x] + amplitude[c][x] * moved;
+                top += model * found[c][x];
+                bottom += model * model;
             }
             let albedo = top / bottom;
             for c in 0..4 {

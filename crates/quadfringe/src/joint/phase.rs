@@ -1,59 +1,80 @@
-//! Joint least squares of all four channels: once the order is known every channel measures the same column.
+//! Step 6: the phase from all four channels. Once the order is known every channel measures the same projector column.
 //!
-//! `I_c = rho (a_c + b_c cos(N_c / N_1 Phi + delta_c))` with `Phi` absolute: a Gauss-Newton step of the phase of every
-//! pixel, its albedo eliminated, averaged over the window that follows the surface.
+//! A Gauss-Newton step of the phase of every pixel under the model (S1), with the albedo eliminated, averaged over the window that
+//! follows the surface.
 
 use super::cells::RowMaps;
-use super::local_fit::binomial;
-use super::photometry::{Backgrounds, carriers};
-use super::scene::{Scene, around};
+use super::model::{FringeRows, carriers};
+use super::neighbours::{around, binomial};
+use super::params::phase::{ALBEDO_SHARE, UNLIT_WEIGHT};
+use super::params::tasks::ROWS;
+use super::photometry::Photometry;
+use super::scene::{Scene, Scratch};
 use super::window::{Average, Window, WindowRows};
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Rows that one task works on: of each the model is computed once, but for the two rows beside a block.
-const BLOCK: usize = 32;
-
-/// Share of a pixel in the albedo that it is given, the mean of nine by [`binomial`]. Were all of it its own, a step would be up to
-/// four times longer and, where neighbours err to different sides, lead beyond the solution.
-const OWN_ALBEDO: f32 = 0.25;
-
-/// What a dark pixel counts in the albedo of its neighbours: its phase is anything, and with it its albedo.
-const UNKNOWN: f32 = 1e-3;
-
-/// Working rows of the joint fit.
+/// The phase fit, with the working rows of its tasks.
 #[derive(Debug, Default)]
-pub(crate) struct Joint {
+pub(super) struct PhaseFit {
     slots: Slots<Rows>,
 }
 
-/// Rows of the image to write what a round finds, each as long as what is wanted of it.
-pub(crate) struct Found<'a> {
-    /// Misfit of the four channels: mean square in linear light.
-    pub misfit: Vec<&'a mut [f32]>,
+/// Where the fit writes what it finds besides the phase: rows of the image, each as long as is wanted of it.
+pub(super) struct FitRows<'a> {
+    /// Mean of the squared residuals of the four channels, in linear light squared.
+    pub squared_residual: Vec<&'a mut [f32]>,
     /// Modulation of R and B in linear light.
     pub modulation: Vec<&'a mut [f32]>,
-    /// What the window knows of the phase of every pixel: sum of weighted squared derivatives, 1/rad^2 in units of linear
-    /// light. The uncertainty is made of it.
+    /// Sum of the weighted squared derivatives of the intensities in the window, in linear light squared per rad^2: noise^2 over
+    /// it is the variance of the phase, apart from the share of the window.
     pub information: Vec<&'a mut [f32]>,
 }
 
-impl Found<'_> {
-    /// When nothing is wanted but the phase.
-    pub fn nothing(height: usize) -> Self {
+impl FitRows<'_> {
+    /// Rows of length 0: only the phase is wanted.
+    pub fn none(height: usize) -> Self {
         let rows = || (0..height).map(|_| <&mut [f32]>::default()).collect();
-        Self { misfit: rows(), modulation: rows(), information: rows() }
+        Self { squared_residual: rows(), modulation: rows(), information: rows() }
     }
 }
 
-/// Sums over the four channels on one row: products of the model `m` for an albedo of 1, of its derivative `d` by the phase and
-/// of the light `s`, as mm, md, dd, ms, ds, ss; the mean modulation of R and B for an albedo of 1; the albedo that fits best times
-/// its weight, and that weight.
+/// What one fit starts from.
+#[derive(Clone, Copy)]
+pub(super) struct PhaseModel<'a> {
+    pub scene: &'a Scene<'a>,
+    pub photometry: &'a Photometry,
+    /// Fringe numbers over the first.
+    pub ratios: [f32; 3],
+    pub window: Window<'a>,
+}
+
+/// Sums over the four channels along one row, for the model `m` with an albedo of 1, its derivative `d` with respect to the phase
+/// and the light `s`.
 #[derive(Debug, Default)]
 struct ModelRow {
-    rows: [Vec<f32>; 9],
+    mm: Vec<f32>,
+    md: Vec<f32>,
+    dd: Vec<f32>,
+    ms: Vec<f32>,
+    ds: Vec<f32>,
+    ss: Vec<f32>,
+    /// Mean amplitude of R and B for an albedo of 1.
+    amplitude: Vec<f32>,
+    /// Albedo that fits best, times its weight, and that weight.
+    weighted_albedo: Vec<f32>,
+    albedo_weight: Vec<f32>,
+}
+
+/// Rows that tell the pixels of a row apart.
+#[derive(Clone, Copy)]
+struct PixelRows<'a> {
+    phase: &'a [f32],
+    /// Share of the contrast that averaging pixels has cost.
+    loss: &'a [f32],
+    modulation: &'a [f32],
 }
 
 /// Rows of one task.
@@ -61,107 +82,144 @@ struct ModelRow {
 struct Rows {
     maps: RowMaps,
     losses: RowMaps,
+    /// Models of the rows above, at and below; their places move on by one with every row.
     ring: [ModelRow; 3],
-    /// Means of albedo and weight over neighbours.
-    means: [Vec<f32>; 2],
-    smooth: Vec<f32>,
-    /// Misfit and modulation.
-    found: [Vec<f32>; 2],
+    smooth: SmoothAlbedo,
+    spare: Vec<f32>,
+    found: FoundRows,
     window: WindowRows,
 }
 
-impl Joint {
-    /// One round on an absolute phase in rad, in place. `ratios` are the fringe numbers over the first; what two `lent` planes
-    /// held is lost.
+/// Albedo and its weight, averaged over nine pixels.
+#[derive(Debug, Default)]
+struct SmoothAlbedo {
+    weighted: Vec<f32>,
+    weight: Vec<f32>,
+}
+
+/// What the fit finds in one row of pixels.
+#[derive(Debug, Default)]
+struct FoundRows {
+    squared_residual: Vec<f32>,
+    modulation: Vec<f32>,
+}
+
+impl PhaseFit {
+    /// One step of an absolute phase in rad, in place.
     pub fn step(
         &mut self,
-        scene: &Scene<'_>,
-        (backgrounds, ratios): (&Backgrounds, [f32; 3]),
-        window: &Window<'_>,
+        model: PhaseModel<'_>,
         phase: &mut [f32],
-        [average, weight]: [&mut [f32]; 2],
-        found: &mut Found<'_>,
+        Scratch { first, second }: Scratch<'_>,
+        found: &mut FitRows<'_>,
     ) {
-        let (grid, slots) = (scene.grid, &self.slots);
-        let [average, weight] = [average, weight].map(|plane| &mut plane[..grid.pixels()]);
-        let Found { misfit, modulation, information } = found;
+        let (grid, slots) = (model.scene.grid, &self.slots);
+        let [average, weight] = [first, second].map(|plane| &mut plane[..grid.pixels()]);
+        let FitRows { squared_residual, modulation, information } = found;
         let before = &*phase;
         let out = average
             .par_chunks_mut(grid.stride)
             .zip(weight.par_chunks_mut(grid.stride))
-            .zip(misfit.par_iter_mut().zip(modulation.par_iter_mut()))
-            .chunks(BLOCK)
+            .zip(squared_residual.par_iter_mut().zip(modulation.par_iter_mut()))
+            .chunks(ROWS)
             .enumerate();
+        // Blocks of rows: the model of each row is computed once, except for the two rows next to a block.
         out.for_each_init(
             || slots.take(),
             |rows, (block, out)| {
-                let rows = &mut **rows;
-                let first = block * BLOCK;
-                let model = |rows: &mut Rows, y: usize, at: usize| {
-                    let maps = backgrounds.sample(scene, y, &mut rows.maps);
-                    let loss = window.loss(y, &mut rows.losses);
-                    let pixels = [scene.row(before, y), loss, window.modulation(y)];
-                    rows.ring[at].fill(maps, pixels, scene.rows(y), ratios);
-                };
-                model(rows, around(first, grid.height)[0], 0);
-                model(rows, first, 1);
-                for (i, ((phase, weight), (misfit, modulation))) in out.into_iter().enumerate() {
+                let (rows, first) = (&mut **rows, block * ROWS);
+                rows.model(model, before, around(first, grid.height)[0], 0);
+                rows.model(model, before, first, 1);
+                for (i, ((phase, weight), (squared_residual, modulation))) in out.into_iter().enumerate() {
                     let y = first + i;
-                    model(rows, around(y, grid.height)[2], (i + 2) % 3);
-                    let Rows { ring, means, smooth, found, window: window_rows, .. } = rows;
-                    means.iter_mut().chain(&mut *found).for_each(|row| row.resize(grid.stride, 0.0));
-                    for (mean, from) in means.iter_mut().zip([7, 8]) {
-                        let near = [0, 1, 2].map(|k| ring[(i + k) % 3].rows[from].as_slice());
-                        binomial(near, grid.width, smooth, mean);
-                    }
-                    let model = ring[(i + 1) % 3].rows.each_ref().map(Vec::as_slice);
-                    let means = means.each_ref().map(Vec::as_slice);
-                    let lit = [window.modulation(y), scene.row(scene.usable, y)];
-                    let [misfits, modulations] = found.each_mut().map(Vec::as_mut_slice);
-                    let measure = |[numerator, denominator]: [&mut [f32]; 2]| {
-                        linearise(model, means, lit, [numerator, denominator, misfits, modulations]);
-                    };
-                    window.along(y, window_rows, scene.row(before, y), measure, [phase, weight]);
-                    let [misfits, modulations] = found;
-                    misfit.copy_from_slice(&misfits[..misfit.len()]);
-                    modulation.copy_from_slice(&modulations[..modulation.len()]);
+                    rows.model(model, before, around(y, grid.height)[2], (i + 2) % 3);
+                    rows.average(model, before, y, i, [phase, weight]);
+                    squared_residual.copy_from_slice(&rows.found.squared_residual[..squared_residual.len()]);
+                    modulation.copy_from_slice(&rows.found.modulation[..modulation.len()]);
                 }
             },
         );
         let average = Average { phase: average, weight };
-        window.down(&average, slots, |rows| &mut rows.window, phase, information);
+        model.window.down(&average, slots, |rows| &mut rows.window, phase, information);
+    }
+}
+
+impl Rows {
+    /// The model of row `y`, into place `at` of the ring.
+    fn model(&mut self, model: PhaseModel<'_>, phase: &[f32], y: usize, at: usize) {
+        let PhaseModel { scene, photometry, ratios, window } = model;
+        let fringes = photometry.sample(scene, y, &mut self.maps);
+        let loss = window.loss(y, &mut self.losses);
+        let pixels = PixelRows { phase: scene.row(phase, y), loss, modulation: window.modulation(y) };
+        predict(&fringes, pixels, scene.rows(y), ratios, &mut self.ring[at]);
+    }
+
+    /// Normal equations of row `y`, number `i` of its block, and their average along the row.
+    fn average(&mut self, model: PhaseModel<'_>, before: &[f32], y: usize, i: usize, out: [&mut [f32]; 2]) {
+        let (scene, grid) = (model.scene, model.scene.grid);
+        let Self { ring, smooth, spare, found, window, .. } = self;
+        let FoundRows { squared_residual, modulation } = &mut *found;
+        for row in [&mut smooth.weighted, &mut smooth.weight, squared_residual, modulation] {
+            row.resize(grid.stride, 0.0);
+        }
+        let near = [0, 1, 2].map(|k| &ring[(i + k) % 3]);
+        binomial(near.map(|row| row.weighted_albedo.as_slice()), grid.width, spare, &mut smooth.weighted);
+        binomial(near.map(|row| row.albedo_weight.as_slice()), grid.width, spare, &mut smooth.weight);
+        let lit = Lit { modulation: model.window.modulation(y), usable: scene.row(scene.usable, y) };
+        let measure = |[numerator, denominator]: [&mut [f32]; 2]| {
+            linearise(near[1], smooth, lit, NormalRows { numerator, denominator }, found);
+        };
+        model.window.along(y, window, scene.row(before, y), measure, out);
     }
 }
 
 impl ModelRow {
-    fn fill(&mut self, maps: [&[f32]; 8], pixels: [&[f32]; 3], light: [&[f32]; 4], ratios: [f32; 3]) {
-        self.rows.iter_mut().for_each(|row| row.resize(pixels[0].len(), 0.0));
-        predict(maps, pixels, light, ratios, self.rows.each_mut().map(Vec::as_mut_slice));
+    fn rows_mut(&mut self, length: usize) -> [&mut [f32]; 9] {
+        let Self { mm, md, dd, ms, ds, ss, amplitude, weighted_albedo, albedo_weight } = self;
+        [mm, md, dd, ms, ds, ss, amplitude, weighted_albedo, albedo_weight].map(|row| {
+            row.resize(length, 0.0);
+            row.as_mut_slice()
+        })
     }
+}
+
+/// Which pixels of a row are lit and may take part.
+#[derive(Clone, Copy)]
+struct Lit<'a> {
+    modulation: &'a [f32],
+    usable: &'a [f32],
+}
+
+/// Normal equations of a step of the phase along a row: the step is numerator over denominator.
+struct NormalRows<'a> {
+    numerator: &'a mut [f32],
+    denominator: &'a mut [f32],
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn predict(
-    maps: [&[f32]; 8],
-    pixels: [&[f32]; 3],
+    fringes: &FringeRows,
+    pixels: PixelRows,
     light: [&[f32]; 4],
     ratios: [f32; 3],
-    out: [&mut [f32]; 9],
+    out: &mut ModelRow,
 ) {
-    let (maps, pixels, light) = (maps.map(lanes), pixels.map(lanes), light.map(lanes));
-    let mut out = out.map(lanes_mut);
+    let mut out = out.rows_mut(pixels.phase.len()).map(lanes_mut);
+    let pixels = [pixels.phase, pixels.loss, pixels.modulation].map(lanes);
+    let (offset, amplitude, light) =
+        (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     for i in 0..pixels[0].len() {
-        let (maps, light) = (take(&maps, i), take(&light, i));
+        let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, loss, lit] = take(&pixels, i);
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
+            let carriers = carriers(phase[x], ratios, loss[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
             let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {
-                let (a, b, s) = (maps[2 * c][x], maps[2 * c + 1][x], light[c][x]);
-                let m = a + b * cosines[c];
-                let (m, d) = (if m > 0.0 { m } else { 0.0 }, b * derivatives[c]);
+                let (a, b, s) = (offset[c][x], amplitude[c][x], light[c][x]);
+                let m = a + b * carriers.cosine[c];
+                let (m, d) = (if m > 0.0 { m } else { 0.0 }, b * carriers.derivative[c]);
                 mm += m * m;
                 md += m * d;
                 dd += d * d;
@@ -171,35 +229,39 @@ fn predict(
             }
             let albedo = ms / mm;
             let albedo = if albedo > 1e-4 { albedo } else { 1e-4 };
-            let weight = if lit[x] > 0.0 { 1.0 } else { UNKNOWN };
-            let mean = 0.5 * (maps[1][x] + maps[5][x]);
-            let own = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];
-            (0..9).for_each(|row| found[row][x] = own[row]);
+            let weight = if lit[x] > 0.0 { 1.0 } else { UNLIT_WEIGHT };
+            let mean = 0.5 * (amplitude[0][x] + amplitude[2][x]);
+            let values = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];
+            (0..9).for_each(|row| found[row][x] = values[row]);
         }
         put(&mut out, i, &found);
     }
 }
 
-/// Gauss-Newton terms of every pixel with the albedo eliminated, and how far the channels are from their model.
+/// Gauss-Newton terms of every pixel with the albedo eliminated, and the residuals of the four channels.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn linearise(model: [&[f32]; 9], means: [&[f32]; 2], lit: [&[f32]; 2], out: [&mut [f32]; 4]) {
-    let (model, means, lit) = (model.map(lanes), means.map(lanes), lit.map(lanes));
+fn linearise(model: &ModelRow, albedo: &SmoothAlbedo, lit: Lit, normal: NormalRows, found: &mut FoundRows) {
+    let sums = [&model.mm, &model.md, &model.dd, &model.ms, &model.ds, &model.ss, &model.amplitude];
+    let sums = sums.map(|row| lanes(row));
+    let (albedo, lit) =
+        ([&albedo.weighted, &albedo.weight].map(|row| lanes(row)), [lit.modulation, lit.usable].map(lanes));
+    let out = [normal.numerator, normal.denominator, &mut found.squared_residual, &mut found.modulation];
     let mut out = out.map(lanes_mut);
-    for i in 0..means[0].len() {
-        let [mm, md, dd, ms, ds, ss, modulation, _, _] = take(&model, i);
-        let ([albedo, weight], lit) = (take(&means, i), take(&lit, i));
+    for i in 0..albedo[0].len() {
+        let [mm, md, dd, ms, ds, ss, amplitude] = take(&sums, i);
+        let ([weighted, weight], [modulation, usable]) = (take(&albedo, i), take(&lit, i));
         let mut found = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let albedo = albedo[x] / weight[x];
-            let top = albedo * (ds[x] - albedo * md[x]);
+            let albedo = weighted[x] / weight[x];
+            let numerator = albedo * (ds[x] - albedo * md[x]);
             let square = ss[x] - albedo * (2.0 * ms[x] - albedo * mm[x]);
-            // What a change of albedo would explain as well says nothing about the phase.
-            let kept = albedo * albedo * (dd[x] - OWN_ALBEDO * md[x] * md[x] / mm[x]);
-            let on = (lit[0][x] > 0.0) & (lit[1][x] > 0.0);
-            found[0][x] = if on { top } else { 0.0 };
-            found[1][x] = if on { kept } else { 0.0 };
+            // A change that a change of albedo would explain as well says nothing about the phase.
+            let denominator = albedo * albedo * (dd[x] - ALBEDO_SHARE * md[x] * md[x] / mm[x]);
+            let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
+            found[0][x] = if on { numerator } else { 0.0 };
+            found[1][x] = if on { denominator } else { 0.0 };
             found[2][x] = if square > 0.0 { 0.25 * square } else { 0.0 };
-            found[3][x] = if lit[0][x] > 0.0 { albedo * modulation[x] } else { 0.0 };
+            found[3][x] = if modulation[x] > 0.0 { albedo * amplitude[x] } else { 0.0 };
         }
         put(&mut out, i, &found);
     }

@@ -1,20 +1,16 @@
-//! What the model leaves of the light around every cell. Beside an edge of colours, where no backgrounds are right yet, that
-//! is more than noise, and neighbouring phases differ by as much.
+//! Residuals around every cell. Near an edge of the texture, where offsets and amplitudes are not right yet, they exceed the noise,
+//! and neighbouring phases differ accordingly.
 
-use super::cells::{CellMaps, CellWork, RowMaps};
+use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::params::phase::{RESIDUAL_SAMPLED_ROWS, RESIDUAL_WIDTH};
 use super::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 
-/// Width (sigma) in fringe periods over which squares are averaged.
-const WIDTH: f32 = 0.125;
-/// Rows of pixels that stand for a row of cells.
-const SAMPLED_ROWS: usize = 2;
-
 /// Mean square residual in linear light on the cells.
 #[derive(Debug)]
-pub(crate) struct Residuals {
+pub(super) struct Residuals {
     maps: CellMaps,
     sums: CellMaps,
     slots: Slots<((), CellWork)>,
@@ -27,14 +23,14 @@ impl Default for Residuals {
 }
 
 impl Residuals {
-    /// Average the mean squares `misfit` of the pixels; `modulation` is 0 where there is no light.
-    pub fn measure(&mut self, scene: &Scene<'_>, misfit: &[f32], modulation: &[f32]) {
+    /// Average the mean squared residuals of the pixels, in linear light squared; `modulation` is 0 where there is no light.
+    pub fn measure(&mut self, scene: &Scene<'_>, squared_residual: &[f32], modulation: &[f32]) {
         scene.grid.window_sums::<2, ()>(
-            (scene.cells(WIDTH), SAMPLED_ROWS),
+            CellWindow { sigma_cells: scene.cells(RESIDUAL_WIDTH), sampled_rows: RESIDUAL_SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.maps,
-            |(), y, sums| add_lit([misfit, modulation].map(|plane| scene.row(plane, y)), sums),
+            |(), y, sums| add_lit([squared_residual, modulation].map(|plane| scene.row(plane, y)), sums),
             |_, [count, squares], out| {
                 for (out, (square, n)) in out.iter_mut().zip(squares.iter().zip(count)) {
                     *out = square / n.max(1e-6);
@@ -43,7 +39,7 @@ impl Residuals {
         );
     }
 
-    /// Those of row `y`, of the scene that was measured or of a finer one.
+    /// Mean squared residual along row `y` of the scene that was measured, or of a finer one.
     pub fn row<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
         let [row] = maps.sample(scene.grid, &self.maps, 0, y);
         row
@@ -54,11 +50,11 @@ impl Residuals {
 fn add_lit(pixels: [&[f32]; 2], sums: &mut [[Lanes; 2]]) {
     let pixels = pixels.map(lanes);
     for (i, sums) in sums.iter_mut().enumerate() {
-        let [misfit, modulation] = take(&pixels, i);
+        let [square, modulation] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
-            (terms[0][x], terms[1][x]) = if lit { (1.0, misfit[x]) } else { (0.0, 0.0) };
+            (terms[0][x], terms[1][x]) = if lit { (1.0, square[x]) } else { (0.0, 0.0) };
         }
         add(sums, &terms);
     }
@@ -75,9 +71,9 @@ mod tests {
         let plane = |value: &dyn Fn(usize) -> f32| -> Vec<f32> {
             (0..grid.pixels()).map(|i| value(i % 128)).collect()
         };
-        // Every second column is dark, and whatever is missed there does not count.
+        // Every second column is dark, and its residuals do not count.
         let modulation = plane(&|x| if x % 2 == 0 { 0.4 } else { 0.0 });
-        let misfit = plane(&|x| {
+        let square = plane(&|x| {
             if x % 2 == 1 {
                 1.0
             } else if x < 64 {
@@ -89,7 +85,7 @@ mod tests {
         let light = vec![0.5; grid.pixels()];
         let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
         let mut residuals = Residuals::default();
-        residuals.measure(&scene, &misfit, &modulation);
+        residuals.measure(&scene, &square, &modulation);
         let mut maps = RowMaps::default();
         let row = residuals.row(&scene, 30, &mut maps);
         for x in 0..128 {

@@ -1,18 +1,77 @@
-//! One shot as the steps of the best method see it: four planes of light, the pixels that count, and a grid of cells.
+//! One shot as the steps of the joint method see it: four planes of light, the pixels that count, and a grid of cells.
 
 use super::cells::Grid;
+use super::params::pyramid::MOSAIC_REACH_PX;
+
+/// A grid of cells over one level of the image pyramid.
+#[derive(Clone, Copy)]
+pub(super) struct ScaledGrid<'a> {
+    pub grid: &'a Grid,
+    /// Fringe period across the fringes, in pixels of this level.
+    pub period_px: f64,
+    /// Camera pixels along a side of a pixel of this level, which is their mean.
+    pub factor: usize,
+}
+
+/// The grids of one shot on both levels of the image pyramid.
+pub(super) struct Frame<'a> {
+    pub full: ScaledGrid<'a>,
+    pub coarse: ScaledGrid<'a>,
+    /// Pixels that interpolated light reaches into a shadow.
+    pub reach_px: usize,
+}
+
+impl<'a> Frame<'a> {
+    /// `coarse` has the cells of `full` over fewer pixels; the fringe period is in pixels of `full`.
+    pub fn new(full: &'a Grid, coarse: &'a Grid, period_px: f64, is_mosaic: bool) -> Self {
+        let factor = full.step / coarse.step;
+        Self {
+            full: ScaledGrid { grid: full, period_px, factor: 1 },
+            coarse: ScaledGrid { grid: coarse, period_px: period_px / factor as f64, factor },
+            reach_px: if is_mosaic { MOSAIC_REACH_PX } else { 0 },
+        }
+    }
+
+    /// The reach in pixels of the coarse level.
+    pub fn coarse_reach_px(&self) -> usize {
+        self.reach_px.div_ceil(self.coarse.factor)
+    }
+}
 
 /// Four planes of linear light, row-major and padded, with a grid of cells over them.
 #[derive(Clone, Copy)]
-pub(crate) struct Scene<'a> {
+pub(super) struct Scene<'a> {
+    /// R, G, B, IR.
     pub light: [&'a [f32]; 4],
     /// 1 for pixels that may take part in a fit, 0 for the others.
     pub usable: &'a [f32],
     pub grid: &'a Grid,
     /// Fringe period across the fringes in pixels.
     pub period_px: f64,
-    /// Pixels of the camera along a side of a pixel, which is their mean.
+    /// Camera pixels along a side of a pixel, which is their mean.
     pub factor: usize,
+}
+
+/// The phase of an image and where it is known, in padded rows.
+#[derive(Clone, Copy)]
+pub(super) struct PhaseMap<'a> {
+    /// Phase of R and B in rad.
+    pub phase: &'a [f32],
+    /// Modulation of R and B in linear light; 0 where the pixel is not lit or does not take part.
+    pub modulation: &'a [f32],
+}
+
+/// Two planes of working memory, as large as the image; their content is lost.
+pub(super) struct Scratch<'a> {
+    pub first: &'a mut [f32],
+    pub second: &'a mut [f32],
+}
+
+impl Scratch<'_> {
+    /// The same planes for one step.
+    pub fn lend(&mut self) -> Scratch<'_> {
+        Scratch { first: &mut *self.first, second: &mut *self.second }
+    }
 }
 
 impl<'a> Scene<'a> {
@@ -30,9 +89,4 @@ impl<'a> Scene<'a> {
     pub fn cells(&self, periods: f32) -> f32 {
         periods * self.period_px as f32 / self.grid.step as f32
     }
-}
-
-/// Rows above, at and below row `y`; borders repeat.
-pub(crate) fn around(y: usize, height: usize) -> [usize; 3] {
-    [y.saturating_sub(1), y, (y + 1).min(height - 1)]
 }

@@ -1,30 +1,22 @@
-//! Slopes of the phase on the cells, from a wrapped phase.
+//! Slopes of the phase on the cells, from a phase that may be wrapped.
 
-use super::cells::{CellMaps, CellWork, RowMaps};
-use super::scene::Scene;
+use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::params::slopes::{FINE_WIDTH, SAMPLED_ROWS, WIDE_SHARE, WIDTH};
+use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
 use crate::parallel::lanes::{LANES, Lanes, lanes, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use std::f32::consts::PI;
 
-/// Width (sigma) in fringe periods over which slopes are averaged.
-const WIDTH: f32 = 0.43;
-/// The same for the slopes of a phase that is sure, which follow the surface closer.
-const FINE_WIDTH: f32 = 0.2;
-/// What the slopes of the wide window count among them, as a share of the pixels of a whole fine one.
-const BACKING: f32 = 0.1;
-/// Rows of pixels that stand for a row of cells.
-const SAMPLED_ROWS: usize = 2;
-
 /// Weights and weighted steps along and down, and lit pixels.
 const TERMS: usize = 5;
 
 /// Slopes of the phase in rad per cell, which stays right when the cells are laid over another image.
 #[derive(Debug)]
-pub(crate) struct Slopes {
+pub(super) struct Slopes {
     maps: CellMaps,
-    /// Slopes that back finer ones.
+    /// Slopes of the wide window, which join those of the fine one.
     wide: CellMaps,
     sums: CellMaps,
     slots: Slots<([Vec<f32>; 2], CellWork)>,
@@ -38,24 +30,31 @@ impl Default for Slopes {
 }
 
 impl Slopes {
-    /// Measure a phase (rad, wrapped or not); `modulation` is 0 where there is no light.
-    pub fn measure(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
-        self.take(scene, [phase, modulation], WIDTH, 0.0);
+    /// Slopes of a phase in a wide window.
+    pub fn measure(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>) {
+        self.average(scene, map, WIDTH, 0.0);
     }
 
-    /// Measure a phase that is sure once more, in a smaller window; where that holds little the slopes stay as they were.
-    pub fn refine(&mut self, scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) {
+    /// Slopes of a phase without wrong orders in a smaller window; where that holds few pixels they stay as they were.
+    pub fn refine(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>) {
         std::mem::swap(&mut self.maps, &mut self.wide);
-        self.take(scene, [phase, modulation], FINE_WIDTH, BACKING);
+        self.average(scene, map, FINE_WIDTH, WIDE_SHARE);
     }
 
-    fn take(&mut self, scene: &Scene<'_>, [phase, modulation]: [&[f32]; 2], width: f32, backing: f32) {
+    /// `wide_share` is the weight of the wide slopes, as a share of the pixels of a whole window.
+    fn average(
+        &mut self,
+        scene: &Scene<'_>,
+        PhaseMap { phase, modulation }: PhaseMap<'_>,
+        width: f32,
+        wide_share: f32,
+    ) {
         let grid = scene.grid;
         let Self { maps, wide, sums, slots } = self;
         let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
-        let backing = backing * whole;
+        let wide_weight = wide_share * whole;
         grid.window_sums::<TERMS, [Vec<f32>; 2]>(
-            (scene.cells(width), SAMPLED_ROWS),
+            CellWindow { sigma_cells: scene.cells(width), sampled_rows: SAMPLED_ROWS },
             slots,
             sums,
             maps,
@@ -74,8 +73,8 @@ impl Slopes {
             |row, [w, along, v, down, lit], out| {
                 let (columns, step) = (w.len(), grid.step as f32);
                 let slope = |i: usize, sum: &[f32], weight: &[f32], map: usize| {
-                    let backed = if backing > 0.0 { backing * wide.line(row, map)[i] } else { 0.0 };
-                    (step * sum[i] + backed) / (weight[i] + backing).max(1e-6)
+                    let wide = if wide_weight > 0.0 { wide_weight * wide.line(row, map)[i] } else { 0.0 };
+                    (step * sum[i] + wide) / (weight[i] + wide_weight).max(1e-6)
                 };
                 for i in 0..columns {
                     out[i] = slope(i, along, w, 0);
@@ -115,7 +114,7 @@ impl Slopes {
         self.maps.line(row, 2)[column] * loss_scale(scene)
     }
 
-    /// Share of the window around the pixels of row `y` that is lit; nothing is lit beyond the borders.
+    /// Share of the window around the pixels of row `y` that is lit; beyond the borders there is no light.
     pub fn lit<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
         let [row] = maps.sample(scene.grid, &self.maps, 3, y);
         row
@@ -189,9 +188,9 @@ mod tests {
         let light = vec![0.5; grid.pixels()];
         let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
         let mut slopes = Slopes::default();
-        slopes.measure(&scene, &phase, &lit);
+        slopes.measure(&scene, PhaseMap { phase: &phase, modulation: &lit });
         let (before, beyond) = (slopes.maps.line(12, 0).to_vec(), slopes.at(12, 44));
-        slopes.refine(&scene, &phase, &lit);
+        slopes.refine(&scene, PhaseMap { phase: &phase, modulation: &lit });
         let after = slopes.maps.line(12, 0);
         let truth = |column: usize| 4.0 * (0.25 + wave * (wave * (4.0 * column as f32 + 2.0)).cos());
         let worst =

@@ -1,36 +1,24 @@
 //! A smoothing window that follows the local slope of the phase and stops at edges.
 //!
-//! Neighbours count as far as their phase fits the slope through the pixel within the noise (a bilateral window,
-//! Tukey's biweight), first along rows and then along columns; what is added up are the normal equations of a
-//! Gauss-Newton step, so that every neighbour counts by what it knows.
+//! The weight of a neighbour falls with the difference between its phase and the slope through the pixel, in units of the noise (a
+//! bilateral window with Tukey's biweight), first along rows and then along columns. The window adds up normal equations of a
+//! Gauss-Newton step, so that every neighbour counts by its information.
 
 use super::cells::RowMaps;
+use super::params::phase::{REACH_RAD, REACH_SIGMAS, SIGMA_MAX_PX, SIGMA_MIN_PX, WIDE, WIDTH};
+use super::params::tasks::ROWS;
 use super::residuals::Residuals;
 use super::scene::Scene;
 use super::slopes::Slopes;
-use crate::parallel::angle::wrap;
 use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Width (sigma) of the window in fringe periods.
-const WIDTH: f32 = 0.125;
-/// Width (sigma) of a window that averages over what wrong backgrounds do to the phase, in fringe periods.
-const WIDE: f32 = 0.5;
-/// Neighbours further off than this many noise widths belong to another surface.
-const REACH_SIGMAS: f32 = 7.0;
-/// The same for a capture without noise.
-const REACH_RAD: f32 = 0.06;
-/// Rows that one task works on.
-const BLOCK: usize = 32;
-/// One pixel in so many is asked for the noise.
-const NOISE_STRIDE: usize = 13;
-
 /// The window of one shot.
 #[derive(Clone, Copy)]
-pub(crate) struct Window<'a> {
+pub(super) struct Window<'a> {
     scene: &'a Scene<'a>,
     slopes: &'a Slopes,
     modulation: &'a [f32],
@@ -44,14 +32,14 @@ pub(crate) struct Window<'a> {
 
 /// A phase averaged along rows, and its weight.
 #[derive(Clone, Copy)]
-pub(crate) struct Average<'a> {
+pub(super) struct Average<'a> {
     pub phase: &'a [f32],
     pub weight: &'a [f32],
 }
 
 /// Rows of one task.
 #[derive(Debug, Default)]
-pub(crate) struct WindowRows {
+pub(super) struct WindowRows {
     maps: RowMaps,
     slopes: Vec<f32>,
     sharpness: Vec<f32>,
@@ -64,7 +52,7 @@ impl<'a> Window<'a> {
     /// A window over a scene whose intensities have `noise` (standard deviation in linear light); `modulation` is 0
     /// where there is no light.
     pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
-        let sigma = (WIDTH * scene.period_px as f32).clamp(0.8, 6.0);
+        let sigma = (WIDTH * scene.period_px as f32).clamp(SIGMA_MIN_PX, SIGMA_MAX_PX);
         let radius = (2.0 * sigma).ceil() as usize;
         Self { scene, slopes, modulation, radius, spacing: 1, sigma, noise, residuals: None }
     }
@@ -84,7 +72,7 @@ impl<'a> Window<'a> {
         Self { radius: self.radius.min(2), ..self }
     }
 
-    /// The same with a reach of a whole fringe: what wrong backgrounds do to the phase changes its sign along a fringe.
+    /// The same with a reach of a whole fringe: errors that wrong offsets and amplitudes cause change their sign along a fringe.
     pub fn wide(self) -> Self {
         let sigma = WIDE * self.scene.period_px as f32;
         // A third of sigma apart neighbours still add up to a smooth window.
@@ -92,7 +80,7 @@ impl<'a> Window<'a> {
         Self { sigma, spacing, radius: (2.0 * sigma / spacing as f32).ceil() as usize, ..self }
     }
 
-    /// The same where the model leaves `residuals` above the noise: phases of one surface differ by as much there.
+    /// The same, wider in phase where the model leaves `residuals` above the noise.
     pub fn loosened(self, residuals: &'a Residuals) -> Self {
         Self { residuals: Some(residuals), ..self }
     }
@@ -113,7 +101,7 @@ impl<'a> Window<'a> {
         self.sharpen(y, residuals, sharpness);
         let inner = padded.each_mut().map(|row| {
             row.resize(2 * reach + grid.stride, 0.0);
-            // What another window has left beside the row is nothing to measure by.
+            // Another window may have left values before and behind the row.
             let (before, rest) = row.split_at_mut(reach);
             let (inner, behind) = rest.split_at_mut(grid.stride);
             before.fill(0.0);
@@ -152,11 +140,11 @@ impl<'a> Window<'a> {
         information: &mut [&mut [f32]],
     ) {
         let stride = self.scene.grid.stride;
-        let out = phase.par_chunks_mut(BLOCK * stride).zip(information.par_chunks_mut(BLOCK));
+        let out = phase.par_chunks_mut(ROWS * stride).zip(information.par_chunks_mut(ROWS));
         out.enumerate().for_each_init(
             || slots.take(),
             |slot, (block, (phase, information))| {
-                let first = block * BLOCK;
+                let first = block * ROWS;
                 let rows = rows(slot);
                 self.slopes_down(first, phase.len() / stride, rows);
                 let mut weight = std::mem::take(&mut rows.weight);
@@ -181,7 +169,7 @@ impl<'a> Window<'a> {
     /// Slopes of the rows that `count` rows from `first` on need.
     fn slopes_down(&self, first: usize, count: usize, rows: &mut WindowRows) {
         let (stride, reach) = (self.scene.grid.stride, self.reach());
-        rows.slopes.resize((BLOCK + 2 * reach) * stride, 0.0);
+        rows.slopes.resize((ROWS + 2 * reach) * stride, 0.0);
         for (k, line) in rows.slopes.chunks_exact_mut(stride).take(count + 2 * reach).enumerate() {
             let y = (first + k).saturating_sub(reach).min(self.scene.grid.height - 1);
             line.copy_from_slice(self.slopes.down(self.scene, y, &mut rows.maps));
@@ -213,7 +201,7 @@ impl<'a> Window<'a> {
         average_down(&self.taps(inside), &there, here, out);
     }
 
-    /// How sharply a misfit counts at every pixel of a row: one over the square of what still belongs to the surface.
+    /// Sharpness at every pixel of a row: 1 / the square of the greatest difference in phase within a surface.
     fn sharpen(&self, y: usize, maps: &mut RowMaps, sharpness: &mut Vec<f32>) {
         sharpness.clear();
         match self.residuals {
@@ -244,7 +232,7 @@ fn fit(d: f32, sharpness: f32) -> f32 {
     fits * fits
 }
 
-/// Average over neighbours along a row, as far as they fit: the phase between two pixels is the mean of their slopes
+/// Average over neighbours along a row, weighted by how well they fit: the phase between two pixels is the mean of their slopes
 /// times their distance, which is exact for a surface of constant curvature.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn average_along(
@@ -303,29 +291,11 @@ fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out
     }
 }
 
-/// Standard deviation of the intensities, from the second differences of the phase: slopes and most curvature drop out.
-pub(crate) fn noise(scene: &Scene<'_>, phase: &[f32], modulation: &[f32]) -> f32 {
-    let grid = scene.grid;
-    let mut seen: Vec<f32> = (0..phase.len())
-        .step_by(NOISE_STRIDE)
-        .filter(|i| (1..grid.width - 1).contains(&(i % grid.stride)))
-        .filter(|&i| modulation[i - 1].min(modulation[i]).min(modulation[i + 1]) > 0.0)
-        .map(|i| {
-            let bend = wrap(wrap(phase[i + 1] - phase[i]) - wrap(phase[i] - phase[i - 1]));
-            bend.abs() * modulation[i]
-        })
-        .collect();
-    if seen.is_empty() {
-        return 0.0;
-    }
-    let middle = seen.len() / 2;
-    let (_, median, _) = seen.select_nth_unstable_by(middle, f32::total_cmp);
-    *median / (0.6745 * 6f32.sqrt())
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::cells::Grid;
+    use super::super::noise::noise_of_phase;
+    use super::super::scene::PhaseMap;
     use super::*;
 
     /// A phase averaged by a window that counts every pixel alike.
@@ -351,7 +321,7 @@ mod tests {
     #[test]
     fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
         let grid = Grid::new([96, 256], 4.0);
-        // What wrong backgrounds do to a two-step phase, beside a step of 1.3 rad.
+        // The error that wrong offsets cause in a two-step phase, next to a step of 1.3 rad.
         let truth = |i: usize| 0.25 * (i % 256) as f32 + if i % 256 >= 128 { 1.3 } else { 0.0 };
         let ripple = |i: usize| 0.05 * (2.0 * truth(i)).sin();
         let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + ripple(i)).collect();
@@ -359,7 +329,7 @@ mod tests {
         let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
         let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
         let mut slopes = Slopes::default();
-        slopes.measure(&scene, &seen, &modulation);
+        slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
         let mut residuals = Residuals::default();
         residuals.measure(&scene, &vec![(0.04f32 * 0.4).powi(2); grid.pixels()], &modulation);
         let window = || Window::new(&scene, &slopes, &modulation, 1e-4);
@@ -397,12 +367,17 @@ mod tests {
         let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
         let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
         let mut slopes = Slopes::default();
-        slopes.measure(&scene, &seen, &modulation);
-        let window = Window::new(&scene, &slopes, &modulation, noise(&scene, &seen, &modulation));
+        slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
+        let window = Window::new(
+            &scene,
+            &slopes,
+            &modulation,
+            noise_of_phase(&scene, PhaseMap { phase: &seen, modulation: &modulation }),
+        );
         let phase = averaged(&window, &seen);
         let error = |i: usize| (phase[i] - truth(i)).abs();
         let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
-        // Beside the step its rise leaks into the slopes.
+        // Near the step its rise leaks into the slopes.
         assert!(worst < 0.05, "{worst}");
         // Away from step and borders, where the window is whole, noise of 0.0115 rad is down to a fifth.
         let inside = |i: usize| (16..48).contains(&(i / 128)) && (76..112).contains(&(i % 128));

@@ -1,74 +1,111 @@
-//! What the pixels of a node see of their fringes: its phase, and sums that tell every order's misfit.
+//! Step 4: the evidence of the nodes. Each has a phase, beats from the local fit, and sums over its pixels from which the cost of
+//! every order follows.
 
-use super::matching::{Evidence, Seen};
-use super::{Rows, SAMPLED_ROWS, SUMS, Wrapped};
+use super::matching::{CosineSums, NodeEvidence};
+use super::wrapped::Wrapped;
+use crate::joint::cells::RowMaps;
+use crate::joint::local_fit::Beats;
+use crate::joint::model::FringeRows;
+use crate::joint::params::orders::{LIT_WEIGHT, OBSERVED_COSINE_MAX, SAMPLED_ROWS};
 use crate::joint::scene::Scene;
 use crate::parallel::angle::{atan2, sin_cos, wrap, wrap_positive};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
 
-/// What a pixel sees of a cosine, cut where noise or glare has taken over.
-#[inline(always)]
-pub(super) fn cosine(light: f32, albedo: f32, [a, b]: [f32; 2]) -> f32 {
-    let scale = albedo * b;
-    let seen = (light - albedo * a) / if scale > 1e-6 { scale } else { 1e-6 };
-    let seen = if seen < 2.0 { seen } else { 2.0 };
-    if seen > -2.0 { seen } else { -2.0 }
+/// Sums over the pixels of a node: pixels, then s^2, s cos f, s sin f, cos 2f, sin 2f of G and of IR.
+const SUMS: usize = 11;
+
+/// Working rows of one task.
+#[derive(Debug, Default)]
+pub(super) struct EvidenceRows {
+    maps: [RowMaps; 2],
+    node_phase: Vec<f32>,
+    sums: Vec<[Lanes; SUMS]>,
+    cells: [Vec<f32>; SUMS],
 }
 
-/// Albedo by what R and B see of a phase: they are never both dark.
+/// The cosine of a channel that a pixel observes, limited where noise or glare dominates.
 #[inline(always)]
-pub(super) fn albedo(phase: f32, [red, blue]: [f32; 2], [[a_r, b_r], [a_b, b_b]]: [[f32; 2]; 2]) -> f32 {
+pub(super) fn observed_cosine(light: f32, albedo: f32, offset: f32, amplitude: f32) -> f32 {
+    let scale = albedo * amplitude;
+    let seen = (light - albedo * offset) / if scale > 1e-6 { scale } else { 1e-6 };
+    let seen = if seen < OBSERVED_COSINE_MAX { seen } else { OBSERVED_COSINE_MAX };
+    if seen > -OBSERVED_COSINE_MAX { seen } else { -OBSERVED_COSINE_MAX }
+}
+
+/// Albedo of a pixel from R and B at a phase: the two are never both dark. The arrays hold R and B.
+#[inline(always)]
+pub(super) fn albedo(phase: f32, light: [f32; 2], offset: [f32; 2], amplitude: [f32; 2]) -> f32 {
     let (s, c) = sin_cos(phase);
-    let (r, b) = (a_r + b_r * c, a_b - b_b * s);
+    let (r, b) = (offset[0] + amplitude[0] * c, offset[1] - amplitude[1] * s);
     let norm = r * r + b * b;
-    (red * r + blue * b) / if norm > 1e-6 { norm } else { 1e-6 }
+    (light[0] * r + light[1] * b) / if norm > 1e-6 { norm } else { 1e-6 }
 }
 
-/// Wrapped phase of the nodes of one row: that of the lit pixel nearest to the middle of each cell.
+/// Wrapped phase of the nodes of one row: that of the lit pixel nearest to the middle of each cell, in [0, 2 pi).
 #[inline(never)]
-pub(super) fn node_phases(scene: &Scene<'_>, known: &Wrapped<'_>, row: usize, out: &mut [f32]) {
+pub(super) fn node_phases(scene: &Scene<'_>, wrapped: &Wrapped<'_>, row: usize, out: &mut [f32]) {
     let grid = scene.grid;
     let half = grid.step / 2;
     for (column, out) in out.iter_mut().enumerate() {
         let (cy, cx) = (row * grid.step + half, column * grid.step + half);
         let middle = cy.min(grid.height - 1) * grid.stride + cx;
-        *out = wrap_positive(known.phase[middle]);
-        if known.modulation[middle] > 0.0 {
+        *out = wrap_positive(wrapped.map.phase[middle]);
+        if wrapped.map.modulation[middle] > 0.0 {
             continue;
         }
         let mut nearest = usize::MAX;
         for y in row * grid.step..((row + 1) * grid.step).min(grid.height) {
             for x in column * grid.step..(column + 1) * grid.step {
                 let far = y.abs_diff(cy).pow(2) + x.abs_diff(cx).pow(2);
-                if far < nearest && known.modulation[y * grid.stride + x] > 0.0 {
-                    (nearest, *out) = (far, wrap_positive(known.phase[y * grid.stride + x]));
+                if far < nearest && wrapped.map.modulation[y * grid.stride + x] > 0.0 {
+                    (nearest, *out) = (far, wrap_positive(wrapped.map.phase[y * grid.stride + x]));
                 }
             }
         }
     }
 }
 
-/// Sums over the pixels of a row of nodes, into `rows.cells`; the first is the number of lit pixels.
+/// Appends the evidence of a row of nodes, whose wrapped phases are `nodes`, to `out`.
 #[inline(never)]
-pub(super) fn gather(
+pub(super) fn row_evidence(
     scene: &Scene<'_>,
-    known: &Wrapped<'_>,
+    wrapped: &Wrapped<'_>,
     ratios: [f32; 2],
     row: usize,
     nodes: &[f32],
-    rows: &mut Rows,
+    rows: &mut EvidenceRows,
+    out: &mut Vec<NodeEvidence>,
+) {
+    gather(scene, wrapped, ratios, row, nodes, rows);
+    let beats = wrapped.fit.beats(row);
+    out.extend((0..nodes.len()).map(|x| evidence(nodes[x], &beats, &rows.cells, x)));
+}
+
+/// Sums over the pixels of a row of nodes, into `rows.cells`; the first is the number of lit pixels.
+fn gather(
+    scene: &Scene<'_>,
+    wrapped: &Wrapped<'_>,
+    ratios: [f32; 2],
+    row: usize,
+    nodes: &[f32],
+    rows: &mut EvidenceRows,
 ) {
     let grid = scene.grid;
-    let Rows { maps, node, sums, cells } = rows;
-    node.clear();
-    nodes.iter().for_each(|&phase| node.extend(std::iter::repeat_n(phase, grid.step)));
+    let EvidenceRows { maps, node_phase, sums, cells } = rows;
+    node_phase.clear();
+    nodes.iter().for_each(|&phase| node_phase.extend(std::iter::repeat_n(phase, grid.step)));
     sums.clear();
     sums.resize(grid.stride / LANES, [[0.0; LANES]; SUMS]);
     for y in grid.samples(row, SAMPLED_ROWS) {
-        let fringes = known.fringes(scene, y, maps);
-        let pixels = [known.phase, known.modulation, scene.usable].map(|plane| scene.row(plane, y));
-        add_seen(node, pixels, scene.rows(y), fringes, ratios, sums);
+        let fringes = wrapped.fringes(scene, y, maps);
+        let pixels = PixelRows {
+            node_phase,
+            phase: scene.row(wrapped.map.phase, y),
+            modulation: scene.row(wrapped.map.modulation, y),
+            usable: scene.row(scene.usable, y),
+        };
+        add_cosines(&pixels, scene.rows(y), &fringes, ratios, sums);
     }
     for (k, line) in cells.iter_mut().enumerate() {
         line.resize(grid.columns, 0.0);
@@ -76,35 +113,45 @@ pub(super) fn gather(
     }
 }
 
+/// One row of pixels.
+struct PixelRows<'a> {
+    /// Phase of the node that each pixel belongs to.
+    node_phase: &'a [f32],
+    phase: &'a [f32],
+    modulation: &'a [f32],
+    usable: &'a [f32],
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_seen(
-    node: &[f32],
-    pixels: [&[f32]; 3],
+fn add_cosines(
+    pixels: &PixelRows,
     light: [&[f32]; 4],
-    fringes: [&[f32]; 8],
+    fringes: &FringeRows,
     ratios: [f32; 2],
     sums: &mut [[Lanes; SUMS]],
 ) {
-    let (node, pixels) = (lanes(node), pixels.map(lanes));
-    let (light, fringes) = (light.map(lanes), fringes.map(lanes));
+    let pixels = [pixels.node_phase, pixels.phase, pixels.modulation, pixels.usable].map(lanes);
+    let (light, offset, amplitude) =
+        (light.map(lanes), fringes.offset.map(lanes), fringes.amplitude.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
-        let (node, [phase, modulation, usable]) = (node[i], take(&pixels, i));
-        let (light, fringes) = (take(&light, i), take(&fringes, i));
+        let [node, phase, modulation, usable] = take(&pixels, i);
+        let (light, offset, amplitude) = (take(&light, i), take(&offset, i), take(&amplitude, i));
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
             let weight = if lit { usable[x] } else { 0.0 };
-            // Light counts a thousandth of a pixel, so that a node of saturated pixels is lit and knows nothing.
-            terms[0][x] = if lit { weight + LIT } else { 0.0 };
-            let own = node[x] + wrap(phase[x] - node[x]);
-            let fringe = |c: usize| [fringes[2 * c][x], fringes[2 * c + 1][x]];
-            let albedo = albedo(phase[x], [light[0][x], light[2][x]], [fringe(0), fringe(2)]);
-            for c in 0..2 {
-                let s = cosine(light[2 * c + 1][x], albedo, fringe(2 * c + 1));
-                let (sine, cos) = sin_cos(ratios[c] * own);
+            // A lit pixel counts a little even if it is saturated, so that a node of such pixels is lit without evidence.
+            terms[0][x] = if lit { weight + LIT_WEIGHT } else { 0.0 };
+            let unwrapped = node[x] + wrap(phase[x] - node[x]);
+            let red_blue = |rows: &[Lanes; 4]| [rows[0][x], rows[2][x]];
+            let albedo = albedo(phase[x], red_blue(&light), red_blue(&offset), red_blue(&amplitude));
+            for beat in 0..2 {
+                let c = 2 * beat + 1;
+                let s = observed_cosine(light[c][x], albedo, offset[c][x], amplitude[c][x]);
+                let (sine, cos) = sin_cos(ratios[beat] * unwrapped);
                 let values = [s * s, s * cos, s * sine, cos * cos - sine * sine, 2.0 * sine * cos];
                 for k in 0..5 {
-                    terms[1 + 5 * c + k][x] = weight * values[k];
+                    terms[1 + 5 * beat + k][x] = weight * values[k];
                 }
             }
         }
@@ -112,24 +159,18 @@ fn add_seen(
     }
 }
 
-/// What a lit pixel counts at least.
-const LIT: f32 = 1.0 / 1024.0;
-
-pub(super) fn evidence(
-    phase: f32,
-    [g_p, g_q, ir_p, ir_q]: [f32; 4],
-    cells: &[Vec<f32>; SUMS],
-    x: usize,
-) -> Evidence {
-    let seen = |from: usize| Seen {
+/// Evidence of node `x` of a row.
+fn evidence(phase: f32, beats: &Beats<'_>, cells: &[Vec<f32>; SUMS], x: usize) -> NodeEvidence {
+    let cosines = |from: usize| CosineSums {
         square: cells[from][x],
         first: [cells[from + 1][x], cells[from + 2][x]],
         second: [cells[from + 3][x], cells[from + 4][x]],
     };
-    Evidence {
-        phase: Evidence::turns(phase),
-        beats: [Evidence::turns(-atan2(g_q, g_p)), Evidence::turns(-atan2(ir_q, ir_p))],
-        seen: [seen(1), seen(6)],
+    let beat = |c: usize| NodeEvidence::turns(-atan2(beats.sine[c][x], beats.cosine[c][x]));
+    NodeEvidence {
+        phase: NodeEvidence::turns(phase),
+        beats: [beat(0), beat(1)],
+        cosines: [cosines(1), cosines(6)],
         pixels: cells[0][x].floor(),
         lit: cells[0][x] > 0.0,
     }

@@ -1,10 +1,12 @@
-//! Whose backgrounds a pixel takes. Beside an edge between two colours a window mixes both; some way off, on the side that the
-//! pixel belongs to, it does not. Where light does not fit the backgrounds of its own place, every pixel takes those of the place
-//! around it that explain it and its neighbours best.
+//! Step 5 on textured surfaces: each pixel chooses a place to take offsets and amplitudes from. Near an edge of the texture a window
+//! mixes two albedos; some way off, on the side of the pixel, it does not. Where the light does not fit the offsets and amplitudes of
+//! its place, a pixel takes those of the place around it that explain it and its neighbours best.
 
-use super::carriers;
 use crate::joint::cells::{CellMaps, Grid, RowMaps};
-use crate::joint::local_fit::binomial;
+use crate::joint::model::carriers;
+use crate::joint::neighbours::binomial;
+use crate::joint::params::photometry::{PLACE_BETTER, PLACE_DISTANCE, PLACE_GAIN_MIN, PLACE_NOISES};
+use crate::joint::params::tasks::PLACE_ROWS;
 use crate::joint::scene::Scene;
 use crate::joint::slopes::Slopes;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
@@ -12,9 +14,8 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// How far off the nearer places are, in fringe periods: somewhat more than the window of the backgrounds is wide (sigma).
-const ASIDE: f32 = 0.35;
-/// Places to take backgrounds from, in units of that: rows down, columns right. The own one comes first, then row by row.
+/// Places to take offsets and amplitudes from, in units of `PLACE_DISTANCE`: rows down, columns right. The place of the pixel comes
+/// first, then row by row.
 const PLACES: [[isize; 2]; 17] = [
     [0, 0],
     [-2, -2],
@@ -34,23 +35,13 @@ const PLACES: [[isize; 2]; 17] = [
     [2, 0],
     [2, 2],
 ];
-/// Pixels look around where they miss more, on average over a vector in the rows of a task, than this many times what noise
-/// does: three standard deviations of that average.
-const NOISES: f32 = 1.2;
-/// Root mean square, in units of the modulation, that has to be missed on top of that and gained by another place: what a curved or
-/// blurred surface misses without being another colour must not send its pixels elsewhere.
-const SHARE: f32 = 0.02;
-/// Squared misfit in units of the variance of the noise: four intensities less albedo and phase.
-const MISSED_BY_NOISE: f32 = 2.0;
-/// Other backgrounds are taken when they miss less than this share of what a pixel's own do.
-const BETTER: f32 = 0.9;
-/// Rows of one task.
-const BLOCK: usize = 16;
+/// Squared residual in units of the variance of the noise: four intensities less albedo and phase.
+const RESIDUAL_BY_NOISE: f32 = 2.0;
 
-/// The place that every pixel takes its backgrounds from.
+/// The place that every pixel takes offsets and amplitudes from.
 #[derive(Debug, Default)]
 pub(super) struct Choice {
-    /// Numbers in [`PLACES`], in padded rows of the scene of the fit; none when all pixels take their own.
+    /// Numbers in [`PLACES`], in padded rows of the scene of the fit; none when all pixels take those of their place.
     places: Vec<u8>,
     stride: usize,
     aside: usize,
@@ -61,11 +52,11 @@ pub(super) struct Choice {
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
-    /// Backgrounds of one row, continued to both sides as far as the furthest place.
+    /// Offsets and amplitudes of one row, continued to both sides up to the furthest place.
     wide: [Vec<f32>; 8],
     /// Cosines and derivatives of the four channels.
     carriers: Vec<[Vec<f32>; 8]>,
-    /// Misfits with the backgrounds of places beside each other, place by place.
+    /// Squared residuals with the offsets and amplitudes of places in one row, place by place.
     misfit: Vec<Vec<f32>>,
     /// What another place has to undercut.
     best: Vec<Vec<f32>>,
@@ -76,7 +67,7 @@ struct Rows {
 }
 
 impl Choice {
-    /// Every pixel takes its own.
+    /// Every pixel takes those of its place.
     pub fn forget(&mut self) {
         self.places.clear();
     }
@@ -91,8 +82,8 @@ impl Choice {
         }
     }
 
-    /// Choose among backgrounds on a grid of cells over a scene, by how well the four intensities fit, whatever the albedo and to
-    /// first order whatever the phase. Returns the share of the lit pixels that do not take their own.
+    /// Choose among places on a grid of cells over a scene, by how well the four intensities fit with the best albedo and, to first
+    /// order, the best phase. Returns the share of the lit pixels that take another place.
     pub fn make(
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
@@ -102,16 +93,17 @@ impl Choice {
         noise: f32,
     ) -> f32 {
         let Self { places, stride, aside, slots } = self;
-        (*stride, *aside) = (grid.stride, (ASIDE * scene.period_px as f32).round().max(1.0) as usize);
+        (*stride, *aside) =
+            (grid.stride, (PLACE_DISTANCE * scene.period_px as f32).round().max(1.0) as usize);
         let aside = *aside as isize;
         places.clear();
         places.resize(grid.pixels(), 0);
-        let least = NOISES * MISSED_BY_NOISE * noise * noise;
-        places.par_chunks_mut(BLOCK * *stride).enumerate().for_each_init(
+        let least = PLACE_NOISES * RESIDUAL_BY_NOISE * noise * noise;
+        places.par_chunks_mut(PLACE_ROWS * *stride).enumerate().for_each_init(
             || slots.take(),
             |rows, (block, places)| {
                 let inside = |y: isize| y.clamp(0, grid.height as isize - 1) as usize;
-                let (first, count) = ((block * BLOCK) as isize, places.len() / grid.stride);
+                let (first, count) = ((block * PLACE_ROWS) as isize, places.len() / grid.stride);
                 let rows = &mut **rows;
                 let lines: Vec<usize> = (first - 1..=first + count as isize).map(inside).collect();
                 rows.prepare(scene, &lines, phase, how);
@@ -140,7 +132,7 @@ impl Choice {
         chosen as f32 / count(modulation, |light| *light > 0.0).max(1) as f32
     }
 
-    /// Put what the pixels of row `y` have chosen into the backgrounds of that row; the cells lie over the scene of the fit or over
+    /// Put what the pixels of row `y` have chosen into the offsets and amplitudes of that row; the cells lie over the scene of the fit or over
     /// a finer one.
     pub fn apply(&self, grid: &Grid, maps: &CellMaps, y: usize, rows: &mut [&mut [f32]; 8]) {
         if self.places.is_empty() {
@@ -163,7 +155,7 @@ fn apply(
     let aside = (aside * factor) as isize;
     let last = [grid.height - 1, grid.width - 1].map(|last| last as isize);
     for (group, places) in places.chunks(LANES).enumerate() {
-        // Most vectors hold no other place; they are told apart at once.
+        // Most vectors hold no other place.
         if places.iter().fold(0, |any, place| any | place) == 0 {
             continue;
         }
@@ -206,7 +198,7 @@ impl Rows {
         asked.resize(stride / LANES, true);
     }
 
-    /// Misfits of the rows `lines` with backgrounds of the rows `from`, so many columns to the right.
+    /// Squared residuals of the rows `lines` with offsets and amplitudes of the rows `from`, so many columns to the right.
     fn miss(
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
@@ -236,8 +228,8 @@ impl Rows {
         }
     }
 
-    /// Which vectors look around, if any: those that miss more than `least` and a share of the modulation on average, and their
-    /// neighbours. The others have nothing to gain. `lights` are the rows of the modulation.
+    /// Which vectors look around, if any: those whose squared residuals exceed `least` and a share of the modulation on average, and
+    /// their neighbours. `lights` are the rows of the modulation.
     fn ask<'a>(&mut self, lights: impl Iterator<Item = &'a [f32]> + Clone, width: usize, least: f32) -> bool {
         let Self { misfit, best, asked, spare, smooth, .. } = self;
         let misses = |group: usize| {
@@ -245,7 +237,7 @@ impl Rows {
             let own = misfit[1..].iter().zip(lights.clone()).flat_map(|(row, light)| {
                 row[pixels.clone()].iter().zip(&light[pixels.clone()]).filter(|(own, _)| **own > 0.0)
             });
-            let excess = own.map(|(own, light)| own - least - (SHARE * light).powi(2));
+            let excess = own.map(|(own, light)| own - least - (PLACE_GAIN_MIN * light).powi(2));
             excess.sum::<f32>() > 0.0
         };
         let much: Vec<bool> = (0..asked.len()).map(misses).collect();
@@ -255,13 +247,13 @@ impl Rows {
         for (i, (best, light)) in best.iter_mut().zip(lights).enumerate() {
             binomial([&misfit[i], &misfit[i + 1], &misfit[i + 2]], width, spare, smooth);
             for (best, (own, light)) in best.iter_mut().zip(smooth.iter().zip(light)) {
-                *best = BETTER * own - (SHARE * light).powi(2);
+                *best = PLACE_BETTER * own - (PLACE_GAIN_MIN * light).powi(2);
             }
         }
         much.contains(&true)
     }
 
-    /// Take the backgrounds of `place`, whose misfits begin at number `first`, where they are better than any before.
+    /// Take `place`, whose squared residuals begin at number `first`, where it is better than any before.
     fn compare(&mut self, place: u8, first: usize, grid: &Grid, places: &mut [u8]) {
         let Self { misfit, best, spare, smooth, .. } = self;
         for (i, (places, best)) in places.chunks_mut(grid.stride).zip(best).enumerate() {
@@ -301,17 +293,17 @@ fn carry(pixels: [&[f32]; 2], ratios: [f32; 3], out: [&mut [f32]; 8]) {
         let [phase, loss] = take(&pixels, i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let (cosines, derivatives) = carriers(phase[x], ratios, loss[x]);
+            let carriers = carriers(phase[x], ratios, loss[x]);
             for c in 0..4 {
-                (found[c][x], found[4 + c][x]) = (cosines[c], derivatives[c]);
+                (found[c][x], found[4 + c][x]) = (carriers.cosine[c], carriers.derivative[c]);
             }
         }
         put(&mut out, i, &found);
     }
 }
 
-/// Sum of squares of what neither the albedo nor a small change of the phase explains; 0 where there is nothing to see, too much
-/// in vectors that nobody asked.
+/// Squared residual after the best albedo and a small change of the phase; 0 of unlit pixels, the greatest number in vectors that do
+/// not look around.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn miss(
     model: [&[f32]; 8],
@@ -368,7 +360,7 @@ mod tests {
         (choice, share)
     }
 
-    /// Greatest difference from the colour of the pixel, own and chosen; the pixels at the edge see both colours in their
+    /// Greatest difference from the texture of the pixel, in its place and as chosen; the pixels at the edge see both colours in their
     /// neighbours.
     fn errors(edge: &Edge, choice: &Choice) -> [f32; 2] {
         let mut rows = RowMaps::default();
@@ -386,7 +378,7 @@ mod tests {
     }
 
     #[test]
-    fn pixels_beside_an_edge_take_the_backgrounds_of_their_side() {
+    fn pixels_near_an_edge_take_offsets_and_amplitudes_of_their_side() {
         let colours =
             [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
         let edge = Edge::new(colours, 0.0);
@@ -394,7 +386,7 @@ mod tests {
         let [own, chosen] = errors(&edge, &choice);
         assert!(own > 0.1, "{own}");
         assert!(chosen < 0.02, "{chosen}");
-        // Those are the pixels that see a mixture in their own place, and they are left out of the next fit.
+        // Those pixels see a mixture in their place, and they take no part in the next fit.
         let mut usable = vec![1.0; 256];
         choice.leave_out(30, &mut usable);
         let left_out: Vec<usize> = (0..256).filter(|&x| usable[x] == 0.0).collect();
@@ -407,7 +399,7 @@ mod tests {
     }
 
     #[test]
-    fn what_noise_explains_stays_where_it_is() {
+    fn residuals_that_noise_explains_move_no_pixel() {
         let colours = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
         let edge = Edge::new(colours, 0.0);
         let (choice, share) = choose(&edge, 0.03);

@@ -1,7 +1,7 @@
-//! For tests: two colours that meet, and cells as a window leaves them.
+//! For tests: an edge between two textures, and cells as a window leaves them.
 
-use super::carriers;
 use crate::joint::cells::{CellMaps, Grid};
+use crate::joint::model::carriers;
 use crate::joint::scene::Scene;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::{Pcg64Mcg, rand_core::SeedableRng};
@@ -32,7 +32,7 @@ impl Edge {
         let light = std::array::from_fn(|c| {
             let clean = |i: usize| {
                 let [a, b] = [2 * c, 2 * c + 1].map(|k| colours[usize::from(i % 256 >= EDGE)][k]);
-                ALBEDO * (a + b * carriers(phase[i], RATIOS, 0.0).0[c])
+                ALBEDO * (a + b * carriers(phase[i], RATIOS, 0.0).cosine[c])
             };
             let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
             (0..grid.pixels()).map(|i| clean(i) + noise * draw()).collect()

@@ -1,11 +1,9 @@
 //! Normal equations of cells, solved side by side.
 
 use super::{MATRIX, SUMS};
+use crate::joint::params::photometry::RIDGE;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
-
-/// Ridge relative to the diagonal: what a window without a whole fringe does not show stays as it was.
-const RIDGE: f32 = 1.7e-2;
 
 /// Normal equations of a row of cells, solved for the change of the eight unknowns.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
@@ -73,7 +71,7 @@ impl System {
                 size[x] += before[r][x] * before[r][x];
             }
         }
-        // Light of another colour is missed least by a model of next to nothing. Only ratios have a meaning, so the size stays.
+        // For light of another texture a model of 0 has the least residual. Only ratios have a meaning, so the size is held.
         let scale: Lanes = std::array::from_fn(|x| (trace[x] + 8.0 * floor[x]) / size[x]);
         for r in 0..8 {
             for x in 0..LANES {

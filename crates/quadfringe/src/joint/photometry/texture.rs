@@ -1,13 +1,17 @@
-//! Colours of a print: the albedo of every channel at every pixel.
+//! Step 5 on textured surfaces: the albedo of every channel at every pixel.
 //!
-//! Background and modulation share one albedo, `I_c = rho_c (1 + k_c cos)`, and the contrast `k_c` is that of the light, not of the
-//! ink: it varies slowly. So once the phase is known a pixel tells the albedo of every channel, as surely as its fringe is bright
-//! there, and the mean over the pixels around that have the same albedo in all channels, as far as noise lets tell, has no window
-//! on two colours (a bilateral mean; Tomasi and Manduchi, ICCV 1998).
+//! Offset and amplitude share one albedo, `I_c = rho_c (1 + k_c cos)`, and the contrast `k_c` belongs to the light and not to the
+//! texture, so it varies slowly. Once the phase is known each pixel gives the albedo of every channel, with a precision that grows
+//! with the brightness of its fringe. The mean runs over the surrounding pixels whose albedo agrees in all channels within the noise,
+//! so that no window mixes two albedos (a bilateral mean; Tomasi and Manduchi, ICCV 1998).
 
-use super::carriers;
 use crate::joint::cells::{CellMaps, CellWork, Grid, RowMaps};
-use crate::joint::local_fit::binomial;
+use crate::joint::model::carriers;
+use crate::joint::neighbours::binomial;
+use crate::joint::params::photometry::{
+    ALBEDO_ERROR, ALBEDO_EXCESS, ALBEDO_EXPECTED, ALBEDO_REACH, ALBEDO_STEPS, ALBEDO_WIDTH, CONTRAST_WIDTH,
+};
+use crate::joint::params::tasks::ROWS;
 use crate::joint::scene::Scene;
 use crate::joint::slopes::Slopes;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
@@ -15,39 +19,24 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Width (sigma) over which the contrast is averaged, in fringe periods.
-const CONTRAST: f32 = 1.5;
-/// How far the mean reaches, and its width (sigma), in fringe periods.
-const REACH: f32 = 0.6;
-const WIDTH: f32 = 0.3;
-/// Steps to the furthest pixel of the mean, at most.
-const STEPS: usize = 3;
-/// What a mean of nine by [`binomial`] keeps of the variance of noise.
+/// Share of the variance of noise that a mean of nine by [`binomial`] keeps.
 const MEAN_OF_NINE: f32 = 9.0 / 64.0;
-/// Relative error of an albedo by those of phase and contrast.
-const ERROR: f32 = 0.015;
-/// What the sum of squared differences of four channels, in units of what is expected, may be before a pixel counts less, and the
-/// excess at which it counts no more.
-const EXPECTED: f32 = 4.0;
-const EXCESS: f32 = 16.0;
-/// Steps of an albedo of 1, the greatest is twice that; what noise leaves of a mean is coarser by far.
+/// Steps of an albedo of 1; the greatest albedo is twice that. The noise of a mean is far coarser.
 const LEVELS: f32 = 32768.0;
-/// Rows of one task, at least; as many as a mean spans when that is more, because each task computes a span on top of them.
-const BLOCK: usize = 32;
 
 /// Albedos of every pixel, and working maps.
 #[derive(Debug)]
-pub(super) struct Colours {
+pub(super) struct PixelAlbedo {
     /// Albedos of R, G, B, IR in padded rows, in units of 1/[`LEVELS`].
     planes: [Vec<u16>; 4],
-    /// Length of these rows; 0 when the pixels take the backgrounds of their cells.
+    /// Length of these rows; 0 when the pixels take those of their cells.
     stride: usize,
     /// 1 and the contrast of every channel.
     contrasts: CellMaps,
     slots: Slots<(Rows, CellWork)>,
 }
 
-impl Default for Colours {
+impl Default for PixelAlbedo {
     fn default() -> Self {
         Self { planes: Default::default(), stride: 0, contrasts: CellMaps::new(8), slots: Slots::default() }
     }
@@ -70,41 +59,41 @@ struct Rows {
 /// Another pixel of the mean: rows down, columns right, both from the first, and weight.
 type Tap = ([usize; 2], f32);
 
-impl Colours {
-    /// The pixels take the backgrounds of their cells.
+impl PixelAlbedo {
+    /// The pixels take offsets and amplitudes of their cells.
     pub fn forget(&mut self) {
         self.stride = 0;
     }
 
-    /// Whether the pixels of `scene` have colours of their own.
-    pub fn known(&self, scene: &Scene<'_>) -> bool {
+    /// Whether the albedo of the pixels of `scene` is known.
+    pub fn is_known(&self, scene: &Scene<'_>) -> bool {
         self.stride == scene.grid.stride
     }
 
-    /// Backgrounds and modulations of row `y`, with contrasts on `grid`.
+    /// Offsets and amplitudes of row `y`, with contrasts on `grid`.
     pub fn sample<'a>(&self, grid: &Grid, y: usize, maps: &'a mut RowMaps) -> [&'a mut [f32]; 8] {
         let mut rows = maps.sample_mut::<8>(grid, &self.contrasts, 0, y);
         let albedos = self.planes.each_ref().map(|plane| &plane[y * grid.stride..][..grid.stride]);
-        colour(albedos, rows.each_mut().map(|row| &mut **row));
+        apply(albedos, rows.each_mut().map(|row| &mut **row));
         rows
     }
 
-    /// Measure them by a phase (rad) and where there is light; `backgrounds` give the contrasts, and intensities have the standard
-    /// deviation `noise`.
+    /// Estimate the albedo by a phase (rad) and a modulation; `fringes` (offset and amplitude of each channel) give the contrasts, and
+    /// the intensities have the standard deviation `noise`.
     pub fn measure(
         &mut self,
-        (grid, backgrounds): (&Grid, &CellMaps),
+        (grid, fringes): (&Grid, &CellMaps),
         scene: &Scene<'_>,
         (ratios, slopes): ([f32; 3], &Slopes),
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
         sums: &mut CellMaps,
     ) {
-        self.contrast(grid, backgrounds, scene, sums);
+        self.contrast(grid, fringes, scene, sums);
         let Self { planes, stride, contrasts, slots } = self;
         *stride = grid.stride;
         let (taps, reach) = taps(scene.period_px as f32);
-        let (wide, kept, rows) = (grid.stride + 2 * reach, 2 * reach + 1, BLOCK.max(2 * reach));
+        let (wide, kept, rows) = (grid.stride + 2 * reach, 2 * reach + 1, ROWS.max(2 * reach));
         planes.iter_mut().for_each(|plane| plane.resize(grid.pixels(), 0));
         let [red, green, blue, infrared] =
             planes.each_mut().map(|plane| plane.par_chunks_mut(rows * grid.stride));
@@ -133,7 +122,7 @@ impl Colours {
                     let y = from + i as isize;
                     model(y + 1, &mut models[(i + 2) % 3]);
                     let known = &mut ring[8 * wide * (i % kept)..][..8 * wide];
-                    // Beyond the border nothing is known.
+                    // Beyond the border there are no pixels.
                     let on = if (0..grid.height as isize).contains(&y) { 1.0 } else { 0.0 };
                     for c in 0..4 {
                         let (albedo, precision) = known[2 * c * wide..][..2 * wide].split_at_mut(wide);
@@ -156,15 +145,15 @@ impl Colours {
         );
     }
 
-    /// Contrasts of the light, from backgrounds that colours have as well.
-    fn contrast(&mut self, grid: &Grid, backgrounds: &CellMaps, scene: &Scene<'_>, sums: &mut CellMaps) {
+    /// Contrasts of the light: amplitude over offset, from which the albedo cancels.
+    fn contrast(&mut self, grid: &Grid, fringes: &CellMaps, scene: &Scene<'_>, sums: &mut CellMaps) {
         let Self { contrasts, slots, .. } = self;
         grid.smooth::<8, Rows>(
-            CONTRAST * scene.period_px as f32 / grid.step as f32,
+            CONTRAST_WIDTH * scene.period_px as f32 / grid.step as f32,
             slots,
             sums,
             contrasts,
-            |row, k| Some(backgrounds.line(row, k)),
+            |row, k| Some(fringes.line(row, k)),
             |_, sums, out| {
                 let columns = sums[0].len();
                 for (pair, out) in sums.chunks_exact(2).zip(out.chunks_exact_mut(2 * columns)) {
@@ -181,16 +170,16 @@ impl Colours {
 
 /// The pixels of the mean around one, and how far they reach.
 fn taps(period_px: f32) -> (Vec<Tap>, usize) {
-    let spacing = (REACH * period_px / STEPS as f32).round().max(1.0) as usize;
-    let sigma = WIDTH * period_px;
-    let line = || 0..=2 * STEPS;
+    let spacing = (ALBEDO_REACH * period_px / ALBEDO_STEPS as f32).round().max(1.0) as usize;
+    let sigma = ALBEDO_WIDTH * period_px;
+    let line = || 0..=2 * ALBEDO_STEPS;
     let all = line().flat_map(|down| line().map(move |right| [down, right]));
     let near = all.filter_map(|steps| {
-        let square = steps.map(|s| (s as f32 - STEPS as f32).powi(2)).iter().sum::<f32>();
+        let square = steps.map(|s| (s as f32 - ALBEDO_STEPS as f32).powi(2)).iter().sum::<f32>();
         let weight = (-0.5 * square * (spacing as f32 / sigma).powi(2)).exp();
-        (square <= (STEPS * STEPS) as f32).then(|| (steps.map(|s| s * spacing), weight))
+        (square <= (ALBEDO_STEPS * ALBEDO_STEPS) as f32).then(|| (steps.map(|s| s * spacing), weight))
     });
-    (near.collect(), spacing * STEPS)
+    (near.collect(), spacing * ALBEDO_STEPS)
 }
 
 /// Light times its model for an albedo of 1, channel by channel, and the squares of that model; 0 for what has none.
@@ -209,10 +198,10 @@ fn project(
         let [phase, modulation, usable, loss] = take(&pixels, i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let (cosines, _) = carriers(phase[x], ratios, loss[x]);
+            let carriers = carriers(phase[x], ratios, loss[x]);
             let on = if modulation[x] > 0.0 { usable[x] } else { 0.0 };
             for c in 0..4 {
-                let model = 1.0 + contrasts[c][x] * cosines[c];
+                let model = 1.0 + contrasts[c][x] * carriers.cosine[c];
                 let model = if model > 0.0 { on * model } else { 0.0 };
                 (found[c][x], found[4 + c][x]) = (model * light[c][x], model * model);
             }
@@ -228,13 +217,14 @@ fn divide((on, noise): (f32, f32), [product, square]: [&mut [f32]; 2]) {
     for (albedo, precision) in product.iter_mut().zip(square) {
         let square = *precision;
         *albedo /= if square > 1e-4 { square } else { 1e-4 };
-        *precision = on * square / (variance + square * (ERROR * ERROR * *albedo * *albedo + 1e-8));
+        *precision =
+            on * square / (variance + square * (ALBEDO_ERROR * ALBEDO_ERROR * *albedo * *albedo + 1e-8));
     }
 }
 
-/// Backgrounds, and modulations in the places of the contrasts.
+/// Offsets, and amplitudes in the places of the contrasts.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn colour(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
+fn apply(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
     let albedos = albedos.map(|row| row.as_chunks::<LANES>().0);
     let rows = rows.map(lanes_mut);
     for c in 0..4 {
@@ -252,7 +242,7 @@ fn colour(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
 /// Pixels that are averaged side by side: with more the sums would not stay in registers.
 const SIDE: usize = LANES / 2;
 
-/// Mean albedos over the pixels around that have the same in all channels. `taps` give where in the `ring` another pixel
+/// Mean albedos over the surrounding pixels that have the same albedo in all channels. `taps` give where in the `ring` another pixel
 /// begins, `own` the pixel itself.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn average(taps: &[(usize, f32)], own: usize, (ring, wide): (&[f32], usize), out: [&mut [u16]; 4]) {
@@ -277,7 +267,7 @@ fn average(taps: &[(usize, f32)], own: usize, (ring, wide): (&[f32], usize), out
     }
 }
 
-/// Adds other pixels, as far as they have the same albedo, to sums of weighted albedos and of weights.
+/// Adds other pixels, weighted by how well their albedos agree, to sums of weighted albedos and of weights.
 #[inline(always)]
 fn join(
     mut sums: [[f32; SIDE]; 8],
@@ -287,7 +277,7 @@ fn join(
 ) -> [[f32; SIDE]; 8] {
     let mut weight = [0.0; SIDE];
     for x in 0..SIDE {
-        let mut apart = -EXPECTED;
+        let mut apart = -ALBEDO_EXPECTED;
         for c in 0..4 {
             let (mine, theirs) = (own[2 * c + 1][x], other[2 * c + 1][x]);
             let sure = if mine < theirs { mine } else { theirs };
@@ -295,7 +285,7 @@ fn join(
             // Of two variances the greater one stands for about two thirds of their sum.
             apart += 0.7 * sure * gap * gap;
         }
-        let excess = if apart > 0.0 { apart * (1.0 / EXCESS) } else { 0.0 };
+        let excess = if apart > 0.0 { apart * (1.0 / ALBEDO_EXCESS) } else { 0.0 };
         let fits = if excess < 1.0 { 1.0 - excess } else { 0.0 };
         weight[x] = near * fits * fits;
     }
@@ -317,10 +307,10 @@ mod tests {
     const CONTRASTS: [f32; 4] = [0.8, 0.7, 0.9, 0.6];
     const INKS: [[f32; 4]; 2] = [[0.5, 0.2, 0.6, 0.4], [0.3, 0.5, 0.2, 0.4]];
 
-    /// Colours found of two inks that meet.
+    /// PixelAlbedo found of two inks that meet.
     struct Print {
         edge: Edge,
-        colours: Colours,
+        albedo: PixelAlbedo,
     }
 
     impl Print {
@@ -331,28 +321,28 @@ mod tests {
             let edge = Edge::new(INKS.map(colour), noise);
             let usable: Vec<f32> = (0..edge.grid.pixels()).map(usable).collect();
             let (modulation, mut sums) = (edge.plane(0.2), CellMaps::default());
-            let mut colours = Colours::default();
+            let mut albedo = PixelAlbedo::default();
             let how = (RATIOS, &Slopes::flat(&edge.grid));
             let pixels = [edge.phase.as_slice(), &modulation];
             let cells = (&edge.grid, &edge.maps);
-            colours.measure(cells, &edge.scene(&usable), how, pixels, noise, &mut sums);
-            Self { edge, colours }
+            albedo.measure(cells, &edge.scene(&usable), how, pixels, noise, &mut sums);
+            Self { edge, albedo }
         }
 
         /// Background and modulation of a channel in row 30 over what they ought to be.
         fn ratios(&self, c: usize, columns: impl Iterator<Item = usize>) -> Vec<[f32; 2]> {
             let mut maps = RowMaps::default();
-            let rows = self.colours.sample(&self.edge.grid, 30, &mut maps);
+            let rows = self.albedo.sample(&self.edge.grid, 30, &mut maps);
             let ratio = |x: usize, k: usize| rows[k][x] / (ALBEDO * self.edge.colour(x)[k]);
             columns.map(|x| [ratio(x, 2 * c), ratio(x, 2 * c + 1)]).collect()
         }
     }
 
     #[test]
-    fn beside_an_edge_every_pixel_has_the_colour_of_its_side() {
+    fn near_an_edge_every_pixel_has_the_albedo_of_its_side() {
         let print = Print::new(1e-3, |_| 1.0);
         for c in 0..4 {
-            // A pixel and its neighbours see both colours in the two columns at the edge.
+            // A pixel and its neighbours see both inks in the two columns at the edge.
             let columns = (20..236).filter(|x| !(EDGE - 1..=EDGE).contains(x));
             for (at, ratios) in print.ratios(c, columns).into_iter().enumerate() {
                 assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{c} {at} {ratios:?}");
@@ -361,7 +351,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_means_where_only_noise_tells_pixels_apart() {
+    fn albedos_are_means_where_pixels_differ_by_noise() {
         let noise = 0.02;
         let print = Print::new(noise, |_| 1.0);
         for c in 0..4 {
@@ -373,7 +363,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_be_used_takes_the_colour_around() {
+    fn unusable_pixels_take_the_albedo_around_them() {
         let hole = |i: usize| (28..33).contains(&(i / 256)) && (60..65).contains(&(i % 256));
         let print = Print::new(1e-3, |i| if hole(i) { 0.0 } else { 1.0 });
         for c in 0..4 {

@@ -1,12 +1,61 @@
-//! One shot at one resolution: four planes of linear light, and which pixels count.
+//! The image pyramid: one shot at full resolution and on the coarse level. A level is four planes of linear light and the masks of
+//! its pixels.
 
-pub(in crate::joint) mod upsample;
+mod upsample;
+
+pub(in crate::joint) use upsample::{Levels, Upsampler};
 
 use crate::joint::cells::Grid;
-use crate::joint::scene::Scene;
+use crate::joint::params::pyramid::{COARSE_PERIOD_MIN_PX, FACTOR_MAX};
+use crate::joint::scene::{Frame, ScaledGrid, Scene};
 use crate::parallel::lanes::{LANES, lanes, lanes_mut};
 use multiversion::multiversion;
 use rayon::prelude::*;
+
+/// Both levels of one shot.
+#[derive(Debug)]
+pub(in crate::joint) struct Pyramid {
+    pub full: Level,
+    pub coarse: Level,
+}
+
+impl Pyramid {
+    /// For so many pixels of the full image, padding included.
+    pub fn new(pixels: usize) -> Self {
+        let mut full = Level::default();
+        full.resize(pixels);
+        Self { full, coarse: Level::default() }
+    }
+
+    /// Make the coarse level. With a factor of 1 it is the full level itself, moved there until [`Self::restore`].
+    pub fn shrink(&mut self, frame: &Frame<'_>) {
+        match frame.coarse.factor {
+            1 => std::mem::swap(&mut self.full, &mut self.coarse),
+            factor => self.coarse.shrink(&self.full, frame.coarse.grid, frame.full.grid, factor),
+        }
+    }
+
+    /// Move the full level back after the steps on the coarse level.
+    pub fn restore(&mut self, frame: &Frame<'_>) {
+        if frame.coarse.factor == 1 {
+            std::mem::swap(&mut self.full, &mut self.coarse);
+        }
+    }
+
+    /// The coarse level and the full one with their grids.
+    pub fn scenes<'a>(&'a self, frame: &Frame<'a>) -> [Scene<'a>; 2] {
+        [self.coarse.scene(frame.coarse), self.full.scene(frame.full)]
+    }
+}
+
+/// How many times fewer pixels along a side the coarse level has: as few as still show the fringes.
+pub(in crate::joint) fn factor(period_px: f64, grid: &Grid) -> usize {
+    let mut factor = 1;
+    while factor < FACTOR_MAX.min(grid.step) && period_px >= 2.0 * COARSE_PERIOD_MIN_PX * factor as f64 {
+        factor *= 2;
+    }
+    factor
+}
 
 /// Planes of pixels, padded as their grid says.
 #[derive(Debug, Default)]
@@ -24,27 +73,27 @@ impl Level {
         planes.for_each(|plane| plane.resize(pixels, 0.0));
     }
 
-    /// The planes with a grid of cells; a fringe period is `period_px` wide, a pixel is the mean of `factor` x `factor`.
-    pub fn scene<'a>(&'a self, grid: &'a Grid, period_px: f64, factor: usize) -> Scene<'a> {
+    /// The planes with a grid of cells.
+    pub fn scene<'a>(&'a self, ScaledGrid { grid, period_px, factor }: ScaledGrid<'a>) -> Scene<'a> {
         let light = self.light.each_ref().map(Vec::as_slice);
         Scene { light, usable: &self.usable, grid, period_px, factor }
     }
 
-    /// Takes the pixels out where `found` has no light.
-    pub fn restrict(&mut self, grid: &Grid, found: &[f32]) {
+    /// Takes the pixels out where the mask `illuminated` is 0.
+    pub fn restrict(&mut self, grid: &Grid, illuminated: &[f32]) {
         let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
-        masks.zip(found.par_chunks(grid.stride)).for_each(|((lit, usable), found)| {
-            for ((lit, usable), found) in lit.iter_mut().zip(usable).zip(found) {
-                *lit *= found;
+        masks.zip(illuminated.par_chunks(grid.stride)).for_each(|((lit, usable), illuminated)| {
+            for ((lit, usable), illuminated) in lit.iter_mut().zip(usable).zip(illuminated) {
+                *lit *= illuminated;
                 *usable *= *lit;
             }
         });
     }
 
-    /// The image with the mean of every `factor` x `factor` pixels of `fine`, lit where all of them are and usable where half of
-    /// them are; so what lies in part beyond the last row or column is dark. Light repeats beyond the last row; beyond the last
-    /// column pixels count as far as they exist.
-    pub fn shrink(&mut self, fine: &Self, [grid, fine_grid]: [&Grid; 2], factor: usize) {
+    /// The image with the mean of every `factor` x `factor` pixels of `fine`, lit where all of them are lit and usable where half of
+    /// them are usable; a mean that lies partly beyond the last row or column is therefore unlit. Light repeats beyond the last
+    /// row; beyond the last column existing pixels count. `grid` is that of the mean image.
+    pub fn shrink(&mut self, fine: &Self, grid: &Grid, fine_grid: &Grid, factor: usize) {
         self.resize(grid.pixels());
         let planes = self.light.each_mut().map(|plane| plane.par_chunks_mut(grid.stride));
         let [red, green, blue, infrared] = planes;
@@ -61,10 +110,10 @@ impl Level {
             }
             least(factor, &rows_of(&fine.lit, fine_grid, row, factor), lit);
             if (row + 1) * factor > fine_grid.height {
-                // Its phase would be that of another place than its middle.
+                // Its mean belongs to another place than its middle.
                 lit.fill(0.0);
             }
-            // Noise takes single pixels of a crest beyond full scale; without the crest nothing of the fringe would fit.
+            // Noise takes single pixels of a crest beyond full scale; without the crest the fringe has no fit.
             mean(factor, &rows_of(&fine.usable, fine_grid, row, factor), usable);
             at_least_half(lit, usable);
         });
@@ -147,7 +196,7 @@ mod tests {
                 fine.usable[at] = f32::from(u8::from(!saturated.contains(&(y, x))));
                 fine.lit[at] = f32::from(u8::from((y, x) != (1, 2)));
             }
-            out.shrink(&fine, [&grid, &fine_grid], factor);
+            out.shrink(&fine, &grid, &fine_grid, factor);
             for (row, column) in (0..grid.height).flat_map(|y| (0..grid.width).map(move |x| (y, x))) {
                 let ys = (0..factor).map(|i| (row * factor + i).min(height - 1));
                 let xs = column * factor..((column + 1) * factor).min(width);

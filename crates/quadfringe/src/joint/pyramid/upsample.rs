@@ -1,32 +1,27 @@
-//! From the phase that guides to a first phase of every pixel.
+//! Step 6: upsampling from the phase of the coarse level to a first phase of every pixel.
 //!
-//! Where the surface is smooth it is interpolated. Beside tears and shadows every pixel is asked: of the surfaces that
-//! meet there it is given the one that explains its four intensities, and those of its neighbours, best.
+//! Where the surface is smooth the phase is interpolated. Near discontinuities and shadows each pixel takes, of the surfaces that meet
+//! there, the one that explains its four intensities and those of its neighbours best.
 
 use crate::joint::cells::{blend, spread};
-use crate::joint::coarse::Guide;
-use crate::joint::photometry::carriers;
-use crate::joint::scene::{Scene, around};
+use crate::joint::coarse::CoarseLevel;
+use crate::joint::model::{CellFringes, carriers};
+use crate::joint::neighbours::around;
+use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
+use crate::joint::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, lanes};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Surfaces nearer than this, in rad, are one.
-const SAME_RAD: f32 = 0.3;
-/// Greatest square of what a surface leaves unexplained, in units of the modulation.
-const MISS_MAX: f32 = 0.5;
-/// Greatest step from the phase of a surface to that of the pixel, in rad.
-const STEP_MAX: f32 = 1.0;
 /// A pixel and its eight neighbours.
 const NEAR: usize = 9;
-/// Greatest factor between the two images.
-pub(in crate::joint) const FACTOR_MAX: usize = 4;
+/// Vectors that hold the pixels of a block and of a rim of one pixel.
 const VECTORS: usize = ((FACTOR_MAX + 2) * (FACTOR_MAX + 2)).div_ceil(LANES);
 
 /// Working rows of the tasks.
 #[derive(Debug, Default)]
-pub(in crate::joint) struct Expander {
+pub(in crate::joint) struct Upsampler {
     slots: Slots<Rows>,
 }
 
@@ -36,14 +31,14 @@ struct Rows {
     around: Around,
 }
 
-/// What the surfaces leave unexplained at the pixels of a block and around it, and their steps to them.
+/// The surfaces at the pixels of a block and of its rim: squared residuals, and corrections of the phase.
 #[derive(Debug, Default)]
 struct Around {
-    misses: [[Lanes; NEAR]; VECTORS],
-    steps: [[Lanes; NEAR]; VECTORS],
+    squared_residuals: [[Lanes; NEAR]; VECTORS],
+    corrections: [[Lanes; NEAR]; VECTORS],
 }
 
-/// One of the surfaces that meet at a pixel of the coarse image: phase at its middle and slopes, per fine pixel.
+/// One of the surfaces that meet at a pixel of the coarse level: phase at the first fine pixel in rad, slopes in rad per fine pixel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Surface {
     phase: f32,
@@ -54,21 +49,28 @@ struct Surface {
 
 impl Surface {
     /// Its phase at fine pixel (x, y) of the block, whose first is (0, 0).
-    fn at(&self, [x, y]: [f32; 2]) -> f32 {
+    fn at(&self, x: f32, y: f32) -> f32 {
         self.phase + self.along * x + self.down * y
     }
 }
 
-impl Expander {
-    /// Phase (rad) and modulation of the pixels of `fine`, from a guide on `coarse`; `lit` is 1 where light falls.
-    pub fn run(
-        &self,
-        [coarse, fine]: [&Scene<'_>; 2],
-        guide: &Guide,
-        ratios: [f32; 3],
-        lit: &[f32],
-        [phase, modulation]: [&mut [f32]; 2],
-    ) {
+/// What upsampling starts from.
+#[derive(Clone, Copy)]
+pub(in crate::joint) struct Levels<'a> {
+    pub coarse: &'a Scene<'a>,
+    pub fine: &'a Scene<'a>,
+    /// Phase, discontinuities, slopes and photometry of the coarse level.
+    pub found: &'a CoarseLevel,
+    /// Fringe numbers over the first.
+    pub ratios: [f32; 3],
+    /// 1 for lit pixels of the fine level.
+    pub lit: &'a [f32],
+}
+
+impl Upsampler {
+    /// Absolute phase (rad) and modulation of every pixel of the fine level.
+    pub fn run(&self, levels: Levels<'_>, phase: &mut [f32], modulation: &mut [f32]) {
+        let Levels { coarse, fine, found, lit, .. } = levels;
         let (grid, stride) = (coarse.grid, fine.grid.stride);
         let factor = stride / grid.stride;
         let out = phase.par_chunks_mut(factor * stride).zip(modulation.par_chunks_mut(factor * stride));
@@ -77,15 +79,14 @@ impl Expander {
             |rows, (row, (phase, modulation))| {
                 let rows = &mut **rows;
                 let near = around(row, grid.height);
-                let phases = near.map(|y| coarse.row(&guide.phase, y));
-                let lights = near.map(|y| coarse.row(&guide.modulation, y));
+                let phases = near.map(|y| coarse.row(&found.phase, y));
+                let lights = near.map(|y| coarse.row(&found.modulation, y));
                 for (from, to) in [(phases, &mut *phase), (lights, &mut *modulation)] {
                     for (i, out) in to.chunks_exact_mut(stride).enumerate() {
-                        interpolate(from, (i, factor), &mut rows.mix, out);
+                        interpolate(from, i, factor, &mut rows.mix, out);
                     }
                 }
-                let beside = Beside { scenes: [coarse, fine], guide, ratios, lit, row, factor };
-                beside.decide(rows, phase, modulation);
+                CoarseRow { levels, row, factor }.decide(rows, phase, modulation);
                 let lit = &lit[row * factor * stride..];
                 modulation.iter_mut().zip(lit).for_each(|(modulation, lit)| *modulation *= lit);
             },
@@ -93,8 +94,8 @@ impl Expander {
     }
 }
 
-/// Row `i` of `factor` below each other, bilinear.
-fn interpolate(rows: [&[f32]; 3], (i, factor): (usize, usize), mix: &mut Vec<f32>, out: &mut [f32]) {
+/// Fine row `i` of the `factor` rows of a coarse row, bilinear.
+fn interpolate(rows: [&[f32]; 3], i: usize, factor: usize, mix: &mut Vec<f32>, out: &mut [f32]) {
     let columns = rows[0].len();
     mix.resize(columns + 2, 0.0);
     let place = (i as f32 + 0.5) / factor as f32 - 0.5;
@@ -104,36 +105,33 @@ fn interpolate(rows: [&[f32]; 3], (i, factor): (usize, usize), mix: &mut Vec<f32
     spread(factor, mix, out);
 }
 
-/// The pixels of one coarse row that lie beside tears and shadows.
-struct Beside<'a> {
-    scenes: [&'a Scene<'a>; 2],
-    guide: &'a Guide,
-    ratios: [f32; 3],
-    lit: &'a [f32],
+/// One row of coarse pixels, of which those near discontinuities and shadows are decided one by one.
+struct CoarseRow<'a> {
+    levels: Levels<'a>,
     row: usize,
     factor: usize,
 }
 
-impl Beside<'_> {
+impl CoarseRow<'_> {
     fn decide(&self, rows: &mut Rows, phase: &mut [f32], modulation: &mut [f32]) {
-        let width = self.scenes[0].grid.width;
-        let torn = self.scenes[0].row(&self.guide.torn, self.row);
-        // Vectors without a tear are the rule.
-        let torn = lanes(torn).iter().enumerate().filter(|(_, torn)| torn.iter().any(|&t| t > 0.0));
-        for (i, torn) in torn {
-            let columns = (i * LANES..((i + 1) * LANES).min(width)).filter(|x| torn[x % LANES] > 0.0);
+        let Levels { coarse, found, .. } = self.levels;
+        let width = coarse.grid.width;
+        let marks = lanes(coarse.row(&found.discontinuities, self.row)).iter().enumerate();
+        // Most vectors have no discontinuity.
+        for (i, marks) in marks.filter(|(_, marks)| marks.iter().any(|&mark| mark > 0.0)) {
+            let columns = (i * LANES..((i + 1) * LANES).min(width)).filter(|x| marks[x % LANES] > 0.0);
             columns.for_each(|column| self.block(column, &mut rows.around, phase, modulation));
         }
     }
 
     /// The fine pixels of one coarse pixel.
     fn block(&self, column: usize, around: &mut Around, phase: &mut [f32], modulation: &mut [f32]) {
-        let (factor, stride) = (self.factor, self.scenes[1].grid.stride);
+        let (factor, stride) = (self.factor, self.levels.fine.grid.stride);
         let mut found = [Surface::default(); NEAR];
         let count = self.surfaces(column, &mut found);
         let surfaces = &found[..count];
         if count > 1 {
-            self.ask(column, surfaces, around);
+            self.compare(column, surfaces, around);
         }
         for i in 0..factor * factor {
             let (y, x) = (i / factor, i % factor);
@@ -143,28 +141,29 @@ impl Beside<'_> {
             }
             (phase[at], modulation[at]) = match surfaces {
                 [] => (0.0, 0.0),
-                [only] => (only.at([x as f32, y as f32]), only.modulation),
+                [only] => (only.at(x as f32, y as f32), only.modulation),
                 _ => {
-                    let best = around.least([x, y], factor + 2, count);
-                    let own = (y + 1) * (factor + 2) + x + 1;
-                    let step = around.steps[own / LANES][best][own % LANES];
-                    (surfaces[best].at([x as f32, y as f32]) + step, surfaces[best].modulation)
+                    let best = around.best(x, y, factor + 2, count);
+                    let place = (y + 1) * (factor + 2) + x + 1;
+                    let correction = around.corrections[place / LANES][best][place % LANES];
+                    (surfaces[best].at(x as f32, y as f32) + correction, surfaces[best].modulation)
                 }
             };
         }
     }
 
-    /// Backgrounds and modulations near a coarse pixel.
-    fn fringes(&self, column: usize) -> [[f32; 2]; 4] {
-        let coarse = self.scenes[0];
+    /// Offsets and amplitudes near a coarse pixel.
+    fn fringes(&self, column: usize) -> CellFringes {
+        let coarse = self.levels.coarse;
         let [row, column] = [self.row, column].map(|v| v / coarse.grid.step);
-        self.guide.backgrounds.cell(coarse, row, column)
+        self.levels.found.photometry.cell(coarse, row, column)
     }
 
     /// Surfaces of the pixel and its neighbours, those that differ; their number.
-    fn surfaces(&self, column: usize, found: &mut [Surface; NEAR]) -> usize {
-        let (grid, factor) = (self.scenes[0].grid, self.factor as f32);
-        let slopes = self.guide.slopes.at(self.row / grid.step, column / grid.step);
+    fn surfaces(&self, column: usize, surfaces: &mut [Surface; NEAR]) -> usize {
+        let Levels { coarse, found, .. } = self.levels;
+        let (grid, factor) = (coarse.grid, self.factor as f32);
+        let slopes = found.slopes.at(self.row / grid.step, column / grid.step);
         let [along, down] = slopes.map(|slope| slope / (grid.step as f32 * factor));
         let middle = 0.5 * (factor - 1.0);
         let mut count = 0;
@@ -176,87 +175,95 @@ impl Beside<'_> {
                 continue;
             }
             let at = y * grid.stride + x;
-            let modulation = self.guide.modulation[at];
+            let modulation = found.modulation[at];
             if modulation <= 0.0 {
                 continue;
             }
             let offset = |d: usize| middle + (d as f32 - 1.0) * factor;
-            let phase = self.guide.phase[at] - along * offset(dx) - down * offset(dy);
-            if found[..count].iter().all(|other| (other.phase - phase).abs() > SAME_RAD) {
-                found[count] = Surface { phase, along, down, modulation };
+            let phase = found.phase[at] - along * offset(dx) - down * offset(dy);
+            if surfaces[..count].iter().all(|other| (other.phase - phase).abs() > SAME_SURFACE_RAD) {
+                surfaces[count] = Surface { phase, along, down, modulation };
                 count += 1;
             }
         }
         count
     }
 
-    /// What every surface leaves unexplained at the pixels of a block and around it.
-    fn ask(&self, column: usize, surfaces: &[Surface], around: &mut Around) {
-        let (fine, factor) = (self.scenes[1], self.factor);
+    /// Residuals and corrections of every surface at the pixels of a block and of its rim.
+    fn compare(&self, column: usize, surfaces: &[Surface], around: &mut Around) {
+        let (Levels { fine, lit: mask, ratios, .. }, factor) = (self.levels, self.factor);
         let (grid, side) = (fine.grid, factor + 2);
-        let first = [column * factor, self.row * factor];
+        let [first_x, first_y] = [column * factor, self.row * factor];
         let fringes = self.fringes(column);
         for vector in 0..(side * side).div_ceil(LANES) {
-            let (mut light, mut lit, mut places) = ([[0.0; LANES]; 4], [0.0; LANES], [[0.0; LANES]; 2]);
+            let (mut light, mut lit) = ([[0.0; LANES]; 4], [0.0; LANES]);
+            let [mut place_x, mut place_y] = [[0.0; LANES]; 2];
             for k in 0..LANES.min(side * side - vector * LANES) {
                 let i = vector * LANES + k;
-                let x = (first[0] + i % side).saturating_sub(1).min(grid.width - 1);
-                let y = (first[1] + i / side).saturating_sub(1).min(grid.height - 1);
+                let x = (first_x + i % side).saturating_sub(1).min(grid.width - 1);
+                let y = (first_y + i / side).saturating_sub(1).min(grid.height - 1);
                 let at = y * grid.stride + x;
-                lit[k] = self.lit[at];
+                lit[k] = mask[at];
                 light.iter_mut().zip(fine.light).for_each(|(light, plane)| light[k] = plane[at]);
-                (places[0][k], places[1][k]) = (x as f32 - first[0] as f32, y as f32 - first[1] as f32);
+                (place_x[k], place_y[k]) = (x as f32 - first_x as f32, y as f32 - first_y as f32);
             }
             for (k, surface) in surfaces.iter().enumerate() {
-                let mut phases = [0.0; LANES];
+                let mut phase = [0.0; LANES];
                 for x in 0..LANES {
-                    phases[x] = surface.at([places[0][x], places[1][x]]);
+                    phase[x] = surface.at(place_x[x], place_y[x]);
                 }
-                let known = [&phases, &lit];
-                let found = [&mut around.misses[vector][k], &mut around.steps[vector][k]];
-                explain(&light, known, &fringes, self.ratios, surface.modulation, found);
+                let pixels = Pixels { phase, lit, light: &light, modulation: surface.modulation };
+                let squared_residual = &mut around.squared_residuals[vector][k];
+                explain(&pixels, &fringes, ratios, squared_residual, &mut around.corrections[vector][k]);
             }
         }
     }
 }
 
 impl Around {
-    /// The surface with the least misfit over the pixel (x, y) of a block and its neighbours.
-    fn least(&self, [x, y]: [usize; 2], side: usize, count: usize) -> usize {
-        let miss = |n: usize, k: usize| {
+    /// The surface with the least squared residual over the pixel (x, y) of a block and its neighbours.
+    fn best(&self, x: usize, y: usize, side: usize, count: usize) -> usize {
+        let square = |n: usize, k: usize| {
             let at = (y + n / 3) * side + x + n % 3;
-            self.misses[at / LANES][k][at % LANES]
+            self.squared_residuals[at / LANES][k][at % LANES]
         };
-        let sum = |k: usize| -> f32 { (0..NEAR).map(|n| miss(n, k)).sum() };
+        let sum = |k: usize| -> f32 { (0..NEAR).map(|n| square(n, k)).sum() };
         let (mut best, mut least) = (0, sum(0));
         for k in 1..count {
-            let own = sum(k);
-            if own < least {
-                (best, least) = (k, own);
+            let sum = sum(k);
+            if sum < least {
+                (best, least) = (k, sum);
             }
         }
         best
     }
 }
 
-/// What neither albedo nor a small change of the phase explains of the intensities of lit pixels, and that change.
+/// A vector of pixels with the phase that one surface gives them, and the modulation of that surface.
+struct Pixels<'a> {
+    phase: Lanes,
+    lit: Lanes,
+    light: &'a [Lanes; 4],
+    modulation: f32,
+}
+
+/// Squared residual of lit pixels after the best albedo and a small correction of the phase, and that correction.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn explain(
-    light: &[Lanes; 4],
-    [phases, lit]: [&Lanes; 2],
-    fringes: &[[f32; 2]; 4],
+    pixels: &Pixels,
+    fringes: &CellFringes,
     ratios: [f32; 3],
-    modulation: f32,
-    [misses, steps]: [&mut Lanes; 2],
+    squared_residuals: &mut Lanes,
+    corrections: &mut Lanes,
 ) {
-    let most = MISS_MAX * modulation * modulation;
+    let most = SQUARED_MISFIT_MAX * pixels.modulation * pixels.modulation;
     for x in 0..LANES {
-        let (cosines, derivatives) = carriers(phases[x], ratios, 0.0);
+        let carriers = carriers(pixels.phase[x], ratios, 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {
-            let [a, b] = fringes[c];
-            let (m, d, s) = (a + b * cosines[c], b * derivatives[c], light[c][x]);
+            let (a, b) = (fringes.offset[c], fringes.amplitude[c]);
+            let (m, d, s) = (a + b * carriers.cosine[c], b * carriers.derivative[c], pixels.light[c][x]);
             mm += m * m;
             md += m * d;
             dd += d * d;
@@ -271,9 +278,10 @@ fn explain(
         let rest = if rest > 0.0 { rest } else { 0.0 };
         let rest = if rest < most { rest } else { most };
         let step = change / if albedo > 1e-4 { albedo } else { 1e-4 };
-        let step = if step < STEP_MAX { step } else { STEP_MAX };
-        let on = lit[x] > 0.0;
-        misses[x] = if on { rest } else { 0.0 };
-        steps[x] = if on { if step > -STEP_MAX { step } else { -STEP_MAX } } else { 0.0 };
+        let step = if step < CORRECTION_MAX_RAD { step } else { CORRECTION_MAX_RAD };
+        let on = pixels.lit[x] > 0.0;
+        squared_residuals[x] = if on { rest } else { 0.0 };
+        corrections[x] =
+            if on { if step > -CORRECTION_MAX_RAD { step } else { -CORRECTION_MAX_RAD } } else { 0.0 };
     }
 }

@@ -1,16 +1,14 @@
-//! Islands too small to be trusted.
+//! Step 8: connected components of the valid pixels, and their sizes.
 
 use crate::joint::cells::Grid;
+use crate::joint::params::tasks::GROUP;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Pixels of a row that are looked through at once.
-const GROUP: usize = 64;
-
-/// Connected regions by their runs along rows.
+/// Connected components by their runs along rows (union-find).
 #[derive(Debug, Clone, Default)]
-pub(super) struct Islands {
+pub(super) struct Components {
     rows: Vec<Vec<Run>>,
     parents: Vec<u32>,
     sizes: Vec<u32>,
@@ -25,28 +23,44 @@ struct Run {
     number: u32,
 }
 
-impl Islands {
-    /// Takes from `sure` every connected region of fewer than `least` pixels, and keeps those of `many` and more in `large`;
-    /// neighbours whose `phase` (rad) is half a turn or more apart are not connected.
-    pub fn remove(
+/// Sizes of components in pixels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SizeLimits {
+    /// Smaller components are removed.
+    pub least: usize,
+    /// Components of this size or more are seeds of region growing.
+    pub seed: usize,
+}
+
+/// One row of pixels.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    runs: &'a [Run],
+    phase: &'a [f32],
+}
+
+impl Components {
+    /// Removes small components from `valid`, and writes 1 into `seeds` for pixels of large ones, 0 elsewhere. Neighbours whose
+    /// `phase` (rad) is half a turn or more apart are not connected.
+    pub fn remove_small(
         &mut self,
         grid: &Grid,
         phase: &[f32],
-        [least, many]: [usize; 2],
-        sure: &mut [u8],
-        large: &mut [u8],
+        limits: SizeLimits,
+        valid: &mut [u8],
+        seeds: &mut [u8],
     ) {
         let stride = grid.stride;
         self.rows.resize_with(grid.height, Vec::new);
-        let source = sure.par_chunks(stride).zip(phase.par_chunks(stride));
-        self.rows.par_iter_mut().zip(source).for_each_init(Vec::new, |ends, (runs, (sure, phase))| {
-            find_runs(&sure[..grid.width], phase, ends, runs);
+        let source = valid.par_chunks(stride).zip(phase.par_chunks(stride));
+        self.rows.par_iter_mut().zip(source).for_each_init(Vec::new, |ends, (runs, (valid, phase))| {
+            find_runs(&valid[..grid.width], phase, ends, runs);
         });
         self.number();
         for y in 1..grid.height {
-            let (above, below) = (&self.rows[y - 1], &self.rows[y]);
-            let lines = [y - 1, y].map(|row| &phase[row * stride..][..stride]);
-            connect(above, below, lines, &mut self.parents);
+            let [above, below] =
+                [y - 1, y].map(|y| Row { runs: &self.rows[y], phase: &phase[y * stride..][..stride] });
+            connect(above, below, &mut self.parents);
         }
         self.sizes.clear();
         self.sizes.resize(self.parents.len(), 0);
@@ -54,16 +68,16 @@ impl Islands {
             let root = root(&mut self.parents, run.number);
             self.sizes[root as usize] += run.to - run.from;
         }
-        let rows = sure.chunks_mut(stride).zip(large.chunks_mut(stride));
-        for (runs, (sure, large)) in self.rows.iter().zip(rows) {
-            large.fill(0);
+        let rows = valid.chunks_mut(stride).zip(seeds.chunks_mut(stride));
+        for (runs, (valid, seeds)) in self.rows.iter().zip(rows) {
+            seeds.fill(0);
             for run in runs {
                 let root = root(&mut self.parents, run.number);
                 let (size, at) = (self.sizes[root as usize] as usize, run.from as usize..run.to as usize);
-                if size < least {
-                    sure[at].fill(0);
-                } else if size >= many {
-                    large[at].fill(1);
+                if size < limits.least {
+                    valid[at].fill(0);
+                } else if size >= limits.seed {
+                    seeds[at].fill(1);
                 }
             }
         }
@@ -81,42 +95,43 @@ impl Islands {
 }
 
 /// Runs of a row; `ends` is working memory.
-fn find_runs(sure: &[u8], phase: &[f32], ends: &mut Vec<u8>, runs: &mut Vec<Run>) {
+fn find_runs(valid: &[u8], phase: &[f32], ends: &mut Vec<u8>, runs: &mut Vec<Run>) {
     runs.clear();
-    ends.resize(sure.len(), 0);
-    mark_ends(sure, &phase[..sure.len()], ends);
-    let mut open = (sure[0] != 0).then_some(0);
+    ends.resize(valid.len(), 0);
+    mark_ends(valid, &phase[..valid.len()], ends);
+    let mut open = (valid[0] != 0).then_some(0);
     for (i, group) in ends.chunks(GROUP).enumerate() {
         if group.iter().fold(0, |any, end| any | end) == 0 {
             continue;
         }
         for x in (0..group.len()).filter(|&x| group[x] != 0).map(|x| (i * GROUP + x) as u32) {
             runs.extend(open.map(|from| Run { from, to: x, number: 0 }));
-            open = (sure[x as usize] != 0).then_some(x);
+            open = (valid[x as usize] != 0).then_some(x);
         }
     }
-    runs.extend(open.map(|from| Run { from, to: sure.len() as u32, number: 0 }));
+    runs.extend(open.map(|from| Run { from, to: valid.len() as u32, number: 0 }));
 }
 
 /// 1 for every pixel but the first where a run begins or has ended.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn mark_ends(sure: &[u8], phase: &[f32], ends: &mut [u8]) {
+fn mark_ends(valid: &[u8], phase: &[f32], ends: &mut [u8]) {
     ends[0] = 0;
     let n = ends.len() - 1;
-    let [before, own] = [0, 1].map(|from| (&sure[from..from + n], &phase[from..from + n]));
+    let [valid_before, valid] = [0, 1].map(|from| &valid[from..from + n]);
+    let [phase_before, phase] = [0, 1].map(|from| &phase[from..from + n]);
     for (x, end) in ends[1..].iter_mut().enumerate() {
-        let changes = before.0[x] != own.0[x];
-        *end = u8::from(changes | ((own.0[x] != 0) & !joined(before.1[x], own.1[x])));
+        let changes = valid_before[x] != valid[x];
+        *end = u8::from(changes | ((valid[x] != 0) & !joined(phase_before[x], phase[x])));
     }
 }
 
 /// Unites runs of two rows that touch on one surface.
-fn connect(above: &[Run], below: &[Run], [upper, lower]: [&[f32]; 2], parents: &mut [u32]) {
+fn connect(above: Row<'_>, below: Row<'_>, parents: &mut [u32]) {
     let (mut i, mut k) = (0, 0);
-    while i < above.len() && k < below.len() {
-        let (a, b) = (above[i], below[k]);
+    while i < above.runs.len() && k < below.runs.len() {
+        let (a, b) = (above.runs[i], below.runs[k]);
         let mut common = a.from.max(b.from) as usize..a.to.min(b.to) as usize;
-        if common.any(|x| joined(upper[x], lower[x])) {
+        if common.any(|x| joined(above.phase[x], below.phase[x])) {
             unite(parents, a.number, b.number);
         }
         if a.to < b.to {
@@ -151,7 +166,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn islands_go_and_surfaces_stay() {
+    fn small_components_go_and_large_ones_stay() {
         let grid = Grid::new([20, 32], 4.0);
         let place = |x: usize, y: usize| y * grid.stride + x;
         let mut phase = vec![10.0f32; grid.pixels()];
@@ -159,29 +174,32 @@ mod tests {
         for y in 0..20 {
             (15..20).for_each(|x| phase[place(x, y)] = 30.0);
         }
-        let mut sure = vec![1u8; grid.pixels()];
-        let mut large = vec![1u8; grid.pixels()];
-        Islands::default().remove(&grid, &phase, [10, 101], &mut sure, &mut large);
+        let (mut valid, mut seeds) = (vec![1u8; grid.pixels()], vec![1u8; grid.pixels()]);
+        let limits = SizeLimits { least: 10, seed: 101 };
+        Components::default().remove_small(&grid, &phase, limits, &mut valid, &mut seeds);
         let at = |map: &[u8]| [place(5, 5), place(2, 3), place(17, 2), place(25, 2)].map(|at| map[at]);
-        assert_eq!((at(&sure), at(&large)), ([0, 1, 1, 1], [0, 1, 0, 1]));
-        Islands::default().remove(&grid, &phase, [101, 101], &mut sure, &mut large);
-        assert_eq!(at(&sure), [0, 1, 0, 1]);
+        assert_eq!((at(&valid), at(&seeds)), ([0, 1, 1, 1], [0, 1, 0, 1]));
+        let limits = SizeLimits { least: 101, seed: 101 };
+        Components::default().remove_small(&grid, &phase, limits, &mut valid, &mut seeds);
+        assert_eq!(at(&valid), [0, 1, 0, 1]);
     }
 
     #[test]
-    fn a_spiral_is_one_island() {
+    fn a_spiral_is_one_component() {
         let grid = Grid::new([16, 16], 4.0);
-        let mut sure = vec![0u8; grid.pixels()];
+        let mut valid = vec![0u8; grid.pixels()];
         // Two columns joined at the bottom only.
         for y in 0..16 {
-            sure[y * 16 + 3] = 1;
-            sure[y * 16 + 6] = 1;
+            valid[y * 16 + 3] = 1;
+            valid[y * 16 + 6] = 1;
         }
-        (3..=6).for_each(|x| sure[15 * 16 + x] = 1);
-        let (before, mut large) = (sure.clone(), sure.clone());
-        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], [34, 99], &mut sure, &mut large);
-        assert_eq!(sure, before);
-        Islands::default().remove(&grid, &vec![0.0; grid.pixels()], [35, 99], &mut sure, &mut large);
-        assert!(sure.iter().all(|&v| v == 0));
+        (3..=6).for_each(|x| valid[15 * 16 + x] = 1);
+        let (before, mut seeds, phase) = (valid.clone(), valid.clone(), vec![0.0; grid.pixels()]);
+        let limits = SizeLimits { least: 34, seed: 99 };
+        Components::default().remove_small(&grid, &phase, limits, &mut valid, &mut seeds);
+        assert_eq!(valid, before);
+        let limits = SizeLimits { least: 35, seed: 99 };
+        Components::default().remove_small(&grid, &phase, limits, &mut valid, &mut seeds);
+        assert!(valid.iter().all(|&v| v == 0));
     }
 }

@@ -1,194 +1,207 @@
-//! Which pixels can be trusted: a hole is better than a lie.
+//! Step 8: validity. A hole is better than a wrong point: pixels become no data unless light, model and neighbourhood agree.
 
 mod components;
 mod discontinuities;
 mod propagate;
 mod regrow;
+mod support;
 
+use super::cells::{CellWork, Grid, RowMaps};
+use super::neighbours::around;
+use super::orders::Orders;
+use super::params::validity::{
+    COMPONENT_SIDE, GROWN_MISFIT_MAX, MISFIT_MAX, NEIGHBOURS_MIN, PIXEL_MISFIT_MAX,
+    PIXEL_RESIDUAL_NOISES_MAX, RESIDUAL_NOISES_MAX, SEED_SIDE,
+};
+use super::scene::{PhaseMap, Scene};
 use crate::decode::output::hole_unless;
-use crate::joint::cells::{CellMaps, CellWork, Grid, RowMaps};
-use crate::joint::orders::Orders;
-use crate::joint::params::MISFIT_MAX;
-use crate::joint::scene::{Scene, around};
 use crate::parallel::slots::Slots;
-use components::Islands;
-use discontinuities::Tears;
+use components::{Components, SizeLimits};
+use discontinuities::{Discontinuities, remove_slivers};
 use multiversion::multiversion;
-use propagate::Odds;
+use propagate::Propagation;
 use rayon::prelude::*;
-use regrow::Growth;
+use regrow::Regrow;
+use support::Support;
 
-/// Greatest misfit of the four channels, root mean square: in units of the noise, and of the modulation.
-const NOISE_MAX: f32 = 1.5;
-/// The same of a pixel by itself: in units of the noise and of its own modulation. A pixel in a narrow shadow is dim, and its
-/// misfit small beside the light of its surroundings.
-const OWN_NOISE_MAX: f32 = 3.0;
-const OWN_MISFIT_MAX: f32 = 0.5;
-/// Greatest misfit, in the same units, of what a surface may grow into: there less vouches for a pixel.
-const GROWN_MISFIT_MAX: f32 = 0.35;
-/// Trusted pixels of the 25 around that make a pixel part of a surface; a straight edge leaves 15.
-const NEIGHBOURS_MIN: u8 = 10;
-/// Least side of a region that is a surface, in fringe periods.
-const ISLAND_SIDE: f64 = 0.25;
-/// The same of one that is trusted to grow.
-const GROWING_SIDE: f64 = 1.0;
-/// Width (sigma) in fringe periods of the surroundings that back an order.
-const BACKING: f32 = 1.0;
-
-/// What there is to judge by.
-pub(in crate::joint) struct Findings<'a> {
-    /// Absolute phase in rad.
-    pub phase: &'a [f32],
-    /// 0 where there is no light.
+/// What the fit of step 6 left of every pixel by itself, row by row without padding.
+#[derive(Clone, Copy)]
+pub(super) struct PixelFit<'a> {
+    /// Mean squared residual of the four channels, in linear light squared.
+    pub squared_residual: &'a [f32],
+    /// Modulation in linear light by the albedo of the pixel.
     pub modulation: &'a [f32],
-    /// Mean square misfit of the four channels, and modulation, of every pixel by itself, row by row without padding.
-    pub own: [&'a [f32]; 2],
-    /// Standard deviation of the intensities.
+}
+
+/// Limits of a shot.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Limits {
+    /// Standard deviation of the intensities in linear light.
     pub noise: f32,
-    pub orders: &'a Orders,
+    /// Least quality of a valid order.
     pub quality_min: f32,
 }
 
-/// The verdict on every pixel.
+/// The validity mask of a shot, with working maps.
 #[derive(Debug, Default)]
-pub(in crate::joint) struct Judge {
-    /// 1 for what can be trusted, 0 elsewhere.
-    pub sure: Vec<u8>,
-    tears: Tears,
-    seams: Vec<u8>,
-    /// 1 for pixels of regions that are trusted to grow, [`regrow::GROWN`] for what they grew into.
-    surfaces: Vec<u8>,
-    odds: Odds,
-    backing: CellMaps,
-    sums: CellMaps,
-    islands: Islands,
-    /// 1 for pixels whose own light agrees with their order.
-    agreeing: Vec<u8>,
-    growth: Growth,
+pub(super) struct Validity {
+    /// 1 for valid pixels, 0 elsewhere.
+    pub valid: Vec<u8>,
+    discontinuities: Discontinuities,
+    /// 1 for pixels at or next to an order jump.
+    excluded: Vec<u8>,
+    /// First 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`regrow::GROWN`] for those added.
+    components: Vec<u8>,
+    /// 1 for pixels whose intensities agree with their order.
+    consistent: Vec<u8>,
+    support: Support,
+    labelling: Components,
+    regrow: Regrow,
+    propagation: Propagation,
     slots: Slots<(Rows, CellWork)>,
 }
 
-/// Rows of one task.
+/// Working rows of one task.
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
     sums: Vec<f32>,
-    margin: Vec<f32>,
+    lead: Vec<f32>,
 }
 
-impl Judge {
-    /// Judge every pixel; `quality`, without padding, receives that of the order of what is lit, NaN elsewhere.
-    pub fn run(&mut self, scene: &Scene<'_>, findings: &Findings<'_>, quality: &mut [f32]) {
+impl Validity {
+    /// Find the valid pixels of an absolute phase; `quality`, without padding, receives the quality of the orders of lit pixels, NaN
+    /// elsewhere.
+    pub fn run(
+        &mut self,
+        scene: &Scene<'_>,
+        map: PhaseMap<'_>,
+        pixel: PixelFit<'_>,
+        orders: &Orders,
+        limits: Limits,
+        quality: &mut [f32],
+    ) {
         let grid = scene.grid;
-        self.tears.mark(grid, findings.phase, findings.modulation, &mut self.seams);
-        self.back(scene, findings.orders);
-        self.surfaces.resize(grid.pixels(), 0);
-        self.agreeing.resize(grid.pixels(), 0);
-        let Self { surfaces, agreeing, seams, backing, slots, .. } = self;
-        let masks = surfaces.par_chunks_mut(grid.stride).zip(agreeing.par_chunks_mut(grid.stride));
+        self.discontinuities.mark(grid, map, &mut self.excluded);
+        self.support.measure(scene, orders);
+        self.check_pixels(scene, map, pixel, orders, limits, quality);
+        remove_slivers(grid, NEIGHBOURS_MIN, &self.components, &mut self.valid);
+        let pixels = |side: f64| (side * scene.period_px).powi(2) as usize;
+        let limits = SizeLimits { least: pixels(COMPONENT_SIDE), seed: pixels(SEED_SIDE) };
+        self.labelling.remove_small(grid, map.phase, limits, &mut self.valid, &mut self.components);
+        let candidates = regrow::Candidates {
+            phase: map.phase,
+            consistent: &self.consistent,
+            at_jump: self.discontinuities.at_jump(),
+        };
+        self.regrow.run(grid, &candidates, &mut self.valid, &mut self.components);
+    }
+
+    /// Step 9 for components: doubtful orders take the probability of a wrong order, and the quality, from certain pixels of their
+    /// component. Both maps are without padding.
+    pub fn propagate(&mut self, grid: &Grid, phase: &[f32], wrong_order: &mut [f32], quality: &mut [f32]) {
+        self.propagation.run(grid, phase, &self.components, wrong_order, quality);
+    }
+
+    /// Limits of every pixel by itself and with its eight neighbours.
+    fn check_pixels(
+        &mut self,
+        scene: &Scene<'_>,
+        map: PhaseMap<'_>,
+        pixel: PixelFit<'_>,
+        orders: &Orders,
+        limits: Limits,
+        quality: &mut [f32],
+    ) {
+        let grid = scene.grid;
+        self.components.resize(grid.pixels(), 0);
+        self.consistent.resize(grid.pixels(), 0);
+        let Self { components, consistent, excluded, support, slots, .. } = self;
+        let masks = components.par_chunks_mut(grid.stride).zip(consistent.par_chunks_mut(grid.stride));
         let rows = quality.par_chunks_mut(grid.width).zip(masks).enumerate();
         rows.for_each_init(
             || slots.take(),
-            |slot, (y, (quality, (sure, agreeing)))| {
-                let Rows { maps, sums, margin } = &mut slot.0;
-                let [backing] = maps.sample(grid, backing, 1, y);
-                margin.clear();
-                for (lead, _, lit) in findings.orders.verdict(scene, y / grid.step) {
-                    margin.extend(std::iter::repeat_n(if lit { lead } else { 0.0 }, grid.step));
+            |slot, (y, (quality, (passed, consistent)))| {
+                let Rows { maps, sums, lead } = &mut slot.0;
+                lead.clear();
+                for node in orders.verdicts(scene, y / grid.step) {
+                    lead.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
                 }
-                let [misfit, light] = findings.own;
-                let near = around(y, grid.height).map(|row| &misfit[row * grid.width..][..grid.width]);
-                let light = &light[y * grid.width..][..grid.width];
-                let known = [scene.row(findings.modulation, y), light, margin, backing];
-                let limits = [findings.noise, findings.quality_min];
-                let out = [sure, agreeing];
-                verdict(near, known, scene.row(seams, y), grid.width, limits, sums, quality, out);
-            },
-        );
-        discontinuities::remove_slivers(grid, NEIGHBOURS_MIN, &self.surfaces, &mut self.sure);
-        let sizes = [ISLAND_SIDE, GROWING_SIDE].map(|side| (side * scene.period_px).powi(2) as usize);
-        let surfaces = &mut self.surfaces;
-        self.islands.remove(grid, findings.phase, sizes, &mut self.sure, surfaces);
-        self.growth.run(
-            grid,
-            findings.phase,
-            [&self.agreeing, self.tears.torn()],
-            [&mut self.sure, surfaces],
-        );
-    }
-
-    /// What is known of the orders of whole surfaces settles the doubts of windows that see more than one of them, in the maps of
-    /// the probability of another order and of quality, without padding.
-    pub fn settle(&mut self, grid: &Grid, phase: &[f32], [wrong, quality]: [&mut [f32]; 2]) {
-        self.odds.settle(grid, phase, &self.surfaces, [wrong, quality]);
-    }
-
-    /// Share of the surroundings whose own light speaks for the order chosen there.
-    fn back(&mut self, scene: &Scene<'_>, orders: &Orders) {
-        let grid = scene.grid;
-        let mut agree = std::mem::take(&mut self.backing);
-        agree.fill::<2>(grid, |row, [weight, agree]| {
-            for ((weight, agree), (_, misfit, lit)) in
-                weight.iter_mut().zip(agree).zip(orders.verdict(scene, row))
-            {
-                (*weight, *agree) = if lit { (1.0, 1.0 - misfit) } else { (0.0, 0.0) };
-            }
-        });
-        self.backing = CellMaps::new(2);
-        grid.smooth::<2, Rows>(
-            scene.cells(BACKING),
-            &self.slots,
-            &mut self.sums,
-            &mut self.backing,
-            |row, k| Some(agree.line(row, k)),
-            |_, [weight, agree], out| {
-                let columns = weight.len();
-                for i in 0..columns {
-                    out[columns + i] = ((agree[i] + 1e-6) / (weight[i] + 1e-6)).clamp(0.0, 1.0);
-                }
+                let near = around(y, grid.height);
+                let known = CheckRow {
+                    squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
+                    modulation: &scene.row(map.modulation, y)[..grid.width],
+                    pixel_modulation: &pixel.modulation[y * grid.width..][..grid.width],
+                    lead: &lead[..grid.width],
+                    support: &support.row(grid, y, maps)[..grid.width],
+                    excluded: &scene.row(excluded, y)[..grid.width],
+                };
+                let out = VerdictRow { quality, passed, consistent };
+                check_row(&known, limits, sums, out);
             },
         );
     }
 }
 
-/// Quality of the pixels of a row; which of them are sure, because they agree, with their neighbours, with the model of the
-/// chosen order and lie at no seam; and which agree themselves. A wrong order has G and IR wrong.
+/// What decides on the pixels of a row.
+struct CheckRow<'a> {
+    /// Of the rows above, at and below.
+    squared_residual: [&'a [f32]; 3],
+    /// Modulation by the albedo of the neighbourhood.
+    modulation: &'a [f32],
+    /// Modulation by the albedo of the pixel.
+    pixel_modulation: &'a [f32],
+    lead: &'a [f32],
+    support: &'a [f32],
+    excluded: &'a [u8],
+}
+
+/// Verdicts on the pixels of a row.
+struct VerdictRow<'a> {
+    quality: &'a mut [f32],
+    passed: &'a mut [u8],
+    consistent: &'a mut [u8],
+}
+
+/// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
+/// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-#[expect(clippy::too_many_arguments, reason = "one row of everything")]
-fn verdict(
-    misfit: [&[f32]; 3],
-    [modulation, light, margin, backing]: [&[f32]; 4],
-    seams: &[u8],
-    width: usize,
-    [noise, quality_min]: [f32; 2],
-    sums: &mut Vec<f32>,
-    quality: &mut [f32],
-    [sure, agreeing]: [&mut [u8]; 2],
-) {
+fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: VerdictRow) {
+    let width = known.modulation.len();
     sums.resize(width + 2, 0.0);
-    let [above, own, below] = misfit.map(|row| &row[..width]);
+    let [above, own, below] = known.squared_residual.map(|row| &row[..width]);
     let middle = &mut sums[1..=width];
     for x in 0..width {
         middle[x] = above[x] + own[x] + below[x];
     }
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
-    let (modulation, light) = (&modulation[..width], &light[..width]);
-    let (margin, backing) = (&margin[..width], &backing[..width]);
-    let (seams, quality) = (&seams[..width], &mut quality[..width]);
-    let (sure, agreeing) = (&mut sure[..width], &mut agreeing[..width]);
-    let floors = [NOISE_MAX, OWN_NOISE_MAX].map(|most| (most * noise) * (most * noise));
+    let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
+    let (lead, support, excluded) = (&known.lead[..width], &known.support[..width], &known.excluded[..width]);
+    let (quality, passed, consistent) =
+        (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
+    let floors = [RESIDUAL_NOISES_MAX, PIXEL_RESIDUAL_NOISES_MAX]
+        .map(|most| (most * limits.noise) * (most * limits.noise));
     for x in 0..width {
         let lit = modulation[x] > 0.0;
-        let own_quality = margin[x] * backing[x];
+        let order_quality = lead[x] * support[x];
         let share = MISFIT_MAX * modulation[x];
-        let [own_share, grown_share] = [OWN_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * light[x]);
+        let [pixel_share, grown_share] =
+            [PIXEL_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * pixel_modulation[x]);
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] + share * share)
-            && own[x] <= floors[1] + own_share * own_share;
-        quality[x] = own_quality + hole_unless(lit);
-        let clear = lit & (own_quality >= quality_min);
-        sure[x] = u8::from(clear & agrees & (seams[x] == 0));
-        agreeing[x] = u8::from(lit & (own[x] <= floors[0] + grown_share * grown_share));
+            && own[x] <= floors[1] + pixel_share * pixel_share;
+        quality[x] = order_quality + hole_unless(lit);
+        let certain = lit & (order_quality >= limits.quality_min);
+        passed[x] = u8::from(certain & agrees & (excluded[x] == 0));
+        consistent[x] = u8::from(lit & (own[x] <= floors[0] + grown_share * grown_share));
+    }
+}
+
+/// The phase of valid pixels, NaN elsewhere.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn copy_valid(valid: &[u8], phase: &[f32], out: &mut [f32]) {
+    for (out, (valid, phase)) in out.iter_mut().zip(valid.iter().zip(phase)) {
+        *out = *phase + hole_unless(*valid != 0);
     }
 }
 
@@ -197,22 +210,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_dim_pixel_is_measured_by_its_own_light() {
-        // The same misfit, a quarter of the modulation, of a pixel as bright as its surroundings and of one in a narrow shadow.
-        let (mut misfit, mut light) = ([0.0; 16], [0.4; 16]);
-        (misfit[4], misfit[12], light[12]) = (0.01, 0.01, 0.1);
-        let (mut quality, mut sure, mut agreeing) = ([0.0; 16], [0; 16], [0; 16]);
-        verdict(
-            [&[0.0; 16], &misfit, &[0.0; 16]],
-            [&[0.4; 16], &light, &[1.0; 16], &[1.0; 16]],
-            &[0; 16],
-            16,
-            [0.01, 0.1],
-            &mut Vec::new(),
-            &mut quality,
-            [&mut sure, &mut agreeing],
-        );
-        for marks in [sure, agreeing] {
+    fn the_residual_of_a_dim_pixel_is_relative_to_its_light() {
+        // The same residual, a quarter of the modulation, of a pixel as bright as its neighbours and of one in a narrow shadow.
+        let (mut squared_residual, mut pixel_modulation) = ([0.0; 16], [0.4; 16]);
+        (squared_residual[4], squared_residual[12], pixel_modulation[12]) = (0.01, 0.01, 0.1);
+        let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [0; 16]);
+        let known = CheckRow {
+            squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
+            modulation: &[0.4; 16],
+            pixel_modulation: &pixel_modulation,
+            lead: &[1.0; 16],
+            support: &[1.0; 16],
+            excluded: &[0; 16],
+        };
+        let out = VerdictRow { quality: &mut quality, passed: &mut passed, consistent: &mut consistent };
+        check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, &mut Vec::new(), out);
+        for marks in [passed, consistent] {
             assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
         }
     }

@@ -1,185 +1,231 @@
-//! The order of a pixel is as sure as that of the surface it belongs to.
+//! Step 9 for connected components: the order of a pixel is as certain as that of the component it belongs to.
 //!
-//! Costs of orders are summed over windows, and a window that sees both sides of a seam doubts the order on either. But from one
-//! pixel of a surface to the next the phase goes on, and so does the order: what a window some cells deeper says, which sees this
-//! surface alone, holds up to the seam.
+//! Costs of orders are summed over windows, and a window that sees both sides of a discontinuity makes the order doubtful on either.
+//! From one pixel of a component to the next the phase is continuous, and so is the order. A window some cells deeper sees this
+//! component alone, and its verdict holds up to the discontinuity.
 
 use super::regrow::GROWN;
 use crate::joint::cells::Grid;
+use crate::joint::params::tasks::{GROUP, PROPAGATION_ROWS};
+use crate::joint::params::uncertainty::{
+    DOUBTFUL, GROWN_PROBABILITY_MIN, PROPAGATION_CELLS, SETTLED_PROBABILITY_MIN,
+};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// Probability of another order from which on an order is doubted.
-const DOUBT: f32 = 0.01;
-/// Cells that windows reach across a seam.
-const REACH_CELLS: usize = 3;
-/// What stays of a doubt that a surface settles, as a probability, and of one at pixels that a surface grew into, of which some
-/// belong to what lies behind: bounds, about twice of what the captures show (`tests/test_captures.py`).
-const SETTLED_DOUBT: f32 = 0.005;
-const GROWN_DOUBT: f32 = 0.1;
-/// Rows that one task works on, and pixels of a row that are looked through at once.
-const BLOCK: usize = 64;
-const GROUP: usize = 64;
-
-/// Working memory of the tasks.
+/// Propagation along components, with working memory.
 #[derive(Debug, Default)]
-pub(super) struct Odds {
-    /// Places without padding, with the probability and the quality that they take, by task.
-    settled: Vec<Vec<(usize, [f32; 2])>>,
+pub(super) struct Propagation {
+    /// Settled pixels of each task.
+    settled: Vec<Vec<Settled>>,
     slots: Slots<Reach>,
 }
 
-impl Odds {
-    /// Doubtful pixels of the `surfaces` take the probability of another order, and the quality, of the surest of the four pixels
-    /// some cells along their row and column, as far as the surface goes on to there. Both maps are without padding.
-    pub fn settle(&mut self, grid: &Grid, phase: &[f32], surfaces: &[u8], [wrong, quality]: [&mut [f32]; 2]) {
+/// New values for a doubtful pixel.
+#[derive(Debug, Clone, Copy)]
+struct Settled {
+    /// Place without padding.
+    at: usize,
+    wrong_order: f32,
+    quality: f32,
+}
+
+impl Propagation {
+    /// Doubtful pixels of the `components` take the probability of a wrong order, and the quality, of the most certain of four pixels
+    /// some cells away along their row and column, or as far as the component continues. Both maps are without padding.
+    pub fn run(
+        &mut self,
+        grid: &Grid,
+        phase: &[f32],
+        components: &[u8],
+        wrong_order: &mut [f32],
+        quality: &mut [f32],
+    ) {
         let Self { settled, slots } = self;
-        let scene = Scene { grid, phase, surfaces, known: [&*wrong, &*quality] };
-        settled.resize_with(grid.height.div_ceil(BLOCK), Vec::new);
+        let image = Image { grid, phase, components, wrong_order: &*wrong_order, quality: &*quality };
+        settled.resize_with(grid.height.div_ceil(PROPAGATION_ROWS), Vec::new);
         settled.par_iter_mut().enumerate().for_each_init(
             || slots.take(),
             |reach, (block, settled)| {
                 settled.clear();
-                let rows = block * BLOCK..((block + 1) * BLOCK).min(grid.height);
-                if rows.clone().any(|y| scene.doubted(y).next().is_some()) {
-                    reach.settle(&scene, rows, settled);
+                let rows = block * PROPAGATION_ROWS..((block + 1) * PROPAGATION_ROWS).min(grid.height);
+                if rows.clone().any(|y| image.doubtful(y).next().is_some()) {
+                    reach.settle(&image, rows, settled);
                 }
             },
         );
-        for &(at, odds) in settled.iter().flatten() {
-            [wrong[at], quality[at]] = odds;
+        for pixel in settled.iter().flatten() {
+            (wrong_order[pixel.at], quality[pixel.at]) = (pixel.wrong_order, pixel.quality);
         }
     }
 }
 
-/// The absolute phase (rad) and the surfaces of an image; the probability of another order and the quality, without padding.
-struct Scene<'a> {
+/// An image: absolute phase (rad) and components in padded rows; probability of a wrong order and quality without padding.
+struct Image<'a> {
     grid: &'a Grid,
     phase: &'a [f32],
-    surfaces: &'a [u8],
-    known: [&'a [f32]; 2],
+    components: &'a [u8],
+    wrong_order: &'a [f32],
+    quality: &'a [f32],
 }
 
-impl Scene<'_> {
-    /// Groups of pixels of row `y` with a doubt among them.
-    fn doubted(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
-        let wrong = &self.known[0][y * self.grid.width..][..self.grid.width];
-        let groups = wrong.chunks(GROUP).enumerate();
-        // Without a way out in the middle a group takes a few instructions.
-        let doubted = |group: &[f32]| group.iter().fold(false, |any, &wrong| any | (wrong > DOUBT));
-        groups.filter(move |(_, group)| doubted(group)).map(|(i, group)| i * GROUP..i * GROUP + group.len())
+/// One row of pixels.
+#[derive(Clone, Copy)]
+struct Row<'a> {
+    phase: &'a [f32],
+    components: &'a [u8],
+}
+
+impl Image<'_> {
+    /// Groups of pixels of row `y` with a doubtful one among them.
+    fn doubtful(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
+        let wrong_order = &self.wrong_order[y * self.grid.width..][..self.grid.width];
+        let groups = wrong_order.chunks(GROUP).enumerate();
+        // Without a way out in the middle the loop over a group becomes a few vector instructions.
+        let doubtful = |group: &[f32]| group.iter().fold(false, |any, &wrong| any | (wrong > DOUBTFUL));
+        groups.filter(move |(_, group)| doubtful(group)).map(|(i, group)| i * GROUP..i * GROUP + group.len())
     }
 
-    fn row(&self, y: usize) -> (&[f32], &[u8]) {
+    fn row(&self, y: usize) -> Row<'_> {
         let row = y * self.grid.stride..y * self.grid.stride + self.grid.width;
-        (&self.phase[row.clone()], &self.surfaces[row])
+        Row { phase: &self.phase[row.clone()], components: &self.components[row] }
+    }
+
+    /// New values for a doubtful pixel, from the ends of its component in four directions.
+    fn settle(&self, at: usize, ends: [usize; 4], component: u8) -> Option<Settled> {
+        let (wrong_order, quality) = (self.wrong_order, self.quality);
+        // NaN outside the projector's image compares as false.
+        let certain = ends.into_iter().filter(|&end| wrong_order[end] < wrong_order[at]);
+        let best = certain.min_by(|&a, &b| wrong_order[a].total_cmp(&wrong_order[b]))?;
+        let floor = if component == GROWN { GROWN_PROBABILITY_MIN } else { SETTLED_PROBABILITY_MIN };
+        Some(Settled {
+            at,
+            wrong_order: wrong_order[at].min(wrong_order[best].max(floor)),
+            quality: quality[at].max(quality[best]),
+        })
     }
 }
 
-/// How many pixels the surface of a pixel goes on, as far as is asked for: to the right and up, in one row, and down, in the last
-/// row looked at and in those of a task.
+/// How many pixels the component of a pixel continues, up to a limit: to the right, up and down.
 #[derive(Debug, Default)]
 struct Reach {
-    /// 0 where a pixel and the one on its left are of one surface.
+    /// 0 where a pixel and the one on its left are of one component.
     apart: Vec<u8>,
     right: Vec<u8>,
+    /// Of the last row visited from above.
     up: Vec<u8>,
+    /// Of the last row visited from below.
     below: Vec<u8>,
+    /// Downwards, for all rows of the task.
     down: Vec<u8>,
 }
 
 impl Reach {
-    fn settle(&mut self, scene: &Scene<'_>, rows: Range<usize>, settled: &mut Vec<(usize, [f32; 2])>) {
-        let Self { apart, right, up, below, down } = self;
-        let Grid { width, height, .. } = *scene.grid;
-        let reach = REACH_CELLS * scene.grid.step;
+    fn settle(&mut self, image: &Image<'_>, rows: Range<usize>, settled: &mut Vec<Settled>) {
+        let Grid { width, .. } = *image.grid;
+        let reach = PROPAGATION_CELLS * image.grid.step;
         let most = u8::try_from(reach).expect("cells are at most sixteen pixels wide");
-        for counts in [&mut *right, &mut *up, &mut *below] {
+        for counts in [&mut self.right, &mut self.up, &mut self.below] {
             counts.clear();
             counts.resize(width, 0);
         }
-        apart.resize(width, 1);
-        down.resize(rows.len() * width, 0);
-        for y in (rows.start..(rows.end + reach).min(height)).rev() {
-            if y + 1 < height {
-                go_on(scene.row(y), scene.row(y + 1), most, below);
-            }
-            if y < rows.end {
-                down[(y - rows.start) * width..][..width].copy_from_slice(below);
-            }
-        }
+        self.apart.resize(width, 1);
+        self.count_down(image, rows.clone(), most);
         for y in rows.start.saturating_sub(reach)..rows.end {
             if y > 0 {
-                go_on(scene.row(y), scene.row(y - 1), most, up);
+                count_on(image.row(y), image.row(y - 1), most, &mut self.up);
             }
-            let mut groups = scene.doubted(y).peekable();
+            let mut groups = image.doubtful(y).peekable();
             if y < rows.start || groups.peek().is_none() {
                 continue;
             }
-            let (phase, surfaces) = scene.row(y);
-            side_by_side(phase, surfaces, apart);
-            let down = &down[(y - rows.start) * width..][..width];
-            let doubts = &scene.known[0][y * width..][..width];
+            mark_apart(image.row(y), &mut self.apart);
             for group in groups {
-                let seen = group.start.saturating_sub(reach)..(group.end + reach).min(width);
-                let mut run = 0;
-                for x in seen.clone().rev() {
-                    right[x] = run;
-                    run = if apart[x] == 0 { (run + 1).min(most) } else { 0 };
-                }
-                let mut left = 0;
-                for x in seen.start..group.end {
-                    left = if apart[x] == 0 { (left + 1).min(most) } else { 0 };
-                    if group.contains(&x) && doubts[x] > DOUBT && surfaces[x] != 0 {
-                        let at = y * width + x;
-                        let [left, right, up, down] = [left, right[x], up[x], down[x]].map(usize::from);
-                        let ends = [at - left, at + right, at - up * width, at + down * width];
-                        settled.extend(surest(scene.known, ends, surfaces[x], at).map(|odds| (at, odds)));
-                    }
-                }
+                self.settle_group(image, y, y - rows.start, group, settled);
+            }
+        }
+    }
+
+    /// Counts downwards for all rows of a task.
+    fn count_down(&mut self, image: &Image<'_>, rows: Range<usize>, most: u8) {
+        let Grid { width, height, .. } = *image.grid;
+        self.down.resize(rows.len() * width, 0);
+        for y in (rows.start..(rows.end + usize::from(most)).min(height)).rev() {
+            if y + 1 < height {
+                count_on(image.row(y), image.row(y + 1), most, &mut self.below);
+            }
+            if y < rows.end {
+                self.down[(y - rows.start) * width..][..width].copy_from_slice(&self.below);
+            }
+        }
+    }
+
+    /// Settles the doubtful pixels of a group of row `y`, number `index` of its task.
+    fn settle_group(
+        &mut self,
+        image: &Image<'_>,
+        y: usize,
+        index: usize,
+        group: Range<usize>,
+        settled: &mut Vec<Settled>,
+    ) {
+        let Self { apart, right, up, down, .. } = self;
+        let width = image.grid.width;
+        let reach = PROPAGATION_CELLS * image.grid.step;
+        let most = reach as u8;
+        let down = &down[index * width..][..width];
+        let components = image.row(y).components;
+        let seen = group.start.saturating_sub(reach)..(group.end + reach).min(width);
+        let mut run = 0;
+        for x in seen.clone().rev() {
+            right[x] = run;
+            run = if apart[x] == 0 { (run + 1).min(most) } else { 0 };
+        }
+        let mut left = 0;
+        for x in seen.start..group.end {
+            left = if apart[x] == 0 { (left + 1).min(most) } else { 0 };
+            let at = y * width + x;
+            if group.contains(&x) && image.wrong_order[at] > DOUBTFUL && components[x] != 0 {
+                let [left, right, up, down] = [left, right[x], up[x], down[x]].map(usize::from);
+                let ends = [at - left, at + right, at - up * width, at + down * width];
+                settled.extend(image.settle(at, ends, components[x]));
             }
         }
     }
 }
 
-/// Whether one surface goes on between two pixels.
+/// Whether a component continues between two pixels.
 #[inline(always)]
-fn joined((phase, surface): (f32, u8), (other, other_surface): (f32, u8)) -> bool {
-    (surface != 0) & (other_surface != 0) & ((phase - other).abs() < PI)
+fn joined(here: Row<'_>, there: Row<'_>, x: usize) -> bool {
+    let near = (here.phase[x] - there.phase[x]).abs() < PI;
+    (here.components[x] != 0) & (there.components[x] != 0) & near
 }
 
-/// 0 for pixels that are of one surface with the one on their left, 1 for others and for the first.
+/// 0 for pixels that are of one component with the one on their left, 1 for others and for the first.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn side_by_side(phase: &[f32], surfaces: &[u8], apart: &mut [u8]) {
+fn mark_apart(row: Row, apart: &mut [u8]) {
     let n = apart.len() - 1;
-    let [left, right] = [0, 1].map(|from| (&phase[from..from + n], &surfaces[from..from + n]));
+    let part =
+        |from: usize| Row { phase: &row.phase[from..from + n], components: &row.components[from..from + n] };
+    let (left, right) = (part(0), part(1));
     for (x, apart) in apart[1..].iter_mut().enumerate() {
-        *apart = u8::from(!joined((left.0[x], left.1[x]), (right.0[x], right.1[x])));
+        *apart = u8::from(!joined(left, right, x));
     }
 }
 
-/// Counts of the pixels that a surface goes on, from those of the row it goes on to.
+/// Counts of the pixels that a component continues, from those of the row that it continues into.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn go_on(here: (&[f32], &[u8]), there: (&[f32], &[u8]), most: u8, counts: &mut [u8]) {
+fn count_on(here: Row, there: Row, most: u8, counts: &mut [u8]) {
     let n = counts.len();
-    let [(phase, surfaces), (other, other_surfaces)] = [here, there].map(|row| (&row.0[..n], &row.1[..n]));
+    let [here, there] =
+        [here, there].map(|row| Row { phase: &row.phase[..n], components: &row.components[..n] });
     for x in 0..n {
-        let on = joined((phase[x], surfaces[x]), (other[x], other_surfaces[x]));
         let longer = if counts[x] < most { counts[x] + 1 } else { most };
-        counts[x] = if on { longer } else { 0 };
+        counts[x] = if joined(here, there, x) { longer } else { 0 };
     }
-}
-
-/// Probability of another order and quality at a doubted pixel, with the help of the ends of its surface.
-fn surest([wrong, quality]: [&[f32]; 2], ends: [usize; 4], surface: u8, at: usize) -> Option<[f32; 2]> {
-    // NaN beside the field of the projector says nothing.
-    let known = ends.into_iter().filter(|&end| wrong[end] < wrong[at]);
-    let surest = known.min_by(|&a, &b| wrong[a].total_cmp(&wrong[b]))?;
-    let doubt = if surface == GROWN { GROWN_DOUBT } else { SETTLED_DOUBT };
-    Some([wrong[at].min(wrong[surest].max(doubt)), quality[at].max(quality[surest])])
 }
 
 #[cfg(test)]
@@ -187,29 +233,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn doubts_at_a_seam_go_as_far_as_the_surface_reaches() {
-        // Two surfaces two turns apart; windows doubt the orders of eight columns at their seam, and beyond column 28 there is none.
+    fn certainty_reaches_a_discontinuity_and_the_end_of_the_component() {
+        // Two components two turns apart; the orders of eight columns at their border are doubtful, and column 28 ends the second.
         let grid = Grid::new([6, 32], 4.0);
         let columns = |value: fn(usize) -> f32| (0..6 * 32).map(|i| value(i % 32)).collect::<Vec<_>>();
         let phase = columns(|x| 0.2 * x as f32 + if x < 16 { 0.0 } else { 4.0 * PI });
-        let mut wrong = columns(|x| if (12..20).contains(&x) || x >= 28 { 0.4 } else { 1e-5 });
+        let mut wrong_order = columns(|x| if (12..20).contains(&x) || x >= 28 { 0.4 } else { 1e-5 });
         let mut quality = columns(|x| if (12..20).contains(&x) { 0.1 } else { 0.9 });
-        let surfaces: Vec<u8> = (0..grid.pixels())
+        let components: Vec<u8> = (0..grid.pixels())
             .map(|i| [1, GROWN, 0][usize::from(i % 32 == 15) + 2 * usize::from(i % 32 >= 28)])
             .collect();
-        Odds::default().settle(&grid, &phase, &surfaces, [&mut wrong, &mut quality]);
+        Propagation::default().run(&grid, &phase, &components, &mut wrong_order, &mut quality);
         let row = |map: &[f32]| [11, 14, 15, 16, 30].map(|x| map[3 * 32 + x]);
-        assert_eq!(row(&wrong), [1e-5, SETTLED_DOUBT, GROWN_DOUBT, SETTLED_DOUBT, 0.4]);
+        let (settled, grown) = (SETTLED_PROBABILITY_MIN, GROWN_PROBABILITY_MIN);
+        assert_eq!(row(&wrong_order), [1e-5, settled, grown, settled, 0.4]);
         assert_eq!(row(&quality), [0.9; 5]);
     }
 
     #[test]
-    fn where_all_of_a_surface_is_doubted_it_stays_doubted() {
+    fn a_component_without_certain_pixels_stays_doubtful() {
         let grid = Grid::new([6, 32], 4.0);
-        let (phase, surfaces) = (vec![1.0; grid.pixels()], vec![1; grid.pixels()]);
-        let (mut wrong, mut quality) = (vec![0.3; 6 * 32], vec![0.2; 6 * 32]);
-        wrong[40] = f32::NAN;
-        Odds::default().settle(&grid, &phase, &surfaces, [&mut wrong, &mut quality]);
-        assert!(wrong[40].is_nan() && wrong.iter().filter(|wrong| **wrong == 0.3).count() == 6 * 32 - 1);
+        let (phase, components) = (vec![1.0; grid.pixels()], vec![1; grid.pixels()]);
+        let (mut wrong_order, mut quality) = (vec![0.3; 6 * 32], vec![0.2; 6 * 32]);
+        wrong_order[40] = f32::NAN;
+        Propagation::default().run(&grid, &phase, &components, &mut wrong_order, &mut quality);
+        assert!(wrong_order[40].is_nan());
+        assert_eq!(wrong_order.iter().filter(|wrong| **wrong == 0.3).count(), 6 * 32 - 1);
     }
 }

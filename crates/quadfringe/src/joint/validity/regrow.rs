@@ -1,101 +1,108 @@
-//! Surfaces that are sure grow into what is doubtful beside them.
+//! Step 8: components grow back into doubtful pixels next to them (region growing with hysteresis; Canny, IEEE TPAMI 8, 679 (1986)).
 //!
-//! At a seam one of two sides is wrong, or a pixel sees both, and the marks take a strip from each; orders are known by cells, and one
-//! cell across the rim of a surface doubts all of its pixels. A side that is wrong is most often a sliver, of which nothing is left.
-//! What is left of a surface takes back the pixels into which its phase goes on straight, and whose own light agrees with that
-//! (hysteresis; Canny, IEEE TPAMI 8, 679 (1986)). Where two surfaces meet, what lies between them stays holes.
+//! At an order jump one of two sides is wrong, or a pixel sees both surfaces, and the exclusion removes a strip from each side. Orders
+//! are known by cells, and one cell across the rim of a surface makes all of its pixels doubtful. A side that is wrong is mostly a
+//! sliver that is removed entirely. The remaining component takes back the pixels into which its phase continues straight and whose
+//! intensities agree with that. Between two surfaces that meet, holes remain.
 
-use super::discontinuities::BLIND_REACH;
 use crate::joint::cells::Grid;
-use crate::joint::params::BEND_MAX;
+use crate::joint::params::tasks::GROUP;
+use crate::joint::params::validity::{AMBIGUOUS_REACH, BEND_MAX_RAD, FACING_REACH};
 use std::f32::consts::PI;
 
-/// Pixels around which no other surface may be sure, when one grew there further than marks reach.
-const FACING: usize = BLIND_REACH + 1;
-/// Pixels that are looked through at once.
-const GROUP: usize = 64;
-/// What marks a pixel of a surface that it grew into; 1 marks the others.
+/// Mark of a pixel that was added to a component; 1 marks the others.
 pub(super) const GROWN: u8 = 2;
 
-/// Working lists of the growth: places of pixels.
+/// What decides whether a pixel may be added.
+#[derive(Clone, Copy)]
+pub(super) struct Candidates<'a> {
+    /// Absolute phase in rad.
+    pub phase: &'a [f32],
+    /// 1 for pixels whose intensities agree with their order.
+    pub consistent: &'a [u8],
+    /// 1 for pixels at an order jump.
+    pub at_jump: &'a [u8],
+}
+
+/// Working lists of pixels, by their places.
 #[derive(Debug, Default)]
-pub(super) struct Growth {
+pub(super) struct Regrow {
     open: Vec<u32>,
     taken: Vec<u32>,
-    /// What was taken at a tear, or further away than marks reach.
+    /// Pixels taken at an order jump, or further away than exclusion reaches.
     far: Vec<u32>,
 }
 
-impl Growth {
-    /// Adds to `sure` and to the `surfaces`, which are part of it, those of the `agreeing` pixels, no more than a cell (or what
-    /// marks reach) away, into which the `phase` (rad) of two pixels of a surface in a line goes on straight. Those that are
-    /// `torn`, or further away than marks reach, stay holes where another surface is sure near by.
-    pub fn run(
-        &mut self,
-        grid: &Grid,
-        phase: &[f32],
-        [agreeing, torn]: [&[u8]; 2],
-        [sure, surfaces]: [&mut [u8]; 2],
-    ) {
+impl Regrow {
+    /// Adds to `valid` and to the `components`, which are part of it, consistent pixels no more than a cell (or the reach of exclusion)
+    /// away into which the phase of two pixels of a component in a line continues straight. Those at an order jump, or further away
+    /// than exclusion reaches, stay holes where another surface is valid nearby.
+    pub fn run(&mut self, grid: &Grid, candidates: &Candidates<'_>, valid: &mut [u8], components: &mut [u8]) {
+        let phase = candidates.phase;
+        self.open_pixels(grid, candidates.consistent, valid);
         let Self { open, taken, far } = self;
-        open.clear();
         far.clear();
-        for y in 0..grid.height {
-            let [agreeing, sure] = [agreeing, &*sure].map(|map| &map[y * grid.stride..][..grid.width]);
-            for (i, (agreeing, sure)) in agreeing.chunks(GROUP).zip(sure.chunks(GROUP)).enumerate() {
-                let asked = |x: &usize| agreeing[*x] > sure[*x];
-                // Groups without one are the rule, and told at once.
-                if (0..agreeing.len()).fold(false, |any, x| any | asked(&x)) {
-                    let first = y * grid.stride + i * GROUP;
-                    open.extend((0..agreeing.len()).filter(asked).map(|x| (first + x) as u32));
-                }
-            }
-        }
-        for round in 0..grid.step.max(BLIND_REACH) {
+        for round in 0..grid.step.max(AMBIGUOUS_REACH) {
             taken.clear();
             open.retain(|&at| {
-                let goes_on = goes_on(grid, phase, surfaces, at as usize);
-                if goes_on {
+                let continues = continues(grid, phase, components, at as usize);
+                if continues {
                     taken.push(at);
                 }
-                !goes_on
+                !continues
             });
             if taken.is_empty() {
                 break;
             }
             for at in taken.iter().map(|&at| at as usize) {
-                (sure[at], surfaces[at]) = (1, GROWN);
+                (valid[at], components[at]) = (1, GROWN);
             }
-            taken.retain(|&at| round >= BLIND_REACH || torn[at as usize] != 0);
+            taken.retain(|&at| round >= AMBIGUOUS_REACH || candidates.at_jump[at as usize] != 0);
             far.append(taken);
         }
-        far.retain(|&at| faces_another(grid, phase, sure, at as usize));
+        far.retain(|&at| faces_another(grid, phase, valid, at as usize));
         for at in far.iter().map(|&at| at as usize) {
-            (sure[at], surfaces[at]) = (0, 0);
+            (valid[at], components[at]) = (0, 0);
+        }
+    }
+
+    /// Lists the consistent pixels that are not valid.
+    fn open_pixels(&mut self, grid: &Grid, consistent: &[u8], valid: &[u8]) {
+        self.open.clear();
+        for y in 0..grid.height {
+            let [consistent, valid] = [consistent, valid].map(|map| &map[y * grid.stride..][..grid.width]);
+            for (i, (consistent, valid)) in consistent.chunks(GROUP).zip(valid.chunks(GROUP)).enumerate() {
+                let is_open = |x: &usize| consistent[*x] > valid[*x];
+                // Most groups have no such pixel; without a way out in the middle the loop over a group becomes vectors.
+                if (0..consistent.len()).fold(false, |any, x| any | is_open(&x)) {
+                    let first = y * grid.stride + i * GROUP;
+                    self.open.extend((0..consistent.len()).filter(is_open).map(|x| (first + x) as u32));
+                }
+            }
         }
     }
 }
 
-/// Whether two pixels of a surface side by side lead straight to the pixel, in one of four directions.
-fn goes_on(grid: &Grid, phase: &[f32], surfaces: &[u8], at: usize) -> bool {
+/// Whether two pixels of a component in a line lead straight to the pixel, in one of four directions.
+fn continues(grid: &Grid, phase: &[f32], components: &[u8], at: usize) -> bool {
     directions(grid, at, 2).any(|step| {
         let (near, far) = (at.wrapping_add_signed(step), at.wrapping_add_signed(2 * step));
-        let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX;
-        (surfaces[near] != 0) & (surfaces[far] != 0) & straight
+        let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX_RAD;
+        (components[near] != 0) & (components[far] != 0) & straight
     })
 }
 
-/// Whether a pixel of another surface is sure near by, in one of four directions.
-fn faces_another(grid: &Grid, phase: &[f32], sure: &[u8], at: usize) -> bool {
-    (1..=FACING).any(|count| {
+/// Whether a pixel of another surface is valid nearby, in one of four directions.
+fn faces_another(grid: &Grid, phase: &[f32], valid: &[u8], at: usize) -> bool {
+    (1..=FACING_REACH).any(|count| {
         directions(grid, at, count).any(|step| {
             let other = at.wrapping_add_signed(count as isize * step);
-            (sure[other] != 0) & ((phase[other] - phase[at]).abs() >= PI)
+            (valid[other] != 0) & ((phase[other] - phase[at]).abs() >= PI)
         })
     })
 }
 
-/// Steps to the four neighbours of a pixel, as far as there are `count` pixels that way.
+/// Steps to those of the four neighbours of a pixel behind which the image has `count` pixels.
 fn directions(grid: &Grid, at: usize, count: usize) -> impl Iterator<Item = isize> {
     let (y, x, down) = (at / grid.stride, at % grid.stride, grid.stride as isize);
     let left_or_up = [(x, -1), (y, -down)].map(|(before, step)| (before >= count, step));
@@ -108,74 +115,93 @@ fn directions(grid: &Grid, at: usize, count: usize) -> impl Iterator<Item = isiz
 mod tests {
     use super::*;
 
-    /// A surface, a step of 20 rad at column 16, and a strip of six columns marked around it: phase, torn pixels, sure ones.
-    fn scene() -> (Grid, Vec<f32>, [Vec<u8>; 2]) {
-        let grid = Grid::new([20, 32], 4.0);
-        let place = |i: usize| (i % grid.stride, i / grid.stride);
-        let phase = (0..grid.pixels())
-            .map(place)
-            .map(|(x, y)| 0.6 * x as f32 + 0.1 * y as f32 + if x >= 16 { 20.0 } else { 0.0 });
-        let phase = phase.collect();
-        let columns = |from: usize, to: usize| {
-            (0..grid.pixels()).map(|i| u8::from((from..to).contains(&(i % grid.stride)))).collect::<Vec<_>>()
-        };
-        let sure = columns(13, 19).iter().map(|marked| 1 - marked).collect();
-        let torn = columns(15, 17);
-        (grid, phase, [torn, sure])
+    /// A surface with a step of 20 rad at column 16: its phase, pixels at the jump, valid pixels outside six columns around it.
+    struct Step {
+        grid: Grid,
+        phase: Vec<f32>,
+        at_jump: Vec<u8>,
+        valid: Vec<u8>,
     }
 
-    fn grown(grid: &Grid, phase: &[f32], agreeing: &[u8], [torn, sure]: &[Vec<u8>; 2]) -> Vec<u8> {
-        let (mut sure, mut surfaces) = (sure.clone(), sure.clone());
-        Growth::default().run(grid, phase, [agreeing, torn], [&mut sure, &mut surfaces]);
-        assert!(sure.iter().zip(&surfaces).all(|(sure, surface)| *sure == u8::from(*surface > 0)));
-        sure
+    impl Step {
+        fn new() -> Self {
+            let grid = Grid::new([20, 32], 4.0);
+            let phase =
+                |x: usize, y: usize| 0.6 * x as f32 + 0.1 * y as f32 + if x >= 16 { 20.0 } else { 0.0 };
+            let phase = (0..grid.pixels()).map(|i| phase(i % grid.stride, i / grid.stride)).collect();
+            let columns = |from: usize, to: usize| {
+                (0..grid.pixels()).map(move |i| u8::from((from..to).contains(&(i % grid.stride))))
+            };
+            let valid = columns(13, 19).map(|marked| 1 - marked).collect();
+            Self { grid, phase, at_jump: columns(15, 17).collect(), valid }
+        }
+
+        fn place(&self, x: usize, y: usize) -> usize {
+            y * self.grid.stride + x
+        }
+
+        /// Valid pixels after growing into the consistent ones.
+        fn grown(&self, consistent: &[u8]) -> Vec<u8> {
+            let (mut valid, mut components) = (self.valid.clone(), self.valid.clone());
+            let candidates = Candidates { phase: &self.phase, consistent, at_jump: &self.at_jump };
+            Regrow::default().run(&self.grid, &candidates, &mut valid, &mut components);
+            assert!(
+                valid.iter().zip(&components).all(|(valid, component)| *valid == u8::from(*component > 0))
+            );
+            valid
+        }
+
+        fn all(&self) -> Vec<u8> {
+            vec![1; self.grid.pixels()]
+        }
     }
 
     #[test]
     fn both_surfaces_grow_up_to_the_pixels_at_their_step() {
-        let (grid, phase, marks) = scene();
-        let sure = grown(&grid, &phase, &vec![1; grid.pixels()], &marks);
-        for (i, sure) in sure.iter().enumerate() {
-            assert_eq!(*sure == 0, (15..17).contains(&(i % grid.stride)), "{i}");
+        let step = Step::new();
+        for (i, valid) in step.grown(&step.all()).iter().enumerate() {
+            assert_eq!(*valid == 0, (15..17).contains(&(i % step.grid.stride)), "{i}");
         }
     }
 
     #[test]
-    fn further_than_marks_reach_a_surface_stays_away_from_another() {
-        let (grid, phase, [_, sure]) = scene();
-        let untorn = [vec![0; grid.pixels()], sure];
-        let sure = grown(&grid, &phase, &vec![1; grid.pixels()], &untorn);
-        let holes = |sure: &[u8]| (0..32).filter(|&x| sure[5 * grid.stride + x] == 0).collect::<Vec<_>>();
-        assert_eq!(holes(&sure), [15, 16]);
-        // Beyond the step there is nothing.
-        let [untorn, mut sure] = untorn;
-        (0..grid.pixels()).filter(|i| i % grid.stride > 15).for_each(|i| sure[i] = 0);
-        let sure = grown(&grid, &phase, &vec![1; grid.pixels()], &[untorn, sure]);
-        assert_eq!(holes(&sure), (16..32).collect::<Vec<_>>());
+    fn further_than_exclusion_reaches_a_surface_stays_away_from_another() {
+        let mut step = Step::new();
+        step.at_jump.fill(0);
+        let holes =
+            |step: &Step, valid: &[u8]| (0..32).filter(|&x| valid[step.place(x, 5)] == 0).collect::<Vec<_>>();
+        assert_eq!(holes(&step, &step.grown(&step.all())), [15, 16]);
+        // Without a surface beyond the step.
+        (0..step.grid.pixels()).filter(|i| i % step.grid.stride > 15).for_each(|i| step.valid[i] = 0);
+        assert_eq!(holes(&step, &step.grown(&step.all())), (16..32).collect::<Vec<_>>());
     }
 
     #[test]
-    fn what_does_not_agree_or_does_not_go_on_straight_stays_a_hole() {
-        let (grid, mut phase, marks) = scene();
-        let place = |x: usize, y: usize| y * grid.stride + x;
-        let mut agreeing = vec![1; grid.pixels()];
-        agreeing[place(14, 7)] = 0;
-        // Beside the step a sliver has an order too few, so that nothing is sure near the other side; below, column 13 bends.
+    fn inconsistent_pixels_and_bends_stay_holes() {
+        let mut step = Step::new();
+        let mut consistent = step.all();
+        consistent[step.place(14, 7)] = 0;
+        // Next to the step a sliver has an order too few, so that no pixel is valid near the other side; below, column 13 bends.
         for y in 0..20 {
-            (17..19).for_each(|x| phase[place(x, y)] -= std::f32::consts::TAU);
-            phase[place(13, y)] += if y < 10 { 0.0 } else { 3.0 };
+            for x in 17..19 {
+                let at = step.place(x, y);
+                step.phase[at] -= std::f32::consts::TAU;
+            }
+            let at = step.place(13, y);
+            step.phase[at] += if y < 10 { 0.0 } else { 3.0 };
         }
-        let sure = grown(&grid, &phase, &agreeing, &marks);
-        let row = |y: usize| (13..19).filter(|&x| sure[place(x, y)] == 1).collect::<Vec<_>>();
+        let valid = step.grown(&consistent);
+        let row = |y: usize| (13..19).filter(|&x| valid[step.place(x, y)] == 1).collect::<Vec<_>>();
         assert_eq!((row(3), row(7), row(15)), (vec![13, 14, 15], vec![13, 15], vec![]));
     }
 
     #[test]
     fn growth_ends_after_a_cell() {
-        let (grid, phase, _) = scene();
-        let sure = (0..grid.pixels()).map(|i| u8::from(i % grid.stride < 4)).collect();
-        let marks = [vec![0; grid.pixels()], sure];
-        let sure = grown(&grid, &phase, &vec![1; grid.pixels()], &marks);
-        assert_eq!(sure[5 * grid.stride..][..32].iter().position(|&sure| sure == 0), Some(4 + grid.step));
+        let mut step = Step::new();
+        step.at_jump.fill(0);
+        step.valid = (0..step.grid.pixels()).map(|i| u8::from(i % step.grid.stride < 4)).collect();
+        let valid = step.grown(&step.all());
+        let row = &valid[step.place(0, 5)..][..32];
+        assert_eq!(row.iter().position(|&valid| valid == 0), Some(4 + step.grid.step));
     }
 }

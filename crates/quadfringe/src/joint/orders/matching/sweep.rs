@@ -1,10 +1,22 @@
-//! Sweeps of semi-global matching.
+//! Sweeps of semi-global matching: costs summed along rows and columns, with a price for changes of surface.
 
-use super::{LANES, NEVER, Node};
 use multiversion::multiversion;
 
-/// Room beside the labels, so that shifted reads stay inside.
+/// Labels are padded to whole vectors.
+pub(super) const LANES: usize = 16;
+/// Cost of a label outside the field: more than any sum of costs along a path, and no overflow when a price is added.
+pub(super) const IMPOSSIBLE: i16 = 16000;
+/// Room before and after the labels, so that shifted reads stay inside.
 const PAD: usize = 8;
+
+/// A node as the sweeps see it.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Node {
+    /// Wrapped phase of the first fringe number, 65536 to a turn.
+    pub phase: u16,
+    /// Whether there is light to judge by; an unlit node ends all paths.
+    pub lit: bool,
+}
 
 /// Aggregated costs of the last node of one path.
 pub(super) struct Path {
@@ -12,19 +24,20 @@ pub(super) struct Path {
     current: Vec<i16>,
     least: i16,
     phase: u16,
-    /// Nothing before it counts.
+    /// Whether the path starts here.
     fresh: bool,
     labels: usize,
-    /// Cost of any change of the surface, and of one by a single order.
+    /// Price of a change of surface by any number of orders.
     jump: i16,
+    /// Price of one by a single order.
     step: i16,
 }
 
 impl Path {
     pub fn new(labels: usize, jump: i16) -> Self {
         let mut path = Self {
-            previous: vec![NEVER; labels + 2 * PAD],
-            current: vec![NEVER; labels + 2 * PAD],
+            previous: vec![IMPOSSIBLE; labels + 2 * PAD],
+            current: vec![IMPOSSIBLE; labels + 2 * PAD],
             least: 0,
             phase: 0,
             fresh: true,
@@ -42,14 +55,14 @@ impl Path {
         self.previous[PAD..PAD + self.labels].fill(0);
     }
 
-    /// One node further; its aggregated costs replace or join `sums`.
+    /// Goes on to one node; its aggregated costs start the sums, or are added to them.
     #[inline(always)]
-    fn advance(&mut self, node: Node, own: &[i16], sums: &mut [u16], first: bool) {
+    fn advance(&mut self, node: Node, costs: &[i16], sums: &mut [u16], starts_sums: bool) {
         if !node.lit {
             if !self.fresh {
                 self.restart();
             }
-            if first {
+            if starts_sums {
                 sums.fill(0);
             }
             return;
@@ -61,9 +74,17 @@ impl Path {
             ..-32768 => -1isize,
             _ => 0,
         };
+        self.aggregate(shift, costs, sums, starts_sums);
+        (self.phase, self.fresh) = (node.phase, false);
+        std::mem::swap(&mut self.previous, &mut self.current);
+    }
+
+    /// Costs of the node plus the cheapest way to each label from those of the last node, whose labels lie `shift` further.
+    #[inline(always)]
+    fn aggregate(&mut self, shift: isize, costs: &[i16], sums: &mut [u16], starts_sums: bool) {
         let at = (PAD as isize + shift) as usize;
         let blocks = self.labels / LANES;
-        let own = &own.as_chunks::<LANES>().0[..blocks];
+        let costs = &costs.as_chunks::<LANES>().0[..blocks];
         let sums = &mut sums.as_chunks_mut::<LANES>().0[..blocks];
         let target = &mut self.current[PAD..].as_chunks_mut::<LANES>().0[..blocks];
         let [below, same, above] =
@@ -76,15 +97,13 @@ impl Path {
                 let neighbour = (if low < high { low } else { high }).saturating_add(self.step);
                 let best = if same[b][k] < neighbour { same[b][k] } else { neighbour };
                 let best = if best < limit { best } else { limit };
-                let sum = own[b][k].saturating_add(best - self.least);
+                let sum = costs[b][k].saturating_add(best - self.least);
                 target[b][k] = sum;
                 least[k] = if sum < least[k] { sum } else { least[k] };
-                sums[b][k] = if first { sum as u16 } else { sums[b][k].saturating_add(sum as u16) };
+                sums[b][k] = if starts_sums { sum as u16 } else { sums[b][k].saturating_add(sum as u16) };
             }
         }
         self.least = least.iter().copied().fold(i16::MAX, i16::min);
-        (self.phase, self.fresh) = (node.phase, false);
-        std::mem::swap(&mut self.previous, &mut self.current);
     }
 }
 
@@ -108,7 +127,7 @@ pub(super) fn sweep_back(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &
     }
 }
 
-/// One row further for as many paths side by side.
+/// One row further, for paths down columns next to each other.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn across(paths: &mut [Path], nodes: &[Node], costs: &[i16], sums: &mut [u16]) {
     for (x, (path, &node)) in paths.iter_mut().zip(nodes).enumerate() {

@@ -1,0 +1,77 @@
+//! Step 1: planes of linear light (S1), and of step 2 the fringe period.
+
+use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
+use super::pyramid::Level;
+use crate::Shot;
+use crate::condition::{Plan, Sample};
+use crate::stages::carrier;
+use multiversion::multiversion;
+use ndarray::{ArrayView2, s};
+use rayon::prelude::*;
+
+/// Writes the linear light of a shot into the planes of a level. Its mask `lit` is 0 for glare and for pixels that one chip does not
+/// see, `usable` is 0 for saturated pixels too.
+pub(super) fn linear_light<T: Sample>(plan: &Plan, shot: &Shot<'_, T>, shape: [usize; 2], level: &mut Level) {
+    let [height, width] = shape;
+    let stride = level.lit.len() / height;
+    let Level { light, lit, usable } = level;
+    let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
+    let masks = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));
+    let rows = red.zip(green).zip(blue.zip(infrared)).zip(masks).enumerate();
+    rows.for_each_init(
+        || Saturation { unsaturated: vec![false; width], glare: vec![false; width] },
+        |saturation, (y, (((red, green), (blue, infrared)), (usable, lit)))| {
+            let rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
+            let masks = MaskRows { usable: &mut usable[..width], lit: &mut lit[..width] };
+            linear_row(plan, shot, y, saturation, rows, masks);
+        },
+    );
+}
+
+/// Saturation of a row of pixels.
+struct Saturation {
+    unsaturated: Vec<bool>,
+    glare: Vec<bool>,
+}
+
+/// The masks of a row of pixels.
+struct MaskRows<'a> {
+    usable: &'a mut [f32],
+    lit: &'a mut [f32],
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn linear_row<T: Sample>(
+    plan: &Plan,
+    shot: &Shot<'_, T>,
+    y: usize,
+    saturation: &mut Saturation,
+    mut rows: [&mut [f32]; 4],
+    masks: MaskRows<'_>,
+) {
+    let Saturation { unsaturated, glare } = saturation;
+    plan.saturation_row(shot, y, unsaturated, glare);
+    plan.row(shot, y, &mut rows);
+    let [.., infrared] = rows;
+    let masks = masks.usable.iter_mut().zip(masks.lit).zip(unsaturated.iter().zip(glare.iter()));
+    for (infrared, ((usable, lit), (unsaturated, glare))) in infrared.iter().zip(masks) {
+        // A pixel that the infrared chip does not see takes no part in any fit.
+        let seen = infrared.is_finite();
+        *usable = if seen & *unsaturated { 1.0 } else { 0.0 };
+        *lit = if seen & !*glare { 1.0 } else { 0.0 };
+    }
+    plan.continue_infrared(y, infrared);
+}
+
+/// Fringe period across the fringes in pixels, from the red plane; a share of the width when no carrier stands out.
+pub(super) fn fringe_period_px(red: &[f32], [height, width]: [usize; 2]) -> f64 {
+    let stride = red.len() / height;
+    let red = ArrayView2::from_shape((height, stride), red).expect("a plane is whole");
+    let found = carrier(red.slice(s![.., ..width])).period_px();
+    let shorter = width.min(height) as f64;
+    if found.is_finite() {
+        found.clamp(PERIOD_MIN_PX, shorter.max(2.0 * PERIOD_MIN_PX))
+    } else {
+        width as f64 * PERIOD_FALLBACK_SHARE
+    }
+}

@@ -1,0 +1,143 @@
+//! Step 4, near discontinuities: the pixels of a cell choose among the orders that the cell and its neighbours propose.
+
+use super::evidence::{albedo, observed_cosine};
+use super::{Cell, Orders, Wrapped};
+use crate::joint::model::CellFringes;
+use crate::joint::params::orders::{PIXEL_COST_MAX, SAME_ORDER_RAD};
+use crate::joint::scene::Scene;
+use crate::joint::slopes::Slopes;
+use crate::parallel::angle::{round, sin_cos, wrap};
+use std::f32::consts::TAU;
+
+/// The order of the cell and those of eight neighbours.
+const CANDIDATES: usize = 9;
+
+/// Orders to choose from, in turns relative to the order of the cell; the first is 0.
+pub(super) struct Candidates {
+    turns: [f32; CANDIDATES],
+    count: usize,
+}
+
+impl Candidates {
+    /// Orders that a cell and its eight neighbours propose for the pixels of the cell.
+    pub fn of(orders: &Orders, scene: &Scene<'_>, slopes: &Slopes, Cell { row, column }: Cell) -> Self {
+        let grid = scene.grid;
+        let node = row * grid.columns + column;
+        let mut found = Self { turns: [0.0; CANDIDATES], count: 1 };
+        let lines = row.saturating_sub(1)..=(row + 1).min(grid.rows - 1);
+        let here = orders.absolute(node);
+        for other_row in lines {
+            for other_column in column.saturating_sub(1)..=(column + 1).min(grid.columns - 1) {
+                let other = other_row * grid.columns + other_column;
+                if other == node || !orders.matching.is_lit(other) {
+                    continue;
+                }
+                let gap = here - orders.absolute(other);
+                if gap.abs() < SAME_ORDER_RAD {
+                    continue;
+                }
+                let [along, down] = slopes.at(other_row, other_column);
+                let way =
+                    along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32);
+                // The phase that the neighbour predicts here, as turns relative to that of this node.
+                found.add(-round((gap - way) / TAU));
+            }
+        }
+        found
+    }
+
+    /// Whether there is more than one.
+    pub fn is_choice(&self) -> bool {
+        self.count > 1
+    }
+
+    fn turns(&self) -> &[f32] {
+        &self.turns[..self.count]
+    }
+
+    fn add(&mut self, turns: f32) {
+        if !self.turns().contains(&turns) {
+            self.turns[self.count] = turns;
+            self.count += 1;
+        }
+    }
+}
+
+/// Decisions for the pixels of one cell.
+#[derive(Debug, Default)]
+pub(super) struct Block {
+    /// Cost of every candidate at the pixels of the cell and of a rim of one pixel.
+    costs: Vec<[f32; CANDIDATES]>,
+    turns: Vec<f32>,
+}
+
+impl Block {
+    /// Turns of pixel `i` of the cell, as decided.
+    pub fn turns(&self, i: usize) -> f32 {
+        self.turns[i]
+    }
+
+    /// Give every pixel the candidate that explains best what it and its neighbours observe in G and IR.
+    pub fn decide(
+        &mut self,
+        orders: &Orders,
+        scene: &Scene<'_>,
+        wrapped: &Wrapped<'_>,
+        cell: Cell,
+        candidates: &Candidates,
+    ) {
+        let grid = scene.grid;
+        let (step, side) = (grid.step, grid.step + 2);
+        let node = cell.row * grid.columns + cell.column;
+        let (phase, whole) = (orders.phase[node], orders.absolute(node));
+        let fringes = wrapped.cell(scene, cell.row, cell.column);
+        self.costs.clear();
+        for i in 0..side * side {
+            let y = (cell.row * step + i / side).saturating_sub(1).min(grid.height - 1);
+            let x = (cell.column * step + i % side).saturating_sub(1).min(grid.width - 1);
+            let at = y * grid.stride + x;
+            let mut costs = [0.0; CANDIDATES];
+            if wrapped.map.modulation[at] > 0.0 {
+                let wrapped_phase = wrapped.map.phase[at];
+                let pixel = Pixel {
+                    wrapped_phase,
+                    absolute_phase: whole + wrap(wrapped_phase - phase),
+                    light: scene.light.map(|plane| plane[at]),
+                };
+                add_costs(&pixel, &fringes, orders.ratios, candidates.turns(), &mut costs);
+            }
+            self.costs.push(costs);
+        }
+        self.turns.clear();
+        for i in 0..step * step {
+            let (y, x) = (i / step, i % step);
+            let sum =
+                |k: usize| -> f32 { (0..9).map(|n| self.costs[(y + n / 3) * side + x + n % 3][k]).sum() };
+            let best =
+                (0..candidates.count).map(|k| (k, sum(k))).reduce(|a, b| if b.1 < a.1 { b } else { a });
+            self.turns.push(best.map_or(0.0, |(k, _)| candidates.turns[k]));
+        }
+    }
+}
+
+/// One pixel, with the absolute phase that the order of its cell gives it.
+struct Pixel {
+    wrapped_phase: f32,
+    absolute_phase: f32,
+    light: [f32; 4],
+}
+
+/// Adds the squared differences between observed and predicted cosines of G and IR for every candidate.
+fn add_costs(pixel: &Pixel, fringes: &CellFringes, ratios: [f32; 2], turns: &[f32], costs: &mut [f32]) {
+    let CellFringes { offset, amplitude } = fringes;
+    let light = pixel.light;
+    let red_blue = |values: &[f32; 4]| [values[0], values[2]];
+    let albedo = albedo(pixel.wrapped_phase, red_blue(&light), red_blue(offset), red_blue(amplitude));
+    for (c, ratio) in [1, 3].into_iter().zip(ratios) {
+        let seen = observed_cosine(light[c], albedo, offset[c], amplitude[c]);
+        for (cost, turns) in costs.iter_mut().zip(turns) {
+            let (_, predicted) = sin_cos(ratio * (pixel.absolute_phase + TAU * turns));
+            *cost += (seen - predicted).powi(2).min(PIXEL_COST_MAX);
+        }
+    }
+}

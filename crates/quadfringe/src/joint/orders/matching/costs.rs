@@ -1,0 +1,139 @@
+//! Costs of the orders of a node: what every order predicts, and how far the evidence is from it.
+
+use super::evidence::{CosineSums, NodeEvidence};
+use super::sweep::{IMPOSSIBLE, LANES};
+use crate::FringeCode;
+use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
+use multiversion::multiversion;
+use std::f64::consts::TAU;
+
+/// Every order as a label, with what it predicts; label 1 is order 0, label 0 the order before the field.
+#[derive(Debug, Clone)]
+pub(super) struct CostTable {
+    /// Beats of G and IR in a turn of the first phase.
+    ratios: [f64; 2],
+    /// Beats of every label for a wrapped phase of 0: G and IR.
+    beats: [Vec<u16>; 2],
+    /// What every label adds to the phase of order 0: G and IR.
+    rotations: [Rotations; 2],
+    /// Greatest wrapped phase, in turns, that the last order may have.
+    last_turn: f64,
+    /// Least wrapped phase, in turns, that the order before the first may have.
+    first_turn: f64,
+    last_label: usize,
+    count: usize,
+}
+
+/// Cosine and sine of an angle for every label, and those of twice the angle.
+#[derive(Debug, Clone)]
+struct Rotations {
+    cos: Vec<f32>,
+    sin: Vec<f32>,
+    cos_twice: Vec<f32>,
+    sin_twice: Vec<f32>,
+}
+
+impl CostTable {
+    pub fn new(code: &FringeCode) -> Self {
+        let n = code.numbers();
+        let ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
+        let count = (code.orders() + 2).div_ceil(LANES) * LANES;
+        let per_column = n[0] / code.projector_width() as f64;
+        let end = n[0] + 0.5 * per_column;
+        let labels = || (0..count).map(|label| label as f64 - 1.0);
+        let beats =
+            ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
+        let rotations = ratios.map(|ratio| {
+            let angle = |k: f64| TAU * (ratio * k).rem_euclid(1.0);
+            Rotations {
+                cos: labels().map(|k| angle(k).cos() as f32).collect(),
+                sin: labels().map(|k| angle(k).sin() as f32).collect(),
+                cos_twice: labels().map(|k| (2.0 * angle(k)).cos() as f32).collect(),
+                sin_twice: labels().map(|k| (2.0 * angle(k)).sin() as f32).collect(),
+            }
+        });
+        Self {
+            ratios,
+            beats,
+            rotations,
+            last_turn: end - end.floor(),
+            first_turn: 1.0 - 1.5 * per_column,
+            last_label: end.floor() as usize + 1,
+            count,
+        }
+    }
+
+    /// Number of labels, padded to whole vectors.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    /// Cost of every label of a node: the mean of the costs by its beats and by its cosines.
+    pub fn costs(&self, node: &NodeEvidence, out: &mut [i16]) {
+        if !node.lit {
+            out.fill(0);
+            return;
+        }
+        let phase = f64::from(node.phase);
+        let predicted = self.ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
+        let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
+        // Without usable pixels the cosines say nothing: their sums are 0 for every label.
+        let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
+        let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
+        costs(beats, cosines, self, out);
+        let turn = phase / 65536.0;
+        if turn < self.first_turn {
+            out[0] = IMPOSSIBLE;
+        }
+        let end = self.last_label + usize::from(turn <= self.last_turn);
+        if let Some(beyond) = out.get_mut(end..) {
+            beyond.fill(IMPOSSIBLE);
+        }
+    }
+}
+
+/// Cosines of a node; `scale` brings a sum of squared differences to the unit of the costs.
+#[derive(Clone, Copy)]
+struct Cosines<'a> {
+    sums: &'a [CosineSums; 2],
+    pixels: f32,
+    scale: f32,
+}
+
+/// `beats` are those observed less those predicted for order 0.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) {
+    let blocks = out.len() / LANES;
+    let offsets = table.beats.each_ref().map(|map| &map.as_chunks::<LANES>().0[..blocks]);
+    let rotations = table.rotations.each_ref().map(|Rotations { cos, sin, cos_twice, sin_twice }| {
+        [cos, sin, cos_twice, sin_twice].map(|map| &map.as_chunks::<LANES>().0[..blocks])
+    });
+    for (b, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
+        let mut square = [0.0f32; LANES];
+        for (sums, [c, s, c2, s2]) in cosines.sums.iter().zip(&rotations) {
+            let still = sums.square + 0.5 * cosines.pixels;
+            for k in 0..LANES {
+                let first = sums.first[0] * c[b][k] - sums.first[1] * s[b][k];
+                let second = sums.second[0] * c2[b][k] - sums.second[1] * s2[b][k];
+                square[k] += still - 2.0 * first + 0.5 * second;
+            }
+        }
+        for k in 0..LANES {
+            let scaled = cosines.scale * square[k];
+            let by_cosines =
+                (if scaled < f32::from(COST_MAX) { scaled } else { f32::from(COST_MAX) }) as i32 as i16;
+            let by_beats =
+                (beat_cost(beats[0], offsets[0][b][k]) + beat_cost(beats[1], offsets[1][b][k])) >> 4;
+            let by_beats = if by_beats < COST_MAX { by_beats } else { COST_MAX };
+            out[k] = (by_beats + by_cosines) >> 1;
+        }
+    }
+}
+
+/// Squared distance of two beats, 127 for 45 degrees or more.
+#[inline(always)]
+fn beat_cost(observed: u16, predicted: u16) -> i16 {
+    let error = (observed.wrapping_sub(predicted) as i16 >> 6).unsigned_abs();
+    let error = (if error < 127 { error } else { 127 }) as i16;
+    error * error
+}
