@@ -42,13 +42,8 @@ impl Slopes {
     }
 
     /// `wide_share` is the weight of the wide slopes, as a share of the pixels of a whole window.
-    fn average(
-        &mut self,
-        scene: &Scene<'_>,
-        PhaseMap { phase, modulation }: PhaseMap<'_>,
-        width: f32,
-        wide_share: f32,
-    ) {
+    fn average(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, width: f32, wide_share: f32) {
+        let PhaseMap { phase, modulation } = map;
         let grid = scene.grid;
         let Self { maps, wide, sums, slots } = self;
         let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
@@ -86,7 +81,7 @@ impl Slopes {
         );
     }
 
-    /// Slopes of nothing.
+    /// Slopes of 0.
     #[cfg(test)]
     pub fn flat(grid: &super::cells::Grid) -> Self {
         let mut flat = Self::default();
