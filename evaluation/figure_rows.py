@@ -116,7 +116,7 @@ CAPTURES = (
         row
         for name in ("plate", "bottle")
         for key, words, bar in (
-            ("own_response", "as it came", "captures.auto_right_percent"),
+            ("auto_response", "as it came", "captures.auto_right_percent"),
             ("with_response", "with its response", "captures.right_percent"),
         )
         for row in (

@@ -84,7 +84,7 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
         hold("captures.wrong_of_sure", wrong[sure].mean())
 
 
-def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: Path) -> None:
+def test_the_response_is_estimated_from_a_capture(scene: scoring.Scene, response_file: Path) -> None:
     known = ResponseCalibration.load(response_file)
     own, straight = scenes.shape_of(scene), scenes.shape_of(scene, response=known)
     assert own.config["response_of_shot"]
@@ -97,7 +97,7 @@ def test_a_capture_tells_its_own_response(scene: scoring.Scene, response_file: P
     hold("captures.auto_exponent_error", np.abs(exponents - known.red.exponent))
 
 
-def test_the_published_way_takes_the_response_of_the_shot_too(scene: scoring.Scene) -> None:
+def test_the_published_method_uses_the_estimated_response(scene: scoring.Scene) -> None:
     own, linear = (
         scoring.score(scene, scenes.shape_of(scene, response=response, method="published").phase_rad)
         for response in (None, Response())
@@ -106,7 +106,7 @@ def test_the_published_way_takes_the_response_of_the_shot_too(scene: scoring.Sce
     hold("captures.published_gain_percent", own.right_of_returned_percent - linear.right_of_returned_percent)
 
 
-def test_a_capture_whose_response_is_not_undone_is_still_ordered(scene: scoring.Scene) -> None:
+def test_an_uncorrected_capture_is_still_ordered(scene: scoring.Scene) -> None:
     shape = scenes.shape_of(scene, response=Response())
     score = scoring.score(scene, shape.phase_rad)
     hold("captures.linear_right_of_returned_percent", score.right_of_returned_percent)

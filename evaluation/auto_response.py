@@ -1,6 +1,6 @@
 """Accuracy of the response (gamma) that is estimated from one shot, and the gain of correcting it, as one table.
 
-    python evaluation/own_response.py [--json FILE]
+    python evaluation/auto_response.py [--json FILE]
 
 Scenes of the virtual bench, 8 bit, seed 1, decoded as linear light and with the estimated response. Phase: RMS over
 lit pixels with the right order. Wrong: share of the returned pixels that have another order or lie in shadow. `settled`
@@ -73,7 +73,7 @@ def main() -> None:
             pairs = "".join(f"{a:10.4f}{b:8.4f}" for a, b in zip(linear, own, strict=True))
             print(f"{name + f', gamma {gamma:g}':24}{pairs}{settled:10.3f}")
             key = f"{name.replace(' ', '_')}_gamma_{gamma:g}"
-            for label, found in (("linear", linear), ("own", own)):
+            for label, found in (("linear", linear), ("auto", own)):
                 figures |= {f"{key}_{label}_{k}": v for k, v in found._asdict().items()}
             figures[f"{key}_settled"] = settled
     if options.json:
