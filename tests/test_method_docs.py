@@ -202,6 +202,16 @@ def test_every_page_is_listed_in_the_index() -> None:
     assert {path.name for path in folder.glob("*.md")} <= listed | {"index.md"}
 
 
+def steps(text: str, pattern: str) -> list[int]:
+    return [int(step) for step in re.findall(pattern, text, re.MULTILINE)]
+
+
+def test_the_recipe_and_its_page_have_the_same_steps() -> None:
+    recipe = steps((ROOT / "crates/quadfringe/src/joint/mod.rs").read_text(), r"^//! (\d+) +\w")
+    page = steps((ROOT / "docs/method/joint.md").read_text(), r"^\| \[(\d+)\]\(")
+    assert recipe == page == list(range(1, 11))
+
+
 # Planted faults: each check fails on a small tree with one mistake in it.
 
 SOUND = {
