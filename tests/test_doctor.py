@@ -66,7 +66,7 @@ def test_saturation_and_weak_fringes_are_told() -> None:
     weak, _ = shot_of(gain=(0.9, 0.9, 0.9, 0.15), noise=0.0)
     found = by_name(examine_shot(weak, PLAN))
     assert found["modulation ir"].grade == "warning"
-    assert "more light" in found["modulation ir"].fix
+    assert "increase the ir light" in found["modulation ir"].fix
 
 
 def test_exchanged_channels_are_told() -> None:

@@ -95,13 +95,15 @@ def test_a_full_disk_fails_the_run_and_keeps_what_was_written(
 
 def test_recover_makes_a_whole_file(tmp_path: Path) -> None:
     reported = kill_writer(tmp_path / "torn.h5", after_s=0.05)
-    assert "not closed in order" in run("info", tmp_path / "torn.h5").stdout
+    assert "not closed:" in run("info", tmp_path / "torn.h5").stdout
     result = run("recover", tmp_path / "torn.h5", "--out", tmp_path / "whole.h5", "--json", "-")
     assert result.exit_code == 0, result.output
     assert json.loads(result.stdout)["figures"]["shots"] >= reported
-    assert "not closed in order" not in run("info", tmp_path / "whole.h5").stdout
+    assert "not closed:" not in run("info", tmp_path / "whole.h5").stdout
     (tmp_path / "text.h5").write_text("no")
-    refused(run("recover", tmp_path / "text.h5", "--out", tmp_path / "x.h5"), 2, "text.h5", "not a recording")
+    refused(
+        run("recover", tmp_path / "text.h5", "--out", tmp_path / "x.h5"), 2, "text.h5", "expected an HDF5 recording"
+    )
     assert not (tmp_path / "x.h5").exists()
 
 

@@ -1,4 +1,4 @@
-"""What is wrong with a shot, a calibration or the installation, and how to mend it."""
+"""Diagnosis: what is wrong with a shot, a calibration or the installation, and how to fix it."""
 
 from quadfringe.doctor.calibration import examine_calibration
 from quadfringe.doctor.finding import Finding

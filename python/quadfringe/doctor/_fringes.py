@@ -1,8 +1,8 @@
-"""What the fringes of a decoded shot say about the light that made them.
+"""Amplitude, non-linearity and crosstalk of the fringes of a decoded shot, and the drift of the infrared fringes.
 
-With the absolute phase known at every pixel, each channel is a sum of known waves: its own fringes, their second
-harmonic (a response that is not linear) and the fringes of the other channels (crosstalk). Their amplitudes follow by
-least squares over the whole image, in which even 36 and 35 fringes are told apart.
+With the absolute phase known at every pixel, each channel is a sum of known waves: its fringes, their second harmonic
+(a non-linear response) and the fringes of the other channels (crosstalk). Least squares over the whole image gives
+their amplitudes; over the image, even 36 and 35 fringes are nearly orthogonal.
 """
 
 from __future__ import annotations
@@ -21,19 +21,21 @@ from quadfringe.decoding.stages import carrier, linear_light
 __all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift"]
 
 Map = NDArray[np.float32]
-PIXELS_MIN = 5000
-TILE_PX = 96
-TILE_SHARE = 0.3  # of a tile must carry fringes
+# Checked by pytest tests/test_doctor.py on shots with known defects.
+PIXELS_MIN = 5000  # pixels with fringes, below which amplitudes are not estimated
+TILE_PX = 96  # side of a tile: several fringes, so that the offset of a tile averages the noise
+TILE_SHARE = 0.3  # share of a tile that must carry fringes
 TILES_MIN = 2
-SHIFT_MAX = 6  # fringes by which orders may be off
-QUANTILE = 0.95  # of the tiles: the worst that is no accident
+SHIFT_MAX = 6  # largest order error that is considered, fringes
+QUANTILE = 0.95  # of the tiles: the worst offset that is not an outlier
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Amplitudes by channel: of its fringes, share of full scale, and of their second harmonic over the first.
+    """Fringe amplitude of each channel, share of full scale, and the ratio of its second harmonic to the first.
 
-    `crosstalk` has the fringes of each channel (columns) in each channel (rows) over its own, (4, 4).
+    `crosstalk` (4, 4) is the amplitude of the fringes of each channel (columns) in each captured channel (rows),
+    relative to the fringes of the captured channel itself.
     """
 
     names: tuple[str, ...]
@@ -44,9 +46,9 @@ class Fit:
 
 @dataclass(frozen=True)
 class Drift:
-    """How far infrared fringes are from where they should be, in projector pixels, over tiles of the image.
+    """Offset of the infrared fringes from their expected position, projector px, over tiles of the image.
 
-    `off` is the share of tiles whose orders are wrong, all by whole fringes.
+    `off` is the share of tiles whose orders are all wrong by whole fringes.
     """
 
     median_px: float
@@ -55,7 +57,7 @@ class Drift:
 
 
 def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
-    """Fit every channel of linear light; None when fewer than 5000 pixels carry fringes."""
+    """Fit the waves of every channel in linear light; None when fewer than 5000 pixels carry fringes."""
     light, backgrounds, inside = _waves(shot, shape, plan)
     if inside.sum() < PIXELS_MIN:
         return None
@@ -65,8 +67,8 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
     shown = np.stack([np.cos(first), np.cos(second), quadrature, np.cos(third)], axis=1)
     amplitude, harmonic, crosstalk = np.zeros(4), np.zeros(4), np.zeros((4, 4))
     for i, name in enumerate(CHANNELS):
-        own = (first, second, first, third)[i]
-        twice = np.stack([np.cos(2 * own), np.sin(2 * own), np.ones_like(own)], axis=1)
+        phase = (first, second, first, third)[i]
+        twice = np.stack([np.cos(2 * phase), np.sin(2 * phase), np.ones_like(phase)], axis=1)
         wave = (light[name] / backgrounds[name] - 1)[inside]
         found = np.linalg.lstsq(np.hstack([shown, twice]), wave, rcond=None)[0]
         crosstalk[i] = found[:4] / found[i]
@@ -76,11 +78,11 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
 
 
 def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
-    """Compare infrared fringes with their place by the pair that the calibration knows; None with too few tiles.
+    """Compare infrared fringes with the position that the calibration predicts; None with too few tiles.
 
-    Without an infrared projector in the calibration both projectors are taken as coaxial. A pair that is far off moves
-    every order by the same number of fringes and still looks sound; green, from the projector of red and blue, then
-    tells that number, because its mean over a tile is known to a hundredth of a fringe.
+    Without an infrared projector in the calibration, both projectors count as coaxial. A large misalignment shifts
+    every order by the same number of fringes, and the shape still looks plausible; the green fringes, which come from
+    the projector of red and blue, then give that number, because their tile mean is good to a hundredth of a fringe.
     """
     light, backgrounds, inside = _waves(shot, shape, plan)
     width = plan.projector_width_px
@@ -91,9 +93,9 @@ def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
     waves = [light[name] / backgrounds[name] - 1 for name in ("red", "green", "ir")]
     away, shifts = [], []
     for tile in _tiles(inside):
-        mine = inside[tile]
+        lit = inside[tile]
         first, second, third = (
-            _offset_px(wave[tile][mine], place[tile][mine], period)
+            _offset_px(wave[tile][lit], place[tile][lit], period)
             for wave, place, period in zip(waves, places, periods, strict=True)
         )
         shift = _fringes_off(_wrapped(second - first, periods[1]), periods)
@@ -116,7 +118,7 @@ def _tiles(inside: NDArray[np.bool_]) -> list[tuple[slice, slice]]:
 
 
 def _offset_px(wave: NDArray[np.floating], column: NDArray[np.float64], period: float) -> float:
-    """Give how many projector pixels the fringes of a wave lie after their place, within half a period."""
+    """Return the offset of the fringes of a wave from their place, projector px, within half a period."""
     phase = 2 * np.pi * column / period
     design = np.stack([np.cos(phase), -np.sin(phase), np.ones_like(phase)], axis=1)
     cos, sin, _ = np.linalg.lstsq(design, wave, rcond=None)[0]
@@ -124,7 +126,7 @@ def _offset_px(wave: NDArray[np.floating], column: NDArray[np.float64], period: 
 
 
 def _fringes_off(green_px: float, periods: list[float]) -> int:
-    """Give the least number of fringes of red and blue that explains where those of green lie."""
+    """Return the smallest order error of red and blue, fringes, that explains the offset of green."""
     shifts = sorted(range(-SHIFT_MAX, SHIFT_MAX + 1), key=abs)
     missed = [abs(_wrapped(green_px - shift * periods[0], periods[1])) for shift in shifts]
     close = min(missed) + 0.25 * abs(periods[0] - periods[1])
@@ -136,7 +138,7 @@ def _wrapped(offset_px: float, period: float) -> float:
 
 
 def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> tuple[dict[str, Map], dict[str, Map], NDArray[np.bool_]]:
-    """Give linear light, its mean over about a fringe, and the pixels where both and the phase are known."""
+    """Return linear light, its mean over about a fringe, and the pixels where both and the phase are valid."""
     import cv2
 
     light = linear_light(shot, plan.calibration, plan.response)
@@ -158,7 +160,7 @@ def _phases(shape: Shape, plan: Plan, inside: NDArray[np.bool_]) -> tuple[NDArra
 
 
 def _expected_ir_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
-    """Give the column of the infrared projector that lights each point, as the calibration has it."""
+    """Return the column of the infrared projector that lights each point according to the calibration."""
     calibration = plan.calibration
     if calibration is None or calibration.infrared is None or shape.xyz_mm is None:
         return shape.column_px.astype(float)

@@ -1,4 +1,4 @@
-"""Whether a calibration can be trusted: its own record, and what its numbers say."""
+"""Checks of a calibration: its record, and whether its numbers are plausible."""
 
 from __future__ import annotations
 
@@ -12,16 +12,20 @@ from quadfringe.doctor.finding import Finding, graded
 
 __all__ = ["examine_calibration"]
 
-AGE_DAYS = (90.0, 730.0)
-BASELINE_DEG = (8.0, 3.0)  # least angle between the axes of sight of camera and projector at the working distance
-CONDITION = (4.0, 20.0)  # of the crosstalk matrix: how much noise grows by undoing it
-EXPONENTS = (0.3, 2.5)
-WORKING_MM = 800.0
+# Limits for a warning and for a fault.
+AGE_DAYS = (90.0, 730.0)  # a bench drifts with temperature and transport within months
+BASELINE_DEG = (8.0, 3.0)  # smallest angle between the lines of sight of camera and projector: depth noise is 1 over it
+CONDITION = (4.0, 20.0)  # condition number of the crosstalk matrix, by which its inverse may multiply noise
+PAIR = (1.0, 3.0)  # rotation over 2 degrees, and translation over 5 mm, of the pair; the larger counts
+CAMERA_CENTRE = (0.25, 0.6)  # offset of the principal point from the image centre, share of half the image
+PROJECTOR_CENTRE = (1.1, 1.5)  # the same: projectors often project upwards, with a principal point near the edge
+EXPONENTS = (0.3, 2.5)  # plausible range: displays and projectors have 1.8 to 2.4, their inverse 0.4 to 0.6
+WORKING_MM = 800.0  # the published working distance
 AGAIN = "calibrate again: quadfringe calibrate"
 
 
 def examine_calibration(calibration: Calibration) -> list[Finding]:
-    """Look at the record and at the numbers."""
+    """Check the record and the numbers of a calibration."""
     return [
         *_record(calibration),
         _baseline(calibration),
@@ -35,14 +39,14 @@ def examine_calibration(calibration: Calibration) -> list[Finding]:
 def _record(calibration: Calibration) -> list[Finding]:
     record = calibration.record
     if record is None:
-        words = "the file does not say how it was made, from what, and what was left over"
-        return [Finding("record", "warning", words, f"{AGAIN}, which keeps inputs and residuals")]
+        words = "the file has no record of how it was made"
+        return [Finding("record", "warning", words, f"{AGAIN}, which records inputs and residuals")]
     age_days = (datetime.now(UTC) - datetime.fromisoformat(record.made_utc)).total_seconds() / 86400
     words = f"made {record.made_utc} by quadfringe {record.quadfringe_version} for {record.rig}"
-    fix = f"check it with quadfringe accept, and {AGAIN} when a limit is not kept"
+    fix = f"test it with quadfringe accept, and {AGAIN} when a limit is exceeded"
     found = [graded("age", age_days, AGE_DAYS, words, fix)]
     for step in record.steps:
-        fix = "" if step.good else f"take the captures of this step again as it says, then {AGAIN}"
+        fix = "" if step.good else f"take the captures of this step again as described, then {AGAIN}"
         found.append(Finding(f"step {step.name}", "good" if step.good else "fault", step.verdict, fix))
     return found
 
@@ -54,8 +58,8 @@ def _baseline(calibration: Calibration) -> Finding:
     towards = to_point - centre
     cos = float(towards @ to_point / (np.linalg.norm(towards) * WORKING_MM))
     angle = float(np.degrees(np.arccos(np.clip(cos, -1, 1))))
-    words = f"camera and projector see a point {WORKING_MM:g} mm away {angle:.1f} degrees apart"
-    fix = "place the projector farther from the camera: depth errors grow with one over this angle"
+    words = f"camera and projector see a point {WORKING_MM:g} mm away from directions {angle:.1f} degrees apart"
+    fix = "move the projector farther from the camera: the depth error is inversely proportional to this angle"
     return graded("triangulation angle", angle, BASELINE_DEG, words, fix)
 
 
@@ -66,20 +70,22 @@ def _device(name: str, device: Device) -> Finding:
     )
     words = f"principal point {device.centre_px[0]:.1f}, {device.centre_px[1]:.1f} px of {device.width_px} x "
     words += f"{device.height_px}, focal length {device.focal_px[0]:.1f} px"
-    limits = (0.25, 0.6) if name == "camera" else (1.1, 1.5)  # projectors are often made to look upwards
-    return graded(name, away, limits, words, "add tilted poses of the board, over the whole field, and calibrate again")
+    limits = CAMERA_CENTRE if name == "camera" else PROJECTOR_CENTRE
+    return graded(name, away, limits, words, "add tilted poses of the board over the whole field, and calibrate again")
 
 
 def _pair(calibration: Calibration) -> list[Finding]:
     if calibration.infrared is None:
-        return [Finding("coaxial pair", "good", "taken as coaxial: one projector stands for both")]
+        return [Finding("coaxial pair", "good", "the calibration has one projector, so both count as coaxial")]
     first, second = calibration.projector, calibration.infrared
     turn = np.array(second.rotation) @ np.array(first.rotation).T
     shift = np.array(second.translation_mm) - turn @ np.array(first.translation_mm)
     angle = float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))))
-    words = f"turned by {angle:.3f} degrees and shifted by {float(np.linalg.norm(shift)):.3f} mm against one another"
-    fix = "align the projectors at the beam splitter, or correct the pattern with quadfringe reproduce's correction"
-    return [graded("coaxial pair", max(angle / 2.0, float(np.linalg.norm(shift)) / 5.0), (1.0, 3.0), words, fix)]
+    words = (
+        f"rotated by {angle:.3f} degrees and shifted by {float(np.linalg.norm(shift)):.3f} mm relative to each other"
+    )
+    fix = "align the projectors at the beam splitter, or pre-deform the infrared pattern (--predeformed-z-mm)"
+    return [graded("coaxial pair", max(angle / 2.0, float(np.linalg.norm(shift)) / 5.0), PAIR, words, fix)]
 
 
 def _responses(calibration: Calibration) -> list[Finding]:
@@ -90,10 +96,14 @@ def _responses(calibration: Calibration) -> list[Finding]:
             channel: ChannelResponse = getattr(channels, name)
             if not EXPONENTS[0] <= channel.exponent <= EXPONENTS[1]:
                 words = f"exponent {channel.exponent:.2f} of {name} is outside {EXPONENTS[0]} to {EXPONENTS[1]}"
-                fix = "look at the captures of the levels: a channel may be saturated, or not lit by its own projector"
+                fix = "check the level captures: this channel may be saturated, or not lit by its projector"
                 found.append(Finding(what, "fault", words, fix))
     if not found:
-        words = "no response is known: taken as linear" if calibration.response is None else "exponents are plausible"
+        words = (
+            "no response is calibrated; the light counts as linear"
+            if calibration.response is None
+            else "exponents are plausible"
+        )
         grade = "warning" if calibration.response is None else "good"
         fix = f"{AGAIN}, step levels" if calibration.response is None else ""
         found.append(Finding("response", grade, words, fix))  # type: ignore[arg-type]
@@ -102,11 +112,11 @@ def _responses(calibration: Calibration) -> list[Finding]:
 
 def _crosstalk(calibration: Calibration) -> Finding:
     if calibration.crosstalk is None:
-        words = "no crosstalk is known: taken as none"
+        words = "no crosstalk is calibrated, so it counts as zero"
         return Finding("crosstalk", "warning", words, f"{AGAIN}, step levels")
     matrix = np.array(calibration.crosstalk)
     worst = float(np.abs(matrix - np.diag(np.diag(matrix))).max())
     condition = float(np.linalg.cond(matrix))
-    words = f"up to {worst:.1%} of one channel in another; undoing it multiplies noise by up to {condition:.1f}"
-    fix = "put band-pass filters before the projectors or the camera, so that less light of one channel reaches another"
+    words = f"up to {worst:.1%} of one channel in another; the correction multiplies noise by up to {condition:.1f}"
+    fix = "put band-pass filters in front of the projectors or the camera, to separate the channels"
     return graded("crosstalk", condition, CONDITION, words, fix)

@@ -1,4 +1,4 @@
-"""What the doctor says: one finding for each thing looked at, good ones included."""
+"""The findings of the doctor, one for each check, including the good ones."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Grade = Literal["good", "warning", "fault"]
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that was looked at: its grade, what was found, and the fix, which is empty when it is good."""
+    """The result of one check: its name, grade, what was found, and the fix, which is empty for a good grade."""
 
     name: str
     grade: Grade
@@ -22,7 +22,7 @@ class Finding:
 
 
 def graded(name: str, value: float, limits: tuple[float, float], found: str, fix: str) -> Finding:
-    """Grade a value by its limits, above which it is a warning, and a fault; falling limits are lower bounds.
+    """Grade a value by its limits for a warning and for a fault; decreasing limits are lower bounds.
 
     >>> from quadfringe.doctor.finding import graded
     >>> graded("saturation", 0.02, (0.01, 0.1), "2 % of the pixels", "shorten the exposure").grade

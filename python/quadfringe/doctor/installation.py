@@ -1,4 +1,4 @@
-"""Whether the installation is sound: the kernel's build, OpenCV, extras, access to the projectors."""
+"""Checks of the installation: build of the kernel, OpenCV, extras, access to the projectors."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EXTRAS = {"matplotlib": "plot", "trimesh": "export", "tifffile": "export"}
 
 
 def examine_installation() -> list[Finding]:
-    """Look at what every command needs."""
+    """Check what the commands need."""
     return [_machine(), _build(), *_opencv(), *_extras(), *_projectors()]
 
 
@@ -38,14 +38,14 @@ def _build() -> Finding:
         "kernel",
         "fault",
         f"compiled as {_core.__profile__}: ten to fifty times slower",
-        "build it again: maturin develop --release",
+        "build it with optimisation: maturin develop --release",
     )
 
 
 def _opencv() -> list[Finding]:
     names = sorted({(found.metadata["Name"] or "").lower() for found in distributions()} & set(OPENCV))
     if len(names) != 1:
-        words = f"{' and '.join(names)} overwrite each other" if names else "OpenCV is not installed"
+        words = f"{' and '.join(names)} are installed and overwrite each other" if names else "OpenCV is not installed"
         fix = f"pip uninstall -y {' '.join(names)}; pip install " if names else "pip install "
         return [Finding("opencv", "fault", words, f'{fix}"{OPENCV[-1]}>=4.10,<6"')]
     import cv2
@@ -64,7 +64,7 @@ def _opencv() -> list[Finding]:
 def _extras() -> list[Finding]:
     missing = sorted({extra for module, extra in EXTRAS.items() if find_spec(module) is None})
     if not missing:
-        return [Finding("extras", "good", "pictures (plot) and PLY and TIFF (export) can be written")]
+        return [Finding("extras", "good", "plot (pictures) and export (PLY, TIFF) are installed")]
     names = ",".join(missing)
     return [Finding("extras", "warning", f"not installed: {names}", f'pip install "quadfringe[{names}]"')]
 
@@ -73,13 +73,13 @@ def _projectors() -> list[Finding]:
     try:
         found = _core.lightcrafters()
     except OSError as error:
-        return [Finding("projectors", "warning", str(error), "plug the projectors in, or go on with the virtual bench")]
+        return [Finding("projectors", "warning", str(error), "connect the projectors, or use the virtual bench")]
     if not found:
         return [Finding("projectors", "good", "no LightCrafter 4500 is connected; the virtual bench needs none")]
     closed = [port for port, _, serial in found if serial is None]
     if closed:
         file, rule = _core.udev_rule()
-        fix = f"as root write into {file}: {rule} ; then udevadm control --reload, and plug in again"
+        fix = f"as root, write into {file}: {rule} ; then run udevadm control --reload, and reconnect the USB cable"
         return [Finding("projectors", "fault", f"no permission to open port {', '.join(closed)}", fix)]
     ports = ", ".join(port for port, _, _ in found)
-    return [Finding("projectors", "good", f"ports {ports} can be opened; more: quadfringe projector doctor")]
+    return [Finding("projectors", "good", f"ports {ports} can be opened; for details run quadfringe projector doctor")]

@@ -1,1 +1,16 @@
-"""Images, points and depth maps as files. This package knows arrays only; records are in `quadfringe.data`."""
+"""Read and write images, points and depth maps. This package handles arrays only; records are in `quadfringe.data`."""
+
+from quadfringe.io.export import read_npy, read_npz, write_depth, write_npz, write_ply
+from quadfringe.io.images import read_grey, read_image, read_rgb, write_image
+
+__all__ = [
+    "read_grey",
+    "read_image",
+    "read_npy",
+    "read_npz",
+    "read_rgb",
+    "write_depth",
+    "write_image",
+    "write_npz",
+    "write_ply",
+]

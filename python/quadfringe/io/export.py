@@ -1,4 +1,4 @@
-"""Arrays to files of other programs: PLY for MeshLab and CloudCompare, TIFF for image tools, NPZ for NumPy."""
+"""Write arrays for other programs: PLY for MeshLab and CloudCompare, TIFF for image tools, NPZ for NumPy."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ __all__ = ["grey", "read_npy", "read_npz", "write_depth", "write_npz", "write_pl
 
 
 def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
-    """Modulation as a grey picture, (H, W, 3): it follows the reflectance, and shows no fringes."""
+    """Convert modulation (H, W) to a grey picture (H, W, 3) uint8; it follows the albedo and shows no fringes."""
     top = np.nanquantile(modulation, 0.99) if np.isfinite(modulation).any() else 1.0
     shades = np.nan_to_num(modulation / max(float(top), 1e-9)).clip(0, 1) * 255
     return np.repeat(shades.astype(np.uint8)[:, :, None], 3, axis=2)
@@ -29,7 +29,7 @@ def write_ply(
     colour: NDArray[np.uint8],
     scalars: Mapping[str, NDArray[np.float32]],
 ) -> None:
-    """Write N points as binary PLY: x, y, z in mm (N, 3), colour (N, 3), and scalars (N,) by name."""
+    """Write N points as binary PLY: x, y, z (N, 3), mm, colour (N, 3), and scalars (N,) by name."""
     require("trimesh", "export")
     from trimesh import PointCloud
     from trimesh.exchange.ply import export_ply
@@ -41,32 +41,32 @@ def write_ply(
 
 
 def write_depth(path: Path, depth_mm: NDArray[np.float32]) -> None:
-    """Write a depth map (H, W) as 32-bit float TIFF in mm; no data stays NaN."""
+    """Write a depth map (H, W) as 32-bit float TIFF, mm; missing data stays NaN."""
     tifffile = require("tifffile", "export")
     with atomic(path) as temporary:
         tifffile.imwrite(temporary, depth_mm.astype(np.float32), metadata={"unit": "mm"})
 
 
 def write_npz(path: Path, maps: Mapping[str, NDArray[Any]], texts: Mapping[str, str]) -> None:
-    """Write named maps and named JSON texts into one NPZ."""
+    """Write named maps and named JSON texts to one NPZ file."""
     arrays: dict[str, Any] = {**maps, **{name: np.array(text) for name, text in texts.items()}}
     with atomic(path) as temporary, temporary.open("wb") as stream:
         np.savez(stream, **arrays)
 
 
 def read_npz(path: Path) -> dict[str, NDArray[Any]]:
-    """Read every array of an NPZ; raises `InputError` when the file is not one."""
+    """Read every array of an NPZ file; raises `InputError` for any other file."""
     stored = _load(path, "NPZ")
     if isinstance(stored, np.ndarray):
-        raise InputError(f"{path}: expected an archive of arrays (.npz), got one array")
+        raise InputError(f"{path}: expected an archive of arrays (.npz), got a single array")
     return stored
 
 
 def read_npy(path: Path) -> NDArray[Any]:
-    """Read one array from an NPY file; raises `InputError` when the file is not one."""
+    """Read the array of an NPY file; raises `InputError` for any other file."""
     stored = _load(path, "NPY")
     if isinstance(stored, dict):
-        raise InputError(f"{path}: expected one array (.npy), got an archive of several")
+        raise InputError(f"{path}: expected a single array (.npy), got an archive of arrays")
     return stored
 
 
@@ -75,5 +75,5 @@ def _load(path: Path, kind: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
     try:
         stored = np.load(stream, allow_pickle=False)
         return stored if isinstance(stored, np.ndarray) else {name: stored[name] for name in stored.files}
-    except Exception as error:  # zipfile, zlib and numpy each raise their own on a damaged file
+    except Exception as error:  # zipfile, zlib and numpy each raise other exceptions for a damaged file
         raise InputError(f"{path}: not a readable {kind} file: {error}") from error

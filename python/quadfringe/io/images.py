@@ -1,4 +1,4 @@
-"""Image files to arrays and back: 8 and 16 bit PNG, TIFF and BMP, colour in R, G, B order."""
+"""Read and write image files: PNG, TIFF and BMP, 8 and 16 bit, colour in R, G, B order."""
 
 from __future__ import annotations
 
@@ -26,22 +26,24 @@ def read_image(path: Path) -> NDArray[Any]:
     except cv2.error:
         image = None
     if image is None:
-        raise InputError(f"{path}: not a readable image; expected PNG, TIFF or BMP ({data.size} bytes)")
+        raise InputError(
+            f"{path}: not a readable image; expected PNG, TIFF or BMP, got {data.size} bytes of something else"
+        )
     if image.dtype.name not in DTYPES:
         raise InputError(f"{path}: expected {', '.join(DTYPES)} pixels, got {image.dtype.name}")
     if image.ndim == 3 and image.shape[2] == 4:
-        image = image[:, :, :3]  # transparency says nothing about light
+        image = image[:, :, :3]  # an alpha channel carries no light
     colour: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, ::-1])
     return colour
 
 
 def full_scale(image: NDArray[Any]) -> np.float32:
-    """Give the intensity of a full pixel by type: 255, 65535, or 1 for float32."""
+    """Return the intensity of a saturated pixel by dtype: 255, 65535, or 1 for float32."""
     return np.float32(np.iinfo(image.dtype).max if image.dtype.kind == "u" else 1.0)
 
 
 def read_grey(path: Path) -> NDArray[Any]:
-    """Read one channel, (H, W); a colour file passes only when its three planes are equal."""
+    """Read one channel, (H, W); raises `InputError` for a colour image whose planes differ."""
     image = read_image(path)
     if image.ndim == 2:
         return image
@@ -51,15 +53,17 @@ def read_grey(path: Path) -> NDArray[Any]:
 
 
 def read_rgb(path: Path) -> NDArray[Any]:
-    """Read a colour image, (H, W, 3) in R, G, B order."""
+    """Read a colour image, (H, W, 3) in R, G, B order; raises `InputError` for a grey image."""
     image = read_image(path)
     if image.ndim != 3:
-        raise InputError(f"{path}: expected a colour image, got one grey channel")
+        raise InputError(
+            f"{path}: expected a colour image, got one grey channel; give it as --red, --green, --blue or --ir"
+        )
     return image
 
 
 def write_image(path: Path, image: NDArray[Any]) -> None:
-    """Write (H, W) or (H, W, 3) in R, G, B order, whole or not at all."""
+    """Write an image (H, W) or (H, W, 3) in R, G, B order; the file is complete or does not exist."""
     import cv2
 
     stored = image if image.ndim == 2 else image[:, :, ::-1]

@@ -1,4 +1,4 @@
-"""Takes: raw shots on disk, crash-safe, and back."""
+"""Recordings: raw shots on disk that survive a crash; recorder, reader, replay, recovery and batch decoding."""
 
 from quadfringe.recording.reader import Recording
 from quadfringe.recording.recorder import Recorder, RecorderStatistics

@@ -1,16 +1,16 @@
-"""What a recording is: one HDF5 file, whose names, types and header stand here and nowhere else.
+"""The file format of a recording: one HDF5 file with these attributes, datasets and types.
 
     /               attributes: format, schema_version, software, created_utc, device, full_scale, and bayer
-    /config         the resolved system, JSON; "null" when there was none
-    /calibration    the calibration, JSON; "null" when there was none
-    /red /green /blue /ir, or /raw /ir      (N, H, W), one chunk a shot, not compressed
+    /config         the resolved system, JSON; "null" when there is none
+    /calibration    the calibration, JSON; "null" when there is none
+    /red /green /blue /ir, or /raw /ir      (N, H, W), one uncompressed chunk per shot
     /id             (N,) uint64, number of the exposure
-    /time_us        (N,) int64, begin of the exposure, UTC since 1970
-    /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of each chip's frame; only with chips
+    /time_us        (N,) int64, start of the exposure, us since 1970 UTC
+    /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of the frame of each chip; for camera shots
     /crc32          (N, images) uint32, of the bytes of each image, in the order above
-    /closed         1 once the file was closed in order
+    /closed         1 once the file has been closed properly
 
-Everything is made before HDF5's mode of one writer and many readers begins, because nothing can be added in it.
+All datasets are created before the single-writer multiple-reader mode of HDF5 starts, which permits no new objects.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ __all__ = ["Header", "crcs_of", "make_datasets", "stamp_at", "stamp_values"]
 FORMAT = "quadfringe recording"
 SCHEMA_VERSION = 1
 IMAGES = (("red", "green", "blue", "ir"), ("raw", "ir"))
-SHOTS_PER_CHUNK = 512  # of numbers, not of images
+SHOTS_PER_CHUNK = 512  # of the datasets of numbers; an image is a chunk of its shot
 
 
 @dataclass(frozen=True)
 class Header:
-    """What is the same for every shot of a recording."""
+    """The properties that all shots of a recording share."""
 
     images: tuple[str, ...]
     height_px: int
@@ -56,13 +56,13 @@ class Header:
 
     @classmethod
     def of(cls, shot: AnyShot, config: SystemConfig | None, calibration: Calibration | None) -> Self:
-        """Give the header of a recording whose shots are like this one; raises `InputError` for mixed images."""
+        """Return the header of a recording for shots like this one; raises `InputError` for images that differ."""
         image = shot.ir
         odd = [n for n, i in shot.images.items() if i.shape != image.shape or i.dtype != image.dtype or i.ndim != 2]
         if odd:
             raise InputError(
-                f"a recording needs images (H, W) of one size and type: {', '.join(odd)} "
-                f"unlike ir with {image.dtype} {image.shape}"
+                f"recording: expected images (H, W) of one size and type; {', '.join(odd)} differ from ir with "
+                f"{image.dtype} {image.shape}"
             )
         height_px, width_px = image.shape
         return cls(
@@ -80,30 +80,33 @@ class Header:
 
     @property
     def shot_bytes(self) -> int:
-        """Bytes of the images of one shot."""
+        """Number of bytes of the images of one shot."""
         return len(self.images) * self.height_px * self.width_px * self.dtype.itemsize
 
     def require_alike(self, shot: AnyShot) -> None:
-        """Raise `InputError` unless `shot` has images, size, type and full scale of this recording."""
+        """Raise `InputError` unless `shot` has the images, size, type and full scale of this recording."""
         other = Header.of(shot, self.config, self.calibration)
         if other != self:
-            raise InputError(f"this recording holds {self.described()}; a shot came with {other.described()}")
+            raise InputError(
+                f"recording: expected {self.described()}, got a shot with {other.described()}; start another file for "
+                "it"
+            )
 
     def described(self) -> str:
-        """Name the images with size, type and full scale."""
+        """Describe the images with size, type and full scale."""
         kind = ", ".join(self.images) + (f" ({self.bayer})" if self.bayer else "")
         device = f" from {self.device}" if self.device else ""
-        return f"{kind} of {self.width_px} x {self.height_px} {self.dtype} up to {self.full_scale:g}{device}"
+        return f"{kind} of {self.width_px} x {self.height_px} {self.dtype}, full scale {self.full_scale:g}{device}"
 
     def shot(self, images: Mapping[str, NDArray[Any]], stamp: Stamp) -> AnyShot:
-        """Make a shot of its images."""
+        """Make a shot from its images and its stamp."""
         if self.bayer is not None:
             return BayerShot(images["raw"], self.bayer, images["ir"], self.full_scale, stamp=stamp)
         red, green, blue, ir = (images[name] for name in ("red", "green", "blue", "ir"))
         return Shot(red, green, blue, ir, self.full_scale, stamp=stamp)
 
     def write(self, file: h5py.File) -> None:
-        """Write the header into a new file."""
+        """Write the header to a new file."""
         file.attrs["format"] = FORMAT
         file.attrs["schema_version"] = SCHEMA_VERSION
         file.attrs["software"] = f"quadfringe {_core.__version__}"
@@ -118,15 +121,21 @@ class Header:
 
     @classmethod
     def read(cls, file: h5py.File, source: str) -> Self:
-        """Read the header; raises `InputError` when the file is no recording, or one of a later version."""
+        """Read the header; raises `InputError` when the file is no recording or has another version."""
         if file.attrs.get("format") != FORMAT:
-            raise InputError(f"{source}: an HDF5 file, but not a recording of quadfringe")
+            raise InputError(f"{source}: expected a recording of quadfringe, got another HDF5 file")
         if (version := file.attrs.get("schema_version")) != SCHEMA_VERSION:
-            raise InputError(f"{source}: recorded as version {version}; this program reads version {SCHEMA_VERSION}")
+            raise InputError(
+                f"{source}: recording version {version}, expected {SCHEMA_VERSION}; read it with the program that "
+                "wrote it"
+            )
         images = next((names for names in IMAGES if all(name in file for name in names)), None)
         missing = [name for name in ("id", "time_us", "crc32", "config", "calibration", "closed") if name not in file]
         if images is None or missing:
-            raise InputError(f"{source}: a recording without {', '.join(missing) or 'images'}; it cannot be used")
+            raise InputError(
+                f"{source}: the recording lacks {', '.join(missing) or 'images'}; copy it again from where it was "
+                "recorded"
+            )
         first = file[images[0]]
         chips = tuple(file["chip_stamps"].attrs["chips"]) if "chip_stamps" in file else ()
         full_scale, bayer, device = (file.attrs.get(name) for name in ("full_scale", "bayer", "device"))
@@ -141,7 +150,7 @@ class Header:
 
 
 def make_datasets(file: h5py.File, header: Header) -> None:
-    """Make the empty datasets of a recording."""
+    """Create the empty datasets of a recording."""
     size = (header.height_px, header.width_px)
     for name in header.images:
         file.create_dataset(name, (0, *size), header.dtype, maxshape=(None, *size), chunks=(1, *size))
@@ -160,7 +169,7 @@ def make_datasets(file: h5py.File, header: Header) -> None:
 
 
 def stamp_values(stamp: Stamp) -> dict[str, Any]:
-    """Give what a stamp puts into each dataset of numbers."""
+    """Return the value of a stamp for each dataset of numbers."""
     values: dict[str, Any] = {"id": stamp.id, "time_us": stamp.time_us}
     if stamp.frames:
         values["chip_stamps"] = [(frame.id, frame.device_ns, frame.arrival_ns) for frame in stamp.frames.values()]
@@ -175,5 +184,5 @@ def stamp_at(file: h5py.File, header: Header, index: int) -> Stamp:
 
 
 def crcs_of(images: Mapping[str, NDArray[Any]]) -> list[int]:
-    """Give the CRC-32 of the bytes of each image (C order)."""
+    """Return the CRC-32 of the bytes of each image, in C order."""
     return [_core.crc32(np.ascontiguousarray(image).view(np.uint8)) for image in images.values()]

@@ -1,12 +1,12 @@
-"""Many recordings on many cores or machines: every shot decoded once, into zarr and PLY.
+"""Decode many recordings on many cores or machines, each shot once, to zarr and PLY.
 
-The work is handed to any executor of `concurrent.futures`; `executor_for` gives one of this machine or of a dask
-cluster. A shot is a task of its own, and its status is written last, so that a run that was killed goes on where it
-was and ends with the same files.
+The work runs on any executor of `concurrent.futures`; `executor_for` makes one for this machine or a dask cluster.
+Each shot is one task, which writes its status last; a run that was killed can therefore be continued, and ends with the
+same files.
 
     OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status; with the settings
     OUT/take/shot_000000.ply ...
-    OUT/take/errors.json     by number of the shot, why it has no shape; only when there are such shots
+    OUT/take/errors.json     reason for each shot without a shape; only when there are such shots
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ __all__ = ["Job", "Outcome", "decode_recordings", "executor_for", "prepare", "ru
 
 MAPS = ("phase_rad", "modulation", "quality")
 DONE, REFUSED = 1, 2
-RESTARTS = 3
+RESTARTS = 3  # new pools after a worker process died: a shot that kills each of them is not retried for ever
 FORMAT = "quadfringe batch"
 
 
 @dataclass(frozen=True)
 class Job:
-    """One recording, where its results go, and the shots that are still to be decoded."""
+    """One recording, the folder of its results, and the shots that remain to be decoded."""
 
     recording: Path
     out: Path
@@ -61,13 +61,13 @@ class Job:
 
     @property
     def folder(self) -> Path:
-        """The folder of PLY files and errors."""
+        """The folder of the PLY files and of errors.json."""
         return self.out / self.recording.stem
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of a shot: the share of pixels returned, or why there is no shape."""
+    """The result of a shot: the percentage of returned pixels, or the reason why it has no shape."""
 
     recording: Path
     shot: int
@@ -78,9 +78,9 @@ class Outcome:
 def prepare(
     recordings: Sequence[Path], out: Path, system: SystemConfig | None = None, *, ply: bool = True
 ) -> list[Job]:
-    """Look at every recording, make the empty results or find those of an earlier run; nothing is decoded yet.
+    """Examine every recording, and create its empty results or find those of an earlier run; decode nothing.
 
-    Settings of `system` replace the recorded ones. Raises `InputError` for recordings that cannot be read, for two of
+    Settings of `system` replace the recorded ones. Raises `InputError` for unreadable recordings, for two recordings of
     one name, for results of other settings in `out`, and for PLY files without a calibration.
     """
     require("zarr", "batch")
@@ -88,7 +88,7 @@ def prepare(
         require("trimesh", "batch")
     stems = [recording.stem for recording in recordings]
     if twice := sorted({stem for stem in stems if stems.count(stem) > 1}):
-        raise InputError(f"two recordings are named {', '.join(twice)}; give each an --out of its own")
+        raise InputError(f"two recordings are named {', '.join(twice)}; use a separate --out for each")
     folder_for(out)
     return [_prepared(recording, out, system or SystemConfig(), ply) for recording in recordings]
 
@@ -98,7 +98,8 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
     with Recording(recording) as take, _opened(config) as scanner:
         if ply and scanner.calibration is None:
             raise InputError(
-                f"{recording}: recorded without a calibration, so there are no points: name one, or no PLY"
+                f"{recording}: recorded without a calibration, so it has no points; name a calibration in --system, or "
+                "use --no-ply"
             )
         job = Job(recording.resolve(), out.resolve(), config, ply, len(take), ())
         status = _open_store(job, take, scanner)[:]
@@ -116,7 +117,7 @@ def _opened(config: SystemConfig) -> Scanner:
 
 
 def _open_store(job: Job, take: Recording, scanner: Scanner) -> Any:
-    """Give the status array of a store, made new when there is none; raises when it belongs to something else."""
+    """Return the status array of a store, which is created if missing; raises `InputError` for a foreign store."""
     import zarr
 
     attributes = {"format": FORMAT, "source": job.recording.name, "settings": _settings(scanner)}
@@ -125,12 +126,12 @@ def _open_store(job: Job, take: Recording, scanner: Scanner) -> Any:
             group = zarr.open_group(job.store, mode="r")
             found, shots = dict(group.attrs), group["status"].shape[0]
         except (KeyError, ValueError, OSError) as error:
-            raise InputError(f"{job.store}: not the result of a batch: {error}; choose another --out") from error
+            raise InputError(f"{job.store}: expected the result of a batch: {error}; choose another --out") from error
         if found != attributes or shots != job.shots:
             raise InputError(f"{job.store}: made with other settings or from another recording; choose another --out")
         _sweep(job)
         return group["status"]
-    # Made beside its place: a store that is there is complete.
+    # Created in a temporary folder and renamed, so that an existing store is complete.
     with atomic_folder(job.store) as temporary:
         _fill(
             zarr.open_group(temporary, mode="w", attributes=attributes),
@@ -141,7 +142,7 @@ def _open_store(job: Job, take: Recording, scanner: Scanner) -> Any:
 
 
 def _sweep(job: Job) -> None:
-    """Remove what a killed worker was just writing."""
+    """Remove the partial files of a killed worker."""
     for leftover in (*job.store.rglob("*.partial"), *job.folder.glob(".shot_*")):
         leftover.unlink(missing_ok=True)
 
@@ -178,7 +179,7 @@ def _fill(group: Any, take: Recording, calibrated: bool) -> None:
 
 
 def _settings(scanner: Scanner) -> dict[str, Any]:
-    """Give what decides about the results, as plain data."""
+    """Return the settings that determine the results, as plain data."""
     config = scanner.config.model_dump(mode="json", exclude_none=True, exclude={"capture", "calibration"})
     calibration = scanner.calibration
     known = None if calibration is None else calibration.model_dump(mode="json", exclude_none=True)
@@ -195,9 +196,9 @@ def decode_recordings(
     workers: int | None = None,
     scheduler: str | None = None,
 ) -> Iterator[Outcome]:
-    """Decode all shots that are not decoded yet; outcomes come as they are ready, some twice if a process died.
+    """Decode all shots that are not decoded yet; yield outcomes as they finish, some twice after a process died.
 
-    Raises `InputError` as `prepare` and `executor_for` do, `BatchError` when worker processes die again and again.
+    Raises `InputError` as `prepare` and `executor_for`, and `BatchError` when worker processes die repeatedly.
     """
     for _ in range(RESTARTS):
         jobs = prepare(recordings, out, system, ply=ply)
@@ -206,12 +207,12 @@ def decode_recordings(
                 yield from run(jobs, executor)
             return
         except BrokenProcessPool:
-            continue  # what was done stays done
-    raise BatchError(f"worker processes died {RESTARTS} times; is there enough memory for --workers?")
+            continue  # finished shots stay finished
+    raise BatchError(f"worker processes died {RESTARTS} times; lower --workers, which all need memory")
 
 
 def run(jobs: Sequence[Job], executor: Executor) -> Iterator[Outcome]:
-    """Decode every pending shot with an executor. Errors are kept in errors.json at the end."""
+    """Decode every pending shot with an executor; write errors.json at the end."""
     errors: dict[Path, dict[int, str]] = {job.folder: {} for job in jobs}
     futures: list[Future[Outcome]] = [executor.submit(decode_shot, job, shot) for job in jobs for shot in job.pending]
     folders = {job.recording: job.folder for job in jobs}
@@ -235,11 +236,11 @@ def _write_errors(path: Path, errors: dict[int, str]) -> None:
             temporary.write_text(json.dumps({str(shot): errors[shot] for shot in sorted(errors)}, indent=2) + "\n")
 
 
-_ONE_AT_A_TIME = Lock()  # a worker of a cluster may have threads; a decoder has not
+_ONE_AT_A_TIME = Lock()  # a cluster worker may run threads, but a decoder serves one at a time
 
 
 def decode_shot(job: Job, shot: int) -> Outcome:
-    """Decode one shot of a recording and write its results; the status last."""
+    """Decode one shot of a recording and write its results, the status last."""
     import zarr
 
     with _ONE_AT_A_TIME:
@@ -256,7 +257,7 @@ def decode_shot(job: Job, shot: int) -> Outcome:
 
 
 def _reader(job: Job) -> tuple[Recording, Scanner]:
-    """Give the recording and its decoder, planned once for each process."""
+    """Return the recording and its decoder, which each process plans once."""
     return _planned(job.recording, pickle.dumps(job.config))
 
 
@@ -276,13 +277,13 @@ def _save(job: Job, shot: int, shape: Shape, group: Any) -> None:
 
 @contextmanager
 def executor_for(workers: int | None = None, scheduler: str | None = None) -> Iterator[Executor]:
-    """Give processes of this machine, as many as cores by default, or the workers of a dask scheduler.
+    """Yield a process pool of this machine, by default one process per core, or the workers of a dask scheduler.
 
-    Workers of a cluster must see recordings and results under the same paths, and have quadfringe installed.
-    Raises `InputError` when no scheduler answers at the address.
+    Cluster workers need quadfringe, and the recordings and results under the same paths. Raises `InputError` when no
+    scheduler answers at the address.
     """
     if scheduler is None:
-        # Spawned, because a process with threads of the kernel and of HDF5 must not be forked.
+        # Spawned, because a process with threads (kernel, HDF5) must not be forked.
         with ProcessPoolExecutor(workers or usable_cores(), mp_context=multiprocessing.get_context("spawn")) as pool:
             yield pool
         return
@@ -290,6 +291,6 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
     try:
         client = distributed.Client(scheduler, timeout="10s")
     except (OSError, ValueError) as error:
-        raise InputError(f"no dask scheduler at {scheduler}: {error}") from error
+        raise InputError(f"{scheduler}: no dask scheduler answers: {error}; check the address") from error
     with client, client.get_executor(retries=RESTARTS, pure=False) as cluster:
         yield cluster

@@ -1,4 +1,4 @@
-"""What a file holds, in lines for a reader."""
+"""Describe the content of a file as lines of text."""
 
 from __future__ import annotations
 
@@ -55,9 +55,9 @@ def _array(name: str, array: NDArray[Any]) -> str:
         return size
     finite = np.isfinite(array)
     if not finite.any():
-        return f"{size}, no data"
+        return f"{size}, all NaN"
     values = array[finite]
-    return f"{size}, {values.min():.6g} to {values.max():.6g}, {100 * finite.mean():.1f} % data"
+    return f"{size}, {values.min():.6g} to {values.max():.6g}, {100 * finite.mean():.1f} % valid"
 
 
 def _calibration(path: Path) -> list[str]:
@@ -74,16 +74,16 @@ def _calibration(path: Path) -> list[str]:
 
 
 def _recording(path: Path) -> list[str]:
-    with Recording(path) as take:
-        times_us = take.times_us
-        lines = [f"Recording: {len(take)} shots of {take.header.described()}"]
-        if len(take):
-            lost = int(take.ids[-1] - take.ids[0]) + 1 - len(take)
+    with Recording(path) as recording:
+        times_us = recording.times_us
+        lines = [f"Recording: {len(recording)} shots of {recording.header.described()}"]
+        if len(recording):
+            lost = int(recording.ids[-1] - recording.ids[0]) + 1 - len(recording)
             begin = datetime.fromtimestamp(times_us[0] / 1e6, UTC).isoformat(timespec="milliseconds")
             lines.append(f"begin: {begin}, {(times_us[-1] - times_us[0]) / 1e6:.3f} s, {lost} exposures missing")
-        if not take.closed_in_order:
-            lines.append("not closed in order: still being written, or its writer was killed (quadfringe recover)")
-        for name, model in (("calibration", take.calibration), ("config", take.config)):
+        if not recording.closed_in_order:
+            lines.append("not closed: still being written, or its writer was killed (then use quadfringe recover)")
+        for name, model in (("calibration", recording.calibration), ("config", recording.config)):
             known = None if model is None else model.model_dump_json(indent=2, exclude_none=True)
             lines += [f"{name}:", *("none" if known is None else known).splitlines()]
     return lines
@@ -92,5 +92,5 @@ def _recording(path: Path) -> list[str]:
 def _ply_header(path: Path) -> list[str]:
     header, end, _ = read_bytes(path).partition(b"end_header\n")
     if not header.startswith(b"ply") or not end:
-        raise InputError(f"{path}: not a PLY file")
+        raise InputError(f"{path}: expected a PLY file, got another format")
     return header.decode("ascii", "replace").splitlines()

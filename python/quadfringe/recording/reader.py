@@ -1,4 +1,4 @@
-"""A recording as a sequence of shots, also while it is written, and after its writer was killed."""
+"""Read a recording as a sequence of shots, also while it is being written, and after its writer was killed."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from quadfringe.recording._layout import Header, crcs_of, stamp_at
 
 __all__ = ["Recording"]
 
-LAST_SHOT_BYTES = 64 << 20  # more than a shot that could not be written any more
-LOOK_S = 30.0  # a busy machine starts a process slowly
+LAST_SHOT_BYTES = 64 << 20  # upper bound of an unfinished shot: four 16-bit images of 8 million pixels
+LOOK_S = 30.0  # limit for the process that checks a cut file: a busy machine starts it slowly
 LOOK = """
 import h5py, sys
 with h5py.File(sys.argv[1], "r", libver="latest", swmr=True) as file:
@@ -34,7 +34,7 @@ with h5py.File(sys.argv[1], "r", libver="latest", swmr=True) as file:
 class Recording:
     """The shots of one file, oldest first; close it, or use it in a `with` block.
 
-    The file may still grow: `len` is what was complete when it was opened. Every shot that is read is compared with
+    The file may still grow; `len` counts the shots that were complete when it was opened. Every shot is checked against
     its CRC-32. Raises `InputError` for a file that is missing, damaged, or no recording.
 
     >>> with Recording("take.h5") as take:                                          # doctest: +SKIP
@@ -51,7 +51,7 @@ class Recording:
             self._file.close()
             if isinstance(error, InputError):
                 raise
-            raise InputError(f"{path}: a damaged recording: {error}") from error
+            raise InputError(f"{path}: damaged recording: {error}; copy it again from where it was recorded") from error
 
     @property
     def config(self) -> SystemConfig | None:
@@ -65,18 +65,18 @@ class Recording:
 
     @property
     def closed_in_order(self) -> bool:
-        """False while the file is written, and for good when its writer was killed."""
+        """False while the file is being written, and after its writer was killed."""
         return bool(self._file["closed"][()])
 
     @property
     def ids(self) -> NDArray[np.uint64]:
-        """Numbers of the exposures, (N,); gaps are exposures that never became a shot."""
+        """Exposure numbers, (N,); gaps are exposures that did not become a shot."""
         ids: NDArray[np.uint64] = self._file["id"][: self._length]
         return ids
 
     @property
     def times_us(self) -> NDArray[np.int64]:
-        """Begin of every exposure, (N,), us, UTC since 1970."""
+        """Start of every exposure, (N,), us since 1970 UTC."""
         times: NDArray[np.int64] = self._file["time_us"][: self._length]
         return times
 
@@ -90,18 +90,20 @@ class Recording:
     def __getitem__(self, index: int) -> AnyShot:
         place = index + self._length if index < 0 else index
         if not 0 <= place < self._length:
-            raise IndexError(f"{self.path}: shot {index} of {self._length}")
+            raise IndexError(f"{self.path}: expected a shot from 0 to {self._length - 1}, got {index}")
         images = self.images(place)
         if images is None:
-            raise InputError(f"{self.path}: shot {place} is damaged (CRC); `quadfringe recover` keeps the others")
+            raise InputError(
+                f"{self.path}: shot {place} is damaged (CRC mismatch); quadfringe recover rescues the others"
+            )
         return self.header.shot(images, self.stamp(place))
 
     def stamp(self, index: int) -> Stamp:
-        """Give number and time of a shot."""
+        """Return the stamp of a shot."""
         return stamp_at(self._file, self.header, index)
 
     def images(self, index: int) -> dict[str, NDArray[Any]] | None:
-        """Give the images of a shot, or None when their bytes are not those that were recorded."""
+        """Return the images of a shot, or None when they do not match their CRC-32."""
         try:
             images = {name: self._file[name][index] for name in self.header.images}
             expected = self._file["crc32"][index].tolist()
@@ -110,7 +112,7 @@ class Recording:
         return images if crcs_of(images) == expected else None
 
     def _complete(self) -> int:
-        """Count shots; one that was being written when its writer died is at the end and has no matching CRC."""
+        """Count the complete shots; a shot that its writer left unfinished is the last and fails its CRC-32."""
         length = min(len(self._file[name]) for name in (*self.header.images, "id", "time_us", "crc32"))
         if not self.closed_in_order:
             while length and self.images(length - 1) is None:
@@ -118,7 +120,7 @@ class Recording:
         return int(length)
 
     def close(self) -> None:
-        """Close the file; closing twice is allowed."""
+        """Close the file; further calls do nothing."""
         self._file.close()
 
     def __enter__(self) -> Recording:
@@ -130,13 +132,13 @@ class Recording:
 
 def _open(path: Path) -> h5py.File:
     if not path.is_file():
-        raise InputError(f"{path}: no such file")
+        raise InputError(f"{path}: no such file; check the path")
     if not h5py.is_hdf5(path):
-        raise InputError(f"{path}: not a recording: expected HDF5, as `quadfringe record` writes it")
+        raise InputError(f"{path}: expected an HDF5 recording of quadfringe record, got another format")
     try:
         file = h5py.File(path, "r", libver="latest", swmr=True)
     except (OSError, RuntimeError) as error:
-        raise InputError(f"{path}: cannot be opened, damaged or cut short: {str(error).splitlines()[0]}") from error
+        raise InputError(f"{path}: damaged or cut short: {str(error).splitlines()[0]}; copy it again") from error
     missing = file.id.get_filesize() - path.stat().st_size
     if missing > 0 and not (missing < LAST_SHOT_BYTES and _has_its_tables(path)):
         file.close()
@@ -145,9 +147,9 @@ def _open(path: Path) -> h5py.File:
 
 
 def _has_its_tables(path: Path) -> bool:
-    """Whether every table of a file without its end is there: a writer that failed has written them before.
+    """Return whether every index table of a cut file is present: a failed writer wrote them before the missing data.
 
-    HDF5 waits for ever for a table that is missing, and cannot be interrupted; so another process looks.
+    HDF5 waits forever for a missing table and cannot be interrupted, so another process reads them.
     """
     with suppress(subprocess.TimeoutExpired):
         return (

@@ -1,4 +1,4 @@
-"""Recording beside a live stream: goes on in a new file when a full disk has room again."""
+"""Record a live stream; after a full disk has room again, recording resumes in a new file."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from quadfringe.recording.writer import RecordingWriter
 
 __all__ = ["Recorder", "RecorderStatistics"]
 
-RETRY_S = 1.0
+RETRY_S = 1.0  # pause between attempts to create a new file
 
 
 @dataclass(frozen=True)
 class RecorderStatistics:
-    """Shots that are safe on file, shots that the disk refused, bytes of images, and what is wrong right now."""
+    """Shots on file, shots that the disk refused, bytes of images, files, and the current fault, if any."""
 
     written: int
     refused: int
@@ -30,11 +30,11 @@ class RecorderStatistics:
 
 
 class Recorder:
-    """Writes shots into take.h5, and into take_001.h5 and so on after a fault of the disk or at `file_gb`.
+    """Writes shots to take.h5, and to take_001.h5 and so on after a disk fault or at a size of `file_gb`.
 
-    `write` is made for a tap of a stream: it blocks for one write and does not raise for a full disk. The shot is
-    then counted as refused, `statistics().fault` says why, and a new file is begun once a second until one can be.
-    Raises `InputError` for a file that exists and for shots that are unlike each other.
+    `write` is meant as a tap of a stream: it blocks for one write and does not raise when the disk is full. It then
+    counts the shot as refused, sets `statistics().fault`, and tries once a second to start a new file. Raises
+    `InputError` for a file that exists, and for shots that differ from the first.
     """
 
     def __init__(
@@ -62,7 +62,7 @@ class Recorder:
             raise InputError(f"{path}: the folder {self.path.parent} does not exist; create it first")
 
     def write(self, shot: AnyShot) -> None:
-        """Write a shot; it is counted as written when it is safe."""
+        """Write a shot; count it as written once it is safe on file."""
         with self._lock:
             try:
                 writer = self._writer_for(shot)
@@ -84,7 +84,7 @@ class Recorder:
         self._end_file()
 
     def _writer_for(self, shot: AnyShot) -> RecordingWriter | None:
-        """Give the file in use, a new one when there is none, or None while a fault waits for its next try."""
+        """Return the current file, or a new one, or None while a fault waits for the next attempt."""
         if self._is_long_enough():
             self._end_file()
         writer = self._writer
@@ -113,11 +113,11 @@ class Recorder:
             self._writer = None
 
     def statistics(self) -> RecorderStatistics:
-        """Give the counters, at any time and from any thread."""
+        """Return the counters; safe to call at any time from any thread."""
         return RecorderStatistics(self._written, self._refused, self._image_bytes, tuple(self._files), self._fault)
 
     def close(self) -> None:
-        """Close the file in order; closing twice is allowed."""
+        """Close the file properly; further calls do nothing."""
         with self._lock:
             self._end_file()
 

@@ -1,4 +1,4 @@
-"""What a killed writer or a bad disk left, copied into a new and whole recording."""
+"""Rescue the shots of a recording whose writer was killed or whose disk failed."""
 
 from __future__ import annotations
 
@@ -16,28 +16,28 @@ __all__ = ["Recovered", "recover"]
 
 @dataclass(frozen=True)
 class Recovered:
-    """How many shots were copied, and the places of those that were damaged."""
+    """The number of copied shots, and the indices of the damaged ones."""
 
     shots: int
     damaged: tuple[int, ...]
 
 
 def recover(source: Path, target: Path) -> Recovered:
-    """Copy every shot of `source` whose bytes are as recorded into `target`, whole or not at all.
+    """Copy every undamaged shot of `source` to the new recording `target`.
 
-    The source is only read: HDF5's own repair (`h5clear`) can destroy a file that its writer was killed over.
-    Raises `InputError` when nothing can be read, or when `target` exists.
+    The source is only read, because the repair tool of HDF5 (`h5clear`) can destroy a file whose writer was killed.
+    Raises `InputError` when `source` cannot be read or `target` exists.
     """
     if target.exists():
         raise InputError(f"{target}: exists already; recordings are never overwritten")
-    with Recording(source) as take, atomic(target) as temporary:
+    with Recording(source) as recording, atomic(target) as temporary:
         temporary.unlink()
         damaged = []
-        with RecordingWriter(temporary, take.header) as writer:
-            for index in range(len(take)):
-                images = take.images(index)
+        with RecordingWriter(temporary, recording.header) as writer:
+            for index in range(len(recording)):
+                images = recording.images(index)
                 if images is None:
                     damaged.append(index)
                 else:
-                    writer.append_images(images, take.stamp(index), crcs_of(images))
-        return Recovered(len(take) - len(damaged), tuple(damaged))
+                    writer.append_images(images, recording.stamp(index), crcs_of(images))
+        return Recovered(len(recording) - len(damaged), tuple(damaged))

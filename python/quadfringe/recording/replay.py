@@ -1,4 +1,4 @@
-"""A recording as a camera: the same shots with the same stamps, at the pace of their day or at full speed."""
+"""A recording as a camera: the same shots with the same stamps, at their original pace or at full speed."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ from quadfringe.recording import Recording
 
 __all__ = ["ReplayCamera", "open_devices"]
 
-MAY_WAIT = {"latest": 1, "all": 64}  # overdue shots that a real camera's queue would still hold
+MAY_WAIT = {"latest": 1, "all": 64}  # overdue shots that the queue of a real camera would hold
 
 
 class ReplayCamera:
-    """Plays a take once, from its first shot; opening it again begins anew.
+    """Plays a recording once from its first shot; open it again to play it again.
 
-    At original speed shots come as far apart as they were exposed, and those that nobody takes in time are dropped as
-    those of a camera are. At full speed none is dropped.
+    At original speed, shots come at the intervals of their exposures, and shots that are not taken in time are dropped
+    as by a real camera. At full speed, no shot is dropped.
     """
 
-    def __init__(self, take: Recording, speed: Literal["original", "full"] = "original") -> None:
-        self._take = take
+    def __init__(self, recording: Recording, speed: Literal["original", "full"] = "original") -> None:
+        self._recording = recording
         self._next = self._shots = self._dropped = 0
         self._streaming = False
         self._closed = Event()
@@ -37,31 +37,33 @@ class ReplayCamera:
 
     @property
     def name(self) -> str:
-        """The name of the file."""
-        return self._take.path.name
+        """Name of the file."""
+        return self._recording.path.name
 
     @property
     def calibration(self) -> Calibration | None:
-        """The calibration that was recorded."""
-        return self._take.calibration
+        """The calibration in the recording."""
+        return self._recording.calibration
 
-    def snap(self, timeout_s: float | None = None) -> AnyShot:  # noqa: ARG002 - a file keeps nobody waiting
-        """Give the next shot, at once; raises `ShotTimeoutError` after the last."""
+    def snap(self, timeout_s: float | None = None) -> AnyShot:  # noqa: ARG002 - a file never waits
+        """Return the next shot at once; raises `ShotTimeoutError` after the last."""
         self._check_free()
-        if self._next == len(self._take):
-            raise ShotTimeoutError(f"{self.name}: all {len(self._take)} shots were played; open it again to begin anew")
+        if self._next == len(self._recording):
+            raise ShotTimeoutError(
+                f"{self.name}: all {len(self._recording)} shots were played; open the recording again to play it again"
+            )
         return self._read()
 
     def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:
-        """Give the next shots, until `count` of them came or the take ends."""
+        """Yield the next shots, up to `count`, until the recording ends."""
         self._check_free()
         return self._play(count, MAY_WAIT[keep])
 
     def _play(self, count: int | None, may_wait: int) -> Iterator[AnyShot]:
         self._check_free()
         self._streaming = True
-        end = len(self._take) if count is None else min(len(self._take), self._next + count)
-        due_s = self._take.times_us / 1e6
+        end = len(self._recording) if count is None else min(len(self._recording), self._next + count)
+        due_s = self._recording.times_us / 1e6
         due_s += time.monotonic() - (due_s[self._next] if self._next < end else 0.0)
         try:
             while self._next < end and not self._closed.is_set():
@@ -82,7 +84,7 @@ class ReplayCamera:
             self._dropped += shots
 
     def _read(self) -> AnyShot:
-        shot = self._take[self._next]
+        shot = self._recording[self._next]
         self._next += 1
         self._shots += 1
         return shot
@@ -91,16 +93,16 @@ class ReplayCamera:
         if self._closed.is_set():
             raise ValueError(f"the replay of {self.name} is closed")
         if self._streaming:
-            raise ValueError(f"{self.name} streams already; end that stream first")
+            raise ValueError(f"{self.name} already streams; close that stream first")
 
     def statistics(self) -> CameraStatistics:
-        """Give how many shots were played, and how many of them nobody took in time."""
+        """Return how many shots were played, and how many of them were dropped."""
         return CameraStatistics(shots=self._shots, dropped=self._dropped)
 
     def close(self) -> None:
-        """Close the file; closing twice is allowed."""
+        """Close the file; further calls do nothing."""
         self._closed.set()
-        self._take.close()
+        self._recording.close()
 
     def __enter__(self) -> Self:
         return self
@@ -110,18 +112,18 @@ class ReplayCamera:
 
 
 def open_devices(config: SystemConfig) -> Devices:
-    """Open a take; its recorded settings hold wherever `config` says nothing.
+    """Open a recording; its recorded settings apply wherever `config` sets nothing.
 
-    Raises `InputError` for a file that cannot be read, `ConfigError` for projectors, which a recording cannot see.
+    Raises `InputError` for an unreadable file, and `ConfigError` for projectors, which a recording cannot use.
     """
     if not isinstance(config.capture, ReplayConfig):
         raise ConfigError(f"capture: expected a replay, got {config.capture.kind}")
     if config.projectors is not None:
-        raise ConfigError("projectors: a recording does not see them; leave them out")
-    take = Recording(config.capture.file)
-    recorded = take.config or SystemConfig()
-    # A calibration in another file and the projectors belong to the place of the recording; the take has their result.
+        raise ConfigError("projectors: a recording cannot use them; leave them out")
+    recording = Recording(config.capture.file)
+    recorded = recording.config or SystemConfig()
+    # The recorded paths of projectors and calibration file are void here; the recording contains the calibration.
     elsewhere = {"calibration": None, "projectors": None}
     said = {name: getattr(config, name) for name in config.model_fields_set}
     merged = recorded.model_copy(update={**elsewhere, **said, "capture": config.capture})
-    return Devices(ReplayCamera(take, config.capture.speed), ExternalLight(), merged)
+    return Devices(ReplayCamera(recording, config.capture.speed), ExternalLight(), merged)

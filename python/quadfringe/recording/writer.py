@@ -1,4 +1,4 @@
-"""One recording, one shot at a time: a shot is on file when `append` returns, and survives whatever comes after."""
+"""Write a recording shot by shot; a shot is safe on file when `append` returns, whatever happens afterwards."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from quadfringe.recording._layout import Header, crcs_of, make_datasets, stamp_v
 
 __all__ = ["RecordingWriter", "require_room"]
 
-RESERVE_BYTES = 8 << 20  # HDF5's own tables, and room to close in order
+RESERVE_BYTES = 8 << 20  # room for the tables of HDF5 and for closing the file
 READABLE_SINCE = ("v110", "v110")  # the file format of HDF5 1.10, the first that survives a killed writer
 
 
 class RecordingWriter:
-    """Writes shots into a new file; use it in a `with` block, from one thread.
+    """Writes shots to a new file; use it in a `with` block, from one thread.
 
-    The file is in HDF5's mode of one writer and many readers from the first shot on: it can be read while it grows,
-    and every shot that `append` has returned for is readable after the process was killed. Raises `InputError` when
-    the file exists or cannot be made, `RecordingError` when the disk is full or fails.
+    The file uses the single-writer multiple-reader mode of HDF5: it can be read while it grows, and every shot for
+    which `append` has returned stays readable when the process is killed. Raises `InputError` when the file exists or
+    cannot be created, and `RecordingError` when the disk is full or fails.
     """
 
     def __init__(self, path: Path | str, header: Header) -> None:
@@ -39,7 +39,7 @@ class RecordingWriter:
         self._dtypes = {name: dataset.dtype for name, dataset in self._datasets.items()}
 
     def append(self, shot: AnyShot) -> None:
-        """Write one shot; when this returns it is safe. A shot without a stamp is numbered and gets the time now."""
+        """Write one shot, which is safe on return. A shot without a stamp gets the next number and the current time."""
         self.header.require_alike(shot)
         require_room(self.path.parent, self.header.shot_bytes, self.written)
         images = {name: np.ascontiguousarray(image) for name, image in shot.images.items()}
@@ -47,14 +47,14 @@ class RecordingWriter:
         self.append_images(images, stamp, crcs_of(images))
 
     def append_images(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
-        """Write images whose bytes have these CRC-32s, unlooked at."""
+        """Write images with these CRC-32 values, without checking them."""
         try:
             self._write(images, stamp, crcs)
         except (OSError, RuntimeError) as error:  # h5py raises both for a write that failed
             self._failed = True
             raise RecordingError(
                 f"{self.path}: shot {self.written} could not be written: {_first_line(error)}; "
-                f"the {self.written} before it are safe"
+                f"the {self.written} shots before it are safe"
             ) from error
         except BaseException:  # Ctrl-C in the middle of a shot
             self._failed = True
@@ -69,10 +69,10 @@ class RecordingWriter:
             place.write_direct_chunk((n, 0, 0), image)
         for name, value in (stamp_values(stamp) | {"crc32": crcs}).items():
             _append_row(datasets[name].id, n, np.asarray(value, self._dtypes[name]))
-        self._file.flush()  # of the file: what a flush of datasets alone leaves behind is lost to HDF5's own repair
+        self._file.flush()  # the whole file, because h5clear loses what a flush of single datasets leaves behind
 
     def close(self) -> None:
-        """Close the file, marked as closed in order unless a write failed; closing twice is allowed."""
+        """Close the file and mark it as closed, unless a write failed; further calls do nothing."""
         if not self._file.id.valid:
             return
         with suppress(OSError, RuntimeError):
@@ -88,11 +88,12 @@ class RecordingWriter:
 
 
 def require_room(folder: Path, shot_bytes: int, written: int) -> None:
-    """Raise `RecordingError` while the disk has room for one more shot no longer: HDF5 is then never cut short."""
+    """Raise `RecordingError` unless the disk has room for one more shot, so that HDF5 never runs out of space."""
     free = shutil.disk_usage(folder).free
     if free < shot_bytes + RESERVE_BYTES:
         raise RecordingError(
-            f"{folder}: the disk is full ({free / 1e6:.0f} MB left); the {written} shots written before are safe"
+            f"{folder}: the disk is full ({free / 1e6:.0f} MB left); free space; the {written} shots written before "
+            "are safe"
         )
 
 
@@ -122,7 +123,7 @@ def _create(path: Path, header: Header) -> h5py.File:
 
 
 def _append_row(dataset: h5py.h5d.DatasetID, n: int, row: NDArray[Any]) -> None:
-    """Write row `n` of a dataset that has `n`: what `dataset[n] = row` does, with less around it."""
+    """Append row `n` to a dataset: like `dataset[n] = row`, but without its overhead."""
     dataset.set_extent((n + 1, *row.shape))
     place = dataset.get_space()
     place.select_hyperslab((n, *[0] * row.ndim), (1, *row.shape))

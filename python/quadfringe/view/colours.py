@@ -1,4 +1,4 @@
-"""Maps and channels to pictures for the eye: (H, W) to (H, W, 3) uint8 in R, G, B order; no data is grey."""
+"""Pictures of maps and channels: (H, W) to (H, W, 3) uint8 in R, G, B order, with missing data in grey."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ __all__ = ["Picture", "channels_picture", "coloured", "limits_of", "phase_pictur
 
 Picture = NDArray[np.uint8]
 Map = NDArray[np.float32]
-NO_DATA = 90
-COARSE = 16  # a colour is the mean over so many pixels, times the blur: more than a fringe
+NO_DATA = 90  # grey level of pixels without data: distinct from black and from every colour of the map
+COARSE = 16  # colours are means over 16 x 16 pixels, blurred by five of these: wider than a fringe
 
 
 def limits_of(values: Map) -> tuple[float, float]:
-    """Give the range of most values, a little widened, whatever a few outliers say; (0, 1) when there are none."""
+    """Return the range of the middle 92 % of the values, widened by a tenth at both ends; (0, 1) without values."""
     finite = values[::4, ::4][np.isfinite(values[::4, ::4])]
     if not finite.size:
         return (0.0, 1.0)
@@ -30,7 +30,7 @@ def limits_of(values: Map) -> tuple[float, float]:
 
 
 def coloured(values: Map, limits: tuple[float, float], colours: int = cv2.COLORMAP_TURBO) -> Picture:
-    """Paint a map with a colour map of OpenCV."""
+    """Paint a map with an OpenCV colour map between the limits (low, high)."""
     low, high = limits
     known = np.isfinite(values)
     level = np.where(known, (values - low) * np.float32(255 / (high - low)), 0).clip(0, 255).astype(np.uint8)
@@ -40,13 +40,13 @@ def coloured(values: Map, limits: tuple[float, float], colours: int = cv2.COLORM
 
 
 def phase_picture(shape: Shape, columns: int, max_px: int = 480) -> Picture:
-    """Paint the absolute phase, through the projector's `columns`, from blue to red."""
+    """Paint the projector column of each pixel, from 0 to `columns`, from blue to red."""
     step = max(1, math.ceil(max(shape.column_px.shape) / max_px))
     return coloured(shape.column_px[::step, ::step], (0.0, float(columns)))
 
 
 def channels_picture(shot: AnyShot, max_px: int = 640) -> Picture:
-    """Put red and green above blue and infrared, each in its own light."""
+    """Arrange red and green above blue and infrared, each tinted with its colour."""
     tints = {"red": (0,), "green": (1,), "blue": (2,), "ir": (0, 1, 2)}
     height, width = shot.channels["red"].shape
     step = math.ceil(2 * max(height, width) / max_px)
@@ -65,9 +65,9 @@ def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes:
 
 
 def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
-    """Give the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
+    """Return the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
 
-    Its brightness is the modulation's, its colour that of the mean light around.
+    The brightness is the modulation, and the colour is that of the mean light in the neighbourhood.
     """
     top = max(limits_of(shape.modulation)[1], 1e-6)
     modulation = np.nan_to_num(shape.modulation[::stride, ::stride])

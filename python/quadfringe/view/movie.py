@@ -1,4 +1,4 @@
-"""Shapes to pictures of a solid thing, seen from anywhere, and pictures to MP4."""
+"""Rendered pictures of shapes from any viewpoint, and MP4 movies of pictures."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from quadfringe.view.colours import Picture
 
 __all__ = ["Movie", "movie", "solid_picture"]
 
-BACKGROUND = 24
-LIGHT = np.array([-0.45, -0.55, -0.70], np.float32)  # towards the light, in the frame of the picture
+BACKGROUND = 24  # grey level
+LIGHT = np.array([-0.45, -0.55, -0.70], np.float32)  # direction to the light, in the frame of the picture
 
 
 class Movie(Protocol):
-    """Takes pictures of one size, one after the other."""
+    """Takes the pictures of a movie in order; all have one size."""
 
     def add(self, picture: Picture) -> None:
         """Add a picture, (H, W, 3) uint8 in R, G, B order."""
@@ -41,9 +41,11 @@ class _Mp4:
             code = cv2.VideoWriter.fourcc(*"mp4v")
             self._writer = cv2.VideoWriter(str(self._path), code, self._rate_hz, picture.shape[1::-1])
             if not self._writer.isOpened():
-                raise InputError("this OpenCV cannot write MP4; use the wheel opencv-contrib-python-headless")
+                raise InputError(
+                    "this build of OpenCV cannot write MP4; install the wheel opencv-contrib-python-headless"
+                )
         if picture.shape != self._size:
-            raise InputError(f"a movie needs pictures of one size: {self._size}, got {picture.shape}")
+            raise InputError(f"movie: expected pictures of one size, {self._size}, got {picture.shape}")
         self._writer.write(np.ascontiguousarray(picture[:, :, ::-1]))
 
     def close(self) -> None:
@@ -53,7 +55,7 @@ class _Mp4:
 
 @contextmanager
 def movie(path: Path, rate_hz: float) -> Iterator[Movie]:
-    """Write an MP4 of the pictures that are added, whole or not at all."""
+    """Write an MP4 of the pictures that are added; the file is complete or does not exist."""
     require_suffix(path, (".mp4",))
     with atomic(path) as temporary:
         writer = _Mp4(temporary, rate_hz)
@@ -72,12 +74,13 @@ def solid_picture(
     size_px: tuple[int, int] = (640, 480),
     field_mm: float = 320.0,
 ) -> Picture:
-    """Draw a calibrated shape, lit from above left, in its colours (H, W, 3) as (height, width, 3).
+    """Render a calibrated shape with the colours (H, W, 3), lit from above left; returns (height, width, 3) uint8.
 
-    The eye is turned about the middle of the shape by yaw and pitch; `field_mm` is how much of it the width shows.
+    The viewpoint is rotated about `middle_mm`, by default the median point, by yaw and pitch `turn_deg`; `field_mm` is
+    the width of the view at that point.
     """
     if shape.xyz_mm is None:
-        raise InputError("this shape has phase only: decode with a calibration to draw it")
+        raise InputError("shape: expected points, got phase only; decode with a calibration")
     known = np.isfinite(shape.xyz_mm).all(axis=2)
     points = shape.xyz_mm[known]
     if middle_mm is None:
@@ -101,7 +104,7 @@ def _rotation(yaw: float, pitch: float) -> NDArray[np.float32]:
 
 
 def _normals(xyz_mm: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Give unit normals towards the camera, (H, W, 3); straight at it where neighbours have no data."""
+    """Return unit normals towards the camera, (H, W, 3); along the optical axis where neighbours have no data."""
     smooth = cv2.blur(np.nan_to_num(xyz_mm, nan=0.0), (5, 5))
     share = cv2.blur(np.isfinite(xyz_mm).astype(np.float32), (5, 5))
     smooth = np.where(share > 0, smooth / np.maximum(share, 1e-6), np.nan)
@@ -121,7 +124,7 @@ def _shade(normals: NDArray[np.float32]) -> NDArray[np.float32]:
 def _splat(
     seen: NDArray[np.float32], painted: Picture, size_px: tuple[int, int], field_mm: float, dot_px: int
 ) -> Picture:
-    """Draw points from far to near, each as a square of `dot_px`, so that near ones hide far ones."""
+    """Draw points from far to near, each as a square of `dot_px`, so that near points hide far ones."""
     width, height = size_px
     distance_mm = 3 * field_mm
     scale = width / field_mm * distance_mm / (distance_mm + seen[:, 2])

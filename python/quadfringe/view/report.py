@@ -1,4 +1,4 @@
-"""One page about one shot: fringes, wrapped maps, absolute phase, depth, error."""
+"""Report of one shot as a PNG: fringes, wrapped phases, absolute phase, depth and error."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NO_DATA = "#d8d8d8"
 
 
 class Panel:
-    """One picture of a page: an array with its title, unit, colours and range."""
+    """One picture of a page: an array with title, unit, colour map and range; the default range skips outliers."""
 
     def __init__(
         self,
@@ -49,9 +49,9 @@ class Panel:
 
 @dataclass(frozen=True)
 class Graph:
-    """Lines over a common axis, or points: x and y by name; `limit` is a dashed line with a name of its own.
+    """Lines or points, x and y by name, over a common axis; `limit` is a named dashed line.
 
-    `spread` gives points of that name error bars, plus and minus; `ticks` are names of the places 0, 1, 2 and so on.
+    `spread` adds symmetric error bars to the points of that name; `ticks` name the x positions 0, 1, 2 and so on.
     """
 
     title: str
@@ -65,7 +65,7 @@ class Graph:
     ticks: Sequence[str] = ()
 
     def draw(self, _figure: Any, axes: Any) -> None:
-        """Draw the lines with their names."""
+        """Draw the lines with a legend."""
         for name, (x, y) in self.lines.items():
             marker = "." if self.points or len(x) < 50 else None
             if name in self.spread:
@@ -97,7 +97,7 @@ def _limits(image: NDArray[Any]) -> tuple[float, float]:
 
 
 def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]]) -> None:
-    """Write rows of panels and graphs as one PNG; needs matplotlib (extra `plot`)."""
+    """Write rows of panels and graphs to one PNG; needs matplotlib (extra `plot`)."""
     require("matplotlib", "plot")
     from matplotlib.figure import Figure
 
@@ -113,7 +113,7 @@ def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]])
 
 
 def fringe_panels(shot: AnyShot) -> list[Panel]:
-    """Give the four channels as they were captured."""
+    """Return panels of the four channels as captured."""
     full = (0.0, shot.full_scale_value)
     return [Panel(f"captured {name}", image, "", "gray", full) for name, image in shot.channels.items()]
 
@@ -126,7 +126,7 @@ def write_report(
     wrapped: Sequence[NDArray[np.float32]],
     found: Comparison,
 ) -> None:
-    """Write the report of a calibrated shape and its comparison with the truth as PNG."""
+    """Write the report of a calibrated shape and of its comparison with the truth to a PNG."""
     names = ("red and blue, two-step", "green, Fourier", "infrared, Fourier")
     turn = (-np.pi, np.pi)
     error_mm = 4 * found.depth_rms_mm if np.isfinite(found.depth_rms_mm) else 1.0

@@ -1,4 +1,4 @@
-"""A moving shape in the browser: the page that `quadfringe live` serves.
+"""The live page in the browser, which `quadfringe live` serves.
 
 >>> from quadfringe.view.viewer import Viewer                                            # doctest: +SKIP
 >>> with qf.open() as scanner, Viewer() as viewer, scanner.stream() as stream:
@@ -32,25 +32,24 @@ __all__ = ["CLOUDS_PER_S", "Colouring", "Viewer"]
 Colouring = Literal["texture", "height", "quality"]
 Map = NDArray[np.float32]
 COLOURINGS: tuple[Colouring, ...] = ("texture", "height", "quality")
-CLOUDS_PER_S = 4.0
+CLOUDS_PER_S = 4.0  # the default: a browser without a graphics card keeps up with it
 STRIDES = ("1", "2", "4", "8", "16")
-M_PER_MM = 1e-3  # the page is in metres: near and far plane of a browser's camera fit them
-FIGURES_PERIOD_S = 0.1
+M_PER_MM = 1e-3  # the page uses metres, which suit the near and far planes of its camera
+FIGURES_PERIOD_S = 0.1  # ten updates a second look continuous and cost little
 PICTURES_PERIOD_S = 0.1
 LOCAL = "127.0.0.1"
 EVERYBODY = ("0.0.0.0", "::")
-REPLAYED_MS = 60e3  # older shots come from a recording, which keeps the stamps of its day
+REPLAYED_MS = 60e3  # older shots come from a recording, which keeps its original time stamps
 
 
 class Viewer:
-    """Serves the page at `url` from its own threads; close it, or use it in a `with` block.
+    """Serves the page at `url` from background threads; close it, or use it in a `with` block.
 
-    Only this machine can see the page unless another `host` is asked for ("0.0.0.0": everybody on the network; there is
-    no password). A cloud goes out at most `clouds_per_s` times a second, every `stride`-th pixel of every `stride`-th
-    row; a browser that is slower than that leaves out clouds, and nobody else waits for it. With a graphics card 10 and
-    more go; without one a page has most time for pictures and figures with a `stride` of 4 and few clouds. The page has
-    controls for both. When the port is taken the next free one is used: `url` tells. Raises `MissingExtraError` without
-    the extra `view`.
+    Only this machine can open the page, unless `host` says otherwise ("0.0.0.0": the whole network, without a
+    password). At most `clouds_per_s` point clouds are sent per second, with every `stride`-th pixel of every
+    `stride`-th row; a slower browser skips clouds and delays nothing else. A browser with a graphics card shows 10 and
+    more per second; without one, use a `stride` of 4 and few clouds. The page has controls for both. When `port` is
+    taken, the next free one is used; `url` contains it. Raises `MissingExtraError` without the extra `view`.
     """
 
     def __init__(
@@ -97,10 +96,10 @@ class Viewer:
         with gui.add_folder("Absolute phase"):
             self._phase = gui.add_image(blank, format="jpeg", jpeg_quality=80)
         self._server.scene.set_up_direction("-y")
-        # Points are drawn in their own colours: lights and their shadows cost a page time and change nothing.
+        # Points are drawn unshaded, so lights and shadows would cost time and change nothing.
         self._server.scene.configure_default_lights(enabled=False, cast_shadow=False)
-        # A cloud with new colours is a new material to the page, and the last one takes its compiled shader along.
-        # Two points that nobody sees keep it; without them a browser without a graphics card compiles for every cloud.
+        # The page makes a new material for each cloud and drops the compiled shader with the last one. Two invisible
+        # points keep the shader; otherwise a browser without a graphics card would compile it for every cloud.
         self._add_cloud("/shader", np.zeros((2, 3), np.float32), np.zeros((2, 3), np.uint8), point_size=1e-6)
 
     def follow(
@@ -109,7 +108,7 @@ class Viewer:
         recorder: Callable[[], RecorderStatistics] | None = None,
         columns: int = 912,
     ) -> int:
-        """Show what a stream measures until it ends; returns the number of shots. Figures go on without shots."""
+        """Show what a stream measures until it ends; return the number of shots. Figures update between shots too."""
         ended = threading.Event()
 
         def figures() -> None:
@@ -130,7 +129,7 @@ class Viewer:
         return shots
 
     def show(self, measured: Measured, columns: int = 912) -> None:
-        """Show a shot and its shape, or why there is none; what comes faster than the page goes is left out."""
+        """Show a shot and its shape, or the reason why it has none; skip pictures and clouds above the page's rates."""
         now = time.monotonic()
         replayed = measured.latency_ms > REPLAYED_MS
         latency = "replayed" if replayed else f"latency {measured.latency_ms:.0f} ms"
@@ -150,13 +149,13 @@ class Viewer:
             self.show_shape(measured.shot, shape)
 
     def _show_again(self, _: object) -> None:
-        """Show a page that has just come what the others see."""
+        """Show the last shot to a page that has just connected."""
         if self._last is not None:
             self._cloud_at = self._pictures_at = 0.0
             self.show(*self._last)
 
     def show_shape(self, shot: AnyShot, shape: Shape) -> None:
-        """Show the points of a calibrated shape at once."""
+        """Show the points of a calibrated shape immediately."""
         stride = int(self._stride.value)
         points_mm, colours = self._points(shot, shape, stride)
         if not self._placed and len(points_mm):
@@ -177,7 +176,7 @@ class Viewer:
         )
 
     def _points(self, shot: AnyShot, shape: Shape, stride: int) -> tuple[Map, Picture]:
-        """Give the points with data, (N, 3) mm, and their colours, (N, 3)."""
+        """Return the valid points, (N, 3) mm, and their colours, (N, 3)."""
         xyz_mm = np.ascontiguousarray(np.asarray(shape.xyz_mm)[::stride, ::stride])
         quality = shape.quality[::stride, ::stride]
         valid = np.flatnonzero(np.isfinite(xyz_mm[:, :, 2]) & (quality >= self._quality.value))
@@ -193,14 +192,14 @@ class Viewer:
         return texture(shot, shape, stride)
 
     def _depth_limits(self, depth_mm: Map) -> tuple[float, float]:
-        """Give a range of negative depths that follows the scene slowly, so that colours do not flicker."""
+        """Return limits of the negative depth that follow the scene slowly, so that the colours do not flicker."""
         near, far = limits_of(depth_mm)
         old = self._depth_mm or (near, far)
         self._depth_mm = (0.9 * old[0] + 0.1 * near, 0.9 * old[1] + 0.1 * far)
         return (-self._depth_mm[1], -self._depth_mm[0])
 
     def _place_camera(self, points_mm: Map) -> None:
-        """Look at the first shape from where the camera stands, a little from the side."""
+        """Set the viewpoint for the first shape: near the camera, slightly from the side."""
         middle_mm = np.median(points_mm[:: max(1, len(points_mm) // 5000)], axis=0)
         middle = M_PER_MM * middle_mm
         eye = middle + float(middle[2]) * np.array([-0.30, -0.22, -0.62])
@@ -218,7 +217,7 @@ class Viewer:
         )
 
     def close(self) -> None:
-        """Stop serving; closing twice is allowed."""
+        """Stop serving; further calls do nothing."""
         with redirect_stdout(StringIO()):
             self._server.stop()
 
@@ -231,13 +230,13 @@ class Viewer:
 
 def _serve(host: str, port: int) -> viser.ViserServer:
     module: Any = require("viser", "view")
-    with redirect_stdout(StringIO()):  # a banner, also when asked to be quiet
+    with redirect_stdout(StringIO()):  # viser prints a banner even with verbose=False
         server: viser.ViserServer = module.ViserServer(host=host, port=port, label="quadfringe", verbose=False)
     return server
 
 
 def _pixel_mm(points_mm: Map, shape: Shape) -> float:
-    """Give how far apart neighbouring pixels lie on the surface, mm."""
+    """Return the size of a point on the surface, mm: one and a half times the distance of neighbouring pixels."""
     if shape.calibration is None or not len(points_mm):
         return 0.3
     depth_mm = float(np.median(points_mm[:: max(1, len(points_mm) // 5000), 2]))
