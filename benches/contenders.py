@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 import quadfringe as qf
 from quadfringe import _core
-from quadfringe.decoding.stages import wrapped_phases
+from quadfringe.decoding.stages import linear_light, wrapped_phases
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation.machine import usable_cores
@@ -173,7 +173,7 @@ def opencv(bench: Bench) -> list[Contender]:
 def scikit_image(bench: Bench) -> list[Contender]:
     from skimage.restoration import unwrap_phase
 
-    wrapped_rad = wrapped_phases(bench.shot, bench.config.fringes.numbers)[0]
+    wrapped_rad = wrapped_phases(linear_light(bench.shot), bench.config.fringes.numbers)[0]
     masked = np.ma.masked_array(wrapped_rad, ~np.isfinite(wrapped_rad))
 
     def run() -> Map:

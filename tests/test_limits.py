@@ -50,7 +50,6 @@ TO_DO = {
     "crates/quadfringe-python/src/decoder.rs::new",
     "crates/quadfringe/src/condition/mosaic/mod.rs::green_row",
     "crates/quadfringe/src/height/triangulator.rs",
-    "crates/quadfringe/src/published/mod.rs::run",
 }
 
 

@@ -24,27 +24,37 @@ __all__ = [
     "__profile__",
     "__version__",
     "background",
+    "block_means",
+    "block_size",
     "carrier",
     "check_code",
+    "columns_from_phase",
     "crc32",
+    "discard_invalid",
     "estimate_response",
     "estimate_response_of_shot",
     "exposure_in_frame_us",
+    "fill_gaps",
     "fourier",
+    "fourier_pair",
     "lightcrafters",
     "linear_light",
     "linear_light_bayer",
+    "modulation_ratio",
     "n_step",
+    "nearest_turn",
     "optimum",
     "outputs",
     "pack_flash",
     "pattern",
     "power_on_drive",
     "predeform",
+    "row_period",
     "step_pattern",
     "two_step",
     "udev_rule",
     "unwrap",
+    "wrong_order_probability",
     "xyz_from_column",
 ]
 
@@ -326,9 +336,17 @@ class PairTable:
         """Give the infrared phase, not wrapped, where the first absolute phase is known, both (H, W) rad."""
 
     def unwrap(
-        self, first: NDArray[np.float32], second: NDArray[np.float32], third: NDArray[np.float32]
+        self,
+        first: NDArray[np.float32],
+        second: NDArray[np.float32],
+        third: NDArray[np.float32],
+        *,
+        rows: int = 1,
     ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-        """Give absolute phase in rad and margin in [0, 1], as `unwrap` does, but searched along the camera rays."""
+        """Give absolute phase in rad and margin in [0, 1], as `unwrap` does, but searched along the camera rays.
+
+        With `rows`, the maps hold one row for each block of so many rows of the camera image.
+        """
 
 def step_pattern(
     fringe_number: float, shift_rad: float, width: int, height: int, *, axis: str = "columns", layout: str = "regular"
@@ -382,8 +400,71 @@ def background(image: NDArray[np.float32], period_px: float, *, kind: str | None
 def carrier(image: NDArray[np.float32]) -> _Vector2:
     """Give the fringe period in camera pixels along rows and along columns; infinite where there is none."""
 
-def two_step(red: NDArray[np.float32], blue: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Give the wrapped phase in rad of red and blue without their backgrounds, of equal modulation (S2)."""
+def row_period(image: NDArray[np.float32]) -> float:
+    """Give the fringe period along the rows in camera pixels, as the published decoder estimates it from red light.
+
+    It lies between 3 and the width of the image, which it is when no carrier stands out.
+    """
+
+def block_size(green_period_px: float, infrared_period_px: float, width: int) -> tuple[int, int]:
+    """Give rows and columns of the blocks whose means the published decoder works on, from the fringe periods."""
+
+def block_means(image: NDArray[np.float32], rows: int, columns: int) -> NDArray[np.float32]:
+    """Give the means over blocks of pixels, (ceil(H / rows), W // columns).
+
+    ValueError unless `columns` is a power of two.
+    """
+
+def fill_gaps(image: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give the image with each NaN replaced by the last value to its left, or the first one to its right."""
+
+def modulation_ratio(red: NDArray[np.float32], blue: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give the modulation of red over that of blue for each row, (H,), both without their backgrounds."""
+
+def two_step(
+    red: NDArray[np.float32], blue: NDArray[np.float32], *, coarse: bool = False
+) -> NDArray[np.float32]:
+    """Give the wrapped phase in rad of red and blue without their backgrounds, of equal modulation (S2).
+
+    The error of the arctangent is at most 4e-7 rad, with `coarse` 1.3e-5 rad, which is enough to select fringe orders.
+    """
+
+def fourier_pair(
+    first: NDArray[np.float32],
+    second: NDArray[np.float32],
+    periods: tuple[float, float],
+    columns: int,
+    width: int,
+) -> tuple[
+    tuple[NDArray[np.float32], NDArray[np.float32]],
+    tuple[NDArray[np.float32], NDArray[np.float32]],
+]:
+    """Give phase in rad and modulation, (B, width), of two sets of fringes without background (S3).
+
+    Both are means over blocks `columns` wide, (B, width // columns), whose `periods` are in samples. They share one
+    Fourier transform.
+    """
+
+def nearest_turn(wrapped_rad: NDArray[np.float32], estimate_rad: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give the wrapped phase with the turns that bring it nearest to an estimate of the absolute phase, in rad."""
+
+def discard_invalid(
+    phase_rad: NDArray[np.float32],
+    margin: NDArray[np.float32],
+    modulation: NDArray[np.float32],
+    *,
+    modulation_min: float,
+    quality_min: float,
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Give phase and quality: NaN where the modulation is too low, the phase also where the margin is too low."""
+
+def columns_from_phase(
+    phase_rad: NDArray[np.float32], fringe_numbers: _Vector3, projector_width: int
+) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Give absolute phase in rad and projector column, both NaN where no column of the projector lights the pixel."""
+
+def wrong_order_probability(quality: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give the probability in [0, 1] that the order of each pixel is wrong, from the margins of a whole shot."""
 
 def fourier(
     image: NDArray[np.float32], period_px: float, *, band: str | None = None, kind: str | None = None

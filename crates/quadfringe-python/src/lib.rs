@@ -8,6 +8,7 @@ mod height;
 mod memory;
 mod pair;
 mod projector;
+mod published_stages;
 mod stages;
 
 use pyo3::prelude::*;
@@ -40,6 +41,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::fourier, module)?)?;
     module.add_function(wrap_pyfunction!(stages::n_step, module)?)?;
     module.add_function(wrap_pyfunction!(stages::unwrap, module)?)?;
+    published_stages::register(module)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
     module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;

@@ -8,6 +8,7 @@ use quadfringe::FringeCode;
 use quadfringe::height;
 use quadfringe::optics::CoaxialPair;
 use quadfringe::rig::{Bench, Light};
+use quadfringe::stages::Phases;
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
 
@@ -74,17 +75,19 @@ impl PairTable {
     }
 
     /// Absolute phase and margin from three wrapped phases, searched along the rays.
+    #[pyo3(signature = (first, second, third, *, rows = 1))]
     fn unwrap<'py>(
         &self,
         py: Python<'py>,
         first: &Bound<'py, PyAny>,
         second: &Bound<'py, PyAny>,
         third: &Bound<'py, PyAny>,
+        rows: usize,
     ) -> PyResult<(Map<'py>, Map<'py>)> {
         let map = |name: &str, object| expected::<f32, 2>(name, object);
         let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
-        let views = maps.each_ref().map(PyReadonlyArray2::as_array);
-        let found = py.detach(|| self.0.unwrap(views)).map_err(value_error)?;
-        Ok((found.0.into_pyarray(py), found.1.into_pyarray(py)))
+        let views = Phases::from_array(maps.each_ref().map(PyReadonlyArray2::as_array));
+        let found = py.detach(|| self.0.unwrap_blocks(views, rows)).map_err(value_error)?;
+        Ok((found.phase_rad.into_pyarray(py), found.margin.into_pyarray(py)))
     }
 }

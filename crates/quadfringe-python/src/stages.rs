@@ -8,7 +8,7 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::{self, ResponseEstimate, Sample};
-use quadfringe::stages::{self, Background, Band};
+use quadfringe::stages::{self, Background, Band, Phases};
 use quadfringe::{BayerPattern, Conditioner, FringeCode, Shot};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
@@ -115,14 +115,17 @@ pub fn carrier(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(f64, f64)>
 
 /// Wrapped phase from R and B without their backgrounds, of equal modulation.
 #[pyfunction]
+#[pyo3(signature = (red, blue, *, coarse = false))]
 pub fn two_step<'py>(
     py: Python<'py>,
     red: &Bound<'py, PyAny>,
     blue: &Bound<'py, PyAny>,
+    coarse: bool,
 ) -> PyResult<Map<'py>> {
     let (red, blue) = (map("red", red)?, map("blue", blue)?);
-    let views = (red.as_array(), blue.as_array());
-    let found = py.detach(|| stages::two_step(views.0, views.1)).map_err(value_error)?;
+    let (red, blue) = (red.as_array(), blue.as_array());
+    let phase = if coarse { stages::two_step_coarse } else { stages::two_step };
+    let found = py.detach(|| phase(red, blue)).map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -154,9 +157,9 @@ pub fn unwrap<'py>(
 ) -> PyResult<(Map<'py>, Map<'py>)> {
     let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
     let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
-    let views = maps.each_ref().map(PyReadonlyArray2::as_array);
+    let views = Phases::from_array(maps.each_ref().map(PyReadonlyArray2::as_array));
     let found = py.detach(|| stages::unwrap(&code, views)).map_err(value_error)?;
-    Ok((found.0.into_pyarray(py), found.1.into_pyarray(py)))
+    Ok((found.phase_rad.into_pyarray(py), found.margin.into_pyarray(py)))
 }
 
 /// Wrapped phase, background and modulation from a stack of equal steps over one period, (steps, H, W).

@@ -13,7 +13,7 @@ use ndarray::Array2;
 use quadfringe::condition::linearise;
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
-use quadfringe::stages::{self, Background, Band};
+use quadfringe::stages::{self, Background, Band, Phases};
 use quadfringe::{
     BayerPattern, Conditioner, Decoded, Decoder, FringeCode, Method, Options, Result, Shot, surface,
 };
@@ -208,7 +208,9 @@ fn stages(c: &mut Criterion) {
     group.bench_function("improved Fourier", |b| b.iter(|| improved(black_box(green.view()))));
     let wrapped = [&red, &green, &infrared].map(|light| improved(light.view()).expect("a fair period"));
     let maps = wrapped.each_ref().map(|map| map.view());
-    group.bench_function("ladder", |b| b.iter(|| stages::unwrap(&scene.code, black_box(maps))));
+    group.bench_function("ladder", |b| {
+        b.iter(|| stages::unwrap(&scene.code, black_box(Phases::from_array(maps))))
+    });
     let triangulator = scene.triangulator().expect("the reference bench is calibrated");
     let columns = Array2::from_shape_fn(scene.shape(), |(_, x)| 100.0 + 0.7 * x as f32);
     group.bench_function("triangulation", |b| b.iter(|| triangulator.xyz_mm(black_box(columns.view()))));

@@ -5,6 +5,7 @@ mod common;
 use common::{bench, cast_scene, code, decode_planes, noisy};
 use ndarray::{Array2, Array3};
 use quadfringe::rig::{Light, Planes};
+use quadfringe::stages::Phases;
 use quadfringe::{
     Conditioner, Decoded, Decoder, Device, FringeCode, Method, Options, Response, Shot, condition, stages,
 };
@@ -100,7 +101,7 @@ fn plans_out_of_range_are_refused() {
     assert_says(settings(instants([0.0, f32::NAN, 1.0, 0.0])), &["channel_instants_us", "finite", "NaN"]);
     assert_says(settings(instants([5.0; 4])), &["channel_instants_us", "differ"]);
     let published = Options { method: Method::Published, ..instants([-1.0, 0.0, 1.0, 0.0]) };
-    assert_says(settings(published), &["channel_instants_us", "best"]);
+    assert_says(settings(published), &["channel_instants_us", "joint"]);
     let response = [Response { exponent: -1.0, ..Response::default() }; 4];
     let light = Conditioner { response, ..Conditioner::default() };
     assert_says(plan(light, plain), &["exponent", "-1"]);
@@ -110,7 +111,7 @@ fn plans_out_of_range_are_refused() {
 fn stages_refuse_maps_that_do_not_fit() {
     let (a, b) = (Array2::<f32>::zeros((4, 8)), Array2::<f32>::zeros((4, 9)));
     assert!(stages::two_step(a.view(), b.view()).is_err());
-    assert!(stages::unwrap(&code(), [a.view(), a.view(), b.view()]).is_err());
+    assert!(stages::unwrap(&code(), Phases::from_array([a.view(), a.view(), b.view()])).is_err());
     assert!(stages::n_step(Array3::<f32>::zeros((2, 4, 8)).view()).is_err());
     let black = Array3::<f32>::zeros((12, 32, 32));
     assert!(condition::estimate_response(&[black.view()]).is_err());

@@ -7,6 +7,7 @@ use ndarray::{Array2, s};
 use proptest::prelude::*;
 use quadfringe::optics::rotation_from_vector;
 use quadfringe::rig::{Bench, BitDepth, Light, Planes, RenderOptions};
+use quadfringe::stages::{Absolute, Phases};
 use quadfringe::{
     Channel, Conditioner, Decoder, Device, DmdLayout, FringeCode, Method, Options, Shot, encoding, stages,
 };
@@ -62,7 +63,8 @@ proptest! {
                 wrap(encoding::phase_at(&code, i, columns[x]) + errors[32 * i + x]) as f32
             })
         });
-        let (phase, margin) = stages::unwrap(&code, maps.each_ref().map(|m| m.view())).expect("same size");
+        let wrapped = Phases::from_array(maps.each_ref().map(|m| m.view()));
+        let Absolute { phase_rad: phase, margin, .. } = stages::unwrap(&code, wrapped).expect("same size");
         for (x, column) in columns.iter().enumerate() {
             let truth = encoding::phase_at(&code, 0, *column) + errors[x];
             prop_assert!((f64::from(phase[[0, x]]) - truth).abs() < 1e-3, "column {column}");
@@ -71,7 +73,8 @@ proptest! {
         let maps: [Array2<f32>; 3] = std::array::from_fn(|i| {
             Array2::from_shape_fn(shape, |(_, x)| strangers[32 * i + x])
         });
-        let (phase, _) = stages::unwrap(&code, maps.each_ref().map(|m| m.view())).expect("same size");
+        let wrapped = Phases::from_array(maps.each_ref().map(|m| m.view()));
+        let phase = stages::unwrap(&code, wrapped).expect("same size").phase_rad;
         for (given, found) in maps[0].iter().zip(&phase) {
             prop_assert!(wrap(f64::from(found - given)).abs() < 1e-3);
         }

@@ -1,47 +1,116 @@
-"""The stages of the published chain one by one, for those who teach or debug; `decode` does them all at once.
+"""The stages of the published method one by one, to teach and to debug; `decode` runs them all at once.
 
+The recipe, step by step as in docs/method/published.md. Each line can be changed:
+
+>>> import numpy as np
 >>> import quadfringe as qf
 >>> from quadfringe import stages
 >>> with qf.open() as scanner:
-...     wrapped = stages.wrapped_phases(scanner.grab(), (36.0, 35.0, 30.0))
->>> wrapped[0].shape
-(768, 1024)
+...     shot, calibration = scanner.grab(), scanner.calibration
+>>> light = stages.linear_light(shot, calibration)  # 1. linear light (S1)
+>>> wrapped = stages.demodulate(light, (36, 35, 30))  # 2. to 4. background, phases of blocks and of pixels (S2, S3)
+>>> phase_rad, margin = stages.order(wrapped, (36, 35, 30), 912)  # 5. and 6. fringe orders (S4), absolute phase
+>>> phase_rad, quality = stages.discard_invalid(  # 6. low modulation and doubtful orders are no data
+...     phase_rad, margin, wrapped.modulation, modulation_min=0.02, quality_min=0.15
+... )
+>>> phase_rad, column_px = stages.columns_from_phase(phase_rad, (36, 35, 30), 912)  # 8. projector column
+>>> plan = qf.Plan(912, decode=qf.DecodeConfig(method="published"), calibration=calibration, response=qf.Response())
+>>> np.array_equal(phase_rad, qf.decode(shot, plan).phase_rad, equal_nan=True)
+True
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe._core import background, carrier, fourier, n_step, two_step, unwrap
+from quadfringe._core import (
+    background,
+    block_means,
+    block_size,
+    carrier,
+    columns_from_phase,
+    discard_invalid,
+    fill_gaps,
+    fourier,
+    fourier_pair,
+    modulation_ratio,
+    n_step,
+    nearest_turn,
+    row_period,
+    two_step,
+    unwrap,
+    wrong_order_probability,
+)
 from quadfringe.config import ChannelResponse, Response
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.errors import DecodeError
 
 __all__ = [
+    "Wrapped",
     "background",
+    "block_means",
+    "block_size",
     "carrier",
+    "columns_from_phase",
+    "demodulate",
+    "discard_invalid",
+    "fill_gaps",
     "fourier",
+    "fourier_pair",
     "linear_light",
+    "modulation_ratio",
     "n_step",
+    "nearest_turn",
+    "order",
     "response_of_shot",
+    "row_period",
     "two_step",
     "unwrap",
     "wrapped_phases",
+    "wrong_order_probability",
 ]
 
 Map = NDArray[np.float32]
+FringeNumbers = tuple[float, float, float]
+
+
+class Wrapped(NamedTuple):
+    """Phases of one shot before unwrapping, float32.
+
+    Orders are found on means over blocks of a few rows, (B, W) with one row for each block; the phase of the result is
+    that of single pixels, (H, W).
+    """
+
+    phase_rad: Map
+    """Wrapped phase of R and B at every pixel, (H, W), rad (S2)."""
+    modulation: Map
+    """Least modulation of all channels, (H, W), fraction of full scale; NaN where IR has no data."""
+    red_blue_rad: Map
+    """Wrapped phase of the block means of R and B, (B, W), rad."""
+    green_rad: Map
+    """Phase of the block means of G, (B, W), rad, up to whole turns (S3)."""
+    infrared_rad: Map
+    """The same of IR."""
+    rows: int
+    """Rows of a block."""
+
+    def repeated(self, blocks: Map) -> Map:
+        """Give a map of blocks, (B, W), at every pixel, (H, W)."""
+        return np.repeat(blocks, self.rows, axis=0)[: len(self.phase_rad)]
 
 
 def linear_light(
     shot: AnyShot, calibration: Calibration | None = None, response: Response | None = None
 ) -> dict[str, Map]:
-    """Give the channels as linear light, fractions of full scale, (H, W) float32 (step 1 of the chain, S1).
+    """Give the channels as linear light, fractions of full scale, (H, W) float32, by name (S1).
 
-    Dark level, response, crosstalk and registration are those of the `calibration`; `response` stands in for its
-    own. Without either, intensities are taken as linear. NaN where the infrared chip does not see the point. The
-    colours of a raw mosaic are interpolated at every pixel, from samples made linear.
+    Dark level, response, crosstalk and registration come from the `calibration`; a `response` replaces its response.
+    Without either, intensities are taken as linear. IR is NaN where its chip does not see the point. The colours of a
+    raw mosaic are interpolated at every pixel from linear samples.
     """
     known = conditioning(calibration, response)
     if isinstance(shot, BayerShot):
@@ -58,9 +127,9 @@ def response_of_shot(
 ) -> Response | None:
     """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; None for linear light.
 
-    The phase of a shot whose response was not undone is bent itself: decode again with what was found, and repeat;
-    `quadfringe.estimate_response` does. A channel that shows nothing stays linear. Dark level and registration are
-    those of the `calibration`. ValueError when the sizes differ.
+    Without the right response the phase is wrong too, so decode again with the result and repeat, as
+    `quadfringe.estimate_response` does. A channel without fringes stays linear. Dark level and registration come from
+    the `calibration`. ValueError when the sizes differ.
     """
     light = linear_light(shot, calibration)
     found = _core.estimate_response_of_shot(
@@ -71,20 +140,77 @@ def response_of_shot(
     return Response(**channels) if channels else None
 
 
-def wrapped_phases(shot: AnyShot, fringe_numbers: tuple[float, float, float]) -> tuple[Map, Map, Map]:
+def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
+    """Give the phases and the modulation of linear light by name, each (H, W) float32 (S2, S3).
+
+    The fringe period comes from the red image. Raises `DecodeError` when no fringes cross the rows.
+    """
+    red, blue = light["red"], light["blue"]
+    period_px = row_period(red)
+    if not np.isfinite(carrier(red)[0]):
+        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
+    first, second, third = fringe_numbers
+    green_px, infrared_px = period_px * first / second, period_px * first / third
+    rows, columns = block_size(green_px, infrared_px, red.shape[1])
+    red_means, red_level = _fringes(red, rows, 1, period_px)
+    blue_means, blue_level = _fringes(blue, rows, 1, period_px)
+    ratio = modulation_ratio(red_means, blue_means)[:, np.newaxis]
+    green_means, _ = _fringes(light["green"], rows, columns, green_px)
+    infrared_means, _ = _fringes(fill_gaps(light["ir"]), rows, columns, infrared_px)
+    periods = (green_px / columns, infrared_px / columns)
+    found = fourier_pair(green_means, infrared_means, periods, columns, red.shape[1])
+    (green, green_modulation), (infrared, infrared_modulation) = found
+
+    def pixels(blocks: Map) -> Map:
+        return np.repeat(blocks, rows, axis=0)[: len(red)]
+
+    red_fringes = red - pixels(red_level)
+    blue_fringes = (blue - pixels(blue_level)) * pixels(ratio)
+    modulation = np.sqrt(red_fringes * red_fringes + blue_fringes * blue_fringes)
+    least = np.fmin(modulation, np.fmin(pixels(green_modulation), pixels(infrared_modulation)))
+    least[np.isnan(light["ir"])] = np.nan
+    return Wrapped(
+        phase_rad=two_step(red_fringes, blue_fringes),
+        modulation=least,
+        red_blue_rad=two_step(red_means, blue_means * ratio, coarse=True),
+        green_rad=green,
+        infrared_rad=infrared,
+        rows=rows,
+    )
+
+
+def order(
+    wrapped: Wrapped, fringe_numbers: FringeNumbers, projector_width_px: int, rays: _core.PairTable | None = None
+) -> tuple[Map, Map]:
+    """Give absolute phase in rad and margin of the order, (H, W), by the ladder of beats (S4).
+
+    With `rays`, a table of two calibrated projectors, orders are searched along the camera rays.
+    """
+    phases = (wrapped.red_blue_rad, wrapped.green_rad, wrapped.infrared_rad)
+    if rays is None:
+        means_rad, margin = unwrap(*phases, fringe_numbers, projector_width_px)
+    else:
+        means_rad, margin = rays.unwrap(*phases, rows=wrapped.rows)
+    return nearest_turn(wrapped.phase_rad, wrapped.repeated(means_rad)), wrapped.repeated(margin)
+
+
+def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tuple[Map, Map, Map]:
     """Give the wrapped phases in rad, (H, W): red and blue by two steps (S2), green and infrared by Fourier (S3).
 
     Raises `DecodeError` when no fringes cross the rows.
     """
-    light = linear_light(shot)
-    period_px, _ = carrier(light["red"])
-    if not np.isfinite(period_px):
-        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
-    red, blue = (light[name] - background(light[name], period_px) for name in ("red", "blue"))
-    blue *= float(np.sqrt(np.square(red).mean() / max(np.square(blue).mean(), 1e-12)))
-    first, second, third = fringe_numbers
-    return (
-        two_step(red, blue),
-        fourier(light["green"], period_px * first / second),
-        fourier(light["ir"], period_px * first / third),
-    )
+    wrapped = demodulate(light, fringe_numbers)
+    green_rad, infrared_rad = (_wrap(wrapped.repeated(phase)) for phase in (wrapped.green_rad, wrapped.infrared_rad))
+    return wrapped.phase_rad, green_rad, infrared_rad
+
+
+def _wrap(phase_rad: Map) -> Map:
+    turn = np.float32(2 * np.pi)
+    return (phase_rad - turn * np.round(phase_rad / turn)).astype(np.float32)
+
+
+def _fringes(image: Map, rows: int, columns: int, period_px: float) -> tuple[Map, Map]:
+    """Give block means less their background, and the background by the mean envelope."""
+    means = block_means(image, rows, columns)
+    level = background(means, period_px / columns, kind="mean_envelope")
+    return means - level, level

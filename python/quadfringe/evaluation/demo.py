@@ -9,7 +9,7 @@ from time import perf_counter
 from quadfringe.config import SceneConfig, SystemConfig
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding.compare import compare
-from quadfringe.decoding.stages import wrapped_phases
+from quadfringe.decoding.stages import linear_light, wrapped_phases
 from quadfringe.scanner import Scanner, open_system
 from quadfringe.view.report import write_report
 
@@ -38,7 +38,7 @@ def run_scene(surface: str, out: Path) -> SceneResult:
     numbers = config.fringes.numbers
     found = compare(shape, shot.truth, scanner.projector_width_px / numbers[0])
     shape.save(out / f"{surface}.ply")
-    wrapped = wrapped_phases(shot, numbers)
+    wrapped = wrapped_phases(linear_light(shot, scanner.calibration), numbers)
     write_report(out / f"{surface}.png", surface, shot, shape, wrapped, found)
     figures = {
         f"{surface}_depth_rms_mm": found.depth_rms_mm,

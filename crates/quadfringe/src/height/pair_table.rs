@@ -13,7 +13,7 @@ use super::Triangulator;
 use crate::FringeCode;
 use crate::error::{Error, Result};
 use crate::optics::{CoaxialPair, Device};
-use crate::stages::{AlongRay, RayRow};
+use crate::stages::{Absolute, AlongRay, Phases, RayRow};
 
 /// Coefficients of the cubic.
 const NODES: usize = 4;
@@ -73,7 +73,8 @@ impl PairTable {
             let expected = format!("{width_px}, the columns of the visible projector");
             return Err(Error::value("columns of the fringes", expected, code.projector_width()));
         }
-        let [first, _, third] = code.numbers().map(|number| number * TAU);
+        let Phases { quadrature: first, infrared: third, .. } =
+            Phases::from_array(code.numbers()).map(|number| number * TAU);
         let triangulator = Triangulator::new(camera, pair.visible())?;
         let plan = Plan { camera, pair, triangulator, range_mm, first, third };
         let (rows, columns) = (camera.height, camera.width);
@@ -98,7 +99,7 @@ impl PairTable {
         let columns = self.shape.1;
         let lines = &self.numbers[row * LINES * columns..][..LINES * columns];
         let line = |k: usize| &lines[k * columns..][..columns];
-        RayRow { infrared: std::array::from_fn(line), range_rad: [line(NODES), line(NODES + 1)] }
+        RayRow { infrared: std::array::from_fn(line), low_rad: line(NODES), high_rad: line(NODES + 1) }
     }
 
     /// The infrared phase in rad, not wrapped, at every pixel of a map of first absolute phases in rad; NaN in, NaN out,
@@ -107,47 +108,67 @@ impl PairTable {
     /// # Errors
     /// [`Error::Shape`] when the map has another size than the camera image.
     pub fn infrared_rad(&self, phase_rad: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
-        self.check("phase map", phase_rad)?;
+        check("phase map", phase_rad, self.shape)?;
         Ok(Array2::from_shape_fn(self.shape, |(row, column)| {
             self.row(row).infrared_rad(column, phase_rad[[row, column]])
         }))
     }
 
-    /// Absolute phase in rad and margin in [0, 1], both `(rows, columns)`, from three wrapped phases in rad: of all points
-    /// of a camera ray the one whose second and third phase are met best. The margin is 1 when they are met exactly and 0
-    /// when another candidate is as good. NaN in, NaN out, and where no candidate lies on the ray.
+    /// Absolute phase and margin, both `(rows, columns)`, from wrapped phases in rad: of all points on a camera ray the one
+    /// whose green and infrared phase agree best with the measured ones. NaN in, NaN out; NaN also where no candidate lies
+    /// on the ray.
     ///
     /// # Errors
     /// [`Error::Shape`] when a map has another size than the camera image.
-    pub fn unwrap(&self, wrapped: [ArrayView2<'_, f32>; 3]) -> Result<(Array2<f32>, Array2<f32>)> {
-        for (map, name) in wrapped.iter().zip(["first", "second", "third"]) {
-            self.check(&format!("{name} wrapped phase"), *map)?;
-        }
-        let wrapped = wrapped.map(|map| map.as_standard_layout().into_owned());
-        let mut phase = Array2::from_elem(self.shape, f32::NAN);
-        let mut margin = phase.clone();
-        let rows = (phase.axis_iter_mut(Axis(0)).into_par_iter()).zip(margin.axis_iter_mut(Axis(0)));
-        rows.enumerate().for_each(|(y, (mut phase, mut margin))| {
-            let contiguous = "rows in standard layout are contiguous";
-            let wrapped = wrapped.each_ref().map(|map| map.row(y).to_slice().expect(contiguous));
-            let phase = phase.as_slice_mut().expect(contiguous);
-            self.order_row(y, wrapped, phase, margin.as_slice_mut().expect(contiguous));
-        });
-        Ok((phase, margin))
+    pub fn unwrap(&self, wrapped_rad: Phases<ArrayView2<'_, f32>>) -> Result<Absolute> {
+        self.unwrap_blocks(wrapped_rad, 1)
     }
 
-    /// The same for one row of pixels.
+    /// The same for means over blocks of `rows` rows, of [`block_means`](crate::stages::block_means): one row of the maps
+    /// for each block, whose rays are those of its middle row.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] when a map has another number of blocks or columns than the camera image;
+    /// [`Error::Value`] when `rows` is 0.
+    pub fn unwrap_blocks(&self, wrapped_rad: Phases<ArrayView2<'_, f32>>, rows: usize) -> Result<Absolute> {
+        if rows == 0 {
+            return Err(Error::value("rows of a block", "at least 1", rows));
+        }
+        let (height, columns) = self.shape;
+        let shape = (height.div_ceil(rows), columns);
+        let Phases { quadrature, green, infrared } = wrapped_rad;
+        for (name, map) in
+            [("quadrature phase", quadrature), ("green phase", green), ("infrared phase", infrared)]
+        {
+            check(name, map, shape)?;
+        }
+        let wrapped = wrapped_rad.map(|map| map.as_standard_layout().into_owned());
+        let empty = || Array2::from_elem(shape, f32::NAN);
+        let (mut phase_rad, mut margin) = (empty(), empty());
+        let maps = (phase_rad.axis_iter_mut(Axis(0)).into_par_iter()).zip(margin.axis_iter_mut(Axis(0)));
+        maps.enumerate().for_each(|(block, (mut phase, mut margin))| {
+            let contiguous = "rows in standard layout are contiguous";
+            let wrapped = wrapped.as_ref().map(|map| map.row(block).to_slice().expect(contiguous));
+            let phase = phase.as_slice_mut().expect(contiguous);
+            let first = block * rows;
+            let middle = first + rows.min(height - first) / 2;
+            self.order_row(middle, wrapped, phase, margin.as_slice_mut().expect(contiguous));
+        });
+        Absolute::new(phase_rad, margin)
+    }
+
+    /// The same for one row of pixels with the rays of row `y`.
     #[inline(always)]
-    pub(crate) fn order_row(&self, y: usize, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
+    pub(crate) fn order_row(&self, y: usize, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
         self.search.order_row(wrapped, &self.row(y), phase, margin);
     }
+}
 
-    fn check(&self, name: &str, map: ArrayView2<'_, f32>) -> Result<()> {
-        if map.dim() == self.shape {
-            return Ok(());
-        }
-        Err(Error::shape(name, &[self.shape.0, self.shape.1], map.shape()))
+fn check(name: &str, map: ArrayView2<'_, f32>, shape: (usize, usize)) -> Result<()> {
+    if map.dim() == shape {
+        return Ok(());
     }
+    Err(Error::shape(name, &[shape.0, shape.1], map.shape()))
 }
 
 struct Plan<'a> {

@@ -1,67 +1,148 @@
-//! The published chain: every strip of a few rows on its own, from bytes to absolute phase.
+//! THE RECIPE of the published method: one exposure to absolute phase, in the steps of `docs/method/published.md`.
+//!
+//! | step | stage | equation |
+//! |---|---|---|
+//! | 1 linear light, registered, without crosstalk | `condition::linearise` | (S1) |
+//! | 2 fringe period, and the background by the mean envelope | `row_period_px`, `block_means`, `background` | |
+//! | 3 two-step phase of R and B with equal modulations | `modulation_ratio`, `two_step` | (S2) |
+//! | 4 Fourier phase of G and IR in the improved band | `fourier_pair` | (S3) |
+//! | 5 fringe orders by the ladder of beats | `unwrap` | (S4) |
+//! |   or along the camera rays | `PairTable::unwrap_blocks` | |
+//! | 6 absolute phase of each pixel; low modulation and doubtful orders are no data | `nearest_turn`, `discard_invalid` | |
+//! | 7 uncertainty and wrong-order probability | `wrong_order_probability` | |
+//! | 8 projector column and height | `columns_from_phase`, `height::Triangulator` | (S7) |
+//!
+//! Orders are found on means over blocks of a few pixels, whose noise is lower; the phase stays that of single pixels. For
+//! a given `code`, `shot` and `conditioner`, the functions of [`stages`](crate::stages) give the same bits as the decoder
+//! (`tests/stages.rs` compares every map):
+//!
+//! ```
+//! # use ndarray::{Array2, ArrayView2, Zip};
+//! # use quadfringe::condition::linearise;
+//! # use quadfringe::encoding::{Channel, DmdLayout, pattern};
+//! # use quadfringe::stages::*;
+//! # use quadfringe::{Conditioner, Decoder, FringeCode, Method, Options, Shot};
+//! # let code = FringeCode::optimum(16, 400)?;
+//! # let planes = Channel::ALL.map(|channel| pattern(&code, channel, 64, DmdLayout::Regular));
+//! # let shot = Shot::new(planes.each_ref().map(|plane| plane.view()))?;
+//! # let conditioner = Conditioner::default();
+//! # let (height, width) = (64, 400);
+//! // 1. Linear light (S1). The Fourier filter needs rows without gaps.
+//! let [red, green, blue, infrared] = linearise(&shot, &conditioner)?;
+//! let filled = fill_gaps(infrared.view());
+//! // 2. The fringe period along the rows, and the period of each phase in proportion to its fringe number.
+//! let numbers = Phases::from_array(code.numbers());
+//! let period_px = row_period_px(red.view());
+//! let periods_px = numbers.map(|number| period_px * numbers.quadrature / number);
+//! let blocks = Blocks::for_periods(periods_px.green as f32, periods_px.infrared as f32, width);
+//! // 2. Background by the mean envelope, of means over the rows of each block.
+//! let fringes = |image: &Array2<f32>, columns: usize, period_px: f64| {
+//!     let means = block_means(image.view(), blocks.rows, columns)?;
+//!     let level = background(means.view(), Background::MeanEnvelope, period_px / columns as f64)?;
+//!     Ok::<_, quadfringe::Error>((means - &level, level))
+//! };
+//! let (red_means, red_level) = fringes(&red, 1, periods_px.quadrature)?;
+//! let (blue_means, blue_level) = fringes(&blue, 1, periods_px.quadrature)?;
+//! let (green_means, _) = fringes(&green, blocks.columns, periods_px.green)?;
+//! let (infrared_means, _) = fringes(&filled, blocks.columns, periods_px.infrared)?;
+//! // 3. Two-step phase of R and B (S2), of the means and of single pixels.
+//! let ratio = modulation_ratio(red_means.view(), blue_means.view())?.insert_axis(ndarray::Axis(1));
+//! let pixels = |map: ArrayView2<f32>| repeat_rows(map, blocks.rows, height);
+//! let coarse = two_step_coarse(red_means.view(), (&blue_means * &ratio).view())?;
+//! let red_fringes = red - pixels(red_level.view())?;
+//! let blue_fringes = (blue - pixels(blue_level.view())?) * pixels(ratio.view())?;
+//! let wrapped = two_step(red_fringes.view(), blue_fringes.view())?;
+//! // 4. Fourier phase of G and IR (S3).
+//! let period = |period_px: f64| period_px / blocks.columns as f64;
+//! let green = Fringes { means: green_means.view(), period: period(periods_px.green) };
+//! let ir = Fringes { means: infrared_means.view(), period: period(periods_px.infrared) };
+//! let [green, ir] = fourier_pair(green, ir, blocks.columns, width)?;
+//! // 5. Fringe orders of the means by the ladder of beats (S4).
+//! let phases = Phases { quadrature: coarse.view(), green: green.phase_rad.view(), infrared: ir.phase_rad.view() };
+//! let means = unwrap(&code, phases)?;
+//! // 6. Absolute phase of single pixels.
+//! let phase_rad = nearest_turn(wrapped.view(), pixels(means.phase_rad.view())?.view())?;
+//! let absolute = Absolute::new(phase_rad, pixels(means.margin.view())?)?;
+//! // 6. Low modulation is no data. The least of all channels counts, and gaps in IR have none.
+//! let mut modulation = modulation(red_fringes.view(), blue_fringes.view())?;
+//! let (green, ir) = (pixels(green.modulation.view())?, pixels(ir.modulation.view())?);
+//! Zip::from(&mut modulation).and(&green).and(&ir).for_each(|least, green, ir| *least = least.min(*green).min(*ir));
+//! Zip::from(&mut modulation).and(&infrared).for_each(|least, ir| if ir.is_nan() { *least = f32::NAN });
+//! let limits = Limits { modulation_min: 0.02, quality_min: 0.15 };
+//! let valid = discard_invalid(&absolute, modulation.view(), limits)?;
+//! // 7. Probability of a wrong order.
+//! let wrong = wrong_order_probability(valid.quality.view());
+//! // 8. Projector columns, from which the height follows (S7).
+//! let columns = columns_from_phase(&code, valid.phase_rad.view());
+//! # let options = Options { method: Method::Published, ..Options::default() };
+//! # let decoded = Decoder::new(code, [height, width], &conditioner, options)?.decode(&shot)?;
+//! # let bits = |map: &Array2<f32>| map.mapv(f32::to_bits);
+//! # assert_eq!(bits(&columns.column_px), bits(&decoded.column_px));
+//! # assert_eq!(bits(&valid.quality), bits(&decoded.quality));
+//! # assert_eq!(bits(&modulation), bits(&decoded.modulation));
+//! # Ok::<(), quadfringe::Error>(())
+//! ```
+//!
+//! The decoder takes the same steps strip by strip (`strip.rs`); a strip has the rows of one block.
 
-mod means;
+mod statistics;
 mod strip;
 mod uncertainty;
 
 use crate::condition::{Plan, Sample};
 use crate::decode::options::Options;
 use crate::decode::output::Decoded;
-use crate::decode::output::{Finish, OutputRow, ROWS_AT_ONCE};
+use crate::decode::output::{Finish, ROWS_AT_ONCE};
 use crate::height::PairTable;
 use crate::parallel::slots::Slots;
-use crate::stages::Ladder;
-use crate::stages::{Band, LineSpectrum, RowFilter};
+use crate::stages::{Band, Blocks, Ladder, Limits, LineSpectrum, Phases, RowFilter, period_rows};
 use crate::{FringeCode, Shot};
 use ndarray::ArrayView1;
 use rayon::prelude::*;
-use strip::{Strip, StripPlan, decode_strip};
-use uncertainty::Sureness;
+use strip::{FourierPair, Strip, StripPlan, decode_strip};
+use uncertainty::ShotStatistics;
 
-/// Rows of the red image that are looked at for the carrier.
-const CARRIER_ROWS: usize = 16;
-/// One pixel in so many of those rows is asked for noise and margin.
-const LOOK_STRIDE: usize = 3;
-
-/// Fewest samples of a fringe of G or IR when means of two or four pixels of a row take the place of pixels. The band ends at 2.3 times the
-/// carrier, where a turn has more than five of them: from one to the next the phase is far from half a turn, and nearly
-/// straight in between.
-const SAMPLES_PER_FRINGE: f32 = 13.0;
-
-/// Rows of a strip for each pixel of a row that goes into a mean.
-const ROWS_PER_PIXEL: usize = 2;
-
-/// How the order of a pixel is found.
+/// How fringe orders are found.
 enum Unwrapping {
-    /// By beats, taking both projectors as one.
+    /// By the ladder of beats, which takes both projectors as coaxial.
     Ladder(Ladder),
-    /// Among the points of the camera ray.
+    /// Along the camera ray, with both projectors calibrated.
     AlongRay(Box<PairTable>),
 }
 
+/// The published method for images of one size, planned once.
 pub(crate) struct Published {
     unwrapping: Unwrapping,
-    /// For rows of pixels, and of means of two and of four.
-    filters: [RowFilter; 3],
+    /// One Fourier filter for each width of blocks.
+    filters: Vec<SizedFilter>,
     spectrum: LineSpectrum,
     slots: Slots<Strip>,
-    numbers: [f64; 3],
+    numbers: Phases<f64>,
+    /// Rows and columns of the images.
     shape: [usize; 2],
+}
+
+/// The Fourier filter for rows of means over so many columns.
+struct SizedFilter {
+    columns: usize,
+    filter: RowFilter,
 }
 
 impl Published {
     pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
+        let filter =
+            |columns: usize| SizedFilter { columns, filter: RowFilter::new((shape[1] / columns).max(1)) };
         Self {
             unwrapping: Unwrapping::Ladder(Ladder::new(code)),
-            filters: [1, 2, 4].map(|pixels| RowFilter::new((shape[1] / pixels).max(1))),
+            filters: Blocks::all_columns().map(filter).collect(),
             spectrum: LineSpectrum::new(shape[1]),
             slots: Slots::default(),
-            numbers: code.numbers(),
+            numbers: Phases::from_array(code.numbers()),
             shape,
         }
     }
 
-    /// Search the camera rays from now on.
+    /// Search along the camera rays from now on.
     pub fn unwrap_along_rays(&mut self, table: PairTable) {
         self.unwrapping = Unwrapping::AlongRay(Box::new(table));
     }
@@ -72,108 +153,70 @@ impl Published {
 
     pub fn run<T: Sample>(
         &mut self,
-        plan: &Plan,
+        conditioning: &Plan,
         shot: &Shot<'_, T>,
         options: &Options,
         finish: &Finish<'_>,
         out: &mut Decoded,
     ) {
-        let period = match options.period_px {
-            Some(period) => period,
-            None => self.period_px(plan, shot),
+        // 2. The fringe period.
+        let period_px = match options.period_px {
+            Some(period_px) => period_px,
+            None => self.period_px(conditioning, shot),
         };
-        let periods_px = self.numbers.map(|n| (period * self.numbers[0] / n) as f32);
-        let finest = periods_px[1].min(periods_px[2]).min(self.shape[1] as f32);
-        let sparse = |halvings: &usize| finest >= SAMPLES_PER_FRINGE * (1 << halvings) as f32;
-        let halvings = (1..self.filters.len()).take_while(sparse).last().unwrap_or(0);
-        let (filter, pixels) = (&self.filters[halvings], 1 << halvings);
-        let weights = |period_px: f32| filter.weights(Band::Improved, period_px / pixels as f32, pixels);
-        let mut strips = StripPlan {
-            conditioning: plan,
-            unwrapping: &self.unwrapping,
-            filter,
-            pixels,
-            rows: ROWS_PER_PIXEL * pixels,
-            periods_px,
-            weights: [weights(periods_px[1]), weights(periods_px[2])],
-            modulation_min: options.modulation_min,
-            quality_min: options.quality_min,
-            sureness: Sureness::none(),
-        };
+        let mut plan = self.plan(conditioning, options, period_px);
         let mut rows = out.row_by_row();
-        strips.sureness = self.look(&strips, shot, &mut rows);
-        let strips = strips;
-        rows.par_chunks_mut(strips.rows)
-            .with_min_len(ROWS_AT_ONCE.div_ceil(strips.rows))
+        // 7. Uncertainties follow from statistics of the shot, which a few strips give.
+        plan.statistics = self.sample(&plan, shot, &mut rows);
+        let plan = plan;
+        rows.par_chunks_mut(plan.blocks.rows)
+            .with_min_len(ROWS_AT_ONCE.div_ceil(plan.blocks.rows))
             .enumerate()
             .for_each_init(
                 || self.slots.take(),
                 |strip, (index, rows)| {
-                    let first = index * strips.rows;
-                    if self.looked_at(first, rows.len()).next().is_some() {
-                        rows.iter_mut().for_each(|row| strips.sureness.tell(row));
+                    let first = index * plan.blocks.rows;
+                    if self.has_sampled_rows(first, rows.len()) {
+                        rows.iter_mut().for_each(|row| plan.statistics.complete(row));
                     } else {
-                        decode_strip(strip, &strips, shot, first, rows);
+                        // 1. to 7., strip by strip.
+                        decode_strip(strip, &plan, shot, first, rows);
                     }
+                    // 8. Columns and heights (S7).
                     rows.iter_mut().zip(first..).for_each(|(row, y)| finish.row(y, row));
                 },
             );
     }
 
-    /// Those of `count` rows from the `first` on that tell what all have in common: they have neighbours above and below.
-    fn looked_at(&self, first: usize, count: usize) -> impl Iterator<Item = usize> {
-        let height = self.shape[0];
-        let every = height.div_ceil(CARRIER_ROWS);
-        let told = move |y: &usize| y % every == 1 % every && (1..height - 1).contains(y);
-        (first..first + count).filter(told)
+    /// What the strips of a shot with this fringe period share, before its statistics are known.
+    fn plan<'a>(&'a self, conditioning: &'a Plan, options: &Options, period_px: f64) -> StripPlan<'a> {
+        let numbers = self.numbers;
+        let periods_px = numbers.map(|number| (period_px * numbers.quadrature / number) as f32);
+        let blocks = Blocks::for_periods(periods_px.green, periods_px.infrared, self.shape[1]);
+        let sized = self.filters.iter().find(|sized| sized.columns == blocks.columns);
+        let filter = &sized.expect("a filter for every width of blocks").filter;
+        let pixels = blocks.columns;
+        let weights = |period_px: f32| filter.weights(Band::Improved, period_px / pixels as f32, pixels);
+        StripPlan {
+            conditioning,
+            unwrapping: &self.unwrapping,
+            filter,
+            weights: FourierPair { green: weights(periods_px.green), infrared: weights(periods_px.infrared) },
+            blocks,
+            periods_px,
+            limits: Limits { modulation_min: options.modulation_min, quality_min: options.quality_min },
+            statistics: ShotStatistics::unit_noise(),
+        }
     }
 
-    /// Noise of the shot and of its orders, from a few rows, whose strips are decoded in units of the noise.
-    fn look<T: Sample>(
-        &self,
-        plan: &StripPlan<'_>,
-        shot: &Shot<'_, T>,
-        rows: &mut [OutputRow<'_>],
-    ) -> Sureness {
-        let width = self.shape[1];
-        let strips = rows.chunks_mut(plan.rows).enumerate().map(|(index, rows)| (index * plan.rows, rows));
-        let strips: Vec<_> =
-            strips.filter(|(first, rows)| self.looked_at(*first, rows.len()).next().is_some()).collect();
-        let seen = strips.into_par_iter().map_init(
-            || (self.slots.take(), [vec![0.0; width], vec![0.0; width]]),
-            |(strip, bend), (first, rows)| {
-                decode_strip(strip, plan, shot, first, rows);
-                let (mut bends, mut margins) = (Vec::new(), Vec::new());
-                for y in self.looked_at(first, rows.len()) {
-                    for (other, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
-                        plan.conditioning.row(shot, other, &mut strip.light(width));
-                        for (bend, light) in bend.iter_mut().zip([strip.red(), strip.blue()]) {
-                            let kept = if other < y { 0.0 } else { 1.0 };
-                            bend.iter_mut()
-                                .zip(light)
-                                .for_each(|(bend, light)| *bend = kept * *bend + weight * light);
-                        }
-                    }
-                    let quality = &rows[y - first].quality;
-                    let trusted = || (0..width).step_by(LOOK_STRIDE).filter(|&x| quality[x].is_finite());
-                    bends.extend(trusted().flat_map(|x| [bend[0][x], bend[1][x]]));
-                    margins.extend(trusted().map(|x| quality[x]));
-                }
-                (bends, margins)
-            },
-        );
-        let (bends, margins): (Vec<_>, Vec<_>) = seen.unzip();
-        Sureness::new(&mut bends.concat(), &mut margins.concat())
-    }
-
-    /// Fringe period along rows, from a few rows of red light; the whole row when there is none to see.
-    fn period_px<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) -> f64 {
+    /// Fringe period along the rows in camera pixels, from a few rows of red light.
+    fn period_px<T: Sample>(&mut self, conditioning: &Plan, shot: &Shot<'_, T>) -> f64 {
         let [height, width] = self.shape;
         let mut strip = self.slots.take();
-        for y in (0..height).step_by(height.div_ceil(CARRIER_ROWS)) {
-            plan.row(shot, y, &mut strip.light(width));
+        for y in period_rows(height) {
+            conditioning.row(shot, y, &mut strip.light(width));
             self.spectrum.add(ArrayView1::from(strip.red()));
         }
-        self.spectrum.take_period_px().clamp(3.0, width as f64)
+        self.spectrum.take_row_period_px()
     }
 }

@@ -1,72 +1,102 @@
-//! Steps 2 to 6 of the published chain on a strip of rows, small enough to stay in the nearest cache.
+//! Steps 1 to 7 on a strip of a few rows, which is small enough to stay in the nearest cache.
 
 use super::Unwrapping;
-use super::means::{Means, lesser};
-use super::uncertainty::{Sureness, two_step_deviation};
+use super::uncertainty::{ShotStatistics, two_step_sigma};
 use crate::Shot;
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::parallel::Aligned;
-use crate::parallel::angle::{atan2, coarse_atan2, round};
-use crate::stages::{Background, BackgroundScratch, Half, RowFilter, RowScratch, coarsen, draw_background};
+use crate::parallel::angle::{atan2, coarse_atan2};
+use crate::stages::{
+    self, Background, BackgroundScratch, Blocks, Half, Interpolation, Judged, Limits, Phases, RowFilter,
+    RowPair, RowScratch, coarsen, lesser, row_background, with_turns_of,
+};
 use multiversion::multiversion;
-use std::f32::consts::TAU;
 
 /// The published background: half the sum of the envelopes.
 const BACKGROUND: Background = Background::MeanEnvelope;
 
-/// What is the same for all strips of a shot.
+/// What all strips of a shot share.
 pub(super) struct StripPlan<'a> {
     pub conditioning: &'a Plan,
     pub unwrapping: &'a Unwrapping,
-    /// For rows of means of so many `pixels`.
+    /// Fourier filter for rows of block means.
     pub filter: &'a RowFilter,
-    /// G and IR are means of so many pixels of a row, a power of two, and of all rows of a strip.
-    pub pixels: usize,
-    /// Rows of a strip.
-    pub rows: usize,
-    pub periods_px: [f32; 3],
-    /// Filters of G and IR.
-    pub weights: [Vec<f32>; 2],
-    pub modulation_min: f32,
-    pub quality_min: f32,
-    /// What the shot shows of its own noise.
-    pub sureness: Sureness,
+    /// Weights of the filter for G and IR.
+    pub weights: FourierPair<Vec<f32>>,
+    /// A strip has the rows of one block.
+    pub blocks: Blocks,
+    /// Fringe periods along the rows in camera pixels.
+    pub periods_px: Phases<f32>,
+    pub limits: Limits,
+    pub statistics: ShotStatistics,
 }
+
+/// A value for R and one for B, which are in quadrature.
+#[derive(Debug, Default)]
+struct Quadrature<T> {
+    red: T,
+    blue: T,
+}
+
+impl<T> Quadrature<T> {
+    #[inline(always)]
+    fn both_mut(&mut self) -> [&mut T; 2] {
+        [&mut self.red, &mut self.blue]
+    }
+}
+
+/// A value for G and one for IR, which the Fourier filter takes together.
+#[derive(Debug, Default)]
+pub(super) struct FourierPair<T> {
+    pub green: T,
+    pub infrared: T,
+}
+
+impl<T> FourierPair<T> {
+    #[inline(always)]
+    fn both_mut(&mut self) -> [&mut T; 2] {
+        [&mut self.green, &mut self.infrared]
+    }
+}
+
+type Row = Aligned<f32>;
 
 /// Working rows of one task.
 #[derive(Debug, Default)]
 pub(super) struct Strip {
-    /// Light of R and B, row by row.
-    pair: Vec<[Aligned<f32>; 2]>,
-    /// G and IR of the row last read.
-    others: [Aligned<f32>; 2],
-    /// Where IR sees nothing, row by row.
+    /// Light of R and B for each row.
+    quadrature: Vec<Quadrature<Row>>,
+    /// Light of G and IR of the row read last.
+    others: FourierPair<Row>,
+    /// Columns without infrared light for each row.
     gaps: Vec<Vec<usize>>,
-    /// Sums over the rows of R and B, then their means without background.
-    pair_sums: [Aligned<f32>; 2],
-    /// Their background.
-    levels: [Aligned<f32>; 2],
-    /// Sums over the rows of G and IR, and their means without background.
-    sums: [Aligned<f32>; 2],
-    fringes: [Aligned<f32>; 2],
-    /// Wrapped phases of G and IR at every pixel, and the lesser square of their modulations.
-    phases: [Aligned<f32>; 2],
-    power: Aligned<f32>,
-    /// Wrapped phase of the means of R and B, and what it is absolutely.
-    middle: Aligned<f32>,
-    absolute: Aligned<f32>,
-    /// Margins of the orders, and how likely these are wrong.
-    margin: Aligned<f32>,
-    wrong: Aligned<f32>,
-    spare: [Aligned<f32>; 2],
+    /// Sums of R and B over the rows, then their means less the background.
+    quadrature_means: Quadrature<Row>,
+    /// Background of these means.
+    levels: Quadrature<Row>,
+    /// Sums of G and IR over the rows.
+    sums: FourierPair<Row>,
+    /// Block means of G and IR less their background.
+    fringes: FourierPair<Row>,
+    /// Phases of the block means at every pixel: wrapped for R and B, up to whole turns for G and IR.
+    phases: Phases<Row>,
+    /// The lesser squared modulation of G and IR.
+    power: Row,
+    /// Absolute phase of the means.
+    absolute: Row,
+    /// Margin of its order, and the probability that the order is wrong.
+    margin: Row,
+    wrong: Row,
+    coarse: Row,
+    spare: Row,
     background: BackgroundScratch,
     fourier: RowScratch,
-    means: Means,
+    interpolation: Interpolation,
 }
 
-/// The rows of a shot from row `y` on, as many as `out` has, from bytes to phase, modulation and quality. Without fused
-/// multiplication: every number comes out the same for vectors of any width.
+/// Decode as many rows as `out` has, from row `y` on, to phase, modulation and quality. Fused multiplication is not
+/// enabled, so the results are the same for vectors of any width.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn decode_strip<T: Sample>(
     strip: &mut Strip,
@@ -75,219 +105,169 @@ pub(super) fn decode_strip<T: Sample>(
     y: usize,
     out: &mut [OutputRow<'_>],
 ) {
-    strip.ready(plan, out[0].phase.len());
+    strip.resize(plan, out[0].phase.len());
+    // 1. Linear light (S1).
     for i in 0..out.len() {
         plan.conditioning.row(shot, y + i, &mut strip.light_of(i));
-        fill_gaps(&mut strip.others[1], &mut strip.gaps[i]);
+        stages::fill_row_gaps(&mut strip.others.infrared, &mut strip.gaps[i]);
         strip.sum(i);
     }
-    let equal = strip.two_step(plan, out.len());
+    // 2. and 3. Background and two-step phase of the means of R and B (S2).
+    let ratio = strip.two_step(plan, out.len());
+    // 2. and 4. Background and Fourier phase of the block means of G and IR (S3).
     strip.fourier(plan, out.len());
+    // 5. Fringe orders of the means (S4).
     strip.order(y + out.len() / 2, plan);
+    // 6. and 7. Absolute two-step phase of single pixels, its uncertainty, and no data where the modulation is low.
     for (i, row) in out.iter_mut().enumerate() {
-        strip.row(i, equal, plan, row);
+        strip.row(i, ratio, plan, row);
     }
 }
 
 impl Strip {
-    /// Make rows that may have served another image fit for this one.
+    /// Adapt rows that may have served another image.
     #[inline(always)]
-    fn ready(&mut self, plan: &StripPlan<'_>, width: usize) {
-        self.pair.resize_with(plan.rows, Default::default);
-        self.gaps.resize_with(plan.rows, Default::default);
-        let Self {
-            pair,
-            others,
-            pair_sums,
-            levels,
-            sums,
-            phases,
-            power,
-            middle,
-            absolute,
-            margin,
-            wrong,
-            fourier,
-            ..
-        } = self;
-        let rows = pair.iter_mut().flatten().chain(others).chain(pair_sums).chain(levels).chain(sums);
-        rows.chain(phases).chain([power, middle, absolute, margin, wrong]).for_each(|row| row.resize(width));
-        plan.filter.ready(fourier);
+    fn resize(&mut self, plan: &StripPlan<'_>, width: usize) {
+        self.quadrature.resize_with(plan.blocks.rows, Default::default);
+        self.gaps.resize_with(plan.blocks.rows, Default::default);
+        let Phases { quadrature, green, infrared } = &mut self.phases;
+        let phases = [quadrature, green, infrared];
+        let rows = self.quadrature.iter_mut().flat_map(Quadrature::both_mut).chain(self.others.both_mut());
+        let rows = rows.chain(self.quadrature_means.both_mut()).chain(self.levels.both_mut());
+        let rows = rows.chain(self.sums.both_mut()).chain(phases);
+        rows.chain([&mut self.power, &mut self.absolute, &mut self.margin, &mut self.wrong])
+            .for_each(|row| row.resize(width));
+        plan.filter.ready(&mut self.fourier);
     }
 
-    /// Linear light of R, G, B, IR of row `i`, to be filled.
+    /// Rows for the linear light of R, G, B, IR of row `i`.
     #[inline(always)]
     fn light_of(&mut self, i: usize) -> [&mut [f32]; 4] {
-        let [red, blue] = &mut self.pair[i];
-        let [green, infrared] = &mut self.others;
+        let Quadrature { red, blue } = &mut self.quadrature[i];
+        let FourierPair { green, infrared } = &mut self.others;
         [red, green, blue, infrared].map(|row| &mut **row)
     }
 
-    /// The same of a row of `width` pixels on its own.
+    /// The same for a single row of `width` pixels, outside a strip.
     pub fn light(&mut self, width: usize) -> [&mut [f32]; 4] {
-        if self.pair.is_empty() {
-            self.pair.resize_with(1, Default::default);
+        if self.quadrature.is_empty() {
+            self.quadrature.resize_with(1, Default::default);
         }
-        self.pair[0].iter_mut().chain(&mut self.others).for_each(|row| row.resize(width));
+        let rows = self.quadrature[0].both_mut().into_iter().chain(self.others.both_mut());
+        rows.for_each(|row| row.resize(width));
         self.light_of(0)
     }
 
-    /// Linear red light of the row on its own.
+    /// Linear red light of this single row.
     pub fn red(&self) -> &[f32] {
-        &self.pair[0][0]
+        &self.quadrature[0].red
     }
 
-    /// Linear blue light of the row on its own.
+    /// Linear blue light of this single row.
     pub fn blue(&self) -> &[f32] {
-        &self.pair[0][1]
+        &self.quadrature[0].blue
     }
 
-    /// Row `i` of the strip is taken in.
+    /// Add row `i` of the strip to the sums.
     #[inline(always)]
     fn sum(&mut self, i: usize) {
-        let Self { pair, others, pair_sums, sums, .. } = self;
-        for (sum, light) in sums.iter_mut().zip(others) {
+        for (sum, light) in self.sums.both_mut().into_iter().zip(self.others.both_mut()) {
             if i == 0 {
                 std::mem::swap(sum, light);
             } else {
-                add(light, sum);
+                stages::add(light, sum);
             }
         }
-        for (sum, light) in pair_sums.iter_mut().zip(&pair[i]) {
+        let light = self.quadrature[i].both_mut();
+        for (sum, light) in self.quadrature_means.both_mut().into_iter().zip(light) {
             if i == 0 {
                 sum.copy_from_slice(light);
             } else {
-                add(light, sum);
+                stages::add(light, sum);
             }
         }
     }
 
-    /// Steps 2 and 3: background of R and B, which is that of their means over so many `rows`, and the phase of the means, (S2).
-    /// The modulation of R over that of B makes them equal.
+    /// Background of the means of R and B over so many `rows`, and the phase of these means. Returns the modulation of R
+    /// over that of B.
     #[inline(always)]
     fn two_step(&mut self, plan: &StripPlan<'_>, rows: usize) -> f32 {
-        let Self { pair_sums, levels, background, middle, .. } = self;
-        let mut powers = [0.0; 2];
-        for ((sum, level), channel) in pair_sums.iter_mut().zip(levels).zip(&mut powers) {
-            sum.iter_mut().for_each(|sum| *sum *= 1.0 / rows as f32);
-            draw_background(sum, BACKGROUND, plan.periods_px[0], background, level);
-            sum.iter_mut().zip(&**level).for_each(|(sum, level)| *sum -= level);
-            *channel = power(sum);
+        let Self { quadrature_means, levels, background, phases, .. } = self;
+        for (mean, level) in quadrature_means.both_mut().into_iter().zip(levels.both_mut()) {
+            stages::scale(mean, rows);
+            row_background(mean, BACKGROUND, plan.periods_px.quadrature, background, level);
+            mean.iter_mut().zip(&**level).for_each(|(mean, level)| *mean -= level);
         }
-        let [red, blue] = powers;
-        let equal = (red / blue.max(f32::MIN_POSITIVE)).sqrt();
-        for ((middle, red), blue) in middle.iter_mut().zip(&*pair_sums[0]).zip(&*pair_sums[1]) {
-            *middle = coarse_atan2(-blue * equal, *red);
+        let Quadrature { red, blue } = &*quadrature_means;
+        let ratio = stages::row_modulation_ratio(red, blue);
+        for ((phase, red), blue) in phases.quadrature.iter_mut().zip(&**red).zip(&**blue) {
+            *phase = coarse_atan2(-blue * ratio, *red);
         }
-        equal
+        ratio
     }
 
-    /// Steps 2 and 4: G and IR, as means over so many `rows` and some pixels of each, by the improved Fourier filter (S3). The
-    /// lesser modulation counts.
+    /// Phases and modulations of G and IR from their block means over so many `rows`.
     #[inline(always)]
     fn fourier(&mut self, plan: &StripPlan<'_>, rows: usize) {
-        let pixels = plan.pixels;
-        let periods = [plan.periods_px[1], plan.periods_px[2]].map(|period_px| period_px / pixels as f32);
-        let Self { sums, fringes, spare: [means, spare], background, .. } = self;
-        for ((sum, period), fringes) in sums.iter().zip(periods).zip(fringes) {
-            coarsen(sum, pixels, means, spare);
-            means.iter_mut().for_each(|mean| *mean *= 1.0 / rows as f32);
-            fringes.resize(means.len());
-            draw_background(means, BACKGROUND, period, background, fringes);
-            fringes.iter_mut().zip(&**means).for_each(|(level, mean)| *level = mean - *level);
+        let pixels = plan.blocks.columns;
+        let Phases { green, infrared, .. } = plan.periods_px.map(|period_px| period_px / pixels as f32);
+        let Self { sums, fringes, coarse, spare, background, .. } = self;
+        let channels = sums.both_mut().into_iter().zip([green, infrared]).zip(fringes.both_mut());
+        for ((sum, period), fringes) in channels {
+            coarsen(sum, pixels, coarse, spare);
+            stages::scale(coarse, rows);
+            fringes.resize(coarse.len());
+            row_background(coarse, BACKGROUND, period, background, fringes);
+            fringes.iter_mut().zip(&**coarse).for_each(|(level, mean)| *level = mean - *level);
         }
-        let fringes = self.fringes.each_ref().map(|row| &**row);
-        plan.filter.transform(fringes, periods, &mut self.fourier);
+        let FourierPair { green: green_fringes, infrared: infrared_fringes } = &self.fringes;
+        let fringes = RowPair { real: &**green_fringes, imaginary: &**infrared_fringes };
+        plan.filter.transform(fringes, RowPair { real: green, imaginary: infrared }, &mut self.fourier);
         self.power.fill(f32::INFINITY);
-        for (half, (weights, phase)) in
-            [Half::Real, Half::Imaginary].into_iter().zip(plan.weights.iter().zip(&mut self.phases))
-        {
+        let channels = [
+            (Half::Real, &plan.weights.green, &mut self.phases.green),
+            (Half::Imaginary, &plan.weights.infrared, &mut self.phases.infrared),
+        ];
+        for (half, weights, phase) in channels {
             let signal = plan.filter.analytic(half, weights, &mut self.fourier);
-            match pixels {
-                1 => self.means.spread::<1>(signal, phase, &mut self.power),
-                2 => self.means.spread::<2>(signal, phase, &mut self.power),
-                _ => self.means.spread::<4>(signal, phase, &mut self.power),
-            }
+            self.interpolation.run_for(pixels, signal, phase, &mut self.power);
         }
     }
 
-    /// Step 5: orders of the phases of the means; rows from `y` on are meant.
+    /// Absolute phase of the means, with the rays of row `y`.
     #[inline(always)]
     fn order(&mut self, y: usize, plan: &StripPlan<'_>) {
-        let Self { middle, phases: [second, third], absolute, margin, wrong, .. } = self;
-        let wrapped = [&**middle, second, third];
+        let Self { phases, absolute, margin, wrong, .. } = self;
+        let wrapped = phases.as_ref().map(|row| &**row);
         match plan.unwrapping {
             Unwrapping::Ladder(ladder) => ladder.order_row(wrapped, absolute, margin),
             Unwrapping::AlongRay(table) => table.order_row(y, wrapped, absolute, margin),
         }
-        plan.sureness.odds.another(margin, wrong);
+        plan.statistics.wrong_orders.row(margin, wrong);
     }
 
-    /// Steps 3 and 6: absolute phase of row `i`, (S2) with the turn nearest to that of the means, and what is known of it. What has
-    /// too little light or too doubtful an order is no data.
+    /// Results of row `i`: the two-step phase of each pixel with the turns of the means, its uncertainty, and NaN where
+    /// the modulation or the margin is too low.
     #[inline(always)]
-    fn row(&self, i: usize, equal: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
-        let noise = plan.sureness.noise;
-        let [red, blue] = self.pair[i].each_ref().map(|row| row.iter());
-        let [red_level, blue_level] = self.levels.each_ref().map(|row| row.iter());
-        let fringes = red.zip(red_level).zip(blue.zip(blue_level));
+    fn row(&self, i: usize, ratio: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
+        let (noise, limits) = (plan.statistics.noise, plan.limits);
+        let Quadrature { red, blue } = &self.quadrature[i];
+        let fringes = red.iter().zip(&*self.levels.red).zip(blue.iter().zip(&*self.levels.blue));
         let known = self.absolute.iter().zip(&*self.margin).zip(&*self.power);
         let maps = out.phase.iter_mut().zip(out.quality.iter_mut());
         let maps = maps.zip(out.modulation.iter_mut().zip(out.sigma.iter_mut()));
         for ((fringes, known), ((phase, quality), (modulation, sigma))) in fringes.zip(known).zip(maps) {
             let (((red, red_level), (blue, blue_level)), ((absolute, margin), power)) = (fringes, known);
-            let (red, blue) = (red - red_level, (blue - blue_level) * equal);
-            *sigma = two_step_deviation([red, blue], equal, noise);
+            let (red, blue) = (red - red_level, (blue - blue_level) * ratio);
+            *sigma = two_step_sigma(red, blue, ratio, noise);
             *modulation = lesser(*power, red * red + blue * blue).sqrt();
-            let lit = *modulation >= plan.modulation_min;
-            let sure = lit & (*margin >= plan.quality_min);
-            let wrapped = atan2(-blue, red);
-            let found = wrapped + TAU * round((absolute - wrapped) * (1.0 / TAU));
-            *phase = if sure { found } else { f32::NAN };
-            let positive = if *margin > 0.0 { *margin } else { 0.0 };
-            *quality = if lit { positive } else { f32::NAN };
+            let judged = Judged::of(*margin, *modulation, limits);
+            *phase = judged.phase(with_turns_of(*absolute, atan2(-blue, red)));
+            *quality = judged.quality(*margin);
         }
         out.wrong.copy_from_slice(&self.wrong);
         for &x in &self.gaps[i] {
             [out.phase[x], out.quality[x], out.modulation[x]] = [f32::NAN; 3];
-        }
-    }
-}
-
-/// Every number more by that of another row.
-#[inline(always)]
-fn add(row: &[f32], sum: &mut [f32]) {
-    sum.iter_mut().zip(row).for_each(|(sum, light)| *sum += light);
-}
-
-/// Sum of squares, eight sums side by side.
-#[inline(always)]
-fn power(row: &[f32]) -> f32 {
-    let mut sums = [0.0f32; 8];
-    let (blocks, rest) = row.as_chunks::<8>();
-    for block in blocks {
-        sums.iter_mut().zip(block).for_each(|(sum, value)| *sum += value * value);
-    }
-    sums.iter_mut().zip(rest).for_each(|(sum, value)| *sum += value * value);
-    sums.iter().sum()
-}
-
-/// Put the last number seen into gaps, where the infrared chip sees nothing, and say where they are: one NaN would
-/// spread over the whole row in the Fourier filter.
-#[inline(always)]
-fn fill_gaps(row: &mut [f32], gaps: &mut Vec<usize>) {
-    gaps.clear();
-    // A vector comparison of all pixels; there are gaps only with registration.
-    if row.iter().fold(true, |whole, v| whole & v.is_finite()) {
-        return;
-    }
-    let mut seen = row.iter().copied().find(|v| v.is_finite()).unwrap_or(0.0);
-    for (x, value) in row.iter_mut().enumerate() {
-        if value.is_finite() {
-            seen = *value;
-        } else {
-            gaps.push(x);
-            *value = seen;
         }
     }
 }

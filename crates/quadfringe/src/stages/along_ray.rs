@@ -1,24 +1,38 @@
-//! Fringe orders by the light of both projectors where they really stand.
+//! Fringe orders along the camera ray, for two calibrated projectors.
+//!
+//! Each candidate order of the first phase is a point on the camera ray. Both projectors are calibrated, so the second and
+//! the third phase that they show there are known. The candidate whose phases agree best with the measured ones wins,
+//! whether the projectors are coaxial or not.
 
+use super::Phases;
 use crate::FringeCode;
 use crate::parallel::angle::{round, wrap_positive};
 use std::f32::consts::TAU;
 
-/// Pixels that are searched together.
+/// Pixels that are searched together, as vectors.
 const BLOCK: usize = 64;
 
-/// What is known of the rays of a row of pixels, an entry for each pixel.
+/// The rays of a row of pixels, with one entry per pixel.
+///
+/// ```
+/// use quadfringe::stages::RayRow;
+/// // Coaxial projectors: the infrared phase is 30 / 36 of the first one.
+/// let (zero, ratio, end) = ([0.0], [30.0 / 36.0], [226.0]);
+/// let row = RayRow { infrared: [&zero, &ratio, &zero, &zero], low_rad: &zero, high_rad: &end };
+/// assert!((row.infrared_rad(0, 36.0) - 30.0).abs() < 1e-5);
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct RayRow<'a> {
-    /// The infrared phase in rad as a cubic of the first absolute phase, from the constant term up.
+    /// Coefficients of the infrared phase in rad as a cubic of the first absolute phase, from the constant term up.
     pub infrared: [&'a [f32]; 4],
-    /// Least and greatest first absolute phase in rad that a surface on the ray can have, no farther apart than the field
-    /// is wide; NaN where there is none.
-    pub range_rad: [&'a [f32]; 2],
+    /// Least first absolute phase in rad that a surface on the ray can have; NaN if there is none.
+    pub low_rad: &'a [f32],
+    /// Greatest such phase in rad. Both differ by no more than the width of the field.
+    pub high_rad: &'a [f32],
 }
 
 impl RayRow<'_> {
-    /// The infrared phase in rad, not wrapped, at a pixel of the row whose first absolute phase is known.
+    /// The infrared phase in rad, not wrapped, for the first absolute phase of a pixel of the row.
     #[must_use]
     pub fn infrared_rad(&self, column: usize, phase_rad: f32) -> f32 {
         let [e0, e1, e2, e3] = self.infrared.map(|line| line[column]);
@@ -26,34 +40,33 @@ impl RayRow<'_> {
     }
 }
 
-/// Orders of one pixel at a time, searched along the camera ray: each candidate is a point of the ray, which both
-/// projectors light with phases that are known. The one that the second and third phase agree with best wins, whether
-/// the projectors are coaxial or not.
+/// Search along the camera ray, one pixel at a time.
 ///
-/// Where the beat of the first two fringe numbers has one fringe over the field, it says which candidates are near: those
-/// farther away than half a beat of the third number cannot win.
+/// If the beat of the first two fringe numbers has one fringe over the field, it limits the candidates: those farther away
+/// than half a beat of the third number cannot win.
 #[derive(Debug, Clone)]
 pub(crate) struct AlongRay {
     /// Second fringe number over the first.
     ratio: f32,
-    /// Square of the distance of neighbouring candidates, turns.
+    /// Squared distance of the closest candidates, turns^2.
     apart: f32,
     near: Option<Near>,
 }
 
-/// How the beat of the first two phases leads to candidates.
+/// Candidates near the estimate that the beat of the first two phases gives.
 #[derive(Debug, Clone, Copy)]
 struct Near {
     /// 1, or -1 when the second number is the greater.
     sign: f32,
-    /// Orders after which all phases but the infrared one repeat.
+    /// Number of orders after which all phases but the infrared one repeat.
     cycle: f32,
-    /// Candidates to either side.
+    /// Number of candidates to each side.
     reach: i32,
 }
 
 impl Near {
-    fn of([first, second, third]: [f64; 3]) -> Option<Self> {
+    fn of(numbers: Phases<f64>) -> Option<Self> {
+        let Phases { quadrature: first, green: second, infrared: third } = numbers;
         let whole = first.fract() == 0.0 && (first - second).abs() == 1.0;
         let reach = (0.5 * first / (first - third).abs()).ceil();
         let shorter = 2.0 * reach + 1.0 < first;
@@ -65,8 +78,9 @@ impl Near {
     }
 }
 
-/// The least and the second least cost of the candidates of a block of pixels so far, as bits, which grow with a number that
-/// is not negative: of a choice between two of them a compiler makes no masked stores, as it does with floating-point numbers.
+/// Least and second least cost of the candidates so far, for a block of pixels. Costs are kept as the bits of
+/// non-negative numbers, which have the same order: a choice between integers compiles without masked stores, which a
+/// choice between floating-point numbers does not.
 struct Best {
     least: [u32; BLOCK],
     next: [u32; BLOCK],
@@ -74,91 +88,100 @@ struct Best {
 
 impl AlongRay {
     pub fn new(code: &FringeCode) -> Self {
-        let numbers = code.numbers();
+        let numbers = Phases::from_array(code.numbers());
         let apart = code.ambiguity_margin_rad() as f32 / TAU;
-        let ratio = (numbers[1] / numbers[0]) as f32;
+        let ratio = (numbers.green / numbers.quadrature) as f32;
         Self { ratio, apart: apart * apart, near: Near::of(numbers) }
     }
 
-    /// Order a row of pixels: absolute phase, and 1 when the second and third phase are met exactly, 0 when another
-    /// candidate is as good; NaN in, NaN out, and where no candidate lies on the ray.
+    /// Absolute phase and margin of a row of pixels. The margin is 1 if the second and the third phase agree exactly and 0
+    /// if another candidate agrees as well. NaN in, NaN out; NaN also where no candidate lies on the ray.
     #[inline(always)]
-    pub fn order_row(&self, wrapped: [&[f32]; 3], rays: &RayRow<'_>, phase: &mut [f32], margin: &mut [f32]) {
+    pub fn order_row(
+        &self,
+        wrapped: Phases<&[f32]>,
+        rays: &RayRow<'_>,
+        phase: &mut [f32],
+        margin: &mut [f32],
+    ) {
         let out = phase.chunks_mut(BLOCK).zip(margin.chunks_mut(BLOCK));
         for (block, (phase, margin)) in out.enumerate() {
             let at = block * BLOCK..block * BLOCK + phase.len();
             let wrapped = wrapped.map(|row| &row[at.clone()]);
             let rays = RayRow {
                 infrared: rays.infrared.map(|row| &row[at.clone()]),
-                range_rad: rays.range_rad.map(|row| &row[at.clone()]),
+                low_rad: &rays.low_rad[at.clone()],
+                high_rad: &rays.high_rad[at.clone()],
             };
             let mut best = Best::beyond(self.apart);
             match self.near {
-                Some(near) => self.ask_near(near, wrapped, &rays, &mut best, phase),
-                None => self.ask_all(wrapped, &rays, &mut best, phase),
+                Some(near) => self.try_near(near, wrapped, &rays, &mut best, phase),
+                None => self.try_all(wrapped, &rays, &mut best, phase),
             }
-            best.settle(phase, margin);
+            best.finish(phase, margin);
         }
     }
 
-    /// The candidates that the beat of the first two phases leads to.
+    /// Try the candidates near the estimate of the beat of the first two phases.
     #[inline(always)]
-    fn ask_near(
+    fn try_near(
         &self,
         near: Near,
-        wrapped: [&[f32]; 3],
+        wrapped: Phases<&[f32]>,
         rays: &RayRow<'_>,
         best: &mut Best,
         phase: &mut [f32],
     ) {
-        let ([first, second, _], [low, high]) = (wrapped, rays.range_rad);
+        let Phases { quadrature: first, green: second, .. } = wrapped;
+        let (low, high) = (rays.low_rad, rays.high_rad);
         let mut start = [0.0; BLOCK];
         for i in 0..phase.len() {
-            let own = wrap_positive(first[i]);
+            let fine = wrap_positive(first[i]);
             let coarse = wrap_positive((first[i] - second[i]) * near.sign) * near.cycle;
-            start[i] = own + TAU * round((coarse - own) * (1.0 / TAU));
+            start[i] = fine + TAU * round((coarse - fine) * (1.0 / TAU));
         }
         let cycle = TAU * near.cycle;
         for step in -near.reach..=near.reach {
             let turns = TAU * step as f32;
             let guess = |i: usize| {
-                // The ends of the field look alike to the beat.
+                // The beat is the same at both ends of the field.
                 let guess = start[i] + turns;
                 let guess = if guess > high[i] { guess - cycle } else { guess };
                 if guess < low[i] { guess + cycle } else { guess }
             };
-            self.ask(guess, wrapped, rays, best, phase);
+            self.try_one(guess, wrapped, rays, best, phase);
         }
     }
 
-    /// Every order that a pixel of the block can have.
+    /// Try every order that a pixel of the block can have.
     #[inline(always)]
-    fn ask_all(&self, wrapped: [&[f32]; 3], rays: &RayRow<'_>, best: &mut Best, phase: &mut [f32]) {
-        let [low, high] = rays.range_rad;
-        let low = low.iter().fold(f32::INFINITY, |a, b| a.min(*b));
-        let high = high.iter().fold(0.0, |a: f32, b| a.max(*b));
+    fn try_all(&self, wrapped: Phases<&[f32]>, rays: &RayRow<'_>, best: &mut Best, phase: &mut [f32]) {
+        let low = rays.low_rad.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let high = rays.high_rad.iter().fold(0.0, |a: f32, b| a.max(*b));
         for order in (low / TAU).floor() as i32 - 1..(high / TAU).ceil() as i32 {
             let turns = TAU * order as f32;
-            self.ask(|i| wrap_positive(wrapped[0][i]) + turns, wrapped, rays, best, phase);
+            self.try_one(|i| wrap_positive(wrapped.quadrature[i]) + turns, wrapped, rays, best, phase);
         }
     }
 
-    /// One candidate for each pixel.
+    /// Try one candidate for each pixel.
     #[inline(always)]
-    fn ask(
+    fn try_one(
         &self,
         guess: impl Fn(usize) -> f32,
-        wrapped: [&[f32]; 3],
+        wrapped: Phases<&[f32]>,
         rays: &RayRow<'_>,
         best: &mut Best,
         phase: &mut [f32],
     ) {
-        let ([_, second, third], [low, high]) = (wrapped, rays.range_rad);
+        let Phases { green: second, infrared: third, .. } = wrapped;
+        let (low, high) = (rays.low_rad, rays.high_rad);
         let [e0, e1, e2, e3] = rays.infrared;
         for i in 0..phase.len() {
             let guess = guess(i);
             let infrared = e0[i] + guess * (e1[i] + guess * (e2[i] + guess * e3[i]));
-            let cost = miss(guess * self.ratio, second[i]) + miss(infrared, third[i]);
+            let cost =
+                squared_difference(guess * self.ratio, second[i]) + squared_difference(infrared, third[i]);
             let on_the_ray = (guess >= low[i]) & (guess <= high[i]);
             let cost = if on_the_ray { cost } else { f32::INFINITY };
             let cost = cost.to_bits();
@@ -171,15 +194,15 @@ impl AlongRay {
 }
 
 impl Best {
-    /// Before the first candidate, for pixels of which a second one is no farther than `apart`.
+    /// Before the first candidate. A second candidate costs at most `apart`.
     #[inline(always)]
     fn beyond(apart: f32) -> Self {
         Self { least: [f32::INFINITY.to_bits(); BLOCK], next: [apart.to_bits(); BLOCK] }
     }
 
-    /// Margins, and no data where there was no candidate.
+    /// Write the margins, and NaN where there was no candidate.
     #[inline(always)]
-    fn settle(&self, phase: &mut [f32], margin: &mut [f32]) {
+    fn finish(&self, phase: &mut [f32], margin: &mut [f32]) {
         for (i, (phase, margin)) in phase.iter_mut().zip(margin).enumerate() {
             let [least, next] = [&self.least, &self.next].map(|costs| f32::from_bits(costs[i]));
             let found = least.is_finite();
@@ -190,9 +213,9 @@ impl Best {
     }
 }
 
-/// Squared difference of two angles in turns, whole turns left out.
+/// Squared difference of two angles in turns, modulo whole turns.
 #[inline(always)]
-fn miss(predicted: f32, seen: f32) -> f32 {
+fn squared_difference(predicted: f32, seen: f32) -> f32 {
     let turns = (predicted - seen) * (1.0 / TAU);
     let rest = turns - round(turns);
     rest * rest
@@ -210,7 +233,7 @@ mod tests {
         AlongRay::new(&FringeCode::optimum(36, 912).expect("valid code"))
     }
 
-    /// Phase and margin of a pixel at the absolute phase `truth`, whose phases stray by `noise`.
+    /// Phase and margin of a pixel with the absolute phase `truth`, whose three phases are off by `noise`.
     fn search(
         way: &AlongRay,
         infrared: [f32; 4],
@@ -221,19 +244,20 @@ mod tests {
         let [e0, e1, e2, e3] = infrared;
         let seen = e0 + truth * (e1 + truth * (e2 + truth * e3));
         let exact = [truth, truth * way.ratio, seen];
-        let wrapped: [[f32; 1]; 3] = std::array::from_fn(|i| [wrap(exact[i] + noise[i])]);
-        let (coefficients, range) = (infrared.map(|v| [v]), range.map(|v| [v]));
+        let wrapped = Phases::from_array(std::array::from_fn(|i| [wrap(exact[i] + noise[i])]));
+        let (coefficients, [low, high]) = (infrared.map(|v| [v]), range.map(|v| [v]));
         let rays = RayRow {
             infrared: coefficients.each_ref().map(|v| v.as_slice()),
-            range_rad: range.each_ref().map(|v| v.as_slice()),
+            low_rad: &low,
+            high_rad: &high,
         };
         let (mut phase, mut margin) = ([0.0], [0.0]);
-        way.order_row(wrapped.each_ref().map(|v| v.as_slice()), &rays, &mut phase, &mut margin);
+        way.order_row(wrapped.as_ref().map(|v| v.as_slice()), &rays, &mut phase, &mut margin);
         (phase[0], margin[0])
     }
 
     #[test]
-    fn a_pair_that_is_far_from_coaxial_is_ordered_right() {
+    fn orders_are_right_for_projectors_far_from_coaxial() {
         let other = FringeCode::new([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920).expect("valid code");
         let backwards = FringeCode::new([35.0, 36.0, 30.0], 912).expect("valid code");
         for way in [optimum(), AlongRay::new(&other), AlongRay::new(&backwards)] {

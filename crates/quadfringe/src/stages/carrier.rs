@@ -1,21 +1,20 @@
-//! The fringe period that the camera sees, estimated from the shot itself.
+//! The fringe period in camera pixels, estimated from the shot.
+//!
+//! Fringes concentrate power at one frequency, the carrier. The mean power spectrum of a few lines, each without its mean
+//! and under a sine-squared window, has a peak there. The centre of gravity of the peak is the number of fringes on the
+//! line, and the length of the line over this number is the period.
 
+use super::params::{
+    CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, CARRIER_SHARE_MIN, PERIOD_MIN_PX, SAMPLE_ROWS,
+};
 use ndarray::{ArrayView1, ArrayView2};
 use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
 use std::sync::Arc;
 
-/// Lines that are looked at in each direction: enough to average out objects, few enough to cost nothing.
-const LINES: usize = 48;
-/// Fewest fringes over the image that count as a carrier.
-const FEWEST: usize = 4;
-/// Share of the power that a carrier must hold to be believed.
-const SHARE: f32 = 0.2;
-/// Least power of a carrier, as a share of that of the mean level: rounding of a flat line leaves less than 1e-12.
-const FAINTEST: f32 = 1e-8;
-
 /// Fringe period in camera pixels along rows and columns; infinite where no carrier stands out.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Carrier {
     /// Period along a row.
     pub row_px: f64,
@@ -24,14 +23,16 @@ pub struct Carrier {
 }
 
 impl Carrier {
-    /// Period across the fringes, for fringes in any direction.
+    /// Period across the fringes in camera pixels, for fringes in any direction.
     #[must_use]
     pub fn period_px(&self) -> f64 {
         1.0 / (1.0 / self.row_px).hypot(1.0 / self.column_px)
     }
 }
 
-/// The carrier of a fringe image: the strongest line of the mean power spectrum of its rows and of its columns.
+/// The carrier of a fringe image: the strongest peak in the mean power spectrum of its rows and of its columns.
+///
+/// NaN counts as the mean of its line.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -49,14 +50,38 @@ pub fn carrier(image: ArrayView2<'_, f32>) -> Carrier {
 
 fn line_period(image: ArrayView2<'_, f32>) -> f64 {
     let (lines, length) = image.dim();
-    if length < 4 * FEWEST {
+    if length < 4 * CARRIER_CYCLES_MIN {
         return f64::INFINITY;
     }
     let mut spectrum = LineSpectrum::new(length);
-    for line in (0..lines).step_by(lines.div_ceil(LINES)) {
+    for line in (0..lines).step_by(lines.div_ceil(CARRIER_LINES)) {
         spectrum.add(image.row(line));
     }
     spectrum.take_period_px()
+}
+
+/// Fringe period along the rows in camera pixels, as the published decoder estimates it from linear red light: from 3
+/// pixels to the width of the image, which it is when no carrier stands out.
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::stages::row_period_px;
+/// let image = Array2::from_shape_fn((64, 512), |(_, x)| (x as f32 * std::f32::consts::TAU / 20.0).cos());
+/// assert!((row_period_px(image.view()) - 20.0).abs() < 0.2);
+/// ```
+#[must_use]
+pub fn row_period_px(image: ArrayView2<'_, f32>) -> f64 {
+    let (height, width) = image.dim();
+    let mut spectrum = LineSpectrum::new(width);
+    for y in period_rows(height) {
+        spectrum.add(image.row(y));
+    }
+    spectrum.take_row_period_px()
+}
+
+/// Rows that the fringe period is estimated from.
+pub(crate) fn period_rows(height: usize) -> impl Iterator<Item = usize> {
+    (0..height).step_by(height.div_ceil(SAMPLE_ROWS).max(1))
 }
 
 /// Mean power spectrum of lines of one length, planned once.
@@ -67,6 +92,7 @@ pub(crate) struct LineSpectrum {
     spectrum: Vec<Complex32>,
     work: Vec<Complex32>,
     power: Vec<f32>,
+    /// Power of the mean levels of the lines.
     level: f32,
 }
 
@@ -85,7 +111,7 @@ impl LineSpectrum {
         }
     }
 
-    /// Take one more line into account; NaN counts as the mean.
+    /// Add a line; NaN counts as the mean of the line.
     pub fn add(&mut self, line: ArrayView1<'_, f32>) {
         let seen = line.iter().filter(|v| v.is_finite());
         let mean = seen.clone().sum::<f32>() / seen.count().max(1) as f32;
@@ -102,21 +128,28 @@ impl LineSpectrum {
         }
     }
 
-    /// Period of the strongest line of the spectrum, infinite where none stands out; forgets all lines.
+    /// Period of the strongest peak in samples, infinite where none stands out. The lines are forgotten.
     pub fn take_period_px(&mut self) -> f64 {
-        let cycles = strongest(&self.power, FAINTEST * self.level);
+        let cycles = strongest(&self.power, CARRIER_POWER_MIN * self.level);
         self.power.fill(0.0);
         self.level = 0.0;
         cycles.map_or(f64::INFINITY, |cycles| self.window.len() as f64 / cycles)
     }
+
+    /// The same within the limits of [`row_period_px`].
+    pub fn take_row_period_px(&mut self) -> f64 {
+        let width = self.window.len() as f64;
+        self.take_period_px().clamp(PERIOD_MIN_PX, width)
+    }
 }
 
-/// Centre of the strongest line in cycles, when it holds a fair share of all power above the lowest frequencies.
+/// Centre of gravity of the strongest peak in cycles per line, if the peak holds enough of the power.
 fn strongest(power: &[f32], least: f32) -> Option<f64> {
-    let total: f32 = power[FEWEST..].iter().sum();
-    let peak = (FEWEST..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
-    let around = peak.saturating_sub(3).max(FEWEST)..(peak + 4).min(power.len());
+    let total: f32 = power[CARRIER_CYCLES_MIN..].iter().sum();
+    let peak = (CARRIER_CYCLES_MIN..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
+    // Three bins to each side cover the main lobe of the window.
+    let around = peak.saturating_sub(3).max(CARRIER_CYCLES_MIN)..(peak + 4).min(power.len());
     let near: f32 = power[around.clone()].iter().sum();
     let moment: f32 = around.map(|bin| bin as f32 * power[bin]).sum();
-    (near > least && near > SHARE * total).then(|| f64::from(moment / near))
+    (near > least && near > CARRIER_SHARE_MIN * total).then(|| f64::from(moment / near))
 }

@@ -1,23 +1,28 @@
-//! Fringe orders point by point.
+//! Fringe orders by a ladder of beats, pixel by pixel (S4).
+//!
+//! The beat of the phases of N and N - 1 fringes has one fringe over the field, so it has no ambiguity. It gives the order
+//! of the beat of N and N - sqrt(N), which has sqrt(N) fringes, and this one gives the order of N: a ladder 1 -> sqrt(N)
+//! -> N, on which noise grows by the factor sqrt(N) at each rung.
 
+use super::{Absolute, Phases};
 use crate::parallel::angle::{round, sin_cos, wrap_positive};
 use crate::{Error, FringeCode, Result};
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Pixels that are searched together.
+/// Pixels that are searched together, as vectors.
 const BLOCK: usize = 64;
 
-/// Orders of one pixel at a time: the beat of the first two fringe numbers has at most one fringe over the field; it
-/// orders the beat of the first and the third, which orders the first (S4). A triple without such a beat is
-/// searched order by order instead.
+/// Fringe orders of one pixel at a time (S4).
+///
+/// Fringe numbers without a beat of at most one fringe have no ladder; every order is tried in turn for them.
 #[derive(Debug, Clone)]
 pub struct Ladder {
-    numbers: [f32; 3],
+    numbers: Phases<f32>,
     columns_per_turn: f32,
     width: f32,
-    /// Orders after which all three phases repeat, when the whole field is one such cycle.
+    /// Orders after which all three phases repeat, if the whole field is one such cycle.
     cycle: Option<f32>,
     climbs: bool,
     orders: usize,
@@ -25,59 +30,71 @@ pub struct Ladder {
 
 /// Absolute phase of one pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct Ordered {
     /// Phase of the first fringe number in rad, 0 at column 0.
     pub phase_rad: f32,
-    /// 1 when every order was hit in the middle, 0 when one was a coin's toss.
+    /// Distance of the worst beat from the decision between two orders: 1 in the middle of an order, 0 at the decision.
     pub margin: f32,
 }
 
+/// Where the field ends and all phases repeat, in turns of the first phase.
+#[derive(Clone, Copy)]
+struct Repeat {
+    /// End of the field.
+    end: f32,
+    /// Length of the cycle to go back by from there.
+    cycle: f32,
+}
+
 impl Ladder {
-    /// Plan for one code.
+    /// Plan for the fringe numbers of a code.
     #[must_use]
     pub fn new(code: &FringeCode) -> Self {
-        let numbers = code.numbers();
-        let beat = (numbers[0] - numbers[1]).abs();
-        let whole = numbers.iter().all(|n| n.fract() == 0.0);
+        let numbers = Phases::from_array(code.numbers());
+        let beat = (numbers.quadrature - numbers.green).abs();
+        let whole = code.numbers().iter().all(|n| n.fract() == 0.0);
         Self {
             numbers: numbers.map(|n| n as f32),
-            columns_per_turn: (code.projector_width() as f64 / numbers[0]) as f32,
+            columns_per_turn: (code.projector_width() as f64 / numbers.quadrature) as f32,
             width: code.projector_width() as f32,
-            cycle: (whole && beat == 1.0).then_some(numbers[0] as f32),
-            climbs: beat > 0.0 && beat <= 1.0 && numbers[2] != numbers[0],
+            cycle: (whole && beat == 1.0).then_some(numbers.quadrature as f32),
+            climbs: beat > 0.0 && beat <= 1.0 && numbers.infrared != numbers.quadrature,
             orders: code.orders(),
         }
     }
 
-    /// Order one pixel from its three wrapped phases in rad.
+    /// Absolute phase of one pixel from its wrapped phases in rad. NaN in, NaN out.
     ///
     /// ```
-    /// use quadfringe::{FringeCode, stages::Ladder};
+    /// use quadfringe::{FringeCode, stages::{Ladder, Phases}};
     /// let code = FringeCode::optimum(36, 912)?;
     /// let at = |n: f64| (std::f64::consts::TAU * n * 700.25 / 912.0) as f32;
-    /// let found = Ladder::new(&code).order(code.numbers().map(at));
+    /// let wrapped = Phases { quadrature: at(36.0), green: at(35.0), infrared: at(30.0) };
+    /// let found = Ladder::new(&code).order(wrapped);
     /// assert!((found.phase_rad - at(36.0)).abs() < 1e-3);
     /// # Ok::<(), quadfringe::Error>(())
     /// ```
     #[must_use]
-    pub fn order(&self, phases: [f32; 3]) -> Ordered {
-        let [first, second, third] = phases.map(|p| [p]);
+    pub fn order(&self, wrapped_rad: Phases<f32>) -> Ordered {
+        let wrapped = wrapped_rad.map(|phase| [phase]);
         let (mut phase_rad, mut margin) = ([0.0], [0.0]);
-        self.order_row([&first, &second, &third], &mut phase_rad, &mut margin);
+        self.order_row(wrapped.as_ref().map(|row| &row[..]), &mut phase_rad, &mut margin);
         Ordered { phase_rad: phase_rad[0], margin: margin[0] }
     }
 
-    /// Order a row of pixels: absolute phase and margin as in [`Ordered`]; NaN in, NaN out.
+    /// The same for a row of pixels.
     #[inline(always)]
-    pub(crate) fn order_row(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
-        // Column 0 and the end of the field look alike when all phases repeat; the field starts half a column before 0.
+    pub(crate) fn order_row(&self, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
+        // Column 0 and the end of the field look alike if all phases repeat. The field starts half a column before 0.
         let end = (self.width - 0.5) / self.columns_per_turn;
-        let repeat = self.cycle.map_or([f32::INFINITY, 0.0], |cycle| [end, cycle]);
+        let never = Repeat { end: f32::INFINITY, cycle: 0.0 };
+        let repeat = self.cycle.map_or(never, |cycle| Repeat { end, cycle });
         if self.climbs {
             self.climb(wrapped, repeat, phase, margin);
         } else {
             self.search(wrapped, phase, margin);
-            let [end, cycle] = repeat.map(|turns| turns * TAU);
+            let (end, cycle) = (repeat.end * TAU, repeat.cycle * TAU);
             for phase in phase {
                 let below = *phase - cycle;
                 *phase = if *phase >= end { below } else { *phase };
@@ -85,48 +102,51 @@ impl Ladder {
         }
     }
 
-    /// In turns, of which whole ones are easily told. From `end` on there is one cycle less.
+    /// Climb the ladder. Phases are in turns, so that orders are whole numbers.
     #[inline(always)]
-    fn climb(&self, wrapped: [&[f32]; 3], [end, cycle]: [f32; 2], phase: &mut [f32], margin: &mut [f32]) {
-        let [n1, n2, n3] = self.numbers;
+    fn climb(&self, wrapped: Phases<&[f32]>, repeat: Repeat, phase: &mut [f32], margin: &mut [f32]) {
+        let Phases { quadrature: n1, green: n2, infrared: n3 } = self.numbers;
+        let Repeat { end, cycle } = repeat;
         let (coarse, middle) = (n1 - n2, n1 - n3);
         let sign = coarse.signum();
         let (to_middle, to_first) = (middle / coarse.abs(), n1 / middle);
         let out = phase.iter_mut().zip(margin);
-        let seen = wrapped[0].iter().zip(wrapped[1]).zip(wrapped[2]);
+        let seen = wrapped.quadrature.iter().zip(wrapped.green).zip(wrapped.infrared);
         for (((&first_rad, second_rad), third_rad), (phase, margin)) in seen.zip(out) {
             let [first, second, third] = [first_rad, *second_rad, *third_rad].map(|rad| rad * (1.0 / TAU));
             let start = (first - second) * sign;
             let start = start - round(start);
             let start = if start < 0.0 { start + 1.0 } else { start };
-            let (more, low) = whole(start * to_middle - (first - third));
-            let beat = (first - third) + more;
-            let (more, high) = whole(beat * to_first - first);
-            let more = if first + more >= end { more - cycle } else { more };
+            let low = Nearest::to(start * to_middle - (first - third));
+            let beat = (first - third) + low.turns;
+            let high = Nearest::to(beat * to_first - first);
+            let more = if first + high.turns >= end { high.turns - cycle } else { high.turns };
             *phase = first_rad + TAU * more;
-            *margin = 1.0 - 2.0 * if low > high { low } else { high };
+            *margin = 1.0 - 2.0 * if low.rest > high.rest { low.rest } else { high.rest };
         }
     }
 
-    fn search(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
-        let [first, second, third] = wrapped.map(|row| row.chunks(BLOCK));
+    fn search(&self, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
+        let rows = wrapped.map(|row| row.chunks(BLOCK));
         let out = phase.chunks_mut(BLOCK).zip(margin.chunks_mut(BLOCK));
-        for (((first, second), third), (phase, margin)) in first.zip(second).zip(third).zip(out) {
-            self.search_block([first, second, third], phase, margin);
+        let blocks = rows.quadrature.zip(rows.green).zip(rows.infrared);
+        for (((quadrature, green), infrared), (phase, margin)) in blocks.zip(out) {
+            self.search_block(Phases { quadrature, green, infrared }, phase, margin);
         }
     }
 
-    /// Every order in turn for a block of pixels: the one with the least squared miss of the other two phasors, and how
-    /// far behind the next one is.
-    fn search_block(&self, wrapped: [&[f32]; 3], phase: &mut [f32], margin: &mut [f32]) {
-        let [first, second, third] = wrapped;
-        let ratios = [1, 2].map(|i| self.numbers[i] / self.numbers[0]);
+    /// Try every order for a block of pixels. The best one has the least squared error of the other two phasors; the
+    /// margin follows from the next best one.
+    fn search_block(&self, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
+        let Phases { quadrature: first, green: second, infrared: third } = wrapped;
+        let to_second = self.numbers.green / self.numbers.quadrature;
+        let to_third = self.numbers.infrared / self.numbers.quadrature;
         let (mut least, mut next) = ([f32::INFINITY; BLOCK], [f32::INFINITY; BLOCK]);
         for order in 0..self.orders {
             for i in 0..first.len() {
                 let guess = wrap_positive(first[i]) + TAU * order as f32;
-                let miss = |ratio: f32, seen: f32| 1.0 - sin_cos(guess * ratio - seen).1;
-                let cost = miss(ratios[0], second[i]) + miss(ratios[1], third[i]);
+                let error = |ratio: f32, seen: f32| 1.0 - sin_cos(guess * ratio - seen).1;
+                let cost = error(to_second, second[i]) + error(to_third, third[i]);
                 let better = cost < least[i];
                 let behind = if better { least[i] } else { cost };
                 next[i] = if behind < next[i] { behind } else { next[i] };
@@ -143,60 +163,71 @@ impl Ladder {
     }
 }
 
-/// Whole turns, and how far they are from the choice between two.
-#[inline(always)]
-fn whole(turns: f32) -> (f32, f32) {
-    let whole = round(turns);
-    (whole, (turns - whole).abs())
+/// The whole number of turns nearest to a number.
+struct Nearest {
+    turns: f32,
+    /// Distance of the number from it.
+    rest: f32,
 }
 
-/// Absolute phase in rad and order margin in [0, 1], both `(rows, columns)`, from three wrapped phases in rad; NaN in,
-/// NaN out.
+impl Nearest {
+    #[inline(always)]
+    fn to(number: f32) -> Self {
+        let turns = round(number);
+        Self { turns, rest: (number - turns).abs() }
+    }
+}
+
+/// Absolute phase and margin, both `(rows, columns)`, from wrapped phases in rad by the ladder of beats (S4).
+///
+/// NaN in, NaN out.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use quadfringe::{FringeCode, stages::unwrap};
+/// use quadfringe::{FringeCode, stages::{Phases, unwrap}};
 /// let code = FringeCode::optimum(36, 912)?;
 /// let wrapped = |n: f64| Array2::from_shape_fn((1, 912), |(_, u)| {
 ///     let phase = std::f64::consts::TAU * n * u as f64 / 912.0;
 ///     phase.sin().atan2(phase.cos()) as f32
 /// });
-/// let [a, b, c] = code.numbers().map(wrapped);
-/// let (phase, margin) = unwrap(&code, [a.view(), b.view(), c.view()])?;
-/// assert!((phase[[0, 500]] / std::f32::consts::TAU * 912.0 / 36.0 - 500.0).abs() < 1e-2);
-/// assert!(margin[[0, 500]] > 0.9);
+/// let wrapped = Phases::from_array(code.numbers()).map(wrapped);
+/// let found = unwrap(&code, wrapped.as_ref().map(|map| map.view()))?;
+/// assert!((found.phase_rad[[0, 500]] / std::f32::consts::TAU * 912.0 / 36.0 - 500.0).abs() < 1e-2);
+/// assert!(found.margin[[0, 500]] > 0.9);
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
-pub fn unwrap(code: &FringeCode, wrapped: [ArrayView2<'_, f32>; 3]) -> Result<(Array2<f32>, Array2<f32>)> {
-    let [first, second, third] = &wrapped;
-    for (map, name) in [(second, "second wrapped phase"), (third, "third wrapped phase")] {
-        if map.dim() != first.dim() {
-            return Err(Error::shape(name, first.shape(), map.shape()));
+pub fn unwrap(code: &FringeCode, wrapped_rad: Phases<ArrayView2<'_, f32>>) -> Result<Absolute> {
+    let shape = wrapped_rad.quadrature.raw_dim();
+    for (map, name) in [(wrapped_rad.green, "green phase"), (wrapped_rad.infrared, "infrared phase")] {
+        if map.raw_dim() != shape {
+            return Err(Error::shape(name, wrapped_rad.quadrature.shape(), map.shape()));
         }
     }
     let ladder = Ladder::new(code);
-    let mut phase = Array2::from_elem(first.raw_dim(), f32::NAN);
-    let mut margin = phase.clone();
-    let wrapped = wrapped.map(|map| map.as_standard_layout().into_owned());
-    let rows = (phase.axis_iter_mut(Axis(0)).into_par_iter()).zip(margin.axis_iter_mut(Axis(0)));
+    let mut out = Absolute {
+        phase_rad: Array2::from_elem(shape, f32::NAN),
+        margin: Array2::from_elem(shape, f32::NAN),
+    };
+    let wrapped = wrapped_rad.map(|map| map.as_standard_layout().into_owned());
+    let rows = out.phase_rad.axis_iter_mut(Axis(0)).into_par_iter().zip(out.margin.axis_iter_mut(Axis(0)));
     rows.enumerate().for_each(|(y, (mut phase, mut margin))| {
         let contiguous = "rows in standard layout are contiguous";
-        let [a, b, c] = wrapped.each_ref().map(|map| map.row(y).to_slice().expect(contiguous));
+        let wrapped = wrapped.as_ref().map(|map| map.row(y).to_slice().expect(contiguous));
         let phase = phase.as_slice_mut().expect(contiguous);
-        ladder.order_row([a, b, c], phase, margin.as_slice_mut().expect(contiguous));
+        ladder.order_row(wrapped, phase, margin.as_slice_mut().expect(contiguous));
     });
-    Ok((phase, margin))
+    Ok(out)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn phases(code: &FringeCode, column: f64) -> [f32; 3] {
-        code.numbers().map(|n| {
+    fn phases(code: &FringeCode, column: f64) -> Phases<f32> {
+        Phases::from_array(code.numbers()).map(|n| {
             let phase = std::f64::consts::TAU * n * column / code.projector_width() as f64;
             phase.sin().atan2(phase.cos()) as f32
         })
@@ -229,7 +260,7 @@ mod tests {
         let ladder = Ladder::new(&code);
         for noise in [-0.05f32, 0.05] {
             let wrapped = phases(&code, 0.0).map(|p| p + noise);
-            let found = ladder.order([wrapped[0], wrapped[1] - 2.0 * noise, wrapped[2]]);
+            let found = ladder.order(Phases { green: wrapped.green - 2.0 * noise, ..wrapped });
             assert!(found.phase_rad.abs() < 0.1, "{noise} {found:?}");
         }
     }

@@ -1,7 +1,9 @@
-//! N-step phase shifting: one image per step, every pixel on its own.
+//! N-step phase shifting, pixel by pixel, from one image per step.
 //!
+//! The steps shift the fringes by equal parts of a period: `I_s = a + b cos(Phi + 2 pi s / N)`. Over a whole period the sum
+//! of `I_s exp(-2 pi j s / N)` is `N b / 2 exp(j Phi)`, and the mean of `I_s` is `a`. Source:
 //! Bruning et al., "Digital wavefront measuring interferometer for testing optical surfaces and lenses", Applied Optics
-//! 13, 2693 (1974): the first Fourier coefficient over the steps.
+//! 13, 2693 (1974).
 
 use crate::condition::Sample;
 use crate::parallel::angle::atan2;
@@ -11,11 +13,12 @@ use ndarray::{Array2, ArrayView2, ArrayView3, ArrayViewMut1, Axis, Zip};
 use std::f32::consts::PI;
 use std::f64::consts::TAU;
 
-/// Fewest images that tell background, modulation and phase apart.
+/// Fewest images that determine background, modulation and phase.
 const STEPS_MIN: usize = 3;
 
 /// The three unknowns of a fringe image, each `(rows, columns)`.
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct NStep {
     /// Wrapped phase in rad, in (-pi, pi]; NaN where the modulation is exactly 0.
     pub phase_rad: Array2<f32>,
@@ -28,7 +31,7 @@ pub struct NStep {
 /// Phase, background and modulation from equally spaced steps over one period,
 /// `I_s = a + b cos(Phi + 2 pi s / N)`, `stack` being `(steps, rows, columns)` with N >= 3 steps.
 ///
-/// Harmonics of the fringes up to the order N - 2 leave the phase untouched.
+/// Harmonics of the fringes up to the order N - 2 do not change the phase.
 ///
 /// # Errors
 /// [`Error::Value`] for fewer than 3 steps, [`Error::Shape`] for images without pixels, [`Error::NotFinite`] for NaN or
@@ -49,10 +52,7 @@ pub struct NStep {
 pub fn n_step(stack: ArrayView3<'_, f32>) -> Result<NStep> {
     check(&stack)?;
     let (steps, rows, columns) = stack.dim();
-    let waves: Vec<[f64; 2]> = (0..steps)
-        .map(|s| (TAU * s as f64 / steps as f64).sin_cos())
-        .map(|(sin, cos)| [2.0 * cos / steps as f64, -2.0 * sin / steps as f64])
-        .collect();
+    let waves: Vec<Wave> = (0..steps).map(|step| Wave::of(step, steps)).collect();
     let mut phase_rad = Array2::zeros((rows, columns));
     let mut background = Array2::zeros((rows, columns));
     let mut modulation = Array2::zeros((rows, columns));
@@ -60,8 +60,9 @@ pub fn n_step(stack: ArrayView3<'_, f32>) -> Result<NStep> {
         .and(background.rows_mut())
         .and(modulation.rows_mut())
         .into_par_iter()
-        .for_each(|(y, phase, mean, amplitude)| {
-            demodulate_row(stack.index_axis(Axis(1), y), &waves, [phase, mean, amplitude]);
+        .for_each(|(y, phase, background, modulation)| {
+            let out = RowOut { phase, background, modulation };
+            demodulate_row(stack.index_axis(Axis(1), y), &waves, out);
         });
     Ok(NStep { phase_rad, background, modulation })
 }
@@ -80,33 +81,59 @@ fn check(stack: &ArrayView3<'_, f32>) -> Result<()> {
     images.try_for_each(|(s, image)| f32::check_finite(&image, &format!("step {s}")))
 }
 
-/// One row, `(steps, columns)`, into phase, background and modulation.
-///
-/// Sums run over differences to the first step: the weights add up to zero, so nothing changes but the rounding, and
-/// equal images give a modulation of exactly 0.
-fn demodulate_row(
-    steps: ArrayView2<'_, f32>,
-    waves: &[[f64; 2]],
-    [mut phase, mut mean, mut amplitude]: [ArrayViewMut1<'_, f32>; 3],
-) {
-    let first = steps.row(0);
-    let mut sums = vec![[0.0f64; 3]; first.len()];
-    for (step, [cos, sin]) in steps.outer_iter().zip(waves).skip(1) {
-        for ((sum, &value), &zero) in sums.iter_mut().zip(step).zip(first) {
-            let change = f64::from(value) - f64::from(zero);
-            sum[0] += change * cos;
-            sum[1] += change * sin;
-            sum[2] += change;
-        }
-    }
-    for (x, [re, im, change]) in sums.into_iter().enumerate() {
-        mean[x] = (f64::from(first[x]) + change / waves.len() as f64) as f32;
-        amplitude[x] = (re * re + im * im).sqrt() as f32;
-        phase[x] = if amplitude[x] == 0.0 { f32::NAN } else { half_open(atan2(im as f32, re as f32)) };
+/// Weights of one step in the sums over all steps.
+struct Wave {
+    real: f64,
+    imaginary: f64,
+}
+
+impl Wave {
+    fn of(step: usize, steps: usize) -> Self {
+        let (sin, cos) = (TAU * step as f64 / steps as f64).sin_cos();
+        Self { real: 2.0 * cos / steps as f64, imaginary: -2.0 * sin / steps as f64 }
     }
 }
 
-/// -pi and pi are one angle; pi is its name.
+/// Sums over the steps at one pixel, of differences to the first step.
+#[derive(Clone, Default)]
+struct Sums {
+    real: f64,
+    imaginary: f64,
+    change: f64,
+}
+
+/// One row of each result.
+struct RowOut<'a> {
+    phase: ArrayViewMut1<'a, f32>,
+    background: ArrayViewMut1<'a, f32>,
+    modulation: ArrayViewMut1<'a, f32>,
+}
+
+/// Demodulate one row, `(steps, columns)`.
+///
+/// The sums run over differences to the first step. The weights add up to zero, so only the rounding changes, and equal
+/// images give a modulation of exactly 0.
+fn demodulate_row(steps: ArrayView2<'_, f32>, waves: &[Wave], mut out: RowOut<'_>) {
+    let first = steps.row(0);
+    let mut sums = vec![Sums::default(); first.len()];
+    for (step, wave) in steps.outer_iter().zip(waves).skip(1) {
+        for ((sum, &value), &zero) in sums.iter_mut().zip(step).zip(first) {
+            let change = f64::from(value) - f64::from(zero);
+            sum.real += change * wave.real;
+            sum.imaginary += change * wave.imaginary;
+            sum.change += change;
+        }
+    }
+    for (x, Sums { real, imaginary, change }) in sums.into_iter().enumerate() {
+        let modulation = (real * real + imaginary * imaginary).sqrt() as f32;
+        let phase = half_open(atan2(imaginary as f32, real as f32));
+        out.background[x] = (f64::from(first[x]) + change / waves.len() as f64) as f32;
+        out.modulation[x] = modulation;
+        out.phase[x] = if modulation == 0.0 { f32::NAN } else { phase };
+    }
+}
+
+/// An angle in (-pi, pi]: -pi becomes pi.
 fn half_open(angle: f32) -> f32 {
     if angle <= -PI { PI } else { angle }
 }
@@ -142,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn half_a_turn_has_one_name() {
+    fn half_a_turn_is_always_plus_pi() {
         let image = |v: f32| Array2::from_elem((1, 1), v);
         for nudge in [0.0, 1e-9, -1e-9] {
             let images = [image(-1.0), image(nudge), image(1.0), image(0.0)];
@@ -152,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn harmonics_up_to_n_minus_2_do_no_harm() {
+    fn harmonics_up_to_n_minus_2_do_not_change_the_phase() {
         let squared = stack(6).mapv(|v| v * v * v * v);
         let found = n_step(squared.view()).unwrap();
         for ((_, x), &phase) in found.phase_rad.indexed_iter() {

@@ -1,17 +1,14 @@
-//! Half the sum of the envelopes through the fringe maxima and the fringe minima.
+//! The mean envelope: half the sum of the envelopes through the fringe maxima and through the fringe minima.
 
 use super::moving_mean::{Sums, moving_mean};
-use super::waves::Waves;
+use super::waves::{Extremum, Waves};
 use crate::parallel::Aligned;
+use crate::stages::blocks::coarsen;
+use crate::stages::params::{ENVELOPE_SAMPLES_PER_FRINGE, ENVELOPE_SMOOTHING};
 
-/// Fewest samples a fringe is looked at with: an extremum lies between them on a parabola.
-const SAMPLES_PER_FRINGE: f32 = 8.0;
-/// Share of a fringe that is averaged over so that noise adds no extrema, and that a half wave must exceed.
-const SMOOTH: f32 = 0.2;
-
-/// Extrema refined at once.
+/// Extrema that are refined together, as vectors.
 const LANES: usize = 8;
-/// Pixels drawn at once: mostly all from one extremum to the next.
+/// Pixels that are drawn together: in most cases all from one extremum to the next.
 const BLOCK: usize = 24;
 
 /// Working memory of [`mean_envelope`].
@@ -31,11 +28,10 @@ pub(super) struct Scratch {
 struct Knots {
     at_px: Vec<f32>,
     value: Vec<f32>,
-    /// Samples that they lie at; 1 for maxima and -1 for minima.
-    samples: Vec<(u32, f32)>,
+    extrema: Vec<Extremum>,
 }
 
-/// `level + i slope` over the pixels before `end`, from the end of the line before on.
+/// A straight line `level + i slope` from the end of the previous line to the pixel before `end`.
 #[derive(Debug, Default, Clone, Copy)]
 struct Line {
     level: f32,
@@ -43,10 +39,10 @@ struct Line {
     end: u32,
 }
 
-/// Background of `row`; false when the row has no fringes to draw envelopes through.
+/// Background of `row`. Returns false if the row has no fringes.
 ///
-/// A row is split where it crosses its moving mean; each side of a crossing holds one extremum. They are looked for on
-/// sums of 1, 2, 4, ... pixels, as many as leave a fringe `SAMPLES_PER_FRINGE` samples.
+/// The row is split where it crosses its moving mean. Each half wave between two crossings holds one extremum, which is
+/// located on means of 1, 2, 4, ... pixels, as many as leave [`ENVELOPE_SAMPLES_PER_FRINGE`] samples per fringe.
 #[inline(always)]
 pub(super) fn mean_envelope(
     row: &[f32],
@@ -63,10 +59,10 @@ pub(super) fn mean_envelope(
     for buffer in [&mut *smooth, &mut *middle] {
         buffer.resize(Waves::padded(count));
     }
-    moving_mean(coarse, SMOOTH * period, sums, &mut smooth[..count]);
+    moving_mean(coarse, ENVELOPE_SMOOTHING * period, sums, &mut smooth[..count]);
     moving_mean(coarse, period, sums, &mut middle[..count]);
     waves.find(smooth, middle, count);
-    knots.find(waves, smooth, (SMOOTH * period) as usize, step as f32);
+    knots.find(waves, smooth, (ENVELOPE_SMOOTHING * period) as usize, step as f32);
     if knots.at_px.len() < 2 {
         return false;
     }
@@ -78,63 +74,38 @@ pub(super) fn mean_envelope(
 
 fn coarseness(period_px: f32) -> usize {
     let mut step = 1;
-    while period_px >= 2.0 * SAMPLES_PER_FRINGE * step as f32 {
+    while period_px >= 2.0 * ENVELOPE_SAMPLES_PER_FRINGE * step as f32 {
         step *= 2;
     }
     step
 }
 
-/// Means of `step` (a power of two) pixels.
-#[inline(always)]
-pub(crate) fn coarsen(row: &[f32], step: usize, out: &mut Aligned<f32>, spare: &mut Aligned<f32>) {
-    out.resize(row.len() / step.min(2));
-    if step == 1 {
-        out.copy_from_slice(row);
-        return;
-    }
-    pair_means(row, out);
-    for _ in 1..step.ilog2() {
-        spare.resize(out.len() / 2);
-        pair_means(out, spare);
-        std::mem::swap(out, spare);
-    }
-}
-
-/// Means of two samples.
-#[inline(always)]
-fn pair_means(row: &[f32], out: &mut [f32]) {
-    let (pairs, _) = row.as_chunks::<2>();
-    for (to, [a, b]) in out.iter_mut().zip(pairs) {
-        *to = 0.5 * (a + b);
-    }
-}
-
 impl Knots {
-    /// Places and values of the extrema: tops of the parabolas through their samples and both neighbours.
+    /// Places and values of the extrema: the tops of the parabolas through each extremum and its two neighbours.
     #[inline(always)]
     fn find(&mut self, waves: &Waves, smooth: &[f32], shortest: usize, step: f32) {
-        let Self { at_px, value, samples } = self;
-        waves.extrema(smooth, shortest, samples);
-        let count = samples.len();
+        let Self { at_px, value, extrema } = self;
+        waves.extrema(smooth, shortest, extrema);
+        let count = extrema.len();
         let whole = count.next_multiple_of(LANES);
-        // A half wave between two crossings touches neither end of the row, nor does what fills up the last block.
-        samples.resize(whole, (1, 0.0));
+        // Neither a half wave between two crossings nor this padding touches an end of the row.
+        extrema.resize(whole, Extremum { sample: 1, sign: 0.0 });
         at_px.resize(whole, 0.0);
         value.resize(whole, 0.0);
         let out = at_px.chunks_exact_mut(LANES).zip(value.chunks_exact_mut(LANES));
-        for (samples, (at_px, value)) in samples.chunks_exact(LANES).zip(out) {
+        for (extrema, (at_px, value)) in extrema.chunks_exact(LANES).zip(out) {
             let (mut left, mut top, mut right) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-            for (i, (at, _)) in samples.iter().enumerate() {
-                let near = &smooth[*at as usize - 1..][..3];
+            for (i, Extremum { sample, .. }) in extrema.iter().enumerate() {
+                let near = &smooth[*sample as usize - 1..][..3];
                 (left[i], top[i], right[i]) = (near[0], near[1], near[2]);
             }
-            for (i, &(at, sign)) in samples.iter().enumerate() {
+            for (i, &Extremum { sample, sign }) in extrema.iter().enumerate() {
                 let curvature = left[i] - 2.0 * top[i] + right[i];
                 let bent = sign * curvature < 0.0;
                 let across = left[i] - right[i];
                 let shift = 0.5 * across / if bent { curvature } else { 1.0 };
                 let shift = if bent { shift.clamp(-0.5, 0.5) } else { 0.0 };
-                at_px[i] = (at as i32 as f32 + shift + 0.5) * step - 0.5;
+                at_px[i] = (sample as i32 as f32 + shift + 0.5) * step - 0.5;
                 value[i] = top[i] - 0.25 * across * shift;
             }
         }
@@ -143,7 +114,8 @@ impl Knots {
     }
 }
 
-/// The background at each knot: half its own envelope and half the other, which is straight between the neighbours.
+/// The background at each knot: half the sum of its envelope and the opposite one, which is a straight line between the
+/// two neighbouring knots.
 #[inline(always)]
 fn find_levels(Knots { at_px, value, .. }: &Knots, levels: &mut Vec<f32>) {
     let last = value.len() - 1;
@@ -158,11 +130,10 @@ fn find_levels(Knots { at_px, value, .. }: &Knots, levels: &mut Vec<f32>) {
     }
 }
 
-/// Straight lines through the levels at the knots.
+/// Straight lines between the levels at the knots, level before the first and after the last knot.
 #[inline(always)]
 fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>) {
     lines.resize(levels.len() + 1, Line::default());
-    // Up to the first knot the background is level.
     lines[0] = Line { level: levels[0], slope: 0.0, end: at_px[0] as u32 + 1 };
     let ends = at_px.iter().zip(&at_px[1..]).zip(levels.iter().zip(&levels[1..]));
     for (line, ((&x0, &x1), (l0, l1))) in lines[1..].iter_mut().zip(ends) {
@@ -170,11 +141,10 @@ fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>
         let first = x0 as u32 + 1;
         *line = Line { level: l0 + slope * (first as f32 - x0), slope, end: x1 as u32 + 1 };
     }
-    // And from the last one on.
     lines[levels.len()] = Line { level: levels[levels.len() - 1], slope: 0.0, end: u32::MAX };
 }
 
-/// Each line up to the next. Lines are drawn in whole blocks, of which the next line overwrites what is too much.
+/// Draw the lines one after another in whole blocks; each line overwrites the excess of the previous one.
 #[inline(always)]
 fn draw(lines: &[Line], out: &mut [f32]) {
     let mut start = 0;

@@ -1,30 +1,35 @@
-//! Background of a fringe image, row by row (system, section 3, step 2).
+//! Background of a fringe image, row by row: the illumination without the fringes.
+//!
+//! A row is `a + b cos(Phi)` (S1). Its upper envelope is `a + b` and its lower one `a - b`, so half their sum is the
+//! background `a`; a mean over one fringe period is `a` too, because the cosine averages to zero.
 
 mod envelope;
 mod moving_mean;
 mod waves;
 
+use super::params::PERIOD_MIN_PX;
 use crate::{Error, Result};
-pub(crate) use envelope::coarsen;
 use envelope::mean_envelope;
 use moving_mean::{Sums, moving_mean};
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 
-/// How the background of a row is found.
+/// How the background of a row is estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[non_exhaustive]
 pub enum Background {
-    /// Half the sum of the upper and the lower envelope, drawn straight through the fringe maxima and minima of the
-    /// row: the published way.
+    /// The published way: half the sum of the upper and the lower envelope, which are straight lines through the fringe
+    /// maxima and minima of the row.
     MeanEnvelope,
-    /// Moving mean over one fringe period: blind to the carrier, half as noisy, exact for a linear background.
+    /// Moving mean over one fringe period. It has half the noise and is exact for a linear background.
     #[default]
     MovingMean,
 }
 
 /// Background of every row of an image, `(rows, columns)` in the unit of the image.
 ///
-/// `period_px` is the fringe period along the row in camera pixels.
+/// `period_px` is the fringe period along the row in camera pixels. A row without fringes gets its moving mean in either
+/// case. NaN spreads along its row.
 ///
 /// # Errors
 /// [`crate::Error::Value`] when the period is below 3 pixels or longer than a row.
@@ -46,21 +51,21 @@ pub fn background(image: ArrayView2<'_, f32>, kind: Background, period_px: f64) 
         |scratch, (mut target, row)| {
             let row = row.to_vec();
             let target = target.as_slice_mut().expect("a fresh array is contiguous");
-            draw_background(&row, kind, period_px as f32, scratch, target);
+            row_background(&row, kind, period_px as f32, scratch, target);
         },
     );
     Ok(out)
 }
 
 pub(crate) fn check_period(period_px: f64, columns: usize) -> Result<()> {
-    if (3.0..=columns as f64).contains(&period_px) {
+    if (PERIOD_MIN_PX..=columns as f64).contains(&period_px) {
         return Ok(());
     }
-    let expected = format!("a fringe period of 3 to {columns} camera pixels");
+    let expected = format!("a fringe period of {PERIOD_MIN_PX} to {columns} camera pixels");
     Err(Error::value("period_px", expected, period_px))
 }
 
-/// Working memory of [`draw_background`].
+/// Working memory of [`row_background`].
 #[derive(Debug, Default)]
 pub(crate) struct Scratch {
     sums: Sums,
@@ -69,7 +74,7 @@ pub(crate) struct Scratch {
 
 /// Background of one row.
 #[inline(always)]
-pub(crate) fn draw_background(
+pub(crate) fn row_background(
     row: &[f32],
     kind: Background,
     period_px: f32,
@@ -77,11 +82,11 @@ pub(crate) fn draw_background(
     out: &mut [f32],
 ) {
     let Scratch { sums, envelope } = scratch;
-    let drawn = match kind {
+    let has_fringes = match kind {
         Background::MeanEnvelope => mean_envelope(row, period_px, sums, envelope, out),
         Background::MovingMean => false,
     };
-    if !drawn {
+    if !has_fringes {
         moving_mean(row, period_px, sums, out);
     }
 }
@@ -110,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn a_flat_row_is_its_own_background() {
+    fn a_flat_row_is_all_background() {
         let image = Array2::from_elem((1, 64), 0.25f32);
         for kind in [Background::MovingMean, Background::MeanEnvelope] {
             let found = background(image.view(), kind, 16.0).unwrap();

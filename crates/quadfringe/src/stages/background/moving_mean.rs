@@ -1,4 +1,4 @@
-//! Mean over a window whose width need not be whole.
+//! Moving mean over a window of any width, whole or not.
 
 use crate::parallel::Aligned;
 
@@ -10,17 +10,17 @@ pub(super) struct Sums {
     window: Aligned<f32>,
 }
 
-/// Mean over `width` samples around each; a window that would leave the row is moved back inside.
+/// Mean over `width` samples around each sample. A window that would leave the row is shifted inside.
 ///
-/// Window sums are put together from sums over 1, 2, 4, ... samples: every pass is a plain vector addition, and unlike
-/// in a running sum no rounding is carried along the row.
+/// Window sums are composed of sums over 1, 2, 4, ... samples: every pass is a vector addition, and rounding errors do not
+/// accumulate along the row as in a running sum.
 #[inline(always)]
 pub(super) fn moving_mean(row: &[f32], width: f32, sums: &mut Sums, out: &mut [f32]) {
     let n = row.len();
     let width = width.clamp(1.0, n as f32);
     let reach = (width - 1.0) / 2.0;
     let side = reach as usize;
-    // Samples at both ends of the window count in part.
+    // The samples at both ends of the window have a partial weight.
     let part = reach - side as f32;
     let scale = 1.0 / width;
     let (first, last) = (end_mean(row.iter(), width), end_mean(row.iter().rev(), width));
@@ -86,7 +86,7 @@ fn window_sums<'a>(row: &'a [f32], count: usize, sums: &'a mut Sums) -> &'a [f32
     }
 }
 
-/// `out[x] = a[x] + b[x + shift]`, as far as there is such a sample.
+/// `out[x] = a[x] + b[x + shift]` wherever `b` has such a sample.
 #[inline(always)]
 fn add_shifted(a: &[f32], b: &[f32], shift: usize, out: &mut [f32]) {
     for ((to, a), b) in out.iter_mut().zip(a).zip(&b[shift..]) {

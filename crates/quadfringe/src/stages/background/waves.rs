@@ -1,21 +1,30 @@
-//! Extrema of the half waves of a row about its middle. Every sample is a bit: fringes cross too irregularly for a
-//! processor to guess, and bits need no guessing.
+//! Extrema of the half waves of a row about its moving mean. Samples are compared as bits, because fringes cross the mean
+//! too irregularly for branch prediction.
 
 use std::ops::Range;
 
 /// Samples in a word of bits.
 const WORD: usize = 64;
-/// Longest half waves that [`Waves::extrema`] can leave out: half a word on each side of a word is looked at.
+/// Longest half waves that [`Waves::extrema`] can skip: it examines half a word on each side of a word.
 const SHORTEST_MAX: usize = WORD / 2 - 1;
+
+/// An extremum of a row.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Extremum {
+    /// Index of the sample.
+    pub sample: u32,
+    /// 1 for a maximum, -1 for a minimum.
+    pub sign: f32,
+}
 
 /// Half waves of one row.
 #[derive(Debug, Default)]
 pub(super) struct Waves {
-    /// The sample is above the middle.
+    /// The sample is above the moving mean.
     above: Vec<u64>,
-    /// The row turns at the sample: downwards where it is above the middle, upwards where it is below.
+    /// The sample is a local maximum above the moving mean or a local minimum below it.
     turns: Vec<u64>,
-    /// From the first crossing to the last one: half waves cut by an end of the row lie outside.
+    /// From the first crossing to the last one, without the half waves that an end of the row cuts.
     whole: Range<usize>,
 }
 
@@ -25,7 +34,7 @@ impl Waves {
         count.next_multiple_of(WORD) + 1
     }
 
-    /// Split the first `count` samples of a row where they cross the middle. Both buffers are padded.
+    /// Split the first `count` samples of a row where they cross the moving mean. Both buffers are padded.
     #[inline(always)]
     pub fn find(&mut self, row: &mut [f32], middle: &mut [f32], count: usize) {
         for buffer in [&mut *row, &mut *middle] {
@@ -55,14 +64,14 @@ impl Waves {
         }
     }
 
-    /// Samples at the extrema of the half waves longer than `shortest`, with 1 for maxima and -1 for minima, which take
-    /// turns: of two on one side, with a half wave between them that was noise, the further one counts.
+    /// Extrema of the half waves longer than `shortest` samples. Maxima and minima alternate: if a short half wave between
+    /// two extrema of one sign was skipped as noise, the more extreme one is kept.
     #[inline(always)]
-    pub fn extrema(&self, row: &[f32], shortest: usize, out: &mut Vec<(u32, f32)>) {
+    pub fn extrema(&self, row: &[f32], shortest: usize, out: &mut Vec<Extremum>) {
         let shortest = shortest.min(SHORTEST_MAX);
         let turns: u32 = self.turns.iter().map(|word| word.count_ones()).sum();
-        // One more, for the last one that does not count.
-        out.resize(turns as usize + 1, (0, 0.0));
+        // One more, for a last write that does not count.
+        out.resize(turns as usize + 1, Extremum::default());
         let (mut found, mut highest, mut last_side) = (0, 0.0, u64::MAX);
         for (index, (&above, &turns)) in self.above.iter().zip(&self.turns).enumerate() {
             let before = self.above[index.saturating_sub(1)];
@@ -78,8 +87,8 @@ impl Waves {
                 let height = sign * row[at];
                 let again = side == last_side;
                 let lower = again & (height <= highest);
-                // Written in any case, where it counts or behind all that do: no branch to guess.
-                out[found - usize::from(again & !lower)] = (at as u32, sign);
+                // Always written, either in place or behind the last valid entry, to avoid a branch.
+                out[found - usize::from(again & !lower)] = Extremum { sample: at as u32, sign };
                 found += usize::from(!again);
                 highest = if lower { highest } else { height };
                 last_side = side;
@@ -99,15 +108,15 @@ fn in_long_runs([before, word, after]: [u64; 3], shortest: usize) -> u64 {
     (runs >> HALF) as u64
 }
 
-/// Ones for the samples of a word, which begins with sample `first`, that lie in a range.
+/// Ones for the samples of a word that lie in a range. The word begins with sample `first`.
 #[inline(always)]
 fn ones_within(range: &Range<usize>, first: usize) -> u64 {
     let from = |place: usize| u64::MAX.checked_shl(place.saturating_sub(first) as u32).unwrap_or(0);
     from(range.start) & !from(range.end)
 }
 
-/// Which of a word of samples are above others: vectors make a byte of each comparison, and a multiplication gathers the
-/// last bits of eight bytes in the first one from above. Put together bit by bit, a compiler takes the vectors apart.
+/// A bit for each sample of a word that is above the other one. Vectors turn each comparison into a byte, and a
+/// multiplication gathers the lowest bits of eight bytes in one byte; composing the word bit by bit would not vectorise.
 #[inline(always)]
 fn compare(row: &[f32], others: &[f32]) -> u64 {
     const GATHER: u64 = 0x0102_0408_1020_4080;
@@ -127,10 +136,10 @@ mod tests {
     use super::*;
 
     /// Extrema of the half waves longer than `shortest`, sample by sample.
-    fn slow(row: &[f32], middle: &[f32], shortest: usize) -> Vec<(u32, f32)> {
+    fn slow(row: &[f32], middle: &[f32], shortest: usize) -> Vec<Extremum> {
         let above = |i: usize| row[i] > middle[i];
         let crossings: Vec<usize> = (1..row.len()).filter(|&i| above(i) != above(i - 1)).collect();
-        let mut found: Vec<(u32, f32)> = Vec::new();
+        let mut found: Vec<Extremum> = Vec::new();
         for wave in crossings.windows(2).filter(|wave| wave[1] - wave[0] > shortest) {
             let sign = if above(wave[0]) { 1.0 } else { -1.0 };
             for i in wave[0]..wave[1] {
@@ -139,12 +148,12 @@ mod tests {
                     continue;
                 }
                 match found.last() {
-                    Some(&(at, other)) if other == sign => {
-                        if here > sign * row[at as usize] {
-                            *found.last_mut().unwrap() = (i as u32, sign);
+                    Some(last) if last.sign == sign => {
+                        if here > sign * row[last.sample as usize] {
+                            *found.last_mut().unwrap() = Extremum { sample: i as u32, sign };
                         }
                     }
-                    _ => found.push((i as u32, sign)),
+                    _ => found.push(Extremum { sample: i as u32, sign }),
                 }
             }
         }
@@ -152,7 +161,7 @@ mod tests {
     }
 
     #[test]
-    fn bits_find_what_a_look_at_every_sample_finds() {
+    fn bits_find_the_extrema_that_a_loop_over_samples_finds() {
         // Plateaus, half waves longer than a word, rows that end anywhere in a word.
         for (count, period, coarse) in
             [(64, 5.0, 3.0), (130, 17.3, 9.0), (511, 11.1, 2.0), (700, 290.0, 40.0)]
@@ -178,7 +187,7 @@ mod tests {
     }
 
     #[test]
-    fn short_runs_are_left_out_across_words() {
+    fn short_runs_are_skipped_across_words() {
         // A run of three over the border of two words, one of two inside.
         let words = [1 << 63, 0b11 | 0b11 << 20, 0];
         assert_eq!(in_long_runs(words, 1), words[1]);
@@ -189,7 +198,7 @@ mod tests {
     #[test]
     fn a_row_without_crossings_has_no_half_waves() {
         let (mut row, mut middle) = (vec![1.0; Waves::padded(100)], vec![0.0; Waves::padded(100)]);
-        let (mut waves, mut found) = (Waves::default(), vec![(0, 0.0)]);
+        let (mut waves, mut found) = (Waves::default(), vec![Extremum::default()]);
         waves.find(&mut row, &mut middle, 100);
         waves.extrema(&row, 0, &mut found);
         assert!(found.is_empty());

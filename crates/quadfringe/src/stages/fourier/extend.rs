@@ -1,10 +1,11 @@
-//! Fringes beyond the ends of a row, so that the transform, for which a row is a ring, sees no jump.
+//! Continuation of the fringes beyond the ends of a row. The transform treats a row as a ring, and a jump from its end to
+//! its beginning would leak into all frequencies.
 
-/// Write into `tail` fringes that go on from the end of `row` and pass over, through `fade` (0 to 1), into fringes that
-/// lead up to its beginning.
+/// Write fringes into `tail` that continue the end of `row` and fade, with the weights `fade` (0 to 1), into fringes that
+/// lead to its beginning.
 ///
-/// Fringes are even about an extremum. The row is mirrored at the extremum nearest to its end, so value, slope and
-/// phase go on; mirrored at the end itself, the phase would jump.
+/// Fringes are symmetric about an extremum. The row is mirrored at the extremum nearest to its end, which continues value,
+/// slope and phase; mirroring at the end would make the phase jump.
 #[inline(always)]
 pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], scratch: &mut Scratch, tail: &mut [f32]) {
     let n = row.len();
@@ -15,7 +16,7 @@ pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], scratch: &mut Sc
     let after = mirror(edge, quarter, misses);
     let before = mirror(&row[..6 * quarter + 2], quarter, misses);
     reversed(&row[..n - 1 - after], tail);
-    // From the far end of the tail back: what leads up to the beginning of the row.
+    // From the far end of the tail backwards: the fringes that lead to the beginning of the row.
     let beyond = tail.len().saturating_sub(n - 1 - before);
     for (value, weight) in tail[..beyond].iter_mut().zip(fade) {
         *value += weight * (row[n - 1] - *value);
@@ -33,7 +34,7 @@ pub(super) struct Scratch {
     misses: Vec<f32>,
 }
 
-/// The end of `source` backwards; its first sample again where it is too short.
+/// The end of `source` in reverse order. Its first sample fills the rest if it is too short.
 #[inline(always)]
 fn reversed(source: &[f32], out: &mut [f32]) {
     let (known, beyond) = out.split_at_mut(source.len().min(out.len()));
@@ -43,8 +44,8 @@ fn reversed(source: &[f32], out: &mut [f32]) {
     beyond.fill(source[0]);
 }
 
-/// Twice the distance of an extremum from the end of a row, of which `edge[0]` is the last sample; half a fringe is
-/// looked through, from a quarter on, every place at once.
+/// Twice the distance of an extremum from the end of a row, of which `edge[0]` is the last sample: the place about which
+/// a quarter of a fringe is most symmetric. The search covers half a fringe and evaluates all places together.
 #[inline(always)]
 fn mirror(edge: &[f32], quarter: usize, misses: &mut Vec<f32>) -> usize {
     misses.clear();
