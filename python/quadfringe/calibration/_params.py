@@ -58,7 +58,7 @@ POSES_MIN = 5
 # differ most (TILT_MIN) and least (AXIS_MIN). Smaller limits admit poses that leave the focal length undetermined.
 TILT_MIN = 0.03
 AXIS_MIN = 0.012
-# Range of the board distances, share of the mean distance: below this, distortion and distance stand for each other.
+# Range of the board distances, share of the mean distance: below this, distortion and distance are strongly correlated.
 DEPTH_RANGE_MIN = 0.04
 
 # --- Projector maps: pytest tests/test_projector_maps.py
@@ -118,7 +118,7 @@ REGISTRATION_SPREAD_MIN = 0.1
 
 # --- Light, that is dark level, responses, crosstalk and flat field: pytest tests/test_channels.py
 
-LEVEL_STEPS = 8  # levels of a ramp: three show its bend, the others judge the fit
+LEVEL_STEPS = 8  # levels of a ramp: three determine its curvature, the others judge the fit
 DARK_LEVEL_MAX = 0.2  # share of full scale: a brighter shot was taken with the lens open
 HOT = 0.02  # share of full scale above the dark level from which a pixel is hot: 5 of 255
 # Share of full scale from which a captured mean is left out, because the sensor cuts off part of the noise.
@@ -134,7 +134,7 @@ ROBUST = 2e-3
 UNLIT = 0.02
 # Largest share of full light that room light may add; more leaves the fringes no range.
 AMBIENT_MAX = 0.45
-# Unsaturated levels of a ramp that show its bend: offset, slope and exponent.
+# Unsaturated levels of a ramp that determine its offset, slope and exponent.
 USABLE_LEVELS_MIN = 3
 FLAT_SHOTS_MIN = 4  # two that give the gain and two that judge it
 # Scale, px, that separates vignetting and illumination (slower) from the gain of single pixels (faster).

@@ -67,7 +67,7 @@ def run(
 ) -> None:
     """Do every step whose captures exist; report what is missing, what was found and whether it is good.
 
-    The exit status is 1 when a needed step is missing, in which case nothing is written, or when a step is not good.
+    The exit status is 1 when a needed step is missing, in which case no file is written, or when a step is not good.
     """
     from quadfringe.calibration.session import guide
     from quadfringe.files import require_suffix

@@ -64,7 +64,7 @@ def doctor(
 
 
 class _Paths(NamedTuple):
-    """The folder of a shot and the file of a calibration, as far as they are given."""
+    """The folder of a shot and the file of a calibration, where given."""
 
     shot: Path | None
     calibration: Path | None

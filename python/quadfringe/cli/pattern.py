@@ -51,6 +51,6 @@ def pattern(
             "--calibration has no effect without --predeformed-z-mm, the depth of the reference plane; add it"
         )
     known = None if calibration is None else Calibration.load(calibration)
-    asked = Fringes(numbers=fringes, layout=layout.value, predeformed_z_mm=predeformed_z_mm)
-    for path in write_patterns(out, asked.numbers, (width, height), layout.value, predeformation(asked, known)):
+    wanted = Fringes(numbers=fringes, layout=layout.value, predeformed_z_mm=predeformed_z_mm)
+    for path in write_patterns(out, wanted.numbers, (width, height), layout.value, predeformation(wanted, known)):
         say(str(path))

@@ -1,4 +1,4 @@
-"""What a time was measured on: processor, system, versions, and the commit of a checkout."""
+"""Describe the machine that a time was measured on: processor, system, versions, and the commit of a checkout."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ __all__ = ["described", "resident_bytes", "usable_cores"]
 
 
 def described() -> dict[str, str | int | None]:
-    """Give cpu, cores, os, python, quadfringe and commit; the commit is None outside a git checkout.
+    """Return cpu, cores, os, python, quadfringe and commit; the commit is None outside a git checkout.
 
-    A commit that ends in "-dirty" had changes that were not committed.
+    A commit that ends in "-dirty" had uncommitted changes.
 
     >>> from quadfringe.evaluation.machine import described
     >>> sorted(described())
@@ -33,7 +33,7 @@ def described() -> dict[str, str | int | None]:
 
 
 def resident_bytes() -> int | None:
-    """Give the memory of this process that is resident now; None where the system does not tell it as Linux does."""
+    """Return the resident memory of this process, bytes; None on systems other than Linux."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:
@@ -51,7 +51,7 @@ def _cpu() -> str:
 
 
 def _commit() -> str | None:
-    """Give the commit only when git tracks this very file: an environment may lie inside another checkout."""
+    """Return the commit if git tracks this very file; the environment may lie inside another checkout."""
     here = Path(__file__).resolve()
     git = ["git", "-C", str(here.parent)]
     tracked = _output([*git, "ls-files", "--error-unmatch", here.name])

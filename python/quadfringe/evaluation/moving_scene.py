@@ -1,4 +1,4 @@
-"""A scene that moves, measured shot by shot: the raw recording, a PLY of every instant, and a movie."""
+"""Measure a moving scene shot by shot: raw recording, a PLY file per shot, and a movie."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from quadfringe.config.cameras import AravisConfig, ChipConfig, ReplayConfig, Vi
 from quadfringe.data import AnyShot, BayerShot, Shape, Truth
 from quadfringe.decoding.compare import Comparison, compare
 from quadfringe.devices.emulator import Emulator
+from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.files import folder_for
 from quadfringe.recording import Recorder
 from quadfringe.scanner import Scanner, open_system
@@ -25,15 +26,15 @@ from quadfringe.view.movie import movie, solid_picture
 
 __all__ = ["MovingScene", "hand", "hand_system", "measure_scene"]
 
-RATE_HZ = 10.0
+RATE_HZ = 10.0  # frame rate of the movie and of the virtual camera
 SHOTS = 30  # three seconds: the fingers close and open once
-PICTURE_PX = (640, 480)
-HAND_MIDDLE_MM = (0.0, 10.0, 760.0)
+PICTURE_PX = (640, 480)  # width and height of each half of the movie
+HAND_MIDDLE_MM = (0.0, 10.0, 760.0)  # centre of the hand, about which the view rotates
 
 
 @dataclass(frozen=True)
 class MovingScene:
-    """What filming gave: files, and what was lost on the way; errors for shots whose truth is known."""
+    """Files of a measured scene; numbers of shots, shapes and lost frames; errors of shots whose truth is known."""
 
     recording: Path
     movie: Path
@@ -45,17 +46,17 @@ class MovingScene:
 
 
 def hand_system() -> SystemConfig:
-    """Give the virtual bench with the moving hand before a camera with a Bayer chip, lightly coloured, with noise."""
+    """Return the virtual bench with the moving hand, skin-coloured, in front of a noisy camera with a Bayer chip."""
     scene = SceneConfig(surface="hand", albedo=(0.92, 0.70, 0.58, 0.85), noise=0.01, seed=1, bayer="rggb")
     return SystemConfig(capture=VirtualConfig(frame_rate_hz=RATE_HZ), scene=scene)
 
 
-def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> tuple[dict[str, float], Path]:
-    """MovingScene the moving hand: `out`/hand.h5, `out`/hand/shot_000000.ply ..., `out`/hand.mp4.
+def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> Reproduction:
+    """Measure the moving hand; write `out`/hand.h5, `out`/hand/shot_000000.ply and so on, and `out`/hand.mp4.
 
-    The virtual bench renders the frames; two emulated chips send them over GigE Vision on the loopback interface, and
-    they are received, paired, recorded and decoded as those of a real camera are. Without the extra `aravis` they come
-    from a file, and `hand_over_gige_vision` is 0.
+    The virtual bench renders the frames, and two emulated chips send them over GigE Vision on the loopback interface.
+    The camera driver receives, matches, records and decodes them like those of a real camera. Without the extra
+    `aravis`, they are replayed from a file, and `hand_over_gige_vision` is 0.
     """
     with TemporaryDirectory(prefix="quadfringe-") as name:
         stage = _render(system or hand_system(), shots, Path(name))
@@ -73,21 +74,21 @@ def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> t
     if made.depth_rms_mm:
         figures["hand_depth_rms_mm_median"] = float(np.median(made.depth_rms_mm))
         figures["hand_wrong_order_percent_worst"] = max(made.wrong_order_percent)
-    return figures, made.movie
+    return Reproduction(figures, made.movie)
 
 
 @dataclass(frozen=True)
 class _Stage:
-    """Rendered frames, as the emulated chips read them and as a recording, and what is true of each."""
+    """Rendered frames, as a file for the emulated chips and as a recording, and the truth of each."""
 
     config: SystemConfig
     frames: Path
-    take: Path
+    recording: Path
     calibration: Path
     truths: dict[int, Truth]
 
     def truth_of(self, shot: AnyShot) -> Truth | None:
-        """Find the truth of a shot by its pixels: None when one of them came out otherwise than it was sent."""
+        """Return the truth of a shot by its pixels; None when a pixel was changed on the way."""
         return self.truths.get(_pixels(shot))
 
 
@@ -96,11 +97,11 @@ def _pixels(shot: AnyShot) -> int:
 
 
 def _render(config: SystemConfig, shots: int, folder: Path) -> _Stage:
-    stage = _Stage(config, folder / "frames.npz", folder / "take.h5", folder / "calibration.json", {})
+    stage = _Stage(config, folder / "frames.npz", folder / "recording.h5", folder / "calibration.json", {})
     visible, infrared = [], []
     with open_system(config) as scanner:
         scanner.projector.show(config.fringes)
-        with Recorder(stage.take, scanner.config, scanner.calibration) as recorder:
+        with Recorder(stage.recording, scanner.config, scanner.calibration) as recorder:
             for shot in scanner.camera.stream(shots, keep="all"):
                 assert isinstance(shot, BayerShot), "the hand is seen by a Bayer chip"
                 assert shot.truth is not None, "the virtual bench knows the truth"
@@ -115,7 +116,7 @@ def _render(config: SystemConfig, shots: int, folder: Path) -> _Stage:
 
 
 def _wired(stage: _Stage, stack: ExitStack) -> Scanner | None:
-    """Open a system whose camera is emulated on the loopback interface; None without the extra that it needs."""
+    """Open a system with an emulated camera on the loopback interface; None without the extra `aravis`."""
     if find_spec("gi") is None:
         return None
     emulator = stack.enter_context(Emulator(stage.frames))
@@ -129,15 +130,15 @@ def _wired(stage: _Stage, stack: ExitStack) -> Scanner | None:
 
 
 def _replayed(stage: _Stage) -> Scanner:
-    return open_system(stage.config.model_copy(update={"capture": ReplayConfig(file=stage.take, speed="full")}))
+    return open_system(stage.config.model_copy(update={"capture": ReplayConfig(file=stage.recording, speed="full")}))
 
 
 def measure_scene(
     scanner: Scanner, out: Path, name: str, shots: int, truth_of: Callable[[AnyShot], Truth | None] | None = None
 ) -> MovingScene:
-    """Measure `shots` with any system while recording them; an earlier film of this name is replaced.
+    """Measure and record `shots` shots with any system; replaces earlier files of this name.
 
-    Shots whose shape cannot be trusted have no PLY and no picture.
+    Shots without a trustworthy shape get no PLY file and no picture.
     """
     folder = folder_for(out / name)
     for earlier in (*folder.glob("shot_*.ply"), out / f"{name}.h5"):
@@ -172,7 +173,7 @@ def measure_scene(
 
 
 def _picture(shot: AnyShot, shape: Shape, number: int, shots: int) -> Picture:
-    """Put what the camera saw beside the shape, seen from an eye that goes to and fro."""
+    """Combine the camera image and a view of the shape from a viewpoint that swings from side to side."""
     swing = np.sin(2 * np.pi * number / max(shots, 1))
     solid = solid_picture(
         shape, texture(shot, shape), turn_deg=(25.0 * swing, -12.0), middle_mm=HAND_MIDDLE_MM, size_px=PICTURE_PX

@@ -1,4 +1,4 @@
-"""A shot of the virtual bench as files: what a camera would have written, and the truth behind it."""
+"""Simulate a shot as files: the images that a camera would have written, and the truth."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ __all__ = ["virtual_bench_config", "write_simulation"]
 
 
 def virtual_bench_config(system: Path | None, **scene: Any) -> SystemConfig:
-    """Give the config of a system file, or the bench as it comes, with scene settings replaced when not None."""
+    """Return the config of a system file, or of the built-in virtual bench, with the given scene settings replaced."""
     config = SystemConfig() if system is None else load_system(system)
     given = {name: value for name, value in scene.items() if value is not None}
     return checked(SystemConfig, config.model_dump() | {"scene": config.scene.model_dump() | given}, "scene")
 
 
 def write_simulation(folder: Path, config: SystemConfig) -> list[Path]:
-    """Write the images as `write_shot` does, calibration.json and truth.npz; returns their paths."""
+    """Write the images of one shot, calibration.json and truth.npz to a folder; return their paths."""
     with open_system(config) as scanner:
         shot = scanner.grab()
     paths = list(write_shot(folder_for(folder), shot).values())

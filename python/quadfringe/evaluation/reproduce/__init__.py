@@ -1,7 +1,8 @@
-"""Published results, computed again: each function writes its picture and returns its figures.
+"""Published results computed again: each function writes a picture and returns its figures.
 
 The method: "Single-shot 3D shape measurement of discontinuous objects based on a coaxial fringe projection
-system", Applied Optics (2019). A module for each result; `pair_bench` is the bench that those of the pair share.
+system", Applied Optics (2019). Each result has a module; those of the projector pair share
+the virtual bench of `_deviated_pair`.
 """
 
 from __future__ import annotations
@@ -16,10 +17,12 @@ from quadfringe.evaluation.reproduce.pair_depth import pair_depth
 from quadfringe.evaluation.reproduce.pair_deviation import pair_deviation
 from quadfringe.evaluation.reproduce.pair_tolerance import pair_tolerance
 from quadfringe.evaluation.reproduce.peaks import WIDTH_PX, inside, peaks, peaks_shot
+from quadfringe.evaluation.reproduction import Reproduction
 
 __all__ = [
     "REPRODUCTIONS",
     "WIDTH_PX",
+    "Reproduction",
     "hand",
     "inside",
     "pair_calibration",
@@ -31,7 +34,7 @@ __all__ = [
     "peaks_shot",
 ]
 
-REPRODUCTIONS: dict[str, Callable[[Path], tuple[dict[str, float], Path]]] = {
+REPRODUCTIONS: dict[str, Callable[[Path], Reproduction]] = {
     "hand": hand,
     "peaks": peaks,
     "pair-deviation": pair_deviation,

@@ -41,14 +41,14 @@ Unwrapping = Literal["coaxial", "pair"]
 
 FRINGES = Fringes()
 PLANE_MM = 800.0  # the reference plane
-DEVIATION_DEG, DEVIATION_MM = 1.0, 0.5  # on every axis
+DEVIATION_DEG, DEVIATION_MM = 1.0, 0.5  # on every axis: the deviation of the paper
 SEED = 4
 
-# Lenses as they are bought: a tenth of a per cent to a per cent at the edges, another one in each device.
+# Distortion of ordinary lenses, 0.1 to 1 % at the edges of the image, different for each device.
 CAMERA_LENS = (-0.12, 0.08, 2e-4, -3e-4, 0.0)
 VISIBLE_LENS = (-0.05, 0.03, 3e-4, -2e-4, 0.0)
 INFRARED_LENS = (-0.06, 0.04, -2e-4, 3e-4, 0.0)
-# What a real bench adds to the light: noise of 1 %, blur, 5 % crosstalk each way, response with an exponent of 1.8.
+# Defects of a real bench: noise of 1 %, blur, 5 % crosstalk between all channels, a response with exponent 1.8.
 LEAK, EXPONENT, DARK = 0.05, 1.8, 0.02
 CROSSTALK: Matrix4 = tuple(tuple(1.0 if i == j else LEAK for j in range(4)) for i in range(4))  # type: ignore[assignment]
 DEFECTS: dict[str, Any] = {
@@ -63,7 +63,7 @@ DEFECTS: dict[str, Any] = {
 
 @dataclass(frozen=True)
 class ProjectorPair:
-    """Camera, visible and infrared projector, how their mirrors lie, and what the bench adds to the light."""
+    """Camera, visible and infrared projector, their mirror layout, and the defects of the light."""
 
     camera: Device
     visible: Device
@@ -84,7 +84,7 @@ class ProjectorPair:
 
     @property
     def calibration(self) -> Calibration:
-        """What a perfect calibration of this bench would find."""
+        """The exact calibration of this bench."""
         known: dict[str, Any] = {}
         if self.light:
             channel = ChannelResponse(offset=DARK, exponent=EXPONENT)
@@ -96,9 +96,9 @@ class ProjectorPair:
 def ideal_pair(
     rotation_deg: Vector3, translation_mm: Vector3, shrink: int = 1, layout: Literal["regular", "diamond"] = "regular"
 ) -> ProjectorPair:
-    """Give the published bench with a deviated infrared projector, perfect lenses and clean light.
+    """Return the published bench with a deviated infrared projector, ideal lenses and defect-free light.
 
-    The camera has 1/`shrink` of the pixels in each direction over the same field.
+    The camera has 1/`shrink` of the pixels in each direction and the same field of view.
     """
     reference = _core.Bench(layout=layout)
     visible = device_from_core(reference.visible)
@@ -112,7 +112,7 @@ def real_pair(
     shrink: int = 1,
     layout: Literal["regular", "diamond"] = "regular",
 ) -> ProjectorPair:
-    """Give the same with lenses that distort and with all that a real bench adds to the light."""
+    """Return the same bench with lens distortion and with all defects of the light."""
     pair = ideal_pair(rotation_deg, translation_mm, shrink, layout)
     lenses = {"camera": CAMERA_LENS, "visible": VISIBLE_LENS, "infrared": INFRARED_LENS}
     devices = {name: getattr(pair, name).model_copy(update={"distortion": lens}) for name, lens in lenses.items()}
@@ -129,11 +129,11 @@ def _shrunk(camera: Device, shrink: int) -> Device:
 
 @dataclass(frozen=True)
 class Exposure:
-    """A shot of a plane, and its truth: the exact phase in rad, (H, W), NaN where it is not judged.
+    """A shot of a plane, and its truth: the exact phase (H, W), rad, NaN where it is not judged.
 
-    What a projector does not light is not, nor the border of one infrared fringe beside it and beside the ends of the
-    rows, where the Fourier filter of the published method leaks, whatever the projectors do. `apart_rad` is how
-    far plain infrared fringes lie from the visible ones, stated for fringes of the first number.
+    Pixels that one projector does not light are not judged, nor are pixels within one infrared fringe of them or of the
+    row ends, where the Fourier filter of the published method leaks. `apart_rad` is the offset of plain infrared
+    fringes from the visible ones, in the phase of the first fringe number.
     """
 
     shot: Shot
@@ -146,10 +146,10 @@ class Exposure:
 def expose(
     pair: ProjectorPair, z_mm: float = PLANE_MM, known: Calibration | None = None, predeformed: bool = False
 ) -> Exposure:
-    """Take a shot of the plane at depth `z_mm` that is to be decoded with what is `known` of the pair, or the truth.
+    """Render a shot of the plane at depth `z_mm`, to be decoded with the calibration `known`, or with the exact one.
 
-    The infrared image is plain, or pre-deformed for the reference plane by what is known, as the 8-bit image that a
-    projector takes.
+    With `predeformed`, the infrared image is pre-deformed for the reference plane by that calibration, and quantised
+    to 8 bit as a projector receives it.
     """
     known = known or pair.calibration
     fringes = FRINGES.model_copy(update={"layout": pair.layout, "predeformed_z_mm": PLANE_MM if predeformed else None})
@@ -169,7 +169,7 @@ def expose(
 
 
 def _inside(visible_rad: Map, apart_rad: Map, fringes: Fringes) -> NDArray[np.bool_]:
-    """Tell which pixels have light of both projectors for an infrared fringe to either side, (H, W)."""
+    """Return which pixels (H, W) both projectors light for one infrared fringe to either side."""
     slope = abs(float(np.nanmedian(np.diff(visible_rad, axis=1))))
     reach = int(np.ceil(2 * np.pi / slope * fringes.numbers[0] / fringes.numbers[2]))
     lit = np.pad(np.isfinite(apart_rad), ((0, 0), (reach, reach)))
@@ -178,7 +178,7 @@ def _inside(visible_rad: Map, apart_rad: Map, fringes: Fringes) -> NDArray[np.bo
 
 
 def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrapping = "coaxial") -> Map:
-    """Give the absolute phase in rad that the decoder finds, (H, W), wrong orders and all."""
+    """Return the absolute phase (H, W), rad, that the decoder finds, including pixels of wrong order."""
     plan = Plan(
         projector_width_px=exposure.calibration.projector.width_px,
         fringes=exposure.fringes,
@@ -191,9 +191,9 @@ def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrap
 
 
 def infrared_error_rad(exposure: Exposure, unwrapping: Unwrapping = "coaxial") -> Map:
-    """Give how far the infrared fringes are from what the unwrapping takes them for, (H, W).
+    """Return the error (H, W), rad, of the infrared fringes against the phase that the unwrapping expects.
 
-    The phase is that of the Fourier filter; its error is stated for fringes of the first number (36).
+    The phase is that of the Fourier filter; the error is scaled to the first fringe number (36).
     """
     first, _, third = exposure.fringes.numbers
     light = linear_light(exposure.shot, exposure.calibration)
@@ -220,7 +220,7 @@ def _table(exposure: Exposure) -> _core.PairTable:
 
 
 def wrong_percent(phase_rad: Map, truth_rad: Map) -> float:
-    """Give the share of pixels with a phase whose order is wrong, in per cent."""
+    """Return the percentage of valid pixels whose fringe order is wrong."""
     known = np.isfinite(phase_rad) & np.isfinite(truth_rad)
     wrong = np.abs(phase_rad[known] - truth_rad[known]) > np.pi
     return 100.0 * float(wrong.mean()) if wrong.size else float("nan")

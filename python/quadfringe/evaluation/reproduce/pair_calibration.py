@@ -1,4 +1,4 @@
-"""Both projectors calibrated as inverse cameras, and what their calibration is good for."""
+"""Calibration of both projectors as inverse cameras, and the accuracy of the correction and search based on it."""
 
 from __future__ import annotations
 
@@ -26,17 +26,16 @@ from quadfringe.evaluation.reproduce._deviated_pair import (
     real_pair,
     wrong_percent,
 )
+from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.view.report import Graph, draw_panels
 
 __all__ = ["pair_calibration"]
 
 POSES, STEPS = 9, 8  # nine poses, as published
-ENDS_MM = (700.0, 900.0)
+ENDS_MM = (700.0, 900.0)  # ends of the depth range
 
 
-def pair_calibration(
-    out: Path, shrink: int = 1, poses: int = POSES, steps: int = STEPS
-) -> tuple[dict[str, float], Path]:
+def pair_calibration(out: Path, shrink: int = 1, poses: int = POSES, steps: int = STEPS) -> Reproduction:
     """Calibrate a deviated pair from a ring board in nine poses; then use the result to correct and to search.
 
     The bench has all defects of a real one. Writes `out`/pair-calibration.png. The figures are: the mean reprojection
@@ -63,7 +62,7 @@ def pair_calibration(
     figures = {f"{name}_mean_px": getattr(found, name).mean_px for name in ("camera", "visible", "infrared")}
     figures |= _pair_figures(found, pair) | _use_figures(pair, known)
     _draw(out / "pair-calibration.png", found, figures)
-    return figures, out / "pair-calibration.png"
+    return Reproduction(figures, out / "pair-calibration.png")
 
 
 def _pair_figures(found: RigCalibration, pair: ProjectorPair) -> dict[str, float]:
@@ -79,7 +78,7 @@ def _pair_figures(found: RigCalibration, pair: ProjectorPair) -> dict[str, float
 
 
 def _use_figures(pair: ProjectorPair, known: Calibration) -> dict[str, float]:
-    """Give what the calibration is good for: the correction on the reference plane, the search at both ends."""
+    """Return the errors after correction on the reference plane, and by search at both ends of the depth range."""
     corrected = expose(pair, known=known, predeformed=True)
     figures = {
         "corrected_infrared_rms_rad": rms(infrared_error_rad(corrected)),

@@ -1,4 +1,4 @@
-"""The pre-deformed infrared pattern: what it mends, and what is left of the deviation."""
+"""The pre-deformed infrared pattern: the errors before and after, and the remaining deviation."""
 
 from __future__ import annotations
 
@@ -28,6 +28,7 @@ from quadfringe.evaluation.reproduce._deviated_pair import (
     real_pair,
     wrong_percent,
 )
+from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.view.report import Graph, Panel, draw_panels
 
 __all__ = ["pair_correction", "remaining_deviation"]
@@ -39,15 +40,14 @@ CASES = ("single", "before", "after")
 BOARD_X_MM, BOARD_Y_MM, BOARD_Z_MM = (-120, -60, 0, 60, 120), (-80, -40, 0, 40, 80), (-40, 0, 40)
 
 
-def pair_correction(
-    out: Path, shrink: int = 1, calibration: Calibration | None = None
-) -> tuple[dict[str, float], Path]:
-    """Correct a deviated pair by its infrared image, and compare with a single projector on the reference plane.
+def pair_correction(out: Path, shrink: int = 1, calibration: Calibration | None = None) -> Reproduction:
+    """Correct a deviated pair by pre-deforming its infrared image; compare with a single projector on the plane.
 
-    The bench has all defects of a real one. `calibration` is what is known of the pair; without it, the truth. Writes
-    `out`/pair-correction.png. Figures in rad at 36 fringes: `*_rms_rad` of the unwrapped phase against that of a single
-    projector, `infrared_*` of the infrared fringes themselves against where they should be, along row 130 too; wrong
-    orders in per cent; and the deviation that a second calibration would find, deg and mm.
+    The bench has all defects of a real one. `calibration` is the known calibration of the pair, by default the exact
+    one. Writes `out`/pair-correction.png. Figures in rad at 36 fringes, over the image and along row 130: `*_rms_rad`
+    is the error of the unwrapped phase against that of a single projector, `infrared_*` that of the infrared fringes
+    against their expected phase. Further figures: wrong orders in per cent, and the deviation that a second calibration
+    would find, deg and mm.
     """
     pair = real_pair(shrink=shrink)
     known = calibration or pair.calibration
@@ -75,17 +75,17 @@ def pair_correction(
     left = remaining_deviation(pair, known)
     figures |= {f"remaining_{axis}": float(value) for axis, value in zip(AXES, left.values, strict=True)}
     _draw(out / "pair-correction.png", shots, known, errors, infrared, row, figures)
-    return figures, out / "pair-correction.png"
+    return Reproduction(figures, out / "pair-correction.png")
 
 
 def remaining_deviation(pair: ProjectorPair, known: Calibration) -> PairPose:
-    """Give the deviation that calibrating again would find with the pre-deformed patterns.
+    """Return the deviation that a second calibration would find with the pre-deformed patterns.
 
-    Every mirror now stands for the position of the visible projector that it was computed from; where board points are
-    seen from there is what a calibration fits a pose to.
+    Each mirror of the infrared projector now represents the position in the visible projector that its intensity was
+    computed from; a calibration fits a pose to these positions for the points of a board.
     """
     if known.infrared is None:
-        raise InputError("the calibration has no infrared projector")
+        raise InputError("calibration: expected both projectors, got one without `infrared`; calibrate both")
     real = core_device(pair.infrared)
     believed = (core_device(known.infrared), core_device(known.projector))
     points, seen = [], []

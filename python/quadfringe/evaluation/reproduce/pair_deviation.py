@@ -1,4 +1,4 @@
-"""A plane under a pair that is not coaxial: what the published unwrapping makes of it."""
+"""A plane measured with a deviated pair of projectors, by the published unwrapping."""
 
 from __future__ import annotations
 
@@ -15,13 +15,14 @@ from quadfringe.evaluation.reproduce._deviated_pair import (
     ideal_pair,
     wrong_percent,
 )
+from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.view.report import Panel, draw_panels
 
 __all__ = ["pair_deviation"]
 
 
-def pair_deviation(out: Path, shrink: int = 1) -> tuple[dict[str, float], Path]:
-    """Unwrap a plane by one projector and by a pair that deviates by 1 degree and 0.5 mm on every axis.
+def pair_deviation(out: Path, shrink: int = 1) -> Reproduction:
+    """Unwrap a plane with one projector, and with a pair that deviates by 1 degree and 0.5 mm on every axis.
 
     Writes `out`/pair-deviation.png. Figures: RMS of the 36-fringe phase against the exact one in rad, and the share of
     wrong orders in per cent.
@@ -45,4 +46,4 @@ def pair_deviation(out: Path, shrink: int = 1) -> tuple[dict[str, float], Path]:
         ),
     ]
     draw_panels(out / "pair-deviation.png", "unwrapped phase of a plane, published unwrapping", [panels])
-    return figures, out / "pair-deviation.png"
+    return Reproduction(figures, out / "pair-deviation.png")

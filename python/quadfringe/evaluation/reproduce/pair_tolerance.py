@@ -1,4 +1,4 @@
-"""How far the infrared projector may stand from the visible one before the published unwrapping fails."""
+"""How far the infrared projector may deviate from the visible one before the published unwrapping fails."""
 
 from __future__ import annotations
 
@@ -10,15 +10,16 @@ from numpy.typing import NDArray
 from quadfringe import _core
 from quadfringe.calibration.projector_pair import AXES
 from quadfringe.evaluation.reproduce._deviated_pair import FRINGES, PLANE_MM, ProjectorPair, ideal_pair
+from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.view.report import Graph, draw_panels
 
 __all__ = ["orders_are_right", "pair_tolerance", "tolerances"]
 
-LIMITS = (5.0, 5.0, 5.0, 100.0, 100.0, 100.0)  # deg and mm: beyond them the infrared light leaves the field
-PRECISION = 1e-3  # of a tolerance, relative
+LIMITS = (5.0, 5.0, 5.0, 100.0, 100.0, 100.0)  # deg and mm: beyond them the infrared light leaves the field of view
+PRECISION = 1e-3  # relative precision of a tolerance
 
 
-def pair_tolerance(out: Path, shrink: int = 4) -> tuple[dict[str, float], Path]:
+def pair_tolerance(out: Path, shrink: int = 4) -> Reproduction:
     """Find the largest deviation of each of the six parameters for which every order of a plane is still right.
 
     Every `shrink`-th camera pixel is checked. Writes `out`/pair-tolerance.png: the share of wrong orders against each
@@ -37,11 +38,11 @@ def pair_tolerance(out: Path, shrink: int = 4) -> tuple[dict[str, float], Path]:
                 lines[f"{axis[:2]}: {allowed:.3g} {kind}"] = (np.maximum(deviations, deviations[1] / 10), wrong)
         graphs.append(Graph(f"one parameter at a time, {kind}", f"deviation, {kind}", "wrong orders, %", lines))
     draw_panels(out / "pair-tolerance.png", "allowable deviations of the infrared projector", [graphs])
-    return found, out / "pair-tolerance.png"
+    return Reproduction(found, out / "pair-tolerance.png")
 
 
 def tolerances(shrink: int = 4) -> dict[str, float]:
-    """Give the largest allowable deviation of each parameter, of either sign, by bisection on exact phases."""
+    """Return the largest allowable deviation of each parameter, in either direction, by bisection on exact phases."""
     return {axis: min(_tolerance(axis, sign, shrink) for sign in (1.0, -1.0)) for axis in AXES}
 
 
@@ -68,7 +69,7 @@ def _deviated(axis: str, deviation: float, shrink: int) -> ProjectorPair:
 
 
 def orders_are_right(pair: ProjectorPair, z_mm: float = PLANE_MM) -> bool:
-    """Tell whether the published unwrapping finds every order of a plane, from phases without any error."""
+    """Return whether the published unwrapping finds every order of a plane from exact phases."""
     return not _misses(pair, z_mm).any()
 
 
@@ -77,7 +78,7 @@ def _wrong_percent(pair: ProjectorPair) -> float:
 
 
 def _misses(pair: ProjectorPair, z_mm: float) -> NDArray[np.bool_]:
-    """Tell which of the pixels that both projectors light have a wrong order, (n,)."""
+    """Return which of the pixels that both projectors light have a wrong order, (n,)."""
     cast = pair.bench.cast_plane(point_mm=(0.0, 0.0, z_mm), normal=(0.0, 0.0, -1.0))
     columns = [cast.column_px(), cast.column_px(), cast.column_px(infrared=True)]
     width = pair.visible.width_px

@@ -1,4 +1,4 @@
-"""Peaks under noise: three ways of demodulation against the exact phase."""
+"""The peaks surface under noise: three demodulation methods compared with the exact phase."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from quadfringe.data import Shot, core_device
 from quadfringe.decoding import Plan, decode
 from quadfringe.decoding.compare import rms
 from quadfringe.decoding.stages import carrier, fourier, linear_light
+from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.view.report import Panel, draw_panels
 
 __all__ = ["WIDTH_PX", "inside", "peaks", "peaks_shot"]
@@ -26,15 +27,15 @@ WIDTH_PX, HEIGHT_PX = 912, 1140  # the camera sees the projector's array nearly 
 ROW = 760  # the row of the published figures
 NOISE = 0.03  # standard deviation, share of full scale; then rounded to 8 bit
 SEED = 1
-FIELD_MM = 300.0
-DEPTH_MM = 800.0
+FIELD_MM = 300.0  # width of the field of view
+DEPTH_MM = 800.0  # distance of the surface
 ANGLE_DEG = 45.0  # between the axes of camera and projector
 DISTANCE_MM = 5000.0  # from projector to object: fringes of nearly one period
 PEAKS_SCALE_MM = 4.0  # slopes take the local fringe frequency from 0.43 to 1.6 of the carrier
 
 
-def peaks(out: Path) -> tuple[dict[str, float], Path]:
-    """Peaks under 3 % noise: traditional FTP, improved FTP and the proposed method against the exact phase.
+def peaks(out: Path) -> Reproduction:
+    """Compare traditional FTP, improved FTP and the proposed method with the exact phase, under 3 % noise.
 
     Writes `out`/peaks.png. Figures are RMS in rad of the 36-fringe phase, over the field without a border of one
     fringe period, and along row 760.
@@ -52,11 +53,11 @@ def peaks(out: Path) -> tuple[dict[str, float], Path]:
     figures = {f"{name}_rms_rad": rms(error) for name, error in errors.items()}
     figures |= {f"{name}_rms_rad_row{ROW}": rms(error[ROW]) for name, error in errors.items()}
     _draw(out / "peaks.png", shot, truth_rad, errors, figures)
-    return figures, out / "peaks.png"
+    return Reproduction(figures, out / "peaks.png")
 
 
 def peaks_shot(**light: Any) -> tuple[Shot, Map]:
-    """Give the shot, and the exact absolute phase of 36 fringes, (H, W) rad.
+    """Return the shot, and the exact absolute phase of 36 fringes, (H, W) rad.
 
     `light` replaces settings of the published shot, by the names of `SceneConfig`: a white surface in the dark,
     noise of 3 %, 8 bit.
@@ -82,7 +83,7 @@ def _camera() -> Device:
 
 
 def _projector() -> Device:
-    """Give a projector beside the camera that looks at the middle of the field and lights all of it."""
+    """Return a projector to the side of the camera that lights the whole field of view."""
     sine, cosine = math.sin(math.radians(ANGLE_DEG)), math.cos(math.radians(ANGLE_DEG))
     focal_px = (WIDTH_PX * DISTANCE_MM / (1.15 * FIELD_MM * cosine), WIDTH_PX * DISTANCE_MM / (1.3 * FIELD_MM))
     rotation = ((cosine, 0.0, sine), (0.0, 1.0, 0.0), (-sine, 0.0, cosine))
@@ -96,13 +97,13 @@ def _device(focal_px: tuple[float, float]) -> Device:
 
 
 def _turnless(error: Map) -> Map:
-    """Leave out whole turns, which a wrapped phase does not know."""
+    """Remove multiples of 2 pi, which a wrapped phase does not determine."""
     turns = np.round(error / np.float32(2 * np.pi))
     return (error - 2 * np.pi * turns).astype(np.float32)
 
 
 def inside(error: Map, period_px: float) -> Map:
-    """Blank a border of one fringe period with NaN, (H, W)."""
+    """Set a border of one fringe period to NaN, (H, W)."""
     border = math.ceil(period_px)
     blank = np.full_like(error, np.nan)
     inner = np.s_[border:-border, border:-border]

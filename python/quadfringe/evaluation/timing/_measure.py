@@ -1,6 +1,6 @@
 """Timing runs: which cases are decoded, in which order, and how often.
 
-Every case, one method at one number of threads, runs in its own process, started with RAYON_NUM_THREADS, because the
+Every case, one method at one number of threads, runs in a separate process, started with RAYON_NUM_THREADS, because the
 thread pool is created once per process. The processes take turns, so that a busy moment of the machine affects all of
 them. Before each timed decode the process decodes the shot several times untimed (`warm`), so that no case pays for
 cold caches or sleeping threads.
