@@ -33,10 +33,14 @@ NOT_BARS = {
         "the noise of four steps; checks the score"
     ),
     ("test_evaluation.py", "rel=0.05"): "a planted wave; checks the score",
+    ("test_stages.py", "np.isfinite(shape.phase_rad).mean() > 0.1"): "enough pixels to compare",
     ("test_targets.py", "rel=0.001"): "area of a drawing",
     ("test_timing.py", "5.0 < cost.off_percent < 25.0"): "planted times",
     ("test_timing.py", "found['returned_percent'] > 80"): "the timed shots are decoded at all",
     ("test_lightcrafter.py", "abs=0.06"): "resolution of a register",
+}
+RUST_NOT_BARS = {
+    ("stages.rs", "returned > 1000"): "enough pixels to compare",
 }
 
 
@@ -48,7 +52,9 @@ def test_python_tests_hold_no_bar_of_their_own(path: Path) -> None:
 
 def test_exceptions_are_needed() -> None:
     found = {(path.name, text) for path in TESTS for _, text in literal_bars(path.read_text())}
-    assert NOT_BARS.keys() <= found, sorted(NOT_BARS.keys() - found)
+    found |= {(path.name, condition) for path in RUST_TESTS for condition in rust_bars(path.read_text())}
+    unneeded = (NOT_BARS.keys() | RUST_NOT_BARS.keys()) - found
+    assert not unneeded, sorted(unneeded)
 
 
 def test_every_entry_is_used() -> None:
@@ -59,7 +65,8 @@ def test_every_entry_is_used() -> None:
 
 @pytest.mark.parametrize("path", RUST_TESTS, ids=lambda path: path.name)
 def test_bars_of_the_kernel_are_those_of_the_ledger(path: Path) -> None:
-    assert set(rust_bars(path.read_text())) == set(ledger.rust_bars().get(path.name, {}))
+    found = {condition for condition in rust_bars(path.read_text()) if (path.name, condition) not in RUST_NOT_BARS}
+    assert found == set(ledger.rust_bars().get(path.name, {}))
 
 
 def test_kernel_entries_are_dated_and_name_files() -> None:
