@@ -13,7 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -39,11 +39,11 @@ class Found(NamedTuple):
     wrong_percent: float
 
 
-def scored(shot: qf.Shot, response: qf.Response | None) -> Found:
+def scored(shot: qf.Shot, response: qf.Response | Literal["linear"]) -> Found:
     """Decode with `response`, without a verdict, and compare with the truth of the bench."""
     assert shot.truth is not None
-    plan = qf.Plan(WIDTH_PX, response=response or qf.Response())
-    phase_rad = qf.Decoder(shot, plan).shape(shot).phase_rad
+    plan = qf.Plan(WIDTH_PX, response=response)
+    phase_rad = qf.Decoder(shot, plan).decode_without_verdict(shot).phase_rad
     truth_rad = 2 * np.pi * qf.Fringes().numbers[0] * shot.truth.column_px / WIDTH_PX
     lit = np.isfinite(truth_rad) & ~shot.truth.shadow
     error = np.abs(phase_rad - truth_rad)
@@ -68,8 +68,8 @@ def main() -> None:
             with qf.open(qf.SystemConfig(scene=config)) as scanner:
                 shot = scanner.grab()
             response = qf.estimate_response(shot, qf.Plan(WIDTH_PX))
-            linear, own = scored(shot, None), scored(shot, response)
-            settled = gamma * (1.0 if response is None else response.red.exponent)
+            linear, own = scored(shot, "linear"), scored(shot, response)
+            settled = gamma * (1.0 if response == "linear" else response.red.exponent)
             pairs = "".join(f"{a:10.4f}{b:8.4f}" for a, b in zip(linear, own, strict=True))
             print(f"{name + f', gamma {gamma:g}':24}{pairs}{settled:10.3f}")
             key = f"{name.replace(' ', '_')}_gamma_{gamma:g}"

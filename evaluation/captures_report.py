@@ -37,7 +37,7 @@ def capture_scores(data: Path, settings: dict[str, Any]) -> dict[str, scoring.Sc
     for name in scenes.CAPTURES:
         scene = scenes.capture(data, name)
         response = estimate_from_files(scenes.step_files(data, name), scenes.STEPS).calibration
-        for label, known in (("as_linear", qf.Response()), ("auto_response", None), ("with_response", response)):
+        for label, known in (("as_linear", "linear"), ("auto_response", "auto"), ("with_response", response)):
             shape = scenes.shape_of(scene, response=known, **settings)
             scores[f"{name}_{label}"] = scoring.score(scene, shape.phase_rad)
     return scores

@@ -19,7 +19,7 @@ from quadfringe.io.images import write_image
 
 WIDTH_PX = 912
 PLAN = qf.Plan(WIDTH_PX)
-LINEAR = replace(PLAN, response=qf.Response())
+LINEAR = replace(PLAN, response="linear")
 
 
 def taken(**scene: object) -> qf.Shot:
@@ -44,10 +44,10 @@ def phase_rms_rad(shape: Shape, shot: AnyShot) -> float:
 def test_the_response_of_a_shot_is_undone_and_told(bent: qf.Shot) -> None:
     own, linear = qf.decode(bent, PLAN), qf.decode(bent, LINEAR)
     hold("response.phase_of_uncorrected", phase_rms_rad(own, bent) / phase_rms_rad(linear, bent))
-    assert own.config["response_of_shot"] is True
+    assert own.config["response_from"] == "shots"
     for channel in own.config["response"].values():
         assert channel["exponent"] == pytest.approx(1 / 1.8, rel=tolerance("response.exponent_error"))
-    assert "response_of_shot" not in linear.config
+    assert (linear.config["response"], linear.config["response_from"]) == (None, "plan")
 
 
 def test_many_shots_take_it_from_one(bent: qf.Shot) -> None:
@@ -70,9 +70,9 @@ def test_a_part_of_the_image_will_do(bent: qf.Shot) -> None:
     printed = taken(surface="plane", patch_mm=10.0, noise=0.03)
     parts = [qf.Shot(*(image[middle].copy() for image in shot.channels.values())) for shot in (bent, printed)]
     found = qf.estimate_response(parts[0], PLAN)
-    assert found is not None
+    assert isinstance(found, qf.Response)
     assert found.red.exponent == pytest.approx(1 / 1.8, rel=tolerance("response.exponent_error_part"))
-    assert qf.estimate_response(parts[1], PLAN) is None
+    assert qf.estimate_response(parts[1], PLAN) == "linear"
 
 
 @pytest.mark.parametrize("scene", [{"surface": "face"}, {"surface": "plane", "patch_mm": 10.0, "noise": 0.03}])
@@ -80,7 +80,7 @@ def test_linear_light_is_left_alone(scene: dict[str, object]) -> None:
     shot = taken(**scene)
     shape = qf.decode(shot, PLAN)
     assert shape.config["response"] is None
-    assert shape.config["response_of_shot"] is False
+    assert shape.config["response_from"] == "shots"
     np.testing.assert_array_equal(shape.phase_rad, qf.decode(shot, LINEAR).phase_rad)
 
 
@@ -89,12 +89,12 @@ def test_what_is_known_is_not_asked_of_the_shot(bent: qf.Shot) -> None:
         nothing = {"response": None, "crosstalk": None, "projector_response": None}
         silent = scanner.calibration.model_copy(update=nothing)
     known = silent.model_copy(update={"response": qf.Response()})
-    for plan in (LINEAR, replace(PLAN, calibration=known)):
-        assert "response_of_shot" not in qf.decode(bent, plan).config
-        with pytest.raises(qf.InputError, match="knows the response already"):
+    for plan, source in ((LINEAR, "plan"), (replace(PLAN, calibration=known), "calibration")):
+        assert qf.decode(bent, plan).config["response_from"] == source
+        with pytest.raises(qf.InputError, match="has a response"):
             qf.estimate_response(bent, plan)
     shape = qf.decode(bent, replace(PLAN, calibration=silent))
-    assert shape.config["response_of_shot"] is True
+    assert shape.config["response_from"] == "shots"
     assert shape.xyz_mm is not None
 
 

@@ -138,3 +138,22 @@ def test_without_a_calibration_there_is_phase_but_no_ply(take: Path, tmp_path: P
     group = zarr.open_group(jobs[0].store, mode="r")
     assert "xyz_mm" not in group
     assert np.isfinite(group["phase_rad"][0]).mean() > 0.3
+
+
+def test_a_response_that_nobody_states_is_the_same_in_every_process(take: Path, tmp_path: Path) -> None:
+    """Each shot has another gamma, so that a response found in another shot would give other files."""
+    bent = tmp_path / "bent.h5"
+    silent = {"response": None, "crosstalk": None, "projector_response": None}
+    with Recording(take) as recorded:
+        assert recorded.calibration is not None
+        calibration = recorded.calibration.model_copy(update=silent)
+        with Recorder(bent, recorded.config, calibration) as recorder:
+            for number, gamma in enumerate((1.6, 1.8, 2.0)):
+                shot = recorded[number]
+                images = {n: np.rint(255 * (i / 255.0) ** gamma).astype(np.uint8) for n, i in shot.images.items()}
+                recorder.write(Shot(**images, stamp=shot.stamp))
+    for workers in (1, 2):
+        list(decode_recordings([bent], tmp_path / str(workers), workers=workers))
+    assert digests(tmp_path / "1") == digests(tmp_path / "2")
+    response = zarr.open_group(tmp_path / "1" / "bent.zarr", mode="r").attrs["settings"]["config"]["decode"]["response"]
+    assert response["red"]["exponent"] == pytest.approx(1 / 1.6, rel=0.1)

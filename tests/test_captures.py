@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from support.bars import hold
 
-from quadfringe import Response, ResponseCalibration
+from quadfringe import ResponseCalibration
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 
@@ -69,7 +69,7 @@ def test_package_decodes_a_capture(scene: scoring.Scene, response_file: Path) ->
 
 
 def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scene, response_file: Path) -> None:
-    for response in (Response(), None, ResponseCalibration.load(response_file)):
+    for response in ("linear", "auto", ResponseCalibration.load(response_file)):
         shape = scenes.shape_of(scene, response=response)
         assert shape.wrong_order_probability is not None
         seen = scene.scored & shape.returned
@@ -87,7 +87,7 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
 def test_the_response_is_estimated_from_a_capture(scene: scoring.Scene, response_file: Path) -> None:
     known = ResponseCalibration.load(response_file)
     own, straight = scenes.shape_of(scene), scenes.shape_of(scene, response=known)
-    assert own.config["response_of_shot"]
+    assert own.config["response_from"] == "shots"
     scores = [scoring.score(scene, shape.phase_rad) for shape in (own, straight)]
     assert_bars(scores[0], "captures.auto_right_percent")
     # Nearly as good as the response from twelve images of each channel, on both captures.
@@ -100,14 +100,14 @@ def test_the_response_is_estimated_from_a_capture(scene: scoring.Scene, response
 def test_the_published_method_uses_the_estimated_response(scene: scoring.Scene) -> None:
     own, linear = (
         scoring.score(scene, scenes.shape_of(scene, response=response, method="published").phase_rad)
-        for response in (None, Response())
+        for response in ("auto", "linear")
     )
     hold("captures.published_gain_percent", own.right_percent - linear.right_percent)
     hold("captures.published_gain_percent", own.right_of_returned_percent - linear.right_of_returned_percent)
 
 
 def test_an_uncorrected_capture_is_still_ordered(scene: scoring.Scene) -> None:
-    shape = scenes.shape_of(scene, response=Response())
+    shape = scenes.shape_of(scene, response="linear")
     score = scoring.score(scene, shape.phase_rad)
     hold("captures.linear_right_of_returned_percent", score.right_of_returned_percent)
     hold("captures.linear_right_percent", score.right_percent)
@@ -116,7 +116,7 @@ def test_an_uncorrected_capture_is_still_ordered(scene: scoring.Scene) -> None:
 def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file: Path) -> None:
     phases_rad = [
         scenes.shape_of(scene, response=response).phase_rad
-        for response in (Response(), ResponseCalibration.load(response_file))
+        for response in ("linear", ResponseCalibration.load(response_file))
     ]
     raw, linear = (scoring.score(scene, phase_rad) for phase_rad in phases_rad)
     hold("captures.response_gain_percent", linear.right_percent - raw.right_percent)

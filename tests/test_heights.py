@@ -51,7 +51,7 @@ def heights(planes: list[qf.Shape]) -> HeightCalibration:
 
 def test_polynomial_and_triangulation_agree(planes: list[qf.Shape], heights: HeightCalibration) -> None:
     polynomial = [heights.height_from_phase(shape.phase_rad) for shape in planes]
-    triangulated = [heights_over(shape.points_mm, planes[3].points_mm) for shape in planes]
+    triangulated = [heights_over(shape.xyz_mm, planes[3].xyz_mm) for shape in planes]
     found = compare_heights(polynomial, triangulated)
     assert found.pixels > 1_000_000
     hold("heights.agreement_rms_mm", found.rms_mm)

@@ -145,6 +145,6 @@ def test_a_result_carries_the_settings_in_force() -> None:
     with qf.open() as scanner:
         shape = scanner.measure()
     settings = shape.config["decode"]
-    assert settings["method"] == "best"
+    assert settings["method"] == "joint"
     assert 0 < settings["quality_min"] < 1
     assert settings["period_px"] is None

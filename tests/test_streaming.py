@@ -119,7 +119,7 @@ def test_a_shot_that_cannot_be_trusted_does_not_end_the_stream() -> None:
     assert (first.error, third.error) == (None, None)
     assert second.error is not None
     with pytest.raises(DecodeError, match="dark"):
-        _ = second.shape
+        second.result()
 
 
 def test_a_lost_camera_ends_the_stream_with_its_error_after_what_was_taken() -> None:

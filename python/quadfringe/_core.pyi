@@ -421,9 +421,7 @@ def fill_gaps(image: NDArray[np.float32]) -> NDArray[np.float32]:
 def modulation_ratio(red: NDArray[np.float32], blue: NDArray[np.float32]) -> NDArray[np.float32]:
     """Give the modulation of red over that of blue for each row, (H,), both without their backgrounds."""
 
-def two_step(
-    red: NDArray[np.float32], blue: NDArray[np.float32], *, coarse: bool = False
-) -> NDArray[np.float32]:
+def two_step(red: NDArray[np.float32], blue: NDArray[np.float32], *, coarse: bool = False) -> NDArray[np.float32]:
     """Give the wrapped phase in rad of red and blue without their backgrounds, of equal modulation (S2).
 
     The error of the arctangent is at most 4e-7 rad, with `coarse` 1.3e-5 rad, which is enough to select fringe orders.

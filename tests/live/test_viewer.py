@@ -167,7 +167,7 @@ def test_a_shot_without_a_shape_says_why(system: Path) -> None:
     from quadfringe.scanner.streaming import Measured
 
     with qf.open(system) as scanner, Viewer(port=8250) as viewer:
-        viewer.show(Measured(scanner.grab(), DecodeError("channel ir is black"), 7.0))
+        viewer.show(Measured(scanner.grab(), None, DecodeError("channel ir is black"), 7.0))
         with scanner.stream(1) as stream:
             list(stream)
             viewer.show_figures(stream.statistics())

@@ -21,7 +21,7 @@ from quadfringe.calibration.surfaces import (
     measure_steps,
 )
 from quadfringe.config import SystemConfig
-from quadfringe.data import AnyShot, Calibration, Shape
+from quadfringe.data import AnyShot, Calibration, Shape, xyz_mm_of
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.view.report import Panel, draw_panels
@@ -184,7 +184,7 @@ def measure_artefacts(config: SystemConfig, calibration: Calibration | None = No
         shots.append(bench.expose(seed=_seed(config, len(shots))))
     plan = Plan(known.projector.width_px, config.fringes, known, decode=config.decode)
     decoder = Decoder(shots[0], plan)
-    points = [decoder.decode(shot).points_mm for shot in shots]
+    points = [xyz_mm_of(decoder.decode(shot)) for shot in shots]
     return Artefacts(tuple(points[:2]), (points[2],), SPHERE_DIAMETER_MM, (points[3],), STEP_HEIGHTS_MM)
 
 
@@ -200,7 +200,7 @@ def read_artefacts(
     step_heights_mm: Sequence[float],
 ) -> Artefacts:
     """Read measured artefacts from shapes saved as NPZ; raises `InputError` for an uncalibrated shape."""
-    read = [tuple(Shape.load(path).points_mm for path in paths) for paths in (planes, spheres, steps)]
+    read = [tuple(xyz_mm_of(Shape.load(path)) for path in paths) for paths in (planes, spheres, steps)]
     return Artefacts(read[0], read[1], sphere_diameter_mm, read[2], tuple(step_heights_mm))
 
 

@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 __all__ = [
+    "METHODS",
     "Bayer",
     "BoardPosesOption",
     "CalibrationOption",
@@ -21,6 +22,7 @@ __all__ = [
     "ShotsOption",
     "SystemFile",
     "VirtualSystemOption",
+    "method_named",
 ]
 
 
@@ -82,3 +84,11 @@ FileSizeOption = Annotated[
         "--file-gb", min=0.01, help="Start a new file when one reaches this size, GB; default: one file of any size."
     ),
 ]
+METHODS = "joint|published"
+
+
+def method_named(name: str) -> str:
+    """Return the method with this name; "best" is the name of joint in older scripts."""
+    if name not in (*METHODS.split("|"), "best"):
+        raise typer.BadParameter(f"{name!r} is not one of {METHODS.replace('|', ', ')}")
+    return "joint" if name == "best" else name

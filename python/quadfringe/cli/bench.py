@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from quadfringe.cli._options import JsonOption
+from quadfringe.cli._options import METHODS, JsonOption, method_named
 from quadfringe.cli._output import rows, say, write_record
-from quadfringe.cli.decode import Method
 
 if TYPE_CHECKING:
     from quadfringe.evaluation.timing import Case, Cost, Memory, Timing
@@ -20,7 +19,10 @@ __all__ = ["bench"]
 
 SMALLEST_PX = 16  # below this no carrier fits an image
 SizeOption = Annotated[list[str], typer.Option(metavar="WxH", help="Image size, px; may be repeated.")]
-MethodOption = Annotated[list[Method] | None, typer.Option(help="Method to time; may be repeated; default: both.")]
+MethodOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar=METHODS, parser=method_named, help="Method to time; may be repeated; default: both."),
+]
 ThreadsOption = Annotated[
     list[int] | None,
     typer.Option(min=1, help="Number of threads; may be repeated; default: 1 and the number of cores."),
@@ -52,7 +54,7 @@ def bench(
     from quadfringe.evaluation.machine import described, usable_cores
 
     sizes = [_size(text) for text in dict.fromkeys(size)]
-    methods = list(dict.fromkeys(m.value for m in method)) if method else list(timing.METHODS)
+    methods = list(dict.fromkeys(method)) if method else list(timing.METHODS)
     light: dict[str, Any] = {"surface": surface, "patch_mm": patch_mm, "noise": timing.NOISE}
     scene = SceneConfig.model_validate(light)
     counts = sorted(set(threads or (1, usable_cores())))

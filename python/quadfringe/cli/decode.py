@@ -9,21 +9,23 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from quadfringe.cli._options import Bayer, CalibrationOption, ColumnsOption, Fringes3, JsonOption, PredeformedOption
+from quadfringe.cli._options import (
+    METHODS,
+    Bayer,
+    CalibrationOption,
+    ColumnsOption,
+    Fringes3,
+    JsonOption,
+    PredeformedOption,
+    method_named,
+)
 from quadfringe.cli._output import say, write_figures
 
 if TYPE_CHECKING:
-    from quadfringe.config import BayerPattern, Response
+    from quadfringe.config import BayerPattern
     from quadfringe.data import AnyShot, Shape
 
-__all__ = ["Bits", "Method", "Unwrapping", "decode"]
-
-
-class Method(StrEnum):
-    """The published decoding method, or the default one, which is more accurate."""
-
-    published = "published"
-    best = "best"
+__all__ = ["Bits", "Unwrapping", "decode"]
 
 
 class Unwrapping(StrEnum):
@@ -59,19 +61,21 @@ BayerOption = Annotated[
     Bayer | None, typer.Option(help="Filter colours of the first 2 x 2 pixels of --raw, row by row.")
 ]
 ResponseOption = Annotated[
-    Path | None,
+    str | None,
     typer.Option(
-        metavar="FILE",
-        help="Camera response of the channels, .json, as `calibrate response` writes it; default: that of the "
-        "calibration, else estimated from the shot.",
+        metavar="auto|linear|FILE",
+        help="Camera response to correct: auto (default) takes that of --calibration, else estimates it from the shot; "
+        "linear corrects none; FILE is a .json of `calibrate response`.",
     ),
 ]
-LinearOption = Annotated[
-    bool, typer.Option("--linear", help="Take the images as linear light; do not estimate a response from the shot.")
-]
+LinearOption = Annotated[bool, typer.Option("--linear", help="The same as --response linear.")]
 MethodOption = Annotated[
-    Method | None,
-    typer.Option(help="Decoding method; default: the more accurate one. Use published to reproduce the paper."),
+    str | None,
+    typer.Option(
+        metavar=METHODS,
+        parser=method_named,
+        help="Decoding method; default: joint, the more accurate one. Use published to reproduce the paper.",
+    ),
 ]
 UnwrappingOption = Annotated[
     Unwrapping | None,
@@ -122,15 +126,14 @@ def decode(
     """Decode the images of one shot to absolute phase, and with --calibration to millimetres."""
     from quadfringe import decoding
     from quadfringe.config import DecodeConfig, Fringes, checked
-    from quadfringe.data import Calibration
 
     _check_result(out, calibration)
-    settings: dict[str, Any] = {"method": method and method.value, "unwrapping": unwrapping and unwrapping.value}
+    settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
     plan = decoding.Plan(
         projector_width,
         Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
-        None if calibration is None else Calibration.load(calibration),
+        calibration,
         _response(response, linear),
         checked(DecodeConfig, settings, "options"),
     )
@@ -149,17 +152,13 @@ def _check_result(out: Path, calibration: Path | None) -> None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without a calibration, write .npz")
 
 
-def _response(file: Path | None, linear: bool) -> Response | None:
-    """Return the response that the options name; None estimates it from the shot."""
-    from quadfringe.config import Response
-    from quadfringe.data import ResponseCalibration
+def _response(response: str | None, linear: bool) -> str:
+    """Return the response that the two options state together."""
     from quadfringe.errors import InputError
 
-    if file is not None and linear:
+    if linear and response not in (None, "linear"):
         raise InputError("--response and --linear contradict each other; give one of them")
-    if file is not None:
-        return ResponseCalibration.load(file)
-    return Response() if linear else None
+    return "linear" if linear else response or "auto"
 
 
 def _shot(files: Mapping[str, Path | None], raw: Path | None, bayer: Bayer | None, bits: Bits | None) -> AnyShot:
@@ -193,10 +192,10 @@ def _save(shape: Shape, out: Path, json: Path | None) -> None:
     figures = shape.figures()
     pixels = f"{figures['returned_percent']:.1f} % of {shape.phase_rad.size} pixels returned"
     say(f"{out}: {pixels}{_uncertainty(figures)}", json)
-    if shape.config.get("response_of_shot"):
+    if shape.config["response"] is not None and shape.config["response_from"] == "shots":
         exponents = {name: channel["exponent"] for name, channel in shape.config["response"].items()}
         listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
-        say(f"response estimated from the shot, exponents: {listed} (--linear skips this)", json)
+        say(f"response estimated from the shot, exponents: {listed} (--response linear skips this)", json)
         figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
     write_figures(figures, json)
 

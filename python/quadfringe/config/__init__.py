@@ -9,28 +9,19 @@ from quadfringe.config.cameras import (
     VirtualConfig,
     capture_config,
 )
-from quadfringe.config.system import (
-    IDENTITY,
-    Affine,
-    BayerPattern,
+from quadfringe.config.decode import (
     ChannelResponse,
     DecodeConfig,
-    Device,
-    FlashRoute,
     Fringes,
-    HdmiRoute,
-    HeightMapConfig,
-    Matrix4,
-    Pixels,
-    ProjectorConfig,
-    ProjectorsConfig,
     Response,
+    ResponseChoice,
+    ResponseSetting,
     Row4,
-    SceneConfig,
-    SystemConfig,
-    Triple,
-    load_system,
 )
+from quadfringe.config.devices import IDENTITY, Device, Pixels, Triple
+from quadfringe.config.projectors import FlashRoute, HdmiRoute, ProjectorConfig, ProjectorsConfig
+from quadfringe.config.scene import Affine, BayerPattern, HeightMapConfig, Matrix4, SceneConfig, Surface
+from quadfringe.config.system import SystemConfig, load_system
 
 __all__ = [
     "IDENTITY",
@@ -56,8 +47,11 @@ __all__ = [
     "ProjectorsConfig",
     "ReplayConfig",
     "Response",
+    "ResponseChoice",
+    "ResponseSetting",
     "Row4",
     "SceneConfig",
+    "Surface",
     "SystemConfig",
     "Triple",
     "VirtualConfig",

@@ -1,12 +1,16 @@
-"""What every settings model is made of: frozen data with units in names, and one report of all that is wrong."""
+"""What every settings model shares: frozen data, one report of all problems, and a class docstring with every field."""
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping
-from typing import Annotated, Any, TypeVar
+from difflib import get_close_matches
+from inspect import Parameter, Signature
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
+from quadfringe.config._brief import brief, shortened
 from quadfringe.errors import ConfigError
 
 __all__ = ["Finite", "Model", "NotNegative", "Positive", "checked"]
@@ -14,12 +18,61 @@ __all__ = ["Finite", "Model", "NotNegative", "Positive", "checked"]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
+DOC_WIDTH = 100
+
+if TYPE_CHECKING:
+    from pydantic._internal._model_construction import ModelMetaclass
+else:
+    ModelMetaclass = type(BaseModel)
 
 
-class Model(BaseModel):
-    """Frozen data; an unknown key is refused."""
+class _ReportingMeta(ModelMetaclass):
+    """Reports what is wrong with the arguments of a model as the files do.
+
+    Only a call of the class comes through here. Nested models are made by pydantic itself, so that their problems
+    arrive in one report, with their paths.
+    """
+
+    if not TYPE_CHECKING:  # type checkers go on to read the fields as arguments
+
+        def __call__(cls, *args, **values):  # noqa: N805 - that of a metaclass
+            try:
+                return super().__call__(*args, **values)
+            except ValidationError as error:
+                raise ConfigError(_report(cls, error, cls.__name__)) from error
+
+
+class Model(BaseModel, metaclass=_ReportingMeta):
+    """Frozen data. Unknown keys and wrong values raise `ConfigError` with one line for each, from Python as from files.
+
+    The docstring of a model lists every field with its description and default; `help` shows it.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        """Add the fields to the docstring of the class, and give it a signature that can be read."""
+        super().__pydantic_init_subclass__(**kwargs)
+        cls.__doc__ = _with_fields(cls)
+        defaults = {n: Parameter.empty if f.is_required() else f.default for n, f in cls.model_fields.items()}
+        fields = [Parameter(name, Parameter.KEYWORD_ONLY, default=value) for name, value in defaults.items()]
+        cls.__signature__ = Signature(fields)
+
+    @classmethod
+    def model_validate(cls, obj: Any, **kwargs: Any) -> Self:
+        """Make a model of a mapping; raises `ConfigError` as the class does."""
+        try:
+            return super().model_validate(obj, **kwargs)
+        except ValidationError as error:
+            raise ConfigError(_report(cls, error, cls.__name__)) from error
+
+    def __repr__(self) -> str:
+        fields = type(self).model_fields.items()
+        given = [(name, getattr(self, name)) for name, field in fields if getattr(self, name) != field.default]
+        return shortened(f"{type(self).__name__}({', '.join(f'{name}={brief(value)}' for name, value in given)})")
+
+    __str__ = __repr__
 
 
 AnyModel = TypeVar("AnyModel", bound=Model)
@@ -28,20 +81,59 @@ AnyModel = TypeVar("AnyModel", bound=Model)
 def checked(model: type[AnyModel], values: Mapping[str, Any], source: str) -> AnyModel:
     """Validate `values`; raise `ConfigError` that lists every problem of `source` with its path."""
     try:
-        return model.model_validate(values)
+        made: AnyModel = model.__pydantic_validator__.validate_python(values)
     except ValidationError as error:
-        problems = [f"  {_path(p['loc'])}: {_reason(p)}" for p in error.errors(include_url=False)]
-        count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
-        raise ConfigError("\n".join([f"{source}: {count}", *problems])) from error
+        raise ConfigError(_report(model, error, source)) from error
+    return made
+
+
+def _with_fields(model: type[BaseModel]) -> str:
+    """Give the docstring of a model with one paragraph for each field."""
+    head = textwrap.dedent(f"{' ' * 4}{(model.__doc__ or '').lstrip()}").split("\n\nFields\n")[0].rstrip()
+    lines = []
+    for name, field in model.model_fields.items():
+        default = "" if field.default is None or field.default_factory else f" Default: {brief(field.default)}."
+        default = " Required." if field.is_required() else default
+        text = f"{name}: {field.description or ''}{default}"
+        lines += textwrap.wrap(text, DOC_WIDTH, initial_indent="    ", subsequent_indent="        ")
+    return "\n".join([head, "", "Fields", *lines, ""])
+
+
+def _report(model: type[BaseModel], error: ValidationError, source: str) -> str:
+    problems = [f"  {_path(p['loc'])}: {_reason(model, p)}" for p in error.errors(include_url=False)]
+    count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
+    return "\n".join([f"{source}: {count}", *problems])
 
 
 def _path(location: tuple[int | str, ...]) -> str:
-    return ".".join(str(part) for part in location) or "(top level)"
+    """Join a path; words in parentheses are pydantic's names of alternatives."""
+    return ".".join(str(part) for part in location if not str(part).startswith("(")) or "(top level)"
 
 
-def _reason(problem: Any) -> str:
+def _reason(model: type[BaseModel], problem: Any) -> str:
     if problem["type"] == "extra_forbidden":
-        return "this key is not known"
+        *parents, key = problem["loc"]
+        return f"this key is not known{_suggestion(model, parents, str(key))}"
     if problem["type"] == "missing":
         return "this key is required and missing"
-    return f"{problem['msg']}, got {problem['input']!r}"
+    return f"{problem['msg']}, got {shortened(repr(problem['input']))}"
+
+
+def _suggestion(model: type[BaseModel], parents: list[int | str], key: str) -> str:
+    """Name the key that was probably meant: the nearest one of this table, or the same one of a table inside it."""
+    models = [model]
+    for part in parents:
+        fields = [m.model_fields[part] for m in models if part in m.model_fields]
+        models = [found for field in fields for found in _models_in(field.annotation)] or models
+    known = {name: field for m in models for name, field in m.model_fields.items()}
+    if nearest := get_close_matches(key, known, 1):
+        return f"; did you mean {nearest[0]}?"
+    tables = [name for name, field in known.items() for m in _models_in(field.annotation) if key in m.model_fields]
+    return f"; it belongs to {' or '.join(dict.fromkeys(tables))}" if tables else ""
+
+
+def _models_in(annotation: Any) -> list[type[BaseModel]]:
+    """Find the models that a type is made of: itself, or the alternatives of a union."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    return [model for part in get_args(annotation) for model in _models_in(part)]

@@ -18,18 +18,24 @@ __all__ = ["AnyCapture", "AravisConfig", "ChipConfig", "ReplayConfig", "VirtualC
 
 
 class VirtualConfig(Model):
-    """The camera of the virtual bench. With a frame rate the scene's time, and its noise, go on from shot to shot."""
+    """The camera of the virtual bench."""
 
-    kind: Literal["virtual"] = "virtual"
-    frame_rate_hz: Positive | None = None
+    kind: Literal["virtual"] = Field(default="virtual", description="Kind of the camera.")
+    frame_rate_hz: Positive | None = Field(
+        default=None,
+        description="Frame rate in Hz; the time of the scene, and its noise, then go on from shot to shot. "
+        "Absent: a shot is made when it is asked for, always of the same instant.",
+    )
 
 
 class ReplayConfig(Model):
-    """A recording as a camera, at the speed at which it was taken or as fast as it can be read."""
+    """A recording as a camera."""
 
-    kind: Literal["replay"] = "replay"
-    file: Path
-    speed: Literal["original", "full"] = "original"
+    kind: Literal["replay"] = Field(default="replay", description="Kind of the camera.")
+    file: Path = Field(description="Recording (.h5).")
+    speed: Literal["original", "full"] = Field(
+        default="original", description='"original" plays at the recorded pace, "full" as fast as shots are taken.'
+    )
 
 
 PixelFormat = Literal[
@@ -48,42 +54,59 @@ PixelFormat = Literal[
 
 
 class ChipConfig(Model):
-    """One chip of the camera: which device and stream channel deliver it, and how it is set.
+    """One chip of the camera. A setting that is absent stays as it is in the device."""
 
-    `device` is part of the name, the serial number or the IP address; without it the profile of the camera knows.
-    `source` is the value of the GenICam feature SourceSelector, where a device has one. What is absent stays as it is.
-    """
-
-    device: str | None = None
-    stream: Annotated[int, Field(ge=0, le=511)] | None = None
-    source: str | None = None
-    pixel_format: PixelFormat | None = None
-    exposure_us: Positive | None = None
-    gain: NotNegative | None = None
+    device: str | None = Field(
+        default=None,
+        description="Part of the name, serial number or IP address. Absent: as the profile says.",
+    )
+    stream: Annotated[int, Field(ge=0, le=511)] | None = Field(
+        default=None, description="Stream channel that delivers this chip."
+    )
+    source: str | None = Field(
+        default=None, description="Value of the GenICam feature SourceSelector, for devices that have it."
+    )
+    pixel_format: PixelFormat | None = Field(default=None, description="Pixel format, by its GenICam name.")
+    exposure_us: Positive | None = Field(default=None, description="Exposure of this chip, in us.")
+    gain: NotNegative | None = Field(default=None, description="Gain of this chip, in the device's unit.")
 
 
 class AravisConfig(Model):
-    """A GenICam camera with a visible and an infrared chip.
+    """A GenICam camera with a visible and an infrared chip, through Aravis."""
 
-    `device` is part of its name, its serial number or an IP address; empty takes the only one. `trigger` is "free"
-    (the camera runs by itself), "software" (every shot is asked for), or a line of the camera such as "Line5".
-    `features` are GenICam features that are set first, in this order, on every device of the camera that has them.
-    """
-
-    kind: Literal["aravis"] = "aravis"
-    device: str = ""
-    profile: Literal["jai-ad-080ge", "generic"] | None = None
-    visible: ChipConfig = ChipConfig()
-    infrared: ChipConfig = ChipConfig()
-    exposure_us: Positive | None = None
-    frame_rate_hz: Positive | None = None
-    trigger: Annotated[str, Field(min_length=1)] = "free"
-    features: dict[str, bool | int | float | str] = Field(default_factory=dict)
-    packet_size: Annotated[int, Field(ge=576, le=65500)] | None = None
-    packet_delay_ns: Annotated[int, Field(ge=0)] | None = None
-    buffers: Annotated[int, Field(ge=4, le=256)] = 12
-    timeout_s: Positive = 2.0
-    pair_tolerance_us: Positive = 2000.0
+    kind: Literal["aravis"] = Field(default="aravis", description="Kind of the camera.")
+    device: str = Field(
+        default="", description="Part of the name, serial number or IP address. Empty: the only camera that answers."
+    )
+    profile: Literal["jai-ad-080ge", "generic"] | None = Field(
+        default=None, description="How the chips are told apart. Absent: by the model name."
+    )
+    visible: ChipConfig = Field(default=ChipConfig(), description="The visible chip.")
+    infrared: ChipConfig = Field(default=ChipConfig(), description="The infrared chip.")
+    exposure_us: Positive | None = Field(default=None, description="Exposure of both chips, in us.")
+    frame_rate_hz: Positive | None = Field(default=None, description="Frame rate in Hz, when the camera runs free.")
+    trigger: Annotated[str, Field(min_length=1)] = Field(
+        default="free",
+        description='"free": the camera runs by itself; "software": every shot is asked for; or a line of the camera, '
+        'such as "Line5".',
+    )
+    features: dict[str, bool | int | float | str] = Field(
+        default_factory=dict,
+        description="GenICam features that are set first, in this order, on every device of the camera that has them.",
+    )
+    packet_size: Annotated[int, Field(ge=576, le=65500)] | None = Field(
+        default=None, description="Bytes of a GigE Vision packet. Absent: the largest that the network carries."
+    )
+    packet_delay_ns: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="Pause between packets in ns, for two devices on one network link."
+    )
+    buffers: Annotated[int, Field(ge=4, le=256)] = Field(
+        default=12, description="Frames of each chip that may wait; more survive longer pauses and need memory."
+    )
+    timeout_s: Positive = Field(default=2.0, description="Longest time in s that a shot is waited for.")
+    pair_tolerance_us: Positive = Field(
+        default=2000.0, description="Largest difference in us of the instants of two frames of one shot."
+    )
 
     @model_validator(mode="after")
     def _one_exposure(self) -> AravisConfig:

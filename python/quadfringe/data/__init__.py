@@ -8,7 +8,7 @@ from quadfringe.data.calibration import (
     conditioning,
 )
 from quadfringe.data.optics import core_device, device_from_core
-from quadfringe.data.shape import Shape
+from quadfringe.data.shape import Shape, xyz_mm_of
 from quadfringe.data.shot import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp, Truth
 from quadfringe.data.shot_files import read_bayer_shot, read_folder, read_shot, write_shot
 
@@ -32,4 +32,5 @@ __all__ = [
     "read_folder",
     "read_shot",
     "write_shot",
+    "xyz_mm_of",
 ]

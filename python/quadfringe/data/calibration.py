@@ -9,7 +9,7 @@ from typing import Any, Literal, Self
 
 from pydantic import Field
 
-from quadfringe.config import Affine, Device, Matrix4, Model, Response, Row4, checked
+from quadfringe.config import Affine, Device, Matrix4, Model, Response, ResponseChoice, Row4, checked
 from quadfringe.errors import ConfigError
 from quadfringe.files import atomic, read_bytes, require_suffix
 
@@ -94,10 +94,17 @@ class Calibration(Stored):
     record: CalibrationRecord | None = None
 
 
-def conditioning(calibration: Calibration | None, response: Response | None) -> dict[str, Any]:
-    """Give what is known about the intensities as the kernel's keywords; `response` stands in for the calibration's."""
-    response = response or (calibration.response if calibration else None)
-    projector = calibration.projector_response if calibration else None
+def conditioning(calibration: Calibration | None, response: ResponseChoice | None = None) -> dict[str, Any]:
+    """Give what is known about the intensities as the kernel's keywords.
+
+    `response` replaces that of the calibration; "auto" and None leave it to the calibration. With "linear" no response
+    of camera or projector is corrected; dark level, crosstalk and registration still are.
+    """
+    projector = calibration.projector_response if calibration and response != "linear" else None
+    if response is None or response == "auto":
+        response = calibration.response if calibration else None
+    elif response == "linear":
+        response = None
     known = {
         "response": response.rows() if response else None,
         "dark": calibration.dark if calibration else None,

@@ -12,11 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import checked
+from quadfringe.data._checks import check_maps
 from quadfringe.data.calibration import Calibration
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
 
-__all__ = ["Shape"]
+__all__ = ["SUFFIXES", "Shape", "xyz_mm_of"]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "modulation", "quality")
@@ -25,13 +26,21 @@ SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Shape:
-    """A decoded shot: maps (H, W) float32, points (H, W, 3) mm when calibrated; NaN where there is no data.
+    """A decoded shot: maps (H, W) float32, points (H, W, 3) float32; NaN where there is no data.
 
-    `uncertainty_mm` is one standard deviation of the depth (`uncertainty_rad` of the phase when not calibrated) for the
-    order that was chosen, `wrong_order_probability` that of another order. `config` and `calibration` are the settings
-    that made it and travel with it into an NPZ file.
+    phase_rad: absolute phase of the first fringe number, 0 at projector column 0.
+    column_px: projector column that lights the point.
+    modulation: fringe amplitude in linear light, fraction of full scale.
+    quality: trust in the fringe order, 0 to 1; known wherever there is light.
+    xyz_mm: points in the camera frame, (H, W, 3); None without a calibration.
+    wrong_order_probability: probability that the fringe order is wrong, an upper bound.
+    uncertainty_rad, uncertainty_mm: standard deviation of the phase, or with a calibration of the depth, for the order
+    that was chosen; the other one is None.
+
+    `config` holds the settings in force, with method, response and version, and `calibration` the calibration; both are
+    saved in an NPZ file. Raises `InputError` for maps of unequal size.
     """
 
     phase_rad: Map
@@ -42,12 +51,26 @@ class Shape:
     wrong_order_probability: Map | None = None
     uncertainty_rad: Map | None = None
     uncertainty_mm: Map | None = None
-    config: Mapping[str, Any] = field(default_factory=dict, repr=False)
-    calibration: Calibration | None = field(default=None, repr=False)
+    config: Mapping[str, Any] = field(default_factory=dict)
+    calibration: Calibration | None = None
+
+    def __post_init__(self) -> None:
+        maps = {name: getattr(self, name) for name in (*MAPS, *MORE_MAPS)}
+        check_maps({name: values for name, values in maps.items() if name in MAPS or values is not None})
+
+    def __repr__(self) -> str:
+        rows, columns = self.phase_rad.shape
+        words = [f"{columns} x {rows}", f"{100 * float(self.returned.mean()):.1f} % returned"]
+        depth_mm = self.depth_mm
+        if depth_mm is not None and np.isfinite(depth_mm).any():
+            words.append(f"depth {np.nanmin(depth_mm):.1f} to {np.nanmax(depth_mm):.1f} mm")
+        decode = self.config.get("decode", {})
+        words += [f"{name} {decode[name]}" for name in ("method", "method_version") if name in decode]
+        return f"Shape({', '.join(words)})"
 
     @property
     def maps(self) -> dict[str, Map]:
-        """Every map by name; `uncertainty_mm` in place of `uncertainty_rad`, and `xyz_mm`, when calibrated."""
+        """Every map by name; with a calibration `xyz_mm` too, and `uncertainty_mm` in place of `uncertainty_rad`."""
         maps = {name: getattr(self, name) for name in (*MAPS, "order", *MORE_MAPS)}
         return {name: values for name, values in maps.items() if values is not None}
 
@@ -59,26 +82,19 @@ class Shape:
 
     @property
     def returned(self) -> NDArray[np.bool_]:
-        """Pixels with a phase, (H, W)."""
+        """True at pixels with a phase, (H, W)."""
         return np.isfinite(self.phase_rad)
 
     @property
-    def depth_mm(self) -> Map:
-        """Depth along the camera's axis, (H, W), mm; raises `InputError` when not calibrated."""
-        return self.points_mm[:, :, 2]
-
-    @property
-    def points_mm(self) -> Map:
-        """Points in the camera frame, (H, W, 3), mm; raises `InputError` when not calibrated."""
-        if self.xyz_mm is None:
-            raise InputError("this shape has phase only: decode with a calibration to have millimetres")
-        return self.xyz_mm
+    def depth_mm(self) -> Map | None:
+        """Depth along the axis of the camera, (H, W), mm; None without a calibration."""
+        return None if self.xyz_mm is None else self.xyz_mm[:, :, 2]
 
     def figures(self) -> dict[str, float]:
-        """Give what the shape says of itself, by name with unit.
+        """Compute figures of the shape, by name with unit.
 
-        `returned_percent`; where pixels came back also `uncertainty_median_mm` (or `_rad`), one standard deviation, and
-        `wrong_orders_at_most`, the sum of their probabilities of another order, an upper bound.
+        `returned_percent`; if any pixels are returned, also `uncertainty_median_mm` (or `_rad`), one standard
+        deviation, and `wrong_orders_at_most`, the sum of their probabilities of a wrong order, an upper bound.
         """
         returned = self.returned
         found = {"returned_percent": 100.0 * float(returned.mean())}
@@ -96,10 +112,11 @@ class Shape:
         return replace(self, config=config, calibration=calibration)
 
     def save(self, path: Path | str) -> None:
-        """Write by suffix: .ply points, .tif depth, .npz everything. Whole or not at all.
+        """Write by suffix: .ply points, .tif depth in mm, .npz every map, config and calibration. Whole or not at all.
 
         PLY holds the valid points only, with the modulation as grey colour, and as scalars `quality`, `uncertainty_mm`
-        and `wrong_order_probability`.
+        and `wrong_order_probability`. Raises `InputError` for another suffix, a folder that does not exist, and for
+        .ply and .tif without a calibration.
         """
         from quadfringe.io import export
 
@@ -108,12 +125,12 @@ class Shape:
         if suffix == ".npz":
             export.write_npz(path, self.maps, self._texts())
         elif suffix == ".ply":
-            points = self.points_mm
+            points = xyz_mm_of(self)
             valid = np.isfinite(points).all(axis=2)
             scalars = {name: values[valid] for name, values in self.maps.items() if name in SCALARS}
             export.write_ply(path, points[valid], export.grey(self.modulation)[valid], scalars)
         else:
-            export.write_depth(path, self.depth_mm)
+            export.write_depth(path, xyz_mm_of(self)[:, :, 2])
 
     def _texts(self) -> dict[str, str]:
         texts = {"config": json.dumps(dict(self.config))}
@@ -123,7 +140,7 @@ class Shape:
 
     @classmethod
     def load(cls, path: Path | str) -> Shape:
-        """Read back what `save` wrote as NPZ."""
+        """Read what `save` wrote as NPZ; raises `InputError` for any other file."""
         from quadfringe.io.export import read_npz
 
         stored = read_npz(Path(path))
@@ -137,3 +154,10 @@ class Shape:
         config = json.loads(str(stored["config"])) if "config" in stored else {}
         maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
         return cls(**maps, config=config, calibration=calibration)
+
+
+def xyz_mm_of(shape: Shape) -> Map:
+    """Give the points, (H, W, 3) mm; raises `InputError` when the shape holds phase only."""
+    if shape.xyz_mm is None:
+        raise InputError("this shape holds phase only: decode with a calibration to get millimetres")
+    return shape.xyz_mm

@@ -1,15 +1,22 @@
-"""`Shot` and `BayerShot`: one exposure, with its time stamp and, on the virtual bench, the truth."""
+"""`Shot` and `BayerShot`: one exposure, with its time stamp and, on the virtual bench, the truth.
+
+>>> import numpy as np
+>>> from quadfringe.data import Shot
+>>> Shot(*np.zeros((4, 480, 640), np.uint16), full_scale=4095)
+Shot(640 x 480 uint16 up to 4095)
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import BayerPattern
+from quadfringe.data._checks import check_full_scale, check_images, check_maps
 from quadfringe.errors import InputError
 from quadfringe.io.images import full_scale
 
@@ -18,11 +25,13 @@ __all__ = ["AnyShot", "BayerShot", "ChipImage", "FrameStamp", "Shot", "Stamp", "
 Map = NDArray[np.float32]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Truth:
-    """What the virtual bench knows of a shot: maps (H, W) float32, NaN where nothing is seen.
+    """What the virtual bench knows of a shot: maps (H, W) float32, NaN where no surface is seen.
 
-    `edge` marks pixels too near to a step of depth or light for a value of their own.
+    `column_px` is the projector column that lights the point, `xyz_mm` (H, W, 3) the point in the camera frame.
+    `shadow` marks pixels that no projector lights, `edge` those whose values mix two sides of a step of depth or light.
+    Raises `InputError` for maps of unequal size.
     """
 
     column_px: Map
@@ -30,10 +39,16 @@ class Truth:
     shadow: NDArray[np.bool_]
     edge: NDArray[np.bool_]
 
+    def __post_init__(self) -> None:
+        check_maps({field.name: getattr(self, field.name) for field in fields(self)})
+
     @property
     def depth_mm(self) -> Map:
         """Depth along the camera's axis, (H, W), mm."""
         return self.xyz_mm[:, :, 2]
+
+    def __repr__(self) -> str:
+        return f"Truth({self.shadow.shape[1]} x {self.shadow.shape[0]})"
 
 
 @dataclass(frozen=True)
@@ -49,8 +64,8 @@ class FrameStamp:
 class Stamp:
     """When and by which camera a shot was taken.
 
-    `id` numbers the exposures since the camera was opened and jumps where some were lost; `time_us` is UTC in us since
-    1970, when the exposure was, as well as the host can tell; `frames` are by chip, "visible" and "infrared".
+    `id` numbers the exposures since the camera was opened; it jumps where exposures were lost. `time_us` is UTC in us
+    since 1970 when the exposure began, as well as the host can tell. `frames` are by chip, "visible" and "infrared".
     """
 
     id: int
@@ -60,7 +75,7 @@ class Stamp:
 
 
 class Stamped:
-    """What every shot tells of its origin."""
+    """Number and time of a record, taken from its stamp."""
 
     stamp: Stamp | None
 
@@ -75,70 +90,87 @@ class Stamped:
         return None if self.stamp is None else self.stamp.time_us
 
 
-@dataclass(frozen=True)
+def _described(record: Any, image: NDArray[Any], kind: str = "") -> str:
+    """Name a record with size, type, full scale and number."""
+    number = "" if record.id is None else f", id {record.id}"
+    size = f"{image.shape[1]} x {image.shape[0]} {image.dtype}"
+    return f"{type(record).__name__}({kind}{size} up to {record.full_scale_value:g}{number})"
+
+
+@dataclass(frozen=True, repr=False)
 class Shot(Stamped):
-    """One exposure: four images (H, W) of one dtype (uint8, uint16 or float32), and their full scale."""
+    """One exposure: four images (H, W) of one size and one dtype (uint8, uint16 or float32), and their full scale.
+
+    `full_scale` is the intensity of a saturated pixel; None stands for 255, 65535 or 1.0 by dtype. `truth` is what the
+    virtual bench knows, `stamp` when and by which camera the shot was taken. Raises `InputError` for anything else.
+    """
 
     red: NDArray[Any]
     green: NDArray[Any]
     blue: NDArray[Any]
     ir: NDArray[Any]
     full_scale: float | None = None
-    truth: Truth | None = field(default=None, repr=False)
+    truth: Truth | None = None
     stamp: Stamp | None = None
+
+    def __post_init__(self) -> None:
+        check_images(self.images)
+        check_full_scale(self.full_scale)
+
+    def __repr__(self) -> str:
+        return _described(self, self.red)
 
     @property
     def channels(self) -> dict[str, NDArray[Any]]:
-        """Give the images by name, in the order R, G, B, IR."""
+        """The images by name, in the order R, G, B, IR."""
         return {"red": self.red, "green": self.green, "blue": self.blue, "ir": self.ir}
 
     @property
     def images(self) -> dict[str, NDArray[Any]]:
-        """Give what was captured, by name: the four channels."""
+        """The captured images by name: the four channels."""
         return self.channels
 
     @property
     def full_scale_value(self) -> float:
-        """The intensity of a full pixel: as given, else 255, 65535 or 1.0 by dtype."""
+        """The intensity of a saturated pixel: as given, else 255, 65535 or 1.0 by dtype."""
         return float(full_scale(self.red)) if self.full_scale is None else self.full_scale
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class BayerShot(Stamped):
-    """One exposure of a Bayer chip and an infrared one: the raw mosaic and the infrared image, (H, W) of one dtype.
+    """One exposure of a Bayer chip and an infrared chip: the raw mosaic and the infrared image, (H, W) of one dtype.
 
-    `bayer` names the colours of the first two pixels of the first row and of the second. Nothing is interpolated
-    here: decoding does that, after dark level and response. Raises `InputError` for a pattern that does not exist,
-    and for images that are not (H, W) of one size.
+    `bayer` names the colours of the first two pixels of the first row and of the second row (rggb, grbg, gbrg or
+    bggr). Decoding interpolates the colours, after it has corrected dark level and response. The rest is as for `Shot`.
     """
 
     raw: NDArray[Any]
     bayer: BayerPattern
     ir: NDArray[Any]
     full_scale: float | None = None
-    truth: Truth | None = field(default=None, repr=False)
+    truth: Truth | None = None
     stamp: Stamp | None = None
 
     def __post_init__(self) -> None:
+        check_images(self.images)
+        check_full_scale(self.full_scale)
         if self.bayer not in get_args(BayerPattern):
             known = ", ".join(get_args(BayerPattern))
             raise InputError(f"bayer: expected one of {known}, got {self.bayer!r}")
-        if self.raw.ndim != 2 or self.ir.shape != self.raw.shape:
-            raise InputError(
-                f"expected a raw mosaic and an infrared image (H, W) of one size, got shapes {self.raw.shape} "
-                f"and {self.ir.shape}; a colour image is no mosaic any more: give its planes as a `Shot`"
-            )
+
+    def __repr__(self) -> str:
+        return _described(self, self.raw, f"{self.bayer} ")
 
     @property
     def images(self) -> dict[str, NDArray[Any]]:
-        """Give what was captured, by name: `raw` and `ir`."""
+        """The captured images by name: `raw` and `ir`."""
         return {"raw": self.raw, "ir": self.ir}
 
     @property
     def channels(self) -> dict[str, NDArray[Any]]:
-        """Give the samples of each channel by name, to look at: colours have a quarter of the pixels.
+        """The samples of each channel by name, for display: each colour has a quarter of the pixels.
 
-        They lie at different places, half of the green ones are left out, and nothing may be decoded from them.
+        The colours lie at different places and half of the green samples are left out, so do not decode from them.
         """
         row, column = divmod(self.bayer.index("r"), 2)
         red, green = self.raw[row::2, column::2], self.raw[row::2, 1 - column :: 2]
@@ -146,18 +178,18 @@ class BayerShot(Stamped):
 
     @property
     def full_scale_value(self) -> float:
-        """The intensity of a full pixel: as given, else 255, 65535 or 1.0 by dtype."""
+        """The intensity of a saturated pixel: as given, else 255, 65535 or 1.0 by dtype."""
         return float(full_scale(self.raw)) if self.full_scale is None else self.full_scale
 
 
 AnyShot = Shot | BayerShot
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class ChipImage(Stamped):
     """One exposure of one chip: pixels (H, W), or (H, W, 3) in R, G, B order, uint8 or uint16, up to `full_scale`.
 
-    `pixel_format` is its name in GenICam; `bayer` the colours of a raw mosaic, None when it is none.
+    `pixel_format` is the GenICam name of the format; `bayer` the colours of a raw mosaic, None for other images.
     """
 
     pixels: NDArray[Any]
@@ -165,3 +197,11 @@ class ChipImage(Stamped):
     full_scale: float
     bayer: BayerPattern | None
     stamp: Stamp
+
+    @property
+    def full_scale_value(self) -> float:
+        """The intensity of a saturated pixel."""
+        return self.full_scale
+
+    def __repr__(self) -> str:
+        return _described(self, self.pixels, f"{self.pixel_format} ")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.data import Shape, Truth
+from quadfringe.data import Shape, Truth, xyz_mm_of
 
 __all__ = ["Comparison", "compare", "rms"]
 
@@ -33,7 +33,7 @@ def rms(values: NDArray[np.floating]) -> float:
 
 def compare(shape: Shape, truth: Truth, fringe_period_px: float) -> Comparison:
     """Compare a calibrated shape with the truth; an order is wrong when the column is off by half a fringe."""
-    error = shape.depth_mm - truth.depth_mm
+    error = xyz_mm_of(shape)[:, :, 2] - truth.depth_mm
     lit = np.isfinite(truth.column_px) & ~truth.shadow
     smooth = lit & ~truth.edge
     returned = shape.returned

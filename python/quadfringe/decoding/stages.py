@@ -45,7 +45,7 @@ from quadfringe._core import (
     unwrap,
     wrong_order_probability,
 )
-from quadfringe.config import ChannelResponse, Response
+from quadfringe.config import ChannelResponse, Response, ResponseChoice
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.errors import DecodeError
 
@@ -104,7 +104,7 @@ class Wrapped(NamedTuple):
 
 
 def linear_light(
-    shot: AnyShot, calibration: Calibration | None = None, response: Response | None = None
+    shot: AnyShot, calibration: Calibration | None = None, response: ResponseChoice = "auto"
 ) -> dict[str, Map]:
     """Give the channels as linear light, fractions of full scale, (H, W) float32, by name (S1).
 

@@ -20,10 +20,10 @@ MARGIN_ROWS = 48  # rows and columns at least that the median of the margins is 
 DARK = 0.02  # a channel whose brightest pixels stay below this fraction of full scale is black
 NEARLY_NONE = 5e-4  # share of pixels that may differ in a black or saturated channel
 RETURNED_MIN = 0.05  # share of lit pixels that must come back
-# Median order margin of the lit pixels. Sound shots leave above 0.75, and the published way 0.4 when the response is
-# not corrected; channels exchanged leave at most 0.44 (best) and 0.49 (published); other fringe numbers 0.5 to the
-# best way and 0.3 to the ladder.
-COLLAPSED = {"joint": 0.55, "best": 0.55, "published": 0.35}
+# Median order margin of the lit pixels. Sound shots have more than 0.75, by the published method more than 0.4 when the
+# response is not corrected. Exchanged channels have at most 0.44 (joint) and 0.49 (published), other fringe numbers 0.5
+# (joint) and 0.3 (published). `pytest tests/test_verdict.py` holds both sides.
+COLLAPSED = {"joint": 0.55, "published": 0.35}
 DOUBTFUL = 0.6
 CLEARLY_BETTER = 1.2  # ratio of margins that tells channels are exchanged
 
@@ -33,8 +33,8 @@ Decode = Callable[[AnyShot], Shape]
 def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
     """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
 
-    `again` decodes the shot with two channels exchanged, or as another Bayer pattern, to find out which; None leaves
-    that question out.
+    When the median margin is below 0.6, `again` decodes the shot with each two channels exchanged, or as each other
+    Bayer pattern, to name them; with None that check is left out.
     """
     margin, lit, returned = _margin(shape)
     collapsed = COLLAPSED[shape.config["decode"]["method"]]

@@ -14,7 +14,7 @@ from quadfringe.evaluation.scoring import Image, Scene
 
 if TYPE_CHECKING:
     from quadfringe import Calibration, Plan, Shape, Shot, SystemConfig
-    from quadfringe.config import Response
+    from quadfringe.config import ResponseChoice
 
 ROOT = Path(__file__).resolve().parents[3]  # the checkout
 CAPTURES = ("plate", "bottle")
@@ -110,7 +110,7 @@ def plan_of(
     scene: Scene,
     *,
     calibration: Calibration | None = None,
-    response: Response | None = None,
+    response: ResponseChoice = "auto",
     **settings: Any,
 ) -> tuple[Shot, Plan]:
     """Give the product's shot and plan for a scene; `settings` are those of `DecodeConfig`."""

@@ -152,9 +152,9 @@ def measure_scene(
         scanner.stream(shots, keep="all", taps={"record": recorder.write}) as stream,
     ):
         for measured in stream:
-            if measured.error is not None:
-                continue
             shot, shape = measured.shot, measured.shape
+            if shape is None:
+                continue
             shape.save(folder / f"shot_{shapes:06d}.ply")
             pictures.add(_picture(shot, shape, shapes, shots))
             if truth_of is not None and (truth := truth_of(shot)) is not None:

@@ -101,6 +101,10 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
                 f"{recording}: recorded without a calibration, so it has no points; name a calibration in --system, or "
                 "use --no-ply"
             )
+        # Found once here: a response that each process estimated would depend on the shots that it happens to get.
+        decode = scanner.config.decode.model_copy(update={"response": scanner.settle_response(take)})
+        scanner.config = scanner.config.model_copy(update={"decode": decode})
+        config = config.model_copy(update={"decode": decode})
         job = Job(recording.resolve(), out.resolve(), config, ply, len(take), ())
         status = _open_store(job, take, scanner)[:]
     pending = tuple(int(shot) for shot in np.flatnonzero(status != DONE))

@@ -9,35 +9,48 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
+from threading import Lock
 
-from quadfringe.config import SystemConfig, load_system
-from quadfringe.data import AnyShot, Calibration, Shape
+from quadfringe.config import ResponseChoice, SystemConfig, load_system
+from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
+from quadfringe.decoding.response import response_is_known
 from quadfringe.devices import Camera, Keep, Projector, open_devices
+from quadfringe.errors import DecodeError
 from quadfringe.scanner.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
 
-LIGHTCRAFTER_COLUMNS = 912  # projector columns that fringes cover when no calibration and no system file says otherwise
+LIGHTCRAFTER_COLUMNS = 912  # projector columns that fringes cover if neither calibration nor system file say otherwise
+SETTLING_SHOTS = 64  # shots in which a response is looked for; a refused shot costs some 14 decodes
 
 
 class Scanner:
     """A projector, a camera and a decoder that belong together; close it, or use it in a `with` block.
 
-    `calibration` turns shots into millimetres; it is None when the system has none, and shapes then hold phase only.
+    `config` holds the settings, with those that the devices added. `calibration`, a `Calibration` or the path of its
+    file, turns shots into millimetres; without one it is None, and shapes hold phase only. Raises `InputError` for a
+    calibration that cannot be read, and for one that does not fit the fringes.
     """
 
     def __init__(
-        self, config: SystemConfig, projector: Projector, camera: Camera, calibration: Calibration | None
+        self,
+        config: SystemConfig,
+        projector: Projector,
+        camera: Camera,
+        calibration: Calibration | Path | str | None = None,
     ) -> None:
         self.config = config
-        self.calibration = calibration
+        self.calibration = Calibration.load(calibration) if isinstance(calibration, (str, Path)) else calibration
         self.projector = projector
         self.camera = camera
-        self._described = config.model_dump(mode="json", exclude_none=True)
-        self._idle: list[Decoder] = []
+        self._decoder: Decoder | None = None
+        self._planning = Lock()
         self._live: LiveStream | None = None
 
     @property
@@ -46,25 +59,45 @@ class Scanner:
         projector = self.config.projector if self.calibration is None else self.calibration.projector
         return LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px
 
+    @property
+    def plan(self) -> Plan:
+        """What shots of this system are decoded with."""
+        return Plan(self.projector_width_px, self.config.fringes, self.calibration, decode=self.config.decode)
+
+    @property
+    def response(self) -> ResponseChoice:
+        """The response that is corrected, as in `Decoder.response`; "auto" until a sound shot was decoded."""
+        return self.plan.response if self._decoder is None else self._decoder.response
+
     def grab(self) -> AnyShot:
         """Project the fringes and take one shot of them."""
         self.projector.show(self.config.fringes)
         return self.camera.snap()
 
     def decode(self, shot: AnyShot) -> Shape:
-        """Give the shape of a shot of this system; raises `DecodeError` when none can be trusted.
+        """Give the shape of a shot of this system; raises `DecodeError` when it cannot be trusted.
 
-        Threads may call this at the same time: each then has a decoder of its own.
+        All shots are decoded by one `Decoder`, so that a response that nobody states is estimated once and then held.
+        Threads may call this at the same time.
         """
-        try:
-            decoder = self._idle.pop()
-        except IndexError:
-            decoder = Decoder(shot, self._plan())
-        try:
-            shape = decoder.decode(shot)
-        finally:
-            self._idle.append(decoder)
-        return shape.with_settings(self._described | {"decode": shape.config["decode"]}, self.calibration)
+        shape = self._decoder_for(shot).decode(shot)
+        settings = self.config.model_dump(mode="json", exclude_none=True, exclude={"decode"})
+        return replace(shape, config=settings | dict(shape.config))
+
+    def settle_response(self, shots: Iterable[AnyShot]) -> ResponseChoice:
+        """Estimate the response from the first sound ones of these shots, in their order, unless it is known.
+
+        Gives the value that `decode.response` of the settings must have for the same result in another process. At most
+        64 shots are decoded; if none of them is sound, the light is taken as linear.
+        """
+        if response_is_known(self.plan):
+            return self.plan.response
+        for shot in islice(shots, SETTLING_SHOTS):
+            with suppress(DecodeError):
+                self.decode(shot)
+            if self.response != "auto":
+                return self.response
+        return "linear"
 
     def measure(self) -> Shape:
         """Project, grab, decode: one exposure in, one metric shape out."""
@@ -78,25 +111,34 @@ class Scanner:
         taps: Mapping[str, Tap] | None = None,
         resume: bool = False,
     ) -> LiveStream:
-        """Measure without pause: `count` shots are captured, or as many as come until the stream is closed.
+        """Measure without pause: `count` shots, or as many as come until the stream is closed.
 
-        Capture, decode and the caller run at a pace of their own; "latest" gives the newest shape there is, "all" keeps
-        up to 64 shots waiting. Both drop the oldest shot when they must, and count it. `taps` are called with every
-        captured shot, each in a thread of its own: a recorder, say. With `resume` a camera that fails is asked again
+        Capture, decoding and the caller run at different speeds. With keep="latest" the caller gets the newest shape;
+        "all" lets up to 64 shots wait. Both drop the oldest shot when they must, and count it. `taps` get every
+        captured shot, each in its thread: a recorder, for example. With `resume` a camera that fails is tried again
         until the stream is closed; otherwise its `CameraError` ends the stream. A second stream ends the first.
 
         >>> import quadfringe as qf
         >>> with qf.open() as scanner, scanner.stream(2, keep="all") as stream:
-        ...     depths = [measured.shape.depth_mm for measured in stream]
+        ...     depths = [measured.result().depth_mm for measured in stream]
         >>> len(depths)
         2
         """
         self._end_stream()
         self.projector.show(self.config.fringes)
-        # The published method leaves processors idle between its rows and the next shot; the best one keeps them
-        # busy, and two shots at once would only be later.
+        # The published method leaves cores idle between its rows and the next shot. The joint method keeps all of them
+        # busy, so that two shots at once would only come later.
         at_once = 2 if self.config.decode.method == "published" else 1
-        self._live = LiveStream(self.camera, self.decode, count, keep=keep, taps=taps, resume=resume, at_once=at_once)
+        self._live = LiveStream(
+            self.camera,
+            self.decode,
+            count,
+            keep=keep,
+            taps=taps,
+            resume=resume,
+            at_once=at_once,
+            response=lambda: self.response,
+        )
         return self._live
 
     def _end_stream(self) -> None:
@@ -104,13 +146,11 @@ class Scanner:
             self._live.close()
             self._live = None
 
-    def _plan(self) -> Plan:
-        return Plan(
-            projector_width_px=self.projector_width_px,
-            fringes=self.config.fringes,
-            calibration=self.calibration,
-            decode=self.config.decode,
-        )
+    def _decoder_for(self, shot: AnyShot) -> Decoder:
+        with self._planning:
+            if self._decoder is None:
+                self._decoder = Decoder(shot, self.plan)
+        return self._decoder
 
     def close(self) -> None:
         """End the stream and release the devices, the light also when the camera fails."""
@@ -128,18 +168,26 @@ class Scanner:
 
 
 def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
-    """Open the system of a TOML file, of a config, or the virtual bench as it comes.
+    """Open the system of a TOML file, of a folder with system.toml, or of a config; without any, the virtual bench.
 
     Raises `ConfigError` when the file has unknown keys or wrong values, or names devices that do not go together;
-    OSError when a device cannot be opened.
+    `InputError` when a file cannot be read; OSError when a device cannot be opened.
     """
     if system is None:
         config = SystemConfig()
     elif isinstance(system, SystemConfig):
         config = system
     else:
-        config = load_system(Path(system))
-    # The file is read first: a device that is open for nothing stays busy.
+        config = load_system(system)
+    # All files are read before a device is opened: a device that an error leaves open stays busy.
     calibration = None if config.calibration is None else Calibration.load(config.calibration)
-    devices = open_devices(config)
+    devices = open_devices(_with_response_read(config))
     return Scanner(devices.config, devices.projector, devices.camera, calibration or devices.camera.calibration)
+
+
+def _with_response_read(config: SystemConfig) -> SystemConfig:
+    """Put the response in place of the name of its file, so that recordings and results hold it."""
+    if not isinstance(config.decode.response, Path):
+        return config
+    decode = config.decode.model_copy(update={"response": ResponseCalibration.load(config.decode.response)})
+    return config.model_copy(update={"decode": decode})

@@ -1,7 +1,7 @@
-"""From camera to shape without pause: capture, decode and whoever looks each at a pace of its own.
+"""From camera to shape without pause: capture, decoding and the caller run at different speeds.
 
-Between two paces stands a queue that drops its oldest shot when full and counts it, so that a slow decoder or a slow
-view costs shots and never time: what comes out is as fresh as it can be.
+A queue between two of them drops its oldest shot when it is full, and counts it. A slow decoder or a slow view
+therefore loses shots and does not delay them.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Self
 
+from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.devices import Camera, CameraStatistics, Keep
 from quadfringe.devices._queue import DroppingQueue, EndOfQueue, QueueStatistics
@@ -29,30 +30,30 @@ RETRY_S = 0.5
 
 @dataclass(frozen=True)
 class Measured:
-    """A shot and what came of it: a shape, or the reason why there is none."""
+    """A shot and its shape, or the reason why it has none.
+
+    Either `shape` or `error` is None. `latency_ms` is the time from the arrival of the last frame to the shape.
+    """
 
     shot: AnyShot
-    result: Shape | DecodeError
+    shape: Shape | None
+    error: DecodeError | None
     latency_ms: float
 
-    @property
-    def shape(self) -> Shape:
-        """The shape; raises the `DecodeError` of a shot that cannot be trusted."""
-        if isinstance(self.result, DecodeError):
-            raise self.result
-        return self.result
-
-    @property
-    def error(self) -> DecodeError | None:
-        """Why there is no shape; None when there is one."""
-        return self.result if isinstance(self.result, DecodeError) else None
+    def result(self) -> Shape:
+        """Give the shape; raises the `DecodeError` of a shot that cannot be trusted."""
+        if self.error is not None:
+            raise self.error
+        assert self.shape is not None, "a shot has a shape or an error"
+        return self.shape
 
 
 @dataclass(frozen=True)
 class StreamStatistics:
-    """What a stream did until now: its camera, its queues ("decode", "view" and the taps), and its rates.
+    """What a stream has done so far: its camera, its queues ("decode", "view" and the taps), and its rates.
 
-    `refused` shots could not be trusted; `fault` is what the camera fails with while the stream tries to resume.
+    `refused` is the number of shots that could not be trusted; `fault` the error of the camera while the stream tries
+    to resume; `response` the response that is corrected, "auto" until a sound shot was decoded.
     """
 
     camera: CameraStatistics
@@ -61,6 +62,7 @@ class StreamStatistics:
     decoded_per_s: float
     refused: int
     fault: str | None
+    response: ResponseChoice
 
 
 class _Rate:
@@ -81,9 +83,10 @@ class _Rate:
 class LiveStream:
     """Iterates over `Measured`; close it, or use it in a `with` block. Made by `Scanner.stream`.
 
-    Every tap gets every shot that was captured, in a thread of its own behind a queue of its own. What a tap raises
-    ends the stream. A camera that makes shots when asked (`paced` is False) waits for the others, and loses none.
-    `decode` is called from as many threads as shots are decoded `at_once`; results come in the order of the shots.
+    Every tap gets every captured shot, in a thread with a queue before it. An error of a tap ends the stream. A camera
+    that makes shots on request (`paced` is False) waits for the others, so that no shot is lost. `decode` is called
+    from `at_once` threads; results come in the order of the shots. While `response()` is "auto", shots are decoded one
+    after another, so that the estimate depends on their order alone.
     """
 
     def __init__(
@@ -96,7 +99,9 @@ class LiveStream:
         taps: Mapping[str, Tap] | None = None,
         resume: bool = False,
         at_once: int = 1,
+        response: Callable[[], ResponseChoice] = lambda: "linear",
     ) -> None:
+        self._response = response
         self._camera, self._decode, self._count, self._resume = camera, decode, count, resume
         self._wait = not camera.paced
         self._stop = threading.Event()
@@ -143,43 +148,52 @@ class LiveStream:
         self._end(None)
 
     def _end(self, error: BaseException | None) -> None:
-        """End the queues behind the camera; what waits in them is still worked off."""
+        """End the queues behind the camera; shots that wait in them are still processed."""
         for queue in (self._shots, *(queue for _, queue in self._taps.values())):
             queue.end(error)
 
     def _decode_all(self) -> None:
-        """Decode shots as they come; others may do the same, and every result waits for those of earlier shots."""
+        """Decode shots as they come; other threads do the same, and every result waits for those of earlier shots."""
         while True:
-            try:
-                with self._taking:
+            result = None
+            with self._taking:
+                try:
                     shot, turn = self._shots.get(), self._taken
                     self._taken += 1
-            except BaseException as error:
-                self._leave(error)
+                except BaseException as error:
+                    self._leave(error)
+                    return
+                if self._response() == "auto":
+                    result = self._result_of(shot)
+            if result is None:
+                result = self._result_of(shot)
+            if not isinstance(result, (Shape, DecodeError)):
+                self._fail(result)
                 return
-            try:
-                result = self._decoded_or_refused(shot)
-            except BaseException as error:
-                self._fail(error)
-                return
-            with self._order:
-                while self._given != turn and not self._stop.is_set():
-                    self._order.wait()
-                self._refused += isinstance(result, DecodeError)
-                self._decoded.tick()
-                latency_ms = (time.time_ns() - _arrival_ns(shot)) / 1e6
-                self._results.put(Measured(shot, result, latency_ms), wait=self._wait)
-                self._given += 1
-                self._order.notify_all()
+            self._give(shot, result, turn)
 
-    def _decoded_or_refused(self, shot: AnyShot) -> Shape | DecodeError:
+    def _result_of(self, shot: AnyShot) -> Shape | BaseException:
+        """Give the shape of a shot, or what `decode` raised."""
         try:
             return self._decode(shot)
-        except DecodeError as error:
+        except BaseException as error:
             return error
 
+    def _give(self, shot: AnyShot, result: Shape | DecodeError, turn: int) -> None:
+        """Hand over a result after those of all earlier shots."""
+        shape, error = (None, result) if isinstance(result, DecodeError) else (result, None)
+        with self._order:
+            while self._given != turn and not self._stop.is_set():
+                self._order.wait()
+            self._refused += error is not None
+            self._decoded.tick()
+            latency_ms = (time.time_ns() - _arrival_ns(shot)) / 1e6
+            self._results.put(Measured(shot, shape, error, latency_ms), wait=self._wait)
+            self._given += 1
+            self._order.notify_all()
+
     def _leave(self, reason: BaseException) -> None:
-        """Nothing more is to decode: the last one to leave ends the results."""
+        """End this thread because no shots are left; the last thread ends the results."""
         with self._order:
             self._decoders -= 1
             if not self._decoders:
@@ -192,7 +206,7 @@ class LiveStream:
         except EndOfQueue:
             pass
         except CameraError:
-            pass  # the camera's own error reaches the caller with the last result
+            pass  # the error of the camera reaches the caller with the last result
         except BaseException as error:
             self._fail(error)
 
@@ -220,18 +234,19 @@ class LiveStream:
 
     def statistics(self) -> StreamStatistics:
         """Give rates, queues and counts, at any time and from any thread."""
-        own = {"decode": self._shots.statistics(), "view": self._results.statistics()}
+        queues = {"decode": self._shots.statistics(), "view": self._results.statistics()}
         return StreamStatistics(
             camera=self._camera.statistics(),
-            queues=own | {name: queue.statistics() for name, (_, queue) in self._taps.items()},
+            queues=queues | {name: queue.statistics() for name, (_, queue) in self._taps.items()},
             captured_per_s=self._captured.per_s(),
             decoded_per_s=self._decoded.per_s(),
             refused=self._refused,
             fault=self._fault,
+            response=self._response(),
         )
 
     def close(self) -> None:
-        """Stop capturing, let the taps have what was captured, and forget the rest; closing twice is allowed."""
+        """Stop capturing, let the taps finish, and drop other waiting shots; closing twice is allowed."""
         self._stop.set()
         self._results.end(discard=True)
         self._shots.end(discard=True)
@@ -247,7 +262,7 @@ class LiveStream:
 
 
 def _arrival_ns(shot: AnyShot) -> int:
-    """Give when the last frame of a shot was in, in ns of the host's clock."""
+    """Give the time at which the last frame of a shot arrived, in ns of the host's clock."""
     if shot.stamp is None:
         return time.time_ns()
     frames = shot.stamp.frames.values()

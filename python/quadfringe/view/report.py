@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.data import AnyShot, Shape
+from quadfringe.data import AnyShot, Shape, xyz_mm_of
 from quadfringe.decoding.compare import Comparison
 from quadfringe.errors import require
 from quadfringe.files import atomic
@@ -139,7 +139,7 @@ def write_report(
         [
             Panel("absolute phase", shape.phase_rad, "rad", "turbo"),
             Panel("quality", shape.quality, "", "viridis"),
-            Panel("depth", shape.depth_mm, "mm", "viridis_r"),
+            Panel("depth", xyz_mm_of(shape)[:, :, 2], "mm", "viridis_r"),
             Panel("depth error", found.depth_error_mm, "mm", "coolwarm", (-error_mm, error_mm)),
         ],
     ]

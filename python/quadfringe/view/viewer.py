@@ -137,7 +137,7 @@ class Viewer:
         self._last = (measured, columns)
         if self._frozen.value or not self._server.get_clients():
             return
-        shape = None if measured.error else measured.shape
+        shape = measured.shape
         if now - self._pictures_at >= PICTURES_PERIOD_S:
             self._pictures_at = now
             self._channels.image = channels_picture(measured.shot)

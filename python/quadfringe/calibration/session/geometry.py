@@ -23,7 +23,7 @@ from quadfringe.calibration.projector import ProjectorMap, projector_points
 from quadfringe.calibration.registration import Registration, register_views
 from quadfringe.calibration.session.captures import Captures
 from quadfringe.calibration.session.outcome import Outcome, record
-from quadfringe.data import Calibration, Shape
+from quadfringe.data import Calibration, Shape, xyz_mm_of
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import CalibrationError, DecodeError
 
@@ -140,7 +140,7 @@ def planes(captures: Captures, calibration: Calibration) -> Outcome:
     found = fit_heights(session.heights_mm, [shape.phase_rad for shape in shapes], session.height_degree)
     reference = shapes[int(np.argmin(np.abs(session.heights_mm)))]
     polynomial = [found.height_from_phase(shape.phase_rad) for shape in shapes]
-    triangulated = [heights_over(shape.points_mm, reference.points_mm) for shape in shapes]
+    triangulated = [heights_over(xyz_mm_of(shape), xyz_mm_of(reference)) for shape in shapes]
     agreement = compare_heights(polynomial, triangulated)
     figures = {f"agreement_{name}": float(value) for name, value in vars(agreement).items()}
     figures["polynomial_rms_mm"] = float(np.sqrt(np.mean(np.square(found.residual_rms_mm))))
@@ -160,7 +160,7 @@ def acceptance(captures: Captures, calibration: Calibration) -> Outcome:
     """Judge the calibrated instrument by a plane, a sphere and steps."""
     session = captures.session
     names = session.captures("acceptance")
-    plane, sphere, steps = (shape.points_mm for shape in _decoded(captures, "acceptance", names, calibration))
+    plane, sphere, steps = (xyz_mm_of(shape) for shape in _decoded(captures, "acceptance", names, calibration))
     artefacts = Artefacts((plane,), (sphere,), session.sphere_diameter_mm, (steps,), session.step_heights_mm)
     found = accept(artefacts)
     figures = {line.name: line.value_mm for line in found.lines} | dict(found.figures)

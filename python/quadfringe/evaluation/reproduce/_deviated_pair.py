@@ -17,7 +17,7 @@ from quadfringe import _core
 from quadfringe.calibration.projector_pair import deviated
 from quadfringe.config import ChannelResponse, DecodeConfig, Device, Fringes, Matrix4, Response
 from quadfringe.data import Calibration, Shot, core_device, device_from_core
-from quadfringe.decoding import Plan, kernel_decoder
+from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.stages import carrier, fourier, linear_light
 from quadfringe.devices.light import eight_bit, predeformation
 
@@ -186,8 +186,8 @@ def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrap
         decode=DecodeConfig(method=method, unwrapping=unwrapping),
     )
     shot = exposure.shot
-    maps = kernel_decoder(shot, plan).decode(shot.red, shot.green, shot.blue, shot.ir)
-    return np.where(np.isfinite(exposure.phase_rad), maps["phase_rad"], np.float32(np.nan))
+    shape = Decoder(shot, plan).decode_without_verdict(shot)
+    return np.where(np.isfinite(exposure.phase_rad), shape.phase_rad, np.float32(np.nan))
 
 
 def infrared_error_rad(exposure: Exposure, unwrapping: Unwrapping = "coaxial") -> Map:

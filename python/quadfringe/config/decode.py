@@ -1,0 +1,134 @@
+"""Settings of decoding: the table `[decode]` of a system file, fringes, and the response of the channels.
+
+>>> from quadfringe.config import DecodeConfig
+>>> DecodeConfig(method="published", response="linear")
+DecodeConfig(method='published', response='linear')
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from quadfringe.config._base import Finite, Model, NotNegative, Positive
+
+__all__ = ["ChannelResponse", "DecodeConfig", "Fringes", "Response", "ResponseChoice", "ResponseSetting", "Row4"]
+
+Row4 = tuple[Finite, Finite, Finite, Finite]
+# Settings and files written before the method had its name say "best".
+Method = Annotated[Literal["published", "joint"], BeforeValidator(lambda v: "joint" if v == "best" else v)]
+
+
+class ChannelResponse(Model):
+    """Inverse response of one channel: linear = max(I / (1 - knee I^20) - offset, 0) ^ exponent.
+
+    I is the captured intensity as a fraction of full scale.
+    """
+
+    offset: NotNegative = Field(default=0.0, description="Intensity without light, fraction of full scale.")
+    exponent: Positive = Field(default=1.0, description="Exponent that makes the intensity linear; 1 / gamma.")
+    knee: NotNegative = Field(default=0.0, description="Compression of highlights, a share of full scale.")
+
+
+class Response(Model):
+    """Inverse responses of the four channels; a channel that is left out is linear."""
+
+    red: ChannelResponse = Field(default=ChannelResponse(), description="Response of the red channel.")
+    green: ChannelResponse = Field(default=ChannelResponse(), description="Response of the green channel.")
+    blue: ChannelResponse = Field(default=ChannelResponse(), description="Response of the blue channel.")
+    ir: ChannelResponse = Field(default=ChannelResponse(), description="Response of the infrared channel.")
+
+    def rows(self) -> list[tuple[float, float, float]]:
+        """Offset, exponent and knee of R, G, B, IR."""
+        return [(c.offset, c.exponent, c.knee) for c in (self.red, self.green, self.blue, self.ir)]
+
+
+def _kind_of(value: Any) -> str | None:
+    if isinstance(value, (Response, Mapping)):
+        return "(table)"
+    if value in ("auto", "linear"):
+        return "(word)"
+    return "(file)" if isinstance(value, (str, Path)) and Path(value).suffix == ".json" else None
+
+
+ResponseSetting = Annotated[
+    Annotated[Literal["auto", "linear"], Tag("(word)")]
+    | Annotated[Path, Tag("(file)")]
+    | Annotated[Response, Tag("(table)")],
+    Discriminator(
+        _kind_of,
+        custom_error_type="response",
+        custom_error_message='expected "auto", "linear", a response of the channels, or a file that ends in .json',
+    ),
+]
+
+
+ResponseChoice = Response | Literal["auto", "linear"]  # a setting whose file has been read
+
+
+class Fringes(Model):
+    """What the projectors show. The kernel checks that the fringe numbers tell all columns apart."""
+
+    numbers: tuple[float, float, float] = Field(
+        default=(36.0, 35.0, 30.0),
+        description="Fringes over the full projector width: of red and blue, of green, of infrared.",
+    )
+    layout: Literal["regular", "diamond"] = Field(
+        default="regular",
+        description="Mirrors of the projectors: a regular grid, or the diamond array of a LightCrafter 4500.",
+    )
+    predeformed_z_mm: Positive | None = Field(
+        default=None,
+        description="Depth in mm of the plane for which the infrared image is pre-deformed (S11), from the calibration "
+        "of both projectors. Absent: the image is plain. For projectors that are not quite coaxial.",
+    )
+
+
+class DecodeConfig(Model):
+    """How a shot is decoded. What is absent takes the kernel's default, which `Shape.config` then shows."""
+
+    method: Method | None = Field(
+        default=None,
+        description='"joint" fits all channels together (default); "published" is the chain of the paper, some ten '
+        'times as fast, and less accurate at edges and on textured surfaces. "best" is an older name of "joint".',
+    )
+    response: ResponseSetting = Field(
+        default="auto",
+        description='How intensities follow the light. "auto" takes the response of the calibration, or, if the '
+        'calibration holds none, estimates it from the first sound shots; "linear" corrects no response; a Response, '
+        "or a file of one (.json), replaces that of the calibration.",
+    )
+    unwrapping: Literal["coaxial", "pair"] | None = Field(
+        default=None,
+        description='"coaxial" (default) takes the infrared projector as coaxial with the visible one; "pair" searches '
+        "the fringe order along the camera ray with the calibration of both projectors (method published).",
+    )
+    depth_range_mm: tuple[NotNegative, Positive] | None = Field(
+        default=None,
+        description='Nearest and farthest depth in mm that unwrapping = "pair" searches. Absent: all depths.',
+    )
+    modulation_min: NotNegative | None = Field(
+        default=None,
+        description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels.",
+    )
+    quality_min: NotNegative | None = Field(
+        default=None,
+        description="Least quality (0 to 1) of a valid pixel. Raise it for fewer wrong orders and fewer pixels.",
+    )
+    channel_instants_us: Row4 | None = Field(
+        default=None,
+        description="Instants in us at which R, G, B and IR are seen, from the instant that the shape stands for. For "
+        "moving surfaces and a projector that shows its colours one after another (method joint).",
+    )
+    threads: Annotated[int, Field(gt=0)] | None = Field(
+        default=None, description="Threads of one decoder. Absent: as many as the machine has cores."
+    )
+
+    @model_validator(mode="after")
+    def _range_is_searched(self) -> DecodeConfig:
+        if self.depth_range_mm is not None and self.unwrapping != "pair":
+            raise ValueError('depth_range_mm needs unwrapping = "pair", which searches depths')
+        return self

@@ -1,0 +1,52 @@
+"""What records check when they are made: images and maps of one size, of the types that the kernel takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from quadfringe.errors import InputError
+
+__all__ = ["check_full_scale", "check_images", "check_maps"]
+
+DTYPES = ("uint8", "uint16", "float32")
+
+
+def check_images(images: Mapping[str, Any]) -> None:
+    """Raise `InputError` unless all images are arrays (H, W) of one size and one type that can be decoded."""
+    for name, image in images.items():
+        wanted = f"{name}: expected one grey image (H, W) of {', '.join(DTYPES[:2])} or {DTYPES[2]}"
+        if not isinstance(image, np.ndarray):
+            raise InputError(f"{wanted}, got {'None' if image is None else type(image).__name__}")
+        if image.ndim != 2:
+            colour = "; give each plane of a colour image as a channel" if image.ndim == 3 else ""
+            raise InputError(f"{wanted}, got an array of shape {image.shape}{colour}")
+        if image.dtype.name not in DTYPES:
+            raise InputError(f"{wanted}, got {image.dtype.name}; convert it, fractions of full scale to float32")
+    _check_equal("size", {name: f"{image.shape[1]} x {image.shape[0]}" for name, image in images.items()})
+    _check_equal("type", {name: image.dtype.name for name, image in images.items()})
+
+
+def check_full_scale(full_scale: float | None) -> None:
+    """Raise `InputError` unless the full scale is None or a positive number."""
+    if full_scale is not None and not (np.isfinite(full_scale) and full_scale > 0):
+        raise InputError(f"full_scale: expected a positive number, such as 4095 for 12 bit, got {full_scale}")
+
+
+def check_maps(maps: Mapping[str, Any]) -> None:
+    """Raise `InputError` unless all maps are (H, W), or (H, W, 3) when their name begins with xyz, of one size."""
+    for name, values in maps.items():
+        last = (3,) if name.startswith("xyz") else ()
+        shape = values.shape if isinstance(values, np.ndarray) else None
+        if shape is None or shape[2:] != last or len(shape) < 2:
+            got = type(values).__name__ if shape is None else f"an array of shape {shape}"
+            raise InputError(f"{name}: expected an array {'(H, W, 3)' if last else '(H, W)'}, got {got}")
+    _check_equal("size", {name: f"{values.shape[1]} x {values.shape[0]}" for name, values in maps.items()})
+
+
+def _check_equal(what: str, found: Mapping[str, str]) -> None:
+    if len(set(found.values())) > 1:
+        listed = ", ".join(f"{name} {value}" for name, value in found.items())
+        raise InputError(f"expected one {what} for all of {', '.join(found)}, got {listed}")

@@ -1,0 +1,135 @@
+"""The kernel's decoder, planned for one response: buffers for every thread, and the description of what it does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any, Literal
+
+from quadfringe import _core
+from quadfringe.config import Response
+from quadfringe.data import AnyShot, BayerShot, Shape, Shot, conditioning, core_device
+from quadfringe.decoding.plan import Plan
+from quadfringe.errors import InputError
+
+__all__ = ["KernelDecoder", "Size", "size_of"]
+
+Size = tuple[int, int]
+
+
+class KernelDecoder:
+    """Decodes without a verdict, with a response that is known; several threads may do so at once."""
+
+    def __init__(
+        self,
+        size: Size,
+        full_scale: float | None,
+        plan: Plan,
+        source: str | None = None,
+        idle: list[_core.Decoder] | None = None,
+    ) -> None:
+        _check_size(size, plan)
+        self._size, self._full_scale, self.plan = size, full_scale, plan
+        self._idle = idle or [self._planned()]
+        self._described = plan.described() | self._response_described(source) | {"decode": self._idle[0].settings()}
+
+    @property
+    def response(self) -> Response | Literal["linear"]:
+        """The response of the camera that is corrected; "linear" for none."""
+        if self.plan.response != "auto":
+            return self.plan.response
+        calibration = self.plan.calibration
+        return "linear" if calibration is None or calibration.response is None else calibration.response
+
+    def with_response(self, response: Response | Literal["linear"]) -> KernelDecoder:
+        """Give a decoder of the same plan with a response that was estimated from shots."""
+        plan = replace(self.plan, response=response)
+        same = conditioning(plan.calibration, response) == conditioning(plan.calibration, self.plan.response)
+        return KernelDecoder(self._size, self._full_scale, plan, "shots", self._idle if same else None)
+
+    def with_method(self, method: str) -> KernelDecoder:
+        """Give a decoder of the same plan by another method."""
+        decode = self.plan.decode.model_copy(update={"method": method})
+        return KernelDecoder(self._size, self._full_scale, replace(self.plan, decode=decode))
+
+    def shape(self, shot: AnyShot) -> Shape:
+        """Give the shape of a shot of this size."""
+        try:
+            core = self._idle.pop()
+        except IndexError:
+            core = self._planned()
+        try:
+            if isinstance(shot, BayerShot):
+                maps = core.decode_bayer(shot.raw, shot.bayer, shot.ir)
+            else:
+                maps = core.decode(shot.red, shot.green, shot.blue, shot.ir)
+        finally:
+            self._idle.append(core)
+        return Shape(**maps, config=self._described, calibration=self.plan.calibration)
+
+    def _planned(self) -> _core.Decoder:
+        plan = self.plan
+        settings = plan.decode.model_dump(exclude_none=True, exclude={"unwrapping", "response"})
+        return _core.Decoder(
+            self._size,
+            plan.fringes.numbers,
+            plan.projector_width_px,
+            full_scale=self._full_scale,
+            **conditioning(plan.calibration, plan.response),
+            **_geometry(plan),
+            **settings,
+        )
+
+    def _response_described(self, source: str | None) -> dict[str, Any]:
+        """Tell which response is corrected, None for none, and whether plan, calibration or shots gave it."""
+        response = self.response
+        given = "calibration" if self.plan.response == "auto" else "plan"
+        return {
+            "response": None if response == "linear" else response.model_dump(include=set(Response.model_fields)),
+            "response_from": source or given,
+        }
+
+
+def size_of(like: AnyShot | Size, full_scale: float | None) -> tuple[Size, float | None]:
+    """Give rows and columns, and the full scale if it is known."""
+    if isinstance(like, (Shot, BayerShot)):
+        rows, columns = like.ir.shape
+        return (rows, columns), like.full_scale_value if full_scale is None else full_scale
+    try:
+        rows, columns = (int(length) for length in like)
+    except (TypeError, ValueError):
+        raise InputError(f"expected a shot or a size (rows, columns), got {like!r}") from None
+    return (rows, columns), full_scale
+
+
+def _check_size(size: Size, plan: Plan) -> None:
+    if plan.calibration is None:
+        return
+    camera, projector = plan.calibration.camera, plan.calibration.projector
+    if size != (camera.height_px, camera.width_px):
+        raise InputError(
+            f"the calibration is for images of {camera.width_px} x {camera.height_px} pixels, "
+            f"the shot has {size[1]} x {size[0]}; calibrate at the size in use"
+        )
+    if projector.width_px != plan.projector_width_px:
+        raise InputError(
+            f"the calibration's projector has {projector.width_px} columns, "
+            f"projector_width_px is {plan.projector_width_px}; the two must agree"
+        )
+
+
+def _geometry(plan: Plan) -> dict[str, Any]:
+    calibration = plan.calibration
+    searched = plan.decode.unwrapping == "pair"
+    if searched and (calibration is None or calibration.infrared is None):
+        raise InputError(
+            'unwrapping = "pair" needs a calibration with both projectors: one that has an `infrared` device'
+        )
+    if calibration is None:
+        return {}
+    known = {"camera": core_device(calibration.camera), "projector": core_device(calibration.projector)}
+    if not searched or calibration.infrared is None:
+        return known
+    return known | {
+        "infrared": core_device(calibration.infrared),
+        "predeformed_z_mm": plan.fringes.predeformed_z_mm,
+    }

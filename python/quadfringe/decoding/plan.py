@@ -1,0 +1,99 @@
+"""`Plan`: what a decoder is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from operator import index
+from pathlib import Path
+from typing import Any, Literal
+
+from quadfringe import _core
+from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, checked
+from quadfringe.data import Calibration, ResponseCalibration
+from quadfringe.errors import InputError
+
+__all__ = ["Plan"]
+
+
+@dataclass(frozen=True, init=False)
+class Plan:
+    """What a decoder is made from: the fringes, the calibration, the response, and settings of the method.
+
+    `projector_width_px` is the number of projector columns that the fringes cover. `calibration` is a `Calibration` or
+    the path of its file; without one, shapes hold phase only. `response` is "auto", "linear", a `Response`, or the
+    path of a response file, with the meaning of `DecodeConfig.response`; given here or there, it means the same, and
+    afterwards it stands here. `fringes` may be given as three numbers, `decode` as a mapping of its keys.
+
+    Raises `InputError` (`ConfigError` for settings) that names the argument at fault.
+
+    >>> import quadfringe as qf
+    >>> plan = qf.Plan(912, fringes=(36, 35, 30), decode={"method": "published", "response": "linear"})
+    >>> plan.response, plan.decode.method
+    ('linear', 'published')
+    """
+
+    projector_width_px: int
+    fringes: Fringes
+    calibration: Calibration | None
+    response: ResponseChoice
+    decode: DecodeConfig
+
+    def __init__(
+        self,
+        projector_width_px: int,
+        fringes: Fringes | Sequence[float] = Fringes(),
+        calibration: Calibration | Path | str | None = None,
+        response: Response | Literal["auto", "linear"] | Path | str = "auto",
+        decode: DecodeConfig | Mapping[str, Any] = DecodeConfig(),
+    ) -> None:
+        settings = decode if isinstance(decode, DecodeConfig) else checked(DecodeConfig, decode, "decode")
+        fields = {
+            "projector_width_px": _columns(projector_width_px),
+            "fringes": _fringes(fringes),
+            "calibration": _calibration(calibration),
+            "response": _response(response, settings.response),
+            "decode": settings.model_copy(update={"response": "auto"}),
+        }
+        for name, value in fields.items():
+            object.__setattr__(self, name, value)
+
+    def described(self) -> dict[str, Any]:
+        """Describe what is decoded, as plain data for a saved file; the decoder adds response and settings in force."""
+        return {
+            "quadfringe_version": _core.__version__,
+            "projector_width_px": self.projector_width_px,
+            "fringes": self.fringes.model_dump(mode="json"),
+        }
+
+
+def _columns(width: Any) -> int:
+    try:
+        return index(width)
+    except TypeError:
+        raise InputError(f"projector_width_px: expected a number of columns, such as 912, got {width!r}") from None
+
+
+def _fringes(fringes: Fringes | Sequence[float]) -> Fringes:
+    return fringes if isinstance(fringes, Fringes) else Fringes(numbers=tuple(fringes))
+
+
+def _calibration(calibration: Any) -> Calibration | None:
+    if calibration is None or isinstance(calibration, Calibration):
+        return calibration
+    if isinstance(calibration, (str, Path)):
+        return Calibration.load(calibration)
+    raise InputError(f"calibration: expected a Calibration or the path of its file, got {type(calibration).__name__}")
+
+
+def _response(given: Any, setting: Any) -> ResponseChoice:
+    """Give the response that argument and setting agree on, read from its file when a path was given."""
+    if given is None:
+        raise InputError('response: expected "auto", "linear", a Response, or a response file (.json), got None')
+    if given != "auto" and setting not in ("auto", given):
+        raise InputError(f"response: given as {given!r}, and as {setting!r} among the settings; give it once")
+    found = setting if given == "auto" else given
+    if isinstance(found, (str, Path)) and found not in ("auto", "linear"):
+        found = ResponseCalibration.load(found)
+    once: ResponseChoice = DecodeConfig(response=found).response  # type: ignore[assignment]  # no longer a path
+    return once

@@ -1,0 +1,82 @@
+"""The automatic response (gamma): estimated from a shot when neither settings nor calibration give one."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from quadfringe.config import Response
+from quadfringe.data import AnyShot, Shape, conditioning
+from quadfringe.decoding._kernel import KernelDecoder, size_of
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.stages import response_of_shot
+from quadfringe.decoding.verdict import order_margin
+from quadfringe.errors import InputError
+
+__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "response_is_known"]
+
+ROUNDS_MAX = 8  # of decoding and estimating; each takes a part of the distortion out of the phase
+SETTLED = 0.02  # relative change of the exponents at which the rounds end
+SHOTS_TRIED = 3  # sound shots that a response is looked for in, before the light is taken as linear
+
+
+def estimate_response(shot: AnyShot, plan: Plan) -> Response | Literal["linear"]:
+    """Estimate the response (gamma) of the channels from one shot; "linear" when the shot shows none.
+
+    Any object will do that fills a good part of the image: pixels of a tile, sorted by their phase, are what a stack of
+    phase steps is to `quadfringe calibrate response`. The shot is decoded and the response estimated in turn until the
+    estimate settles. The result can be put into a `Plan`, where it means the same. Raises `InputError` when the plan
+    knows a response already, and otherwise as `Decoder`.
+
+    >>> import quadfringe as qf
+    >>> from dataclasses import replace
+    >>> gamma = qf.SystemConfig(scene=qf.SceneConfig(projector_exponent=1.8))
+    >>> with qf.open(gamma) as scanner:
+    ...     shot = scanner.grab()
+    >>> plan = qf.Plan(projector_width_px=912)
+    >>> response = qf.estimate_response(shot, plan)
+    >>> print(f"{response.red.exponent:.1f}")
+    0.6
+    >>> decoder = qf.Decoder(shot, replace(plan, response=response))
+    """
+    if response_is_known(plan):
+        raise InputError('this plan has a response, from `response` or its calibration; make one with response="auto"')
+    return decode_straightened(KernelDecoder(*size_of(shot, None), plan), shot)[0].response
+
+
+def response_is_known(plan: Plan) -> bool:
+    """Tell whether plan or calibration say how intensities follow the light; that they are linear counts too."""
+    if plan.response != "auto":
+        return True
+    return not conditioning(plan.calibration, "auto").keys().isdisjoint(("response", "crosstalk", "projector_response"))
+
+
+def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[KernelDecoder, Shape]:
+    """Decode with the response that the shot shows, if that makes the orders surer; else as captured.
+
+    Gives the decoder that was used, whose response is the estimate, and the shape.
+    """
+    linear = as_captured.with_response("linear")
+    first = linear.shape(shot)
+    found = _estimate(shot, first, as_captured.plan)
+    if found is None:
+        return linear, first
+    # The joint method finds a response that is too strong for the published one. It cannot search along camera rays.
+    searched = as_captured.plan.decode.unwrapping == "pair"
+    finder = as_captured if searched else as_captured.with_method("joint")
+    for _ in range(ROUNDS_MAX):
+        before = found
+        found = _estimate(shot, finder.with_response(found).shape(shot), as_captured.plan) or found
+        if _settled(found, before):
+            break
+    straight = as_captured.with_response(found)
+    shape = straight.shape(shot)
+    return (straight, shape) if order_margin(shape) > order_margin(first) else (linear, first)
+
+
+def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | None:
+    return response_of_shot(shot, shape.phase_rad, plan.fringes.numbers, plan.projector_width_px, plan.calibration)
+
+
+def _settled(one: Response, other: Response) -> bool:
+    pairs = zip(one.rows(), other.rows(), strict=True)
+    return all(abs(a[1] - b[1]) <= SETTLED * b[1] for a, b in pairs)
