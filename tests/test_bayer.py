@@ -144,9 +144,9 @@ def test_an_unknown_pattern_lists_the_four(ideal: list[Image], name: str) -> Non
 
 def test_what_does_not_fit_is_named(ideal: list[Image]) -> None:
     image = ideal[0]
-    with pytest.raises(InputError, match=r"of one size, got shapes \(96, 912, 3\) and \(96, 912\)"):
+    with pytest.raises(InputError, match=r"raw: expected one grey image .* shape \(96, 912, 3\)"):
         qf.BayerShot(np.stack(ideal[:3], axis=2), "rggb", image)
-    with pytest.raises(InputError, match="of one size"):
+    with pytest.raises(InputError, match="expected one size"):
         qf.BayerShot(image, "rggb", image[1:])
     decoder = _core.Decoder((96, 912), *CODE)
     with pytest.raises(TypeError, match="ir: expected a 2D float32 array, got a 2D float64 array"):
@@ -162,12 +162,12 @@ def test_files_of_two_depths_become_fractions(tmp_path: Path) -> None:
     infrared = np.full((6, 8), 51, np.uint8)
     write_image(tmp_path / "raw.tif", raw)
     write_image(tmp_path / "ir.png", infrared)
-    shot = qf.read_bayer_shot(tmp_path / "raw.tif", "bggr", tmp_path / "ir.png", 12)
+    shot = qf.read_shot(tmp_path, 12, bayer="bggr")
     assert (shot.bayer, shot.full_scale) == ("bggr", 1.0)
     np.testing.assert_allclose(shot.raw, raw / 4095, atol=1e-6)
     np.testing.assert_allclose(shot.ir, 0.2, atol=1e-6)
     with pytest.raises(InputError, match=re.escape("raw.tif: has values up to 3995")):
-        qf.read_bayer_shot(tmp_path / "raw.tif", "bggr", tmp_path / "ir.png", 10)
+        qf.read_shot(tmp_path, 10, bayer="bggr")
 
 
 def test_the_command_line_simulates_and_decodes_mosaics(tmp_path: Path) -> None:
@@ -185,7 +185,7 @@ def test_the_command_line_simulates_and_decodes_mosaics(tmp_path: Path) -> None:
     done = run("decode", *images, *FRINGES, *calibration, "--out", tmp_path / "x.npz")
     assert done.exit_code == 0, done.output
     shape = qf.Shape.load(tmp_path / "x.npz")
-    same = qf.decode(qf.read_bayer_shot(raw, "grbg", ir), plan("best"))
+    same = qf.decode(qf.read_shot({"raw": raw, "ir": ir}, bayer="grbg"), plan("best"))
     np.testing.assert_array_equal(shape.phase_rad, same.phase_rad)
     assert shape.xyz_mm is not None
     wrong = run("decode", "--raw", raw, "--bayer", "bggr", "--ir", ir, *FRINGES, "--out", tmp_path / "y.npz")
@@ -197,10 +197,10 @@ def test_the_command_line_simulates_and_decodes_mosaics(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "reasons"),
     [
-        (["--raw", "r.png", "--ir", "i.png"], ["add --bayer NAME"]),
-        (["--bayer", "rggb", "--ir", "i.png"], ["add --raw FILE"]),
-        (["--raw", "r.png", "--bayer", "rggb"], ["add --ir FILE"]),
-        (["--raw", "r.png", "--bayer", "rggb", "--ir", "i.png", "--red", "r.png"], ["leave out --red"]),
+        (["--raw", "r.png", "--ir", "i.png"], ["raw is the mosaic", "bayer = rggb"]),
+        (["--bayer", "rggb", "--ir", "i.png"], ["bayer needs the image raw"]),
+        (["--raw", "r.png", "--bayer", "rggb"], ["give ir"]),
+        (["--raw", "r.png", "--bayer", "rggb", "--ir", "i.png", "--red", "r.png"], ["leave out red"]),
         (["--raw", "r.png", "--bayer", "rgbg", "--ir", "i.png"], [*PATTERNS, "rgbg"]),
         (["--raw", "r.png", "--bayer", "rggb", "--ir", "i.png"], ["r.png: No such file"]),
     ],

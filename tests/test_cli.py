@@ -157,7 +157,7 @@ def test_swapped_channels_are_suspected(small_bench: Path, tmp_path: Path, pair:
 
 def test_images_of_two_sizes_are_refused(small_bench: Path, tmp_path: Path) -> None:
     shot = spoiled(tmp_path, small_bench, blue=np.zeros((9, 9), np.uint8))
-    refused(run("decode", *shot, *FRINGES, "--out", tmp_path / "x.npz"), 2, "B image", "[9, 9]")
+    refused(run("decode", *shot, *FRINGES, "--out", tmp_path / "x.npz"), 2, "expected one size", "blue 9 x 9")
 
 
 def test_not_a_number_is_refused(small_bench: Path, tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_not_a_number_is_refused(small_bench: Path, tmp_path: Path) -> None:
 
 def test_files_at_fault_are_named(small_bench: Path, tmp_path: Path) -> None:
     shot, out = files_of(small_bench), ["--out", tmp_path / "x.npz"]
-    refused(run("decode", *shot[:6], *FRINGES, *out), 2, "--ir FILE")
+    refused(run("decode", *shot[:6], *FRINGES, *out), 2, "no image for ir")
     refused(run("decode", *shot[:7], tmp_path / "no.png", *FRINGES, *out), 2, "no.png")
     (tmp_path / "bad.png").write_bytes(b"bad")
     refused(run("decode", *shot[:7], tmp_path / "bad.png", *FRINGES, *out), 2, "bad.png", "not a readable image")

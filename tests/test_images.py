@@ -101,9 +101,9 @@ def test_mixed_depths_become_fractions(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("names", "reason"),
     [
-        (("rgb",), "give --ir FILE"),
-        (("red", "ir"), "give --green --blue"),
-        (("rgb", "red", "ir"), "leave out --red"),
+        (("rgb",), "give ir"),
+        (("red", "ir"), "give green, blue"),
+        (("rgb", "red", "ir"), "leave out red"),
     ],
 )
 def test_missing_channels_are_named(tmp_path: Path, names: tuple[str, ...], reason: str) -> None:

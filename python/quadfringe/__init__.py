@@ -42,7 +42,6 @@ if TYPE_CHECKING:
         Shot,
         Stamp,
         Truth,
-        read_bayer_shot,
         read_shot,
     )
     from quadfringe.decoding import Decoder, Plan, decode, estimate_response, stages
@@ -106,7 +105,6 @@ __all__ = [
     "open_system",
     "optimum",
     "pattern",
-    "read_bayer_shot",
     "read_shot",
     "stages",
 ]
@@ -122,7 +120,6 @@ _NAMES_IN = {
         "Shot",
         "Stamp",
         "Truth",
-        "read_bayer_shot",
         "read_shot",
     ),
     "decoding": ("Decoder", "Plan", "decode", "estimate_response"),

@@ -1,4 +1,12 @@
-"""Files that are either whole or not there: written beside their place, then renamed into it."""
+"""Files that are either whole or absent: written under a temporary name, then renamed.
+
+>>> import tempfile
+>>> with tempfile.TemporaryDirectory() as folder:
+...     with atomic(f"{folder}/figures.json") as temporary:
+...         _ = temporary.write_text(figures_text({"depth_rms_mm": 0.05}))
+...     read_bytes(Path(folder) / "figures.json").decode().split()
+['{', '"figures":', '{', '"depth_rms_mm":', '0.05', '}', '}']
+"""
 
 from __future__ import annotations
 
@@ -16,8 +24,12 @@ __all__ = ["atomic", "atomic_folder", "figures_text", "folder_for", "read_bytes"
 
 
 @contextmanager
-def atomic(path: Path) -> Iterator[Path]:
-    """Give a temporary path beside `path`; rename it to `path` when the block ends well, else remove it."""
+def atomic(path: Path | str) -> Iterator[Path]:
+    """Give a temporary path in the folder of `path`; rename it to `path` when the block succeeds, else remove it.
+
+    Raises `InputError` when the folder does not exist.
+    """
+    path = Path(path)
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
     handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
@@ -33,7 +45,7 @@ def atomic(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(path: Path) -> Iterator[Path]:
-    """Give an empty folder beside `path`; rename it to `path` when the block ends well, else remove it."""
+    """Give an empty folder next to `path`; rename it to `path` when the block succeeds, else remove it."""
     temporary = Path(tempfile.mkdtemp(prefix=f".{path.stem}-", dir=path.parent))
     try:
         yield temporary
@@ -54,12 +66,14 @@ def folder_for(path: Path) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path}: cannot be made a folder: {error.strerror}") from error
+        raise InputError(f"{path}: cannot create this folder: {error.strerror}") from error
     return path
 
 
 def read_bytes(path: Path) -> bytes:
     """Read a whole file; raise `InputError` naming the file and the reason."""
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file in it")
     try:
         return path.read_bytes()
     except OSError as error:

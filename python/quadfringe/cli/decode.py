@@ -137,8 +137,8 @@ def decode(
         _response(response, linear),
         checked(DecodeConfig, settings, "options"),
     )
-    files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb}
-    shape = decoding.decode(_shot(files, raw, bayer, bits), plan)
+    files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
+    shape = decoding.decode(_shot(files, bayer, bits), plan)
     _save(shape, out, json)
 
 
@@ -161,29 +161,12 @@ def _response(response: str | None, linear: bool) -> str:
     return "linear" if linear else response or "auto"
 
 
-def _shot(files: Mapping[str, Path | None], raw: Path | None, bayer: Bayer | None, bits: Bits | None) -> AnyShot:
+def _shot(files: Mapping[str, Path | None], bayer: Bayer | None, bits: Bits | None) -> AnyShot:
     """Read the shot from separate images, a colour image, or a raw mosaic."""
-    from quadfringe.data.shot_files import read_bayer_shot, read_shot
+    from quadfringe.data import read_shot
 
-    bits_in_use = None if bits is None else int(bits)
-    if raw is None and bayer is None:
-        return read_shot(files, bits_in_use)
-    return read_bayer_shot(*_mosaic(raw, bayer, files), bits_in_use)
-
-
-def _mosaic(raw: Path | None, bayer: Bayer | None, files: Mapping[str, Path | None]) -> tuple[Path, BayerPattern, Path]:
-    """Return mosaic file, pattern and infrared file; raise `InputError` when one is missing or too many are given."""
-    from quadfringe.errors import InputError
-
-    ir = files["ir"]
-    missing = [
-        option for option, value in (("--raw FILE", raw), ("--bayer NAME", bayer), ("--ir FILE", ir)) if not value
-    ]
-    if raw is None or bayer is None or ir is None:
-        raise InputError(f"a raw mosaic needs --raw, --bayer and --ir: add {' and '.join(missing)}")
-    if more := [name for name, path in files.items() if path is not None and name != "ir"]:
-        raise InputError(f"--raw already holds red, green and blue; leave out --{' --'.join(more)}")
-    return raw, bayer.value, ir
+    pattern: BayerPattern | None = None if bayer is None else bayer.value
+    return read_shot(files, None if bits is None else int(bits), bayer=pattern)
 
 
 def _save(shape: Shape, out: Path, json: Path | None) -> None:

@@ -83,12 +83,12 @@ def _sorted_paths(paths: Sequence[Path]) -> _Paths:
 
 
 def _shot_in(folder: Path, bayer: Bayer | None) -> AnyShot:
-    from quadfringe.data.shot_files import read_folder
+    from quadfringe.data import read_shot
     from quadfringe.errors import InputError
 
     if bayer is None and (folder / "raw.png").exists():
         raise InputError(f"{folder}: holds a raw mosaic; name its filter pattern with --bayer")
-    return read_folder(folder, None if bayer is None else bayer.value)
+    return read_shot(folder, bayer=None if bayer is None else bayer.value)
 
 
 def _report(found: Sequence[Finding], json: Path | None) -> None:

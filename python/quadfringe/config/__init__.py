@@ -1,6 +1,7 @@
 """Settings: frozen data with units in names. A key that is not known is an error."""
 
 from quadfringe.config._base import Finite, Model, NotNegative, Positive, checked
+from quadfringe.config._brief import brief, shortened
 from quadfringe.config.cameras import (
     AnyCapture,
     AravisConfig,
@@ -55,7 +56,9 @@ __all__ = [
     "SystemConfig",
     "Triple",
     "VirtualConfig",
+    "brief",
     "capture_config",
     "checked",
     "load_system",
+    "shortened",
 ]

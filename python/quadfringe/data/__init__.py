@@ -10,7 +10,7 @@ from quadfringe.data.calibration import (
 from quadfringe.data.optics import core_device, device_from_core
 from quadfringe.data.shape import Shape, xyz_mm_of
 from quadfringe.data.shot import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp, Truth
-from quadfringe.data.shot_files import read_bayer_shot, read_folder, read_shot, write_shot
+from quadfringe.data.shot_files import read_shot, write_shot
 
 __all__ = [
     "AnyShot",
@@ -28,8 +28,6 @@ __all__ = [
     "conditioning",
     "core_device",
     "device_from_core",
-    "read_bayer_shot",
-    "read_folder",
     "read_shot",
     "write_shot",
     "xyz_mm_of",

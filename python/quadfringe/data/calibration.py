@@ -9,11 +9,13 @@ from typing import Any, Literal, Self
 
 from pydantic import Field
 
-from quadfringe.config import Affine, Device, Matrix4, Model, Response, ResponseChoice, Row4, checked
+from quadfringe.config import Affine, Device, Matrix4, Model, Response, ResponseChoice, Row4, checked, shortened
 from quadfringe.errors import ConfigError
 from quadfringe.files import atomic, read_bytes, require_suffix
 
 __all__ = ["Calibration", "CalibrationRecord", "CalibrationStep", "ResponseCalibration", "conditioning"]
+
+FILE = "calibration.json"  # in a folder that holds a calibration
 
 
 def _short_lists(text: str) -> str:
@@ -22,7 +24,7 @@ def _short_lists(text: str) -> str:
 
 
 class Stored(Model):
-    """A model with a JSON file of its own."""
+    """A model that is saved as a JSON file."""
 
     def save(self, path: Path | str) -> None:
         """Write the model as JSON, whole or not at all."""
@@ -32,9 +34,10 @@ class Stored(Model):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Read a model from JSON; raises `ConfigError` that lists every problem."""
+        """Read a model from JSON; raises `InputError` for no file, `ConfigError` that lists every problem in it."""
+        text = read_bytes(Path(path))
         try:
-            values = json.loads(read_bytes(Path(path)))
+            values = json.loads(text)
         except ValueError as error:
             raise ConfigError(f"{path}: not valid JSON: {error}") from error
         if not isinstance(values, dict):
@@ -45,29 +48,29 @@ class Stored(Model):
 class ResponseCalibration(Stored, Response):
     """Responses of the channels, and what they were estimated from."""
 
-    schema_version: Literal[1] = 1
-    steps: int | None = None
-    inputs: tuple[str, ...] = ()
+    schema_version: Literal[1] = Field(default=1, description="Version of this format.")
+    steps: int | None = Field(default=None, description="Phase steps of each channel.")
+    inputs: tuple[str, ...] = Field(default=(), description="Names of the image files.")
 
 
 class CalibrationStep(Model):
-    """One step of a calibration: what went in, what came out, and what is to be thought of it."""
+    """One step of a calibration: inputs, settings, residuals, and a verdict."""
 
-    name: str
-    inputs: tuple[str, ...] = ()
-    settings: dict[str, Any] = Field(default_factory=dict)
-    figures: dict[str, float | None] = Field(default_factory=dict)
-    good: bool
-    verdict: str
+    name: str = Field(description="Name of the step.")
+    inputs: tuple[str, ...] = Field(default=(), description="Names of the captures.")
+    settings: dict[str, Any] = Field(default_factory=dict, description="Settings and data of the step.")
+    figures: dict[str, float | None] = Field(default_factory=dict, description="Residuals by name with unit.")
+    good: bool = Field(description="Whether the residuals keep their limits.")
+    verdict: str = Field(description="The result in words.")
 
 
 class CalibrationRecord(Model):
     """When a calibration was made, by which version, of which rig, and every step with its residuals."""
 
-    made_utc: str
-    quadfringe_version: str
-    rig: str
-    steps: tuple[CalibrationStep, ...] = ()
+    made_utc: str = Field(description="Time, UTC.")
+    quadfringe_version: str = Field(description="Version of quadfringe.")
+    rig: str = Field(description="Name of the rig.")
+    steps: tuple[CalibrationStep, ...] = Field(default=(), description="Steps in their order.")
 
     @property
     def good(self) -> bool:
@@ -78,20 +81,43 @@ class CalibrationRecord(Model):
 class Calibration(Stored):
     """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
 
-    `response` is undone before `crosstalk` and `projector_response` after it. `infrared` is the second projector, None
-    when it is coaxial with `projector`. Files of schema 1, which know neither it nor the record, are read as they are.
+    `response` is corrected before `crosstalk`, `projector_response` after it.
     """
 
-    schema_version: Literal[1, 2] = 2
-    camera: Device
-    projector: Device
-    infrared: Device | None = None
-    dark: Row4 | None = None
-    response: Response | None = None
-    crosstalk: Matrix4 | None = None
-    projector_response: Response | None = None
-    ir_registration: Affine | None = None
-    record: CalibrationRecord | None = None
+    schema_version: Literal[1, 2] = Field(
+        default=2, description="Version of this format; files of version 1 have neither `infrared` nor `record`."
+    )
+    camera: Device = Field(description="The camera, whose frame holds all coordinates.")
+    projector: Device = Field(description="The visible projector.")
+    infrared: Device | None = Field(
+        default=None, description="The infrared projector. Absent: coaxial with `projector`."
+    )
+    dark: Row4 | None = Field(default=None, description="Dark level of each channel, fraction of full scale.")
+    response: Response | None = Field(default=None, description="Response of the camera.")
+    crosstalk: Matrix4 | None = Field(
+        default=None, description="Rows: captured R, G, B, IR; columns: projected R, G, B, IR."
+    )
+    projector_response: Response | None = Field(default=None, description="Response of the projectors.")
+    ir_registration: Affine | None = Field(
+        default=None, description="Pixel of the infrared chip from that of the visible chip: affine, two rows of three."
+    )
+    record: CalibrationRecord | None = Field(default=None, description="How the calibration was made.")
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Read a calibration from JSON, or calibration.json of a folder; raises `InputError` or `ConfigError`."""
+        path = Path(path)
+        return super().load(path / FILE if (path / FILE).is_file() else path)
+
+    def __repr__(self) -> str:
+        devices = {"camera": self.camera, "projector": self.projector, "infrared": self.infrared}
+        words = [f"{name} {d.width_px} x {d.height_px}" for name, d in devices.items() if d is not None]
+        defects = ("dark", "response", "crosstalk", "projector_response", "ir_registration")
+        words += [name for name in defects if getattr(self, name) is not None]
+        words += [f"made {self.record.made_utc} of {self.record.rig}"] if self.record else []
+        return shortened(f"Calibration({', '.join(words)})")
+
+    __str__ = __repr__
 
 
 def conditioning(calibration: Calibration | None, response: ResponseChoice | None = None) -> dict[str, Any]:

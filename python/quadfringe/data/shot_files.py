@@ -1,102 +1,115 @@
-"""Shots to image files and back: four grey files, or an infrared one and one of all colours, plain or raw mosaic."""
+"""Shots to image files and back: four grey files, or an infrared file and one of all colours, plain or raw mosaic."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import BayerPattern
-from quadfringe.data import AnyShot, BayerShot, Shot
+from quadfringe.data.shot import AnyShot, BayerShot, Shot
 from quadfringe.errors import InputError
+from quadfringe.files import folder_for
 from quadfringe.io.images import full_scale, read_grey, read_rgb, write_image
 
-__all__ = ["read_bayer_shot", "read_folder", "read_shot", "write_shot"]
+__all__ = ["SUFFIXES", "read_shot", "write_shot"]
 
 COLOURS = ("red", "green", "blue")
+NAMES = ("rgb", *COLOURS, "raw", "ir")
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp")
+Source = Mapping[str, Path | str | None] | Path | str
 
 
-def read_shot(files: Mapping[str, Path | None], bits: int | None = None) -> Shot:
-    """Read a shot from `files`: `ir`, and either `rgb` or all of `red`, `green`, `blue`.
+@overload
+def read_shot(source: Source, bits: int | None = None, *, bayer: None = None) -> Shot: ...
+@overload
+def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern) -> BayerShot: ...
+@overload
+def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | None) -> AnyShot: ...
+def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | None = None) -> AnyShot:
+    """Read a shot from image files: a folder, or a mapping of names to paths.
 
-    `bits` is the number of bits in use in 16-bit files (10 or 12 of 16, say). Files of different depth
-    become float32 fractions of full scale. Raises `InputError` that names the file at fault.
+    The names are `ir`, and `rgb` or all of `red`, `green`, `blue`; with `bayer` (rggb, grbg, gbrg or bggr) they are
+    `raw`, the mosaic of a Bayer chip, and `ir`. In a folder they are followed by .png, .tif, .tiff or .bmp. `bits` is
+    the number of bits in use in 16-bit files, 10 or 12 for example. Files of different depth become float32 fractions
+    of full scale. Raises `InputError` that names the file at fault.
+
+    >>> import tempfile
+    >>> import numpy as np
+    >>> import quadfringe as qf
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     paths = qf.data.write_shot(folder, qf.Shot(*np.zeros((4, 6, 8), np.uint8)))
+    ...     qf.read_shot(folder), qf.read_shot(paths)
+    (Shot(8 x 6 uint8 up to 255), Shot(8 x 6 uint8 up to 255))
     """
-    given = {name: path for name, path in files.items() if path is not None}
-    _check_names(given)
+    given = _files_of(source, bayer)
+    try:
+        _check_names(given, bayer)
+    except InputError as error:
+        raise error if isinstance(source, Mapping) else InputError(f"{source}: {error}") from None
     images = _read(given)
     full_scales = {name: _full_scale(image, bits, given.get(name)) for name, image in images.items()}
-    if len({image.dtype for image in images.values()}) == 1:
-        return _shot(images, full_scales["ir"])
-    return _shot(_fractions(images, full_scales), 1.0)
-
-
-def read_bayer_shot(raw: Path, bayer: BayerPattern, ir: Path, bits: int | None = None) -> BayerShot:
-    """Read a raw mosaic of the pattern `bayer` (rggb, grbg, gbrg or bggr) and an infrared image.
-
-    `bits` and files of different depth are as for `read_shot`. Raises `InputError` that names the file at fault.
-    """
-    images = {"raw": read_grey(raw), "ir": read_grey(ir)}
-    full_scales = {name: _full_scale(images[name], bits, path) for name, path in (("raw", raw), ("ir", ir))}
-    if images["raw"].dtype != images["ir"].dtype:
-        images, full_scales = _fractions(images, full_scales), {"ir": 1.0}
-    return BayerShot(images["raw"], bayer, images["ir"], full_scales["ir"])
-
-
-def read_folder(folder: Path, bayer: BayerPattern | None = None, bits: int | None = None) -> AnyShot:
-    """Read a shot from a folder: red, green, blue or rgb, and ir; raw and ir when `bayer` is given.
-
-    The images are .png, .tif, .tiff or .bmp. Raises `InputError` that names what is missing.
-    """
-    files = {name: _image_of(folder, name) for name in ("rgb", *COLOURS, "raw", "ir")}
+    if len({image.dtype for image in images.values()}) > 1:
+        images = {name: (image / full_scales[name]).astype(np.float32) for name, image in images.items()}
+        full_scales = {"ir": 1.0}
     if bayer is not None:
-        raw, ir = (files[name] for name in ("raw", "ir"))
-        if raw is None or ir is None:
-            raise InputError(f"{folder}: expected raw.png and ir.png")
-        return read_bayer_shot(raw, bayer, ir, bits)
-    del files["raw"]
-    missing = [name for name in (*COLOURS, "ir") if files[name] is None]
-    if files["ir"] is None or (files["rgb"] is None and missing):
-        raise InputError(f"{folder}: no {', '.join(f'{name}.png' for name in missing)}")
-    return read_shot(files, bits)
+        return BayerShot(images["raw"], bayer, images["ir"], full_scales["ir"])
+    return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scales["ir"])
+
+
+def _files_of(source: Any, bayer: BayerPattern | None) -> dict[str, Path]:
+    if isinstance(source, Mapping):
+        if unknown := [name for name in source if name not in NAMES]:
+            raise InputError(f"expected images named {', '.join(NAMES)}, got {', '.join(map(str, unknown))}")
+        return {name: Path(path) for name in NAMES if (path := source.get(name)) is not None}
+    if not isinstance(source, (str, Path)):
+        raise InputError(f"expected a folder or a mapping of names to image files, got {type(source).__name__}")
+    folder = Path(source)
+    if not folder.is_dir():
+        reason = "a file, not a folder" if folder.exists() else "no such folder"
+        raise InputError(f"{folder}: {reason}; expected a folder with red.png, green.png, blue.png and ir.png")
+    found = {name: path for name in NAMES if (path := _image_of(folder, name)) is not None}
+    # A folder may hold the mosaic and the planes that a camera made of it; `bayer` says which of them is meant.
+    others = (*COLOURS, "rgb") if bayer is not None else ("raw",) * bool(found.keys() - {"raw", "ir"})
+    return {name: path for name, path in found.items() if name not in others}
 
 
 def _image_of(folder: Path, name: str) -> Path | None:
     found = [folder / f"{name}{suffix}" for suffix in SUFFIXES if (folder / f"{name}{suffix}").is_file()]
     if len(found) > 1:
-        raise InputError(f"{folder}: {' and '.join(path.name for path in found)}; leave one of them")
+        raise InputError(f"{folder}: {' and '.join(path.name for path in found)}; keep one of them")
     return found[0] if found else None
 
 
-def _fractions(images: Mapping[str, NDArray[Any]], full_scales: Mapping[str, float]) -> dict[str, NDArray[np.float32]]:
-    return {name: (image / full_scales[name]).astype(np.float32) for name, image in images.items()}
-
-
-def _shot(images: Mapping[str, NDArray[Any]], full_scale: float) -> Shot:
-    return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scale)
-
-
-def _check_names(given: Mapping[str, Path]) -> None:
-    colours = [name for name in COLOURS if name in given]
+def _check_names(given: Mapping[str, Path], bayer: BayerPattern | None) -> None:
+    """Raise unless the images make a shot, and no colour is given twice."""
+    colours = [name for name in (*COLOURS, "rgb") if name in given]
+    if bayer is not None and bayer not in get_args(BayerPattern):
+        raise InputError(f"bayer: expected one of {', '.join(get_args(BayerPattern))}, got {bayer!r}")
+    if "raw" in given and bayer is None:
+        raise InputError("raw is the mosaic of a Bayer chip: say its pattern too, bayer = rggb, grbg, gbrg or bggr")
+    if bayer is not None and "raw" not in given:
+        raise InputError("bayer needs the image raw, the mosaic of the Bayer chip, in place of the colours")
     if "ir" not in given:
-        raise InputError("the infrared image is missing: give --ir FILE")
-    if "rgb" in given and colours:
-        raise InputError(f"--rgb already holds red, green and blue; leave out --{' --'.join(colours)}")
-    if "rgb" not in given and len(colours) < 3:
-        missing = [name for name in COLOURS if name not in given]
-        raise InputError(f"no image for {', '.join(missing)}: give --{' --'.join(missing)}, or one --rgb FILE")
+        raise InputError("no image for ir, the infrared channel: give ir")
+    if "raw" in given and colours:
+        raise InputError(f"raw already holds red, green and blue; leave out {', '.join(colours)}")
+    if "rgb" in given and len(colours) > 1:
+        raise InputError(f"rgb already holds red, green and blue; leave out {', '.join(colours[:-1])}")
+    if not {"raw", "rgb"} & given.keys() and len(colours) < 3:
+        missing = ", ".join(name for name in COLOURS if name not in given)
+        raise InputError(f"no image for {missing}: give {missing}, or one colour image rgb")
 
 
 def _read(given: Mapping[str, Path]) -> dict[str, NDArray[Any]]:
-    ir = read_grey(given["ir"])
+    images = {name: read_grey(path) for name, path in given.items() if name != "rgb"}
     if "rgb" in given:
         colour = read_rgb(given["rgb"])
-        return {**{name: colour[:, :, i] for i, name in enumerate(COLOURS)}, "ir": ir}
-    return {**{name: read_grey(given[name]) for name in COLOURS}, "ir": ir}
+        images |= {name: colour[:, :, i] for i, name in enumerate(COLOURS)}
+    return images
 
 
 def _full_scale(image: NDArray[Any], bits: int | None, path: Path | None) -> float:
@@ -104,13 +117,16 @@ def _full_scale(image: NDArray[Any], bits: int | None, path: Path | None) -> flo
         return float(full_scale(image))
     full = 2**bits - 1
     if int(image.max()) > full:
-        raise InputError(f"{path or '--rgb'}: has values up to {image.max()}, above {full}, the top of {bits} bits")
+        raise InputError(f"{path or 'rgb'}: has values up to {image.max()}, above {full}, the top of {bits} bits")
     return float(full)
 
 
-def write_shot(folder: Path, shot: AnyShot) -> dict[str, Path]:
-    """Write red.png, green.png, blue.png, ir.png of a shot, or raw.png and ir.png of a mosaic; returns the paths."""
-    paths = {name: folder / f"{name}.png" for name in shot.images}
+def write_shot(folder: Path | str, shot: AnyShot) -> dict[str, Path]:
+    """Write red.png, green.png, blue.png, ir.png of a shot, or raw.png and ir.png of a mosaic; gives the paths.
+
+    A missing folder is made. Raises `InputError` when a file cannot be written.
+    """
+    paths = {name: folder_for(Path(folder)) / f"{name}.png" for name in shot.images}
     for name, image in shot.images.items():
         write_image(paths[name], image)
     return paths

@@ -1,4 +1,13 @@
-"""A shape against the simulator's truth: the figures by which a run is judged."""
+"""A shape compared with the truth of the virtual bench.
+
+>>> import quadfringe as qf
+>>> from quadfringe.decoding.compare import compare
+>>> with qf.open() as scanner:
+...     shot = scanner.grab()
+...     shape = scanner.decode(shot)
+>>> compare(shape, shot.truth, 912 / 36).returned_percent > 95
+True
+"""
 
 from __future__ import annotations
 
@@ -12,17 +21,26 @@ from quadfringe.data import Shape, Truth, xyz_mm_of
 __all__ = ["Comparison", "compare", "rms"]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Comparison:
-    """Figures of one shape; `depth_error_mm` is (H, W), NaN where nothing was returned.
+    """Figures of one shape.
 
-    `depth_rms_mm` is over returned pixels away from edges and shadow borders, wrong orders included.
+    depth_error_mm: error of the depth, (H, W), mm; NaN where no depth is returned.
+    depth_rms_mm: its RMS over returned pixels away from edges and shadow borders, wrong orders included.
+    wrong_order_percent: share of the returned pixels whose fringe order is wrong.
+    returned_percent: share of the lit pixels that are returned.
     """
 
     depth_error_mm: NDArray[np.float32]
     depth_rms_mm: float
     wrong_order_percent: float
     returned_percent: float
+
+    def __repr__(self) -> str:
+        return (
+            f"Comparison(depth_rms_mm={self.depth_rms_mm:.4g}, wrong_order_percent={self.wrong_order_percent:.4g}, "
+            f"returned_percent={self.returned_percent:.4g})"
+        )
 
 
 def rms(values: NDArray[np.floating]) -> float:
@@ -32,7 +50,10 @@ def rms(values: NDArray[np.floating]) -> float:
 
 
 def compare(shape: Shape, truth: Truth, fringe_period_px: float) -> Comparison:
-    """Compare a calibrated shape with the truth; an order is wrong when the column is off by half a fringe."""
+    """Compare a calibrated shape with the truth; an order is wrong when the column is off by half a fringe or more.
+
+    Raises `InputError` for a shape without millimetres.
+    """
     error = xyz_mm_of(shape)[:, :, 2] - truth.depth_mm
     lit = np.isfinite(truth.column_px) & ~truth.shadow
     smooth = lit & ~truth.edge

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any, Literal
 
 from quadfringe import _core
-from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, checked
+from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, checked, shortened
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.errors import InputError
 
 __all__ = ["Plan"]
 
 
-@dataclass(frozen=True, init=False)
+@dataclass(frozen=True, init=False, repr=False)
 class Plan:
     """What a decoder is made from: the fringes, the calibration, the response, and settings of the method.
 
@@ -58,6 +58,11 @@ class Plan:
         for name, value in fields.items():
             object.__setattr__(self, name, value)
 
+    def __repr__(self) -> str:
+        words = [f"{self.projector_width_px}", f"fringes={self.fringes.numbers}", f"calibration={self.calibration}"]
+        words += [f"response={self.response!r}", f"decode={self.decode}"]
+        return shortened(f"Plan({', '.join(words)})")
+
     def described(self) -> dict[str, Any]:
         """Describe what is decoded, as plain data for a saved file; the decoder adds response and settings in force."""
         return {
@@ -92,8 +97,5 @@ def _response(given: Any, setting: Any) -> ResponseChoice:
         raise InputError('response: expected "auto", "linear", a Response, or a response file (.json), got None')
     if given != "auto" and setting not in ("auto", given):
         raise InputError(f"response: given as {given!r}, and as {setting!r} among the settings; give it once")
-    found = setting if given == "auto" else given
-    if isinstance(found, (str, Path)) and found not in ("auto", "linear"):
-        found = ResponseCalibration.load(found)
-    once: ResponseChoice = DecodeConfig(response=found).response  # type: ignore[assignment]  # no longer a path
-    return once
+    found = DecodeConfig(response=setting if given == "auto" else given).response
+    return ResponseCalibration.load(found) if isinstance(found, Path) else found

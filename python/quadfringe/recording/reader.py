@@ -132,7 +132,8 @@ class Recording:
 
 def _open(path: Path) -> h5py.File:
     if not path.is_file():
-        raise InputError(f"{path}: no such file; check the path")
+        reason = "a folder; name a recording (.h5) in it" if path.is_dir() else "no such file; check the path"
+        raise InputError(f"{path}: {reason}")
     if not h5py.is_hdf5(path):
         raise InputError(f"{path}: expected an HDF5 recording of quadfringe record, got another format")
     try:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Self
 
-from quadfringe.config import ResponseChoice
+from quadfringe.config import ResponseChoice, shortened
 from quadfringe.data import AnyShot, Shape
 from quadfringe.devices import Camera, CameraStatistics, Keep
 from quadfringe.devices._queue import DroppingQueue, EndOfQueue, QueueStatistics
@@ -48,7 +48,7 @@ class Measured:
         return self.shape
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StreamStatistics:
     """What a stream has done so far: its camera, its queues ("decode", "view" and the taps), and its rates.
 
@@ -63,6 +63,11 @@ class StreamStatistics:
     refused: int
     fault: str | None
     response: ResponseChoice
+
+    def __repr__(self) -> str:
+        dropped = {name: queue.dropped for name, queue in self.queues.items()}
+        rates = f"captured_per_s={self.captured_per_s:.1f}, decoded_per_s={self.decoded_per_s:.1f}"
+        return shortened(f"StreamStatistics({rates}, refused={self.refused}, dropped={dropped}, fault={self.fault!r})")
 
 
 class _Rate:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from quadfringe.calibration.projector import AXES, ProjectorMap, projector_map
 from quadfringe.calibration.session.settings import FILE, Session
 from quadfringe.data import AnyShot
-from quadfringe.data.shot_files import SUFFIXES, read_folder
+from quadfringe.data.shot_files import SUFFIXES, read_shot
 from quadfringe.devices.light import Levels, Light, Step
 from quadfringe.errors import InputError
 from quadfringe.io.images import full_scale, read_grey
@@ -73,7 +73,7 @@ class FolderCaptures:
 
     def shot(self, step: str, name: str) -> AnyShot:
         """Read one shot."""
-        shot = read_folder(self.folder / step / name, self.session.bayer, self.session.bits)
+        shot = read_shot(self.folder / step / name, self.session.bits, bayer=self.session.bayer)
         self._check_size(next(iter(shot.images.values())), f"{step}/{name}")
         return shot
 
