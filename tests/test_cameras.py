@@ -12,18 +12,18 @@ from typer.testing import CliRunner
 from quadfringe.cli.app import app
 from quadfringe.config import SystemConfig, checked
 from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig, capture_config
-from quadfringe.devices.aravis import _gi
+from quadfringe.devices.aravis import _binding, _device
 from quadfringe.devices.aravis import _profiles as profiles
 from quadfringe.devices.aravis._formats import FORMATS, format_named
 from quadfringe.devices.emulator.frames import TestPattern, packed
 from quadfringe.errors import CameraError, CameraNotFoundError, ConfigError, MissingExtraError
 
-VISIBLE = _gi.Found("192.168.1.10", "JAI Ltd., Japan", "AD-080GE_#0", "4711")
-INFRARED = _gi.Found("192.168.1.11", "JAI Ltd., Japan", "AD-080GE_#1", "4711")
-OTHER = _gi.Found("192.168.1.20", "Basler", "acA1300", "99")
+VISIBLE = _device.Found("192.168.1.10", "JAI Ltd., Japan", "AD-080GE_#0", "4711")
+INFRARED = _device.Found("192.168.1.11", "JAI Ltd., Japan", "AD-080GE_#1", "4711")
+OTHER = _device.Found("192.168.1.20", "Basler", "acA1300", "99")
 
 
-def chosen(config: AravisConfig, *devices: _gi.Found) -> list[tuple[str, int]]:
+def chosen(config: AravisConfig, *devices: _device.Found) -> list[tuple[str, int]]:
     return [(place.where, place.stream) for place in profiles.places(config, lambda: devices)]
 
 
@@ -43,7 +43,7 @@ def test_a_camera_with_two_streams_and_chips_of_two_cameras() -> None:
 
 
 def test_cameras_that_are_not_meant() -> None:
-    twin = [_gi.Found(f"192.168.1.3{n}", "JAI Ltd., Japan", f"AD-080GE_#{n}", "4712") for n in (0, 1)]
+    twin = [_device.Found(f"192.168.1.3{n}", "JAI Ltd., Japan", f"AD-080GE_#{n}", "4712") for n in (0, 1)]
     with pytest.raises(CameraNotFoundError, match=r"fits several cameras(?s:.)*4711(?s:.)*4712"):
         chosen(AravisConfig(device="AD-080GE"), VISIBLE, INFRARED, *twin)
     with pytest.raises(CameraNotFoundError, match="is one of two chips"):
@@ -55,7 +55,7 @@ def test_cameras_that_are_not_meant() -> None:
 
 
 def test_one_chip() -> None:
-    def one(config: AravisConfig, chip: str, *devices: _gi.Found) -> tuple[str, int]:
+    def one(config: AravisConfig, chip: str, *devices: _device.Found) -> tuple[str, int]:
         place = profiles.place(config, chip, lambda: devices)
         return place.where, place.stream
 
@@ -99,9 +99,9 @@ def test_packing_as_the_standard_has_it() -> None:
 
 def test_without_the_binding_the_install_lines_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "gi", None)
-    _gi._aravis.cache_clear()
+    _binding.aravis_binding.cache_clear()
     with pytest.raises(MissingExtraError, match=r"apt-get install (?s:.)*aravis-0\.8(?s:.)*quadfringe\[aravis\]"):
-        _gi.found()
+        _device.found()
     result = CliRunner().invoke(app, ["camera", "list"])
     assert result.exit_code == 2
     assert "apt-get install" in result.stderr

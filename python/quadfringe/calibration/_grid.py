@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from quadfringe.calibration._params import BLOB_AREA_MIN_PX, BLOB_SIZE_RATIO_MAX, NEIGHBOUR_OFF_MAX, SEEDS
 from quadfringe.calibration.targets import Target
 
-__all__ = ["blobs", "homography", "in_grid_order", "jacobians", "symmetries", "through"]
+__all__ = ["GridOrder", "blobs", "homography", "in_grid_order", "jacobians", "symmetries", "through"]
 
 Points = NDArray[np.float64]
 LATTICE_OFF_MAX = 1 / 6  # share of the spacing by which lens distortion may displace a point from a homography
@@ -45,10 +46,17 @@ def _similar(sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
     return max(inside, key=lambda group: (int(group.sum()), float(np.median(sizes[group]))))
 
 
-def in_grid_order(places: Points, target: Target) -> tuple[Points | None, int]:
-    """Return the places in the order of the target's points, up to its symmetries, and how many points were found.
+class GridOrder(NamedTuple):
+    """Places (N, 2) in the order of a grid, or None; and the number of points of the grid that were found."""
 
-    The places are None when points are missing or do not form this grid. The grid is followed from neighbour to
+    places: Points | None
+    found: int
+
+
+def in_grid_order(places: Points, target: Target) -> GridOrder:
+    """Order the places like the target's points, up to its symmetries.
+
+    The result has no places when points are missing or do not form this grid. The grid is followed from neighbour to
     neighbour from the middle, which tolerates perspective and lens distortion. OpenCV's `findCirclesGrid` would return
     the same order, but occasionally takes minutes and does not report how many points it found.
     """
@@ -60,8 +68,8 @@ def in_grid_order(places: Points, target: Target) -> tuple[Points | None, int]:
         order = _matched(cells, wanted)
         most = max(most, int((order >= 0).sum()))
         if (order >= 0).all() and _is_lattice(places[order], target):
-            return places[order], most
-    return None, most
+            return GridOrder(places[order], most)
+    return GridOrder(None, most)
 
 
 def _cells(target: Target) -> NDArray[np.intp]:

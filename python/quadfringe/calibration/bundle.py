@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,9 +162,15 @@ def _not_mirrored(name: str, points: ProjectorPoints, lit: NDArray[np.intp]) -> 
         )
 
 
-def _settled(
-    sights: Sequence[Sight], poses: int, radial3: bool, sizes: dict[str, tuple[int, int]]
-) -> tuple[Adjustment, Array, Array]:
+class _Settled(NamedTuple):
+    """The final adjustment, its parameters (n,) and their covariance (n, n)."""
+
+    adjustment: Adjustment
+    values: Array
+    covariance: Array
+
+
+def _settled(sights: Sequence[Sight], poses: int, radial3: bool, sizes: dict[str, tuple[int, int]]) -> _Settled:
     """Adjust until the set of outliers and the standard deviations of the points no longer change.
 
     The first adjustment uses a robust loss, so that outliers cannot hide behind the parameters that they distort.
@@ -184,7 +190,7 @@ def _settled(
         if all(np.array_equal(a, b) for a, b in zip(before, adjustment.kept, strict=True)):
             break
     adjustment = Adjustment(sights, poses, radial3, sd_px, adjustment.kept)
-    return adjustment, *_adjusted(adjustment, values)
+    return _Settled(adjustment, *_adjusted(adjustment, values))
 
 
 def _robust_sd(adjustment: Adjustment, values: Array) -> dict[str, Array]:

@@ -114,10 +114,10 @@ def _ordered(grey: NDArray[np.float32], stretched: NDArray[np.uint8], target: Ta
     most = 0
     for sigma_px in SMOOTHING_PX:
         places = blobs(cv2.GaussianBlur(stretched, (0, 0), sigma_px), target)
-        ordered, count = in_grid_order(places, target)
-        if ordered is not None:
-            return ordered
-        most = max(most, count)
+        ordered = in_grid_order(places, target)
+        if ordered.places is not None:
+            return ordered.places
+        most = max(most, ordered.found)
     raise _diagnosed(grey, stretched, target, most)
 
 

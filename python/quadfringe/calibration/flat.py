@@ -55,15 +55,25 @@ def flat_field(shots: Sequence[AnyShot], dark: Sequence[float] = (0.0,) * 4) -> 
             f"flat field: expected {FLAT_SHOTS_MIN} shots or more of an evenly lit surface, got {len(shots)}"
         )
     found = [_channel(stacked(shots, name) - level, name) for name, level in zip(CHANNELS, dark, strict=True)]
-    figures = [row4([channel.figures[i] for channel in found]) for i in range(4)]
-    gain = np.stack([channel.gain for channel in found])
-    return FlatField(gain, figures[0], figures[1], figures[2], figures[3], sum(channel.defects for channel in found))
+    return FlatField(
+        gain=np.stack([channel.gain for channel in found]),
+        vignetting_percent=row4([channel.vignetting_percent for channel in found]),
+        pixels_percent=row4([channel.pixels_percent for channel in found]),
+        uneven_before_percent=row4([channel.uneven_before_percent for channel in found]),
+        uneven_after_percent=row4([channel.uneven_after_percent for channel in found]),
+        defects=sum(channel.defects for channel in found),
+    )
 
 
 @dataclass(frozen=True)
 class _Channel:
+    """The fields of `FlatField` for one channel."""
+
     gain: NDArray[np.float32]
-    figures: tuple[float, float, float, float]
+    vignetting_percent: float
+    pixels_percent: float
+    uneven_before_percent: float
+    uneven_after_percent: float
     defects: int
 
 
@@ -86,6 +96,11 @@ def _channel(stack: NDArray[np.float64], name: str) -> _Channel:
     shared = float(np.mean(pixels[0] * pixels[1]) - np.mean(pixels[0]) * np.mean(pixels[1]))
     low, high = np.quantile(slow, (0.001, 0.999))
     uneven = [100 * float(np.nanstd(image)) / level for image in (judged, judged * gain)]
-    vignetting = 100 * float(1 - low / high)
-    figures = (vignetting, 100 * max(shared, 0.0) ** 0.5, uneven[0], uneven[1])
-    return _Channel(gain.astype(np.float32), figures, int(defective.sum()))
+    return _Channel(
+        gain.astype(np.float32),
+        vignetting_percent=100 * float(1 - low / high),
+        pixels_percent=100 * max(shared, 0.0) ** 0.5,
+        uneven_before_percent=uneven[0],
+        uneven_after_percent=uneven[1],
+        defects=int(defective.sum()),
+    )

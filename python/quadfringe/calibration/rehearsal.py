@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,7 +27,7 @@ from quadfringe.data import AnyShot, BayerShot
 from quadfringe.decoding import stages
 from quadfringe.devices.virtual import PrintedBoard, VirtualBench
 
-__all__ = ["Rehearsal", "VirtualBoard", "board_poses", "rehearse"]
+__all__ = ["PoseMaps", "Rehearsal", "VirtualBoard", "board_poses", "rehearse"]
 
 # Albedos in R, G, B, IR of office paper and of carbon black, which also absorbs infrared light.
 PAPER = (0.85, 0.85, 0.85, 0.8)
@@ -41,6 +42,13 @@ class Rehearsal:
     calibration: RigCalibration
     views: tuple[View, ...]
     T_camera_board: NDArray[np.float64]
+
+
+class PoseMaps(NamedTuple):
+    """The maps of the visible and of the infrared projector in one pose."""
+
+    visible: ProjectorMap
+    infrared: ProjectorMap
 
 
 class VirtualBoard:
@@ -63,7 +71,7 @@ class VirtualBoard:
         self._bench.place(self._board, T_camera_board)
         return _planes(self._bench.expose_step(0.0, 0.0))[0]
 
-    def capture(self, T_camera_board: NDArray[np.float64], plan: StepPlan) -> tuple[ProjectorMap, ProjectorMap]:  # noqa: N803
+    def capture(self, T_camera_board: NDArray[np.float64], plan: StepPlan) -> PoseMaps:  # noqa: N803
         """Render and decode a pose: the maps of the visible and of the infrared projector.
 
         The projectors show their fringes one after the other, so crosstalk between them has no effect; crosstalk
@@ -71,7 +79,7 @@ class VirtualBoard:
         """
         self._bench.place(self._board, T_camera_board)
         visible, infrared = (self._map(plan, beam, i) for i, beam in enumerate(("visible", "infrared")))
-        return visible, infrared
+        return PoseMaps(visible, infrared)
 
     def _map(self, plan: StepPlan, beam: str, chip: int) -> ProjectorMap:
         found = []

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,16 @@ from quadfringe.errors import InputError
 if TYPE_CHECKING:
     from quadfringe.data import Calibration
 
-__all__ = ["Levels", "Light", "Predeformation", "Step", "light_images", "predeformation", "projector_images"]
+__all__ = [
+    "Levels",
+    "Light",
+    "Predeformation",
+    "ProjectorImages",
+    "Step",
+    "light_images",
+    "predeformation",
+    "projector_images",
+]
 
 
 @dataclass(frozen=True)
@@ -42,6 +51,13 @@ class Step:
 
 
 Light = Fringes | Levels | Step  # the light of a shot, or of a calibration
+
+
+class ProjectorImages(NamedTuple):
+    """The images of both projectors: `visible` (H, W, 3) and `infrared` (H, W), uint8."""
+
+    visible: NDArray[np.uint8]
+    infrared: NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
@@ -81,8 +97,8 @@ def projector_images(
     size_px: tuple[int, int],
     layout: str,
     deformed: Predeformation | None = None,
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the composite colour image (H, W, 3) and the infrared image (H, W), uint8; `size_px` is (W, H).
+) -> ProjectorImages:
+    """Return the images of both projectors for these fringes; `size_px` is (W, H).
 
     Raises ValueError when the ambiguity range of the fringe numbers does not cover the width, and when the projectors
     of a pre-deformation have another size.
@@ -99,13 +115,11 @@ def projector_images(
                     f"{device.height_px}; use the calibration of these projectors"
                 )
         ir = deformed.light(fringes[2], layout)
-    return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
+    return ProjectorImages(eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir))
 
 
-def light_images(
-    light: Light, size_px: tuple[int, int], deformed: Predeformation | None = None
-) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
-    """Return the colour image (H, W, 3) and the infrared image (H, W), uint8, of any light; `size_px` is (W, H).
+def light_images(light: Light, size_px: tuple[int, int], deformed: Predeformation | None = None) -> ProjectorImages:
+    """Return the images of both projectors for any light; `size_px` is (W, H).
 
     Raises ValueError as `projector_images`, and for levels outside 0 to 1.
 
@@ -121,11 +135,11 @@ def light_images(
         if not all(0 <= level <= 1 for level in light.levels):
             raise ValueError(f"levels: expected numbers from 0 to 1, got {light.levels}")
         red, green, blue, ir = (np.full(shape, level, np.float32) for level in light.levels)
-        return eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir)
+        return ProjectorImages(eight_bit(np.stack([red, green, blue], axis=2)), eight_bit(ir))
     shown = eight_bit(_core.step_pattern(light.number, light.shift_rad, *size_px, axis=light.axis, layout=light.layout))
     black = np.zeros(shape, np.uint8)
     visible, infrared = (shown if light.beam == beam else black for beam in ("visible", "infrared"))
-    return np.repeat(visible[:, :, None], 3, axis=2), infrared
+    return ProjectorImages(np.repeat(visible[:, :, None], 3, axis=2), infrared)
 
 
 def eight_bit(light: NDArray[np.float32]) -> NDArray[np.uint8]:

@@ -8,6 +8,7 @@ their amplitudes; over the image, even 36 and 35 fringes are nearly orthogonal.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -137,8 +138,16 @@ def _wrapped(offset_px: float, period: float) -> float:
     return (offset_px + period / 2) % period - period / 2
 
 
-def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> tuple[dict[str, Map], dict[str, Map], NDArray[np.bool_]]:
-    """Return linear light, its mean over about a fringe, and the pixels where both and the phase are valid."""
+class _Waves(NamedTuple):
+    """Linear light and its mean over about a fringe, by channel, and the pixels where all of them are valid."""
+
+    light: dict[str, Map]
+    backgrounds: dict[str, Map]
+    inside: NDArray[np.bool_]
+
+
+def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
+    """Compute the linear light of a shot and its mean over about a fringe."""
     import cv2
 
     light = linear_light(shot, plan.calibration, plan.response)
@@ -151,7 +160,7 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> tuple[dict[str, Map], dic
         summed = cv2.GaussianBlur(np.where(known, image, 0).astype(np.float32), (0, 0), period_px)
         backgrounds[name] = summed / np.maximum(weight, 1e-6)
     inside = known & (weight > 0.95) & np.all([b > 0.02 for b in backgrounds.values()], axis=0)
-    return light, backgrounds, inside
+    return _Waves(light, backgrounds, inside)
 
 
 def _phases(shape: Shape, plan: Plan, inside: NDArray[np.bool_]) -> tuple[NDArray[np.float64], ...]:

@@ -10,7 +10,7 @@ emulates such a camera on the network.
 
 from __future__ import annotations
 
-from quadfringe.devices.aravis._gi import Found, found
+from quadfringe.devices.aravis._device import Found, found
 from quadfringe.devices.aravis.camera import AravisCamera, ChipCamera, open_devices
 
 __all__ = ["AravisCamera", "ChipCamera", "Found", "found", "open_devices"]

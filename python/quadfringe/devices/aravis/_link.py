@@ -13,9 +13,9 @@ import numpy as np
 from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, BayerShot, ChipImage, Shot, Stamp
 from quadfringe.devices.aravis import _profiles as profiles
+from quadfringe.devices.aravis._device import Device, found
 from quadfringe.devices.aravis._formats import format_named
 from quadfringe.devices.aravis._frame_matching import FrameMatcher, SingleChip, Stamped
-from quadfringe.devices.aravis._gi import Device, found
 from quadfringe.devices.aravis._profiles import CHIPS, Place
 from quadfringe.devices.aravis._reader import Agreed, ChipReader, Frame
 from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from quadfringe.config.cameras import AravisConfig, ChipConfig
-from quadfringe.devices.aravis._gi import Device, Found
+from quadfringe.devices.aravis._device import Device, Found
 from quadfringe.errors import CameraError, CameraNotFoundError
 
 __all__ = [

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from quadfringe.data import FrameStamp
 from quadfringe.devices.aravis._formats import PixelFormat
-from quadfringe.devices.aravis._gi import Buffer, Stream
+from quadfringe.devices.aravis._stream import Buffer, Stream
 
 __all__ = ["Agreed", "ChipReader", "Frame"]
 
@@ -38,7 +38,7 @@ class Agreed:
         """Return what is wrong with a buffer, or None; one with status "success" may still be short."""
         if buffer.status != "success":
             return f"incomplete ({buffer.status})"
-        code, width, height = buffer.image
+        code, width, height = buffer.announced
         if (width, height) != (self.width, self.height):
             return f"{width} x {height} pixels instead of {self.width} x {self.height}"
         if code != self.format.code:
@@ -118,8 +118,7 @@ class ChipReader:
             else:
                 data = buffer.array
             pixels = agreed.format.pixels(data, agreed.width, agreed.height)
-            stamp = FrameStamp(*buffer.times)
-            return Frame(stamp, pixels if lent or agreed.format.packed else pixels.copy())
+            return Frame(buffer.stamp, pixels if lent or agreed.format.packed else pixels.copy())
         finally:
             if not lent:
                 self._stream.push(buffer)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,7 @@ from quadfringe.decoding.stages import carrier, fourier, linear_light
 from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.view.report import Panel, draw_panels
 
-__all__ = ["WIDTH_PX", "inside", "peaks", "peaks_shot"]
+__all__ = ["WIDTH_PX", "PeaksShot", "inside", "peaks", "peaks_shot"]
 
 Map = NDArray[np.float32]
 
@@ -56,8 +56,15 @@ def peaks(out: Path) -> Reproduction:
     return Reproduction(figures, out / "peaks.png")
 
 
-def peaks_shot(**light: Any) -> tuple[Shot, Map]:
-    """Return the shot, and the exact absolute phase of 36 fringes, (H, W) rad.
+class PeaksShot(NamedTuple):
+    """A shot of the peaks surface, and its exact absolute phase (H, W), rad, of 36 fringes."""
+
+    shot: Shot
+    phase_rad: Map
+
+
+def peaks_shot(**light: Any) -> PeaksShot:
+    """Render a shot of the peaks surface, with its exact phase.
 
     `light` replaces settings of the published shot, by the names of `SceneConfig`: a white surface in the dark,
     noise of 3 %, 8 bit.
@@ -74,7 +81,7 @@ def peaks_shot(**light: Any) -> tuple[Shot, Map]:
     images = bench.render(cast, Fringes().numbers, **(published | light))
     phase_rad = 2 * np.pi * Fringes().numbers[0] / WIDTH_PX * cast.column_px().astype(np.float64)
     shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
-    return shot, phase_rad.astype(np.float32)
+    return PeaksShot(shot, phase_rad.astype(np.float32))
 
 
 def _camera() -> Device:
