@@ -63,7 +63,8 @@ class Shape:
         words = [f"{columns} x {rows}", f"{100 * float(self.returned.mean()):.1f} % returned"]
         depth_mm = self.depth_mm
         if depth_mm is not None and np.isfinite(depth_mm).any():
-            words.append(f"depth {np.nanmin(depth_mm):.1f} to {np.nanmax(depth_mm):.1f} mm")
+            low, high = np.nanquantile(depth_mm, (0.01, 0.99))
+            words.append(f"98 % at {low:.1f} to {high:.1f} mm")
         decode = self.config.get("decode", {})
         words += [f"{name} {decode[name]}" for name in ("method", "method_version") if name in decode]
         return f"Shape({', '.join(words)})"
