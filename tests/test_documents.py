@@ -13,6 +13,7 @@ RECORDS = sorted(path for path in DECISIONS.glob("*.md") if path.name != "README
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("crates/*/README.md")])
 PARTS = ("Context", "Decision", "Alternatives considered", "Consequence", "Command")
 LINES_MAX = 30
+FOLDERS = (ROOT, ROOT / "python" / "quadfringe", ROOT / "crates" / "quadfringe" / "src")
 MAKEFILE = (ROOT / "Makefile").read_text()
 
 
@@ -29,12 +30,14 @@ def commands(text: str) -> list[str]:
 
 def missing(command: str) -> list[str]:
     """Give the files and targets that a command names and the repository does not have."""
-    files = re.findall(r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+)", command)
+    files = re.findall(
+        r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+|[\w-]+/[\w./-]+\.(?:py|rs))", command
+    )
     targets = re.findall(r"--test (\w+)", command) if command.startswith("cargo test") else []
     lost = [t for t in targets if not [*ROOT.glob(f"crates/*/tests/{t}.rs"), *ROOT.glob(f"crates/*/tests/{t}/main.rs")]]
     if made := re.match(r"make ([\w-]+)", command):
         lost += [] if re.search(rf"^{made[1]}:", MAKEFILE, re.MULTILINE) else [made[1]]
-    return lost + [file for file in files if not (ROOT / file).exists()]
+    return lost + [file for file in files if not any((folder / file).exists() for folder in FOLDERS)]
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=name)
@@ -73,4 +76,5 @@ def test_what_is_missing_is_found() -> None:
     assert missing("python evaluation/nothing.py --seeds 3") == ["evaluation/nothing.py"]
     assert missing("cargo test --test nothing") == ["nothing"]
     assert missing("make nothing") == ["nothing"]
+    assert missing("devices/nothing.py") == ["devices/nothing.py"]
     assert missing("make demo") == missing("pytest tests/test_documents.py") == []
