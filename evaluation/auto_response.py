@@ -81,12 +81,12 @@ def main() -> None:
         for gamma in GAMMAS:
             shot = shot_of({**scene, "projector_exponent": gamma, "seed": 1})
             response = qf.estimate_response(shot, qf.Plan(WIDTH_PX))
-            linear, own = scored(shot, "linear"), scored(shot, response)
+            linear, auto = scored(shot, "linear"), scored(shot, response)
             settled = gamma * (1.0 if response == "linear" else response.red.exponent)
-            pairs = "".join(f"{a:10.4f}{b:8.4f}" for a, b in zip(linear, own, strict=True))
+            pairs = "".join(f"{a:10.4f}{b:8.4f}" for a, b in zip(linear, auto, strict=True))
             print(f"{name + f', gamma {gamma:g}':24}{pairs}{settled:10.3f}")
             key = f"{name.replace(' ', '_')}_gamma_{gamma:g}"
-            for label, found in (("linear", linear), ("auto", own)):
+            for label, found in (("linear", linear), ("auto", auto)):
                 figures |= {f"{key}_{label}_{k}": v for k, v in found._asdict().items()}
             figures[f"{key}_settled"] = settled
     for surface in ("face", "steps"):

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from support.bars import hold
 
-from quadfringe import ResponseCalibration
+from quadfringe import ResponseCalibration, Shape
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 
@@ -62,15 +62,20 @@ def test_command_line_decodes_a_capture(scene: scoring.Scene, response_file: Pat
         assert "xyz_mm" not in maps
 
 
-def test_package_decodes_a_capture(scene: scoring.Scene, response_file: Path) -> None:
-    response = ResponseCalibration.load(response_file)
-    shape = scenes.shape_of(scene, response=response)
-    assert_bars(scoring.score(scene, shape.phase_rad))
+@pytest.fixture(scope="module")
+def shapes(scene: scoring.Scene, response_file: Path) -> dict[str, Shape]:
+    """The capture decoded with the response uncorrected, estimated from the shot, and known from twelve steps."""
+    known = ResponseCalibration.load(response_file)
+    responses = {"linear": "linear", "auto": "auto", "known": known}
+    return {name: scenes.shape_of(scene, response=response) for name, response in responses.items()}
 
 
-def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scene, response_file: Path) -> None:
-    for response in ("linear", "auto", ResponseCalibration.load(response_file)):
-        shape = scenes.shape_of(scene, response=response)
+def test_package_decodes_a_capture(scene: scoring.Scene, shapes: dict[str, Shape]) -> None:
+    assert_bars(scoring.score(scene, shapes["known"].phase_rad))
+
+
+def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scene, shapes: dict[str, Shape]) -> None:
+    for response, shape in shapes.items():
         assert shape.wrong_order_probability is not None
         seen = scene.scored & shape.returned
         wrong = np.abs(shape.phase_rad - scene.phase_rad)[seen] >= np.pi
@@ -79,45 +84,41 @@ def test_wrong_orders_are_no_more_than_the_probabilities_say(scene: scoring.Scen
         # The bound is useful: most of the object has a small probability, and hardly any of those pixels is wrong.
         sure = probability < 0.01
         hold("captures.sure_of_object", np.count_nonzero(sure) / np.count_nonzero(scene.scored))
-        known = isinstance(response, ResponseCalibration)
-        hold("captures.sure_of_returned_known" if known else "captures.sure_of_returned", sure.mean())
+        hold("captures.sure_of_returned_known" if response == "known" else "captures.sure_of_returned", sure.mean())
         hold("captures.wrong_of_sure", wrong[sure].mean())
 
 
-def test_the_response_is_estimated_from_a_capture(scene: scoring.Scene, response_file: Path) -> None:
-    known = ResponseCalibration.load(response_file)
-    own, straight = scenes.shape_of(scene), scenes.shape_of(scene, response=known)
-    assert own.config["response_from"] == "shots"
-    scores = [scoring.score(scene, shape.phase_rad) for shape in (own, straight)]
+def test_the_response_is_estimated_from_a_capture(
+    scene: scoring.Scene, shapes: dict[str, Shape], response_file: Path
+) -> None:
+    assert shapes["auto"].config["response_from"] == "shots"
+    scores = [scoring.score(scene, shapes[name].phase_rad) for name in ("auto", "known")]
     assert_bars(scores[0], "captures.auto_right_percent")
     # Nearly as good as the response from twelve images of each channel, on both captures.
     hold("captures.auto_right_below_known_percent", scores[1].right_percent - scores[0].right_percent)
     hold("captures.auto_phase_over_known", scores[0].right_phase_rms_rad / scores[1].right_phase_rms_rad)
-    exponents = np.array([list(channel.values()) for channel in own.config["response"].values()])[:, 1]
+    exponents = np.array([list(channel.values()) for channel in shapes["auto"].config["response"].values()])[:, 1]
+    known = ResponseCalibration.load(response_file)
     hold("captures.auto_exponent_error", np.abs(exponents - known.red.exponent))
 
 
 def test_the_published_method_uses_the_estimated_response(scene: scoring.Scene) -> None:
-    own, linear = (
+    auto, linear = (
         scoring.score(scene, scenes.shape_of(scene, response=response, method="published").phase_rad)
         for response in ("auto", "linear")
     )
-    hold("captures.published_gain_percent", own.right_percent - linear.right_percent)
-    hold("captures.published_gain_percent", own.right_of_returned_percent - linear.right_of_returned_percent)
+    hold("captures.published_gain_percent", auto.right_percent - linear.right_percent)
+    hold("captures.published_gain_percent", auto.right_of_returned_percent - linear.right_of_returned_percent)
 
 
-def test_an_uncorrected_capture_is_still_ordered(scene: scoring.Scene) -> None:
-    shape = scenes.shape_of(scene, response="linear")
-    score = scoring.score(scene, shape.phase_rad)
+def test_an_uncorrected_capture_is_still_ordered(scene: scoring.Scene, shapes: dict[str, Shape]) -> None:
+    score = scoring.score(scene, shapes["linear"].phase_rad)
     hold("captures.linear_right_of_returned_percent", score.right_of_returned_percent)
     hold("captures.linear_right_percent", score.right_percent)
 
 
-def test_the_response_makes_the_phase_better(scene: scoring.Scene, response_file: Path) -> None:
-    phases_rad = [
-        scenes.shape_of(scene, response=response).phase_rad
-        for response in ("linear", ResponseCalibration.load(response_file))
-    ]
+def test_the_response_makes_the_phase_better(scene: scoring.Scene, shapes: dict[str, Shape]) -> None:
+    phases_rad = [shapes[name].phase_rad for name in ("linear", "known")]
     raw, linear = (scoring.score(scene, phase_rad) for phase_rad in phases_rad)
     hold("captures.response_gain_percent", linear.right_percent - raw.right_percent)
     hold("captures.phase_of_uncorrected", linear.right_phase_rms_rad / raw.right_phase_rms_rad)
