@@ -13,6 +13,7 @@ RECORDS = sorted(path for path in DECISIONS.glob("*.md") if path.name != "README
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("crates/*/README.md")])
 PARTS = ("Context", "Decision", "Alternatives considered", "Consequence", "Command")
 LINES_MAX = 30
+FILE = re.compile(r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+|[\w-]+/[\w./-]+\.(?:py|rs))")
 FOLDERS = (ROOT, ROOT / "python" / "quadfringe", ROOT / "crates" / "quadfringe" / "src")
 MAKEFILE = (ROOT / "Makefile").read_text()
 
@@ -30,9 +31,7 @@ def commands(text: str) -> list[str]:
 
 def missing(command: str) -> list[str]:
     """Give the files and targets that a command names and the repository does not have."""
-    files = re.findall(
-        r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+|[\w-]+/[\w./-]+\.(?:py|rs))", command
-    )
+    files = FILE.findall(command)
     targets = re.findall(r"--test (\w+)", command) if command.startswith("cargo test") else []
     lost = [t for t in targets if not [*ROOT.glob(f"crates/*/tests/{t}.rs"), *ROOT.glob(f"crates/*/tests/{t}/main.rs")]]
     if made := re.match(r"make ([\w-]+)", command):
