@@ -23,7 +23,7 @@ fn bits(decoded: &Decoded) -> Vec<u32> {
     values.map(|v| v.to_bits()).collect()
 }
 
-/// Coloured squares, on which `best` gives every pixel a colour of its own.
+/// Squares of random albedo, on which the joint method estimates an albedo for every pixel.
 fn printed() -> RenderOptions {
     RenderOptions { albedo: Albedo::Patches { side_mm: 20.0, albedo: [0.9; 4] }, ..noisy(5) }
 }
