@@ -1,4 +1,4 @@
-//! Maps on a coarse grid of cells: what varies slowly (background, modulation, beats) is kept once per cell.
+//! Maps on a grid of cells: quantities that vary slowly (offset, amplitude, beats) are kept once per cell.
 //!
 //! Planes of pixels are padded to whole vectors ([`LANES`]), cells are a power of two of pixels wide, so that every
 //! vector holds whole cells and no loop has a remainder.
@@ -363,7 +363,7 @@ fn add_scaled(weight: f32, from: &[f32], to: &mut [f32]) {
     to.iter_mut().zip(from).for_each(|(t, f)| *t += weight * f);
 }
 
-/// `line` averaged by `kernel`, nothing beyond its ends.
+/// `line` averaged by `kernel`, with zeros beyond its ends.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn smooth_line(kernel: &[f32], line: &mut [f32], spare: &mut Vec<f32>) {
     let (length, reach) = (line.len(), kernel.len() / 2);

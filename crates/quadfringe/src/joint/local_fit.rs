@@ -43,7 +43,7 @@ pub(super) struct LocalFit {
 }
 
 /// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, and their modulation in linear light (0 where
-/// nothing can be measured).
+/// the pixel takes no part).
 pub(super) struct PixelMaps<'a> {
     pub phase: &'a mut [f32],
     pub modulation: &'a mut [f32],
@@ -156,7 +156,7 @@ impl LocalFit {
         let grid = scene.grid;
         let out = out.phase.par_chunks_mut(grid.stride).zip(out.modulation.par_chunks_mut(grid.stride));
         let block = grid.step.max(4);
-        // Blocks of rows: of each the albedo is computed once, but for the two rows beside a block.
+        // Blocks of rows: of each the albedo is computed once, except for the two rows next to a block.
         let out = out.chunks(block).enumerate();
         out.for_each_init(
             || self.slots.take(),

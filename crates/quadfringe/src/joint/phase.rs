@@ -255,7 +255,7 @@ fn linearise(model: &ModelRow, albedo: &SmoothAlbedo, lit: Lit, normal: NormalRo
             let albedo = weighted[x] / weight[x];
             let numerator = albedo * (ds[x] - albedo * md[x]);
             let square = ss[x] - albedo * (2.0 * ms[x] - albedo * mm[x]);
-            // A change that a change of albedo would explain as well says nothing about the phase.
+            // The part of a derivative that a change of albedo would explain as well carries no information about the phase.
             let denominator = albedo * albedo * (dd[x] - ALBEDO_SHARE * md[x] * md[x] / mm[x]);
             let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
             found[0][x] = if on { numerator } else { 0.0 };

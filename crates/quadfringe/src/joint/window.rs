@@ -86,7 +86,7 @@ impl<'a> Window<'a> {
     }
 
     /// Average along row `y` of a phase. `measure` writes the normal equations of a step of it, `numerator / denominator` and 0
-    /// where there is nothing to measure by; `out` receives phase plus mean step, and weight.
+    /// for pixels that take no part; `out` receives phase plus mean step, and weight.
     pub fn along(
         &self,
         y: usize,
@@ -212,7 +212,7 @@ impl<'a> Window<'a> {
     }
 }
 
-/// Mean square residuals become what [`Window::sharpen`] says.
+/// Turns mean squared residuals into the sharpness of [`Window::sharpen`].
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn sharpen(modulation: &[f32], noise: f32, squares: &mut [f32]) {
     for (square, &modulation) in squares.iter_mut().zip(modulation) {

@@ -7,7 +7,7 @@ pub const WINDOW: f32 = 0.5;
 /// Rows of pixels that stand for a row of cells. ROWS_VARIED
 pub const SAMPLED_ROWS: usize = 4;
 
-/// Factor of a Gauss-Newton step. Photometry and phase were fitted as if nothing moved, and have taken up about half of the motion, so
+/// Factor of a Gauss-Newton step. Photometry and phase were fitted as if the surface stood still, and have taken up about half of the motion, so
 /// that a plain step goes half of the way; any factor below 4 converges. A factor measured on the shot itself went astray near edges.
 /// GAIN_VARIED
 pub const GAIN: f32 = 2.0;

@@ -23,14 +23,14 @@ pub const PAIR_WINDOW: f32 = 0.125;
 pub const PAIR_NEIGHBOURHOOD: f32 = 0.4;
 /// Rows of pixels that stand for a row of cells. ROWS_VARIED
 pub const PAIR_SAMPLED_ROWS: usize = 2;
-/// Least share of the information that a pair must have. Less says nothing about the phase. SHARE_VARIED
+/// Least share of the information that a pair must have. SHARE_VARIED
 pub const PAIR_SHARE_MIN: f32 = 0.02;
 /// Greatest squared difference of the pairs beyond noise, in rad^2. Not measured: beyond 1 rad the linearisation has no meaning.
 pub const PAIR_EXCESS_MAX_RAD2: f32 = 1.0;
 
 /// Probability of a wrong order from which a pixel is doubtful. Varied x1.4: the promised wrong orders of peaks rise from 48 to 59 ppm.
 pub const DOUBTFUL: f32 = 0.01;
-/// Cells from which a doubtful pixel may take certainty: as far as windows reach across a discontinuity. Varied (2 and 4): no effect.
+/// Cells from which a doubtful pixel may take certainty: the reach of windows across a discontinuity. Varied (2 and 4): no effect.
 pub const PROPAGATION_CELLS: usize = 3;
 /// Least probability that a pixel keeps when its component settles it: a bound, about twice what the captures show
 /// (`pytest tests/test_captures.py`). Varied: promised wrong orders of peaks 48 -> 38 and 61 ppm, 0 observed.

@@ -57,11 +57,11 @@ struct Rows {
     /// Cosines and derivatives of the four channels.
     carriers: Vec<[Vec<f32>; 8]>,
     /// Squared residuals with the offsets and amplitudes of places in one row, place by place.
-    misfit: Vec<Vec<f32>>,
-    /// What another place has to undercut.
+    squares: Vec<Vec<f32>>,
+    /// Squared residual that another place has to undercut.
     best: Vec<Vec<f32>>,
     /// Vectors of pixels that look around.
-    asked: Vec<bool>,
+    active: Vec<bool>,
     smooth: Vec<f32>,
     spare: Vec<f32>,
 }
@@ -109,9 +109,9 @@ impl Choice {
                 rows.prepare(scene, &lines, phase, how);
                 let from = |y: usize, down: isize| inside(y as isize + down * aside);
                 let planes = [modulation, scene.usable];
-                rows.miss((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
+                rows.measure((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
                 let lights = lines[1..=count].iter().map(|&y| scene.row(modulation, y));
-                if !rows.ask(lights, grid.width, least) {
+                if !rows.find_active(lights, grid.width, least) {
                     return;
                 }
                 let mut places_left = (1..PLACES.len()).peekable();
@@ -121,7 +121,7 @@ impl Choice {
                         std::iter::from_fn(|| places_left.next_if(|&place| PLACES[place][0] == down))
                             .map(|place| PLACES[place][1] * aside)
                             .collect();
-                    rows.miss((grid, maps), scene, planes, &lines, |y| from(y, down), &rights);
+                    rows.measure((grid, maps), scene, planes, &lines, |y| from(y, down), &rights);
                     for k in 0..rights.len() {
                         rows.compare((first + k) as u8, k * lines.len(), grid, places);
                     }
@@ -181,7 +181,7 @@ impl Rows {
         (ratios, slopes): ([f32; 3], &Slopes),
     ) {
         let stride = scene.grid.stride;
-        let Self { maps, carriers, best, asked, smooth, .. } = self;
+        let Self { maps, carriers, best, active, smooth, .. } = self;
         carriers.resize_with(lines.len(), Default::default);
         for (rows, &y) in carriers.iter_mut().zip(lines) {
             rows.iter_mut().for_each(|row| row.resize(stride, 0.0));
@@ -194,12 +194,12 @@ impl Rows {
         best.resize_with(lines.len(), Vec::new);
         best.iter_mut().for_each(|row| row.resize(stride, 0.0));
         smooth.resize(stride, 0.0);
-        asked.clear();
-        asked.resize(stride / LANES, true);
+        active.clear();
+        active.resize(stride / LANES, true);
     }
 
     /// Squared residuals of the rows `lines` with offsets and amplitudes of the rows `from`, so many columns to the right.
-    fn miss(
+    fn measure(
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
         scene: &Scene<'_>,
@@ -208,9 +208,9 @@ impl Rows {
         from: impl Fn(usize) -> usize,
         rights: &[isize],
     ) {
-        let Self { maps: rows, wide, carriers, misfit, asked, .. } = self;
+        let Self { maps: rows, wide, carriers, squares, active, .. } = self;
         let reach = rights.iter().map(|right| right.unsigned_abs()).max().unwrap_or(0);
-        misfit.resize_with(misfit.len().max(rights.len() * lines.len()), Vec::new);
+        squares.resize_with(squares.len().max(rights.len() * lines.len()), Vec::new);
         for (i, &y) in lines.iter().enumerate() {
             let model: [&[f32]; 8] = rows.sample(grid, maps, 0, from(y));
             wide.iter_mut()
@@ -221,33 +221,38 @@ impl Rows {
             for (k, right) in rights.iter().enumerate() {
                 let first = reach.saturating_add_signed(*right);
                 let model = wide.each_ref().map(|row| &row[first..first + grid.stride]);
-                let out = &mut misfit[k * lines.len() + i];
+                let out = &mut squares[k * lines.len() + i];
                 out.resize(grid.stride, 0.0);
-                miss(model, carriers, scene.rows(y), lit, asked, out);
+                squared_residuals(model, carriers, scene.rows(y), lit, active, out);
             }
         }
     }
 
     /// Which vectors look around, if any: those whose squared residuals exceed `least` and a share of the modulation on average, and
     /// their neighbours. `lights` are the rows of the modulation.
-    fn ask<'a>(&mut self, lights: impl Iterator<Item = &'a [f32]> + Clone, width: usize, least: f32) -> bool {
-        let Self { misfit, best, asked, spare, smooth, .. } = self;
-        let misses = |group: usize| {
+    fn find_active<'a>(
+        &mut self,
+        lights: impl Iterator<Item = &'a [f32]> + Clone,
+        width: usize,
+        least: f32,
+    ) -> bool {
+        let Self { squares, best, active, spare, smooth, .. } = self;
+        let exceeds = |group: usize| {
             let pixels = LANES * group..LANES * (group + 1);
-            let own = misfit[1..].iter().zip(lights.clone()).flat_map(|(row, light)| {
-                row[pixels.clone()].iter().zip(&light[pixels.clone()]).filter(|(own, _)| **own > 0.0)
+            let here = squares[1..].iter().zip(lights.clone()).flat_map(|(row, light)| {
+                row[pixels.clone()].iter().zip(&light[pixels.clone()]).filter(|(here, _)| **here > 0.0)
             });
-            let excess = own.map(|(own, light)| own - least - (PLACE_GAIN_MIN * light).powi(2));
+            let excess = here.map(|(here, light)| here - least - (PLACE_GAIN_MIN * light).powi(2));
             excess.sum::<f32>() > 0.0
         };
-        let much: Vec<bool> = (0..asked.len()).map(misses).collect();
-        for (i, asked) in asked.iter_mut().enumerate() {
-            *asked = much[i.saturating_sub(1)..(i + 2).min(much.len())].contains(&true);
+        let much: Vec<bool> = (0..active.len()).map(exceeds).collect();
+        for (i, active) in active.iter_mut().enumerate() {
+            *active = much[i.saturating_sub(1)..(i + 2).min(much.len())].contains(&true);
         }
         for (i, (best, light)) in best.iter_mut().zip(lights).enumerate() {
-            binomial([&misfit[i], &misfit[i + 1], &misfit[i + 2]], width, spare, smooth);
-            for (best, (own, light)) in best.iter_mut().zip(smooth.iter().zip(light)) {
-                *best = PLACE_BETTER * own - (PLACE_GAIN_MIN * light).powi(2);
+            binomial([&squares[i], &squares[i + 1], &squares[i + 2]], width, spare, smooth);
+            for (best, (here, light)) in best.iter_mut().zip(smooth.iter().zip(light)) {
+                *best = PLACE_BETTER * here - (PLACE_GAIN_MIN * light).powi(2);
             }
         }
         much.contains(&true)
@@ -255,9 +260,9 @@ impl Rows {
 
     /// Take `place`, whose squared residuals begin at number `first`, where it is better than any before.
     fn compare(&mut self, place: u8, first: usize, grid: &Grid, places: &mut [u8]) {
-        let Self { misfit, best, spare, smooth, .. } = self;
+        let Self { squares, best, spare, smooth, .. } = self;
         for (i, (places, best)) in places.chunks_mut(grid.stride).zip(best).enumerate() {
-            let near = [0, 1, 2].map(|k| misfit[first + i + k].as_slice());
+            let near = [0, 1, 2].map(|k| squares[first + i + k].as_slice());
             binomial(near, grid.width, spare, smooth);
             take_better(place, &smooth[..grid.width], best, places);
         }
@@ -265,10 +270,10 @@ impl Rows {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn take_better(place: u8, missed: &[f32], best: &mut [f32], places: &mut [u8]) {
-    for ((missed, best), chosen) in missed.iter().zip(best).zip(places) {
-        let better = *missed < *best;
-        *best = best.min(*missed);
+fn take_better(place: u8, square: &[f32], best: &mut [f32], places: &mut [u8]) {
+    for ((square, best), chosen) in square.iter().zip(best).zip(places) {
+        let better = *square < *best;
+        *best = best.min(*square);
         *chosen = if better { place } else { *chosen };
     }
 }
@@ -277,7 +282,7 @@ fn count<T: Sync>(values: &[T], which: impl Fn(&T) -> bool + Sync) -> usize {
     values.par_chunks(1 << 14).map(|values| values.iter().filter(|value| which(value)).count()).sum()
 }
 
-/// A row with its ends repeated: `reach` times before, and behind as far as there are `stride + 2 reach` numbers.
+/// A row with its ends repeated: `reach` times before, and behind until there are `stride + 2 reach` numbers.
 fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
     out.clear();
     out.resize(reach, row[0]);
@@ -305,18 +310,18 @@ fn carry(pixels: [&[f32]; 2], ratios: [f32; 3], out: [&mut [f32]; 8]) {
 /// Squared residual after the best albedo and a small change of the phase; 0 of unlit pixels, the greatest number in vectors that do
 /// not look around.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn miss(
+fn squared_residuals(
     model: [&[f32]; 8],
     carriers: [&[f32]; 8],
     light: [&[f32]; 4],
     lit: [&[f32]; 2],
-    asked: &[bool],
+    active: &[bool],
     out: &mut [f32],
 ) {
     let (model, carriers) = (model.map(lanes), carriers.map(lanes));
     let (light, lit) = (light.map(lanes), lit.map(lanes));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
-        if !asked[i] {
+        if !active[i] {
             *out = [f32::MAX; LANES];
             continue;
         }
@@ -336,8 +341,8 @@ fn miss(
                 ds += d * s;
                 ss += s * s;
             }
-            let (own, across) = (dd - md * md / mm, ds - md * ms / mm);
-            let rest = ss - ms * ms / mm - across * across / if own > 1e-9 { own } else { 1e-9 };
+            let (here, across) = (dd - md * md / mm, ds - md * ms / mm);
+            let rest = ss - ms * ms / mm - across * across / if here > 1e-9 { here } else { 1e-9 };
             let on = (lit[0][x] > 0.0) & (lit[1][x] > 0.0);
             found[x] = if on & (rest > 0.0) { rest } else { 0.0 };
         }
@@ -360,31 +365,31 @@ mod tests {
         (choice, share)
     }
 
-    /// Greatest difference from the texture of the pixel, in its place and as chosen; the pixels at the edge see both colours in their
+    /// Greatest difference from the texture of the pixel, in its place and as chosen; the pixels at the edge see both textures in their
     /// neighbours.
     fn errors(edge: &Edge, choice: &Choice) -> [f32; 2] {
         let mut rows = RowMaps::default();
         let mut sampled = rows.sample_mut::<8>(&edge.grid, &edge.maps, 0, 30);
         let error = |rows: &[&mut [f32]; 8]| {
-            let off = |x: usize, k: usize| (rows[k][x] - edge.colour(x)[k]).abs();
+            let off = |x: usize, k: usize| (rows[k][x] - edge.texture(x)[k]).abs();
             (20..236)
                 .filter(|x| !(127..130).contains(x))
                 .flat_map(|x| (0..8).map(move |k| off(x, k)))
                 .fold(0.0, f32::max)
         };
-        let own = error(&sampled);
+        let here = error(&sampled);
         choice.apply(&edge.grid, &edge.maps, 30, &mut sampled);
-        [own, error(&sampled)]
+        [here, error(&sampled)]
     }
 
     #[test]
     fn pixels_near_an_edge_take_offsets_and_amplitudes_of_their_side() {
-        let colours =
+        let textures =
             [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
-        let edge = Edge::new(colours, 0.0);
+        let edge = Edge::new(textures, 0.0);
         let (choice, share) = choose(&edge, 1e-3);
-        let [own, chosen] = errors(&edge, &choice);
-        assert!(own > 0.1, "{own}");
+        let [here, chosen] = errors(&edge, &choice);
+        assert!(here > 0.1, "{here}");
         assert!(chosen < 0.02, "{chosen}");
         // Those pixels see a mixture in their place, and they take no part in the next fit.
         let mut usable = vec![1.0; 256];
@@ -400,11 +405,11 @@ mod tests {
 
     #[test]
     fn residuals_that_noise_explains_move_no_pixel() {
-        let colours = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
-        let edge = Edge::new(colours, 0.0);
+        let textures = [[0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.4], [0.5, 0.4, 0.5, 0.4, 0.5, 0.4, 0.5, 0.39]];
+        let edge = Edge::new(textures, 0.0);
         let (choice, share) = choose(&edge, 0.03);
-        let [own, chosen] = errors(&edge, &choice);
-        assert_eq!(own, chosen);
+        let [here, chosen] = errors(&edge, &choice);
+        assert_eq!(here, chosen);
         assert_eq!(share, 0.0);
     }
 }

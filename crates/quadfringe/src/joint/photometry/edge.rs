@@ -9,29 +9,29 @@ use std::f32::consts::TAU;
 
 pub const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
 pub const PERIOD_PX: f32 = 25.0;
-/// First column of the second colour.
+/// First column of the second texture.
 pub const EDGE: usize = 128;
-/// What all pixels have of their colour.
+/// Albedo of all pixels, on top of their texture.
 pub const ALBEDO: f32 = 0.6;
 
-/// Fringes on two colours that meet in column [`EDGE`], under noise; the cells mix both over ten pixels to either side.
+/// Fringes on two textures that meet in column [`EDGE`], under noise; the cells mix both over ten pixels to either side.
 pub struct Edge {
     pub grid: Grid,
     /// a, b of R, of G, of B, of IR on both sides.
-    pub colours: [[f32; 8]; 2],
+    pub textures: [[f32; 8]; 2],
     pub maps: CellMaps,
     pub phase: Vec<f32>,
     light: [Vec<f32>; 4],
 }
 
 impl Edge {
-    pub fn new(colours: [[f32; 8]; 2], noise: f32) -> Self {
+    pub fn new(textures: [[f32; 8]; 2], noise: f32) -> Self {
         let grid = Grid::new([64, 256], 4.0);
         let mut random = Pcg64Mcg::seed_from_u64(3);
         let phase: Vec<f32> = (0..grid.pixels()).map(|i| 40.0 + TAU * (i % 256) as f32 / PERIOD_PX).collect();
         let light = std::array::from_fn(|c| {
             let clean = |i: usize| {
-                let [a, b] = [2 * c, 2 * c + 1].map(|k| colours[usize::from(i % 256 >= EDGE)][k]);
+                let [a, b] = [2 * c, 2 * c + 1].map(|k| textures[usize::from(i % 256 >= EDGE)][k]);
                 ALBEDO * (a + b * carriers(phase[i], RATIOS, 0.0).cosine[c])
             };
             let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
@@ -42,11 +42,11 @@ impl Edge {
             for (k, line) in lines.into_iter().enumerate() {
                 for (column, value) in line.iter_mut().enumerate() {
                     let across = ((4.0 * column as f32 + 2.0 - 118.0) / 20.0).clamp(0.0, 1.0);
-                    *value = colours[0][k] + (colours[1][k] - colours[0][k]) * across;
+                    *value = textures[0][k] + (textures[1][k] - textures[0][k]) * across;
                 }
             }
         });
-        Self { grid, colours, maps, phase, light }
+        Self { grid, textures, maps, phase, light }
     }
 
     pub fn scene<'a>(&'a self, usable: &'a [f32]) -> Scene<'a> {
@@ -59,8 +59,8 @@ impl Edge {
         vec![value; self.grid.pixels()]
     }
 
-    /// The colour of a pixel in column `x`.
-    pub fn colour(&self, x: usize) -> [f32; 8] {
-        self.colours[usize::from(x >= EDGE)]
+    /// The texture of a pixel in column `x`.
+    pub fn texture(&self, x: usize) -> [f32; 8] {
+        self.textures[usize::from(x >= EDGE)]
     }
 }

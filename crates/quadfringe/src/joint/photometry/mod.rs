@@ -76,8 +76,8 @@ impl Photometry {
         }
     }
 
-    /// Start from what is known without orders, averaged over the surroundings: where the phase hardly changes in a window
-    /// the fit has nothing better to go by.
+    /// Start from offsets and amplitudes that the local fit finds without orders, averaged over the neighbourhood. Where the phase
+    /// hardly changes in a window they are all there is.
     pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit, slopes: &Slopes, ratios: [f32; 3]) {
         let fine = scene.grid;
         let side = (CELL * scene.period_px).max(fine.step as f64);
@@ -197,32 +197,32 @@ impl Photometry {
     fn draw_together(&mut self, scene: &Scene<'_>, threshold: f32) {
         let Self { grid, maps, next, sums, slots, .. } = self;
         let sigma = NEIGHBOURHOOD * scene.period_px as f32 / grid.step as f32;
-        let own = &*next;
+        let fitted = &*next;
         grid.smooth::<8, Rows>(
             sigma,
             slots,
             sums,
             maps,
-            |row, k| Some(own.line(row, k)),
-            |row, wide, out| blend(threshold, std::array::from_fn(|k| own.line(row, k)), wide, out),
+            |row, k| Some(fitted.line(row, k)),
+            |row, wide, out| blend(threshold, std::array::from_fn(|k| fitted.line(row, k)), wide, out),
         );
     }
 }
 
 /// The fit of every cell, drawn to that of its neighbourhood unless their textures differ.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn blend(threshold: f32, own: [&[f32]; 8], wide: [&[f32]; 8], out: &mut [f32]) {
-    let columns = own[0].len();
+fn blend(threshold: f32, cell: [&[f32]; 8], wide: [&[f32]; 8], out: &mut [f32]) {
+    let columns = cell[0].len();
     for i in 0..columns {
         let norm = |maps: &[&[f32]; 8]| (0..8).map(|k| maps[k][i] * maps[k][i]).sum::<f32>().max(1e-12);
         // Only ratios count: the albedo of the pixels takes a common factor.
-        let scale = (norm(&own) / norm(&wide)).sqrt();
-        let size = norm(&own);
-        let square: f32 = (0..8).map(|k| (own[k][i] - scale * wide[k][i]).powi(2)).sum();
+        let scale = (norm(&cell) / norm(&wide)).sqrt();
+        let size = norm(&cell);
+        let square: f32 = (0..8).map(|k| (cell[k][i] - scale * wide[k][i]).powi(2)).sum();
         let apart = square / (size * threshold * threshold);
         let weight = (apart - 1.0).clamp(0.0, 1.0);
         for k in 0..8 {
-            out[k * columns + i] = scale * wide[k][i] + weight * (own[k][i] - scale * wide[k][i]);
+            out[k * columns + i] = scale * wide[k][i] + weight * (cell[k][i] - scale * wide[k][i]);
         }
     }
 }
@@ -245,9 +245,9 @@ fn add_projected(
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
             let pixel = [phase[x], modulation[x], usable[x], loss[x]];
-            let own = project(model, pixel, seen, ratios, limits);
+            let pixel_terms = project(model, pixel, seen, ratios, limits);
             for k in 0..SUMS {
-                terms[k][x] = own[k];
+                terms[k][x] = pixel_terms[k];
             }
         }
         add(sums, &terms);
@@ -285,8 +285,8 @@ fn project(
     for c in 0..4 {
         let (along_m, along_d) = (dd * m[c] - md * d[c], mm * d[c] - md * m[c]);
         for k in 0..4 {
-            let own = if c == k { 1.0 } else { 0.0 };
-            projector[c][k] = own - (along_m * m[k] + along_d * d[k]) * inverse;
+            let identity = if c == k { 1.0 } else { 0.0 };
+            projector[c][k] = identity - (along_m * m[k] + along_d * d[k]) * inverse;
             rest[c] += projector[c][k] * seen[k];
         }
         misfit += rest[c] * seen[c];
@@ -303,7 +303,7 @@ fn project(
             let q = p * carriers.cosine[c];
             terms[at] = p;
             terms[at + 1] = p * carriers.cosine[k];
-            // Columns a_c and b_c meet a_k and b_k; below the diagonal nothing is kept.
+            // Columns a_c and b_c meet a_k and b_k; the triangle below the diagonal is not stored.
             if k > c {
                 terms[at + 2] = q;
                 terms[at + 3] = q * carriers.cosine[k];
@@ -337,9 +337,9 @@ mod tests {
 
     #[test]
     fn a_window_on_two_colours_keeps_its_size() {
-        let colours =
+        let textures =
             [[0.5, 0.4, 0.2, 0.15, 0.6, 0.45, 0.4, 0.35], [0.3, 0.25, 0.5, 0.4, 0.2, 0.15, 0.4, 0.3]];
-        let edge = Edge::new(colours, 0.0);
+        let edge = Edge::new(textures, 0.0);
         let (grid, phase) = (&edge.grid, &edge.phase);
         let (usable, modulation) = (edge.plane(1.0), edge.plane(0.3));
         let scene = edge.scene(&usable);

@@ -52,7 +52,7 @@ struct Rows {
     spare: Vec<f32>,
     /// Albedo and precision of four channels, with room to both sides, of as many rows as the mean reaches over.
     ring: Vec<f32>,
-    /// Where in it the pixels of the mean begin, and their weights.
+    /// Where in it the pixels of the mean begin, with their weights.
     places: Vec<(usize, f32)>,
 }
 
@@ -243,19 +243,19 @@ fn apply(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
 const SIDE: usize = LANES / 2;
 
 /// Mean albedos over the surrounding pixels that have the same albedo in all channels. `taps` give where in the `ring` another pixel
-/// begins, `own` the pixel itself.
+/// begins, `pixel` the pixel itself.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average(taps: &[(usize, f32)], own: usize, (ring, wide): (&[f32], usize), out: [&mut [u16]; 4]) {
+fn average(taps: &[(usize, f32)], pixel: usize, (ring, wide): (&[f32], usize), out: [&mut [u16]; 4]) {
     let out = out.map(|row| row.as_chunks_mut::<SIDE>().0);
     let at = |first: usize| -> [[f32; SIDE]; 8] {
         let rows = &ring[first..];
         std::array::from_fn(|k| *rows[k * wide..].first_chunk().expect("rows are padded"))
     };
     for i in 0..out[0].len() {
-        let own = at(own + i * SIDE);
+        let pixel = at(pixel + i * SIDE);
         let mut sums = [[0.0; SIDE]; 8];
         for &(first, near) in taps {
-            sums = join(sums, near, own, at(first + i * SIDE));
+            sums = join(sums, near, pixel, at(first + i * SIDE));
         }
         for c in 0..4 {
             for x in 0..SIDE {
@@ -272,18 +272,18 @@ fn average(taps: &[(usize, f32)], own: usize, (ring, wide): (&[f32], usize), out
 fn join(
     mut sums: [[f32; SIDE]; 8],
     near: f32,
-    own: [[f32; SIDE]; 8],
+    pixel: [[f32; SIDE]; 8],
     other: [[f32; SIDE]; 8],
 ) -> [[f32; SIDE]; 8] {
     let mut weight = [0.0; SIDE];
     for x in 0..SIDE {
         let mut apart = -ALBEDO_EXPECTED;
         for c in 0..4 {
-            let (mine, theirs) = (own[2 * c + 1][x], other[2 * c + 1][x]);
-            let sure = if mine < theirs { mine } else { theirs };
-            let gap = own[2 * c][x] - other[2 * c][x];
+            let (mine, theirs) = (pixel[2 * c + 1][x], other[2 * c + 1][x]);
+            let precision = if mine < theirs { mine } else { theirs };
+            let gap = pixel[2 * c][x] - other[2 * c][x];
             // Of two variances the greater one stands for about two thirds of their sum.
-            apart += 0.7 * sure * gap * gap;
+            apart += 0.7 * precision * gap * gap;
         }
         let excess = if apart > 0.0 { apart * (1.0 / ALBEDO_EXCESS) } else { 0.0 };
         let fits = if excess < 1.0 { 1.0 - excess } else { 0.0 };
@@ -315,10 +315,10 @@ mod tests {
 
     impl Print {
         fn new(noise: f32, usable: impl Fn(usize) -> f32) -> Self {
-            let colour = |ink: [f32; 4]| {
+            let texture = |ink: [f32; 4]| {
                 std::array::from_fn(|k| ink[k / 2] * if k % 2 == 0 { 1.0 } else { CONTRASTS[k / 2] })
             };
-            let edge = Edge::new(INKS.map(colour), noise);
+            let edge = Edge::new(INKS.map(texture), noise);
             let usable: Vec<f32> = (0..edge.grid.pixels()).map(usable).collect();
             let (modulation, mut sums) = (edge.plane(0.2), CellMaps::default());
             let mut albedo = PixelAlbedo::default();
@@ -333,7 +333,7 @@ mod tests {
         fn ratios(&self, c: usize, columns: impl Iterator<Item = usize>) -> Vec<[f32; 2]> {
             let mut maps = RowMaps::default();
             let rows = self.albedo.sample(&self.edge.grid, 30, &mut maps);
-            let ratio = |x: usize, k: usize| rows[k][x] / (ALBEDO * self.edge.colour(x)[k]);
+            let ratio = |x: usize, k: usize| rows[k][x] / (ALBEDO * self.edge.texture(x)[k]);
             columns.map(|x| [ratio(x, 2 * c), ratio(x, 2 * c + 1)]).collect()
         }
     }

@@ -57,7 +57,7 @@ pub(in crate::joint) fn factor(period_px: f64, grid: &Grid) -> usize {
     factor
 }
 
-/// Planes of pixels, padded as their grid says.
+/// Planes of pixels in padded rows of their grid.
 #[derive(Debug, Default)]
 pub(in crate::joint) struct Level {
     pub light: [Vec<f32>; 4],

@@ -169,10 +169,10 @@ struct VerdictRow<'a> {
 fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: VerdictRow) {
     let width = known.modulation.len();
     sums.resize(width + 2, 0.0);
-    let [above, own, below] = known.squared_residual.map(|row| &row[..width]);
+    let [above, here, below] = known.squared_residual.map(|row| &row[..width]);
     let middle = &mut sums[1..=width];
     for x in 0..width {
-        middle[x] = above[x] + own[x] + below[x];
+        middle[x] = above[x] + here[x] + below[x];
     }
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
@@ -189,11 +189,11 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
         let [pixel_share, grown_share] =
             [PIXEL_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * pixel_modulation[x]);
         let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] + share * share)
-            && own[x] <= floors[1] + pixel_share * pixel_share;
+            && here[x] <= floors[1] + pixel_share * pixel_share;
         quality[x] = order_quality + hole_unless(lit);
         let certain = lit & (order_quality >= limits.quality_min);
         passed[x] = u8::from(certain & agrees & (excluded[x] == 0));
-        consistent[x] = u8::from(lit & (own[x] <= floors[0] + grown_share * grown_share));
+        consistent[x] = u8::from(lit & (here[x] <= floors[0] + grown_share * grown_share));
     }
 }
 

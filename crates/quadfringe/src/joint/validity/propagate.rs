@@ -35,7 +35,7 @@ struct Settled {
 
 impl Propagation {
     /// Doubtful pixels of the `components` take the probability of a wrong order, and the quality, of the most certain of four pixels
-    /// some cells away along their row and column, or as far as the component continues. Both maps are without padding.
+    /// some cells away along their row and column, or at the end of the component. Both maps are without padding.
     pub fn run(
         &mut self,
         grid: &Grid,

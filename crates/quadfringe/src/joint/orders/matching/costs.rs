@@ -77,7 +77,7 @@ impl CostTable {
         let phase = f64::from(node.phase);
         let predicted = self.ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
         let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
-        // Without usable pixels the cosines say nothing: their sums are 0 for every label.
+        // Without usable pixels all labels have the same cost by cosines, 0.
         let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
         costs(beats, cosines, self, out);
