@@ -171,35 +171,44 @@ pub(crate) struct Finish<'a> {
 impl Finish<'_> {
     /// Row `y`, of which phase, modulation, quality, uncertainty of the phase and probability of a wrong order are known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
-        let per_rad = self.code.period_px(0) as f32 / TAU;
+        let columns_per_rad = self.code.period_px(0) as f32 / TAU;
         let end = self.code.projector_width() as f32 + 0.5;
-        let unit = if self.triangulator.is_some() { per_rad } else { 1.0 };
-        let OutputRow { phase, column, wrong, sigma, .. } = row;
-        columns([per_rad, end, unit], [phase, column, wrong, sigma]);
+        let sigma_unit = if self.triangulator.is_some() { columns_per_rad } else { 1.0 };
+        fill_columns(Projection { columns_per_rad, end, sigma_unit }, row);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
             triangulator.finish_row(y, row.column, xyz, row.sigma);
         }
     }
 }
 
-/// 0, or NaN to turn what it is added to into no data: of a choice between a number in memory and NaN a compiler makes masked
-/// stores, which some processors are slow at.
+/// 0, or NaN, to be added to a number that is no data. For a choice between a number in memory and NaN the compiler would make masked
+/// stores, which are slow on some processors.
 #[inline(always)]
 pub(crate) fn hole_unless(known: bool) -> f32 {
     if known { 0.0 } else { f32::NAN }
 }
 
-/// No light comes from beside the projector's image, of which a column on each side is noise. Where there is no phase
-/// nothing is known of it either; uncertainty in rad is turned into another unit.
+/// From the phase to projector columns.
+#[derive(Clone, Copy)]
+struct Projection {
+    columns_per_rad: f32,
+    /// First column behind the projector's image, with a column of tolerance for noise.
+    end: f32,
+    /// Unit that the standard deviation is brought to, per rad.
+    sigma_unit: f32,
+}
+
+/// Fills the columns of a row. Outside the projector's image there is no light, so a phase found there is no data, and neither are
+/// its uncertainty and the probability of a wrong order.
 #[multiversion(targets("x86_64+avx2"))]
-fn columns([per_rad, end, unit]: [f32; 3], [phase, column, wrong, sigma]: [&mut [f32]; 4]) {
-    let found = phase.iter_mut().zip(column);
-    for ((phase, column), (wrong, sigma)) in found.zip(wrong.iter_mut().zip(sigma)) {
-        let found = *phase * per_rad;
+fn fill_columns(Projection { columns_per_rad, end, sigma_unit }: Projection, row: &mut OutputRow) {
+    let found = row.phase.iter_mut().zip(&mut *row.column);
+    for ((phase, column), (wrong, sigma)) in found.zip(row.wrong.iter_mut().zip(&mut *row.sigma)) {
+        let found = *phase * columns_per_rad;
         let hole = hole_unless((found >= -1.5) & (found < end));
         *phase += hole;
         *column = found + hole;
         *wrong += hole;
-        *sigma = *sigma * unit + hole;
+        *sigma = *sigma * sigma_unit + hole;
     }
 }

@@ -10,7 +10,7 @@ use super::params::phase::{ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
 use super::photometry::Photometry;
 use super::scene::{Scene, Scratch};
-use super::window::{Average, Window, WindowRows};
+use super::window::{Average, AverageRow, NormalRows, Window, WindowRows};
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
@@ -133,7 +133,7 @@ impl PhaseFit {
                 for (i, ((phase, weight), (squared_residual, modulation))) in out.into_iter().enumerate() {
                     let y = first + i;
                     rows.model(model, before, around(y, grid.height)[2], (i + 2) % 3);
-                    rows.average(model, before, y, i, [phase, weight]);
+                    rows.average(model, before, y, i, AverageRow { phase, weight });
                     squared_residual.copy_from_slice(&rows.found.squared_residual[..squared_residual.len()]);
                     modulation.copy_from_slice(&rows.found.modulation[..modulation.len()]);
                 }
@@ -155,7 +155,7 @@ impl Rows {
     }
 
     /// Normal equations of row `y`, number `i` of its block, and their average along the row.
-    fn average(&mut self, model: PhaseModel<'_>, before: &[f32], y: usize, i: usize, out: [&mut [f32]; 2]) {
+    fn average(&mut self, model: PhaseModel<'_>, before: &[f32], y: usize, i: usize, out: AverageRow<'_>) {
         let (scene, grid) = (model.scene, model.scene.grid);
         let Self { ring, smooth, spare, found, window, .. } = self;
         let FoundRows { squared_residual, modulation } = &mut *found;
@@ -166,9 +166,7 @@ impl Rows {
         binomial(near.map(|row| row.weighted_albedo.as_slice()), grid.width, spare, &mut smooth.weighted);
         binomial(near.map(|row| row.albedo_weight.as_slice()), grid.width, spare, &mut smooth.weight);
         let lit = Lit { modulation: model.window.modulation(y), usable: scene.row(scene.usable, y) };
-        let measure = |[numerator, denominator]: [&mut [f32]; 2]| {
-            linearise(near[1], smooth, lit, NormalRows { numerator, denominator }, found);
-        };
+        let measure = |normal: NormalRows<'_>| linearise(near[1], smooth, lit, normal, found);
         model.window.along(y, window, scene.row(before, y), measure, out);
     }
 }
@@ -188,12 +186,6 @@ impl ModelRow {
 struct Lit<'a> {
     modulation: &'a [f32],
     usable: &'a [f32],
-}
-
-/// Normal equations of a step of the phase along a row: the step is numerator over denominator.
-struct NormalRows<'a> {
-    numerator: &'a mut [f32],
-    denominator: &'a mut [f32],
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]

@@ -30,6 +30,18 @@ pub(super) struct Window<'a> {
     residuals: Option<&'a Residuals>,
 }
 
+/// Normal equations of a step of the phase along a row: the step is numerator over denominator, both 0 for pixels that take no part.
+pub(super) struct NormalRows<'a> {
+    pub numerator: &'a mut [f32],
+    pub denominator: &'a mut [f32],
+}
+
+/// One row of a phase averaged along rows, with its weight.
+pub(super) struct AverageRow<'a> {
+    pub phase: &'a mut [f32],
+    pub weight: &'a mut [f32],
+}
+
 /// A phase averaged along rows, and its weight.
 #[derive(Clone, Copy)]
 pub(super) struct Average<'a> {
@@ -92,8 +104,8 @@ impl<'a> Window<'a> {
         y: usize,
         rows: &mut WindowRows,
         phase: &[f32],
-        measure: impl FnOnce([&mut [f32]; 2]),
-        out: [&mut [f32]; 2],
+        measure: impl FnOnce(NormalRows<'_>),
+        out: AverageRow<'_>,
     ) {
         let (grid, reach) = (self.scene.grid, self.reach());
         let WindowRows { maps, sharpness, residuals, padded, .. } = rows;
@@ -111,10 +123,10 @@ impl<'a> Window<'a> {
         let [phases, slopes, numerator, denominator] = inner;
         phases.copy_from_slice(phase);
         slopes.copy_from_slice(slope);
-        measure([numerator, denominator]);
+        measure(NormalRows { numerator, denominator });
         let padded = padded.each_ref().map(Vec::as_slice);
         let taps = self.taps(0..2 * self.radius + 1);
-        average_along((&taps, self.spacing), padded, [phase, slope, sharpness], out);
+        average_along((&taps, self.spacing), padded, [phase, slope, sharpness], [out.phase, out.weight]);
     }
 
     /// Furthest neighbour in pixels.
@@ -305,11 +317,12 @@ mod tests {
         let mut rows = WindowRows::default();
         let lines = along.chunks_mut(grid.stride).zip(weight.chunks_mut(grid.stride));
         for (y, (phase, weight)) in lines.enumerate() {
-            let level = |[numerator, denominator]: [&mut [f32]; 2]| {
+            let level = |NormalRows { numerator, denominator }: NormalRows<'_>| {
                 numerator.fill(0.0);
                 denominator[..grid.width].fill(1.0);
             };
-            window.along(y, &mut rows, &seen[y * grid.stride..][..grid.stride], level, [phase, weight]);
+            let out = AverageRow { phase, weight };
+            window.along(y, &mut rows, &seen[y * grid.stride..][..grid.stride], level, out);
         }
         let average = Average { phase: &along, weight: &weight };
         let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);

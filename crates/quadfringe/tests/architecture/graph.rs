@@ -80,12 +80,14 @@ impl Graph {
         self.places.get(&base).copied()
     }
 
-    /// Files that import from each other in a circle, the first circle found. A file and the module around it count as
-    /// one: a child may use what its parent defines.
-    pub fn circle(&self) -> Option<Vec<&str>> {
+    /// Files that import from each other in a circle, the first circle found. A child may use what the module around it
+    /// defines, except in files that `is_strict` names.
+    pub fn circle(&self, is_strict: impl Fn(&str) -> bool) -> Option<Vec<&str>> {
+        let is_strict = &is_strict;
         let inner = |from: usize| {
             let edges = self.edges[from].iter().copied();
-            edges.filter(move |to| !self.files[*to].contains(&self.files[from]))
+            let file = &self.files[from];
+            edges.filter(move |to| is_strict(&file.path) || !self.files[*to].contains(file))
         };
         let mut state = vec![State::New; self.files.len()];
         let mut path = Vec::new();

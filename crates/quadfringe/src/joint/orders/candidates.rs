@@ -1,7 +1,8 @@
 //! Step 4, near discontinuities: the pixels of a cell choose among the orders that the cell and its neighbours propose.
 
 use super::evidence::{albedo, observed_cosine};
-use super::{Cell, Orders, Wrapped};
+use super::matching::Matching;
+use super::wrapped::Wrapped;
 use crate::joint::model::CellFringes;
 use crate::joint::params::orders::{PIXEL_COST_MAX, SAME_ORDER_RAD};
 use crate::joint::scene::Scene;
@@ -12,6 +13,30 @@ use std::f32::consts::TAU;
 /// The order of the cell and those of eight neighbours.
 const CANDIDATES: usize = 9;
 
+/// A cell, by row and column.
+#[derive(Clone, Copy)]
+pub(super) struct Cell {
+    pub row: usize,
+    pub column: usize,
+}
+
+/// The nodes of a scene after matching.
+#[derive(Clone, Copy)]
+pub(super) struct Nodes<'a> {
+    /// Wrapped phase of every node.
+    pub phase: &'a [f32],
+    pub matching: &'a Matching,
+    /// Fringe numbers of G and IR over that of R and B.
+    pub ratios: [f32; 2],
+}
+
+impl Nodes<'_> {
+    /// Absolute phase of a node.
+    pub fn absolute(&self, node: usize) -> f32 {
+        self.phase[node] + TAU * f32::from(self.matching.order[node])
+    }
+}
+
 /// Orders to choose from, in turns relative to the order of the cell; the first is 0.
 pub(super) struct Candidates {
     turns: [f32; CANDIDATES],
@@ -20,19 +45,19 @@ pub(super) struct Candidates {
 
 impl Candidates {
     /// Orders that a cell and its eight neighbours propose for the pixels of the cell.
-    pub fn of(orders: &Orders, scene: &Scene<'_>, slopes: &Slopes, Cell { row, column }: Cell) -> Self {
+    pub fn of(nodes: Nodes<'_>, scene: &Scene<'_>, slopes: &Slopes, Cell { row, column }: Cell) -> Self {
         let grid = scene.grid;
         let node = row * grid.columns + column;
         let mut found = Self { turns: [0.0; CANDIDATES], count: 1 };
         let lines = row.saturating_sub(1)..=(row + 1).min(grid.rows - 1);
-        let here = orders.absolute(node);
+        let here = nodes.absolute(node);
         for other_row in lines {
             for other_column in column.saturating_sub(1)..=(column + 1).min(grid.columns - 1) {
                 let other = other_row * grid.columns + other_column;
-                if other == node || !orders.matching.is_lit(other) {
+                if other == node || !nodes.matching.is_lit(other) {
                     continue;
                 }
-                let gap = here - orders.absolute(other);
+                let gap = here - nodes.absolute(other);
                 if gap.abs() < SAME_ORDER_RAD {
                     continue;
                 }
@@ -80,7 +105,7 @@ impl Block {
     /// Give every pixel the candidate that explains best what it and its neighbours observe in G and IR.
     pub fn decide(
         &mut self,
-        orders: &Orders,
+        nodes: Nodes<'_>,
         scene: &Scene<'_>,
         wrapped: &Wrapped<'_>,
         cell: Cell,
@@ -89,7 +114,7 @@ impl Block {
         let grid = scene.grid;
         let (step, side) = (grid.step, grid.step + 2);
         let node = cell.row * grid.columns + cell.column;
-        let (phase, whole) = (orders.phase[node], orders.absolute(node));
+        let (phase, whole) = (nodes.phase[node], nodes.absolute(node));
         let fringes = wrapped.cell(scene, cell.row, cell.column);
         self.costs.clear();
         for i in 0..side * side {
@@ -104,7 +129,7 @@ impl Block {
                     absolute_phase: whole + wrap(wrapped_phase - phase),
                     light: scene.light.map(|plane| plane[at]),
                 };
-                add_costs(&pixel, &fringes, orders.ratios, candidates.turns(), &mut costs);
+                add_costs(&pixel, &fringes, nodes.ratios, candidates.turns(), &mut costs);
             }
             self.costs.push(costs);
         }

@@ -14,7 +14,7 @@ use super::uncertainty::{NodeVerdict, WrongOrderModel};
 use crate::parallel::angle::wrap;
 use crate::parallel::slots::Slots;
 use crate::{Channel, FringeCode};
-use candidates::{Block, Candidates};
+use candidates::{Block, Candidates, Cell, Nodes};
 use evidence::{EvidenceRows, node_phases, row_evidence};
 use matching::Matching;
 use rayon::prelude::*;
@@ -29,13 +29,6 @@ pub(super) struct Orders {
     ratios: [f32; 2],
     slots: Slots<EvidenceRows>,
     blocks: Slots<Block>,
-}
-
-/// A cell, by row and column.
-#[derive(Clone, Copy)]
-struct Cell {
-    row: usize,
-    column: usize,
 }
 
 impl Orders {
@@ -99,9 +92,8 @@ impl Orders {
         });
     }
 
-    /// Absolute phase of a node.
-    fn absolute(&self, node: usize) -> f32 {
-        self.phase[node] + TAU * f32::from(self.matching.order[node])
+    fn nodes(&self) -> Nodes<'_> {
+        Nodes { phase: &self.phase, matching: &self.matching, ratios: self.ratios }
     }
 
     /// Absolute phase of the pixels of one cell.
@@ -116,11 +108,12 @@ impl Orders {
     ) {
         let grid = scene.grid;
         let node = cell.row * grid.columns + cell.column;
-        let (phase, whole) = (self.phase[node], self.absolute(node));
-        let candidates = Candidates::of(self, scene, wrapped.slopes, cell);
+        let nodes = self.nodes();
+        let (phase, whole) = (nodes.phase[node], nodes.absolute(node));
+        let candidates = Candidates::of(nodes, scene, wrapped.slopes, cell);
         let first = cell.row * grid.step * grid.stride + cell.column * grid.step;
         if candidates.is_choice() {
-            block.decide(self, scene, wrapped, cell, &candidates);
+            block.decide(nodes, scene, wrapped, cell, &candidates);
         }
         for (dy, line) in absolute.chunks_exact_mut(grid.stride).enumerate() {
             let pixels = &wrapped.map.phase[first + dy * grid.stride..][..grid.step];

@@ -21,13 +21,8 @@ use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use crate::parallel::slots::Slots;
 use choice::Choice;
 use multiversion::multiversion;
-use solve::improve;
+use solve::{MATRIX, SUMS, improve};
 use texture::PixelAlbedo;
-
-/// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
-const MATRIX: usize = 36;
-/// The same with the right hand side.
-const SUMS: usize = MATRIX + 8;
 
 /// Offsets and amplitudes on cells wider than those of the scene.
 #[derive(Debug)]

@@ -1,9 +1,13 @@
 //! Normal equations of cells, solved side by side.
 
-use super::{MATRIX, SUMS};
 use crate::joint::params::photometry::RIDGE;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
+
+/// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
+pub(super) const MATRIX: usize = 36;
+/// The same with the right hand side.
+pub(super) const SUMS: usize = MATRIX + 8;
 
 /// Normal equations of a row of cells, solved for the change of the eight unknowns.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
