@@ -1,8 +1,8 @@
 //! Step 9: whether the channels agree. The difference between the phase of R with B and that of G with IR, beyond noise.
 //!
 //! All four channels measure the same column. Where offsets, amplitudes or albedo are wrong (near edges, at the border of the
-//! image, on textured or moving surfaces) the error of each pair is different, and the mean of both is off by about half of what
-//! they differ by.
+//! image, on textured or moving surfaces) the error of each pair is different, and the mean of both is off by about half of
+//! their difference.
 
 use super::cells::{CellMaps, CellWindow, CellWork, RowMaps, kernel};
 use super::model::{FringeRows, carriers};

@@ -1,5 +1,5 @@
-//! Steps 2 to 6 on the coarse level: light, beats, orders and photometry, which all need a neighbourhood. Its fringes are no wider than
-//! the steps need, and its result is where the phase of the full image starts.
+//! Steps 2 to 6 on the coarse level: mask, beats, orders and photometry, which all need a neighbourhood. The phase of the full image
+//! starts from their result.
 
 use super::illumination::LitMask;
 use super::local_fit::{LocalFit, PixelMaps};
@@ -16,7 +16,7 @@ use super::smooth::mark_discontinuities;
 use super::window::Window;
 use crate::FringeCode;
 
-/// What is known of a shot with the help of neighbourhoods, and the steps that find it.
+/// Results of the steps on the coarse level, and the steps themselves.
 pub(super) struct CoarseLevel {
     /// Absolute phase of every pixel in rad.
     pub phase: Vec<f32>,
@@ -120,7 +120,7 @@ impl CoarseLevel {
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
         self.photometry.fit(scene, ratios, map, &self.slopes, &self.free_fit());
         if moving {
-            // Other offsets and amplitudes must not explain what motion does to the light.
+            // Places with other offsets and amplitudes could explain the effect of motion, so no pixel may choose one.
             let fit = PhotometryFit { phase_trust: params::MOVING_PHASE_TRUST, ..self.free_fit() };
             self.refit(scene, ratios, &fit, scratch.lend());
             self.fit_phase(scene, ratios, scratch);

@@ -19,8 +19,8 @@ use rayon::prelude::*;
 /// Sums of one cell: w, wc, ws, wcc, wcs, then w I, w I c, w I s of R, G, B, IR.
 const SUMS: usize = 17;
 
-/// Maps of the fit on the cells. Of R and B: offset and amplitude, four maps in a row; then of all channels what the model
-/// `a + p cos + q sin` needs; then the least amplitude and the mean amplitude of R and B.
+/// Maps of the fit on the cells. Of R and B: offset and amplitude, four maps in a row; then of all channels the coefficients of
+/// `a + p cos + q sin`; then the least amplitude of all channels and the mean amplitude of R and B.
 mod map {
     pub const TWO_STEP: usize = 0;
     pub const P_R: usize = 4;

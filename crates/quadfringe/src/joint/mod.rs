@@ -13,8 +13,8 @@
 //! 10 heights                                                             (S7)  decode::output, height
 //! ```
 //!
-//! The steps share the model of the intensities (`model`), a grid of cells for what varies slowly (`cells`), and tuned numbers
-//! (`params`). `docs/method/joint.md` derives them under the same numbers.
+//! The steps share the model of the intensities (`model`), a grid of cells for slowly varying quantities (`cells`), and the tuned
+//! numbers (`params`). `docs/method/joint.md` derives them under the same numbers.
 
 mod agreement;
 mod cells;
@@ -140,7 +140,7 @@ impl Joint {
         let noise = self.uncertainty(&frame);
         // 10. Heights (S7).
         self.write(&frame, &noise, finish, out);
-        // 9. again: components settle doubtful orders, after step 10 has marked what lies outside the projector's image.
+        // 9. again: components settle doubtful orders, after step 10 has removed pixels outside the projector's image.
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
         let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
         self.validity.propagate(&grid, &self.phase, wrong_order, quality);

@@ -54,7 +54,7 @@ impl Motion {
         self.velocity.fill::<1>(scene.grid, |_, [line]| line.fill(0.0));
     }
 
-    /// Add to the velocity what compensated light still shows of it, by a step of Gauss and Newton at an absolute phase.
+    /// Improve the velocity by a Gauss-Newton step on compensated light, at an absolute phase.
     pub fn measure(&mut self, scene: &Scene<'_>, timing: Timing, photometry: &Photometry, map: PhaseMap<'_>) {
         let grid = scene.grid;
         grid.window_sums::<2, [RowMaps; 2]>(

@@ -22,7 +22,7 @@ pub(super) struct PhaseFit {
     slots: Slots<Rows>,
 }
 
-/// Where the fit writes what it finds besides the phase: rows of the image, each as long as is wanted of it.
+/// Output of the fit besides the phase: rows of the image; rows of length 0 are not written.
 pub(super) struct FitRows<'a> {
     /// Mean of the squared residuals of the four channels, in linear light squared.
     pub squared_residual: Vec<&'a mut [f32]>,
@@ -34,14 +34,14 @@ pub(super) struct FitRows<'a> {
 }
 
 impl FitRows<'_> {
-    /// Rows of length 0: only the phase is wanted.
+    /// Rows of length 0, for a fit of the phase alone.
     pub fn none(height: usize) -> Self {
         let rows = || (0..height).map(|_| <&mut [f32]>::default()).collect();
         Self { squared_residual: rows(), modulation: rows(), information: rows() }
     }
 }
 
-/// What one fit starts from.
+/// Input of one fit.
 #[derive(Clone, Copy)]
 pub(super) struct PhaseModel<'a> {
     pub scene: &'a Scene<'a>,
@@ -68,7 +68,7 @@ struct ModelRow {
     albedo_weight: Vec<f32>,
 }
 
-/// Rows that tell the pixels of a row apart.
+/// One row of pixels.
 #[derive(Clone, Copy)]
 struct PixelRows<'a> {
     phase: &'a [f32],
@@ -97,7 +97,7 @@ struct SmoothAlbedo {
     weight: Vec<f32>,
 }
 
-/// What the fit finds in one row of pixels.
+/// Residuals and modulation of one row of pixels.
 #[derive(Debug, Default)]
 struct FoundRows {
     squared_residual: Vec<f32>,

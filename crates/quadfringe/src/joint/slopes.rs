@@ -178,7 +178,7 @@ mod tests {
                 0.25 * x + (wave * x).sin()
             })
             .collect();
-        // Beyond column 160 the surface is lost but for what only the wide window reaches.
+        // Beyond column 160 the surface is unlit; only the wide window reaches across.
         let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % 256 < 160))).collect();
         let light = vec![0.5; grid.pixels()];
         let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };

@@ -1,7 +1,7 @@
 //! Step 9: the standard deviation of the phase, and the probability that an order is wrong.
 //!
 //! The phase is a weighted mean of least-squares steps, one from each pixel of a window. A pixel whose intensities have the standard
-//! deviation `noise` knows its phase with the variance `noise^2 / J`, where `J` is the sum of the squared derivatives of its four
+//! deviation `noise` determines its phase with the variance `noise^2 / J`, where `J` is the sum of the squared derivatives of its four
 //! intensities with respect to the phase, albedo eliminated. A mean with weights `w J` has the variance
 //! `noise^2 sum(w^2 J) / sum(w J)^2`. The window adds up `sum(w J)` anyway; `sum(w^2 J)` is a fixed share of it wherever `J` varies
 //! little in the window, also where an edge cuts the window in half. The disagreement of the channels beyond noise and the error

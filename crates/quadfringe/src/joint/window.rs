@@ -141,7 +141,7 @@ impl<'a> Window<'a> {
         numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
     }
 
-    /// Average along columns what [`Self::along`] left; rows of `information` receive the weights that the window
+    /// Average along columns the output of [`Self::along`]; rows of `information` receive the weights that the window
     /// has added up, each as many as it holds.
     pub fn down<T: Default + Send>(
         &self,

@@ -102,7 +102,7 @@ impl Block {
         self.turns[i]
     }
 
-    /// Give every pixel the candidate that explains best what it and its neighbours observe in G and IR.
+    /// Give every pixel the candidate that agrees best with the cosines of G and IR that it and its neighbours observe.
     pub fn decide(
         &mut self,
         nodes: Nodes<'_>,

@@ -1,4 +1,4 @@
-//! What the pixels know before their orders are chosen.
+//! Input of the choice of orders.
 
 use crate::joint::cells::RowMaps;
 use crate::joint::local_fit::LocalFit;

@@ -12,7 +12,7 @@ pub const REACH: f32 = 0.75;
 pub const HEIGHT_MIN: f32 = 0.02;
 
 /// Pixels that the noise of an image is estimated from, at most twice as many. The median of 16,000 values is certain to 1 %.
-/// Varied: no effect beyond what other pixels change (10 ppm of wrong orders on dim steps).
+/// Varied: no effect, but 10 ppm fewer wrong orders of dim steps at x0.7.
 pub const NOISE_SAMPLES: usize = 1 << 14;
 
 /// One pixel in so many is looked at for the noise of a phase. An odd number visits all columns. Varied: no effect, but 4 % near

@@ -6,9 +6,9 @@
 pub const CELLS_PER_PERIOD: f64 = 3.4;
 
 /// Least fringe period on the coarse level in pixels. Larger: more pixels, a tenth to a sixth more time at 12, and less right on
-/// captures; smaller: fringes are lost (`cargo test --test round_trip`, `python evaluation/captures_report.py`, `quadfringe
-/// bench`). Varied x1.4 (means of 2 x 2 pixels in place of 4 x 4): phase RMS of steps +4 %, of the face +5 %, near edges of steps
-/// -25 %; x0.7 has the same level.
+/// captures; smaller: fringes are lost (`cargo test --test round_trip`, `python evaluation/captures_report.py`,
+/// `quadfringe bench`). Varied x1.4 (means of 2 x 2 pixels in place of 4 x 4): phase RMS of steps +4 %, of the face +5 %, near
+/// edges of steps -25 %; x0.7 has the same level.
 pub const COARSE_PERIOD_MIN_PX: f64 = 6.0;
 
 /// Greatest factor between the two levels; means are written for 2 and 4. With 4 the coarse level takes a sixteenth of the time.

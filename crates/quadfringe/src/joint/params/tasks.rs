@@ -1,7 +1,7 @@
 //! Sizes of tasks and blocks. They change no result, only the time (`cargo bench -p quadfringe -- shot`).
 
-/// Rows of pixels that one task works on. More: fewer rows at the border of blocks are computed twice. Fewer: less working memory,
-/// and more tasks to share among threads.
+/// Rows of pixels that one task works on. More: fewer rows at the border of blocks are computed twice. Fewer: less working
+/// memory, and more tasks to share among threads.
 pub const ROWS: usize = 32;
 
 /// The same for the choice of places, which holds several rows of every place.

@@ -3,23 +3,25 @@
 /// Variance of a phase step over `noise^2 / J`. Derived: the albedo of a pixel is the mean of nine with the weights 1 2 1 in both
 /// directions, so of the share `x` of the information that it would take when fitted to the pixel alone,
 /// `1 - (2 * 4/16 - (6/16)^2) x` of the noise is left where `J` counts `1 - x`. Four fringes have
-/// `x = (a^2 + b^2 / 4) / (4 a^2 + 2 b^2)`: 0.21 to 0.25 from full to no contrast, and the variance is 1.17 to 1.21 times as much.
-/// Checked by `cargo test --test uncertainty -- --nocapture`. Varied: errors inside one standard deviation 0.76 -> 0.69 and 0.82
-/// (peaks).
+/// `x = (a^2 + b^2 / 4) / (4 a^2 + 2 b^2)`: 0.21 to 0.25 from full to no contrast, and the variance is 1.17 to 1.21 times as
+/// much. Checked by `cargo test --test uncertainty -- --nocapture`. Varied: errors inside one standard deviation 0.76 -> 0.69 and
+/// 0.82 (peaks).
 pub const ALBEDO_LOSS: f32 = 1.18;
 
-/// Error of the method on a smooth surface without noise, in rad: `python evaluation/round_trip.py`, plane and peaks. Varied: peaks
-/// without noise have 0.66 and 0.88 of their errors inside one standard deviation in place of 0.78; with noise it does not matter.
+/// Error of the method on a smooth surface without noise, in rad: `python evaluation/round_trip.py`, plane and peaks. Varied:
+/// peaks without noise have 0.66 and 0.88 of their errors inside one standard deviation in place of 0.78; with noise it does not
+/// matter.
 pub const METHOD_RAD: f32 = 8e-4;
 
-/// Least temperature of a shot, in units of the greatest cost of a node. Follows from the costs: they are whole numbers up to 333.
+/// Least temperature of a shot, in units of the greatest cost of a node. Follows from the costs: they are whole numbers up to
+/// 333.
 pub const TEMPERATURE_MIN: f32 = 1.0 / super::orders::COST_MAX as f32;
 
-/// Width (sigma) in fringe periods of the windows that give a phase of each pair of channels. Larger: less noise, blurred near edges.
-/// PAIR_WINDOW_VARIED
+/// Width (sigma) in fringe periods of the windows that give a phase of each pair of channels. Larger: less noise, blurred near
+/// edges. Varied: 0.79 and 0.74 of the errors of peaks inside one standard deviation in place of 0.76.
 pub const PAIR_WINDOW: f32 = 0.125;
-/// Width (sigma) in fringe periods of the neighbourhood over which squared differences of the pairs are averaged. Larger: local errors
-/// are missed. Smaller: noise of the uncertainty. NEIGHBOURHOOD_VARIED
+/// Width (sigma) in fringe periods of the neighbourhood over which squared differences of the pairs are averaged. Larger: local
+/// errors are missed. Smaller: noise of the uncertainty. NEIGHBOURHOOD_VARIED
 pub const PAIR_NEIGHBOURHOOD: f32 = 0.4;
 /// Rows of pixels that stand for a row of cells. ROWS_VARIED
 pub const PAIR_SAMPLED_ROWS: usize = 2;
@@ -28,13 +30,15 @@ pub const PAIR_SHARE_MIN: f32 = 0.02;
 /// Greatest squared difference of the pairs beyond noise, in rad^2. Not measured: beyond 1 rad the linearisation has no meaning.
 pub const PAIR_EXCESS_MAX_RAD2: f32 = 1.0;
 
-/// Probability of a wrong order from which a pixel is doubtful. Varied x1.4: the promised wrong orders of peaks rise from 48 to 59 ppm.
+/// Probability of a wrong order from which a pixel is doubtful. Varied x1.4: the promised wrong orders of peaks rise from 48 to
+/// 59 ppm.
 pub const DOUBTFUL: f32 = 0.01;
-/// Cells from which a doubtful pixel may take certainty: the reach of windows across a discontinuity. Varied (2 and 4): no effect.
+/// Cells from which a doubtful pixel may take certainty: the reach of windows across a discontinuity. Varied (2 and 4): no
+/// effect.
 pub const PROPAGATION_CELLS: usize = 3;
-/// Least probability that a pixel keeps when its component settles it: a bound, about twice what the captures show
+/// Least probability that a pixel keeps when its component settles it: a bound, about twice the share on the captures
 /// (`pytest tests/test_captures.py`). Varied: promised wrong orders of peaks 48 -> 38 and 61 ppm, 0 observed.
 pub const SETTLED_PROBABILITY_MIN: f32 = 0.005;
-/// The same at pixels added by region growing, of which some belong to what lies behind. Varied: promised wrong orders of steps
+/// The same at pixels added by region growing, of which some belong to another surface. Varied: promised wrong orders of steps
 /// 1358 -> 1140 and 1594 ppm, 20 observed.
 pub const GROWN_PROBABILITY_MIN: f32 = 0.1;

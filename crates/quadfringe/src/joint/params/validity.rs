@@ -9,7 +9,8 @@ pub const BEND_MAX_RAD: f32 = 0.3;
 /// ([`MISFIT_MAX`]). Larger: wrong orders (varied x1.4: dim steps 190 -> 288 ppm, 0.2 points more of the textured face). Smaller:
 /// fewer pixels (x0.7: 112 ppm, 0.1 points less).
 pub const RESIDUAL_NOISES_MAX: f32 = 1.5;
-/// See [`RESIDUAL_NOISES_MAX`]. MISFIT_VARIED
+/// See [`RESIDUAL_NOISES_MAX`]. Varied x0.7: wrong orders of steps 20 -> 10 ppm, of dim steps 190 -> 143 ppm, 0.4 points less of
+/// the textured face; x1.4: 49 and 256 ppm, 0.4 points more.
 pub const MISFIT_MAX: f32 = 0.28;
 
 /// The same of a pixel by itself: in units of the noise, and with it of its modulation ([`PIXEL_MISFIT_MAX`]). A pixel in a

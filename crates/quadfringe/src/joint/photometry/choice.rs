@@ -355,7 +355,7 @@ mod tests {
     use super::super::edge::{Edge, RATIOS};
     use super::*;
 
-    /// What the pixels choose, and the share of them that take another place.
+    /// The choice of the pixels, and the share of them that take another place.
     fn choose(edge: &Edge, noise: f32) -> (Choice, f32) {
         let (lit, modulation) = (edge.plane(1.0), edge.plane(0.2));
         let how = (RATIOS, &Slopes::flat(&edge.grid));

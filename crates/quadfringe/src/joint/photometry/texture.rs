@@ -182,7 +182,7 @@ fn taps(period_px: f32) -> (Vec<Tap>, usize) {
     (near.collect(), spacing * ALBEDO_STEPS)
 }
 
-/// Light times its model for an albedo of 1, channel by channel, and the squares of that model; 0 for what has none.
+/// Light times its model for an albedo of 1, channel by channel, and the squares of that model; 0 for unlit pixels.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn project(
     contrasts: [&[f32]; 4],
@@ -329,7 +329,7 @@ mod tests {
             Self { edge, albedo }
         }
 
-        /// Background and modulation of a channel in row 30 over what they ought to be.
+        /// Offset and amplitude of a channel in row 30 over their true values.
         fn ratios(&self, c: usize, columns: impl Iterator<Item = usize>) -> Vec<[f32; 2]> {
             let mut maps = RowMaps::default();
             let rows = self.albedo.sample(&self.edge.grid, 30, &mut maps);
@@ -357,7 +357,7 @@ mod tests {
         for c in 0..4 {
             let errors = print.ratios(c, 24..108).into_iter().map(|[a, _]| (a - 1.0).powi(2));
             let rms = (errors.sum::<f32>() / 84.0).sqrt();
-            // One pixel knows its albedo as well as noise over light; hundreds stand together.
+            // The albedo of one pixel has the relative error noise over light; the mean runs over hundreds.
             assert!(rms < 0.25 * noise / (ALBEDO * INKS[0][c]), "{c} {rms}");
         }
     }

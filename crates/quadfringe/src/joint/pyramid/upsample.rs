@@ -54,7 +54,7 @@ impl Surface {
     }
 }
 
-/// What upsampling starts from.
+/// Input of upsampling.
 #[derive(Clone, Copy)]
 pub(in crate::joint) struct Levels<'a> {
     pub coarse: &'a Scene<'a>,

@@ -37,7 +37,7 @@ impl Discontinuities {
 
     /// Marks in `excluded` every lit pixel whose absolute phase (rad) differs by half a turn or more from that of a lit neighbour,
     /// and the pixels around it: there one of the two has the wrong order, or sees two surfaces at once. Where the wrapped phases
-    /// agree only G and IR know on which side a pixel lies, and those are blurred, so more pixels around are marked.
+    /// agree only G and IR show on which side a pixel lies, and those are blurred, so more pixels around are marked.
     pub fn mark(&mut self, grid: &Grid, map: PhaseMap<'_>, excluded: &mut Vec<u8>) {
         let stride = grid.stride;
         self.at_jump.resize(grid.pixels(), 0);

@@ -24,7 +24,7 @@ use rayon::prelude::*;
 use regrow::Regrow;
 use support::Support;
 
-/// What the fit of step 6 left of every pixel by itself, row by row without padding.
+/// Results of the fit of step 6 for every pixel by itself, row by row without padding.
 #[derive(Clone, Copy)]
 pub(super) struct PixelFit<'a> {
     /// Mean squared residual of the four channels, in linear light squared.
@@ -143,7 +143,7 @@ impl Validity {
     }
 }
 
-/// What decides on the pixels of a row.
+/// Input of the check of one row.
 struct CheckRow<'a> {
     /// Of the rows above, at and below.
     squared_residual: [&'a [f32]; 3],

@@ -13,7 +13,7 @@ use std::f32::consts::PI;
 /// Mark of a pixel that was added to a component; 1 marks the others.
 pub(super) const GROWN: u8 = 2;
 
-/// What decides whether a pixel may be added.
+/// Maps that decide whether a pixel may be added.
 #[derive(Clone, Copy)]
 pub(super) struct Candidates<'a> {
     /// Absolute phase in rad.

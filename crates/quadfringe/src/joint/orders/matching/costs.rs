@@ -1,4 +1,4 @@
-//! Costs of the orders of a node: what every order predicts, and how far the evidence is from it.
+//! Costs of the orders of a node: the squared difference between the evidence and the prediction of every order.
 
 use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
@@ -7,14 +7,14 @@ use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
 
-/// Every order as a label, with what it predicts; label 1 is order 0, label 0 the order before the field.
+/// Every order as a label, with its predictions; label 1 is order 0, label 0 the order before the field.
 #[derive(Debug, Clone)]
 pub(super) struct CostTable {
     /// Beats of G and IR in a turn of the first phase.
     ratios: [f64; 2],
     /// Beats of every label for a wrapped phase of 0: G and IR.
     beats: [Vec<u16>; 2],
-    /// What every label adds to the phase of order 0: G and IR.
+    /// Phase that every label adds to that of order 0: G and IR.
     rotations: [Rotations; 2],
     /// Greatest wrapped phase, in turns, that the last order may have.
     last_turn: f64,

@@ -1,4 +1,4 @@
-//! What is known of one node before the costs of its neighbours join.
+//! The evidence of one node, before the costs of its neighbours are added.
 
 use super::sweep::Node;
 
@@ -34,7 +34,7 @@ impl NodeEvidence {
         (angle_rad * (65536.0 / std::f32::consts::TAU)).round() as i32 as u16
     }
 
-    /// What the sweeps need of it.
+    /// The part of it that the sweeps use.
     pub(super) fn node(&self) -> Node {
         Node { phase: self.phase, lit: self.lit }
     }
