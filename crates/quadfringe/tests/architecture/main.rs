@@ -33,7 +33,7 @@ const METHODS: [&str; 2] = ["published", "joint"];
 
 /// Rooms in which a child and the module around it may use each other: types that all files of the room share stand in its
 /// `mod.rs`.
-const SHARING: [&str; 4] = ["optics", "surface", "condition", "published"];
+const SHARING: [&str; 5] = ["optics", "surface", "condition", "stages", "published"];
 
 fn is_strict(path: &str) -> bool {
     room_of(path).is_none_or(|room| !SHARING.contains(&ORDER[room]))
