@@ -1,7 +1,7 @@
 """The tuned numbers of the calibration: value, unit, what each trades, and what it follows from or what checks it.
 
-The heading of each group names the tests that fail when its numbers are wrong; they compare with the exact truth of the
-virtual bench. `python evaluation/calibration.py` measures what all of them achieve together.
+The heading of each group names the tests that exercise its numbers against the exact truth of the virtual bench.
+`python evaluation/calibration.py` measures the accuracy that all of them give together.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ FULL = 0.999
 # Standard deviations of the smoothing tried before blob detection, px, in this order. More smoothing suppresses noise
 # and closes small holes, so the search stops at the first that finds the grid.
 SMOOTHING_PX = (1.0, 2.0, 0.5)
-# Slope of the steepest edges of a sharp image, share of its contrast per px: Gaussian blur with a standard deviation of
-# 5 px has exactly this slope.
+# Slope of the steepest edges of a sharp image, share of its contrast per px: an edge with a Gaussian blur of 5 px
+# standard deviation has this slope, 1 / (5 sqrt(2 pi)).
 SHARP = 0.08
 # Least darkness of an orientation mark, where paper is 0 and solid ink 1; below one half, because blur lightens a dot.
 MARK_MIN = 0.35
@@ -41,7 +41,7 @@ SEEDS = 5
 # --- Sub-pixel centres: pytest tests/test_targets.py, which also compares them with the blob centres of OpenCV
 
 # Radius of the window around a ring, in ring radii, unless a neighbour is nearer. A larger window averages more paper
-# noise into the white level's fit but meets the next ring.
+# pixels into the fit of the white level, but meets the next ring.
 WINDOW_RADII = 1.65
 # Paper begins at this distance from the centre, in ring radii: blur of the edge must not reach the white level.
 PAPER_FROM_RADII = 1.25
@@ -113,7 +113,8 @@ REGISTRATION_POINTS_MIN = 12
 REGISTRATION_OUTLIER_SD = 4.0
 # RMS distance, px, above which the two sets are not the same points: centres are good to 0.05 px.
 REGISTRATION_RMS_MAX_PX = 0.5
-# Extent of the points across over along their main direction; below it the map is undetermined across.
+# Extent of the points across their main direction, divided by that along it; below it, the affine map is undetermined
+# across.
 REGISTRATION_SPREAD_MIN = 0.1
 
 # --- Light, that is dark level, responses, crosstalk and flat field: pytest tests/test_channels.py

@@ -173,7 +173,7 @@ class _Settled(NamedTuple):
 def _settled(sights: Sequence[Sight], poses: int, radial3: bool, sizes: dict[str, tuple[int, int]]) -> _Settled:
     """Adjust until the set of outliers and the standard deviations of the points no longer change.
 
-    The first adjustment uses a robust loss, so that outliers cannot hide behind the parameters that they distort.
+    The first adjustments use a robust loss, so that outliers cannot hide behind the parameters that they distort.
     """
     sd_px = {name: np.ones(2) for name in DEVICES}
     adjustment = Adjustment(sights, poses, radial3, sd_px)

@@ -29,7 +29,7 @@ from quadfringe.calibration._params import (
     USABLE_LEVELS_MIN,
 )
 from quadfringe.calibration.levels import CHANNELS, LevelPlan, row4
-from quadfringe.config import ChannelResponse, Matrix4, Response, Row4
+from quadfringe.config import Matrix4, Response, Row4
 from quadfringe.errors import InputError
 
 __all__ = ["Channels", "fit_channels"]
@@ -95,9 +95,9 @@ def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,
     offset = np.linalg.solve(crosstalk, found.ambient).clip(0.0, AMBIENT_MAX)
     known: dict[str, Any] = {
         "dark": row4(found.dark),
-        "response": _responses(np.zeros(4), found.camera),
+        "response": Response.from_powers(np.zeros(4), found.camera),
         "crosstalk": _matrix(crosstalk),
-        "projector_response": _responses(offset, 1 / found.projector),
+        "projector_response": Response.from_powers(offset, 1 / found.projector),
     }
     return Channels(
         **known,
@@ -255,11 +255,6 @@ def _level_error(plan: LevelPlan, seen: Array) -> Array:
         level, value = plan.levels[rows, channel], seen[rows, channel]
         found[rows, channel] = value / (value @ level / (level @ level)) - level
     return found
-
-
-def _responses(offset: Array, exponent: Array) -> Response:
-    pairs = zip(CHANNELS, offset, exponent, strict=True)
-    return Response(**{name: ChannelResponse(offset=float(o), exponent=float(e)) for name, o, e in pairs})
 
 
 def _matrix(values: Array) -> Matrix4:

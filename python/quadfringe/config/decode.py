@@ -7,9 +7,9 @@ DecodeConfig(method='published', response='linear')
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
 
@@ -44,6 +44,15 @@ class Response(Model):
     def rows(self) -> list[tuple[float, float, float]]:
         """Offset, exponent and knee of R, G, B, IR."""
         return [(c.offset, c.exponent, c.knee) for c in (self.red, self.green, self.blue, self.ir)]
+
+    @classmethod
+    def from_powers(cls, offsets: Iterable[float], exponents: Iterable[float]) -> Self:
+        """Return the responses with these offsets and exponents of R, G, B, IR, without a knee."""
+        red, green, blue, ir = (
+            ChannelResponse(offset=float(offset), exponent=float(exponent))
+            for offset, exponent in zip(offsets, exponents, strict=True)
+        )
+        return cls(red=red, green=green, blue=blue, ir=ir)
 
 
 def _kind_of(value: Any) -> str | None:

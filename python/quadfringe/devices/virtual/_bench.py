@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -10,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config import ChannelResponse, Fringes, Response, Row4, SystemConfig, Triple
+from quadfringe.config import Fringes, Response, Row4, SystemConfig, Triple
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth, core_device, device_from_core
 from quadfringe.devices.light import Levels, Light, Step, eight_bit, predeformation
 from quadfringe.errors import DecodeError, InputError
@@ -23,7 +22,6 @@ __all__ = ["PrintedBoard", "VirtualBench"]
 EDGE_PX = 2.0
 # Fields of `SceneConfig` that describe the scene and not its light.
 NOT_LIGHT = {"surface", "height_map", "time_s", "infrared_from_visible"}
-CHANNELS = ("red", "green", "blue", "ir")
 
 
 @dataclass(frozen=True)
@@ -89,9 +87,9 @@ class VirtualBench:
             camera=device_from_core(self._bench.camera),
             projector=device_from_core(self._bench.visible),
             infrared=device_from_core(self._bench.infrared),
-            response=_responses(offsets, combined),
+            response=Response.from_powers(offsets, combined),
             crosstalk=scene.crosstalk,
-            projector_response=_responses((0.0,) * 4, [1 / sent for sent in projector]) if separate else None,
+            projector_response=Response.from_powers((0.0,) * 4, [1 / sent for sent in projector]) if separate else None,
             ir_registration=scene.infrared_from_visible,
         )
 
@@ -214,8 +212,3 @@ class VirtualBench:
             shadow=cast.shadow(),
             edge=cast.edge_distance_px() < EDGE_PX,
         )
-
-
-def _responses(offsets: Sequence[float], exponents: Sequence[float]) -> Response:
-    pairs = zip(CHANNELS, offsets, exponents, strict=True)
-    return Response(**{name: ChannelResponse(offset=offset, exponent=exponent) for name, offset, exponent in pairs})
