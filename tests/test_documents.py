@@ -71,6 +71,15 @@ def test_the_list_of_records_is_whole() -> None:
     assert [line for line in lines if line.startswith("| [")] == rows
 
 
+def test_names_in_the_glossary_exist() -> None:
+    sources = [*(ROOT / "python").rglob("*.py"), *ROOT.glob("crates/*/src/**/*.rs"), ROOT / "pyproject.toml"]
+    known = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))
+    spans = re.findall(r"`([^`]+)`", (ROOT / "docs" / "glossary.md").read_text())
+    names = {word for span in spans for word in re.findall(r"[A-Za-z]\w+", span) if not word.isupper()}
+    assert len(names) > 80
+    assert names - known == set()
+
+
 def test_what_is_missing_is_found() -> None:
     assert missing("python evaluation/nothing.py --seeds 3") == ["evaluation/nothing.py"]
     assert missing("cargo test --test nothing") == ["nothing"]
