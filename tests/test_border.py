@@ -52,8 +52,16 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
 def test_instants_of_the_channels_are_kept_and_checked() -> None:
     instants = (-5556.0, 0.0, 5556.0, 0.0)
     assert decoder(channel_instants_us=instants).settings()["channel_instants_us"] == list(instants)
-    with pytest.raises(ValueError, match="channel_instants_us: expected none with the published method"):
+    with pytest.raises(ValueError, match="channel_instants_us is an option of the joint method, and the method is published"):
         decoder(channel_instants_us=instants, method="published")
+
+
+def test_settings_name_the_method_and_its_version() -> None:
+    settings = {name: decoder(method=name).settings() for name in ("joint", "published")}
+    for name, found in settings.items():
+        assert (found["method"], found["method_version"]) == (name, "1")
+    # The earlier name of the method, which settings and files may hold.
+    assert decoder(method="best").settings() == settings["joint"] == decoder().settings()
 
 
 def test_memory_is_used_again_only_when_nobody_looks_at_it(images: Four) -> None:

@@ -1,7 +1,7 @@
 """The compiled kernel, as Python sees it. Private: use the names of `quadfringe`.
 
-Every array is (H, W) or (H, W, C); NaN is no data. A value that cannot be used is a ValueError, an array of the
-wrong type a TypeError; both say what was expected and what came. The GIL is released while the kernel works.
+Every array is (H, W) or (H, W, C); NaN is no data. A value that cannot be used raises ValueError, an array of the
+wrong type TypeError; both name the expected and the actual value. The kernel works without the GIL.
 """
 
 from collections.abc import Sequence
@@ -97,7 +97,7 @@ class Device:
     """A camera or a projector: pinhole, OpenCV distortion, and the pose P_device = rotation P_camera + translation_mm.
 
     Raises ValueError for a size of zero, a focal length that is not positive, numbers that are not finite, and a
-    rotation that is none within 1e-6.
+    matrix that is not a rotation within 1e-6.
     """
 
     def __new__(
@@ -132,11 +132,11 @@ class Device:
         """Give origin (mm) and unit direction, in the camera frame, of the ray of a pixel (column, row)."""
 
     def through_plane(self, position: _Vector2, other: Device, z_mm: float) -> _Vector2 | None:
-        """Give the position in `other` of what a position lights, or sees, on the plane z; None when out of reach."""
+        """Map a position to `other` through the point of the plane z that it sees or lights; None if there is none."""
 
 @final
 class Bench:
-    """The virtual bench: a camera and two projectors. What is absent is the published geometry."""
+    """The virtual bench: a camera and two projectors. An argument that is absent is that of the published geometry."""
 
     def __new__(
         cls,
@@ -188,7 +188,7 @@ class Bench:
 
         `coverage` is (rows, columns) float32, 1 where there is ink; `origin_mm` is the centre of its first texel on
         z = 0 of the board, in the pose of `cast_plate`; `paper` and `ink` are albedos of R, G, B, IR. It is (H, W, 4),
-        or (H, W, 8) with an infrared chip of its own, the last four as that sees them.
+        or (H, W, 8) when the infrared chip is registered apart; its albedos are then the last four.
         """
 
     def render(
@@ -202,8 +202,8 @@ class Bench:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
         The infrared projector shows its fringes, or `infrared_image` (rows, columns), linear light from 0 to 1.
-        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An option that
-        is not known is a TypeError.
+        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An unknown
+        option raises TypeError.
         """
 
     def render_step(
@@ -222,7 +222,7 @@ class Bench:
         """
 
     def render_levels(self, cast: Cast, levels: _Vector4, **options: Any) -> dict[str, NDArray[Any]]:
-        """Give the images with each channel (R, G, B, IR) lit evenly at a level of its own, 0 to 1."""
+        """Give the images with each channel (R, G, B, IR) lit evenly at its level, 0 to 1."""
 
 @final
 class Cast:
@@ -235,18 +235,20 @@ class Cast:
         """Give the column of the visible (or infrared) projector that lights each pixel, (H, W), NaN in the dark."""
 
     def shadow(self) -> NDArray[np.bool_]:
-        """Tell where a surface is seen that a projector does not light, (H, W)."""
+        """Give the mask of visible surface that at least one projector does not light, (H, W)."""
 
     def edge_distance_px(self) -> NDArray[np.float32]:
         """Give the distance to the nearest edge of depth, light or surface, (H, W) pixels."""
 
 @final
 class Decoder:
-    """Decodes shots of one size; planned and checked when made.
+    """Decodes shots of one size and one four-channel encoding; planned and checked when made.
 
-    What is absent takes the kernel's default. With `camera`, `projector` and `infrared` orders are searched along the
-    camera rays, with the infrared image plain or pre-deformed, within a range of depths or at all of them. Raises
-    ValueError when the fringe numbers do not cover the projector or a setting is out of range.
+    An argument that is absent takes the kernel's default. `method` is "joint" ("best" is read as "joint") or
+    "published". With `camera`, `projector` and `infrared` the published method searches fringe orders along the camera
+    rays, with the infrared image plain or pre-deformed, within a range of depths or at all of them;
+    `channel_instants_us` is an option of the joint method. Raises ValueError when the fringe numbers do not cover the
+    projector, a setting is out of range, or an option is not one of the method.
     """
 
     def __new__(
@@ -274,7 +276,10 @@ class Decoder:
         depth_range_mm: _Vector2 | None = None,
     ) -> Decoder: ...
     def settings(self) -> dict[str, str | float | list[float] | None]:
-        """Give every setting of the method with defaults included; period_px None is taken from every shot."""
+        """Give every setting in force, defaults included, and `method_version`, for saved results.
+
+        With `period_px` None the fringe period is estimated from every shot.
+        """
 
     def decode(
         self, red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], ir: NDArray[Any]
@@ -308,7 +313,7 @@ def pattern(
 def predeform(
     visible: Device, infrared: Device, fringe_number: float, *, z_mm: float, layout: str = "regular"
 ) -> NDArray[np.float32]:
-    """Give the image that lets the infrared projector show on the plane z what the visible one would (S11).
+    """Give the image with which the infrared projector lights the plane z as the visible one would (S11).
 
     (height, width) of the infrared projector, linear light from 0 to 1, 0 where a mirror misses the plane. Both lens
     distortions and the layout of the mirrors are taken into account.
@@ -386,7 +391,7 @@ def linear_light_bayer(
     projector_response: Sequence[_Vector3] | None = None,
     ir_registration: Sequence[Sequence[float]] | None = None,
 ) -> dict[str, NDArray[np.float32]]:
-    """Give the same of a raw mosaic: each colour at every pixel, interpolated from its own samples.
+    """Give the same of a raw mosaic: each colour at every pixel, interpolated from samples of that colour alone.
 
     Images and errors as those of `Decoder.decode_bayer`.
     """
@@ -499,9 +504,10 @@ def estimate_response_of_shot(
     fringe_numbers: tuple[float, float, float],
     projector_width: int,
 ) -> dict[str, dict[str, float]]:
-    """Give the figures of `estimate_response` by channel, from one shot as captured and the phase it was decoded to.
+    """Give the figures of `estimate_response` by channel, from one captured shot and its decoded phase.
 
-    A channel that is linear as far as the shot can tell, or shows too little, is left out; `pixels` counts tiles.
+    A channel whose response does not differ measurably from a straight line, or with too few fringes, is left out.
+    `pixels` counts tiles.
     """
 
 @final
@@ -519,7 +525,7 @@ class PolynomialHeight:
         phases_rad: Sequence[NDArray[np.float32]],
         degree: int,
     ) -> PolynomialHeight:
-        """Fit planes at known heights, one absolute phase map (H, W) float32 for each.
+        """Fit planes at known heights, with one absolute phase map (H, W) float32 for each.
 
         ValueError when there are fewer different heights than degree + 1, or a map has another size.
         """
@@ -540,12 +546,12 @@ def xyz_from_column(column_px: NDArray[np.float32], camera: Device, projector: D
 class LightCrafter:
     """A LightCrafter 4500 on USB, named by bus and port path ("1-2"), by serial number, or as the only one.
 
-    One command is in flight at a time, and every wait has a bound: 2 s for a reply, 10 s for a change of state. What
-    the caller chose wrongly is a ValueError; what the device did is an OSError: FileNotFoundError when it is absent,
-    PermissionError with the udev rule, TimeoutError, ConnectionError when it was unplugged. Opening sends nothing.
+    One command is in flight at a time, and every wait has a bound: 2 s for a reply, 10 s for a change of state. A wrong
+    argument raises ValueError, a failure of the device OSError: FileNotFoundError when it is absent, PermissionError
+    with the udev rule, TimeoutError, ConnectionError when it was unplugged. Opening sends nothing to the device.
 
-    `light` is TI's own light engine ("evm") or another ("external"), whose `drive_limit` must be stated before a drive
-    is set; `current_inverted` says whether its register is 0 at full current, as TI's is.
+    `light` is the light engine of TI's evaluation module ("evm") or another ("external"), whose `drive_limit` must be
+    given before a drive is set. With `current_inverted` its register is 0 at full current, as in TI's engine.
     """
 
     def __new__(
@@ -561,12 +567,12 @@ class LightCrafter:
     @property
     def port(self) -> str: ...
     def close(self) -> None:
-        """Release the device, which goes on showing what it shows; closing twice is allowed."""
+        """Release the device, which keeps its current display; closing twice is allowed."""
 
     def __enter__(self) -> Self: ...
     def __exit__(self, *_exception: object) -> None: ...
     def status(self) -> _Status:
-        """Give everything that the projector says of itself; `faults` names what is wrong."""
+        """Give all status registers of the projector; `faults` lists the faults that they report."""
 
     def versions(self) -> dict[str, str]:
         """Give the versions of application, api, software and sequencer."""
@@ -578,7 +584,7 @@ class LightCrafter:
         """Give the number of images of 24 bit in flash."""
 
     def check_flash(self, images: int, tag: str | None = None) -> None:
-        """Compare flash with what it should hold; ValueError says what differs."""
+        """Compare the number and tag of the flash images with the expected ones; ValueError names the difference."""
 
     def measure_image_load_ms(self, first: int, count: int) -> float:
         """Measure how long flash images take to load."""
@@ -599,7 +605,7 @@ class LightCrafter:
         """Show an image of flash as a still picture, in linear light."""
 
     def load(self, sequence: PatternSequence) -> list[str]:
-        """Send a sequence and have it judged; returns warnings, OSError names what must not run."""
+        """Send a sequence and let the projector validate it; returns warnings, OSError names a refused sequence."""
 
     def play(self, sequence: PatternSequence) -> list[str]:
         """Load and start."""
@@ -639,13 +645,13 @@ class LightCrafter:
         in_1_delay_us: float = 0.0,
         in_2_falling: bool = False,
     ) -> None:
-        """Set all triggers; what is not given is reset."""
+        """Set all triggers; an argument that is absent is reset to its default."""
 
     def triggers(self) -> _Triggers:
         """Give the triggers to the nearest step."""
 
     def flips(self) -> tuple[bool, bool]:
-        """Tell whether the image is mirrored along the long and the short axis."""
+        """Give two flags: the image is mirrored along the long axis, along the short axis."""
 
     def set_flips(self, long_axis: bool, short_axis: bool) -> None:
         """Mirror the image; in pattern mode from the next image on."""
@@ -657,7 +663,7 @@ class LightCrafter:
         """Exchange dark and bright in all patterns."""
 
     def set_frozen(self, frozen: bool) -> None:
-        """Hold the image that is shown, whatever arrives."""
+        """Hold the current image; new video frames are ignored."""
 
 @final
 class Pattern:
@@ -681,7 +687,7 @@ class Pattern:
 
 @final
 class PatternSequence:
-    """What a projector shows, for how long, started by what; ValueError names the rule that is broken.
+    """Patterns with their exposures and their trigger; ValueError names the rule that a sequence breaks.
 
     `timings_us` has exposure and period for all patterns, or one pair for each. The source is video (`frame_rate_hz`)
     or flash (`images` in the order of use).
@@ -717,7 +723,7 @@ class PatternWindow:
     @property
     def output(self) -> str: ...
     def show(self, image: NDArray[np.uint8]) -> None:
-        """Show red, green, blue, (1140, 912, 3) uint8, until told otherwise."""
+        """Show red, green, blue, (1140, 912, 3) uint8, until the next image."""
 
     def close(self) -> None:
         """Close the window; closing twice is allowed."""
@@ -732,7 +738,7 @@ def udev_rule() -> tuple[str, str]:
     """Give the file and the line that let every user open a projector on Linux."""
 
 def power_on_drive() -> _Bytes3:
-    """Give the LED drive after power-on, also the limit of TI's own light engine."""
+    """Give the LED drive after power-on, which is also the limit of TI's light engine."""
 
 def exposure_in_frame_us(count: int, bit_depth: int, frame_rate_hz: float) -> int:
     """Give the exposure of each of `count` patterns that share a frame; ValueError when they do not fit."""

@@ -1,4 +1,4 @@
-//! NumPy arrays as the kernel sees them: borrowed, never copied; a wrong dtype is named in our own words.
+//! NumPy arrays, borrowed for the kernel and never copied; an array of the wrong type is an error that names its argument.
 
 use numpy::ndarray::{ArrayView2, Dim, Dimension, Ix};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
@@ -11,7 +11,7 @@ pub const CHANNELS: [&str; 4] = ["red", "green", "blue", "ir"];
 /// The images of a shot of a Bayer chip.
 pub const BAYER_IMAGES: [&str; 2] = ["raw", "ir"];
 
-/// Every error of the kernel is a value that cannot be used.
+/// Every error of the kernel is a ValueError: it concerns a value of the caller.
 pub fn value_error(error: quadfringe::Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
@@ -30,7 +30,7 @@ where
     Ok(Some(borrowed))
 }
 
-/// Borrow `object` as an array of this type and number of axes, or say what was expected and what came.
+/// Borrow `object` as an array of this type and number of axes, or raise TypeError with the expected and the actual array.
 pub fn expected<'py, T: Element, const N: usize>(
     name: &str,
     object: &Bound<'py, PyAny>,
@@ -44,7 +44,7 @@ where
     })
 }
 
-/// The TypeError that names the argument, what it should be and what it is.
+/// The TypeError that names the argument, the expected and the actual array.
 pub fn wrong_array(name: &str, expected: &str, object: &Bound<'_, PyAny>) -> PyErr {
     let actual = match object.cast::<PyUntypedArray>() {
         Ok(array) => format!("a {}D {} array", array.ndim(), array.dtype()),
@@ -53,7 +53,7 @@ pub fn wrong_array(name: &str, expected: &str, object: &Bound<'_, PyAny>) -> PyE
     PyTypeError::new_err(format!("{name}: expected {expected}, got {actual}"))
 }
 
-/// CRC-32 (that of zlib) of the bytes of an image in the order of its rows, by instructions made for it.
+/// CRC-32 (that of zlib) of the bytes of an image in the order of its rows, with the processor's CRC instructions.
 #[pyfunction]
 pub fn crc32(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<u32> {
     let bytes = expected::<u8, 2>("image", image)?;
@@ -96,7 +96,7 @@ impl<'py, const COUNT: usize> Images<'py, COUNT> {
     }
 }
 
-/// What the kernel reads of borrowed images.
+/// Views of borrowed images for the kernel.
 pub fn views<'a, T: Element, const COUNT: usize>(
     images: &'a [PyReadonlyArray<'_, T, Dim<[Ix; 2]>>; COUNT],
 ) -> [ArrayView2<'a, T>; COUNT] {

@@ -1,16 +1,15 @@
 //! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` knows the truth.
 
-use crate::arrays::{BAYER_IMAGES, CHANNELS, borrowed, expected, value_error};
+use crate::arrays::{BAYER_IMAGES, CHANNELS, expected, value_error};
 use crate::device::{Device, axis_named, layout_named, unknown};
+use crate::render::render_options;
 use ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
-use pyo3::exceptions::PyTypeError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use quadfringe::BayerPattern;
-use quadfringe::encoding::{Channel, FringeCode};
+use quadfringe::encoding::{Channel, Encoding};
 use quadfringe::optics::Pose;
-use quadfringe::rig::{self, Albedo, Beam, BitDepth, Demosaic, Light, Planes, Print, RenderOptions};
+use quadfringe::rig::{self, Light, Planes, Print, Projector};
 use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
 
 /// Camera and two projectors before a surface.
@@ -136,9 +135,9 @@ impl Bench {
         infrared_image: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let code = FringeCode::new(fringe_numbers, self.0.visible.width).map_err(value_error)?;
+        let encoding = Encoding::four_channel(fringe_numbers, self.0.visible.width).map_err(value_error)?;
         let image = infrared_image.map(|image| expected::<f32, 2>("infrared_image", image)).transpose()?;
-        let mut lights = Light::shot(&code);
+        let mut lights = Light::shot(&encoding).map_err(value_error)?;
         if let Some(image) = &image {
             lights[Channel::Ir.index()] = Light::Image(image.as_array());
         }
@@ -158,12 +157,12 @@ impl Bench {
         beam: Option<&str>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let beam = beam.map(beam_named).transpose()?;
+        let beam = beam.map(projector_named).transpose()?;
         let lights = Light::step(fringe_number, shift_rad, axis_named(axis)?, beam);
         self.render_lights(py, cast, &lights, options)
     }
 
-    /// The images with each channel lit evenly at a level of its own, 0 to 1.
+    /// The images with each channel lit evenly at its level, 0 to 1.
     #[pyo3(signature = (cast, levels, **options))]
     fn render_levels<'py>(
         &self,
@@ -213,7 +212,7 @@ fn named<'py, T: Element, const COUNT: usize>(
     Ok(named)
 }
 
-/// What the bench sees of a scene, and where each pixel is lit from.
+/// A scene as the camera of the bench sees it, with the projector pixels that light it.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct Cast(rig::Cast);
 
@@ -227,8 +226,8 @@ impl Cast {
     /// Column of a projector that lights each pixel, (H, W) float32.
     #[pyo3(signature = (*, infrared = false))]
     fn column_px<'py>(&self, py: Python<'py>, infrared: bool) -> Bound<'py, PyArray2<f32>> {
-        let beam = if infrared { Beam::Infrared } else { Beam::Visible };
-        py.detach(|| self.0.column_px(beam)).into_pyarray(py)
+        let projector = if infrared { Projector::Infrared } else { Projector::Visible };
+        py.detach(|| self.0.column_px(projector)).into_pyarray(py)
     }
 
     /// Where a surface is seen that a projector does not light, (H, W) bool.
@@ -242,60 +241,10 @@ impl Cast {
     }
 }
 
-/// The kernel's defaults with what is given put in their place.
-fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> {
-    let mut options = RenderOptions::default();
-    let mut patch_mm = None;
-    for (name, value) in given.into_iter().flatten() {
-        let name: String = name.extract()?;
-        match name.as_str() {
-            "albedo" => options.albedo = albedo(&value)?,
-            "patch_mm" => patch_mm = Some(value.extract()?),
-            "ambient" => options.ambient = value.extract()?,
-            "shading" => options.shading = value.extract()?,
-            "projector_exponent" => options.projector_exponent = value.extract()?,
-            "crosstalk" => options.crosstalk = value.extract()?,
-            "gain" => options.gain = value.extract()?,
-            "blur_px" => options.blur_px = value.extract()?,
-            "noise" => options.noise = value.extract()?,
-            "camera_offset" => options.camera_offset = value.extract()?,
-            "camera_exponent" => options.camera_exponent = value.extract()?,
-            "bayer" => {
-                options.bayer = Some(BayerPattern::from_name(value.extract()?).map_err(value_error)?);
-            }
-            "demosaic" => options.demosaic = Some(demosaic_named(value.extract()?)?),
-            "bit_depth" => options.bit_depth = BitDepth::from_bits(value.extract()?).map_err(value_error)?,
-            "seed" => options.seed = value.extract()?,
-            _ => {
-                return Err(PyTypeError::new_err(format!("render: no option is called {name:?}")));
-            }
-        }
-    }
-    if let (Some(side_mm), Albedo::Uniform(albedo)) = (patch_mm, &options.albedo) {
-        options.albedo = Albedo::Patches { side_mm, albedo: *albedo };
-    }
-    Ok(options)
-}
-
-/// One albedo for each channel, or an image of them.
-fn albedo(value: &Bound<'_, PyAny>) -> PyResult<Albedo> {
-    if let Some(image) = borrowed::<f32, 3>(value)? {
-        return Ok(Albedo::Image(image.to_owned_array()));
-    }
-    Ok(Albedo::Uniform(value.extract()?))
-}
-
-fn beam_named(name: &str) -> PyResult<Beam> {
+fn projector_named(name: &str) -> PyResult<Projector> {
     match name {
-        "visible" => Ok(Beam::Visible),
-        "infrared" => Ok(Beam::Infrared),
+        "visible" => Ok(Projector::Visible),
+        "infrared" => Ok(Projector::Infrared),
         _ => Err(unknown("beam", name, "visible or infrared")),
-    }
-}
-
-fn demosaic_named(name: &str) -> PyResult<Demosaic> {
-    match name {
-        "bilinear" => Ok(Demosaic::Bilinear),
-        _ => Err(unknown("demosaic", name, "bilinear")),
     }
 }

@@ -1,21 +1,17 @@
 //! `Decoder`: one call from four images to a shape.
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, value_error, views};
-use crate::device::{Device, unknown};
+use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
+use crate::device::Device;
 use crate::memory::Memory;
-use crate::pair::pair_of;
-use ndarray::{Ix2, Ix3};
+use crate::plan::{Choices, Geometry, planned};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::Sample;
-use quadfringe::height::{PairTable, Triangulator};
-use quadfringe::{BayerPattern, Conditioner, Decoded, FringeCode, Method, Options, Response, Shot};
+use quadfringe::{BayerPattern, Decoded, Encoding, Shot};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Arc, Mutex, PoisonError};
-
-/// Offset, exponent and knee of the four channels.
-pub type Responses = [(f32, f32, f32); 4];
 
 /// Decodes shots of one size; planned and checked when made.
 #[pyclass(frozen, module = "quadfringe._core")]
@@ -49,9 +45,9 @@ impl Decoder {
         channel_instants_us: Option<[f32; 4]>,
         threads: Option<usize>,
         dark: Option<[f32; 4]>,
-        response: Option<Responses>,
+        response: Option<[ResponseNumbers; 4]>,
         crosstalk: Option<[[f64; 4]; 4]>,
-        projector_response: Option<Responses>,
+        projector_response: Option<[ResponseNumbers; 4]>,
         ir_registration: Option<[[f64; 3]; 2]>,
         camera: Option<Device>,
         projector: Option<Device>,
@@ -59,34 +55,20 @@ impl Decoder {
         predeformed_z_mm: Option<f64>,
         depth_range_mm: Option<[f64; 2]>,
     ) -> PyResult<Self> {
-        let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
-        let plain = Options::default();
-        let options = Options {
-            method: method.map_or(Ok(plain.method), method_named)?,
-            modulation_min: modulation_min.unwrap_or(plain.modulation_min),
-            quality_min: quality_min.unwrap_or(plain.quality_min),
-            period_px: period_px.or(plain.period_px),
-            channel_instants_us: channel_instants_us.or(plain.channel_instants_us),
-        };
         let conditioner = conditioner_of(dark, response, crosstalk, projector_response, ir_registration);
-        let kernel = py.detach(|| {
-            let decoder = quadfringe::Decoder::new(code.clone(), shape, &conditioner, options)?;
-            let (Some(camera), Some(projector)) = (&camera, &projector) else {
-                return Ok(decoder);
-            };
-            let decoder = decoder.triangulate_with(Triangulator::new(&camera.0, &projector.0)?)?;
-            let Some(infrared) = &infrared else { return Ok(decoder) };
-            let pair = pair_of(projector, infrared, predeformed_z_mm)?;
-            decoder.unwrap_along_rays(PairTable::new(&camera.0, &pair, &code, depth_range_mm)?)
-        });
-        Ok(Self {
-            kernel: Mutex::new(kernel.map_err(value_error)?),
-            pool: threads.map(pool_of).transpose()?,
-            full_scale,
-            shape,
-            calibrated: camera.is_some() && projector.is_some(),
-            memory: Arc::default(),
-        })
+        let choices = Choices { method, modulation_min, quality_min, period_px, channel_instants_us };
+        let geometry = Geometry { camera, projector, infrared, predeformed_z_mm, depth_range_mm };
+        let plan = || {
+            let encoding = Encoding::four_channel(fringe_numbers, projector_width)?;
+            planned(
+                quadfringe::Decoder::builder(&encoding, shape).conditioner(conditioner),
+                &choices,
+                &geometry,
+            )
+        };
+        let kernel = Mutex::new(py.detach(plan).map_err(value_error)?);
+        let (pool, calibrated) = (threads.map(pool_of).transpose()?, geometry.devices().is_some());
+        Ok(Self { kernel, pool, full_scale, shape, calibrated, memory: Arc::default() })
     }
 
     /// The settings in force, the kernel's defaults included.
@@ -94,12 +76,13 @@ impl Decoder {
         let kernel = self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
         let options = kernel.options();
         let named = PyDict::new(py);
-        named.set_item("method", name_of(options.method))?;
+        named.set_item("method", options.method.name())?;
+        named.set_item("method_version", options.method.version())?;
         named.set_item("modulation_min", options.modulation_min)?;
         named.set_item("quality_min", options.quality_min)?;
         named.set_item("period_px", options.period_px)?;
-        named.set_item("channel_instants_us", options.channel_instants_us)?;
-        named.set_item("unwrapping", if kernel.searches_rays() { "pair" } else { "coaxial" })?;
+        named.set_item("channel_instants_us", options.channel_instants_us())?;
+        named.set_item("unwrapping", if options.searches_along_rays() { "pair" } else { "coaxial" })?;
         Ok(named)
     }
 
@@ -146,12 +129,12 @@ impl Decoder {
         shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
     ) -> PyResult<Decoded> {
         let decoded = py.detach(|| {
-            // A panic in an earlier shot leaves nothing behind that the next one does not write again. A thread of the pool must
-            // not wait for the lock: while a shot is decoded it may take up the next one.
+            // A poisoned lock is no harm: every shot writes all that it reads. The lock is taken outside the pool: a thread of
+            // the pool that waited for it could not work on the shot that holds it.
             let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
             let work = || {
                 let shot = scaled(shot(images)?, self.full_scale)?;
-                let mut maps = self.maps();
+                let mut maps = self.memory.maps(self.shape, self.calibrated);
                 kernel.decode_into(&shot, &mut maps).map(|()| maps)
             };
             match &self.pool {
@@ -160,22 +143,6 @@ impl Decoder {
             }
         });
         decoded.map_err(value_error)
-    }
-
-    /// Maps for the kernel to fill.
-    fn maps(&self) -> Decoded {
-        let [rows, columns] = self.shape;
-        let map = || self.memory.take(Ix2(rows, columns));
-        Decoded {
-            phase_rad: map(),
-            column_px: map(),
-            modulation: map(),
-            quality: map(),
-            wrong_order_probability: map(),
-            uncertainty_rad: (!self.calibrated).then(map),
-            uncertainty_mm: self.calibrated.then(map),
-            xyz_mm: self.calibrated.then(|| self.memory.take(Ix3(rows, columns, 3))),
-        }
     }
 
     fn maps_by_name<'py>(&self, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
@@ -196,52 +163,6 @@ impl Decoder {
             named.set_item("xyz_mm", self.memory.lend(py, xyz_mm)?)?;
         }
         Ok(named)
-    }
-}
-
-/// The shot with its white, where that is not the greatest value of the type.
-pub fn scaled<T: Sample>(shot: Shot<'_, T>, full_scale: Option<f32>) -> quadfringe::Result<Shot<'_, T>> {
-    match full_scale {
-        Some(full_scale) => shot.with_full_scale(full_scale),
-        None => Ok(shot),
-    }
-}
-
-/// What is known about the intensities; what is absent is ideal.
-pub fn conditioner_of(
-    dark: Option<[f32; 4]>,
-    response: Option<Responses>,
-    crosstalk: Option<[[f64; 4]; 4]>,
-    projector_response: Option<Responses>,
-    ir_registration: Option<[[f64; 3]; 2]>,
-) -> Conditioner {
-    let ideal = Conditioner::default();
-    Conditioner {
-        dark: dark.unwrap_or(ideal.dark),
-        response: response.map_or(ideal.response, |four| four.map(response_of)),
-        crosstalk: crosstalk.unwrap_or(ideal.crosstalk),
-        projector_response: projector_response.map_or(ideal.projector_response, |four| four.map(response_of)),
-        ir_registration: ir_registration.unwrap_or(ideal.ir_registration),
-    }
-}
-
-fn response_of((offset, exponent, knee): (f32, f32, f32)) -> Response {
-    Response { offset, exponent, knee }
-}
-
-fn name_of(method: Method) -> &'static str {
-    match method {
-        Method::Published => "published",
-        Method::Joint => "joint",
-    }
-}
-
-fn method_named(name: &str) -> PyResult<Method> {
-    match name {
-        "published" => Ok(Method::Published),
-        // Files and settings written before the method had this name say "best".
-        "joint" | "best" => Ok(Method::Joint),
-        _ => Err(unknown("method", name, "published or joint")),
     }
 }
 

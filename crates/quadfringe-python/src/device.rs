@@ -1,10 +1,10 @@
-//! What is projected and through which optics: `optimum`, `check_code`, `pattern`, `Device`.
+//! The encoding that is projected, and the optics: `optimum`, `check_code`, `pattern`, `Device`.
 
 use crate::arrays::value_error;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
-use quadfringe::encoding::{Axis, Channel, DmdLayout, FringeCode};
+use quadfringe::encoding::{self, Axis, Channel, DmdLayout, Encoding};
 use quadfringe::optics;
 
 /// A camera or a projector.
@@ -77,7 +77,7 @@ impl Device {
         (ray.origin_mm, ray.direction)
     }
 
-    /// Position in another device of what a position lights, or sees, on the plane z; None when it is not reached.
+    /// Position in another device of the point of the plane z that a position sees or lights; None without such a point.
     #[pyo3(signature = (position, other, z_mm))]
     fn through_plane(&self, position: [f64; 2], other: &Self, z_mm: f64) -> Option<[f64; 2]> {
         self.0.through_plane(position, &other.0, z_mm)
@@ -91,15 +91,15 @@ impl Device {
 /// Fringe numbers N, N - 1, N - sqrt(N).
 #[pyfunction]
 pub fn optimum(n: u32, projector_width: usize) -> PyResult<[f64; 3]> {
-    let code = FringeCode::optimum(n, projector_width).map_err(value_error)?;
-    Ok(code.numbers())
+    let four = || Encoding::optimum(n, projector_width)?.four_channel_view();
+    four().map(|four| four.numbers()).map_err(value_error)
 }
 
 /// The ambiguity margin in rad of fringe numbers over a projector.
 #[pyfunction]
 pub fn check_code(fringe_numbers: [f64; 3], projector_width: usize) -> PyResult<f64> {
-    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
-    Ok(code.ambiguity_margin_rad())
+    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
+    Ok(encoding.ambiguity_margin_rad())
 }
 
 /// Ideal image of a channel, (height, width) float32.
@@ -113,9 +113,10 @@ pub fn pattern<'py>(
     height: usize,
     layout: &str,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-    let code = FringeCode::new(fringe_numbers, width).map_err(value_error)?;
+    let encoding = Encoding::four_channel(fringe_numbers, width).map_err(value_error)?;
     let (channel, layout) = (channel_named(channel)?, layout_named(layout)?);
-    let image = py.detach(|| quadfringe::encoding::pattern(&code, channel, height, layout));
+    let channel = encoding.channels()[channel.index()];
+    let image = py.detach(|| encoding::pattern(&channel, [width, height], layout));
     Ok(image.into_pyarray(py))
 }
 
@@ -133,8 +134,7 @@ pub fn step_pattern<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (axis, layout) = (axis_named(axis)?, layout_named(layout)?);
     let size = [width, height];
-    let image =
-        py.detach(|| quadfringe::encoding::step_pattern(fringe_number, shift_rad, axis, size, layout));
+    let image = py.detach(|| encoding::step_pattern(fringe_number, shift_rad, axis, size, layout));
     Ok(image.map_err(value_error)?.into_pyarray(py))
 }
 

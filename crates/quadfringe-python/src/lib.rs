@@ -2,13 +2,16 @@
 
 mod arrays;
 mod bench;
+mod conditioner;
 mod decoder;
 mod device;
 mod height;
 mod memory;
 mod pair;
+mod plan;
 mod projector;
 mod published_stages;
+mod render;
 mod stages;
 
 use pyo3::prelude::*;

@@ -1,10 +1,10 @@
-//! Memory of the maps that go to Python, used again once Python has dropped them: the system takes longer to find fresh
-//! memory than the kernel takes to fill it.
+//! Memory of the maps that go to Python, used again once Python has dropped them: to find fresh memory takes the system
+//! longer than the kernel needs to fill it.
 
-use ndarray::{Array, Array1, Dimension};
+use ndarray::{Array, Array1, Dimension, Ix2, Ix3};
 use numpy::PyArray;
 use pyo3::prelude::*;
-use quadfringe::aligned_zeros;
+use quadfringe::Decoded;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Most maps that wait for a shot: those of two shots.
@@ -17,15 +17,31 @@ pub struct Memory {
 }
 
 impl Memory {
-    /// An array of numbers left over from another shot, or of zeros.
-    pub fn take<D: Dimension>(&self, shape: D) -> Array<f32, D> {
+    /// Maps for the kernel to fill, in memory of earlier shots; the kernel replaces those that are left empty.
+    pub fn maps(&self, [rows, columns]: [usize; 2], calibrated: bool) -> Decoded {
+        let map = || self.take(Ix2(rows, columns)).unwrap_or_default();
+        let mut maps = Decoded::default();
+        maps.phase_rad = map();
+        maps.column_px = map();
+        maps.modulation = map();
+        maps.quality = map();
+        maps.wrong_order_probability = map();
+        if calibrated {
+            maps.uncertainty_mm = self.take(Ix2(rows, columns));
+            maps.xyz_mm = self.take(Ix3(rows, columns, 3));
+        } else {
+            maps.uncertainty_rad = self.take(Ix2(rows, columns));
+        }
+        maps
+    }
+
+    /// An array left over from another shot.
+    fn take<D: Dimension>(&self, shape: D) -> Option<Array<f32, D>> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         // The latest first: some of it may still be in a cache.
-        let fitting = waiting.iter().rposition(|values| values.len() == shape.size());
-        match fitting.map(|at| waiting.remove(at)) {
-            Some(values) => values.into_shape_with_order(shape).expect("as many values as the shape has"),
-            None => aligned_zeros(shape),
-        }
+        let fitting = waiting.iter().rposition(|values| values.len() == shape.size())?;
+        let values = waiting.remove(fitting);
+        Some(values.into_shape_with_order(shape).expect("as many values as the shape has"))
     }
 
     /// Lend an array to Python; its memory comes back when the last NumPy array that looks at it is gone.

@@ -4,7 +4,7 @@ use crate::arrays::{expected, value_error};
 use crate::device::{Device, layout_named};
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
-use quadfringe::FringeCode;
+use quadfringe::Encoding;
 use quadfringe::height;
 use quadfringe::optics::CoaxialPair;
 use quadfringe::rig::{Bench, Light};
@@ -22,7 +22,7 @@ pub fn pair_of(
     predeformed_z_mm.map_or(Ok(pair.clone()), |z_mm| pair.predeformed(z_mm))
 }
 
-/// Image for the infrared projector that shows on a plane what the visible one would, (height, width) float32.
+/// Image with which the infrared projector lights a plane as the visible one would, (height, width) float32.
 #[pyfunction]
 #[pyo3(signature = (visible, infrared, fringe_number, *, z_mm, layout = "regular"))]
 pub fn predeform<'py>(
@@ -59,9 +59,9 @@ impl PairTable {
         depth_range_mm: Option<[f64; 2]>,
     ) -> PyResult<Self> {
         let plan = || {
-            let code = FringeCode::new(fringe_numbers, visible.0.width)?;
+            let encoding = Encoding::four_channel(fringe_numbers, visible.0.width)?;
             let pair = pair_of(&visible, &infrared, predeformed_z_mm)?;
-            height::PairTable::new(&camera.0, &pair, &code, depth_range_mm)
+            height::PairTable::new(&camera.0, &pair, &encoding, depth_range_mm)
         };
         py.detach(plan).map(Self).map_err(value_error)
     }

@@ -292,7 +292,7 @@ pub fn udev_rule() -> (&'static str, &'static str) {
     (lightcrafter::error::UDEV_FILE, lightcrafter::error::UDEV_RULE)
 }
 
-/// The drive of the LEDs after power-on, also the limit of TI's own light engine.
+/// The drive of the LEDs after power-on, which is also the limit of TI's light engine.
 #[pyfunction]
 pub fn power_on_drive() -> (u8, u8, u8) {
     Profile::POWER_ON_DRIVE.into()

@@ -3,7 +3,7 @@
 use crate::arrays::{expected, value_error};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
-use quadfringe::FringeCode;
+use quadfringe::Encoding;
 use quadfringe::stages::{self, Absolute, Blocks, Fringes, Limits};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
@@ -121,10 +121,10 @@ fn columns_from_phase<'py>(
     fringe_numbers: [f64; 3],
     projector_width: usize,
 ) -> PyResult<(Map<'py>, Map<'py>)> {
-    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
     let phase = map("phase_rad", phase_rad)?;
     let view = phase.as_array();
-    let found = py.detach(|| stages::columns_from_phase(&code, view));
+    let found = py.detach(|| stages::columns_from_phase(&encoding, view));
     Ok((found.phase_rad.into_pyarray(py), found.column_px.into_pyarray(py)))
 }
 

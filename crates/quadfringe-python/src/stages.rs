@@ -1,7 +1,7 @@
 //! The stages one by one, for those who teach or debug; all on (H, W) float32.
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, expected, value_error, views};
-use crate::decoder::{Responses, conditioner_of, scaled};
+use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
 use crate::device::unknown;
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::{self, ResponseEstimate, Sample};
 use quadfringe::stages::{self, Background, Band, Phases};
-use quadfringe::{BayerPattern, Conditioner, FringeCode, Shot};
+use quadfringe::{BayerPattern, Conditioner, Encoding, Shot};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
 
@@ -30,9 +30,9 @@ pub fn linear_light<'py>(
     ir: &Bound<'py, PyAny>,
     full_scale: Option<f32>,
     dark: Option<[f32; 4]>,
-    response: Option<Responses>,
+    response: Option<[ResponseNumbers; 4]>,
     crosstalk: Option<[[f64; 4]; 4]>,
-    projector_response: Option<Responses>,
+    projector_response: Option<[ResponseNumbers; 4]>,
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let known = (full_scale, conditioner_of(dark, response, crosstalk, projector_response, ir_registration));
@@ -56,9 +56,9 @@ pub fn linear_light_bayer<'py>(
     ir: &Bound<'py, PyAny>,
     full_scale: Option<f32>,
     dark: Option<[f32; 4]>,
-    response: Option<Responses>,
+    response: Option<[ResponseNumbers; 4]>,
     crosstalk: Option<[[f64; 4]; 4]>,
-    projector_response: Option<Responses>,
+    projector_response: Option<[ResponseNumbers; 4]>,
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
@@ -155,10 +155,10 @@ pub fn unwrap<'py>(
     fringe_numbers: [f64; 3],
     projector_width: usize,
 ) -> PyResult<(Map<'py>, Map<'py>)> {
-    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
     let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
     let views = Phases::from_array(maps.each_ref().map(PyReadonlyArray2::as_array));
-    let found = py.detach(|| stages::unwrap(&code, views)).map_err(value_error)?;
+    let found = py.detach(|| stages::unwrap(&encoding, views)).map_err(value_error)?;
     Ok((found.phase_rad.into_pyarray(py), found.margin.into_pyarray(py)))
 }
 
@@ -199,11 +199,11 @@ pub fn estimate_response_of_shot<'py>(
     fringe_numbers: [f64; 3],
     projector_width: usize,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let code = FringeCode::new(fringe_numbers, projector_width).map_err(value_error)?;
+    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
     let light = [map("red", red)?, map("green", green)?, map("blue", blue)?, map("ir", ir)?];
     let phase = map("phase_rad", phase_rad)?;
     let (views, phase) = (light.each_ref().map(PyReadonlyArray2::as_array), phase.as_array());
-    let work = || condition::estimate_response_of_shot(views, phase, &code);
+    let work = || condition::estimate_response_of_shot(views, phase, &encoding);
     let found = py.detach(work).map_err(value_error)?;
     let named = PyDict::new(py);
     for (name, estimate) in CHANNELS.into_iter().zip(found) {

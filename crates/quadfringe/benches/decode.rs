@@ -12,10 +12,10 @@ use criterion::{Criterion, criterion_group, criterion_main};
 use ndarray::Array2;
 use quadfringe::condition::linearise;
 use quadfringe::height::Triangulator;
-use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
+use quadfringe::rig::{Bench, Light, RenderOptions};
 use quadfringe::stages::{self, Background, Band, Phases};
 use quadfringe::{
-    BayerPattern, Conditioner, Decoded, Decoder, FringeCode, Method, Options, Result, Shot, surface,
+    BayerPattern, Conditioner, Decoded, Decoder, Encoding, Method, Options, Result, Shot, surface,
 };
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
@@ -29,27 +29,30 @@ const PERIOD_PX: f64 = 25.6;
 
 struct Scene {
     bench: Bench,
-    code: FringeCode,
+    encoding: Encoding,
     planes: [Array2<u8>; 4],
 }
 
 impl Scene {
     fn new() -> Result<Self> {
-        let (bench, code) = (Bench::reference(), FringeCode::optimum(36, 912)?);
+        let (bench, encoding) = (Bench::reference(), Encoding::optimum(36, 912)?);
         let cast = bench.cast(surface::scene("face", 0.0)?.as_ref());
         let options = RenderOptions { noise: 0.03, ..RenderOptions::default() };
-        let Planes::U8(planes) = bench.render(&cast, &Light::shot(&code), &options)? else {
-            unreachable!("the reference camera has 8 bits")
-        };
-        Ok(Self { bench, code, planes })
+        let planes = bench.render(&cast, &Light::shot(&encoding)?, &options)?.into_u8()?;
+        Ok(Self { bench, encoding, planes })
     }
 
     fn shot(&self) -> Result<Shot<'_, u8>> {
-        Shot::new(self.planes.each_ref().map(|map| map.view()))
+        Shot::try_from(&self.planes)
     }
 
     fn shape(&self) -> [usize; 2] {
         [self.planes[0].nrows(), self.planes[0].ncols()]
+    }
+
+    /// Maps of the size of the scene.
+    fn maps(&self) -> Result<Decoded> {
+        self.decoder(Method::published())?.decode(&self.shot()?)
     }
 
     fn triangulator(&self) -> Result<Triangulator> {
@@ -57,9 +60,9 @@ impl Scene {
     }
 
     fn decoder(&self, method: Method) -> Result<Decoder> {
-        let options = Options { method, ..Options::default() };
-        let decoder = Decoder::new(self.code.clone(), self.shape(), &Conditioner::default(), options)?;
-        decoder.triangulate_with(self.triangulator()?)
+        let options = Options::default().with_method(method);
+        let builder = Decoder::builder(&self.encoding, self.shape()).options(options);
+        builder.triangulator(self.triangulator()?).build()
     }
 }
 
@@ -119,7 +122,8 @@ fn copy(raw: &[u8], out: &mut [f32]) {
 
 fn floor(c: &mut Criterion) {
     let scene = Scene::new().expect("the reference bench renders");
-    let (floor, mut out) = (Floor::new(scene.shape()[1]), Decoded::new(scene.shape(), true));
+    let (floor, maps) = (Floor::new(scene.shape()[1]), scene.maps());
+    let mut out = maps.expect("the reference bench is calibrated");
     let mut group = c.benchmark_group("floor");
     group.sample_size(30);
     group
@@ -133,9 +137,10 @@ fn ratios(_: &mut Criterion) {
     let scene = Scene::new().expect("the reference bench renders");
     let shot = scene.shot().expect("four images of one size");
     let floor = Floor::new(scene.shape()[1]);
-    let mut out = Decoded::new(scene.shape(), true);
+    let mut out = scene.maps().expect("the reference bench is calibrated");
     let pools = [1, 2].map(|n| ThreadPoolBuilder::new().num_threads(n).build().expect("threads"));
-    for method in [Method::Published, Method::Joint] {
+    for method in [Method::published(), Method::joint()] {
+        let name = method.name();
         let mut decoder = scene.decoder(method).expect("the reference bench is calibrated");
         let mut least = [[f64::INFINITY; 2]; 2];
         for _ in 0..TURNS {
@@ -151,7 +156,7 @@ fn ratios(_: &mut Criterion) {
         }
         let [[one, floor_one], [two, floor_two]] = least;
         println!(
-            "{method:?}: {one:.2} ms on one thread, {:.2} times the floor; {two:.2} ms on two, {:.2} times the floor; \
+            "{name}: {one:.2} ms on one thread, {:.2} times the floor; {two:.2} ms on two, {:.2} times the floor; \
              one to two threads {:.2} times",
             one / floor_one,
             two / floor_two,
@@ -171,7 +176,7 @@ fn whole_shots(c: &mut Criterion) {
     let scene = Scene::new().expect("the reference bench renders");
     let mut group = c.benchmark_group("shot");
     group.sample_size(30);
-    for (name, method) in [("published", Method::Published), ("joint", Method::Joint)] {
+    for (name, method) in [("published", Method::published()), ("joint", Method::joint())] {
         let mut decoder = scene.decoder(method).expect("the reference bench is calibrated");
         let shot = scene.shot().expect("four images of one size");
         let mut out = decoder.decode(&shot).expect("a shot of the decoder's size");
@@ -209,7 +214,7 @@ fn stages(c: &mut Criterion) {
     let wrapped = [&red, &green, &infrared].map(|light| improved(light.view()).expect("a fair period"));
     let maps = wrapped.each_ref().map(|map| map.view());
     group.bench_function("ladder", |b| {
-        b.iter(|| stages::unwrap(&scene.code, black_box(Phases::from_array(maps))))
+        b.iter(|| stages::unwrap(&scene.encoding, black_box(Phases::from_array(maps))))
     });
     let triangulator = scene.triangulator().expect("the reference bench is calibrated");
     let columns = Array2::from_shape_fn(scene.shape(), |(_, x)| 100.0 + 0.7 * x as f32);

@@ -12,8 +12,8 @@
 
 use ndarray::Array2;
 use quadfringe::height::Triangulator;
-use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
-use quadfringe::{Conditioner, Decoded, Decoder, FringeCode, Method, Options, Shot, surface};
+use quadfringe::rig::{Bench, Light, RenderOptions};
+use quadfringe::{Decoded, Decoder, Encoding, Method, Options, Shot, surface};
 use rayon::prelude::*;
 use realfft::{RealFftPlanner, RealToComplex};
 use rustfft::num_complex::Complex32;
@@ -115,20 +115,20 @@ struct Contenders {
 
 impl Contenders {
     fn new() -> Outcome<Self> {
-        let (bench, code) = (Bench::reference(), FringeCode::optimum(36, 912)?);
+        let (bench, encoding) = (Bench::reference(), Encoding::optimum(36, 912)?);
         let cast = bench.cast(surface::scene("peaks", 0.0)?.as_ref());
         let options = RenderOptions { noise: 0.03, ..RenderOptions::default() };
-        let Planes::U8(planes) = bench.render(&cast, &Light::shot(&code), &options)? else {
-            unreachable!("the reference camera has 8 bits")
-        };
+        let planes = bench.render(&cast, &Light::shot(&encoding)?, &options)?.into_u8()?;
         let (rows, columns) = planes[0].dim();
         let decoder = |method| -> Outcome<(Decoder, Decoded)> {
-            let options = Options { method, ..Options::default() };
-            let plain = Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), options)?;
+            let options = Options::default().with_method(method);
             let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-            Ok((plain.triangulate_with(triangulator)?, Decoded::new([rows, columns], true)))
+            let builder = Decoder::builder(&encoding, [rows, columns]).options(options);
+            let mut decoder = builder.triangulator(triangulator).build()?;
+            let maps = decoder.decode(&Shot::try_from(&planes)?)?;
+            Ok((decoder, maps))
         };
-        let methods = [decoder(Method::Published)?, decoder(Method::Joint)?];
+        let methods = [decoder(Method::published())?, decoder(Method::joint())?];
         Ok(Self { floor: Floor::new(rows, columns), planes, methods })
     }
 

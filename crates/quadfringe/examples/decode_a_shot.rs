@@ -1,11 +1,11 @@
-//! Simulate one shot of the steps, decode it, and compare depth with the truth.
+//! Simulate one shot of the steps, decode it, and compare the depth with the truth.
 //!
 //! `cargo run --release --example decode_a_shot [scene]`
 
 use quadfringe::height::Triangulator;
-use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
+use quadfringe::rig::{Bench, Light, RenderOptions};
 use quadfringe::surface::scene;
-use quadfringe::{Conditioner, Decoder, FringeCode, Options, Shot};
+use quadfringe::{Decoder, Encoding, Shot};
 use std::error::Error;
 use std::time::Instant;
 
@@ -14,24 +14,22 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     // The forward half: what a camera would see.
     let bench = Bench::reference();
-    let code = FringeCode::optimum(36, bench.visible.width)?;
+    let encoding = Encoding::optimum(36, bench.visible.width)?;
     let cast = bench.cast(scene(&name, 0.0)?.as_ref());
     let render = RenderOptions { noise: 0.03, seed: 1, ..RenderOptions::default() };
-    let Planes::U8(images) = bench.render(&cast, &Light::shot(&code), &render)? else {
-        unreachable!("the default camera has 8 bit");
-    };
+    let images = bench.render(&cast, &Light::shot(&encoding)?, &render)?.into_u8()?;
 
     // The inverse half: planned once, then run for every shot.
     let (rows, columns) = images[0].dim();
-    let mut decoder = Decoder::new(code, [rows, columns], &Conditioner::default(), Options::default())?
-        .triangulate_with(Triangulator::new(&bench.camera, &bench.visible)?)?;
-    let shot = Shot::new(images.each_ref().map(|image| image.view()))?;
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
+    let mut decoder = Decoder::builder(&encoding, [rows, columns]).triangulator(triangulator).build()?;
+    let shot = Shot::try_from(&images)?;
     decoder.decode(&shot)?;
     let start = Instant::now();
     let decoded = decoder.decode(&shot)?;
     let decode_ms = 1e3 * start.elapsed().as_secs_f64();
 
-    let xyz_mm = decoded.xyz_mm.as_ref().expect("the decoder is calibrated");
+    let xyz_mm = decoded.xyz_mm.as_ref().expect("the decoder has a triangulator");
     let (truth_mm, edge_px) = (cast.depth_mm(), cast.edge_distance_px());
     let (mut sum, mut smooth, mut returned) = (0.0, 0usize, 0usize);
     for (at, truth) in truth_mm.indexed_iter() {

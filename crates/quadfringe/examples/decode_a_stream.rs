@@ -1,16 +1,16 @@
-//! Decode a stream: a camera that does not wait, one decoder, and maps that are used again for every shot.
+//! Decode a stream: a camera that does not wait, one decoder, and maps that every shot uses again.
 //!
-//! The camera of this example is the virtual bench before a moving hand, thirty times a second. It leaves every shot in a
-//! channel that holds one; a shot that finds the channel full is dropped, as a driver would, so that the decoder always works on
-//! a fresh one and never falls behind. Decoding allocates nothing once the first shot is through.
+//! The camera of this example is the virtual bench before a moving hand, thirty times a second. It sends every shot
+//! through a channel that holds one, and drops a shot that finds the channel full, as a driver would: the decoder works
+//! on a fresh shot and never falls behind. From the second shot on decoding allocates nothing.
 //!
 //! `cargo run --release --example decode_a_stream [shots]`
 
 use ndarray::Array2;
 use quadfringe::height::Triangulator;
-use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
+use quadfringe::rig::{Bench, Light, RenderOptions};
 use quadfringe::surface::Hand;
-use quadfringe::{Conditioner, Decoded, Decoder, Device, FringeCode, Options, Shot};
+use quadfringe::{Decoded, Decoder, Device, Encoding, Shot};
 use std::error::Error;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread;
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 const FRAME: Duration = Duration::from_millis(33);
 
-/// What a camera delivers: four images and the instant they belong to.
+/// One delivery of the camera: four images and the instant of their exposure.
 struct Frame {
     images: [Array2<u8>; 4],
     time_s: f64,
@@ -28,35 +28,35 @@ fn main() -> Result<(), Box<dyn Error>> {
     let shots = std::env::args().nth(1).map_or(Ok(8), |number| number.parse())?;
     let mut bench = Bench::reference();
     bench.camera = Device::pinhole(512, 384, [1290.3; 2], [255.5, 191.5])?;
-    let code = FringeCode::optimum(36, bench.visible.width)?;
+    let encoding = Encoding::optimum(36, bench.visible.width)?;
 
     // Planned and checked once.
     let shape = [bench.camera.height, bench.camera.width];
-    let mut decoder = Decoder::new(code.clone(), shape, &Conditioner::default(), Options::default())?
-        .triangulate_with(Triangulator::new(&bench.camera, &bench.visible)?)?;
-    let mut maps = Decoded::new(shape, true);
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
+    let mut decoder = Decoder::builder(&encoding, shape).triangulator(triangulator).build()?;
 
     let (sender, frames) = sync_channel(1);
     let camera =
-        thread::spawn(move || film(&bench, &code, shots, &sender).map_err(|error| error.to_string()));
-    follow(&mut decoder, &frames, &mut maps)?;
+        thread::spawn(move || film(&bench, &encoding, shots, &sender).map_err(|error| error.to_string()));
+    follow(&mut decoder, &frames)?;
     let dropped = camera.join().expect("the camera does not panic")?;
     println!("{dropped} of {shots} shots dropped");
     Ok(())
 }
 
-/// Decode until the camera stops. The maps hold the last shot.
-fn follow(decoder: &mut Decoder, frames: &Receiver<Frame>, maps: &mut Decoded) -> quadfringe::Result<()> {
+/// Decode until the camera stops.
+fn follow(decoder: &mut Decoder, frames: &Receiver<Frame>) -> quadfringe::Result<()> {
+    let mut maps = Decoded::default();
     for Frame { images, time_s } in frames {
         let start = Instant::now();
-        decoder.decode_into(&Shot::new(images.each_ref().map(|image| image.view()))?, maps)?;
+        decoder.decode_into(&Shot::try_from(&images)?, &mut maps)?;
         let decode_ms = 1e3 * start.elapsed().as_secs_f64();
 
-        let xyz_mm = maps.xyz_mm.as_ref().expect("the decoder is calibrated");
-        let uncertainty_mm = maps.uncertainty_mm.as_ref().expect("the decoder is calibrated");
-        let sure = maps.wrong_order_probability.indexed_iter().filter(|(_, wrong)| **wrong < 1e-3);
+        let xyz_mm = maps.xyz_mm.as_ref().expect("the decoder has a triangulator");
+        let uncertainty_mm = maps.uncertainty_mm.as_ref().expect("the decoder has a triangulator");
+        let valid = maps.wrong_order_probability.indexed_iter().filter(|(_, wrong)| **wrong < 1e-3);
         let depth = |at: (usize, usize)| (xyz_mm[[at.0, at.1, 2]], uncertainty_mm[at]);
-        let nearest = sure.map(|(at, _)| depth(at)).min_by(|a, b| a.0.total_cmp(&b.0));
+        let nearest = valid.map(|(at, _)| depth(at)).min_by(|a, b| a.0.total_cmp(&b.0));
         if let Some((z_mm, sigma_mm)) = nearest {
             println!("{time_s:.3} s: nearest point at {z_mm:.2} mm +- {sigma_mm:.2} mm, {decode_ms:.1} ms");
         }
@@ -64,23 +64,21 @@ fn follow(decoder: &mut Decoder, frames: &Receiver<Frame>, maps: &mut Decoded) -
     Ok(())
 }
 
-/// Send shots at the frame rate; gives how many the decoder had no time for.
+/// Send shots at the frame rate; returns the number of shots that the decoder had no time for.
 fn film(
     bench: &Bench,
-    code: &FringeCode,
+    encoding: &Encoding,
     shots: u64,
     sender: &SyncSender<Frame>,
 ) -> quadfringe::Result<usize> {
-    let lights = Light::shot(code);
+    let lights = Light::shot(encoding)?;
     let mut dropped = 0;
     for number in 0..shots {
         let start = Instant::now();
         let time_s = number as f64 * FRAME.as_secs_f64();
         let cast = bench.cast(&Hand::at(time_s)?);
         let render = RenderOptions { noise: 0.02, seed: number, ..RenderOptions::default() };
-        let Planes::U8(images) = bench.render(&cast, &lights, &render)? else {
-            unreachable!("the default camera has 8 bit");
-        };
+        let images = bench.render(&cast, &lights, &render)?.into_u8()?;
         match sender.try_send(Frame { images, time_s }) {
             Ok(()) => {}
             Err(TrySendError::Full(_)) => dropped += 1,

@@ -9,7 +9,7 @@ use ndarray::Array2;
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Albedo, Bench, BitDepth, Cast, Light, Planes, RenderOptions};
 use quadfringe::surface::scene;
-use quadfringe::{Conditioner, Decoded, Decoder, FringeCode, Options, Result, Shot};
+use quadfringe::{Decoded, Decoder, Encoding, Result, Shot};
 use std::f64::consts::PI;
 
 /// Pixels of a fringe of the reference bench: farther than this from edges a surface is smooth.
@@ -31,15 +31,13 @@ fn shots() -> [(&'static str, &'static str, RenderOptions); 6] {
     ]
 }
 
-fn decode(bench: &Bench, code: &FringeCode, planes: &Planes) -> Result<Decoded> {
+fn decode(bench: &Bench, encoding: &Encoding, planes: &Planes) -> Result<Decoded> {
     let (rows, columns) = planes.shape();
     let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-    let mut decoder =
-        Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), Options::default())?
-            .triangulate_with(triangulator)?;
+    let mut decoder = Decoder::builder(encoding, [rows, columns]).triangulator(triangulator).build()?;
     match planes {
-        Planes::U8(images) => decoder.decode(&Shot::new(images.each_ref().map(|image| image.view()))?),
-        Planes::U16(images) => decoder.decode(&Shot::new(images.each_ref().map(|image| image.view()))?),
+        Planes::U8(images) => decoder.decode(&Shot::try_from(images)?),
+        Planes::U16(images) => decoder.decode(&Shot::try_from(images)?),
         _ => unreachable!("the shots have full images of 8 and 16 bit"),
     }
 }
@@ -63,9 +61,9 @@ impl Rms {
 }
 
 /// One line of figures.
-fn report(name: &str, decoded: &Decoded, cast: &Cast, code: &FringeCode) {
+fn report(name: &str, decoded: &Decoded, cast: &Cast, encoding: &Encoding) {
     let (truth, edge, depth): (Array2<f32>, _, _) =
-        (cast.phase_rad(code), cast.edge_distance_px(), cast.depth_mm());
+        (cast.phase_rad(encoding), cast.edge_distance_px(), cast.depth_mm());
     let (xyz, sigma) = (&decoded.xyz_mm, &decoded.uncertainty_mm);
     let (xyz, sigma) = (xyz.as_ref().expect("calibrated"), sigma.as_ref().expect("calibrated"));
     let (mut smooth, mut near) = (Rms::default(), Rms::default());
@@ -97,13 +95,13 @@ fn report(name: &str, decoded: &Decoded, cast: &Cast, code: &FringeCode) {
 }
 
 fn main() -> Result<()> {
-    let (bench, code) = (Bench::reference(), FringeCode::optimum(36, 912)?);
+    let (bench, encoding) = (Bench::reference(), Encoding::optimum(36, 912)?);
     println!("returned, % of lit; phase RMS, rad: smooth, near edges; wrong orders, ppm: found, promised;");
     println!("share of smooth errors inside one standard deviation (0.683 of normal errors)");
     for (name, surface, render) in shots() {
         let cast = bench.cast(scene(surface, 0.0)?.as_ref());
-        let planes = bench.render(&cast, &Light::shot(&code), &render)?;
-        report(name, &decode(&bench, &code, &planes)?, &cast, &code);
+        let planes = bench.render(&cast, &Light::shot(&encoding)?, &render)?;
+        report(name, &decode(&bench, &encoding, &planes)?, &cast, &encoding);
     }
     Ok(())
 }

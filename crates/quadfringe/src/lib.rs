@@ -1,50 +1,70 @@
-//! Single-shot absolute 3D measurement by four-channel fringe projection.
+//! Single-shot absolute 3D measurement by four-channel fringe projection: from the images of one exposure to points in mm.
+//!
+//! A visible projector shows fringes in red, green and blue, an infrared projector a fourth set, and a camera with a
+//! visible and an infrared chip takes all four at one instant. R and B are in quadrature and give a wrapped phase at every
+//! pixel; G and IR, with other fringe numbers, tell which fringe it is. Phase gives the projector column that lights the
+//! pixel, and column and camera ray give the point.
+//!
+//! # Three doors
+//! 1. [`Decoder`]: one call from a [`Shot`] to the maps of [`Decoded`]. Start here.
+//! 2. [`stages`]: the steps of the published method one by one, to teach, to inspect, or to build another chain.
+//! 3. The parts: [`encoding`], [`condition`], [`height`], and the virtual bench in [`rig`] and [`surface`].
 //!
 //! # Conventions
-//! - Images are `(rows, columns)`, x to the right, y down, z forward, the origin at the centre of the top-left pixel.
-//! - Lengths in mm, phases in rad; maps of pixels are `f32`, geometry and fits `f64`. NaN means no data.
-//! - Four channels come in the order R, G, B, IR. R and B carry N1 fringes over the width W of the projector, G carries
-//!   N2 and IR N3: channel c shows `0.5 + 0.5 cos(Phi_c + shift_c)` with `Phi_c = 2 pi N_c u / W` at column u, shift
-//!   `pi/2` for B and 0 for the others. Column 0 has phase 0.
-//! - A device stands at `P_device = R P_camera + T`; distortion in OpenCV's order (k1, k2, p1, p2, k3).
+//! - **Arrays** are `(rows, columns)` or `(rows, columns, axes)`, row by row. x runs along the columns to the right, y along
+//!   the rows down, and pixel centres lie at whole numbers: the centre of the top-left pixel is the origin.
+//! - **No data** is NaN. No mask goes with a map.
+//! - **Units** stand in names: `height_mm`, `phase_rad`, `period_px`, `exposure_us`. Light is a fraction of full scale.
+//! - **Precision**: maps of pixels are `f32`, geometry and fits `f64`.
+//! - **Frames** are those of OpenCV: x right, y down, z forward. A device stands at `P_device = R P_camera + T`, and the
+//!   camera frame is the frame of all points. Lens distortion has the order (k1, k2, p1, p2, k3).
+//! - **Channels** of a shot come in the order R, G, B, IR. Channel `c` shows `0.5 + 0.5 cos(Phi_c + delta_c)` with
+//!   `Phi_c = 2 pi N_c u / W` at column `u` of a projector of `W` columns (S1). R and B have the same fringe number `N_c`;
+//!   `delta_c` is `pi/2` for B and 0 for the others. Phase is 0 at column 0.
+//! - **Wrapped phases** lie in `[-pi, pi]`. The absolute phase is that of R and B, counted from column 0.
+//! - **Equation numbers** (S1) to (S11) are those of `docs/method`.
+//! - **Threads**: work is spread over the current pool of rayon, and results are the same bits for any number of threads.
 //!
 //! # Map
-//! In the order light travels; a module uses only what stands above it.
+//! A module uses only modules above it in this table.
 //!
-//! | | |
+//! | module | contents |
 //! |---|---|
-//! | [`error`] | what can be wrong with an input |
-//! | [`encoding`] | what is projected: numbers, shifts, channels, ideal images |
-//! | [`optics`] | the pinhole device, of which a projector is an inverse one, and the Bayer chip |
-//! | [`surface`] | forward: what is measured, as implicit surfaces |
-//! | [`rig`] | forward: the virtual bench, from a surface to a shot |
-//! | [`condition`] | inverse: raw shot to linear light |
-//! | [`stages`] | inverse: the stages of the published method, each by itself: linear light to wrapped and absolute phase |
+//! | [`error`] | errors, with what was expected, what came and what to do |
+//! | [`encoding`] | the channels that are projected, their ideal images, the layout of the mirrors |
+//! | [`optics`] | pinhole devices (a projector is an inverse camera), poses, the Bayer chip |
+//! | [`surface`] | forward: surfaces to measure, as implicit functions |
+//! | [`rig`] | forward: the virtual bench, from a surface to the images of a shot |
+//! | [`condition`] | inverse: raw images to linear light |
+//! | [`stages`] | inverse: linear light to wrapped phases and to absolute phase, step by step |
 //! | [`height`] | inverse: absolute phase to mm |
-//! | `published` | inverse: the published method, strip by strip |
+//! | `published` | inverse: the method of the paper |
 //! | `joint` | inverse: the default method, which fits all four channels together |
-//! | [`decode`] | one shot through all of the inverse half, by either method |
+//! | [`decode`] | inverse: one shot through all steps, by either method |
 //!
-//! The forward half (surface, rig) and the inverse half (condition to decode) never import each other: they meet in
-//! tests, where `inverse(forward(h))` gives h back. The two methods never import each other either.
+//! The forward half (surface, rig) and the inverse half (condition to decode) never import each other. They meet in tests,
+//! where the inverse of a rendered surface is the surface. The two methods never import each other either.
 //!
 //! # A shot, there and back
 //! ```
-//! use quadfringe::rig::{Bench, Light, Planes, RenderOptions};
-//! use quadfringe::{Conditioner, Decoder, Device, FringeCode, Options, Shot, height::Triangulator, surface::scene};
+//! use quadfringe::rig::{Bench, Light, RenderOptions};
+//! use quadfringe::{Decoder, Device, Encoding, Shot, height::Triangulator, surface::scene};
 //!
+//! // Forward: what a camera of 256 x 192 pixels sees of a scene under four channels of fringes.
 //! let mut bench = Bench::reference();
 //! bench.camera = Device::pinhole(256, 192, [645.0; 2], [127.5, 95.5])?;
-//! let code = FringeCode::optimum(36, 912)?;
+//! let encoding = Encoding::optimum(36, 912)?;
 //! let cast = bench.cast(scene("peaks", 0.0)?.as_ref());
-//! let Planes::U8(shot) = bench.render(&cast, &Light::shot(&code), &RenderOptions::default())? else { panic!("8 bit") };
+//! let images = bench.render(&cast, &Light::shot(&encoding)?, &RenderOptions::default())?.into_u8()?;
 //!
+//! // Inverse: planned and checked once, then run for every shot.
 //! let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-//! let mut decoder = Decoder::new(code, [192, 256], &Conditioner::default(), Options::default())?
-//!     .triangulate_with(triangulator)?;
-//! let decoded = decoder.decode(&Shot::new(shot.each_ref().map(|image| image.view()))?)?;
-//! let depth_mm = decoded.xyz_mm.expect("calibrated")[[96, 128, 2]];
-//! assert!((depth_mm - cast.depth_mm()[[96, 128]]).abs() < 0.5);
+//! let mut decoder = Decoder::builder(&encoding, [192, 256]).triangulator(triangulator).build()?;
+//! let decoded = decoder.decode(&Shot::try_from(&images)?)?;
+//!
+//! let xyz_mm = decoded.xyz_mm.as_ref().expect("a decoder with a triangulator gives points");
+//! let (depth_mm, truth_mm) = (xyz_mm[[96, 128, 2]], cast.depth_mm()[[96, 128]]);
+//! assert!((depth_mm - truth_mm).abs() < 0.5);
 //! # Ok::<(), quadfringe::Error>(())
 //! ```
 
@@ -76,8 +96,8 @@ mod joint;
 pub mod decode;
 
 pub use condition::{Conditioner, Response, Shot};
-pub use decode::{Decoded, Decoder, Method, Options, aligned_zeros};
-pub use encoding::{Channel, DmdLayout, FringeCode};
+pub use decode::{Decoded, Decoder, DecoderBuilder, JointOptions, Method, Options, PublishedOptions};
+pub use encoding::{Channel, DmdLayout, Encoding};
 pub use error::{Error, Result};
 pub use optics::{BayerPattern, Device};
 

@@ -2,12 +2,13 @@
 
 mod common;
 
-use common::{bench, cast_scene, code, decode_planes, noisy};
+use common::{bench, bytes, cast_scene, code, decode_planes, noisy};
 use ndarray::{Array2, Array3};
 use quadfringe::rig::{Light, Planes};
 use quadfringe::stages::Phases;
 use quadfringe::{
-    Conditioner, Decoded, Decoder, Device, FringeCode, Method, Options, Response, Shot, condition, stages,
+    Conditioner, Decoded, Decoder, Device, Encoding, JointOptions, Method, Options, Response, Shot,
+    condition, stages,
 };
 
 type Four = [Array2<u8>; 4];
@@ -27,18 +28,15 @@ fn assert_says<T>(result: quadfringe::Result<T>, parts: &[&str]) {
 }
 
 fn decoder(method: Method) -> Decoder {
-    let options = Options { method, ..Options::default() };
-    Decoder::new(code(), [384, 512], &Conditioner::default(), options).expect("valid plan")
+    let builder = Decoder::builder(&code(), [384, 512]).options(Options::default().with_method(method));
+    builder.build().expect("valid plan")
 }
 
 fn shot_of_steps() -> Four {
     let bench = bench(2);
     let cast = cast_scene(&bench, "steps");
-    let planes = bench.render(&cast, &Light::shot(&code()), &noisy(2));
-    match planes.expect("valid scene") {
-        Planes::U8(planes) => planes,
-        other => panic!("expected 8 bit, got {other:?}"),
-    }
+    let lights = Light::shot(&code()).expect("four channels");
+    bytes(bench.render(&cast, &lights, &noisy(2)).expect("valid scene"))
 }
 
 fn returned(decoded: &Decoded) -> f64 {
@@ -57,13 +55,12 @@ fn sizes_are_named() {
     let mixed = Shot::new([whole.view(), odd.view(), whole.view(), whole.view()]);
     assert_says(mixed, &["G image", "[384, 512]", "[384, 511]"]);
     let small = Shot::new([odd.view(), odd.view(), odd.view(), odd.view()]).expect("one size");
-    let result = decoder(Method::Joint).decode(&small);
+    let result = decoder(Method::joint()).decode(&small);
     assert_says(result, &["shot", "[384, 512]", "[384, 511]"]);
     let empty = image(0, 8);
     let none = Shot::new([empty.view(), empty.view(), empty.view(), empty.view()]);
     assert_says(none, &["[0, 8]"]);
-    let conditioner = Conditioner::default();
-    let tiny = Decoder::new(code(), [8, 8], &conditioner, Options::default());
+    let tiny = Decoder::builder(&code(), [8, 8]).build();
     assert_says(tiny, &["[16, 16]", "[8, 8]"]);
 }
 
@@ -80,31 +77,30 @@ fn values_that_are_not_finite_are_counted() {
 fn codes_that_cannot_number_the_field_name_two_columns() {
     for numbers in [[16.0, 8.0, 4.0], [30.0, 30.0, 30.0], [36.0, 18.0, 9.0]] {
         let parts = ["cannot number", "912 columns", "look alike", "36, 35, 30"];
-        assert_says(FringeCode::new(numbers, 912), &parts);
+        assert_says(Encoding::four_channel(numbers, 912), &parts);
     }
-    assert_says(FringeCode::new([f64::NAN, 35.0, 30.0], 912), &["fringe number"]);
-    assert_says(FringeCode::new([-36.0, 35.0, 30.0], 912), &["-36"]);
-    assert_says(FringeCode::new([500.0, 35.0, 30.0], 912), &["500"]);
-    assert_says(FringeCode::optimum(35, 912), &["35"]);
+    assert_says(Encoding::four_channel([f64::NAN, 35.0, 30.0], 912), &["fringe number"]);
+    assert_says(Encoding::four_channel([-36.0, 35.0, 30.0], 912), &["-36"]);
+    assert_says(Encoding::four_channel([500.0, 35.0, 30.0], 912), &["500"]);
+    assert_says(Encoding::optimum(35, 912), &["35"]);
 }
 
 #[test]
 fn plans_out_of_range_are_refused() {
-    let plan = |conditioner: Conditioner, options| Decoder::new(code(), [64, 64], &conditioner, options);
-    let settings = |options| plan(Conditioner::default(), options);
+    let builder = || Decoder::builder(&code(), [64, 64]);
+    let settings = |options| builder().options(options).build();
     let plain = Options::default();
-    let modulation_min = f32::NAN;
-    assert_says(settings(Options { modulation_min, ..plain.clone() }), &["modulation_min", "NaN"]);
-    assert_says(settings(Options { quality_min: 1.0, ..plain.clone() }), &["quality_min"]);
-    assert_says(settings(Options { period_px: Some(1.0), ..plain.clone() }), &["period_px"]);
-    let instants = |instants| Options { channel_instants_us: Some(instants), ..plain.clone() };
-    assert_says(settings(instants([0.0, f32::NAN, 1.0, 0.0])), &["channel_instants_us", "finite", "NaN"]);
-    assert_says(settings(instants([5.0; 4])), &["channel_instants_us", "differ"]);
-    let published = Options { method: Method::Published, ..instants([-1.0, 0.0, 1.0, 0.0]) };
-    assert_says(settings(published), &["channel_instants_us", "joint"]);
+    assert_says(settings(plain.clone().with_modulation_min(f32::NAN)), &["modulation_min", "NaN"]);
+    assert_says(settings(plain.clone().with_quality_min(1.0)), &["quality_min"]);
+    assert_says(settings(plain.clone().with_period_px(1.0)), &["period_px"]);
+    let instants = |instants| {
+        settings(plain.clone().with_method(JointOptions::default().with_channel_instants_us(instants)))
+    };
+    assert_says(instants([0.0, f32::NAN, 1.0, 0.0]), &["channel_instants_us", "finite", "NaN"]);
+    assert_says(instants([5.0; 4]), &["channel_instants_us", "differ"]);
     let response = [Response { exponent: -1.0, ..Response::default() }; 4];
     let light = Conditioner { response, ..Conditioner::default() };
-    assert_says(plan(light, plain), &["exponent", "-1"]);
+    assert_says(builder().conditioner(light).build(), &["exponent", "-1"]);
 }
 
 #[test]
@@ -124,7 +120,7 @@ fn a_blind_channel_is_no_data() {
         for level in [0, 255] {
             let mut images = shot_of_steps();
             images[channel].fill(level);
-            let found = returned(&decode(Method::Joint, images));
+            let found = returned(&decode(Method::joint(), images));
             assert!(found < 0.01, "channel {channel} at {level}: {found}");
         }
     }
@@ -134,7 +130,7 @@ fn a_blind_channel_is_no_data() {
 fn four_equal_images_are_no_data() {
     let [red, ..] = shot_of_steps();
     let images = [red.clone(), red.clone(), red.clone(), red];
-    let found = returned(&decode(Method::Joint, images));
+    let found = returned(&decode(Method::joint(), images));
     assert!(found < 0.01, "{found}");
 }
 
@@ -146,12 +142,12 @@ fn exchanged_channels_leave_little_or_no_trust() {
         known.sort_by(f32::total_cmp);
         known.get(known.len() / 2).copied().unwrap_or(0.0)
     };
-    let sound = decode(Method::Joint, shot_of_steps());
+    let sound = decode(Method::joint(), shot_of_steps());
     assert!(returned(&sound) > 0.8, "{}", returned(&sound));
     for (first, second) in [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)] {
         let mut images = shot_of_steps();
         images.swap(first, second);
-        let decoded = decode(Method::Joint, images);
+        let decoded = decode(Method::joint(), images);
         let (trust, least) = (median(&decoded), median(&sound));
         println!("{first}{second}: median quality {trust}, sound {least}, returned {}", returned(&decoded));
         assert!(trust < 0.6 * least, "{first} for {second}: {trust} {least}");
@@ -164,7 +160,7 @@ fn saturated_parts_are_no_data_and_the_rest_stays() {
     for image in &mut images {
         image.slice_mut(ndarray::s![100..200, 100..300]).fill(255);
     }
-    let decoded = decode(Method::Joint, images);
+    let decoded = decode(Method::joint(), images);
     let inside = decoded.phase_rad.slice(ndarray::s![100..200, 100..300]);
     assert!(inside.iter().all(|p| p.is_nan()));
     assert!(returned(&decoded) > 0.7, "{}", returned(&decoded));

@@ -33,12 +33,12 @@ fn inner_phase_rms_rad(decoded: &Decoded, cast: &Cast) -> f64 {
     (sum / count as f64).sqrt()
 }
 
-fn found(bench: &Bench, cast: &Cast, render: &RenderOptions, method: Method) -> Score {
+fn found(bench: &Bench, cast: &Cast, render: &RenderOptions, method: &Method) -> Score {
     score(&there_and_back(bench, cast, &code(), render, method), cast, &code(), FRINGE_PX)
 }
 
 /// The same scene with all colours everywhere, from the raw mosaic, and from planes that the camera interpolated.
-fn three_ways(bench: &Bench, cast: &Cast, plain: &RenderOptions, method: Method) -> [Score; 3] {
+fn three_ways(bench: &Bench, cast: &Cast, plain: &RenderOptions, method: &Method) -> [Score; 3] {
     let raw = mosaic(plain);
     let bilinear = RenderOptions { demosaic: Some(Demosaic::Bilinear), ..raw.clone() };
     [plain, &raw, &bilinear].map(|render| found(bench, cast, render, method))
@@ -50,8 +50,8 @@ fn three_ways(bench: &Bench, cast: &Cast, plain: &RenderOptions, method: Method)
 fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
     let bench = bench(1);
     let cast = cast_scene(&bench, "peaks");
-    for (method, times_better) in [(Method::Published, 4.0), (Method::Joint, 1.05)] {
-        let [full, raw, bilinear] = three_ways(&bench, &cast, &clean(), method);
+    for (method, times_better) in [(Method::published(), 4.0), (Method::joint(), 1.05)] {
+        let [full, raw, bilinear] = three_ways(&bench, &cast, &clean(), &method);
         println!("{method:?}\n{full:?}\n{raw:?}\n{bilinear:?}");
         assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
         assert!(times_better * raw.phase_rms_rad < bilinear.phase_rms_rad, "{raw:?} {bilinear:?}");
@@ -65,7 +65,7 @@ fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
 fn a_mosaic_loses_no_orders_at_edges() {
     let bench = bench(1);
     let cast = cast_scene(&bench, "steps");
-    let [full, raw, _] = three_ways(&bench, &cast, &clean(), Method::Joint);
+    let [full, raw, _] = three_ways(&bench, &cast, &clean(), &Method::joint());
     println!("{full:?}\n{raw:?}");
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
@@ -79,7 +79,7 @@ fn a_noisy_mosaic_leaves_a_tenth_of_a_millimetre() {
     let bench = bench(1);
     for (seed, name) in (21..).zip(["steps", "face"]) {
         let cast = cast_scene(&bench, name);
-        let raw = found(&bench, &cast, &mosaic(&noisy(seed)), Method::Joint);
+        let raw = found(&bench, &cast, &mosaic(&noisy(seed)), &Method::joint());
         println!("{name}: {raw:?}");
         assert!(raw.depth_rms_mm < 0.10, "{name}: {raw:?}");
         assert!(raw.wrong_share() <= 1e-3, "{name}: {raw:?}");
@@ -110,9 +110,9 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         ir_registration: MISALIGNED,
         ..Conditioner::default()
     };
-    for method in [Method::Published, Method::Joint] {
-        let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), method);
-        let undone = there_and_back_by(&apart, &cast_apart, &code(), &flawed, method, &conditioner);
+    for method in [Method::published(), Method::joint()] {
+        let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), &method);
+        let undone = there_and_back_by(&apart, &cast_apart, &code(), &flawed, &method, &conditioner);
         let rms = [&plain, &undone].map(|decoded| inner_phase_rms_rad(decoded, &cast));
         let judged = score(&undone, &cast, &code(), FRINGE_PX);
         println!("{method:?} {rms:?} {judged:?}");
@@ -130,15 +130,15 @@ fn registration_costs_neither_phase_nor_orders() {
     let apart = bench.clone().with_infrared_chip(MISALIGNED).expect("regular");
     let conditioner = Conditioner { ir_registration: MISALIGNED, ..Conditioner::default() };
     let cases = [
-        ("peaks", clean(), Method::Published),
-        ("peaks", clean(), Method::Joint),
-        ("steps", clean(), Method::Joint),
-        ("steps", noisy(5), Method::Joint),
+        ("peaks", clean(), Method::published()),
+        ("peaks", clean(), Method::joint()),
+        ("steps", clean(), Method::joint()),
+        ("steps", noisy(5), Method::joint()),
     ];
     for (name, render, method) in cases {
         let [cast, cast_apart] = [&bench, &apart].map(|bench| cast_scene(bench, name));
-        let aligned = there_and_back(&bench, &cast, &code(), &render, method);
-        let registered = there_and_back_by(&apart, &cast_apart, &code(), &render, method, &conditioner);
+        let aligned = there_and_back(&bench, &cast, &code(), &render, &method);
+        let registered = there_and_back_by(&apart, &cast_apart, &code(), &render, &method, &conditioner);
         let rms = [&aligned, &registered].map(|decoded| inner_phase_rms_rad(decoded, &cast));
         let [aligned, registered] = [aligned, registered].map(|d| score(&d, &cast, &code(), FRINGE_PX));
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
@@ -173,7 +173,7 @@ fn what_is_no_mosaic_is_named() {
         bit_depth: BitDepth::Float,
         ..RenderOptions::default()
     };
-    let lights = quadfringe::rig::Light::shot(&code());
+    let lights = quadfringe::rig::Light::shot(&code()).expect("four channels");
     let error: Error = bench.render(&cast_scene(&bench, "plane"), &lights, &render).expect_err("no pattern");
     assert!(error.to_string().contains("demosaic"), "{error}");
 }

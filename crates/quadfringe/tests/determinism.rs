@@ -2,11 +2,10 @@
 
 mod common;
 
-use common::{bench, cast_scene, code, decode_planes, noisy, there_and_back};
+use common::{bench, bytes, cast_scene, code, decode_planes, decoder, noisy, there_and_back};
 use ndarray::Array2;
-use quadfringe::height::Triangulator;
-use quadfringe::rig::{Albedo, Bench, Light, Planes, RenderOptions};
-use quadfringe::{Conditioner, Decoded, Decoder, Device, Method, Options, Shot};
+use quadfringe::rig::{Albedo, Bench, Light, RenderOptions};
+use quadfringe::{Decoded, Decoder, Device, Method, Options, Shot};
 use rayon::ThreadPoolBuilder;
 
 fn bits(decoded: &Decoded) -> Vec<u32> {
@@ -31,18 +30,18 @@ fn printed() -> RenderOptions {
 #[test]
 fn threads_change_no_bit() {
     let bench = bench(2);
-    let cases = [(Method::Joint, noisy(5)), (Method::Joint, printed()), (Method::Published, noisy(5))];
+    let cases = [(Method::joint(), noisy(5)), (Method::joint(), printed()), (Method::published(), noisy(5))];
     for (method, options) in cases {
         let run = |threads: usize| {
             let pool = ThreadPoolBuilder::new().num_threads(threads).build();
             pool.expect("threads").install(|| {
                 let cast = cast_scene(&bench, "face");
-                bits(&there_and_back(&bench, &cast, &code(), &options, method))
+                bits(&there_and_back(&bench, &cast, &code(), &options, &method))
             })
         };
         let one = run(1);
         for threads in [2, 3] {
-            assert!(run(threads) == one, "{method:?}, {threads} threads");
+            assert!(run(threads) == one, "{}, {threads} threads", method.name());
         }
     }
 }
@@ -52,17 +51,19 @@ fn a_shot_leaves_nothing_behind() {
     let bench = bench(2);
     let shots = [("steps", noisy(5)), ("peaks", printed()), ("steps", noisy(5))].map(|(name, options)| {
         let cast = cast_scene(&bench, name);
-        let planes = bench.render(&cast, &Light::shot(&code()), &options);
+        let lights = Light::shot(&code()).expect("four channels");
+        let planes = bench.render(&cast, &lights, &options);
         planes.expect("a valid scene")
     });
-    for method in [Method::Joint, Method::Published] {
-        let options = Options { method, ..Options::default() };
+    for method in [Method::joint(), Method::published()] {
+        let name = method.name();
         let (rows, columns) = shots[0].shape();
+        let builder = Decoder::builder(&code(), [rows, columns]);
         let mut decoder =
-            Decoder::new(code(), [rows, columns], &Conditioner::default(), options).expect("valid options");
+            builder.options(Options::default().with_method(method)).build().expect("valid options");
         let [first, _, again] =
             shots.each_ref().map(|planes| bits(&decode_planes(&mut decoder, planes).expect("a valid shot")));
-        assert!(first == again, "{method:?}");
+        assert!(first == again, "{name}");
     }
 }
 
@@ -76,21 +77,18 @@ fn maps_may_hold_anything() {
         let camera = Device::pinhole(width, height, focal, centre).expect("valid camera");
         let bench = Bench { camera, ..whole };
         let cast = cast_scene(&bench, "steps");
-        let planes = bench.render(&cast, &Light::shot(&code()), &options).expect("a valid scene");
-        let Planes::U8(images) = &planes else { panic!("noisy images have 8 bit") };
-        let shot = Shot::new(images.each_ref().map(|image| image.view())).expect("equal images");
-        for method in [Method::Joint, Method::Published] {
-            let options = Options { method, ..Options::default() };
-            let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("valid devices");
-            let mut decoder = Decoder::new(code(), [height, width], &Conditioner::default(), options)
-                .and_then(|decoder| decoder.triangulate_with(triangulator))
-                .expect("valid options");
+        let lights = Light::shot(&code()).expect("four channels");
+        let images = bytes(bench.render(&cast, &lights, &options).expect("a valid scene"));
+        let shot = Shot::try_from(&images).expect("equal images");
+        for method in [Method::joint(), Method::published()] {
+            let name = method.name();
+            let mut decoder = decoder(&bench, Options::default().with_method(method));
             let mut decoded = decoder.decode(&shot).expect("a valid shot");
             let first = bits(&decoded);
             for round in 0..2 {
                 poison(&mut decoded);
                 decoder.decode_into(&shot, &mut decoded).expect("maps of the right size");
-                assert!(first == bits(&decoded), "{method:?}, {width} x {height}, round {round}");
+                assert!(first == bits(&decoded), "{name}, {width} x {height}, round {round}");
             }
         }
     }

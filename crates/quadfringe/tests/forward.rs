@@ -1,9 +1,9 @@
 //! The virtual bench against what it must be.
 
 use ndarray::{Array2, Array3};
-use quadfringe::encoding::{Channel, DmdLayout, FringeCode, pattern};
+use quadfringe::encoding::{Channel, DmdLayout, Encoding, pattern};
 use quadfringe::optics::{BayerPattern, Device};
-use quadfringe::rig::{Albedo, Beam, Bench, BitDepth, Light, Planes, RenderOptions};
+use quadfringe::rig::{Albedo, Bench, BitDepth, Light, Planes, Projector, RenderOptions};
 use quadfringe::surface::{Plane, scene};
 
 fn small(bench: Bench, shrink: usize) -> Bench {
@@ -43,10 +43,12 @@ fn identical_camera_and_projector_capture_the_projected_image() {
     let device = Device::pinhole(1024, 768, [focal; 2], [511.5, 383.5]).expect("valid device");
     let bench =
         Bench { camera: device.clone(), visible: device.clone(), infrared: device, ..Bench::reference() };
-    let code = FringeCode::optimum(36, 1024).expect("valid code");
+    let code = Encoding::optimum(36, 1024).expect("a valid encoding");
     let cast = bench.cast(&Plane::at_z(800.0));
-    let images = Channel::ALL.map(|channel| pattern(&code, channel, 768, DmdLayout::Regular));
-    let continuous = bench.render(&cast, &Light::shot(&code), &clean()).expect("valid scene");
+    let images = Channel::ALL
+        .map(|channel| pattern(&code.channels()[channel.index()], [1024, 768], DmdLayout::Regular));
+    let continuous =
+        bench.render(&cast, &Light::shot(&code).expect("four channels"), &clean()).expect("valid scene");
     let sampled = images.each_ref().map(|image| Light::Image(image.view()));
     let sampled = bench.render(&cast, &sampled, &clean()).expect("valid scene");
     for shot in [floats(continuous), floats(sampled)] {
@@ -67,19 +69,20 @@ fn rows_do_not_depend_on_the_number_of_threads() {
         seed: 11,
         ..RenderOptions::default()
     };
-    let code = FringeCode::optimum(36, 912).expect("valid code");
+    let code = Encoding::optimum(36, 912).expect("a valid encoding");
     let shots = [1, 2, 5].map(|threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
         pool.install(|| {
             let cast = bench.cast(scene("face", 0.0).expect("known scene").as_ref());
-            bench.render(&cast, &Light::shot(&code), &options).expect("valid scene")
+            bench.render(&cast, &Light::shot(&code).expect("four channels"), &options).expect("valid scene")
         })
     });
     assert_eq!(shots[0], shots[1]);
     assert_eq!(shots[0], shots[2]);
     let other = RenderOptions { seed: 12, ..options };
     let cast = bench.cast(scene("face", 0.0).expect("known scene").as_ref());
-    let again = bench.render(&cast, &Light::shot(&code), &other).expect("valid scene");
+    let again =
+        bench.render(&cast, &Light::shot(&code).expect("four channels"), &other).expect("valid scene");
     assert_ne!(shots[0], again);
 }
 
@@ -129,7 +132,7 @@ fn the_infrared_chip_has_rays_of_its_own() {
     let bench = small(Bench::reference(), 16);
     let apart = bench.clone().with_infrared_chip([[1.0, 0.0, 2.0], [0.0, 1.0, -1.0]]).expect("regular");
     let surface = scene("peaks", 0.0).expect("known scene");
-    let lights = Light::shot(&FringeCode::optimum(36, 912).expect("valid code"));
+    let lights = Light::shot(&Encoding::optimum(36, 912).expect("a valid encoding")).expect("four channels");
     let mut crosstalk = RenderOptions::default().crosstalk;
     crosstalk[3][0] = 0.2;
     let options = RenderOptions { bit_depth: BitDepth::Float, crosstalk, ..clean() };
@@ -177,7 +180,7 @@ fn steps_throw_shadows_and_have_edges() {
     assert!(dark > 100 && dark < 5000, "{dark}");
     let near = distance.iter().filter(|d| **d == 0.0).count();
     assert!(near > 300 && near < 8000, "{near}");
-    let column = cast.column_px(Beam::Visible);
+    let column = cast.column_px(Projector::Visible);
     for (column, dark) in column.iter().zip(&cast.shadow()) {
         assert_eq!(column.is_nan(), *dark);
     }

@@ -6,7 +6,7 @@ use ndarray::Array2;
 use proptest::prelude::*;
 use quadfringe::height::Triangulator;
 use quadfringe::optics::{Device, rotation_from_vector};
-use quadfringe::rig::{Beam, Bench};
+use quadfringe::rig::{Bench, Projector};
 use quadfringe::surface::{HeightMap, Interpolation, Plane, Sphere, Surface, Union, scene};
 
 prop_compose! {
@@ -85,7 +85,7 @@ proptest! {
     #[test]
     fn triangulation_gives_the_surface_back(bench in any_bench(), surface in any_surface()) {
         let cast = bench.cast(surface.as_ref());
-        let columns = cast.column_px(Beam::Visible);
+        let columns = cast.column_px(Projector::Visible);
         let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("beside the camera");
         let xyz = triangulator.xyz_mm(columns.view()).expect("same size");
         let mut lit = 0;

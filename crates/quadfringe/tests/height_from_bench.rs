@@ -1,10 +1,10 @@
 //! Phase to millimetres against simulated benches.
 
 use ndarray::{Array2, Axis};
-use quadfringe::FringeCode;
+use quadfringe::Encoding;
 use quadfringe::height::{CrossedAxes, PolynomialHeight, Triangulator};
 use quadfringe::optics::{Device, rotation_from_vector};
-use quadfringe::rig::{Beam, Bench};
+use quadfringe::rig::{Bench, Projector};
 use quadfringe::surface::Plane;
 
 /// Camera straight down on the plane z = L0; projector `d` to its left at the same height, its axis through the foot of
@@ -24,7 +24,7 @@ fn crossed_axes_bench(distance_mm: f64, baseline_mm: f64) -> Bench {
 fn analytic_geometry_agrees_with_a_ray_cast_of_its_layout() {
     let (distance_mm, baseline_mm, fringes) = (800.0, 230.0, 36.0);
     let bench = crossed_axes_bench(distance_mm, baseline_mm);
-    let code = FringeCode::optimum(36, 912).expect("valid code");
+    let code = Encoding::optimum(36, 912).expect("a valid encoding");
     // Period on the plane normal to the projector axis, at the distance of the crossing.
     let period_mm = 912.0 / fringes / 1570.0 * distance_mm.hypot(baseline_mm);
     let layout = CrossedAxes::new(distance_mm, baseline_mm, period_mm).expect("valid layout");
@@ -33,10 +33,10 @@ fn analytic_geometry_agrees_with_a_ray_cast_of_its_layout() {
     for height_mm in [-30.0, 5.0, 40.0, 120.0] {
         let object = bench.cast(&Plane::at_z(distance_mm - height_mm));
         for (on_plane, on_object) in reference.hits().iter().zip(object.hits()) {
-            if !on_plane.is_lit(Beam::Visible) || !on_object.is_lit(Beam::Visible) {
+            if !on_plane.is_lit(Projector::Visible) || !on_object.is_lit(Projector::Visible) {
                 continue;
             }
-            let phase = |column_px: f64| quadfringe::encoding::phase_at(&code, 0, column_px);
+            let phase = |column_px: f64| code.absolute_phase_rad(column_px);
             let difference_rad = phase(on_object.lit_from_px[0][0]) - phase(on_plane.lit_from_px[0][0]);
             let found = layout.height_from_phase(difference_rad, on_plane.xyz_mm[0]);
             assert!((found - height_mm).abs() < 1e-9, "{found} for {height_mm}");
@@ -51,7 +51,7 @@ fn analytic_geometry_agrees_with_a_ray_cast_of_its_layout() {
 #[test]
 fn polynomial_from_planes_measures_a_plane_between_them() {
     let bench = crossed_axes_bench(800.0, 200.0);
-    let code = FringeCode::optimum(36, 912).expect("valid code");
+    let code = Encoding::optimum(36, 912).expect("a valid encoding");
     let phase = |height_mm: f64| bench.cast(&Plane::at_z(800.0 - height_mm)).phase_rad(&code);
     let heights: Vec<f64> = (0..7).map(|i| 10.0 * f64::from(i)).collect();
     let maps: Vec<Array2<f32>> = heights.iter().map(|h| phase(*h)).collect();
@@ -73,7 +73,7 @@ fn triangulation_is_exact_over_depth_with_both_distortions() {
     let mut worst = 0f64;
     for z_mm in [650.0, 725.0, 800.0, 875.0, 950.0] {
         let cast = bench.cast(&Plane::at_z(z_mm));
-        let xyz = triangulator.xyz_mm(cast.column_px(Beam::Visible).view()).expect("same size");
+        let xyz = triangulator.xyz_mm(cast.column_px(Projector::Visible).view()).expect("same size");
         for (found, expected) in xyz.index_axis(Axis(2), 2).iter().zip(&cast.depth_mm()) {
             if found.is_finite() {
                 worst = worst.max(f64::from((found - expected).abs()));

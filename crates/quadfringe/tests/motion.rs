@@ -2,11 +2,10 @@
 
 mod common;
 
-use common::{bench, code, decode_planes};
-use quadfringe::height::Triangulator;
+use common::{bench, code, decode_planes, decoder};
 use quadfringe::rig::{Bench, Cast, Light, Planes, RenderOptions};
 use quadfringe::surface::{Hand, Plane, Surface};
-use quadfringe::{Conditioner, Decoded, Decoder, Options};
+use quadfringe::{Decoded, JointOptions, Options};
 use std::f32::consts::PI;
 
 /// R, G and B share a frame of 60 Hz; infrared is lit throughout.
@@ -19,18 +18,17 @@ fn film<S: Surface>(bench: &Bench, at: impl Fn(f64) -> S) -> (Planes, Cast) {
     let instants = [0, 1, 2].map(|c| f64::from(INSTANTS_US[c]) * 1e-6);
     let casts = instants.map(|time_s| bench.cast(&at(time_s)));
     let render = RenderOptions { noise: 0.03, seed: 3, ..RenderOptions::default() };
-    let planes = bench.render_moving(casts.each_ref(), &Light::shot(&code()), &render);
+    let lights = Light::shot(&code()).expect("four channels");
+    let planes = bench.render_moving(casts.each_ref(), &lights, &render);
     let [_, middle, _] = casts;
     (planes.expect("a valid scene"), middle)
 }
 
 fn decode(bench: &Bench, planes: &Planes, channel_instants_us: Option<[f32; 4]>) -> Decoded {
-    let (rows, columns) = planes.shape();
-    let options = Options { channel_instants_us, ..Options::default() };
-    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
-    let decoder = Decoder::new(code(), [rows, columns], &Conditioner::default(), options);
-    let mut decoder = decoder.and_then(|d| d.triangulate_with(triangulator)).expect("valid options");
-    decode_planes(&mut decoder, planes).expect("a valid shot")
+    let mut joint = JointOptions::default();
+    joint.channel_instants_us = channel_instants_us;
+    let options = Options::default().with_method(joint);
+    decode_planes(&mut decoder(bench, options), planes).expect("a valid shot")
 }
 
 /// RMS of the phase in rad over right orders a fringe away from edges and border; share of pixels with light that come back,

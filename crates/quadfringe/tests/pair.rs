@@ -3,13 +3,13 @@
 mod common;
 
 use common::{bench, clean, code, decode_planes, noisy};
-use quadfringe::encoding::phase_at;
 use quadfringe::height::{PairTable, Triangulator};
 use quadfringe::optics::CoaxialPair;
-use quadfringe::rig::{Beam, Bench, Cast, Light, RenderOptions};
+use quadfringe::rig::{Bench, Cast, Light, Projector, RenderOptions};
 use quadfringe::surface::{Plane, Surface, scene};
-use quadfringe::{Conditioner, Decoded, Decoder, DmdLayout, Method, Options, Result};
+use quadfringe::{Channel, Decoded, Decoder, DmdLayout, Options, PublishedOptions, Result};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 const DEPTHS_MM: [f64; 5] = [700.0, 750.0, 800.0, 850.0, 900.0];
 
@@ -39,19 +39,18 @@ fn decode(
     table: Option<PairTable>,
 ) -> Result<Decoded> {
     let code = code();
-    let mut lights = Light::shot(&code);
+    let mut lights = Light::shot(&code).expect("four channels");
     if let Some(ir) = ir {
         lights[3] = ir;
     }
     let planes = bench.render(cast, &lights, light)?;
     let (rows, columns) = planes.shape();
-    let options = Options { method: Method::Published, ..Options::default() };
-    let decoder = Decoder::new(code, [rows, columns], &Conditioner::default(), options)?;
-    let mut decoder = decoder.triangulate_with(Triangulator::new(&bench.camera, &bench.visible)?)?;
-    if let Some(table) = table {
-        decoder = decoder.unwrap_along_rays(table)?;
-    }
-    decode_planes(&mut decoder, &planes)
+    let mut published = PublishedOptions::default();
+    published.along_rays = table.map(Arc::new);
+    let builder = Decoder::builder(&code, [rows, columns])
+        .options(Options::default().with_method(published))
+        .triangulator(Triangulator::new(&bench.camera, &bench.visible)?);
+    decode_planes(&mut builder.build()?, &planes)
 }
 
 /// A fringe of the infrared light in pixels of the largest image here: nearer to a border of light the row filter leaks.
@@ -59,7 +58,7 @@ const BORDER_PX: usize = 17;
 
 /// Lit, returned and wrong pixels, of those that both projectors light, away from borders of light.
 fn counts(decoded: &Decoded, cast: &Cast) -> (usize, usize, usize) {
-    let (truth, lit) = (cast.phase_rad(&code()), cast.column_px(Beam::Infrared));
+    let (truth, lit) = (cast.phase_rad(&code()), cast.column_px(Projector::Infrared));
     let columns = truth.ncols();
     let whole = |(at, (t, ir)): (usize, (&f32, &f32))| {
         let x = at % columns;
@@ -81,21 +80,21 @@ fn counts(decoded: &Decoded, cast: &Cast) -> (usize, usize, usize) {
 /// Plain or pre-deformed, in both layouts, the table knows the infrared phase at every depth.
 #[test]
 fn the_table_knows_the_infrared_phase() {
-    let code = code();
+    let four = code().four_channel_view().expect("four channels");
     for layout in [DmdLayout::Regular, DmdLayout::Diamond] {
         let bench = apart(16, layout);
         for pair in [pair_of(&bench), pair_of(&bench).predeformed(800.0).expect("a depth")] {
             let limits = [(None, 0.03), (Some([690.0, 910.0]), 2e-3)];
             for (range_mm, limit) in limits {
-                let table = PairTable::new(&bench.camera, &pair, &code, range_mm).expect("valid pair");
+                let table = PairTable::new(&bench.camera, &pair, &code(), range_mm).expect("valid pair");
                 for z_mm in DEPTHS_MM {
                     let cast = bench.cast(&Plane::at_z(z_mm));
-                    let known = table.infrared_rad(cast.phase_rad(&code).view()).expect("same size");
+                    let known = table.infrared_rad(cast.phase_rad(&code()).view()).expect("same size");
                     for ((pixel, hit), known) in cast.hits().indexed_iter().zip(&known) {
-                        let lit = hit.is_lit(Beam::Visible);
+                        let lit = hit.is_lit(Projector::Visible);
                         let turns = pair.infrared_turns(hit.xyz_mm).filter(|_| lit);
                         let Some(turns) = turns else { continue };
-                        let error = known - phase_at(&code, 2, turns * 912.0) as f32;
+                        let error = known - four.phase_rad(Channel::Ir, turns * 912.0) as f32;
                         assert!(error.abs() < limit, "{layout:?} {range_mm:?} {z_mm} {pixel:?}: {error}");
                     }
                 }
@@ -165,15 +164,13 @@ fn bad_input_is_refused() {
         assert!(table(Some(range_mm)).is_err(), "{range_mm:?}");
     }
     assert!(pair_of(&bench).predeformed(-800.0).is_err());
-    let narrow = quadfringe::FringeCode::optimum(16, 400).expect("valid code");
+    let narrow = quadfringe::Encoding::optimum(16, 400).expect("a valid encoding");
     assert!(PairTable::new(&bench.camera, &pair_of(&bench), &narrow, None).is_err());
-    let plan = |shape, method| {
-        let options = Options { method, ..Options::default() };
-        let decoder = Decoder::new(code(), shape, &Conditioner::default(), options).expect("a plan");
-        decoder.unwrap_along_rays(table(None).expect("valid pair")).map(|decoder| decoder.searches_rays())
+    let plan = |shape| {
+        let published = PublishedOptions::default().with_along_rays(table(None).expect("valid pair"));
+        Decoder::builder(&code(), shape).options(Options::default().with_method(published)).build()
     };
-    assert_eq!(plan([48, 64], Method::Published), Ok(true));
-    assert!(plan([48, 60], Method::Published).is_err());
-    let refused = plan([48, 64], Method::Joint).expect_err("not yet").to_string();
-    assert!(refused.contains("published"), "{refused}");
+    assert!(plan([48, 64]).is_ok());
+    let refused = plan([48, 60]).map(|_| ()).expect_err("another camera").to_string();
+    assert!(refused.contains("camera of the calibrated pair") && refused.contains("[48, 60]"), "{refused}");
 }

@@ -5,16 +5,16 @@ mod common;
 use common::{cast_scene, decode_planes, score, there_and_back};
 use ndarray::{Array2, s};
 use proptest::prelude::*;
+use quadfringe::encoding::pattern;
+use quadfringe::height::Triangulator;
 use quadfringe::optics::rotation_from_vector;
 use quadfringe::rig::{Bench, BitDepth, Light, Planes, RenderOptions};
 use quadfringe::stages::{Absolute, Phases};
-use quadfringe::{
-    Channel, Conditioner, Decoder, Device, DmdLayout, FringeCode, Method, Options, Shot, encoding, stages,
-};
+use quadfringe::{Channel, Decoder, Device, DmdLayout, Encoding, Method, Shot, stages};
 use std::f64::consts::TAU;
 
 /// Fringe codes for a projector of 912 columns, whole numbers and others.
-fn any_code() -> impl Strategy<Value = FringeCode> {
+fn any_code() -> impl Strategy<Value = Encoding> {
     let triples = vec![
         [36.0, 35.0, 30.0],
         [25.0, 24.0, 20.0],
@@ -22,7 +22,7 @@ fn any_code() -> impl Strategy<Value = FringeCode> {
         [28.25, 27.3, 23.1],
         [45.714, 42.667, 40.0],
     ];
-    prop::sample::select(triples).prop_map(|numbers| FringeCode::new(numbers, 912).expect("valid"))
+    prop::sample::select(triples).prop_map(|numbers| Encoding::four_channel(numbers, 912).expect("valid"))
 }
 
 fn wrap(angle: f64) -> f64 {
@@ -30,18 +30,17 @@ fn wrap(angle: f64) -> f64 {
 }
 
 /// The images that a camera sees which sees the projector's columns one to one: a + b * pattern, and a shift of a.
-fn one_to_one(code: &FringeCode, rows: usize, offset: f32, scale: f32) -> [Array2<f32>; 4] {
+fn one_to_one(code: &Encoding, rows: usize, offset: f32, scale: f32) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
-        let image = encoding::pattern(code, channel, rows, DmdLayout::Regular);
+        let size_px = [code.projector_width(), rows];
+        let image = pattern(&code.channels()[channel.index()], size_px, DmdLayout::Regular);
         image.mapv(|light| offset + scale * light)
     })
 }
 
-fn best(code: &FringeCode, images: [Array2<f32>; 4]) -> quadfringe::Decoded {
+fn joint(code: &Encoding, images: [Array2<f32>; 4]) -> quadfringe::Decoded {
     let (rows, columns) = images[0].dim();
-    let mut decoder =
-        Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), Options::default())
-            .expect("valid options");
+    let mut decoder = Decoder::builder(code, [rows, columns]).build().expect("valid options");
     decode_planes(&mut decoder, &Planes::F32(images)).expect("valid shot")
 }
 
@@ -57,16 +56,18 @@ proptest! {
         errors in prop::collection::vec(-0.05..0.05f64, 96),
         strangers in prop::collection::vec(-3.1..3.1f32, 96),
     ) {
+        let four = code.four_channel_view().expect("four channels");
         let shape = (1, columns.len());
         let maps: [Array2<f32>; 3] = std::array::from_fn(|i| {
+            let channel = [Channel::R, Channel::G, Channel::Ir][i];
             Array2::from_shape_fn(shape, |(_, x)| {
-                wrap(encoding::phase_at(&code, i, columns[x]) + errors[32 * i + x]) as f32
+                wrap(four.phase_rad(channel, columns[x]) + errors[32 * i + x]) as f32
             })
         });
         let wrapped = Phases::from_array(maps.each_ref().map(|m| m.view()));
         let Absolute { phase_rad: phase, margin, .. } = stages::unwrap(&code, wrapped).expect("same size");
         for (x, column) in columns.iter().enumerate() {
-            let truth = encoding::phase_at(&code, 0, *column) + errors[x];
+            let truth = code.absolute_phase_rad(*column) + errors[x];
             prop_assert!((f64::from(phase[[0, x]]) - truth).abs() < 1e-3, "column {column}");
             prop_assert!((0.0..=1.0).contains(&margin[[0, x]]));
         }
@@ -110,10 +111,10 @@ proptest! {
         offset in 0.0..0.25f32,
         scale in 0.3..0.7f32,
     ) {
-        let code = FringeCode::optimum(16, 400).expect("valid code");
+        let code = Encoding::optimum(16, 400).expect("a valid encoding");
         let inner = s![12..52, 40..360];
-        let plain = best(&code, one_to_one(&code, 64, 0.05, 0.7));
-        let other = best(&code, one_to_one(&code, 64, 0.05 + offset, scale));
+        let plain = joint(&code, one_to_one(&code, 64, 0.05, 0.7));
+        let other = joint(&code, one_to_one(&code, 64, 0.05 + offset, scale));
         let (mut sum, mut most) = (0.0, 0.0f64);
         for (a, b) in plain.phase_rad.slice(inner).iter().zip(other.phase_rad.slice(inner)) {
             let apart = f64::from(a - b).abs();
@@ -168,13 +169,14 @@ proptest! {
         let cast = cast_scene(&bench, name);
         let render = RenderOptions { noise, seed, bit_depth: BitDepth::Twelve, ..RenderOptions::default() };
         // Twelve bits come in 16-bit words.
-        let planes = bench.render(&cast, &Light::shot(&code), &render).expect("valid scene");
+        let lights = Light::shot(&code).expect("four channels");
+        let planes = bench.render(&cast, &lights, &render).expect("valid scene");
         let Planes::U16(images) = &planes else { panic!("12 bit") };
         let (rows, columns) = planes.shape();
-        let mut decoder = Decoder::new(code.clone(), [rows, columns], &Conditioner::default(), Options::default())
-            .and_then(|d| d.triangulate_with(quadfringe::height::Triangulator::new(&bench.camera, &bench.visible)?))
-            .expect("valid plan");
-        let shot = Shot::new(images.each_ref().map(|i| i.view()))
+        let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("valid bench");
+        let builder = Decoder::builder(&code, [rows, columns]).triangulator(triangulator);
+        let mut decoder = builder.build().expect("valid plan");
+        let shot = Shot::try_from(images)
             .and_then(|shot| shot.with_full_scale(4095.0))
             .expect("valid shot");
         let decoded = decoder.decode(&shot).expect("valid shot");
@@ -191,8 +193,8 @@ proptest! {
 fn the_published_way_holds_on_a_small_bench() {
     let bench = common::bench(2);
     let cast = cast_scene(&bench, "plane");
-    let code = FringeCode::optimum(25, 912).expect("valid code");
-    let decoded = there_and_back(&bench, &cast, &code, &common::clean(), Method::Published);
+    let code = Encoding::optimum(25, 912).expect("a valid encoding");
+    let decoded = there_and_back(&bench, &cast, &code, &common::clean(), &Method::published());
     let found = score(&decoded, &cast, &code, 20.0);
     assert!(found.wrong_share() < 0.02, "{found:?}");
 }

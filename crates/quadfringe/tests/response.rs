@@ -7,7 +7,7 @@ use ndarray::Array2;
 use quadfringe::condition::{estimate_response_of_shot, linearise};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Albedo, Bench, Cast, Light, Planes, RenderOptions};
-use quadfringe::{Conditioner, Decoded, Decoder, Error, Options, Response, Shot};
+use quadfringe::{Conditioner, Decoded, Decoder, Error, Response, Shot};
 
 const FRINGE_PX: f32 = 14.0;
 
@@ -16,8 +16,8 @@ fn decode(bench: &Bench, planes: &Planes, response: [Response; 4]) -> Decoded {
         let (rows, columns) = planes.shape();
         let conditioner = Conditioner { response, ..Conditioner::default() };
         let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-        let mut decoder = Decoder::new(code(), [rows, columns], &conditioner, Options::default())?
-            .triangulate_with(triangulator)?;
+        let builder = Decoder::builder(&code(), [rows, columns]).conditioner(conditioner);
+        let mut decoder = builder.triangulator(triangulator).build()?;
         decode_planes(&mut decoder, planes)
     };
     work().expect("a valid scene")
@@ -25,7 +25,7 @@ fn decode(bench: &Bench, planes: &Planes, response: [Response; 4]) -> Decoded {
 
 fn captured(planes: &Planes) -> [Array2<f32>; 4] {
     let Planes::U8(images) = planes else { panic!("8 bit") };
-    let shot = Shot::new(images.each_ref().map(|image| image.view())).expect("one size");
+    let shot = Shot::try_from(images).expect("one size");
     linearise(&shot, &Conditioner::default()).expect("a valid shot")
 }
 
@@ -48,7 +48,7 @@ fn straightened(bench: &Bench, planes: &Planes, rounds: usize) -> (Decoded, [Res
 }
 
 fn render(bench: &Bench, cast: &Cast, options: &RenderOptions) -> Planes {
-    bench.render(cast, &Light::shot(&code()), options).expect("a valid scene")
+    bench.render(cast, &Light::shot(&code()).expect("four channels"), options).expect("a valid scene")
 }
 
 /// Nearly all of the phase error goes and no pixels are lost, with steps, curves and 3 % noise.

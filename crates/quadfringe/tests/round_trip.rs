@@ -16,7 +16,7 @@ fn without_noise_the_surface_comes_back() {
     let bench = bench(1);
     for name in ["plane", "peaks", "steps", "sphere", "face"] {
         let cast = cast_scene(&bench, name);
-        let decoded = there_and_back(&bench, &cast, &code(), &clean(), Method::Joint);
+        let decoded = there_and_back(&bench, &cast, &code(), &clean(), &Method::joint());
         let found = score(&decoded, &cast, &code(), FRINGE_PX);
         println!("{name}: {found:?}");
         assert!(found.phase_rms_rad < 0.005, "{name}: {found:?}");
@@ -32,7 +32,7 @@ fn noise_of_three_percent_leaves_a_tenth_of_a_millimetre() {
     let bench = bench(1);
     for (seed, name) in (11..).zip(["plane", "peaks", "steps", "sphere", "face"]) {
         let cast = cast_scene(&bench, name);
-        let decoded = there_and_back(&bench, &cast, &code(), &noisy(seed), Method::Joint);
+        let decoded = there_and_back(&bench, &cast, &code(), &noisy(seed), &Method::joint());
         let found = score(&decoded, &cast, &code(), FRINGE_PX);
         println!("{name}: {found:?}");
         assert!(found.depth_rms_mm <= 0.10, "{name}: {found:?}");
@@ -46,7 +46,7 @@ fn the_published_way_gives_a_smooth_surface_back() {
     let bench = bench(1);
     for name in ["plane", "peaks"] {
         let cast = cast_scene(&bench, name);
-        let decoded = there_and_back(&bench, &cast, &code(), &clean(), Method::Published);
+        let decoded = there_and_back(&bench, &cast, &code(), &clean(), &Method::published());
         let found = score(&decoded, &cast, &code(), FRINGE_PX);
         println!("{name}: {found:?}");
         assert!(found.phase_rms_rad < 0.05, "{name}: {found:?}");
@@ -58,7 +58,7 @@ fn the_published_way_gives_a_smooth_surface_back() {
 fn maps_agree_with_one_another() {
     let bench = bench(2);
     let cast = cast_scene(&bench, "steps");
-    let decoded = there_and_back(&bench, &cast, &code(), &noisy(3), Method::Joint);
+    let decoded = there_and_back(&bench, &cast, &code(), &noisy(3), &Method::joint());
     let xyz = decoded.xyz_mm.as_ref().expect("calibrated");
     let orders = decoded.order();
     for (at, &phase) in decoded.phase_rad.indexed_iter() {

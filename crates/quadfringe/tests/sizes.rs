@@ -4,19 +4,20 @@ mod common;
 
 use common::decode_planes;
 use ndarray::{Array2, s};
+use quadfringe::encoding::pattern;
 use quadfringe::rig::Planes;
-use quadfringe::{Channel, Conditioner, Decoder, DmdLayout, FringeCode, Method, Options, encoding};
+use quadfringe::{Channel, Decoder, DmdLayout, Encoding, Method, Options};
 use std::f64::consts::TAU;
 
 /// What a camera sees that sees the projector's columns one to one, but those from `step` on `shift` columns further.
-fn images(code: &FringeCode, shape: [usize; 2], step: usize, shift: usize) -> [Array2<f32>; 4] {
+fn images(code: &Encoding, shape: [usize; 2], step: usize, shift: usize) -> [Array2<f32>; 4] {
     seen(code, shape, move |_, x| (if x < step { x } else { x + shift }) as f64)
 }
 
 /// What a camera sees whose pixel `(y, x)` looks at column `source(y, x)`.
-fn seen(code: &FringeCode, shape: [usize; 2], source: impl Fn(usize, usize) -> f64) -> [Array2<f32>; 4] {
+fn seen(code: &Encoding, shape: [usize; 2], source: impl Fn(usize, usize) -> f64) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
-        let image = encoding::pattern(code, channel, 1, DmdLayout::Regular);
+        let image = pattern(&code.channels()[channel.index()], [912, 1], DmdLayout::Regular);
         Array2::from_shape_fn(shape, |(y, x)| {
             let column = source(y, x);
             let (left, part) = (column as usize, column.fract() as f32);
@@ -34,11 +35,12 @@ fn columns_come_back(
     border: usize,
     source: impl Fn(usize, usize) -> f64,
 ) {
-    let code = FringeCode::new(numbers, 912).expect("valid");
+    let code = Encoding::four_channel(numbers, 912).expect("valid");
     let images = Planes::F32(seen(&code, shape, &source));
-    for method in [Method::Joint, Method::Published] {
-        let options = Options { method, ..Options::default() };
-        let mut decoder = Decoder::new(code.clone(), shape, &Conditioner::default(), options).expect("valid");
+    for method in [Method::joint(), Method::published()] {
+        let name = method.name();
+        let options = Options::default().with_method(method);
+        let mut decoder = Decoder::builder(&code, shape).options(options).build().expect("valid");
         let phase = decode_planes(&mut decoder, &images).expect("valid shot").phase_rad;
         let (mut returned, mut worst) = (0, [0.0f64; 2]);
         for ((y, x), phase) in phase.indexed_iter().filter(|(_, phase)| phase.is_finite()) {
@@ -48,9 +50,9 @@ fn columns_come_back(
             returned += 1;
         }
         let share = f64::from(returned) / phase.len() as f64;
-        println!("{method:?} {shape:?}: {share:.4} returned, worst {worst:.4?} rad at the border and inside");
-        assert!(share > 0.96, "{method:?} {shape:?}: {share}");
-        assert!(worst[0] < 0.3 && worst[1] < 0.05, "{method:?} {shape:?}: {worst:?}");
+        println!("{name} {shape:?}: {share:.4} returned, worst {worst:.4?} rad at the border and inside");
+        assert!(share > 0.96, "{name} {shape:?}: {share}");
+        assert!(worst[0] < 0.3 && worst[1] < 0.05, "{name} {shape:?}: {worst:?}");
     }
 }
 
@@ -58,12 +60,11 @@ fn columns_come_back(
 fn every_size_and_period_gives_every_pixel_its_column() {
     // Fringes of 14, 29 and 59 pixels; sizes that no factor divides.
     for numbers in [[64.0, 63.0, 56.0], [31.0, 30.0, 26.0], [15.5, 14.5, 12.0]] {
-        let code = FringeCode::new(numbers, 912).expect("valid");
+        let code = Encoding::four_channel(numbers, 912).expect("valid");
         for shape in [[97, 601], [130, 643], [163, 702]] {
             let (step, shift) = (301, 101);
             let images = images(&code, shape, step, shift);
-            let mut decoder = Decoder::new(code.clone(), shape, &Conditioner::default(), Options::default())
-                .expect("valid");
+            let mut decoder = Decoder::builder(&code, shape).build().expect("valid");
             let phase = decode_planes(&mut decoder, &Planes::F32(images)).expect("valid shot").phase_rad;
             let (mut returned, mut worst) = (0, [0.0f64; 2]);
             for ((_, x), phase) in phase.indexed_iter().filter(|(_, phase)| phase.is_finite()) {
@@ -107,10 +108,10 @@ fn inclined_fringes_give_every_pixel_its_column() {
 
 #[test]
 fn the_border_is_measured_too() {
-    let code = FringeCode::new([31.0, 30.0, 26.0], 912).expect("valid");
+    let code = Encoding::four_channel([31.0, 30.0, 26.0], 912).expect("valid");
     let shape = [131, 643];
     let images = images(&code, shape, 643, 0);
-    let mut decoder = Decoder::new(code, shape, &Conditioner::default(), Options::default()).expect("valid");
+    let mut decoder = Decoder::builder(&code, shape).build().expect("valid");
     let phase = decode_planes(&mut decoder, &Planes::F32(images)).expect("valid shot").phase_rad;
     for row in [phase.slice(s![0, ..]), phase.slice(s![130, ..])] {
         assert!(row.iter().filter(|phase| phase.is_finite()).count() > 630);

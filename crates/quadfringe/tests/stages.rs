@@ -13,7 +13,8 @@ use quadfringe::stages::{
     discard_invalid, fill_gaps, fourier_pair, modulation, modulation_ratio, nearest_turn, repeat_rows,
     row_period_px, two_step, two_step_coarse, unwrap, wrong_order_probability,
 };
-use quadfringe::{Conditioner, Decoder, FringeCode, Method, Options, Response, Result, Shot};
+use quadfringe::{Conditioner, Decoder, Encoding, Options, PublishedOptions, Response, Result, Shot};
+use std::sync::Arc;
 
 /// Maps of a shot that was decoded by hand.
 struct Maps {
@@ -38,10 +39,10 @@ fn means(image: &Array2<f32>, rows: usize, columns: usize, period_px: f64) -> Re
 }
 
 /// The recipe of `published/mod.rs` with the steps in functions of this test.
-fn by_hand(light: [Array2<f32>; 4], code: &FringeCode, table: Option<&PairTable>) -> Result<Maps> {
+fn by_hand(light: [Array2<f32>; 4], code: &Encoding, table: Option<&PairTable>) -> Result<Maps> {
     let [red, green, blue, infrared] = light;
     let (height, width) = red.dim();
-    let numbers = Phases::from_array(code.numbers());
+    let numbers = Phases::from_array(code.four_channel_view()?.numbers());
     let period_px = row_period_px(red.view());
     let periods_px = numbers.map(|number| period_px * numbers.quadrature / number);
     let blocks = Blocks::for_periods(periods_px.green as f32, periods_px.infrared as f32, width);
@@ -98,7 +99,7 @@ fn by_hand(light: [Array2<f32>; 4], code: &FringeCode, table: Option<&PairTable>
 
 fn light_of(planes: &Planes, conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
     fn four<T: Sample>(planes: &[Array2<T>; 4], conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
-        linearise(&Shot::new(planes.each_ref().map(|plane| plane.view()))?, conditioner)
+        linearise(&Shot::try_from(planes)?, conditioner)
     }
     fn bayer<T: Sample>([raw, ir]: &[Array2<T>; 2], conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
         linearise(&Shot::bayer(raw.view(), BAYER, ir.view())?, conditioner)
@@ -122,17 +123,16 @@ fn bits(map: &Array2<f32>) -> Array2<u32> {
 fn compare(
     name: &str,
     planes: &Planes,
-    code: &FringeCode,
+    code: &Encoding,
     conditioner: &Conditioner,
     table: Option<PairTable>,
 ) -> (Blocks, usize) {
     let (rows, columns) = planes.shape();
-    let options = Options { method: Method::Published, ..Options::default() };
-    let mut decoder =
-        Decoder::new(code.clone(), [rows, columns], conditioner, options).expect("valid options");
-    if let Some(table) = table.clone() {
-        decoder = decoder.unwrap_along_rays(table).expect("a published decoder");
-    }
+    let mut published = PublishedOptions::default();
+    published.along_rays = table.clone().map(Arc::new);
+    let options = Options::default().with_method(published);
+    let builder = Decoder::builder(code, [rows, columns]).conditioner(conditioner.clone()).options(options);
+    let mut decoder = builder.build().expect("valid options");
     let decoded = decode_planes(&mut decoder, planes).expect("a valid shot");
     let light = light_of(planes, conditioner).expect("a valid shot");
     let found = by_hand(light, code, table.as_ref()).expect("fringes along the rows");
@@ -151,7 +151,8 @@ fn compare(
 }
 
 fn render(bench: &Bench, scene: &str, options: &RenderOptions) -> Planes {
-    bench.render(&cast_scene(bench, scene), &Light::shot(&code()), options).expect("a valid scene")
+    let lights = Light::shot(&code()).expect("four channels");
+    bench.render(&cast_scene(bench, scene), &lights, options).expect("a valid scene")
 }
 
 #[test]
@@ -166,10 +167,11 @@ fn stages_give_the_bits_of_the_decoder_for_scenes_of_every_size_of_blocks() {
         assert!(returned > 1000, "{scene}: {returned}");
         widths.push(blocks.columns);
     }
-    let coarse = FringeCode::optimum(16, 912).expect("valid code");
+    let coarse = Encoding::optimum(16, 912).expect("a valid encoding");
     let bench = bench(1);
     let cast = cast_scene(&bench, "face");
-    let planes = bench.render(&cast, &Light::shot(&coarse), &noisy(6)).expect("a valid scene");
+    let lights = Light::shot(&coarse).expect("four channels");
+    let planes = bench.render(&cast, &lights, &noisy(6)).expect("a valid scene");
     let (blocks, returned) = compare("coarse", &planes, &coarse, &Conditioner::default(), None);
     assert!(returned > 1000, "{returned}");
     widths.push(blocks.columns);

@@ -2,10 +2,9 @@
 
 mod common;
 
-use common::{bench, cast_scene, code, decode_planes};
-use quadfringe::height::Triangulator;
+use common::{bench, cast_scene, code, decode_planes, decoder};
 use quadfringe::rig::{Albedo, Bench, Cast, Light, RenderOptions};
-use quadfringe::{Conditioner, Decoded, Decoder, Method, Options};
+use quadfringe::{Decoded, Method, Options};
 use std::f32::consts::PI;
 
 /// A fringe of the reference bench: smooth parts are farther than this from edges and from the border.
@@ -28,12 +27,9 @@ fn decode(
         seed: 11,
         ..RenderOptions::default()
     };
-    let planes = bench.render(cast, &Light::shot(&code()), &render).expect("a valid scene");
-    let (rows, columns) = planes.shape();
-    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
-    let decoder = Decoder::new(code(), [rows, columns], &Conditioner::default(), options);
-    let mut decoder = decoder.and_then(|d| d.triangulate_with(triangulator)).expect("valid options");
-    decode_planes(&mut decoder, &planes).expect("a valid shot")
+    let lights = Light::shot(&code()).expect("four channels");
+    let planes = bench.render(cast, &lights, &render).expect("a valid scene");
+    decode_planes(&mut decoder(bench, options), &planes).expect("a valid shot")
 }
 
 /// Shares of the errors of smooth parts inside one, two and three standard deviations, of the depth.
@@ -59,13 +55,13 @@ fn inside(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
 const NORMAL: [f64; 3] = [0.683, 0.954, 0.997];
 
 /// Whether every share keeps within a tolerance, below and above, of those of normal errors.
-fn hold_shares(method: Method, surfaces: &[&str], below: [f64; 3], above: [f64; 3]) {
+fn hold_shares(method: &Method, surfaces: &[&str], below: [f64; 3], above: [f64; 3]) {
     let bench = bench(1);
     let mut off = Vec::new();
     for name in surfaces {
         let cast = cast_scene(&bench, name);
         for light in LIGHTS {
-            let decoded = decode(&bench, &cast, light, Options { method, ..Options::default() });
+            let decoded = decode(&bench, &cast, light, Options::default().with_method(method.clone()));
             let shares = inside(&decoded, &cast);
             let line = format!("{method:?} {name} {light:?}: {shares:.4?}");
             println!("{line}");
@@ -80,18 +76,18 @@ fn hold_shares(method: Method, surfaces: &[&str], below: [f64; 3], above: [f64; 
 fn errors_of_the_best_method_are_as_large_as_it_says() {
     // With little noise it is the method that is off: by less than is said on a plane, by more beside the shadows of the steps.
     let surfaces = ["plane", "peaks", "steps", "sphere"];
-    hold_shares(Method::Joint, &surfaces, [0.04, 0.04, 0.03], [0.11, 0.035, 0.003]);
+    hold_shares(&Method::joint(), &surfaces, [0.04, 0.04, 0.03], [0.11, 0.035, 0.003]);
 }
 
 /// Features smaller than the window are smoothed away by all four channels alike, which none of them can tell.
 #[test]
 fn errors_on_small_features_are_little_larger_than_it_says() {
-    hold_shares(Method::Joint, &["face"], [0.06, 0.1, 0.08], [0.04, 0.02, 0.003]);
+    hold_shares(&Method::joint(), &["face"], [0.06, 0.1, 0.08], [0.04, 0.02, 0.003]);
 }
 
 #[test]
 fn errors_of_the_published_method_are_as_large_as_it_says() {
-    hold_shares(Method::Published, &["plane", "peaks"], [0.04, 0.025, 0.01], [0.04, 0.025, 0.003]);
+    hold_shares(&Method::published(), &["plane", "peaks"], [0.04, 0.025, 0.01], [0.04, 0.025, 0.003]);
 }
 
 /// What the probabilities of a shot promise, before quality decides.
@@ -126,10 +122,11 @@ impl Promise {
     }
 }
 
-fn promise(method: Method, name: &str, light: (f64, f32, f64)) -> Promise {
+fn promise(method: &Method, name: &str, light: (f64, f32, f64)) -> Promise {
     let bench = bench(1);
     let cast = cast_scene(&bench, name);
-    let decoded = decode(&bench, &cast, light, Options { method, quality_min: 0.0, ..Options::default() });
+    let decoded =
+        decode(&bench, &cast, light, Options::default().with_method(method.clone()).with_quality_min(0.0));
     let found = Promise::of(&decoded, &cast);
     let Promise { returned, wrong, promised, sure, surely_wrong } = found;
     println!(
@@ -142,7 +139,7 @@ fn promise(method: Method, name: &str, light: (f64, f32, f64)) -> Promise {
 fn wrong_orders_of_the_best_method_are_not_more_than_promised() {
     for name in ["plane", "steps", "sphere", "face"] {
         for light in [LIGHTS[0], LIGHTS[1], LIGHTS[2]] {
-            let found = promise(Method::Joint, name, light);
+            let found = promise(&Method::joint(), name, light);
             assert!(found.wrong <= found.promised, "{name} {light:?}");
             // A bound that says something: few pixels are doubtful, and the others are right.
             assert!(found.promised < 0.006 * found.returned, "{name} {light:?}");
@@ -155,7 +152,7 @@ fn wrong_orders_of_the_best_method_are_not_more_than_promised() {
 #[test]
 fn wrong_orders_of_the_published_method_are_not_more_than_promised() {
     for name in ["plane", "steps"] {
-        let found = promise(Method::Published, name, LIGHTS[0]);
+        let found = promise(&Method::published(), name, LIGHTS[0]);
         assert!(found.wrong <= found.promised, "{name}");
     }
 }

@@ -6,7 +6,7 @@ use pyo3::exceptions::{
 };
 use pyo3::prelude::*;
 
-/// ValueError for what the caller chose, OSError and its kinds for what the device did.
+/// ValueError for a wrong argument, OSError and its subclasses for a failure of the device.
 pub fn device_error(error: Error) -> PyErr {
     let message = error.to_string();
     match error {

@@ -44,7 +44,7 @@ impl Pattern {
     }
 }
 
-/// What a projector shows, for how long, started by what.
+/// Patterns with their exposures and their trigger.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct PatternSequence(pub Sequence);
 

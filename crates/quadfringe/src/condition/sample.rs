@@ -81,7 +81,7 @@ impl Sample for f32 {
         match bad.next() {
             None => Ok(()),
             Some(((row, column), _)) => Err(Error::NotFinite {
-                what: format!("{channel} image"),
+                what: format!("{channel} image").into(),
                 count: 1 + bad.count(),
                 row,
                 column,

@@ -2,7 +2,7 @@
 
 use super::Sample;
 use crate::{BayerPattern, Channel, Error, Result};
-use ndarray::ArrayView2;
+use ndarray::{Array2, ArrayView2};
 
 /// The images of one exposure, all `(rows, columns)` of one type; views may be strided.
 #[derive(Debug, Clone)]
@@ -131,5 +131,34 @@ impl<'a, T: Sample> Shot<'a, T> {
         match &self.images {
             Images::Planes([.., infrared]) | Images::Bayer { infrared, .. } => infrared,
         }
+    }
+}
+
+/// Four images in the order R, G, B, IR, as of [`Shot::new`].
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::Shot;
+/// let images = [(); 4].map(|()| Array2::<u8>::zeros((4, 8)));
+/// assert_eq!(Shot::try_from(&images)?.shape(), [4, 8]);
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
+impl<'a, T: Sample> TryFrom<&'a [Array2<T>; 4]> for Shot<'a, T> {
+    type Error = Error;
+
+    fn try_from(images: &'a [Array2<T>; 4]) -> Result<Self> {
+        Self::new(images.each_ref().map(|image| image.view()))
+    }
+}
+
+/// The same of a list of four images.
+impl<'a, T: Sample> TryFrom<&'a [Array2<T>]> for Shot<'a, T> {
+    type Error = Error;
+
+    fn try_from(images: &'a [Array2<T>]) -> Result<Self> {
+        let four: Result<&[Array2<T>; 4]> = images
+            .try_into()
+            .map_err(|_| Error::value("images of a shot", "four images: R, G, B and IR", images.len()));
+        Self::try_from(four?)
     }
 }

@@ -1,71 +1,95 @@
-//! How a shot is to be decoded.
+//! The method of decoding, and the thresholds that every method has.
 
-use crate::{Error, Result};
+use super::method::Method;
+use crate::error::{Error, Limit, Result};
 
-/// Which way a shot is decoded.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Method {
-    /// As published: mean envelope, two-step, improved Fourier filter along rows, ladder point by point. Needs fringes
-    /// across the rows.
-    Published,
-    /// Local fit of all channels in any fringe direction, noise-aware phase, orders with spatial support.
-    #[default]
-    Joint,
-}
-
-/// What a user may choose; the defaults live here and nowhere else.
-#[derive(Debug, Clone, PartialEq)]
+/// The options of decoding. Their defaults stand here and nowhere else.
+///
+/// ```
+/// use quadfringe::Options;
+/// let options = Options::default().with_modulation_min(0.01).with_period_px(20.0);
+/// assert_eq!((options.modulation_min, options.quality_min), (0.01, 0.15));
+/// ```
+#[derive(Debug, Clone)]
+#[non_exhaustive]
 pub struct Options {
-    /// The way of decoding.
+    /// The method, with the choices that it alone has. Default: joint.
     pub method: Method,
-    /// Least modulation of R and B that counts as light, as a fraction of full scale.
+    /// Least modulation of R and B that counts as light, as a fraction of full scale. Lower it for dark surfaces, raise it
+    /// against noise in shadows. Default: 0.02.
     pub modulation_min: f32,
-    /// Least quality of an order that is trusted, in [0, 1].
+    /// Least quality of a fringe order that is returned, in [0, 1]. Raise it to lose wrong orders and points with them.
+    /// Default: 0.15.
     pub quality_min: f32,
-    /// Fringe period in camera pixels; `None` estimates it from every shot.
+    /// Fringe period in camera pixels, at least 3; `None` estimates it from every shot. Give it where one object in a
+    /// dark field makes the estimate fail. Default: `None`.
     pub period_px: Option<f64>,
-    /// Instants at which R, G, B and IR are seen (the middle of each exposure), in us from the instant that the result is to
-    /// stand for; `None` when all see the same. A projector that shows its colours one after another needs them when the
-    /// surface moves. [`Method::Joint`] alone can do this.
-    pub channel_instants_us: Option<[f32; 4]>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self {
-            method: Method::default(),
-            modulation_min: 0.02,
-            quality_min: 0.15,
-            period_px: None,
-            channel_instants_us: None,
-        }
+        Self { method: Method::default(), modulation_min: 0.02, quality_min: 0.15, period_px: None }
     }
 }
 
 impl Options {
-    pub(super) fn check(&self) -> Result<()> {
+    /// The same with this method.
+    #[must_use]
+    pub fn with_method(mut self, method: impl Into<Method>) -> Self {
+        self.method = method.into();
+        self
+    }
+
+    /// The same with this least modulation.
+    #[must_use]
+    pub const fn with_modulation_min(mut self, modulation_min: f32) -> Self {
+        self.modulation_min = modulation_min;
+        self
+    }
+
+    /// The same with this least quality.
+    #[must_use]
+    pub const fn with_quality_min(mut self, quality_min: f32) -> Self {
+        self.quality_min = quality_min;
+        self
+    }
+
+    /// The same with this fringe period in camera pixels.
+    #[must_use]
+    pub const fn with_period_px(mut self, period_px: f64) -> Self {
+        self.period_px = Some(period_px);
+        self
+    }
+
+    /// Instants of the channels, when the method has them.
+    #[must_use]
+    pub const fn channel_instants_us(&self) -> Option<[f32; 4]> {
+        match &self.method {
+            Method::Joint(joint) => joint.channel_instants_us,
+            Method::Published(_) => None,
+        }
+    }
+
+    /// Whether fringe orders are searched along the camera rays of a calibrated pair.
+    #[must_use]
+    pub const fn searches_along_rays(&self) -> bool {
+        matches!(&self.method, Method::Published(published) if published.along_rays.is_some())
+    }
+
+    /// For images of `shape` (rows, columns).
+    pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
         let fractions = [("modulation_min", self.modulation_min), ("quality_min", self.quality_min)];
         for (name, value) in fractions {
             if !(0.0..1.0).contains(&value) {
-                return Err(Error::value(name, "a fraction in [0, 1)", value));
+                return Err(Error::value(name, Limit::Fraction, value));
             }
         }
-        self.channel_instants_us.map_or(Ok(()), |instants| check_instants(instants, self.method))?;
         match self.period_px {
             Some(period) if !(period.is_finite() && period >= 3.0) => {
-                Err(Error::value("period_px", "at least 3 camera pixels", period))
+                return Err(Error::value("period_px (camera pixels)", Limit::AtLeast(3.0), period));
             }
-            _ => Ok(()),
+            _ => {}
         }
+        self.method.check(shape)
     }
-}
-
-fn check_instants(instants: [f32; 4], method: Method) -> Result<()> {
-    let expected = match method {
-        Method::Published => "none with the published method, which cannot undo motion; take the joint one",
-        Method::Joint if instants.iter().any(|t| !t.is_finite()) => "finite times",
-        Method::Joint if instants.iter().all(|t| *t == instants[0]) => "times that differ, or none",
-        Method::Joint => return Ok(()),
-    };
-    Err(Error::value("channel_instants_us", expected, format!("{instants:?}")))
 }

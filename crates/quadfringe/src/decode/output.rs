@@ -1,47 +1,43 @@
-//! What comes out of a shot.
+//! The maps of a decoded shot, and the last step of every method: columns and points from the absolute phase.
 
+use crate::encoding::FourChannel;
 use crate::height::Triangulator;
 use crate::parallel::{first_of_line, spare};
-use crate::{Error, FringeCode, Result};
 use multiversion::multiversion;
-use ndarray::{Array, Array1, Array2, Array3, Dimension, IntoDimension, s};
+use ndarray::{Array, Array1, Array2, Array3, Dimension, Ix2, Ix3, s};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Maps of one decoded shot, pixel by pixel on the visible chip; NaN is no data.
-#[derive(Debug, Clone)]
+/// Maps of one decoded shot, pixel by pixel of the visible chip; NaN is no data.
+///
+/// [`Decoder::decode`](crate::Decoder::decode) makes them. The default holds empty maps, which
+/// [`Decoder::decode_into`](crate::Decoder::decode_into) replaces.
+#[derive(Debug, Clone, Default)]
+#[non_exhaustive]
 pub struct Decoded {
-    /// Absolute phase of the first fringe number in rad, 0 at projector column 0.
+    /// Absolute phase of the first fringe number in rad, 0 at projector column 0; `(rows, columns)`, as all maps but the
+    /// last.
     pub phase_rad: Array2<f32>,
-    /// Projector column.
+    /// Column of the visible projector.
     pub column_px: Array2<f32>,
-    /// Modulation of R and B in linear light, as a fraction of full scale, by the published method the least of all channels;
-    /// known wherever there is light.
+    /// Modulation in linear light, as a fraction of full scale: that of R and B by the joint method, the least of all
+    /// channels by the published one. Known wherever there is light.
     pub modulation: Array2<f32>,
-    /// How far the order is from another one, in [0, 1]; known wherever there is light.
+    /// Margin of the fringe order over the next best one, in [0, 1]; known wherever there is light.
     pub quality: Array2<f32>,
-    /// Probability that the order is another one, in [0, 1]; an upper bound.
+    /// Upper bound of the probability that the fringe order is wrong, in [0, 1].
     pub wrong_order_probability: Array2<f32>,
-    /// Standard deviation of the absolute phase in rad, for the order that was chosen, when the decoder is not calibrated.
+    /// Standard deviation of the absolute phase in rad, given that the fringe order is right; of a decoder without
+    /// triangulator.
     pub uncertainty_rad: Option<Array2<f32>>,
-    /// Standard deviation of the depth Z in mm, for the order that was chosen, when the decoder is calibrated.
+    /// Standard deviation of the depth Z in mm, given that the fringe order is right; of a decoder with triangulator.
     pub uncertainty_mm: Option<Array2<f32>>,
-    /// Points in the camera frame in mm, `(rows, columns, 3)`, when the decoder is calibrated.
+    /// Points in the camera frame in mm, `(rows, columns, 3)`; of a decoder with triangulator.
     pub xyz_mm: Option<Array3<f32>>,
 }
 
-/// Zeros of `shape` that begin with a cache line, as [`Decoded::new`] makes them: vectors across two lines are written in two
-/// goes, and a decoder takes longer to fill maps that lie anywhere.
-///
-/// ```
-/// use quadfringe::aligned_zeros;
-/// let map = aligned_zeros((3, 5));
-/// assert_eq!(map.dim(), (3, 5));
-/// assert_eq!(map.as_ptr().addr() % 64, 0);
-/// ```
-#[must_use]
-pub fn aligned_zeros<S: IntoDimension>(shape: S) -> Array<f32, S::Dim> {
-    let shape = shape.into_dimension();
+/// Zeros of `shape` that begin with a cache line: a vector across two lines takes two stores, which slows a decoder down.
+fn aligned_zeros<D: Dimension>(shape: D) -> Array<f32, D> {
     let count = shape.size();
     let memory = vec![0.0; count + spare::<f32>()];
     let start = first_of_line(&memory);
@@ -49,66 +45,49 @@ pub fn aligned_zeros<S: IntoDimension>(shape: S) -> Array<f32, S::Dim> {
     aligned.into_shape_with_order(shape).expect("as many numbers as the shape has")
 }
 
-impl Decoded {
-    /// Maps for a decoder to fill, for images of `shape`.
-    #[must_use]
-    pub fn new(shape: [usize; 2], calibrated: bool) -> Self {
-        let map = || aligned_zeros(shape);
-        Self {
-            phase_rad: map(),
-            column_px: map(),
-            modulation: map(),
-            quality: map(),
-            wrong_order_probability: map(),
-            uncertainty_rad: (!calibrated).then(map),
-            uncertainty_mm: calibrated.then(map),
-            xyz_mm: calibrated.then(|| aligned_zeros([shape[0], shape[1], 3])),
-        }
+/// Replace a map of another shape or layout.
+fn fit<D: Dimension>(map: &mut Array<f32, D>, shape: D) {
+    if map.raw_dim() != shape || !map.is_standard_layout() {
+        *map = aligned_zeros(shape);
     }
+}
 
-    /// Fringe order: whole turns of the absolute phase, rounded down; NaN is no data.
+/// The same of a map that is wanted or not.
+fn fit_if<D: Dimension>(wanted: bool, map: &mut Option<Array<f32, D>>, shape: D) {
+    match map {
+        Some(map) if wanted => fit(map, shape),
+        _ => *map = wanted.then(|| aligned_zeros(shape)),
+    }
+}
+
+impl Decoded {
+    /// Fringe order of every pixel: whole turns of the absolute phase, rounded down; NaN is no data.
     ///
     /// ```
-    /// use quadfringe::Decoded;
-    /// let mut decoded = Decoded::new([1, 2], false);
-    /// decoded.phase_rad[[0, 1]] = 20.0;
-    /// assert_eq!(decoded.order(), ndarray::array![[0.0, 3.0]]);
+    /// use ndarray::array;
+    /// let mut decoded = quadfringe::Decoded::default();
+    /// decoded.phase_rad = array![[0.0, 20.0]];
+    /// assert_eq!(decoded.order(), array![[0.0, 3.0]]);
     /// ```
     #[must_use]
     pub fn order(&self) -> Array2<f32> {
         self.phase_rad.mapv(|phase| (phase / TAU).floor())
     }
 
-    pub(super) fn check(&self, shape: [usize; 2], calibrated: bool) -> Result<()> {
+    /// Make every map ready for a decoder of images of `shape`; those that are ready keep their memory.
+    pub(super) fn fit(&mut self, shape: [usize; 2], calibrated: bool) {
+        let [rows, columns] = shape;
         let maps = [
-            &self.phase_rad,
-            &self.column_px,
-            &self.modulation,
-            &self.quality,
-            &self.wrong_order_probability,
+            &mut self.phase_rad,
+            &mut self.column_px,
+            &mut self.modulation,
+            &mut self.quality,
+            &mut self.wrong_order_probability,
         ];
-        // One of the two, or rows would not know which to fill.
-        let (name, uncertainty, other) = match calibrated {
-            true => ("uncertainty_mm", &self.uncertainty_mm, &self.uncertainty_rad),
-            false => ("uncertainty_rad", &self.uncertainty_rad, &self.uncertainty_mm),
-        };
-        if uncertainty.is_none() || other.is_some() {
-            let only = format!("{name}, the only map of uncertainty");
-            return Err(Error::shape(only, &shape, &[0]));
-        }
-        for map in maps.into_iter().chain(uncertainty) {
-            if map.shape() != shape || !map.is_standard_layout() {
-                return Err(Error::shape("output map", &shape, map.shape()));
-            }
-        }
-        let expected = [shape[0], shape[1], 3];
-        match &self.xyz_mm {
-            Some(xyz) if xyz.shape() != expected || !xyz.is_standard_layout() => {
-                Err(Error::shape("xyz_mm", &expected, xyz.shape()))
-            }
-            None if calibrated => Err(Error::shape("xyz_mm", &expected, &[0])),
-            _ => Ok(()),
-        }
+        maps.into_iter().for_each(|map| fit(map, Ix2(rows, columns)));
+        fit_if(!calibrated, &mut self.uncertainty_rad, Ix2(rows, columns));
+        fit_if(calibrated, &mut self.uncertainty_mm, Ix2(rows, columns));
+        fit_if(calibrated, &mut self.xyz_mm, Ix3(rows, columns, 3));
     }
 
     /// All maps row by row, for an engine to fill.
@@ -125,10 +104,11 @@ impl Decoded {
             &mut self.modulation,
             &mut self.quality,
             &mut self.wrong_order_probability,
-            self.uncertainty_mm.as_mut().or(self.uncertainty_rad.as_mut()).expect("checked"),
+            self.uncertainty_mm.as_mut().or(self.uncertainty_rad.as_mut()).expect("one of the two is there"),
         ];
-        let mut maps = maps.map(|map| map.as_slice_mut().expect("checked layout").chunks_exact_mut(width));
-        let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("checked layout"));
+        let mut maps =
+            maps.map(|map| map.as_slice_mut().expect("fitted maps are contiguous").chunks_exact_mut(width));
+        let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("fitted maps are contiguous"));
         let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
         let mut next = || {
             let [phase, column, modulation, quality, wrong, sigma] = maps.each_mut().map(Iterator::next);
@@ -155,24 +135,25 @@ pub(crate) struct OutputRow<'a> {
     pub column: &'a mut [f32],
     pub modulation: &'a mut [f32],
     pub quality: &'a mut [f32],
-    /// Probability of another order.
+    /// Wrong-order probability.
     pub wrong: &'a mut [f32],
     /// Standard deviation: of the phase until the row is finished, then of the depth when calibrated.
     pub sigma: &'a mut [f32],
     pub xyz: Option<&'a mut [f32]>,
 }
 
-/// The last step of either method, row by row: columns, points and their uncertainty from the phase and its own.
+/// The last step of either method, row by row: columns and points from the absolute phase, with their uncertainty.
 pub(crate) struct Finish<'a> {
-    pub code: &'a FringeCode,
+    pub four: &'a FourChannel,
     pub triangulator: Option<&'a Triangulator>,
 }
 
 impl Finish<'_> {
-    /// Row `y`, of which phase, modulation, quality, uncertainty of the phase and probability of a wrong order are known.
+    /// Finish row `y`, of which phase, modulation, quality, uncertainty of the phase and wrong-order probability are
+    /// known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
-        let columns_per_rad = self.code.period_px(0) as f32 / TAU;
-        let end = self.code.projector_width() as f32 + 0.5;
+        let columns_per_rad = self.four.period_px() as f32 / TAU;
+        let end = self.four.projector_width as f32 + 0.5;
         let sigma_unit = if self.triangulator.is_some() { columns_per_rad } else { 1.0 };
         fill_columns(Projection { columns_per_rad, end, sigma_unit }, row);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {

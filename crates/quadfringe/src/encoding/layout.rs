@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use ndarray::Array2;
 
-use super::{Channel, FringeCode, phase_at};
+use super::ChannelCode;
 use crate::error::{Error, Result};
 
 /// How the mirrors of a projector's micromirror array lie.
@@ -70,24 +70,26 @@ pub(crate) fn row_shift(layout: DmdLayout, row: usize) -> f64 {
     }
 }
 
-/// Ideal image of a channel, `(height, projector width)`, linear light from 0 to 1 (S1).
+/// Ideal image of one channel for a projector of `[width, height]` mirrors, `(height, width)`, linear light from 0 to 1
+/// (S1). [`Encoding::patterns`](super::Encoding::patterns) gives those of all channels.
 ///
 /// ```
-/// use quadfringe::encoding::{Channel, DmdLayout, FringeCode, pattern};
-/// let code = FringeCode::optimum(36, 912)?;
-/// let red = pattern(&code, Channel::R, 1140, DmdLayout::Regular);
+/// use quadfringe::encoding::{DmdLayout, Encoding, pattern};
+/// let encoding = Encoding::optimum(36, 912)?;
+/// let red = pattern(&encoding.channels()[0], [912, 1140], DmdLayout::Regular);
 /// assert_eq!((red.dim(), red[[0, 0]]), ((1140, 912), 1.0));
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
 #[must_use]
-pub fn pattern(code: &FringeCode, channel: Channel, height: usize, layout: DmdLayout) -> Array2<f32> {
+pub fn pattern(channel: &ChannelCode, [width, height]: [usize; 2], layout: DmdLayout) -> Array2<f32> {
     let level = |row: usize, column: usize| {
-        let phase = phase_at(code, channel.phase_index(), mirror_column(layout, row, column));
-        (0.5 + 0.5 * (phase + channel.shift_rad()).cos()) as f32
+        let phase = channel.phase_rad(mirror_column(layout, row, column), width);
+        (0.5 + 0.5 * (phase + channel.shift_rad).cos()) as f32
     };
+    // All even rows are alike, and all odd ones.
     let kinds: Vec<Vec<f32>> =
-        (0..2).map(|row| (0..code.projector_width).map(|column| level(row, column)).collect()).collect();
-    Array2::from_shape_fn((height, code.projector_width), |(row, column)| kinds[row % 2][column])
+        (0..2).map(|row| (0..width).map(|column| level(row, column)).collect()).collect();
+    Array2::from_shape_fn((height, width), |(row, column)| kinds[row % 2][column])
 }
 
 /// Ideal image of one step of an N-step capture, `(height, width)`, linear light `0.5 + 0.5 cos(2 pi number u / size + shift)`
@@ -127,12 +129,14 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
+    use crate::encoding::Encoding;
 
     #[test]
     fn diamond_rows_are_shifted() {
-        let code = FringeCode::optimum(36, 912).expect("valid code");
-        let image = pattern(&code, Channel::B, 4, DmdLayout::Diamond);
-        let expected = 0.5 + 0.5 * (phase_at(&code, 0, 7.5) + PI / 2.0).cos();
+        let encoding = Encoding::optimum(36, 912).expect("valid");
+        let [_, _, blue, _] = encoding.channels() else { panic!("four channels") };
+        let image = pattern(blue, [912, 4], DmdLayout::Diamond);
+        let expected = 0.5 + 0.5 * (encoding.absolute_phase_rad(7.5) + PI / 2.0).cos();
         assert!((f64::from(image[[3, 7]]) - expected).abs() < 1e-7);
         assert_eq!(image.row(0), image.row(2));
     }

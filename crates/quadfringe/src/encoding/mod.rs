@@ -1,145 +1,175 @@
-//! What is projected: fringe numbers, phase shifts, channels and the ideal pattern images.
+//! The encoding of projector columns: channels of fringes, their ideal images, and the layout of the mirrors that show them.
 //!
-//! A channel `c` shows `0.5 + 0.5 cos(2 pi N_c u / W + delta_c)` over the projector columns `u` (S1), in linear light:
-//! `R` and `B` share the first fringe number and are in quadrature, `G` has the second number, `Ir` the third.
+//! An [`Encoding`] is a list of channels over the columns `u` of a projector of width `W`. Channel `c` shows
+//! `0.5 + 0.5 cos(2 pi N_c u / W + delta_c)` in linear light (S1), with its fringe number `N_c` and shift `delta_c`.
+//! Channels of one projector and one fringe number measure one phase together: two in quadrature (two-step phase
+//! shifting), or more (phase stepping). A channel that stands alone measures its phase by a Fourier filter. An encoding
+//! is valid when these phases tell all columns apart.
 
-use std::f64::consts::{PI, TAU};
-
-use crate::error::{Error, Result};
-
+mod ambiguity;
+mod four_channel;
 mod layout;
 
+pub use four_channel::{Channel, FourChannel};
 pub(crate) use layout::row_shift;
 pub use layout::{Axis, DmdLayout, mirror_column, pattern, step_pattern};
 
-/// Least distance in phase space (rad) between two columns for them to be told apart.
-const MARGIN_NEEDED_RAD: f64 = 0.3;
+use crate::error::{Error, Limit, Result};
+use ambiguity::{Closest, MARGIN_NEEDED_RAD};
+use ndarray::Array2;
+use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// One of the four channels of a shot, in the order of every four-channel array: R, G, B, IR.
+/// One of the two projectors.
 ///
 /// ```
-/// use quadfringe::encoding::Channel;
-/// assert_eq!(Channel::ALL.map(Channel::phase_index), [0, 1, 0, 2]);
+/// use quadfringe::encoding::{Channel, Projector};
+/// assert_eq!(Channel::Ir.projector(), Projector::Infrared);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Channel {
-    /// Red, visible projector: first fringe number, shift 0.
-    R,
-    /// Green, visible projector: second fringe number, shift 0.
-    G,
-    /// Blue, visible projector: first fringe number, shift +pi/2.
-    B,
-    /// Infrared, infrared projector: third fringe number, shift 0.
-    Ir,
+pub enum Projector {
+    /// The visible light projector, P1.
+    Visible,
+    /// The infrared light projector, P2.
+    Infrared,
 }
 
-impl Channel {
-    /// The channels in array order.
-    pub const ALL: [Self; 4] = [Self::R, Self::G, Self::B, Self::Ir];
+impl Projector {
+    /// Both, in the order of arrays with one entry for each projector.
+    pub const ALL: [Self; 2] = [Self::Visible, Self::Infrared];
 
-    /// Place in four-channel arrays: R 0, G 1, B 2, IR 3.
+    /// Place in arrays with one entry for each projector.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
     }
+}
 
-    /// Place of the channel's fringe number: 0 for R and B, 1 for G, 2 for IR.
+/// The fringes of one channel.
+///
+/// ```
+/// use quadfringe::encoding::{ChannelCode, Projector};
+/// let green = ChannelCode::new(35.0, 0.0, Projector::Visible);
+/// assert_eq!(green.phase_rad(0.0, 912), 0.0);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct ChannelCode {
+    /// Number of fringes over the full projector width; need not be whole.
+    pub fringe_number: f64,
+    /// Phase that is added to that of the column, in rad.
+    pub shift_rad: f64,
+    /// The projector that shows the channel.
+    pub projector: Projector,
+}
+
+impl ChannelCode {
+    /// A channel with `fringe_number` fringes over the projector width, shifted by `shift_rad`. [`Encoding::new`] checks
+    /// the numbers.
     #[must_use]
-    pub const fn phase_index(self) -> usize {
-        match self {
-            Self::R | Self::B => 0,
-            Self::G => 1,
-            Self::Ir => 2,
-        }
+    pub const fn new(fringe_number: f64, shift_rad: f64, projector: Projector) -> Self {
+        Self { fringe_number, shift_rad, projector }
     }
 
-    /// The channel's name in messages and files: R, G, B, IR.
+    /// Phase in rad at a column of a projector of this width, not wrapped and without the shift of the channel (S1).
     #[must_use]
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::R => "R",
-            Self::G => "G",
-            Self::B => "B",
-            Self::Ir => "IR",
-        }
-    }
-
-    /// Phase shift in rad: pi/2 for B, else 0.
-    #[must_use]
-    pub const fn shift_rad(self) -> f64 {
-        match self {
-            Self::B => PI / 2.0,
-            _ => 0.0,
-        }
+    pub fn phase_rad(&self, column_px: f64, projector_width: usize) -> f64 {
+        phase_at(self.fringe_number, column_px, projector_width)
     }
 }
 
-/// Fringe numbers over the full projector width, proven to give every column its own triple of phases.
+/// Phase in rad of this number of fringes at a projector column, not wrapped (S1).
+fn phase_at(fringe_number: f64, column_px: f64, projector_width: usize) -> f64 {
+    TAU * fringe_number * column_px / projector_width as f64
+}
+
+/// The channels that are projected, with proof that their phases tell all projector columns apart.
+///
+/// The phase of the first channel is the one that decoding makes absolute.
 ///
 /// ```
-/// use quadfringe::encoding::FringeCode;
-/// let code = FringeCode::optimum(36, 912)?;
-/// assert_eq!(code.numbers(), [36.0, 35.0, 30.0]);
-/// assert!(FringeCode::new([16.0, 8.0, 4.0], 912).is_err());
-/// # Ok::<(), quadfringe::error::Error>(())
+/// use quadfringe::Encoding;
+/// use quadfringe::encoding::{ChannelCode, Projector};
+/// use std::f64::consts::FRAC_PI_2;
+///
+/// let encoding = Encoding::optimum(36, 912)?;
+/// let channels: Vec<f64> = encoding.channels().iter().map(|channel| channel.fringe_number).collect();
+/// assert_eq!(channels, [36.0, 35.0, 36.0, 30.0]);
+///
+/// // The same, channel by channel.
+/// let visible = |number, shift_rad| ChannelCode::new(number, shift_rad, Projector::Visible);
+/// let infrared = ChannelCode::new(30.0, 0.0, Projector::Infrared);
+/// let list = [visible(36.0, 0.0), visible(35.0, 0.0), visible(36.0, FRAC_PI_2), infrared];
+/// assert_eq!(Encoding::new(list, 912)?, encoding);
+///
+/// // 16, 8 and 4 fringes repeat four times over the projector.
+/// assert!(Encoding::four_channel([16.0, 8.0, 4.0], 912).is_err());
+/// # Ok::<(), quadfringe::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct FringeCode {
-    numbers: [f64; 3],
+pub struct Encoding {
+    channels: Vec<ChannelCode>,
     projector_width: usize,
 }
 
-impl FringeCode {
-    /// Code from three fringe numbers (whole or not) over `projector_width` columns: R and B, G, IR.
+impl Encoding {
+    /// An encoding of any channels over `projector_width` columns.
     ///
     /// # Errors
-    /// [`Error::Value`] when a number is not finite, not positive, or not below half the width (a fringe needs more than
-    /// two columns); [`Error::JointRange`] when two columns of the field have nearly the same three phases.
-    pub fn new(numbers: [f64; 3], projector_width: usize) -> Result<Self> {
-        if projector_width < 2 {
-            return Err(Error::value("projector_width (columns)", "at least 2", projector_width));
-        }
-        let limit = projector_width as f64 / 2.0;
-        for number in numbers {
-            if !(number.is_finite() && number > 0.0 && number < limit) {
-                let expected = format!("a number above 0 and below {limit} (half the projector width)");
-                return Err(Error::value("fringe number", expected, number));
-            }
-        }
-        let code = Self { numbers, projector_width };
-        let (margin_rad, distance_px) = code.closest_columns();
-        if margin_rad < MARGIN_NEEDED_RAD {
+    /// [`Error::Value`] for an empty list, a projector of less than two columns, a fringe number that is not above 0 and
+    /// below half the width (a fringe needs more than two columns), and a shift that is not finite;
+    /// [`Error::JointRange`] when two columns of the projector have nearly the same phases.
+    pub fn new(channels: impl Into<Vec<ChannelCode>>, projector_width: usize) -> Result<Self> {
+        let encoding = Self { channels: channels.into(), projector_width };
+        encoding.check_values()?;
+        let closest = encoding.closest_columns();
+        if closest.margin_rad < MARGIN_NEEDED_RAD {
             return Err(Error::JointRange {
-                numbers,
-                width: projector_width,
+                fringe_numbers: encoding.measured_numbers(),
+                width_px: projector_width,
                 first_px: 0.0,
-                second_px: distance_px,
-                margin_rad,
+                second_px: closest.distance_px,
+                margin_rad: closest.margin_rad,
                 needed_rad: MARGIN_NEEDED_RAD,
             });
         }
-        Ok(code)
+        Ok(encoding)
     }
 
-    /// The optimum three-frequency code `N`, `N - 1`, `N - sqrt(N)` (S4): the beats number 1 and `sqrt(N)` fringes.
+    /// The four channels of the paper from three fringe numbers: of R and B, of G, and of IR. R and B are in quadrature:
+    /// B is shifted by `pi/2`. The visible projector shows R, G and B, the infrared one IR.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn four_channel([quadrature, green, infrared]: [f64; 3], projector_width: usize) -> Result<Self> {
+        let visible = |number, shift_rad| ChannelCode::new(number, shift_rad, Projector::Visible);
+        let channels = [
+            visible(quadrature, 0.0),
+            visible(green, 0.0),
+            visible(quadrature, FRAC_PI_2),
+            ChannelCode::new(infrared, 0.0, Projector::Infrared),
+        ];
+        Self::new(channels, projector_width)
+    }
+
+    /// The four channels of the paper with the optimum fringe numbers `N`, `N - 1` and `N - sqrt(N)` (S4): the beats of
+    /// the first with the others have 1 and `sqrt(N)` fringes.
     ///
     /// # Errors
     /// [`Error::Value`] when `n` is not a perfect square of at least 4, or does not fit the width; [`Error::JointRange`]
-    /// when `n` is so large that neighbouring beats can no longer be told apart.
+    /// when `n` is so large that neighbouring beats cannot be told apart.
     pub fn optimum(n: u32, projector_width: usize) -> Result<Self> {
         let root = n.isqrt();
         if n < 4 || root * root != n {
-            let expected = "a perfect square of at least 4, such as 16, 25 or 36";
+            let expected = Limit::words("a perfect square of at least 4, such as 16, 25 or 36");
             return Err(Error::value("optimum fringe number", expected, n));
         }
-        let numbers = [n, n - 1, n - root].map(f64::from);
-        Self::new(numbers, projector_width)
+        Self::four_channel([n, n - 1, n - root].map(f64::from), projector_width)
     }
 
-    /// Fringe numbers over the full width: of R and B, of G, of IR.
+    /// The channels in the order of the images of a shot.
     #[must_use]
-    pub const fn numbers(&self) -> [f64; 3] {
-        self.numbers
+    pub fn channels(&self) -> &[ChannelCode] {
+        &self.channels
     }
 
     /// Number of projector columns that the fringe numbers refer to.
@@ -148,103 +178,81 @@ impl FringeCode {
         self.projector_width
     }
 
-    /// Fringe period in projector columns.
+    /// Projector columns of one turn of the absolute phase, that of the first channel.
+    #[must_use]
+    pub fn period_px(&self) -> f64 {
+        self.projector_width as f64 / self.channels[0].fringe_number
+    }
+
+    /// Absolute phase in rad at a projector column: that of the first channel.
     ///
-    /// # Panics
-    /// When `phase_index` is not 0, 1 or 2.
+    /// ```
+    /// use quadfringe::Encoding;
+    /// let encoding = Encoding::optimum(36, 912)?;
+    /// assert!((encoding.absolute_phase_rad(912.0 / 36.0) - std::f64::consts::TAU).abs() < 1e-12);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
     #[must_use]
-    pub fn period_px(&self, phase_index: usize) -> f64 {
-        self.projector_width as f64 / self.numbers[phase_index]
+    pub fn absolute_phase_rad(&self, column_px: f64) -> f64 {
+        self.channels[0].phase_rad(column_px, self.projector_width)
     }
 
-    /// Number of fringe orders of the first fringe number that the field can hold.
+    /// The ideal images of all channels in their order, each `(height, projector width)`, linear light from 0 to 1.
+    ///
+    /// ```
+    /// use quadfringe::{DmdLayout, Encoding};
+    /// let images = Encoding::optimum(36, 912)?.patterns(1140, DmdLayout::Regular);
+    /// assert_eq!((images.len(), images[3].dim(), images[3][[0, 0]]), (4, (1140, 912), 1.0));
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
     #[must_use]
-    pub fn orders(&self) -> usize {
-        self.numbers[0].ceil() as usize
+    pub fn patterns(&self, height: usize, layout: DmdLayout) -> Vec<Array2<f32>> {
+        let size_px = [self.projector_width, height];
+        self.channels.iter().map(|channel| pattern(channel, size_px, layout)).collect()
     }
 
-    /// Least distance in phase space (rad) between two columns of the field that share the first phase: how far the
-    /// second and third phases may stray before a fringe order is mistaken. At most `pi sqrt(2)`.
+    /// Least distance in phase space (rad) between two columns that share the first phase: the error of the other phases
+    /// together at which a fringe order is mistaken. At most `pi sqrt(m)` for `m` other phases.
     #[must_use]
     pub fn ambiguity_margin_rad(&self) -> f64 {
-        self.closest_columns().0
+        self.closest_columns().margin_rad
     }
 
-    /// Margin in rad, and the column distance at which it occurs. Two columns share the first phase when a whole number
-    /// of first periods lies between them.
-    fn closest_columns(&self) -> (f64, f64) {
-        let width = self.projector_width as f64;
-        let period = self.period_px(0);
-        let mut closest = (PI * 2f64.sqrt(), width);
-        for k in 1.. {
-            let distance = f64::from(k) * period;
-            if distance >= width * (1.0 - 1e-12) {
-                break;
+    fn check_values(&self) -> Result<()> {
+        if self.channels.is_empty() {
+            return Err(Error::value("channels of an encoding", Limit::AtLeast(1.0), 0.0));
+        }
+        if self.projector_width < 2 {
+            return Err(Error::value("projector_width", Limit::AtLeast(2.0), self.projector_width));
+        }
+        let limit = self.projector_width as f64 / 2.0;
+        for channel in &self.channels {
+            let number = channel.fringe_number;
+            if !(number > 0.0 && number < limit) {
+                let expected = Limit::FringeNumber { below: limit };
+                return Err(Error::value("fringe number", expected, number));
             }
-            let apart = |index: usize| wrapped(TAU * self.numbers[index] * distance / width);
-            let margin = apart(1).hypot(apart(2));
-            if margin < closest.0 {
-                closest = (margin, distance);
+            if !channel.shift_rad.is_finite() {
+                return Err(Error::value("shift_rad", Limit::Finite, channel.shift_rad));
             }
         }
-        closest
-    }
-}
-
-/// Angle brought to `[-pi, pi]`.
-fn wrapped(angle_rad: f64) -> f64 {
-    angle_rad - TAU * (angle_rad / TAU).round()
-}
-
-/// Phase in rad, not wrapped and without the channel's shift, at a projector column (S1).
-///
-/// # Panics
-/// When `phase_index` is not 0, 1 or 2.
-///
-/// ```
-/// use quadfringe::encoding::{FringeCode, phase_at};
-/// let code = FringeCode::optimum(36, 912)?;
-/// assert!((phase_at(&code, 0, 912.0 / 36.0) - std::f64::consts::TAU).abs() < 1e-12);
-/// # Ok::<(), quadfringe::error::Error>(())
-/// ```
-#[must_use]
-pub fn phase_at(code: &FringeCode, phase_index: usize, column_px: f64) -> f64 {
-    TAU * code.numbers[phase_index] * column_px / code.projector_width as f64
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn joint_range_decides() {
-        let accepted = [
-            ([36.0, 35.0, 30.0], 912),
-            ([36.0, 35.0, 34.0], 912),
-            ([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920),
-            ([45.714, 42.667, 40.0], 1920),
-            ([1.0, 1.0, 1.0], 912),
-        ];
-        for (numbers, width) in accepted {
-            assert!(FringeCode::new(numbers, width).is_ok(), "{numbers:?}");
-        }
-        for numbers in [[16.0, 8.0, 4.0], [30.0, 30.0, 30.0], [36.0, 34.0, 30.0], [36.0, 36.0, 36.0]] {
-            let refused = FringeCode::new(numbers, 912);
-            assert!(matches!(refused, Err(Error::JointRange { .. })), "{numbers:?}");
-        }
-        for numbers in [[f64::NAN, 35.0, 30.0], [-1.0, 35.0, 30.0], [456.0, 35.0, 30.0], [0.0, 1.0, 2.0]] {
-            let refused = FringeCode::new(numbers, 912);
-            assert!(matches!(refused, Err(Error::Value { .. })), "{numbers:?}");
-        }
+        Ok(())
     }
 
-    #[test]
-    fn margins_of_known_codes() {
-        let optimum = FringeCode::optimum(36, 912).expect("valid code");
-        assert!((optimum.ambiguity_margin_rad() - TAU / 6.0).abs() < 1e-9);
-        let captured = FringeCode::new([45.714, 42.667, 40.0], 1920).expect("valid code");
-        assert!((captured.ambiguity_margin_rad() - 0.42).abs() < 0.05);
-        assert!(FringeCode::optimum(35, 912).is_err());
-        assert!(FringeCode::optimum(0, 912).is_err());
+    /// Fringe numbers of the phases that are measured, in order: channels that share projector and fringe number measure
+    /// one phase.
+    fn measured_numbers(&self) -> Vec<f64> {
+        let mut phases: Vec<(f64, Projector)> = Vec::new();
+        for channel in &self.channels {
+            let phase = (channel.fringe_number, channel.projector);
+            if !phases.contains(&phase) {
+                phases.push(phase);
+            }
+        }
+        phases.into_iter().map(|(number, _)| number).collect()
+    }
+
+    fn closest_columns(&self) -> Closest {
+        ambiguity::closest_columns(&self.measured_numbers(), self.projector_width)
     }
 }

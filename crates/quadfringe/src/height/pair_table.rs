@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::Triangulator;
-use crate::FringeCode;
+use crate::encoding::Encoding;
 use crate::error::{Error, Result};
 use crate::optics::{CoaxialPair, Device};
 use crate::stages::{Absolute, AlongRay, Phases, RayRow};
@@ -28,13 +28,13 @@ const FAR_MM: f64 = 1e9;
 /// The infrared phase along every camera ray of a calibrated pair of projectors, planned once.
 ///
 /// ```
-/// use quadfringe::{FringeCode, height::PairTable, optics::{CoaxialPair, Device}};
+/// use quadfringe::{Encoding, height::PairTable, optics::{CoaxialPair, Device}};
 /// let camera = Device::pinhole(64, 48, [160.0; 2], [31.5, 23.5])?;
 /// let visible = Device::pinhole(912, 1140, [1570.0; 2], [455.5, 569.5])?
 ///     .with_pose(camera.rotation, [-200.0, 0.0, 0.0])?;
 /// let infrared = visible.clone().with_pose(camera.rotation, [-199.5, 0.0, 0.0])?;
 /// let pair = CoaxialPair::new(visible, infrared);
-/// let table = PairTable::new(&camera, &pair, &FringeCode::optimum(36, 912)?, Some([700.0, 900.0]))?;
+/// let table = PairTable::new(&camera, &pair, &Encoding::optimum(36, 912)?, Some([700.0, 900.0]))?;
 /// let (point, row) = (camera.ray([60.0, 20.0]).at(800.0), table.row(20));
 /// let turns = pair.visible().project(point).expect("in front")[0] / 912.0;
 /// let first = (turns * 36.0 * std::f64::consts::TAU) as f32;
@@ -56,11 +56,12 @@ impl PairTable {
     ///
     /// # Errors
     /// [`Error::Value`] when the devices are none that [`Triangulator`] can use, when the fringes are for another width
-    /// than the visible projector's, or when the range is not two growing depths of at least 0.
+    /// than the visible projector's, or when the range is not two growing depths of at least 0;
+    /// [`Error::NotFourChannel`] for another encoding.
     pub fn new(
         camera: &Device,
         pair: &CoaxialPair,
-        code: &FringeCode,
+        encoding: &Encoding,
         depth_range_mm: Option<[f64; 2]>,
     ) -> Result<Self> {
         let range_mm = depth_range_mm.unwrap_or([0.0, FAR_MM]);
@@ -69,19 +70,19 @@ impl PairTable {
             return Err(Error::value("depth_range_mm", expected, format!("{range_mm:?}")));
         }
         let width_px = pair.visible().width;
-        if code.projector_width() != width_px {
+        let four = encoding.four_channel_view()?;
+        if four.projector_width != width_px {
             let expected = format!("{width_px}, the columns of the visible projector");
-            return Err(Error::value("columns of the fringes", expected, code.projector_width()));
+            return Err(Error::value("columns of the fringes", expected, four.projector_width));
         }
-        let Phases { quadrature: first, infrared: third, .. } =
-            Phases::from_array(code.numbers()).map(|number| number * TAU);
+        let (first, third) = (four.quadrature * TAU, four.infrared * TAU);
         let triangulator = Triangulator::new(camera, pair.visible())?;
         let plan = Plan { camera, pair, triangulator, range_mm, first, third };
         let (rows, columns) = (camera.height, camera.width);
         let mut numbers = vec![f32::NAN; rows * LINES * columns];
         let lines = numbers.par_chunks_mut(LINES * columns).enumerate();
         lines.for_each(|(row, out)| plan.row(row, out));
-        Ok(Self { search: AlongRay::new(code), shape: (rows, columns), numbers })
+        Ok(Self { search: AlongRay::new(&four), shape: (rows, columns), numbers })
     }
 
     /// Size of the maps (rows, columns): that of the camera.
@@ -168,7 +169,7 @@ fn check(name: &str, map: ArrayView2<'_, f32>, shape: (usize, usize)) -> Result<
     if map.dim() == shape {
         return Ok(());
     }
-    Err(Error::shape(name, &[shape.0, shape.1], map.shape()))
+    Err(Error::shape(name.to_owned(), &[shape.0, shape.1], map.shape()))
 }
 
 struct Plan<'a> {

@@ -14,7 +14,7 @@ use super::scene::{PhaseMap, ScaledGrid, Scene, Scratch};
 use super::slopes::Slopes;
 use super::smooth::mark_discontinuities;
 use super::window::Window;
-use crate::FringeCode;
+use crate::encoding::FourChannel;
 
 /// Results of the steps on the coarse level, and the steps themselves.
 pub(super) struct CoarseLevel {
@@ -44,7 +44,7 @@ pub(super) struct CoarseLevel {
 }
 
 impl CoarseLevel {
-    pub fn new(code: &FringeCode) -> Self {
+    pub fn new(code: &FourChannel) -> Self {
         Self {
             phase: Vec::new(),
             modulation: Vec::new(),

@@ -40,11 +40,12 @@ mod uncertainty;
 mod validity;
 mod window;
 
+use crate::Shot;
 use crate::condition::{Plan, Sample};
 use crate::decode::options::Options;
 use crate::decode::output::{Decoded, Finish};
+use crate::encoding::FourChannel;
 use crate::parallel::lanes::LANES;
-use crate::{FringeCode, Shot};
 use agreement::Agreement;
 use cells::{Grid, RowMaps};
 use coarse::CoarseLevel;
@@ -87,7 +88,7 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
+    pub fn new(code: &FourChannel, shape: [usize; 2]) -> Self {
         let stride = shape[1].next_multiple_of(FACTOR_MAX * LANES);
         let numbers = code.numbers();
         Self {
@@ -127,7 +128,7 @@ impl Joint {
         // 2. to 6. Absolute phase.
         let mut spare = std::mem::take(&mut self.spare);
         let mut memory = OutputMemory::new(out, &mut spare, grid.pixels());
-        let instants = options.channel_instants_us.map(|instants| instants.map(|t| 1e-6 * t));
+        let instants = options.channel_instants_us().map(|instants| instants.map(|t| 1e-6 * t));
         self.absolute_phase(&frame, options, &mut memory);
         // 7. Motion between the channels.
         if let Some(instants) = instants {
@@ -149,7 +150,7 @@ impl Joint {
     /// Steps 2 to 6.
     fn absolute_phase(&mut self, frame: &Frame<'_>, options: &Options, memory: &mut OutputMemory<'_>) {
         let Self { pyramid, coarse, ratios, .. } = self;
-        let moving = options.channel_instants_us.is_some();
+        let moving = options.channel_instants_us().is_some();
         pyramid.shrink(frame);
         let level = &mut pyramid.coarse;
         // 2. Mask of lit pixels.

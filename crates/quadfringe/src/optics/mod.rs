@@ -3,7 +3,7 @@
 //! `s [u v 1]^T = A [R T] P`: a point `P` of the camera frame (mm) becomes `R P + T` in the device frame, is divided by
 //! its depth, distorted, scaled by the focal length and moved to the principal point. Pixel centres are integers.
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 
 mod bayer;
 mod distortion;
@@ -221,7 +221,7 @@ fn check_finite(name: &str, numbers: &[f64]) -> Result<()> {
     if numbers.iter().all(|n| n.is_finite()) {
         return Ok(());
     }
-    Err(Error::value(name, "finite numbers", format!("{numbers:?}")))
+    Err(Error::value(name.to_owned(), Limit::Finite, format!("{numbers:?}")))
 }
 
 #[cfg(test)]

@@ -13,25 +13,24 @@
 //! | 8 projector column and height | `columns_from_phase`, `height::Triangulator` | (S7) |
 //!
 //! Orders are found on means over blocks of a few pixels, whose noise is lower; the phase stays that of single pixels. For
-//! a given `code`, `shot` and `conditioner`, the functions of [`stages`](crate::stages) give the same bits as the decoder
+//! a given `encoding`, `shot` and `conditioner`, the functions of [`stages`](crate::stages) give the same bits as the decoder
 //! (`tests/stages.rs` compares every map):
 //!
 //! ```
 //! # use ndarray::{Array2, ArrayView2, Zip};
 //! # use quadfringe::condition::linearise;
-//! # use quadfringe::encoding::{Channel, DmdLayout, pattern};
 //! # use quadfringe::stages::*;
-//! # use quadfringe::{Conditioner, Decoder, FringeCode, Method, Options, Shot};
-//! # let code = FringeCode::optimum(16, 400)?;
-//! # let planes = Channel::ALL.map(|channel| pattern(&code, channel, 64, DmdLayout::Regular));
-//! # let shot = Shot::new(planes.each_ref().map(|plane| plane.view()))?;
+//! # use quadfringe::{Conditioner, Decoder, DmdLayout, Encoding, Method, Options, Shot};
+//! # let encoding = Encoding::optimum(16, 400)?;
+//! # let planes = encoding.patterns(64, DmdLayout::Regular);
+//! # let shot = Shot::try_from(planes.as_slice())?;
 //! # let conditioner = Conditioner::default();
 //! # let (height, width) = (64, 400);
 //! // 1. Linear light (S1). The Fourier filter needs rows without gaps.
 //! let [red, green, blue, infrared] = linearise(&shot, &conditioner)?;
 //! let filled = fill_gaps(infrared.view());
 //! // 2. The fringe period along the rows, and the period of each phase in proportion to its fringe number.
-//! let numbers = Phases::from_array(code.numbers());
+//! let numbers = Phases::from_array(encoding.four_channel_view()?.numbers());
 //! let period_px = row_period_px(red.view());
 //! let periods_px = numbers.map(|number| period_px * numbers.quadrature / number);
 //! let blocks = Blocks::for_periods(periods_px.green as f32, periods_px.infrared as f32, width);
@@ -59,7 +58,7 @@
 //! let [green, ir] = fourier_pair(green, ir, blocks.columns, width)?;
 //! // 5. Fringe orders of the means by the ladder of beats (S4).
 //! let phases = Phases { quadrature: coarse.view(), green: green.phase_rad.view(), infrared: ir.phase_rad.view() };
-//! let means = unwrap(&code, phases)?;
+//! let means = unwrap(&encoding, phases)?;
 //! // 6. Absolute phase of single pixels.
 //! let phase_rad = nearest_turn(wrapped.view(), pixels(means.phase_rad.view())?.view())?;
 //! let absolute = Absolute::new(phase_rad, pixels(means.margin.view())?)?;
@@ -73,9 +72,10 @@
 //! // 7. Probability of a wrong order.
 //! let wrong = wrong_order_probability(valid.quality.view());
 //! // 8. Projector columns, from which the height follows (S7).
-//! let columns = columns_from_phase(&code, valid.phase_rad.view());
-//! # let options = Options { method: Method::Published, ..Options::default() };
-//! # let decoded = Decoder::new(code, [height, width], &conditioner, options)?.decode(&shot)?;
+//! let columns = columns_from_phase(&encoding, valid.phase_rad.view());
+//! # let options = Options::default().with_method(Method::published());
+//! # let builder = Decoder::builder(&encoding, [height, width]).conditioner(conditioner).options(options);
+//! # let decoded = builder.build()?.decode(&shot)?;
 //! # let bits = |map: &Array2<f32>| map.mapv(f32::to_bits);
 //! # assert_eq!(bits(&columns.column_px), bits(&decoded.column_px));
 //! # assert_eq!(bits(&valid.quality), bits(&decoded.quality));
@@ -89,16 +89,18 @@ mod statistics;
 mod strip;
 mod uncertainty;
 
+use crate::Shot;
 use crate::condition::{Plan, Sample};
 use crate::decode::options::Options;
 use crate::decode::output::Decoded;
 use crate::decode::output::{Finish, ROWS_AT_ONCE};
+use crate::encoding::FourChannel;
 use crate::height::PairTable;
 use crate::parallel::slots::Slots;
 use crate::stages::{Band, Blocks, Ladder, Limits, LineSpectrum, Phases, RowFilter, period_rows};
-use crate::{FringeCode, Shot};
 use ndarray::ArrayView1;
 use rayon::prelude::*;
+use std::sync::Arc;
 use strip::{FourierPair, Strip, StripPlan, decode_strip};
 use uncertainty::ShotStatistics;
 
@@ -107,7 +109,7 @@ enum Unwrapping {
     /// By the ladder of beats, which takes both projectors as coaxial.
     Ladder(Ladder),
     /// Along the camera ray, with both projectors calibrated.
-    AlongRay(Box<PairTable>),
+    AlongRay(Arc<PairTable>),
 }
 
 /// The published method for images of one size, planned once.
@@ -129,7 +131,7 @@ struct SizedFilter {
 }
 
 impl Published {
-    pub fn new(code: &FringeCode, shape: [usize; 2]) -> Self {
+    pub fn new(code: &FourChannel, shape: [usize; 2]) -> Self {
         let filter =
             |columns: usize| SizedFilter { columns, filter: RowFilter::new((shape[1] / columns).max(1)) };
         Self {
@@ -143,12 +145,8 @@ impl Published {
     }
 
     /// Search along the camera rays from now on.
-    pub fn unwrap_along_rays(&mut self, table: PairTable) {
-        self.unwrapping = Unwrapping::AlongRay(Box::new(table));
-    }
-
-    pub fn searches_rays(&self) -> bool {
-        matches!(self.unwrapping, Unwrapping::AlongRay(_))
+    pub fn unwrap_along_rays(&mut self, table: Arc<PairTable>) {
+        self.unwrapping = Unwrapping::AlongRay(table);
     }
 
     pub fn run<T: Sample>(

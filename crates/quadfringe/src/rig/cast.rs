@@ -3,7 +3,7 @@
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
-use super::{Beam, Bench};
+use super::{Bench, Projector};
 use crate::optics::{Device, Ray, dot};
 use crate::surface::Surface;
 
@@ -13,18 +13,18 @@ const SHADOW_GAP_MM: f64 = 1e-3;
 /// What one camera pixel sees.
 ///
 /// ```
-/// use quadfringe::{Device, rig::{Beam, Bench}, surface::Plane};
+/// use quadfringe::{Device, rig::{Projector, Bench}, surface::Plane};
 /// let mut bench = Bench::reference();
 /// bench.camera = Device::pinhole(8, 6, [20.0, 20.0], [3.5, 2.5])?;
 /// let cast = bench.cast(&Plane::at_z(800.0));
-/// assert!(cast.hits()[[3, 4]].is_lit(Beam::Visible));
+/// assert!(cast.hits()[[3, 4]].is_lit(Projector::Visible));
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
     /// Point of the surface in the camera frame, mm; NaN where the ray meets nothing.
     pub xyz_mm: [f64; 3],
-    /// Projector column and row that light the point, for each [`Beam`]; NaN in shadow and outside the projected image.
+    /// Projector column and row that light the point, for each [`Projector`]; NaN in shadow and outside the projected image.
     pub lit_from_px: [[f64; 2]; 2],
     /// Cosine between the surface normal and the direction to each projector.
     pub facing: [f64; 2],
@@ -42,20 +42,20 @@ impl Hit {
 
     /// Whether a projector lights the point.
     #[must_use]
-    pub fn is_lit(&self, beam: Beam) -> bool {
-        !self.lit_from_px[beam.index()][0].is_nan()
+    pub fn is_lit(&self, projector: Projector) -> bool {
+        !self.lit_from_px[projector.index()][0].is_nan()
     }
 }
 
 /// A scene as the bench sees it: made once by [`Bench::cast`], rendered as often as needed, and the truth to judge by.
 ///
 /// ```
-/// use quadfringe::{Device, rig::{Beam, Bench}, surface::Plane};
+/// use quadfringe::{Device, rig::{Projector, Bench}, surface::Plane};
 /// let mut bench = Bench::reference();
 /// bench.camera = Device::pinhole(8, 6, [20.0, 20.0], [3.5, 2.5])?;
 /// let cast = bench.cast(&Plane::at_z(800.0));
 /// assert_eq!(cast.depth_mm()[[3, 4]], 800.0);
-/// assert!(cast.column_px(Beam::Visible)[[3, 4]] > 400.0);
+/// assert!(cast.column_px(Projector::Visible)[[3, 4]] > 400.0);
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
@@ -88,8 +88,8 @@ impl Bench {
         let size = (self.camera.height, self.camera.width);
         let mut hits = Array2::from_elem(size, Hit::NOTHING);
         let coaxial = self.visible == self.infrared;
-        let projectors = Beam::ALL.map(|beam| {
-            let device = self.projector(beam);
+        let projectors = Projector::ALL.map(|projector| {
+            let device = self.projector(projector);
             (device, device.centre_mm())
         });
         hits.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {

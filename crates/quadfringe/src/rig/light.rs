@@ -4,17 +4,17 @@ use std::f64::consts::TAU;
 
 use ndarray::ArrayView2;
 
-use crate::encoding::{Axis, Channel, DmdLayout, FringeCode, row_shift};
+use crate::encoding::{Axis, Channel, DmdLayout, Encoding, row_shift};
 use crate::error::{Error, Result};
 use crate::optics::Device;
 
-use super::Beam;
+use super::Projector;
 
 /// Light of one channel before the projector's response, 0 to 1.
 ///
 /// ```
-/// use quadfringe::{FringeCode, rig::Light};
-/// let lights = Light::shot(&FringeCode::optimum(36, 912)?);
+/// use quadfringe::{Encoding, rig::Light};
+/// let lights = Light::shot(&Encoding::optimum(36, 912)?)?;
 /// assert_eq!(lights[1], Light::fringes(35.0, 0.0));
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
@@ -43,22 +43,25 @@ impl Light<'_> {
     }
 
     /// The four channels of a shot: R, G, B, IR.
-    #[must_use]
-    pub fn shot(code: &FringeCode) -> [Self; 4] {
-        Channel::ALL.map(|channel| Self::fringes(code.numbers()[channel.phase_index()], channel.shift_rad()))
+    ///
+    /// # Errors
+    /// [`Error::NotFourChannel`] for another encoding: the camera of the bench has these four channels.
+    pub fn shot(encoding: &Encoding) -> Result<[Self; 4]> {
+        let four = encoding.four_channel_view()?;
+        Ok(Channel::ALL.map(|channel| Self::fringes(four.fringe_number(channel), channel.shift_rad())))
     }
 
-    /// The same fringes in all four channels: one step of an N-step capture. With a beam, the other projector is dark.
+    /// The same fringes in all four channels: one step of an N-step capture. With a projector, the other one is dark.
     ///
     /// ```
-    /// use quadfringe::rig::{Axis, Beam, Light};
-    /// let lights = Light::step(36.0, 0.0, Axis::Rows, Some(Beam::Infrared));
+    /// use quadfringe::rig::{Axis, Projector, Light};
+    /// let lights = Light::step(36.0, 0.0, Axis::Rows, Some(Projector::Infrared));
     /// assert_eq!(lights[0], Light::Uniform(0.0));
     /// ```
     #[must_use]
-    pub fn step(number: f64, shift_rad: f64, axis: Axis, beam: Option<Beam>) -> [Self; 4] {
-        Channel::ALL.map(|channel| match beam {
-            Some(beam) if beam != Beam::of(channel) => Self::Uniform(0.0),
+    pub fn step(number: f64, shift_rad: f64, axis: Axis, projector: Option<Projector>) -> [Self; 4] {
+        Channel::ALL.map(|channel| match projector {
+            Some(projector) if projector != channel.projector() => Self::Uniform(0.0),
             _ => Self::Fringes { number, shift_rad, axis },
         })
     }
@@ -120,10 +123,10 @@ mod tests {
 
     #[test]
     fn images_follow_the_continuous_fringes_in_both_layouts() {
-        let code = FringeCode::optimum(36, 912).expect("valid code");
+        let encoding = Encoding::optimum(36, 912).expect("valid");
         let device = Device::pinhole(912, 20, [1500.0; 2], [455.5, 9.5]).expect("valid device");
         for layout in [DmdLayout::Regular, DmdLayout::Diamond] {
-            let image = pattern(&code, Channel::R, 20, layout);
+            let image = pattern(&encoding.channels()[0], [912, 20], layout);
             let (image, fringes) = (Light::Image(image.view()), Light::fringes(36.0, 0.0));
             for i in 0..500 {
                 let at = [1.0 + 1.8 * f64::from(i), 0.036 * f64::from(i)];

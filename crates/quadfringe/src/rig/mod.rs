@@ -21,55 +21,21 @@ pub use options::{Albedo, BitDepth, Demosaic, RenderOptions};
 pub use print::Print;
 pub use render::Planes;
 
-pub use crate::encoding::Axis;
-use crate::encoding::{Channel, DmdLayout};
+use crate::encoding::DmdLayout;
+pub use crate::encoding::{Axis, Projector};
 use crate::error::{Error, Result};
 use crate::optics::{Device, dot, rotation_from_vector};
-
-/// One of the two projectors.
-///
-/// ```
-/// use quadfringe::{Channel, rig::Beam};
-/// assert_eq!(Beam::of(Channel::Ir), Beam::Infrared);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Beam {
-    /// The visible light projector: R, G and B.
-    Visible,
-    /// The infrared light projector.
-    Infrared,
-}
-
-impl Beam {
-    /// Both, in the order of arrays with one entry for each projector.
-    pub const ALL: [Self; 2] = [Self::Visible, Self::Infrared];
-
-    /// The projector that shows a channel.
-    #[must_use]
-    pub const fn of(channel: Channel) -> Self {
-        match channel {
-            Channel::Ir => Self::Infrared,
-            _ => Self::Visible,
-        }
-    }
-
-    /// Place in arrays with one entry for each projector.
-    #[must_use]
-    pub const fn index(self) -> usize {
-        self as usize
-    }
-}
 
 /// Camera and projectors of a bench; the poses of the projectors are relative to the camera.
 ///
 /// ```
-/// use quadfringe::encoding::FringeCode;
+/// use quadfringe::Encoding;
 /// use quadfringe::rig::{Bench, Light, RenderOptions};
 /// use quadfringe::surface::scene;
 /// let mut bench = Bench::reference();
 /// bench.camera = quadfringe::Device::pinhole(64, 48, [161.0, 161.0], [31.5, 23.5])?;
 /// let cast = bench.cast(scene("steps", 0.0)?.as_ref());
-/// let lights = Light::shot(&FringeCode::optimum(36, 912)?);
+/// let lights = Light::shot(&Encoding::optimum(36, 912)?)?;
 /// let shot = bench.render(&cast, &lights, &RenderOptions::default())?;
 /// assert_eq!(shot.shape(), (48, 64));
 /// # Ok::<(), quadfringe::error::Error>(())
@@ -172,12 +138,12 @@ impl Bench {
         self.infrared_from_visible.and_then(|affine| inverse(affine).ok())
     }
 
-    /// The device behind a beam.
+    /// The device that is one of the two projectors.
     #[must_use]
-    pub const fn projector(&self, beam: Beam) -> &Device {
-        match beam {
-            Beam::Visible => &self.visible,
-            Beam::Infrared => &self.infrared,
+    pub const fn projector(&self, projector: Projector) -> &Device {
+        match projector {
+            Projector::Visible => &self.visible,
+            Projector::Infrared => &self.infrared,
         }
     }
 }

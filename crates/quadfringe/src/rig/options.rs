@@ -5,7 +5,7 @@ use ndarray::Array3;
 use crate::error::{Error, Result};
 use crate::optics::BayerPattern;
 
-use super::Beam;
+use super::Projector;
 
 /// Share of light that the surface gives back in each channel.
 ///
@@ -42,8 +42,8 @@ const PATCH_COLOURS: [[f32; 4]; 6] = [
 ];
 
 impl Albedo {
-    /// Albedo of the surface point (mm) seen by the pixel (row, column) of the chip of a beam.
-    pub(super) fn at(&self, chip: Beam, pixel: [usize; 2], [x, y, _]: [f64; 3]) -> [f32; 4] {
+    /// Albedo of the surface point (mm) seen by the pixel (row, column) of the chip that sees a projector.
+    pub(super) fn at(&self, chip: Projector, pixel: [usize; 2], [x, y, _]: [f64; 3]) -> [f32; 4] {
         match self {
             Self::Uniform(albedo) => *albedo,
             Self::Patches { side_mm, albedo } => {

@@ -3,7 +3,7 @@
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
-use super::{Beam, Bench, Cast, Hit, Light, RenderOptions, blur, expose, mosaic};
+use super::{Bench, Cast, Hit, Light, Projector, RenderOptions, blur, expose, mosaic};
 use crate::encoding::Channel;
 use crate::error::{Error, Result};
 
@@ -43,6 +43,32 @@ impl Planes {
             Self::BayerU16(images) => images[0].dim(),
             Self::BayerF32(images) => images[0].dim(),
         }
+    }
+
+    /// The four images of 8 bit.
+    ///
+    /// # Errors
+    /// [`Error::Value`] for a shot of another bit depth, or of a Bayer chip.
+    ///
+    /// ```
+    /// use quadfringe::rig::{Bench, Light, RenderOptions};
+    /// use quadfringe::{Device, Encoding, Shot, surface::scene};
+    /// let mut bench = Bench::reference();
+    /// bench.camera = Device::pinhole(64, 48, [161.0; 2], [31.5, 23.5])?;
+    /// let cast = bench.cast(scene("steps", 0.0)?.as_ref());
+    /// let lights = Light::shot(&Encoding::optimum(36, 912)?)?;
+    /// let images = bench.render(&cast, &lights, &RenderOptions::default())?.into_u8()?;
+    /// assert_eq!(Shot::try_from(&images)?.shape(), [48, 64]);
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    pub fn into_u8(self) -> Result<[Array2<u8>; 4]> {
+        let actual = match self {
+            Self::U8(images) => return Ok(images),
+            Self::U16(_) => "images of more than 8 bit",
+            Self::F32(_) => "images that are not rounded",
+            Self::BayerU8(_) | Self::BayerU16(_) | Self::BayerF32(_) => "the mosaic of a Bayer chip",
+        };
+        Err(Error::value("rendered images", "four of 8 bit: the bit depth 8 and no Bayer chip", actual))
     }
 
     fn from_counts(planes: [Array2<f32>; 4], full_scale: f32) -> Self {
@@ -122,7 +148,7 @@ impl Bench {
             }
         }
         for (channel, light) in Channel::ALL.into_iter().zip(lights) {
-            light.check(self.projector(Beam::of(channel)))?;
+            light.check(self.projector(channel.projector()))?;
         }
         options.check(shape)?;
         let mut planes = self.light_on_sensor(casts, lights, options);
@@ -170,12 +196,13 @@ impl Bench {
                 for column in 0..shape.1 {
                     let pixel = [row, column];
                     let hits = casts.map(|cast| &cast.hits[pixel]);
-                    let light = painter.light(Beam::Visible, pixel, hits, moving);
+                    let light = painter.light(Projector::Visible, pixel, hits, moving);
                     red[column] = painter.captured(Channel::R, light);
                     green[column] = painter.captured(Channel::G, light);
                     blue[column] = painter.captured(Channel::B, light);
                     let own = infrared_hits.map(|all| all.map(|hits| &hits[pixel]));
-                    let light = own.map_or(light, |own| painter.light(Beam::Infrared, pixel, own, moving));
+                    let light =
+                        own.map_or(light, |own| painter.light(Projector::Infrared, pixel, own, moving));
                     infrared[column] = painter.captured(Channel::Ir, light);
                 }
             });
@@ -192,7 +219,7 @@ struct Painter<'a, 'image> {
 
 impl Painter<'_, '_> {
     /// Light of the four projected channels on a pixel of a chip; R, G and B each have their own instant.
-    fn light(&self, chip: Beam, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f64; 4] {
+    fn light(&self, chip: Projector, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f64; 4] {
         let mut light = [0.0; 4];
         for (channel, hit) in Channel::ALL.into_iter().zip(hits) {
             light[channel.index()] = self.reflected(channel, chip, pixel, hit);
@@ -209,19 +236,19 @@ impl Painter<'_, '_> {
         (self.options.gain[channel.index()] * mixed) as f32
     }
 
-    fn reflected(&self, channel: Channel, chip: Beam, pixel: [usize; 2], hit: &Hit) -> f64 {
+    fn reflected(&self, channel: Channel, chip: Projector, pixel: [usize; 2], hit: &Hit) -> f64 {
         if !hit.is_surface() {
             return 0.0;
         }
-        let (index, beam) = (channel.index(), Beam::of(channel));
+        let (index, source) = (channel.index(), channel.projector());
         let mut light = self.options.ambient[index];
-        if hit.is_lit(beam) {
-            let at = hit.lit_from_px[beam.index()];
-            let projector = self.bench.projector(beam);
+        if hit.is_lit(source) {
+            let at = hit.lit_from_px[source.index()];
+            let projector = self.bench.projector(source);
             let level = self.lights[index].level(projector, self.bench.layout, at);
             let exponent = self.options.projector_exponent[index];
             let sent = if exponent == 1.0 { level } else { level.max(0.0).powf(exponent) };
-            light += if self.options.shading { sent * hit.facing[beam.index()] } else { sent };
+            light += if self.options.shading { sent * hit.facing[source.index()] } else { sent };
         }
         light * f64::from(self.options.albedo.at(chip, pixel, hit.xyz_mm)[index])
     }

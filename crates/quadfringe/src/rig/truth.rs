@@ -2,8 +2,8 @@
 
 use ndarray::{Array2, Array3};
 
-use super::{Beam, Cast, Hit};
-use crate::encoding::{FringeCode, phase_at};
+use super::{Cast, Hit, Projector};
+use crate::encoding::Encoding;
 
 impl Cast {
     /// Size of the maps (rows, columns).
@@ -40,33 +40,34 @@ impl Cast {
 
     /// Projector column that lights each pixel, NaN where the projector lights nothing that is seen.
     #[must_use]
-    pub fn column_px(&self, beam: Beam) -> Array2<f32> {
-        self.hits.map(|hit| hit.lit_from_px[beam.index()][0] as f32)
+    pub fn column_px(&self, projector: Projector) -> Array2<f32> {
+        self.hits.map(|hit| hit.lit_from_px[projector.index()][0] as f32)
     }
 
     /// Projector row that lights each pixel, NaN where the projector lights nothing that is seen.
     #[must_use]
-    pub fn row_px(&self, beam: Beam) -> Array2<f32> {
-        self.hits.map(|hit| hit.lit_from_px[beam.index()][1] as f32)
+    pub fn row_px(&self, projector: Projector) -> Array2<f32> {
+        self.hits.map(|hit| hit.lit_from_px[projector.index()][1] as f32)
     }
 
     /// Absolute phase in rad of the first fringe number, 0 at column 0 of the visible projector; NaN where dark.
     #[must_use]
-    pub fn phase_rad(&self, code: &FringeCode) -> Array2<f32> {
-        self.hits.map(|hit| phase_at(code, 0, hit.lit_from_px[0][0]) as f32)
+    pub fn phase_rad(&self, encoding: &Encoding) -> Array2<f32> {
+        self.hits.map(|hit| encoding.absolute_phase_rad(hit.lit_from_px[0][0]) as f32)
     }
 
     /// Fringe order of the first fringe number: the whole periods in the absolute phase; NaN where dark.
     #[must_use]
-    pub fn order(&self, code: &FringeCode) -> Array2<f32> {
-        let period = code.period_px(0);
+    pub fn order(&self, encoding: &Encoding) -> Array2<f32> {
+        let period = encoding.period_px();
         self.hits.map(|hit| (hit.lit_from_px[0][0] / period).floor() as f32)
     }
 
     /// Where a surface is seen that at least one projector does not light.
     #[must_use]
     pub fn shadow(&self) -> Array2<bool> {
-        self.hits.map(|hit| hit.is_surface() && Beam::ALL.iter().any(|beam| !hit.is_lit(*beam)))
+        self.hits
+            .map(|hit| hit.is_surface() && Projector::ALL.iter().any(|projector| !hit.is_lit(*projector)))
     }
 
     /// Distance in pixels to the nearest edge: a step in depth, a border of shadow, or a border of the surface. Pixels on
@@ -107,10 +108,10 @@ impl Cast {
     }
 
     fn is_edge(&self, [a, b]: [&Hit; 2]) -> bool {
-        let differs = |beam: &Beam| a.is_lit(*beam) != b.is_lit(*beam);
+        let differs = |projector: &Projector| a.is_lit(*projector) != b.is_lit(*projector);
         let (za, zb) = (a.xyz_mm[2], b.xyz_mm[2]);
         a.is_surface() != b.is_surface()
-            || Beam::ALL.iter().any(differs)
+            || Projector::ALL.iter().any(differs)
             || (za - zb).abs() > self.step_per_depth * za.min(zb)
     }
 }

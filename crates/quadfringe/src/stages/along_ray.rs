@@ -5,7 +5,7 @@
 //! whether the projectors are coaxial or not.
 
 use super::Phases;
-use crate::FringeCode;
+use crate::encoding::FourChannel;
 use crate::parallel::angle::{round, wrap_positive};
 use std::f32::consts::TAU;
 
@@ -87,9 +87,9 @@ struct Best {
 }
 
 impl AlongRay {
-    pub fn new(code: &FringeCode) -> Self {
+    pub fn new(code: &FourChannel) -> Self {
         let numbers = Phases::from_array(code.numbers());
-        let apart = code.ambiguity_margin_rad() as f32 / TAU;
+        let apart = code.ambiguity_margin_rad as f32 / TAU;
         let ratio = (numbers.green / numbers.quadrature) as f32;
         Self { ratio, apart: apart * apart, near: Near::of(numbers) }
     }
@@ -224,13 +224,14 @@ fn squared_difference(predicted: f32, seen: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encoding::Encoding;
     use crate::parallel::angle::wrap;
 
     const COAXIAL: [f32; 4] = [0.0, 30.0 / 36.0, 0.0, 0.0];
     const APART: [f32; 4] = [4.0, 0.85, -1e-4, 1e-7];
 
     fn optimum() -> AlongRay {
-        AlongRay::new(&FringeCode::optimum(36, 912).expect("valid code"))
+        AlongRay::new(&FourChannel::of(Encoding::optimum(36, 912)))
     }
 
     /// Phase and margin of a pixel with the absolute phase `truth`, whose three phases are off by `noise`.
@@ -258,8 +259,8 @@ mod tests {
 
     #[test]
     fn orders_are_right_for_projectors_far_from_coaxial() {
-        let other = FringeCode::new([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920).expect("valid code");
-        let backwards = FringeCode::new([35.0, 36.0, 30.0], 912).expect("valid code");
+        let other = FourChannel::of(Encoding::four_channel([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920));
+        let backwards = FourChannel::of(Encoding::four_channel([35.0, 36.0, 30.0], 912));
         for way in [optimum(), AlongRay::new(&other), AlongRay::new(&backwards)] {
             for i in 0..1990 {
                 let truth = 0.11 * i as f32;

@@ -3,7 +3,7 @@
 //! `Phi = 2 pi N u / W` (S1), so `u = Phi W / (2 pi N)`. No light comes from beside the projector image, so columns more
 //! than one beyond its edges are wrong and become NaN together with their phase.
 
-use crate::FringeCode;
+use crate::encoding::Encoding;
 use ndarray::{Array2, ArrayView2};
 use std::f32::consts::TAU;
 
@@ -21,18 +21,18 @@ pub struct Columns {
 ///
 /// ```
 /// use ndarray::array;
-/// use quadfringe::{FringeCode, stages::columns_from_phase};
-/// let code = FringeCode::optimum(36, 912)?;
+/// use quadfringe::{Encoding, stages::columns_from_phase};
+/// let encoding = Encoding::optimum(36, 912)?;
 /// let turns = 2.0 * std::f32::consts::TAU;
-/// let found = columns_from_phase(&code, array![[turns, -turns]].view());
+/// let found = columns_from_phase(&encoding, array![[turns, -turns]].view());
 /// assert!((found.column_px[[0, 0]] - 2.0 * 912.0 / 36.0).abs() < 1e-4);
 /// assert!(found.column_px[[0, 1]].is_nan() && found.phase_rad[[0, 1]].is_nan());
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
 #[must_use]
-pub fn columns_from_phase(code: &FringeCode, phase_rad: ArrayView2<'_, f32>) -> Columns {
-    let per_rad = code.period_px(0) as f32 / TAU;
-    let edges = ProjectorEdges::of(code.projector_width());
+pub fn columns_from_phase(encoding: &Encoding, phase_rad: ArrayView2<'_, f32>) -> Columns {
+    let per_rad = encoding.period_px() as f32 / TAU;
+    let edges = ProjectorEdges::of(encoding.projector_width());
     let mut found =
         Columns { phase_rad: phase_rad.to_owned(), column_px: phase_rad.mapv(|phase| phase * per_rad) };
     for (phase, column) in found.phase_rad.iter_mut().zip(&mut found.column_px) {

@@ -5,8 +5,9 @@
 //! -> N, on which noise grows by the factor sqrt(N) at each rung.
 
 use super::{Absolute, Phases};
+use crate::encoding::{Encoding, FourChannel};
 use crate::parallel::angle::{round, sin_cos, wrap_positive};
-use crate::{Error, FringeCode, Result};
+use crate::{Error, Result};
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -48,16 +49,16 @@ struct Repeat {
 }
 
 impl Ladder {
-    /// Plan for the fringe numbers of a code.
+    /// Plan for the fringe numbers of an encoding.
     #[must_use]
-    pub fn new(code: &FringeCode) -> Self {
+    pub fn new(code: &FourChannel) -> Self {
         let numbers = Phases::from_array(code.numbers());
         let beat = (numbers.quadrature - numbers.green).abs();
         let whole = code.numbers().iter().all(|n| n.fract() == 0.0);
         Self {
             numbers: numbers.map(|n| n as f32),
-            columns_per_turn: (code.projector_width() as f64 / numbers.quadrature) as f32,
-            width: code.projector_width() as f32,
+            columns_per_turn: (code.projector_width as f64 / numbers.quadrature) as f32,
+            width: code.projector_width as f32,
             cycle: (whole && beat == 1.0).then_some(numbers.quadrature as f32),
             climbs: beat > 0.0 && beat <= 1.0 && numbers.infrared != numbers.quadrature,
             orders: code.orders(),
@@ -67,8 +68,8 @@ impl Ladder {
     /// Absolute phase of one pixel from its wrapped phases in rad. NaN in, NaN out.
     ///
     /// ```
-    /// use quadfringe::{FringeCode, stages::{Ladder, Phases}};
-    /// let code = FringeCode::optimum(36, 912)?;
+    /// use quadfringe::{Encoding, stages::{Ladder, Phases}};
+    /// let code = Encoding::optimum(36, 912)?.four_channel_view()?;
     /// let at = |n: f64| (std::f64::consts::TAU * n * 700.25 / 912.0) as f32;
     /// let wrapped = Phases { quadrature: at(36.0), green: at(35.0), infrared: at(30.0) };
     /// let found = Ladder::new(&code).order(wrapped);
@@ -183,30 +184,30 @@ impl Nearest {
 /// NaN in, NaN out.
 ///
 /// # Errors
-/// [`Error::Shape`] when the maps differ in size.
+/// [`Error::Shape`] when the maps differ in size; [`Error::NotFourChannel`] for another encoding.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use quadfringe::{FringeCode, stages::{Phases, unwrap}};
-/// let code = FringeCode::optimum(36, 912)?;
+/// use quadfringe::{Encoding, stages::{Phases, unwrap}};
+/// let encoding = Encoding::optimum(36, 912)?;
 /// let wrapped = |n: f64| Array2::from_shape_fn((1, 912), |(_, u)| {
 ///     let phase = std::f64::consts::TAU * n * u as f64 / 912.0;
 ///     phase.sin().atan2(phase.cos()) as f32
 /// });
-/// let wrapped = Phases::from_array(code.numbers()).map(wrapped);
-/// let found = unwrap(&code, wrapped.as_ref().map(|map| map.view()))?;
+/// let wrapped = Phases::from_array([36.0, 35.0, 30.0]).map(wrapped);
+/// let found = unwrap(&encoding, wrapped.as_ref().map(|map| map.view()))?;
 /// assert!((found.phase_rad[[0, 500]] / std::f32::consts::TAU * 912.0 / 36.0 - 500.0).abs() < 1e-2);
 /// assert!(found.margin[[0, 500]] > 0.9);
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
-pub fn unwrap(code: &FringeCode, wrapped_rad: Phases<ArrayView2<'_, f32>>) -> Result<Absolute> {
+pub fn unwrap(encoding: &Encoding, wrapped_rad: Phases<ArrayView2<'_, f32>>) -> Result<Absolute> {
     let shape = wrapped_rad.quadrature.raw_dim();
     for (map, name) in [(wrapped_rad.green, "green phase"), (wrapped_rad.infrared, "infrared phase")] {
         if map.raw_dim() != shape {
             return Err(Error::shape(name, wrapped_rad.quadrature.shape(), map.shape()));
         }
     }
-    let ladder = Ladder::new(code);
+    let ladder = Ladder::new(&encoding.four_channel_view()?);
     let mut out = Absolute {
         phase_rad: Array2::from_elem(shape, f32::NAN),
         margin: Array2::from_elem(shape, f32::NAN),
@@ -226,9 +227,9 @@ pub fn unwrap(code: &FringeCode, wrapped_rad: Phases<ArrayView2<'_, f32>>) -> Re
 mod tests {
     use super::*;
 
-    fn phases(code: &FringeCode, column: f64) -> Phases<f32> {
+    fn phases(code: &FourChannel, column: f64) -> Phases<f32> {
         Phases::from_array(code.numbers()).map(|n| {
-            let phase = std::f64::consts::TAU * n * column / code.projector_width() as f64;
+            let phase = std::f64::consts::TAU * n * column / code.projector_width as f64;
             phase.sin().atan2(phase.cos()) as f32
         })
     }
@@ -236,16 +237,16 @@ mod tests {
     #[test]
     fn every_column_of_every_kind_of_code_is_found() {
         let codes = [
-            FringeCode::optimum(36, 912).unwrap(),
-            FringeCode::optimum(64, 1280).unwrap(),
-            FringeCode::new([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920).unwrap(),
-            FringeCode::new([30.0, 31.0, 36.0], 912).unwrap(),
+            FourChannel::of(Encoding::optimum(36, 912)),
+            FourChannel::of(Encoding::optimum(64, 1280)),
+            FourChannel::of(Encoding::four_channel([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920)),
+            FourChannel::of(Encoding::four_channel([30.0, 31.0, 36.0], 912)),
         ];
         for code in codes {
             let ladder = Ladder::new(&code);
-            for i in 0..2 * code.projector_width() {
+            for i in 0..2 * code.projector_width {
                 let column = i as f64 / 2.0 + 0.1;
-                if column >= code.projector_width() as f64 - 0.5 {
+                if column >= code.projector_width as f64 - 0.5 {
                     continue;
                 }
                 let found = ladder.order(phases(&code, column)).phase_rad / TAU * ladder.columns_per_turn;
@@ -256,7 +257,7 @@ mod tests {
 
     #[test]
     fn the_first_column_does_not_jump_to_the_last_under_noise() {
-        let code = FringeCode::optimum(36, 912).unwrap();
+        let code = FourChannel::of(Encoding::optimum(36, 912));
         let ladder = Ladder::new(&code);
         for noise in [-0.05f32, 0.05] {
             let wrapped = phases(&code, 0.0).map(|p| p + noise);

@@ -33,10 +33,10 @@ pub struct Valid {
 ///
 /// ```
 /// use ndarray::{Array2, array};
-/// use quadfringe::{FringeCode, stages::{Limits, Phases, discard_invalid, unwrap}};
-/// let code = FringeCode::optimum(36, 912)?;
+/// use quadfringe::{Encoding, stages::{Limits, Phases, discard_invalid, unwrap}};
+/// let encoding = Encoding::optimum(36, 912)?;
 /// let zero = Array2::<f32>::zeros((1, 2));
-/// let absolute = unwrap(&code, Phases { quadrature: zero.view(), green: zero.view(), infrared: zero.view() })?;
+/// let absolute = unwrap(&encoding, Phases { quadrature: zero.view(), green: zero.view(), infrared: zero.view() })?;
 /// let limits = Limits { modulation_min: 0.02, quality_min: 0.15 };
 /// let valid = discard_invalid(&absolute, array![[0.3f32, 0.01]].view(), limits)?;
 /// assert!(valid.phase_rad[[0, 0]] == 0.0 && valid.phase_rad[[0, 1]].is_nan());

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 /// Rooms in the order of `lib.rs`. A file belongs to the longest name that its path begins with: what every method of
 /// decoding takes and gives stands above the methods, the decoder that chooses between them below.
-const ORDER: [&str; 14] = [
+const ORDER: [&str; 15] = [
     "error",
     "parallel",
     "encoding",
@@ -20,6 +20,7 @@ const ORDER: [&str; 14] = [
     "condition",
     "stages",
     "height",
+    "decode/method",
     "decode/options",
     "decode/output",
     "published",
@@ -27,8 +28,17 @@ const ORDER: [&str; 14] = [
     "decode",
 ];
 const FORWARD: [&str; 2] = ["surface", "rig"];
-const INVERSE: [&str; 8] =
-    ["condition", "stages", "height", "decode/options", "decode/output", "published", "joint", "decode"];
+const INVERSE: [&str; 9] = [
+    "condition",
+    "stages",
+    "height",
+    "decode/method",
+    "decode/options",
+    "decode/output",
+    "published",
+    "joint",
+    "decode",
+];
 const METHODS: [&str; 2] = ["published", "joint"];
 
 /// Rooms in which a child and the module around it may use each other: types that all files of the room share stand in its

@@ -2,12 +2,13 @@
 
 #![allow(dead_code)] // each test uses its part
 
+use ndarray::Array2;
 use proptest::test_runner::{Config as ProptestConfig, RngSeed};
 use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, BitDepth, Cast, Light, Planes, RenderOptions};
 use quadfringe::surface::scene;
 use quadfringe::{
-    BayerPattern, Conditioner, Decoded, Decoder, Device, Error, FringeCode, Method, Options, Result, Shot,
+    BayerPattern, Conditioner, Decoded, Decoder, Device, Encoding, Error, Method, Options, Result, Shot,
 };
 use std::f32::consts::PI;
 
@@ -45,8 +46,21 @@ pub fn noisy(seed: u64) -> RenderOptions {
     RenderOptions { noise: 0.03, seed, ..RenderOptions::default() }
 }
 
-pub fn code() -> FringeCode {
-    FringeCode::optimum(36, 912).expect("valid code")
+pub fn code() -> Encoding {
+    Encoding::optimum(36, 912).expect("a valid encoding")
+}
+
+/// A decoder to millimetres for the camera of a bench.
+pub fn decoder(bench: &Bench, options: Options) -> Decoder {
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
+    let shape = [bench.camera.height, bench.camera.width];
+    let builder = Decoder::builder(&code(), shape).options(options).triangulator(triangulator);
+    builder.build().expect("valid options")
+}
+
+/// The four images of 8 bit.
+pub fn bytes(planes: Planes) -> [Array2<u8>; 4] {
+    planes.into_u8().expect("the default bit depth")
 }
 
 /// Decode what the bench rendered; a mosaic is taken as `BAYER`.
@@ -55,9 +69,9 @@ pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> 
         Planes::BayerU8([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
         Planes::BayerU16([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
         Planes::BayerF32([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
-        Planes::U8(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
-        Planes::U16(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
-        Planes::F32(p) => decoder.decode(&Shot::new(p.each_ref().map(|x| x.view()))?),
+        Planes::U8(p) => decoder.decode(&Shot::try_from(p)?),
+        Planes::U16(p) => decoder.decode(&Shot::try_from(p)?),
+        Planes::F32(p) => decoder.decode(&Shot::try_from(p)?),
     }
 }
 
@@ -65,9 +79,9 @@ pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> 
 pub fn there_and_back(
     bench: &Bench,
     cast: &Cast,
-    code: &FringeCode,
+    code: &Encoding,
     render: &RenderOptions,
-    method: Method,
+    method: &Method,
 ) -> Decoded {
     there_and_back_by(bench, cast, code, render, method, &Conditioner::default())
 }
@@ -76,18 +90,19 @@ pub fn there_and_back(
 pub fn there_and_back_by(
     bench: &Bench,
     cast: &Cast,
-    code: &FringeCode,
+    code: &Encoding,
     render: &RenderOptions,
-    method: Method,
+    method: &Method,
     conditioner: &Conditioner,
 ) -> Decoded {
     let work = || -> std::result::Result<Decoded, Error> {
-        let planes = bench.render(cast, &Light::shot(code), render)?;
+        let planes = bench.render(cast, &Light::shot(code)?, render)?;
         let (rows, columns) = planes.shape();
-        let options = Options { method, ..Options::default() };
-        let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
-        let mut decoder = Decoder::new(code.clone(), [rows, columns], conditioner, options)?
-            .triangulate_with(triangulator)?;
+        let mut decoder = Decoder::builder(code, [rows, columns])
+            .conditioner(conditioner.clone())
+            .options(Options::default().with_method(method.clone()))
+            .triangulator(Triangulator::new(&bench.camera, &bench.visible)?)
+            .build()?;
         decode_planes(&mut decoder, &planes)
     };
     work().expect("a valid scene")
@@ -132,7 +147,7 @@ impl Score {
 }
 
 /// Judge a decoded shot; smooth parts are more than `far_px` away from any edge.
-pub fn score(decoded: &Decoded, cast: &Cast, code: &FringeCode, far_px: f32) -> Score {
+pub fn score(decoded: &Decoded, cast: &Cast, code: &Encoding, far_px: f32) -> Score {
     let (truth, edge) = (cast.phase_rad(code), cast.edge_distance_px());
     let (depth, shadow) = (cast.depth_mm(), cast.shadow());
     let xyz = decoded.xyz_mm.as_ref().expect("calibrated");

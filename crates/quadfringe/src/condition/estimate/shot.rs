@@ -7,7 +7,8 @@
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
-use crate::{Channel, Error, FringeCode, Result};
+use crate::encoding::{Channel, Encoding};
+use crate::{Error, Result};
 use ndarray::{Array2, ArrayView1, ArrayView2, s};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
@@ -45,18 +46,18 @@ const STRIDE: usize = 4;
 /// estimate repeated, until it stays: a phase from light that is bent is bent itself. The `pixels` of an estimate are tiles.
 ///
 /// # Errors
-/// [`Error::Shape`] when the maps differ in size.
+/// [`Error::Shape`] when the maps differ in size; [`Error::NotFourChannel`] for another encoding.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use quadfringe::{FringeCode, condition::estimate_response_of_shot};
-/// let code = FringeCode::optimum(36, 912)?;
+/// use quadfringe::{Encoding, condition::estimate_response_of_shot};
+/// let encoding = Encoding::optimum(36, 912)?;
 /// let phase = Array2::from_shape_fn((300, 400), |(y, x)| 0.3 * x as f32 + 0.05 * y as f32);
-/// let light = code.numbers().map(|n| {
-///     phase.mapv(|first| (0.5 + 0.4 * (first * (n / code.numbers()[0]) as f32).cos()).powf(2.2))
+/// let light = [36.0, 35.0, 30.0].map(|n: f32| {
+///     phase.mapv(|first| (0.5 + 0.4 * (first * (n / 36.0)).cos()).powf(2.2))
 /// });
 /// let [first, second, third] = light.each_ref().map(|plane| plane.view());
-/// let found = estimate_response_of_shot([first, second, first, third], phase.view(), &code)?;
+/// let found = estimate_response_of_shot([first, second, first, third], phase.view(), &encoding)?;
 /// let red = found[0].expect("bent light");
 /// assert!((red.response.exponent - 1.0 / 2.2).abs() < 0.02);
 /// # Ok::<(), quadfringe::Error>(())
@@ -64,18 +65,18 @@ const STRIDE: usize = 4;
 pub fn estimate_response_of_shot(
     light: [ArrayView2<'_, f32>; 4],
     phase_rad: ArrayView2<'_, f32>,
-    code: &FringeCode,
+    encoding: &Encoding,
 ) -> Result<[Option<ResponseEstimate>; 4]> {
     for (channel, plane) in Channel::ALL.iter().zip(&light) {
         if plane.dim() != phase_rad.dim() {
             return Err(Error::shape(channel.name(), phase_rad.shape(), plane.shape()));
         }
     }
+    let four = encoding.four_channel_view()?;
     let Some(slope) = median_slope(phase_rad) else { return Ok([None; 4]) };
-    let numbers = code.numbers();
     let mut means = [(); 4].map(|()| Array2::zeros([0, STEPS]));
     means.par_iter_mut().zip(Channel::ALL).for_each(|(means, channel)| {
-        let scale = (numbers[channel.phase_index()] / numbers[0]) as f32;
+        let scale = (four.fringe_number(channel) / four.quadrature) as f32;
         let side = ((TILE_FRINGES * TAU / (slope * scale)).ceil() as usize).max(SIDE_MIN);
         *means = tiles(light[channel.index()], phase_rad, scale, side);
     });

@@ -11,9 +11,10 @@ use super::params::local_fit;
 use super::params::orders::JUMP_PERIODS;
 use super::scene::Scene;
 use super::uncertainty::{NodeVerdict, WrongOrderModel};
+use crate::Channel;
+use crate::encoding::FourChannel;
 use crate::parallel::angle::wrap;
 use crate::parallel::slots::Slots;
-use crate::{Channel, FringeCode};
 use candidates::{Block, Candidates, Cell, Nodes};
 use evidence::{EvidenceRows, node_phases, row_evidence};
 use matching::Matching;
@@ -32,9 +33,8 @@ pub(super) struct Orders {
 }
 
 impl Orders {
-    pub fn new(code: &FringeCode) -> Self {
-        let n = code.numbers();
-        let ratios = [Channel::G, Channel::Ir].map(|c| (n[c.phase_index()] / n[0]) as f32);
+    pub fn new(code: &FourChannel) -> Self {
+        let ratios = [Channel::G, Channel::Ir].map(|c| (code.fringe_number(c) / code.quadrature) as f32);
         Self {
             matching: Matching::new(code),
             phase: Vec::new(),

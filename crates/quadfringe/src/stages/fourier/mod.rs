@@ -201,7 +201,7 @@ fn contiguous<'a>(row: ArrayViewMut1<'a, f32>) -> &'a mut [f32] {
 impl Fringes<'_> {
     fn check(&self, name: &str, shape: [usize; 2]) -> Result<()> {
         if self.means.shape() != shape {
-            return Err(Error::shape(name, &shape, self.means.shape()));
+            return Err(Error::shape(name.to_owned(), &shape, self.means.shape()));
         }
         check_period(self.period, shape[1])
     }

@@ -2,7 +2,7 @@
 
 use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
-use crate::FringeCode;
+use crate::encoding::FourChannel;
 use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
@@ -34,11 +34,11 @@ struct Rotations {
 }
 
 impl CostTable {
-    pub fn new(code: &FringeCode) -> Self {
+    pub fn new(code: &FourChannel) -> Self {
         let n = code.numbers();
         let ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
         let count = (code.orders() + 2).div_ceil(LANES) * LANES;
-        let per_column = n[0] / code.projector_width() as f64;
+        let per_column = n[0] / code.projector_width as f64;
         let end = n[0] + 0.5 * per_column;
         let labels = || (0..count).map(|label| label as f64 - 1.0);
         let beats =

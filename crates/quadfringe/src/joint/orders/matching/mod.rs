@@ -12,7 +12,7 @@ mod sweep;
 
 pub(super) use evidence::{CosineSums, NodeEvidence};
 
-use crate::FringeCode;
+use crate::encoding::FourChannel;
 use crate::joint::params::orders::{COST_MAX, JUMP_NODES_MAX, JUMP_NODES_MIN};
 use crate::joint::params::tasks::SWEEP_COLUMNS;
 use costs::CostTable;
@@ -38,7 +38,7 @@ pub(super) struct Matching {
 }
 
 impl Matching {
-    pub fn new(code: &FringeCode) -> Self {
+    pub fn new(code: &FourChannel) -> Self {
         Self {
             table: CostTable::new(code),
             columns: 0,
@@ -172,18 +172,19 @@ fn cheapest(sums: &[u16]) -> Cheapest {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::encoding::Encoding;
     use std::f64::consts::TAU;
 
     const COLUMNS: usize = 96;
     const ROWS: usize = 64;
 
     /// A node that sees projector column `u`, with the beats of a perfect shot and one pixel in it.
-    fn node(code: &FringeCode, u: f64) -> NodeEvidence {
+    fn node(code: &FourChannel, u: f64) -> NodeEvidence {
         let [n1, n2, n3] = code.numbers();
-        let turns = |n: f64| ((n * u / code.projector_width() as f64) * 65536.0).round() as i64 as u16;
+        let turns = |n: f64| ((n * u / code.projector_width as f64) * 65536.0).round() as i64 as u16;
         let wrapped = f64::from(turns(n1)) / 65536.0 * TAU;
         let seen = |n: f64| {
-            let s = (TAU * n * u / code.projector_width() as f64).cos();
+            let s = (TAU * n * u / code.projector_width as f64).cos();
             let f = n / n1 * wrapped;
             let [square, first, second] =
                 [[s * s, 0.0], [s * f.cos(), s * f.sin()], [(2.0 * f).cos(), (2.0 * f).sin()]];
@@ -199,20 +200,20 @@ mod tests {
         }
     }
 
-    fn choose(code: &FringeCode, evidence: impl Fn(usize, usize) -> NodeEvidence + Sync) -> Matching {
+    fn choose(code: &FourChannel, evidence: impl Fn(usize, usize) -> NodeEvidence + Sync) -> Matching {
         let mut matching = Matching::new(code);
         let row = |y: usize, out: &mut Vec<NodeEvidence>| out.extend((0..COLUMNS).map(|x| evidence(x, y)));
         matching.choose([ROWS, COLUMNS], 8.0, row);
         matching
     }
 
-    fn right(code: &FringeCode, column: f64, order: i16) -> bool {
-        order == (column / code.period_px(0)).floor() as i16
+    fn right(code: &FourChannel, column: f64, order: i16) -> bool {
+        order == (column / code.period_px()).floor() as i16
     }
 
     #[test]
     fn every_order_of_a_field_and_of_a_step_is_right() {
-        let code = FringeCode::optimum(36, 912).unwrap();
+        let code = FourChannel::of(Encoding::optimum(36, 912));
         let step =
             |x: usize, y: usize| if x < 50 { 9.3 * x as f64 + y as f64 } else { 300.2 + 5.1 * x as f64 };
         let found = choose(&code, |x, y| node(&code, step(x, y)));
@@ -224,7 +225,7 @@ mod tests {
 
     #[test]
     fn neighbours_outvote_a_band_of_wrong_evidence_and_its_cost_shows_it() {
-        let code = FringeCode::optimum(36, 912).unwrap();
+        let code = FourChannel::of(Encoding::optimum(36, 912));
         let column = |x: usize| 400.0 + 1.7 * x as f64;
         let found = choose(&code, |x, y| {
             let mut node = node(&code, column(x));
@@ -242,10 +243,9 @@ mod tests {
 
     #[test]
     fn dark_nodes_pass_no_costs_on() {
-        let code = FringeCode::optimum(36, 912).unwrap();
+        let code = FourChannel::of(Encoding::optimum(36, 912));
         // Beyond the dark lies another surface, ten orders on.
-        let column =
-            |x: usize| 101.37 + 4.0 * x as f64 + if x >= 44 { 10.0 * code.period_px(0) } else { 0.0 };
+        let column = |x: usize| 101.37 + 4.0 * x as f64 + if x >= 44 { 10.0 * code.period_px() } else { 0.0 };
         let found =
             choose(&code, |x, _| NodeEvidence { lit: !(40..44).contains(&x), ..node(&code, column(x)) });
         for i in 0..ROWS * COLUMNS {
@@ -257,7 +257,7 @@ mod tests {
 
     #[test]
     fn cosines_of_pixels_decide_where_beats_are_wrong() {
-        let code = FringeCode::optimum(36, 912).unwrap();
+        let code = FourChannel::of(Encoding::optimum(36, 912));
         let column = |x: usize, y: usize| 200.37 + 2.9 * x as f64 + 0.31 * y as f64;
         let found = choose(&code, |x, y| {
             let node = node(&code, column(x, y));

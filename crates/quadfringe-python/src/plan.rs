@@ -1,0 +1,55 @@
+//! The plan of a decoder from keyword arguments; an argument that is absent takes the kernel's default.
+
+use crate::device::Device;
+use crate::pair::pair_of;
+use quadfringe::height::{PairTable, Triangulator};
+use quadfringe::{Decoder, DecoderBuilder, Method, Options, Result};
+
+/// The method and its thresholds.
+pub struct Choices<'a> {
+    pub method: Option<&'a str>,
+    pub modulation_min: Option<f32>,
+    pub quality_min: Option<f32>,
+    pub period_px: Option<f64>,
+    pub channel_instants_us: Option<[f32; 4]>,
+}
+
+/// Calibrated devices.
+pub struct Geometry {
+    pub camera: Option<Device>,
+    pub projector: Option<Device>,
+    pub infrared: Option<Device>,
+    pub predeformed_z_mm: Option<f64>,
+    pub depth_range_mm: Option<[f64; 2]>,
+}
+
+impl Geometry {
+    /// Camera and visible projector, when both are known.
+    pub fn devices(&self) -> Option<(&Device, &Device)> {
+        self.camera.as_ref().zip(self.projector.as_ref())
+    }
+}
+
+/// Add choices and devices to a plan, and make the decoder.
+pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geometry) -> Result<Decoder> {
+    let mut method = choices.method.map_or(Ok(Method::default()), Method::from_name)?;
+    if let Some(instants) = choices.channel_instants_us {
+        method = method.with_channel_instants_us(instants)?;
+    }
+    if let (Some((camera, projector)), Some(infrared)) = (geometry.devices(), &geometry.infrared) {
+        let pair = pair_of(projector, infrared, geometry.predeformed_z_mm)?;
+        let table = PairTable::new(&camera.0, &pair, builder.encoding(), geometry.depth_range_mm)?;
+        method = method.with_along_rays(table)?;
+    }
+    let mut options = Options::default().with_method(method);
+    options.modulation_min = choices.modulation_min.unwrap_or(options.modulation_min);
+    options.quality_min = choices.quality_min.unwrap_or(options.quality_min);
+    options.period_px = choices.period_px;
+    let builder = builder.options(options);
+    match geometry.devices() {
+        Some((camera, projector)) => {
+            builder.triangulator(Triangulator::new(&camera.0, &projector.0)?).build()
+        }
+        None => builder.build(),
+    }
+}

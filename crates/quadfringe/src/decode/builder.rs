@@ -1,0 +1,98 @@
+//! A decoder, planned step by step.
+
+use super::method::Method;
+use super::options::Options;
+use super::{Decoder, Engine};
+use crate::condition::Conditioner;
+use crate::encoding::Encoding;
+use crate::error::{Error, Result};
+use crate::height::Triangulator;
+use crate::joint::Joint;
+use crate::published::Published;
+
+/// Least size of an image in either direction: fewer pixels hold no neighbourhood to fit.
+const SIDE_MIN_PX: usize = 16;
+
+/// The plan of a [`Decoder`], made by [`Decoder::builder`]. A part that is left out takes its default.
+#[derive(Debug, Clone)]
+#[must_use = "a builder does nothing until `build`"]
+pub struct DecoderBuilder {
+    encoding: Encoding,
+    shape: [usize; 2],
+    conditioner: Conditioner,
+    options: Options,
+    triangulator: Option<Triangulator>,
+}
+
+impl Decoder {
+    /// Plan a decoder of this encoding for images of `shape` (rows, columns).
+    pub fn builder(encoding: &Encoding, shape: [usize; 2]) -> DecoderBuilder {
+        DecoderBuilder {
+            encoding: encoding.clone(),
+            shape,
+            conditioner: Conditioner::default(),
+            options: Options::default(),
+            triangulator: None,
+        }
+    }
+}
+
+impl DecoderBuilder {
+    /// The encoding that the decoder is for.
+    #[must_use]
+    pub const fn encoding(&self) -> &Encoding {
+        &self.encoding
+    }
+
+    /// Photometric calibration. Default: images are linear, without crosstalk, and registered.
+    pub fn conditioner(mut self, conditioner: Conditioner) -> Self {
+        self.conditioner = conditioner;
+        self
+    }
+
+    /// The method and its thresholds.
+    pub fn options(mut self, options: Options) -> Self {
+        self.options = options;
+        self
+    }
+
+    /// Calibrated camera and projector, for points in mm. Default: the decoder stops at the projector column.
+    pub fn triangulator(mut self, triangulator: Triangulator) -> Self {
+        self.triangulator = Some(triangulator);
+        self
+    }
+
+    /// Check and plan everything once.
+    ///
+    /// # Errors
+    /// [`Error::TooSmall`] for images of less than 16 x 16 pixels; [`Error::NotFourChannel`] for an encoding that the
+    /// method does not take; [`Error::Shape`] when a calibration was made for another size of image; [`Error::Value`]
+    /// for an option or a number of the conditioner out of range.
+    pub fn build(self) -> Result<Decoder> {
+        let Self { encoding, shape, conditioner, options, triangulator } = self;
+        if shape.iter().any(|side| *side < SIDE_MIN_PX) {
+            return Err(Error::TooSmall { least: [SIDE_MIN_PX; 2], actual: shape });
+        }
+        options.check(shape)?;
+        if let Some(camera) =
+            triangulator.as_ref().map(|triangulator| <[usize; 2]>::from(triangulator.shape()))
+        {
+            if camera != shape {
+                return Err(Error::shape("calibrated camera", &shape, &camera));
+            }
+        }
+        options.method.accepts(&encoding)?;
+        let four = encoding.four_channel_view()?;
+        let engine = match &options.method {
+            Method::Joint(_) => Engine::Joint(Box::new(Joint::new(&four, shape))),
+            Method::Published(published) => {
+                let mut engine = Published::new(&four, shape);
+                if let Some(table) = &published.along_rays {
+                    engine.unwrap_along_rays(table.clone());
+                }
+                Engine::Published(Box::new(engine))
+            }
+        };
+        Ok(Decoder { encoding, four, shape, plan: conditioner.plan()?, options, engine, triangulator })
+    }
+}

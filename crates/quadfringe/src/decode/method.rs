@@ -1,0 +1,228 @@
+//! The methods that decode a shot, each with the choices that it alone knows.
+
+use crate::encoding::Encoding;
+use crate::error::{Error, Limit, Result};
+use crate::height::PairTable;
+use std::fmt::{self, Formatter};
+use std::sync::Arc;
+
+/// Names of the methods.
+const NAMES: &[&str] = &["published", "joint"];
+
+/// The method that decodes a shot. A choice that one method alone knows is part of that method.
+///
+/// ```
+/// use quadfringe::{Decoder, Encoding, Method, Options};
+/// let encoding = Encoding::optimum(36, 912)?;
+/// let published = Options::default().with_method(Method::published());
+/// let decoder = Decoder::builder(&encoding, [768, 1024]).options(published).build()?;
+/// assert_eq!(decoder.options().method.name(), "published");
+/// assert_eq!(Method::default().name(), "joint");
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+#[non_exhaustive]
+pub enum Method {
+    /// All four channels together: local fit in any fringe direction, phase weighted by noise, fringe orders from
+    /// neighbourhoods. The default: the most accurate phase and the fewest wrong orders.
+    Joint(JointOptions),
+    /// The chain of the paper: mean envelope, two-step phase shifting, improved Fourier filter along the rows, ladder of
+    /// beats pixel by pixel. Needs fringes that run across the rows.
+    Published(PublishedOptions),
+}
+
+impl Method {
+    /// The joint method with its defaults.
+    #[must_use]
+    pub fn joint() -> Self {
+        Self::Joint(JointOptions::default())
+    }
+
+    /// The published method with its defaults.
+    #[must_use]
+    pub fn published() -> Self {
+        Self::Published(PublishedOptions::default())
+    }
+
+    /// The method of this name with its defaults: joint or published. `best`, the earlier name of `joint`, is read from
+    /// old settings and files.
+    ///
+    /// # Errors
+    /// [`Error::Value`] that lists the names for any other.
+    pub fn from_name(name: &str) -> Result<Self> {
+        match name {
+            "joint" | "best" => Ok(Self::joint()),
+            "published" => Ok(Self::published()),
+            _ => Err(Error::value("method", Limit::OneOf(NAMES), format!("{name:?}"))),
+        }
+    }
+
+    /// The same method with fringe orders searched along the camera rays of this table; for callers that have the method by
+    /// name.
+    ///
+    /// # Errors
+    /// [`Error::NotOfMethod`] for another method than the published one.
+    pub fn with_along_rays(self, table: PairTable) -> Result<Self> {
+        match self {
+            Self::Published(published) => Ok(published.with_along_rays(table).into()),
+            Self::Joint(_) => Err(self.lacks("the search along camera rays", "published")),
+        }
+    }
+
+    /// The same method with channels exposed at these instants (R, G, B, IR); for callers that have the method by name.
+    ///
+    /// # Errors
+    /// [`Error::NotOfMethod`] for another method than the joint one.
+    pub fn with_channel_instants_us(self, instants: [f32; 4]) -> Result<Self> {
+        match self {
+            Self::Joint(joint) => Ok(joint.with_channel_instants_us(instants).into()),
+            Self::Published(_) => Err(self.lacks("channel_instants_us", "joint")),
+        }
+    }
+
+    /// For images of `shape` (rows, columns).
+    pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
+        match self {
+            Self::Joint(joint) => joint.check(),
+            Self::Published(published) => published.check(shape),
+        }
+    }
+
+    const fn lacks(&self, option: &'static str, of: &'static str) -> Error {
+        Error::NotOfMethod { option, of, method: self.name() }
+    }
+
+    /// The name in settings and files.
+    #[must_use]
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::Joint(_) => "joint",
+            Self::Published(_) => "published",
+        }
+    }
+
+    /// Version of the method, for saved results. It is raised whenever the method gives other maps for the same shot and
+    /// options.
+    #[must_use]
+    pub const fn version(&self) -> &'static str {
+        match self {
+            Self::Joint(_) | Self::Published(_) => "1",
+        }
+    }
+
+    /// Whether the method decodes this encoding. Both take the four channels of the paper, with any fringe numbers.
+    ///
+    /// # Errors
+    /// [`Error::NotFourChannel`] that names the first difference.
+    pub fn accepts(&self, encoding: &Encoding) -> Result<()> {
+        match self {
+            Self::Joint(_) | Self::Published(_) => encoding.four_channel_view().map(|_| ()),
+        }
+    }
+}
+
+impl Default for Method {
+    fn default() -> Self {
+        Self::joint()
+    }
+}
+
+impl From<JointOptions> for Method {
+    fn from(options: JointOptions) -> Self {
+        Self::Joint(options)
+    }
+}
+
+impl From<PublishedOptions> for Method {
+    fn from(options: PublishedOptions) -> Self {
+        Self::Published(options)
+    }
+}
+
+/// Choices of the joint method.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[non_exhaustive]
+pub struct JointOptions {
+    /// The middle of the exposure of R, G, B and IR in us, relative to the instant that the result shall show; `None`
+    /// when all channels are exposed together. A projector that shows its colours one after another needs them when the
+    /// surface moves.
+    pub channel_instants_us: Option<[f32; 4]>,
+}
+
+impl JointOptions {
+    /// Channels exposed at these instants: R, G, B, IR.
+    #[must_use]
+    pub const fn with_channel_instants_us(mut self, instants: [f32; 4]) -> Self {
+        self.channel_instants_us = Some(instants);
+        self
+    }
+
+    fn check(&self) -> Result<()> {
+        let Some(instants) = self.channel_instants_us else { return Ok(()) };
+        let expected = match instants {
+            _ if instants.iter().any(|t| !t.is_finite()) => Limit::Finite,
+            _ if instants.iter().all(|t| *t == instants[0]) => Limit::words("times that differ, or none"),
+            _ => return Ok(()),
+        };
+        Err(Error::value("channel_instants_us", expected, instants))
+    }
+}
+
+/// Choices of the published method.
+#[derive(Clone, Default)]
+#[non_exhaustive]
+pub struct PublishedOptions {
+    /// Search fringe orders along the camera rays with both projectors calibrated: each candidate order is a depth, at
+    /// which the infrared projector lights the ray with a known phase. `None` takes the two projectors as coaxial.
+    pub along_rays: Option<Arc<PairTable>>,
+}
+
+impl PublishedOptions {
+    /// Search fringe orders along the camera rays of this table.
+    #[must_use]
+    pub fn with_along_rays(mut self, table: PairTable) -> Self {
+        self.along_rays = Some(Arc::new(table));
+        self
+    }
+
+    fn check(&self, shape: [usize; 2]) -> Result<()> {
+        match &self.along_rays {
+            Some(table) if <[usize; 2]>::from(table.shape()) != shape => {
+                let (rows, columns) = table.shape();
+                Err(Error::shape("camera of the calibrated pair", &shape, &[rows, columns]))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Without the numbers of the table.
+impl fmt::Debug for PublishedOptions {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let size = self.along_rays.as_ref().map(|table| table.shape());
+        f.debug_struct("PublishedOptions").field("along_rays", &size).finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_of_methods_are_read_back() {
+        for method in [Method::joint(), Method::published()] {
+            let read = Method::from_name(method.name()).expect("a name that the method gives");
+            assert_eq!((read.name(), read.version()), (method.name(), method.version()));
+        }
+    }
+
+    /// Settings and files of earlier releases hold this name.
+    #[test]
+    fn best_is_read_as_joint() {
+        assert_eq!(Method::from_name("best").expect("the earlier name").name(), "joint");
+        for other in ["Best", "fast", ""] {
+            let refused = Method::from_name(other).map(|_| ()).unwrap_err();
+            assert_eq!(refused.to_string(), format!("method: expected published or joint, got {other:?}"));
+        }
+    }
+}

@@ -1,0 +1,100 @@
+//! How well the phases of an encoding tell projector columns apart.
+
+use std::f64::consts::{PI, TAU};
+
+/// Least distance in phase space (rad) between two columns that counts as different. It leaves 0.15 rad of joint error to
+/// each of the two; smaller values accept encodings in which noise decides, larger ones refuse encodings that decode.
+pub(super) const MARGIN_NEEDED_RAD: f64 = 0.3;
+
+/// Two columns that are hardest to tell apart.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Closest {
+    /// Their distance in the space of phases, in rad.
+    pub margin_rad: f64,
+    /// Their distance in projector columns.
+    pub distance_px: f64,
+}
+
+/// The pair of columns that share the first phase and are closest in all others. Two columns share the first phase when a
+/// whole number of its periods lies between them; where no two do, the margin is the greatest that phases can have.
+pub(super) fn closest_columns(fringe_numbers: &[f64], projector_width: usize) -> Closest {
+    let [first, others @ ..] = fringe_numbers else { unreachable!("an encoding has channels") };
+    let width = projector_width as f64;
+    let period_px = width / first;
+    let greatest = PI * (others.len().max(1) as f64).sqrt();
+    let mut closest = Closest { margin_rad: greatest, distance_px: width };
+    for periods in 1.. {
+        let distance_px = f64::from(periods) * period_px;
+        if distance_px >= width * (1.0 - 1e-12) {
+            break;
+        }
+        let apart = |number: &f64| wrapped(TAU * number * distance_px / width);
+        let margin_rad = others.iter().map(apart).fold(0.0, f64::hypot);
+        if margin_rad < closest.margin_rad {
+            closest = Closest { margin_rad, distance_px };
+        }
+    }
+    closest
+}
+
+/// Angle brought to `[-pi, pi]`.
+fn wrapped(angle_rad: f64) -> f64 {
+    angle_rad - TAU * (angle_rad / TAU).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::encoding::{ChannelCode, Encoding, Projector};
+    use crate::error::Error;
+    use std::f64::consts::{FRAC_PI_2, TAU};
+
+    #[test]
+    fn joint_range_decides() {
+        let accepted = [
+            ([36.0, 35.0, 30.0], 912),
+            ([36.0, 35.0, 34.0], 912),
+            ([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920),
+            ([45.714, 42.667, 40.0], 1920),
+            ([1.0, 1.0, 1.0], 912),
+        ];
+        for (numbers, width) in accepted {
+            assert!(Encoding::four_channel(numbers, width).is_ok(), "{numbers:?}");
+        }
+        for numbers in [[16.0, 8.0, 4.0], [30.0, 30.0, 30.0], [36.0, 34.0, 30.0], [36.0, 36.0, 36.0]] {
+            let refused = Encoding::four_channel(numbers, 912);
+            assert!(matches!(refused, Err(Error::JointRange { .. })), "{numbers:?}");
+        }
+        for numbers in [[f64::NAN, 35.0, 30.0], [-1.0, 35.0, 30.0], [456.0, 35.0, 30.0], [0.0, 1.0, 2.0]] {
+            let refused = Encoding::four_channel(numbers, 912);
+            assert!(matches!(refused, Err(Error::Value { .. })), "{numbers:?}");
+        }
+    }
+
+    #[test]
+    fn margins_of_known_encodings() {
+        let optimum = Encoding::optimum(36, 912).expect("valid");
+        assert!((optimum.ambiguity_margin_rad() - TAU / 6.0).abs() < 1e-9);
+        let captured = Encoding::four_channel([45.714, 42.667, 40.0], 1920).expect("valid");
+        assert!((captured.ambiguity_margin_rad() - 0.42).abs() < 0.05);
+        assert!(Encoding::optimum(35, 912).is_err());
+        assert!(Encoding::optimum(0, 912).is_err());
+    }
+
+    #[test]
+    fn lists_of_channels_are_judged_by_the_phases_that_they_measure() {
+        let visible = |number, shift| ChannelCode::new(number, shift, Projector::Visible);
+        let three_colours = [visible(36.0, 0.0), visible(35.0, 0.0), visible(30.0, 0.0)];
+        let found = Encoding::new(three_colours, 912).expect("all columns differ");
+        assert!((found.ambiguity_margin_rad() - TAU / 6.0).abs() < 1e-9);
+        // Four steps of one fringe number measure one phase, which repeats; with a second number it does not.
+        let steps = |number| (0..4).map(move |k| visible(number, f64::from(k) * FRAC_PI_2));
+        let alone: Vec<_> = steps(36.0).collect();
+        assert!(matches!(Encoding::new(alone, 912), Err(Error::JointRange { .. })));
+        let both: Vec<_> = steps(16.0).chain(steps(15.0)).collect();
+        assert!(Encoding::new(both, 912).is_ok());
+        // One fringe over the projector needs no other.
+        assert!(Encoding::new([visible(1.0, 0.0)], 912).is_ok());
+        assert!(matches!(Encoding::new([], 912), Err(Error::Value { .. })));
+        assert!(matches!(Encoding::new([visible(1.0, f64::NAN)], 912), Err(Error::Value { .. })));
+    }
+}

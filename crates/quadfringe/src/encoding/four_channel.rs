@@ -1,0 +1,206 @@
+//! The four-channel encoding of the paper: R and B in quadrature, G and IR alone.
+
+use super::{ChannelCode, Encoding, Projector, phase_at};
+use crate::error::{Error, FourChannelFault, Result};
+use std::f64::consts::FRAC_PI_2;
+
+/// One of the four channels of a shot, in the order of every four-channel array: R, G, B, IR.
+///
+/// ```
+/// use quadfringe::Channel;
+/// assert_eq!(Channel::ALL.map(Channel::name), ["R", "G", "B", "IR"]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Channel {
+    /// Red, visible projector, shift 0: in quadrature with B.
+    R,
+    /// Green, visible projector, shift 0.
+    G,
+    /// Blue, visible projector, shift `pi/2`: in quadrature with R.
+    B,
+    /// Infrared, infrared projector, shift 0.
+    Ir,
+}
+
+impl Channel {
+    /// The channels in array order.
+    pub const ALL: [Self; 4] = [Self::R, Self::G, Self::B, Self::Ir];
+
+    /// Place in four-channel arrays: R 0, G 1, B 2, IR 3.
+    #[must_use]
+    pub const fn index(self) -> usize {
+        self as usize
+    }
+
+    /// The channel's name in messages and files: R, G, B, IR.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::R => "R",
+            Self::G => "G",
+            Self::B => "B",
+            Self::Ir => "IR",
+        }
+    }
+
+    /// Phase shift in rad: `pi/2` for B, else 0.
+    #[must_use]
+    pub const fn shift_rad(self) -> f64 {
+        match self {
+            Self::B => FRAC_PI_2,
+            _ => 0.0,
+        }
+    }
+
+    /// The projector that shows the channel.
+    #[must_use]
+    pub const fn projector(self) -> Projector {
+        match self {
+            Self::Ir => Projector::Infrared,
+            _ => Projector::Visible,
+        }
+    }
+}
+
+/// The four-channel encoding as decoders see it: three fringe numbers over the projector width.
+/// [`Encoding::four_channel_view`] makes it, which guarantees valid numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
+pub struct FourChannel {
+    /// Fringe number of R and B, which are in quadrature; their phase is the one that becomes absolute.
+    pub quadrature: f64,
+    /// Fringe number of G.
+    pub green: f64,
+    /// Fringe number of IR.
+    pub infrared: f64,
+    /// Number of projector columns that the fringe numbers refer to.
+    pub projector_width: usize,
+    /// [`Encoding::ambiguity_margin_rad`] of the encoding.
+    pub ambiguity_margin_rad: f64,
+}
+
+impl FourChannel {
+    /// Fringe number of a channel.
+    #[must_use]
+    pub const fn fringe_number(&self, channel: Channel) -> f64 {
+        match channel {
+            Channel::R | Channel::B => self.quadrature,
+            Channel::G => self.green,
+            Channel::Ir => self.infrared,
+        }
+    }
+
+    /// The fringe numbers of the three phases: of R and B, of G, of IR.
+    #[must_use]
+    pub const fn numbers(&self) -> [f64; 3] {
+        [self.quadrature, self.green, self.infrared]
+    }
+
+    /// Number of fringe orders of R and B that the projector holds.
+    #[must_use]
+    pub fn orders(&self) -> usize {
+        self.quadrature.ceil() as usize
+    }
+
+    /// Projector columns of one turn of the absolute phase, that of R and B.
+    #[must_use]
+    pub fn period_px(&self) -> f64 {
+        self.projector_width as f64 / self.quadrature
+    }
+
+    /// Phase of a channel in rad at a projector column, not wrapped and without the shift of the channel (S1).
+    #[must_use]
+    pub fn phase_rad(&self, channel: Channel, column_px: f64) -> f64 {
+        phase_at(self.fringe_number(channel), column_px, self.projector_width)
+    }
+}
+
+impl Encoding {
+    /// The encoding as the four channels of the paper, which are what the decoders of this crate take.
+    ///
+    /// ```
+    /// use quadfringe::Encoding;
+    /// use quadfringe::encoding::{ChannelCode, Projector};
+    /// let four = Encoding::optimum(36, 912)?.four_channel_view()?;
+    /// assert_eq!((four.quadrature, four.green, four.infrared), (36.0, 35.0, 30.0));
+    ///
+    /// let three_colours = [36.0, 35.0, 30.0].map(|number| ChannelCode::new(number, 0.0, Projector::Visible));
+    /// let refused = Encoding::new(three_colours, 912)?.four_channel_view().unwrap_err();
+    /// assert!(refused.to_string().contains("got 3 channels"));
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Error::NotFourChannel`] that names the first difference.
+    pub fn four_channel_view(&self) -> Result<FourChannel> {
+        let fault = |fault| Err(Error::NotFourChannel { fault });
+        let [red, green, blue, infrared] = self.channels() else {
+            return fault(FourChannelFault::Count(self.channels().len()));
+        };
+        for (channel, code) in Channel::ALL.into_iter().zip(self.channels()) {
+            let ChannelCode { shift_rad, projector, .. } = *code;
+            if projector != channel.projector() {
+                return fault(FourChannelFault::Projector { channel: channel.name() });
+            }
+            if shift_rad != channel.shift_rad() {
+                return fault(FourChannelFault::Shift { channel: channel.name(), found_rad: shift_rad });
+            }
+        }
+        if red.fringe_number != blue.fringe_number {
+            let (red, blue) = (red.fringe_number, blue.fringe_number);
+            return fault(FourChannelFault::Quadrature { red, blue });
+        }
+        Ok(FourChannel {
+            quadrature: red.fringe_number,
+            green: green.fringe_number,
+            infrared: infrared.fringe_number,
+            projector_width: self.projector_width(),
+            ambiguity_margin_rad: self.ambiguity_margin_rad(),
+        })
+    }
+}
+
+#[cfg(test)]
+impl FourChannel {
+    /// The view of an encoding that is known to be valid.
+    pub(crate) fn of(encoding: Result<Encoding>) -> Self {
+        encoding.and_then(|encoding| encoding.four_channel_view()).expect("a valid four-channel encoding")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fault_of(change: impl Fn(&mut [ChannelCode; 4])) -> FourChannelFault {
+        let encoding = Encoding::optimum(36, 912).expect("valid");
+        let mut channels: [ChannelCode; 4] = encoding.channels().try_into().expect("four");
+        change(&mut channels);
+        match Encoding::new(channels, 912).expect("all columns differ").four_channel_view() {
+            Err(Error::NotFourChannel { fault }) => fault,
+            other => panic!("expected a refusal, got {other:?}"),
+        }
+    }
+
+    #[test]
+    fn the_first_difference_is_named() {
+        let found = fault_of(|channels| channels[3].projector = Projector::Visible);
+        assert_eq!(found, FourChannelFault::Projector { channel: "IR" });
+        let found = fault_of(|channels| channels[2].shift_rad = -FRAC_PI_2);
+        assert_eq!(found, FourChannelFault::Shift { channel: "B", found_rad: -FRAC_PI_2 });
+        let found = fault_of(|channels| channels[2].fringe_number = 37.0);
+        assert_eq!(found, FourChannelFault::Quadrature { red: 36.0, blue: 37.0 });
+        assert_eq!(found.to_string(), "36 fringes in R and 37 in B");
+    }
+
+    #[test]
+    fn the_view_holds_the_numbers_of_the_list() {
+        let encoding = Encoding::four_channel([36.0, 35.0, 30.0], 912).expect("valid");
+        let four = encoding.four_channel_view().expect("the four channels");
+        for (channel, code) in Channel::ALL.into_iter().zip(encoding.channels()) {
+            assert_eq!(four.fringe_number(channel), code.fringe_number);
+            assert_eq!(four.phase_rad(channel, 77.5), code.phase_rad(77.5, 912));
+        }
+        assert_eq!(four.period_px(), encoding.period_px());
+    }
+}
