@@ -1,4 +1,9 @@
-"""What can go wrong, by who can mend it: the caller (`InputError`), the bench (`DecodeError`, `CameraError`)."""
+"""Errors by who can mend them: the caller (`InputError`), or a person at the bench (`DecodeError`, `CameraError`).
+
+>>> from quadfringe.errors import ConfigError, InputError
+>>> issubclass(ConfigError, InputError), issubclass(InputError, ValueError)
+(True, True)
+"""
 
 from __future__ import annotations
 
@@ -25,23 +30,23 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A file or a value that cannot be used; the message says what was expected and what came."""
+    """A file or a value cannot be used; the message says what was expected and what came."""
 
 
 class ConfigError(InputError):
-    """A settings or calibration file with unknown keys or wrong values; the message lists every one with its path."""
+    """Settings or a calibration have unknown keys or wrong values; the message lists every one with its path."""
 
 
 class DecodeError(RuntimeError):
-    """A shot from which no shape can be trusted; the message says why and what to look at."""
+    """The shape of a shot cannot be trusted; the message says why and what to check."""
 
 
 class CameraError(OSError):
-    """What a camera did; the message says what to look at. The camera may be asked again: it reconnects."""
+    """A camera failed; the message says what to check. Call the camera again: it reconnects."""
 
 
 class CameraNotFoundError(CameraError):
-    """No camera answers to this name, or more than one does; the message lists those that answer."""
+    """No camera has this name, or several have; the message lists the cameras that answer."""
 
 
 class CameraBusyError(CameraError):
@@ -53,27 +58,27 @@ class CameraLostError(CameraError):
 
 
 class ShotTimeoutError(CameraError):
-    """The camera answers, and no shot came in time: no trigger, or all of its packets are lost."""
+    """The camera answers, but no shot came in time: no trigger, or all packets were lost."""
 
 
 class UnpairedError(ShotTimeoutError):
-    """Frames of one chip came, and none of the other chip of the same instant."""
+    """Frames of one chip came, but none of the other chip of the same instant."""
 
 
 class WrongFrameError(CameraError):
-    """Frames came in another size or pixel format than was agreed, or damaged, and none that is right."""
+    """All frames were damaged, or had another size or pixel format than agreed."""
 
 
 class RecordingError(OSError):
-    """A recording that cannot go on; the message says why and how many shots are safe."""
+    """A recording cannot continue; the message says why and how many shots are safe."""
 
 
 class BatchError(RuntimeError):
-    """A batch that cannot go on; what was decoded stays, and the same command goes on from there."""
+    """A batch cannot continue; finished shots are kept, and the same command continues with the rest."""
 
 
 class CalibrationError(DecodeError):
-    """Captures that cannot be calibrated; `reason` is one word for programs, the message is for people."""
+    """Captures cannot be calibrated; `reason` is one word for programs, the message is for people."""
 
     def __init__(self, reason: str, message: str) -> None:
         super().__init__(message)
@@ -81,11 +86,11 @@ class CalibrationError(DecodeError):
 
 
 class MissingExtraError(ImportError):
-    """An optional library that is not installed; the message names the extra that brings it."""
+    """An optional library is not installed; the message names the extra that installs it."""
 
 
 def require(module: str, extra: str) -> ModuleType:
-    """Import an optional library, or raise `MissingExtraError` naming the extra that brings it."""
+    """Import an optional library; raise `MissingExtraError` that names the extra which installs it."""
     try:
         return import_module(module)
     except ImportError as error:

@@ -17,9 +17,9 @@ __all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "response_
 ROUNDS_MAX = 8  # of decoding and estimating; each takes a part of the distortion out of the phase
 SETTLED = 0.02  # relative change of the exponents at which the rounds end
 # One shot that shows a response decides: between shots with 3 % noise the exponent scatters by less than 0.3 %, a small
-# part of SETTLED (`python evaluation/auto_response.py`). A shot may show none
-# because little of it has fringes; this many sound shots without any mean that the light is linear. More would cost a
-# linear bench further estimates at the start, fewer would trust one shot that shows little.
+# part of SETTLED (`python evaluation/auto_response.py`). A shot may show none because little of it has fringes; this
+# many sound shots without any mean that the light is linear. A larger number costs a linear bench further estimates at
+# the start, a smaller one trusts one shot that shows little.
 SHOTS_TRIED = 3
 
 

@@ -1,4 +1,4 @@
-"""Whether a decoded shot can be trusted, and if not, why: black or saturated channels, channels exchanged."""
+"""Verdict on a decoded shot: it is refused when channels are black, saturated or exchanged, or its orders collapse."""
 
 from __future__ import annotations
 
@@ -15,17 +15,17 @@ from quadfringe.errors import DecodeError
 
 __all__ = ["judge", "order_margin"]
 
-STRIDE = 4  # pixels whose light is looked at, along rows and columns: enough for quantiles, free of cost
-MARGIN_ROWS = 48  # rows and columns at least that the median of the margins is taken from, in every shot
-DARK = 0.02  # a channel whose brightest pixels stay below this fraction of full scale is black
-NEARLY_NONE = 5e-4  # share of pixels that may differ in a black or saturated channel
-RETURNED_MIN = 0.05  # share of lit pixels that must come back
+STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles, at no cost
+MARGIN_ROWS = 48  # least number of rows and columns that the median margin is taken from
+DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
+NEARLY_NONE = 5e-4  # share of the pixels of a black or saturated channel that may differ
+RETURNED_MIN = 0.05  # least share of the lit pixels that must be returned
 # Median order margin of the lit pixels. Sound shots have more than 0.75, by the published method more than 0.4 when the
 # response is not corrected. Exchanged channels have at most 0.44 (joint) and 0.49 (published), other fringe numbers 0.5
 # (joint) and 0.3 (published). `pytest tests/test_verdict.py` holds both sides.
 COLLAPSED = {"joint": 0.55, "published": 0.35}
 DOUBTFUL = 0.6
-CLEARLY_BETTER = 1.2  # ratio of margins that tells channels are exchanged
+CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged
 
 Decode = Callable[[AnyShot], Shape]
 
@@ -64,7 +64,7 @@ def order_margin(shape: Shape) -> float:
 
 
 def _margin(shape: Shape) -> tuple[float, int, int]:
-    """Give the median order margin of the lit pixels, how many are lit, and how many come back."""
+    """Give the median order margin of the lit pixels, their number, and the number of returned pixels."""
     stride = max(1, min(shape.quality.shape) // MARGIN_ROWS)
     quality = shape.quality[::stride, ::stride]
     lit = quality[np.isfinite(quality)]
@@ -73,7 +73,7 @@ def _margin(shape: Shape) -> tuple[float, int, int]:
 
 
 def _blind_channels(shot: AnyShot) -> list[str]:
-    """Name the channels that are black or saturated over nearly the whole frame."""
+    """Name the channels that are black or saturated over nearly the whole image."""
     full, found = shot.full_scale_value, []
     for name, image in shot.channels.items():
         low, high = (float(q) for q in np.quantile(image[::STRIDE, ::STRIDE], (NEARLY_NONE, 1 - NEARLY_NONE)))
@@ -85,7 +85,7 @@ def _blind_channels(shot: AnyShot) -> list[str]:
 
 
 def _refuse_exchanged(shot: AnyShot, margin: float, least: float, again: Decode) -> None:
-    """Raise when taking the channels for others brings the margin above `least`."""
+    """Raise `DecodeError` if exchanging channels raises the median margin above `least`."""
     found = {words: _margin(again(other))[0] for words, other in _suspects(shot).items()}
     best = max(found, key=lambda words: found[words])
     if found[best] > least:
@@ -95,7 +95,7 @@ def _refuse_exchanged(shot: AnyShot, margin: float, least: float, again: Decode)
 
 
 def _suspects(shot: AnyShot) -> dict[str, AnyShot]:
-    """Give what the shot may be instead, by what is then to say."""
+    """Give the shot with channels exchanged or another Bayer pattern, by the message for that case."""
     if isinstance(shot, BayerShot):
         others = (name for name in get_args(BayerPattern) if name != shot.bayer)
         return {f"the Bayer pattern seems to be {o}, not {shot.bayer}": replace(shot, bayer=o) for o in others}
