@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Literal
 
-from quadfringe.config import Response
-from quadfringe.data import AnyShot, Shape, conditioning
+from quadfringe.config import Response, ResponseChoice
+from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, size_of
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.stages import response_of_shot
 from quadfringe.decoding.verdict import order_margin
 from quadfringe.errors import InputError
 
-__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "response_is_known"]
+__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "stated_response"]
 
 ROUNDS_MAX = 8  # of decoding and estimating; each takes a part of the distortion out of the phase
 SETTLED = 0.02  # relative change of the exponents at which the rounds end
@@ -42,16 +42,22 @@ def estimate_response(shot: AnyShot, plan: Plan) -> Response | Literal["linear"]
     0.6
     >>> decoder = qf.Decoder(shot, replace(plan, response=response))
     """
-    if response_is_known(plan):
+    if stated_response(plan) != "auto":
         raise InputError('this plan has a response, from `response` or its calibration; make one with response="auto"')
     return decode_straightened(KernelDecoder(*size_of(shot, None), plan), shot)[0].response
 
 
-def response_is_known(plan: Plan) -> bool:
-    """Tell whether plan or calibration say how intensities follow the light; that they are linear counts too."""
+def stated_response(plan: Plan) -> ResponseChoice:
+    """Give the response that plan or calibration state; "auto" when neither says how intensities follow the light.
+
+    A calibration with crosstalk, or with a response of the projector, and without a response states linear light.
+    """
     if plan.response != "auto":
-        return True
-    return not conditioning(plan.calibration, "auto").keys().isdisjoint(("response", "crosstalk", "projector_response"))
+        return plan.response
+    known = plan.calibration
+    if known is None or (known.response or known.crosstalk or known.projector_response) is None:
+        return "auto"
+    return "linear" if known.response is None else known.response
 
 
 def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[KernelDecoder, Shape]:

@@ -102,9 +102,8 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
                 "use --no-ply"
             )
         # Found once here: a response that each process estimated would depend on the shots that it happens to get.
-        decode = scanner.config.decode.model_copy(update={"response": scanner.settle_response(take)})
-        scanner.config = scanner.config.model_copy(update={"decode": decode})
-        config = config.model_copy(update={"decode": decode})
+        scanner.change_decode(response=scanner.settle_response(take))
+        config = config.model_copy(update={"decode": scanner.config.decode})
         job = Job(recording.resolve(), out.resolve(), config, ply, len(take), ())
         status = _open_store(job, take, scanner)[:]
     pending = tuple(int(shot) for shot in np.flatnonzero(status != DONE))
@@ -115,8 +114,7 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
 def _opened(config: SystemConfig) -> Scanner:
     """Open a recording as a system with one thread: as many processes as cores share the machine."""
     scanner = open_system(config)
-    decode = scanner.config.decode.model_copy(update={"threads": 1})
-    scanner.config = scanner.config.model_copy(update={"decode": decode})
+    scanner.change_decode(threads=1)
     return scanner
 
 

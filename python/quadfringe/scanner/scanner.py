@@ -15,13 +15,14 @@ from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
-from quadfringe.config import ResponseChoice, SystemConfig, load_system
+from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, load_system
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.response import response_is_known
+from quadfringe.decoding.response import stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
-from quadfringe.errors import DecodeError
+from quadfringe.errors import DecodeError, InputError
 from quadfringe.scanner.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
@@ -34,8 +35,8 @@ class Scanner:
     """A projector, a camera and a decoder that belong together; close it, or use it in a `with` block.
 
     `config` holds the settings, with those that the devices added. `calibration`, a `Calibration` or the path of its
-    file, turns shots into millimetres; without one it is None, and shapes hold phase only. Raises `InputError` for a
-    calibration that cannot be read, and for one that does not fit the fringes.
+    file, turns shots into millimetres; without one it is None, and shapes hold phase only. `plan` is what shots are
+    decoded with. Raises `InputError` for a calibration or a response that cannot be read.
     """
 
     def __init__(
@@ -45,13 +46,12 @@ class Scanner:
         camera: Camera,
         calibration: Calibration | Path | str | None = None,
     ) -> None:
-        self.config = config
         self.calibration = Calibration.load(calibration) if isinstance(calibration, (str, Path)) else calibration
         self.projector = projector
         self.camera = camera
-        self._decoder: Decoder | None = None
         self._planning = Lock()
         self._live: LiveStream | None = None
+        self._use(config)
 
     @property
     def projector_width_px(self) -> int:
@@ -60,14 +60,31 @@ class Scanner:
         return LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px
 
     @property
-    def plan(self) -> Plan:
-        """What shots of this system are decoded with."""
-        return Plan(self.projector_width_px, self.config.fringes, self.calibration, decode=self.config.decode)
-
-    @property
     def response(self) -> ResponseChoice:
         """The response that is corrected, as in `Decoder.response`; "auto" until a sound shot was decoded."""
-        return self.plan.response if self._decoder is None else self._decoder.response
+        return stated_response(self.plan) if self._decoder is None else self._decoder.response
+
+    def change_decode(self, **settings: Any) -> None:
+        """Change settings of `DecodeConfig` from the next shot on; raises `ConfigError` for wrong ones.
+
+        >>> import quadfringe as qf
+        >>> with qf.open() as scanner:
+        ...     scanner.change_decode(method="published")
+        ...     shape = scanner.measure()
+        >>> shape.config["decode"]["method"]
+        'published'
+        """
+        decode = self.config.decode
+        given = {name: getattr(decode, name) for name in decode.model_fields_set} | settings
+        self._use(self.config.model_copy(update={"decode": DecodeConfig(**given)}))
+
+    def _use(self, config: SystemConfig) -> None:
+        """Decode with the settings of `config`; the decoder is planned with the next shot."""
+        with self._planning:
+            self.config = config
+            self.plan = Plan(self.projector_width_px, config.fringes, self.calibration, decode=config.decode)
+            self._settings = config.model_dump(mode="json", exclude_none=True, exclude={"decode"})
+            self._decoder: Decoder | None = None
 
     def grab(self) -> AnyShot:
         """Project the fringes and take one shot of them."""
@@ -81,16 +98,16 @@ class Scanner:
         Threads may call this at the same time.
         """
         shape = self._decoder_for(shot).decode(shot)
-        settings = self.config.model_dump(mode="json", exclude_none=True, exclude={"decode"})
-        return replace(shape, config=settings | dict(shape.config))
+        return replace(shape, config=self._settings | dict(shape.config))
 
     def settle_response(self, shots: Iterable[AnyShot]) -> ResponseChoice:
         """Estimate the response from the first sound ones of these shots, in their order, unless it is known.
 
-        Gives the value that `decode.response` of the settings must have for the same result in another process. At most
-        64 shots are decoded; if none of them is sound, the light is taken as linear.
+        Gives the value that `decode.response` of the settings must have for the same result in another process: "auto"
+        if the calibration holds the response. At most 64 shots are decoded; if none of them is sound, the result is
+        "linear".
         """
-        if response_is_known(self.plan):
+        if stated_response(self.plan) != "auto":
             return self.plan.response
         for shot in islice(shots, SETTLING_SHOTS):
             with suppress(DecodeError):
@@ -182,7 +199,12 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
     # All files are read before a device is opened: a device that an error leaves open stays busy.
     calibration = None if config.calibration is None else Calibration.load(config.calibration)
     devices = open_devices(_with_response_read(config))
-    return Scanner(devices.config, devices.projector, devices.camera, calibration or devices.camera.calibration)
+    try:
+        return Scanner(devices.config, devices.projector, devices.camera, calibration or devices.camera.calibration)
+    except InputError:
+        devices.camera.close()
+        devices.projector.close()
+        raise
 
 
 def _with_response_read(config: SystemConfig) -> SystemConfig:
