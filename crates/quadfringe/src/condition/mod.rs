@@ -20,6 +20,7 @@ pub use response::Response;
 pub use sample::Sample;
 pub use shot::Shot;
 
+use crate::error::Limit;
 use crate::{Channel, Error, Result};
 use ndarray::Array2;
 
@@ -74,7 +75,7 @@ impl Conditioner {
         for (channel, dark) in Channel::ALL.iter().zip(self.dark) {
             if !(0.0..1.0).contains(&dark) {
                 let name = format!("dark level of {}", channel.name());
-                return Err(Error::value(name, "a fraction of full scale in [0, 1)", dark));
+                return Err(Error::value(name, Limit::Fraction, dark));
             }
         }
         for (what, responses) in
@@ -86,7 +87,7 @@ impl Conditioner {
         }
         if self.ir_registration.iter().flatten().any(|v| !v.is_finite()) {
             let actual = format!("{:?}", self.ir_registration);
-            return Err(Error::value("ir_registration", "finite numbers", actual));
+            return Err(Error::value("ir_registration", Limit::Finite, actual));
         }
         self.crosstalk_inverse().map(|_| ())
     }

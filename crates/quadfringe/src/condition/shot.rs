@@ -1,6 +1,7 @@
 //! The images of one exposure, borrowed: four planes, or the raw mosaic of a Bayer chip and an infrared image.
 
 use super::Sample;
+use crate::error::Limit;
 use crate::{BayerPattern, Channel, Error, Result};
 use ndarray::{Array2, ArrayView2};
 
@@ -89,7 +90,7 @@ impl<'a, T: Sample> Shot<'a, T> {
     /// [`Error::Value`] unless positive and finite.
     pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
         if !(full_scale.is_finite() && full_scale > 0.0) {
-            return Err(Error::value("full_scale", "a positive intensity", full_scale));
+            return Err(Error::value("full_scale", Limit::Positive, full_scale));
         }
         self.full_scale = full_scale;
         Ok(self)

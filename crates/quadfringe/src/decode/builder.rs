@@ -74,12 +74,10 @@ impl DecoderBuilder {
             return Err(Error::TooSmall { least: [SIDE_MIN_PX; 2], actual: shape });
         }
         options.check(shape)?;
-        if let Some(camera) =
-            triangulator.as_ref().map(|triangulator| <[usize; 2]>::from(triangulator.shape()))
-        {
-            if camera != shape {
-                return Err(Error::shape("calibrated camera", &shape, &camera));
-            }
+        let of_camera = |triangulator: &Triangulator| <[usize; 2]>::from(triangulator.shape());
+        let camera = triangulator.as_ref().map_or(shape, of_camera);
+        if camera != shape {
+            return Err(Error::shape("calibrated camera", &shape, &camera));
         }
         options.method.accepts(&encoding)?;
         let four = encoding.four_channel_view()?;

@@ -3,7 +3,7 @@
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 use rayon::prelude::*;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 
 const DEGREE_MAX: usize = 6;
 
@@ -125,7 +125,7 @@ fn check_planes(
     }
     for (index, (height, map)) in planes.iter().enumerate() {
         if !height.is_finite() {
-            return Err(Error::value("height of a plane (mm)", "a finite number", height));
+            return Err(Error::value("height of a plane (mm)", Limit::Finite, height));
         }
         if map.dim() != reference_rad.dim() {
             let what = format!("phase map of plane {index}");

@@ -1,7 +1,7 @@
 //! The colour filters of a chip that sees one colour at each pixel.
 
 use crate::encoding::Channel;
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 
 /// Colours of the first two pixels of the first row and of the second row of a Bayer chip, row by row.
 ///
@@ -34,7 +34,8 @@ impl BayerPattern {
     /// [`Error::Value`] that lists the four for any other name.
     pub fn from_name(name: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|pattern| pattern.name() == name);
-        found.ok_or_else(|| Error::value("Bayer pattern", "rggb, grbg, gbrg or bggr", format!("{name:?}")))
+        let known = Limit::OneOf(&["rggb", "grbg", "gbrg", "bggr"]);
+        found.ok_or_else(|| Error::value("Bayer pattern", known, format!("{name:?}")))
     }
 
     /// Its name, four letters in the order of the pixels.

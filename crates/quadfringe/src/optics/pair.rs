@@ -1,7 +1,7 @@
 //! Two projectors that are meant to be one, and what the infrared one really shows.
 
 use super::Device;
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 
 impl Device {
     /// Position (column, row) in `other` of what a position of this device sees, or lights, on the plane z = `z_mm` of the
@@ -87,5 +87,5 @@ pub(crate) fn check_plane(z_mm: f64) -> Result<()> {
     if z_mm.is_finite() && z_mm > 0.0 {
         return Ok(());
     }
-    Err(Error::value("depth of the reference plane (mm)", "a positive number", z_mm))
+    Err(Error::value("depth of the reference plane (mm)", Limit::Positive, z_mm))
 }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use ndarray::ArrayView2;
 
 use crate::encoding::{Axis, Channel, DmdLayout, Encoding, row_shift};
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 use crate::optics::Device;
 
 use super::Projector;
@@ -72,7 +72,7 @@ impl Light<'_> {
                 Err(Error::shape("pattern image", &[projector.height, projector.width], image.shape()))
             }
             Self::Uniform(level) if !(0.0..=1.0).contains(level) => {
-                Err(Error::value("uniform light", "0 to 1", level))
+                Err(Error::value("uniform light", Limit::Range { from: 0.0, to: 1.0 }, level))
             }
             Self::Fringes { number, shift_rad, .. } if !(number.is_finite() && shift_rad.is_finite()) => {
                 let actual = format!("number {number}, shift {shift_rad} rad");

@@ -5,6 +5,7 @@
 //! pixels; the means only select its order.
 
 use super::params::{BLOCK_COLUMNS_MAX, ROWS_PER_COLUMN, SAMPLES_PER_FRINGE_MIN};
+use crate::error::Limit;
 use crate::parallel::Aligned;
 use crate::{Error, Result};
 use ndarray::{Array2, ArrayView2, Axis};
@@ -65,7 +66,7 @@ impl Blocks {
 /// ```
 pub fn block_means(image: ArrayView2<'_, f32>, rows: usize, columns: usize) -> Result<Array2<f32>> {
     if rows == 0 {
-        return Err(Error::value("rows of a block", "at least 1", rows));
+        return Err(Error::value("rows of a block", Limit::AtLeast(1.0), rows));
     }
     if !columns.is_power_of_two() || columns > image.ncols() {
         let expected = format!("a power of two, at most the {} columns of the image", image.ncols());

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::Surface;
 use super::blend::{Capsule, join};
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 
 /// A hand in front of the reference plane, as it stands at one instant: it waves about the wrist once in 2 s, the
 /// fingers close and open once in 3 s, and it comes nearer and goes back once in 4 s.
@@ -41,7 +41,7 @@ impl Hand {
     /// [`Error::Value`] when the time is not finite.
     pub fn at(time_s: f64) -> Result<Self> {
         if !time_s.is_finite() {
-            return Err(Error::value("time_s", "a finite time in seconds", time_s));
+            return Err(Error::value("time_s", Limit::Finite, time_s));
         }
         let wave = 0.22 * (TAU * time_s / 2.0).sin();
         let curl = 0.30 - 0.22 * (TAU * time_s / 3.0).cos();
