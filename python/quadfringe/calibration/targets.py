@@ -17,8 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from quadfringe.config import Model, checked
-from quadfringe.config._base import Positive
+from quadfringe.config import Model, Positive, checked
 
 __all__ = [
     "Disc",

@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config import BayerPattern, SystemConfig
-from quadfringe.config._base import checked
+from quadfringe.config import BayerPattern, SystemConfig, checked
 from quadfringe.data import AnyShot, BayerShot, Calibration, FrameStamp, Shot, Stamp
 from quadfringe.errors import InputError
 

@@ -15,8 +15,7 @@ from quadfringe.calibration.acceptance import SPHERE_DIAMETER_MM, STEP_HEIGHTS_M
 from quadfringe.calibration.levels import LevelPlan, level_plan
 from quadfringe.calibration.projector import AXES, StepPlan
 from quadfringe.calibration.targets import Target, ring_board
-from quadfringe.config import BayerPattern, Fringes, Pixels
-from quadfringe.config._base import Finite, Positive
+from quadfringe.config import BayerPattern, Finite, Fringes, Pixels, Positive
 from quadfringe.data.calibration import Stored
 from quadfringe.errors import InputError
 
