@@ -213,6 +213,7 @@ def test_a_result_says_what_made_it(shot_folder: Path, tmp_path: Path) -> None:
         assert shape.calibration == qf.Calibration.load(shot_folder)
         assert shape.config["quadfringe_version"] == qf.__version__
         assert shape.config["decode"]["method"] == "joint"
+        assert shape.config["decode"]["method_version"]
         assert shape.config["response_from"] == "calibration"
         assert shape.config["projector_width_px"] == 912
         assert shape.config["fringes"]["numbers"] == [36, 35, 30]
