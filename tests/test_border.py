@@ -52,7 +52,9 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
 def test_instants_of_the_channels_are_kept_and_checked() -> None:
     instants = (-5556.0, 0.0, 5556.0, 0.0)
     assert decoder(channel_instants_us=instants).settings()["channel_instants_us"] == list(instants)
-    with pytest.raises(ValueError, match="channel_instants_us is an option of the joint method, and the method is published"):
+    with pytest.raises(
+        ValueError, match="channel_instants_us is an option of the joint method, and the method is published"
+    ):
         decoder(channel_instants_us=instants, method="published")
 
 
