@@ -35,8 +35,10 @@ impl PolynomialHeight {
         let phases: PyResult<Vec<_>> =
             phases_rad.iter().map(|map| expected::<f32, 2>("phases_rad", map)).collect();
         let phases = phases?;
+        let maps = phases.iter().map(PyReadonlyArray2::as_array);
+        let planes = heights_mm.into_iter().zip(maps);
         let planes: Vec<_> =
-            heights_mm.into_iter().zip(phases.iter().map(PyReadonlyArray2::as_array)).collect();
+            planes.map(|(height_mm, phase_rad)| height::HeightPlane { height_mm, phase_rad }).collect();
         let reference = reference.as_array();
         py.detach(|| height::PolynomialHeight::fit(reference, &planes, degree)).map(Self).map_err(value_error)
     }

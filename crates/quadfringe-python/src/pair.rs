@@ -6,7 +6,7 @@ use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use quadfringe::Encoding;
 use quadfringe::height;
-use quadfringe::optics::CoaxialPair;
+use quadfringe::optics::ProjectorPair;
 use quadfringe::rig::{Bench, Light};
 use quadfringe::stages::Phases;
 
@@ -17,8 +17,8 @@ pub fn pair_of(
     visible: &Device,
     infrared: &Device,
     predeformed_z_mm: Option<f64>,
-) -> quadfringe::Result<CoaxialPair> {
-    let pair = CoaxialPair::new(visible.0.clone(), infrared.0.clone());
+) -> quadfringe::Result<ProjectorPair> {
+    let pair = ProjectorPair::new(visible.0.clone(), infrared.0.clone());
     predeformed_z_mm.map_or(Ok(pair.clone()), |z_mm| pair.predeformed(z_mm))
 }
 

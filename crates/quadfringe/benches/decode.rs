@@ -197,10 +197,8 @@ fn stages(c: &mut Criterion) {
     let raw = raw.expect("two images of one size");
     let of_mosaic = || linearise(black_box(&raw), &Conditioner::default());
     group.bench_function("conditioning of a mosaic", |b| b.iter(of_mosaic));
-    let turned = Conditioner {
-        ir_registration: [[1.002, -0.0044, 0.37], [0.0044, 1.002, -1.62]],
-        ..Conditioner::default()
-    };
+    let turned =
+        Conditioner::default().with_ir_registration([[1.002, -0.0044, 0.37], [0.0044, 1.002, -1.62]]);
     let registered = || linearise(black_box(&shot), &turned);
     group.bench_function("conditioning with registration", |b| b.iter(registered));
     group.bench_function("carrier", |b| b.iter(|| stages::carrier(black_box(red.view()))));

@@ -99,7 +99,7 @@ fn plans_out_of_range_are_refused() {
     assert_says(instants([0.0, f32::NAN, 1.0, 0.0]), &["channel_instants_us", "finite", "NaN"]);
     assert_says(instants([5.0; 4]), &["channel_instants_us", "differ"]);
     let response = [Response { exponent: -1.0, ..Response::default() }; 4];
-    let light = Conditioner { response, ..Conditioner::default() };
+    let light = Conditioner::default().with_response(response);
     assert_says(builder().conditioner(light).build(), &["exponent", "-1"]);
 }
 

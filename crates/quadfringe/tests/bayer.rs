@@ -103,13 +103,11 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
         camera_exponent: [1.8; 4],
         ..mosaic(&clean())
     };
-    let conditioner = Conditioner {
-        dark: [0.03; 4],
-        response: [Response { exponent: 1.8, ..Response::default() }; 4],
-        crosstalk,
-        ir_registration: MISALIGNED,
-        ..Conditioner::default()
-    };
+    let conditioner = Conditioner::default()
+        .with_dark([0.03; 4])
+        .with_response([Response { exponent: 1.8, ..Response::default() }; 4])
+        .with_crosstalk(crosstalk)
+        .with_ir_registration(MISALIGNED);
     for method in [Method::published(), Method::joint()] {
         let plain = there_and_back(&bench, &cast, &code(), &mosaic(&clean()), &method);
         let undone = there_and_back_by(&apart, &cast_apart, &code(), &flawed, &method, &conditioner);
@@ -128,7 +126,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
 fn registration_costs_neither_phase_nor_orders() {
     let bench = bench(1);
     let apart = bench.clone().with_infrared_chip(MISALIGNED).expect("regular");
-    let conditioner = Conditioner { ir_registration: MISALIGNED, ..Conditioner::default() };
+    let conditioner = Conditioner::default().with_ir_registration(MISALIGNED);
     let cases = [
         ("peaks", clean(), Method::published()),
         ("peaks", clean(), Method::joint()),

@@ -2,7 +2,7 @@
 
 use ndarray::{Array2, Axis};
 use quadfringe::Encoding;
-use quadfringe::height::{CrossedAxes, PolynomialHeight, Triangulator};
+use quadfringe::height::{CrossedAxes, HeightPlane, PolynomialHeight, Triangulator};
 use quadfringe::optics::{Device, rotation_from_vector};
 use quadfringe::rig::{Bench, Projector};
 use quadfringe::surface::Plane;
@@ -55,7 +55,11 @@ fn polynomial_from_planes_measures_a_plane_between_them() {
     let phase = |height_mm: f64| bench.cast(&Plane::at_z(800.0 - height_mm)).phase_rad(&code);
     let heights: Vec<f64> = (0..7).map(|i| 10.0 * f64::from(i)).collect();
     let maps: Vec<Array2<f32>> = heights.iter().map(|h| phase(*h)).collect();
-    let planes: Vec<_> = heights.iter().copied().zip(maps.iter().map(|map| map.view())).collect();
+    let planes: Vec<_> = heights
+        .iter()
+        .zip(&maps)
+        .map(|(height_mm, map)| HeightPlane { height_mm: *height_mm, phase_rad: map.view() })
+        .collect();
     let fitted = PolynomialHeight::fit(maps[0].view(), &planes, 3).expect("enough planes");
     let measured = fitted.height_from_phase(phase(27.5).view()).expect("same size");
     let worst = measured.iter().filter(|h| h.is_finite()).fold(0f32, |w, h| w.max((h - 27.5).abs()));

@@ -4,7 +4,7 @@ mod common;
 
 use common::{bench, clean, code, decode_planes, noisy};
 use quadfringe::height::{PairTable, Triangulator};
-use quadfringe::optics::CoaxialPair;
+use quadfringe::optics::ProjectorPair;
 use quadfringe::rig::{Bench, Cast, Light, Projector, RenderOptions};
 use quadfringe::surface::{Plane, Surface, scene};
 use quadfringe::{Channel, Decoded, Decoder, DmdLayout, Options, PublishedOptions, Result};
@@ -27,8 +27,8 @@ fn apart(shrink: usize, layout: DmdLayout) -> Bench {
     }
 }
 
-fn pair_of(bench: &Bench) -> CoaxialPair {
-    CoaxialPair::new(bench.visible.clone(), bench.infrared.clone())
+fn pair_of(bench: &Bench) -> ProjectorPair {
+    ProjectorPair::new(bench.visible.clone(), bench.infrared.clone())
 }
 
 fn decode(

@@ -14,7 +14,7 @@ const FRINGE_PX: f32 = 14.0;
 fn decode(bench: &Bench, planes: &Planes, response: [Response; 4]) -> Decoded {
     let work = || -> Result<Decoded, Error> {
         let (rows, columns) = planes.shape();
-        let conditioner = Conditioner { response, ..Conditioner::default() };
+        let conditioner = Conditioner::default().with_response(response);
         let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
         let builder = Decoder::builder(&code(), [rows, columns]).conditioner(conditioner);
         let mut decoder = builder.triangulator(triangulator).build()?;

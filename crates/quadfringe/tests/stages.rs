@@ -6,7 +6,7 @@ use common::{BAYER, bench, cast_scene, code, decode_planes, noisy};
 use ndarray::{Array2, ArrayView2, Axis, Zip};
 use quadfringe::condition::{Sample, linearise};
 use quadfringe::height::PairTable;
-use quadfringe::optics::CoaxialPair;
+use quadfringe::optics::ProjectorPair;
 use quadfringe::rig::{Albedo, Bench, BitDepth, Light, Planes, RenderOptions};
 use quadfringe::stages::{
     Absolute, Background, Blocks, Fringes, Limits, Phases, background, block_means, columns_from_phase,
@@ -185,14 +185,14 @@ fn stages_give_the_bits_of_the_decoder_with_a_calibration() {
     let bench = bench(2);
     let mut crosstalk = Conditioner::default().crosstalk;
     (crosstalk[0][1], crosstalk[1][2], crosstalk[3][0]) = (0.08, 0.05, 0.02);
-    let conditioner = Conditioner {
-        dark: [0.01, 0.02, 0.015, 0.005],
-        response: [Response { exponent: 1.1, ..Response::default() }; 4],
-        crosstalk,
-        projector_response: [Response { exponent: 0.8, ..Response::default() }; 4],
+    let response = |exponent: f32| [Response { exponent, ..Response::default() }; 4];
+    let conditioner = Conditioner::default()
+        .with_dark([0.01, 0.02, 0.015, 0.005])
+        .with_response(response(1.1))
+        .with_crosstalk(crosstalk)
+        .with_projector_response(response(0.8))
         // Part of the image lies beyond the infrared chip.
-        ir_registration: [[1.001, 0.002, 3.4], [-0.002, 0.999, -2.3]],
-    };
+        .with_ir_registration([[1.001, 0.002, 3.4], [-0.002, 0.999, -2.3]]);
     for (depth, scene) in [(BitDepth::Eight, "face"), (BitDepth::Twelve, "steps"), (BitDepth::Float, "hand")]
     {
         let options = RenderOptions {
@@ -212,7 +212,7 @@ fn stages_give_the_bits_of_the_decoder_with_a_calibration() {
 #[test]
 fn stages_give_the_bits_of_the_decoder_along_the_camera_rays() {
     let bench = bench(2).deviated([1f64.to_radians(); 3], [0.5; 3]).expect("finite");
-    let pair = CoaxialPair::new(bench.visible.clone(), bench.infrared.clone());
+    let pair = ProjectorPair::new(bench.visible.clone(), bench.infrared.clone());
     let table = PairTable::new(&bench.camera, &pair, &code(), Some([600.0, 1000.0])).expect("valid pair");
     let planes = render(&bench, "face", &noisy(9));
     let (_, returned) = compare("rays", &planes, &code(), &Conditioner::default(), Some(table));

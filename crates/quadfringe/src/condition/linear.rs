@@ -1,4 +1,4 @@
-//! Raw numbers to linear light, channel by channel, by look-up where the type allows it.
+//! Raw intensities to linear light, channel by channel, with look-up tables for integer types.
 
 use super::{Conditioner, Response, Sample};
 use std::borrow::Cow;
@@ -10,7 +10,7 @@ use ndarray::ArrayView2;
 pub(super) struct Linear {
     dark: [f32; 4],
     response: [Response; 4],
-    /// Undone here only where no crosstalk has to be undone in between.
+    /// Applied here only without crosstalk, which must be removed in between.
     projector_response: [Response; 4],
     full_scale: f32,
     tables: [Vec<f32>; 4],
@@ -63,7 +63,7 @@ impl Linear {
         }
     }
 
-    /// A row of two channels that take turns: the even columns and the odd ones.
+    /// A row in which two channels alternate: the first in even columns, the second in odd ones.
     #[inline(always)]
     pub fn row_of_two<T: Sample>(&self, channels: [usize; 2], row: &[T], [even, odd]: [&mut [f32]; 2]) {
         let (pairs, last) = row.as_chunks::<2>();
@@ -86,7 +86,7 @@ impl Linear {
         }
     }
 
-    /// Arithmetic instead of a table: it runs on vectors.
+    /// Whether plain arithmetic replaces the table, because it vectorises.
     #[inline(always)]
     fn is_plain(&self, c: usize) -> bool {
         [self.response[c], self.projector_response[c]] == [Response::default(); 2]
@@ -101,7 +101,7 @@ impl Linear {
     }
 }
 
-/// Row `y`, contiguous, so that no loop has to look at strides pixel by pixel.
+/// Row `y` as a contiguous slice, so that loops need no strides.
 #[inline]
 pub(super) fn row_of<'r, T: Sample>(plane: &'r ArrayView2<'_, T>, y: usize) -> Cow<'r, [T]> {
     let row = plane.row(y);
@@ -111,8 +111,8 @@ pub(super) fn row_of<'r, T: Sample>(plane: &'r ArrayView2<'_, T>, y: usize) -> C
     }
 }
 
-/// Continue the `count` samples after the first `margin` on both sides: mirrored at the end sample in place and in value,
-/// which keeps a slope. As many samples are written before as after.
+/// Extend the `count` samples after the first `margin` by `margin` samples on both sides. Samples are mirrored at the end
+/// sample in place and in value, which keeps the slope.
 pub(super) fn extend(line: &mut [f32], margin: usize, count: usize) {
     let (first, last) = (margin, margin + count - 1);
     for i in 1..=margin {

@@ -1,12 +1,13 @@
-//! Raw shot -> linear planes: dark level, response, crosstalk, registration (step 1 of the recipe, system (S1)).
+//! A raw shot to linear light: dark level, response, crosstalk, registration (step 1 of both methods, (S1)).
 //!
-//! A [`Conditioner`] is what a calibration knows about the four channels; a [`Shot`] borrows the images of one instant:
-//! four planes, or the raw mosaic of a Bayer chip and an infrared image. Conditioning turns intensities into fractions of
-//! full scale that are linear in the projected light, all four at every pixel.
+//! A [`Conditioner`] holds the calibration of the four channels. A [`Shot`] borrows the images of one exposure: four
+//! planes, or the raw mosaic of a Bayer chip and an infrared image. Conditioning turns intensities into fractions of full
+//! scale that are linear in the projected light, for all four channels at every pixel.
 
 mod estimate;
 mod linear;
 mod mosaic;
+mod params;
 mod plan;
 mod registered;
 mod response;
@@ -24,29 +25,29 @@ use crate::error::Limit;
 use crate::{Channel, Error, Result};
 use ndarray::Array2;
 
-/// What a calibration knows about the intensities of the four channels.
+/// Calibration of the intensities of the four channels.
 ///
 /// The default leaves intensities as they are.
 ///
 /// ```
 /// use quadfringe::{Conditioner, Response};
-/// let conditioner = Conditioner {
-///     response: [Response { exponent: 0.5, ..Response::default() }; 4],
-///     ..Conditioner::default()
-/// };
+/// let response = [Response { exponent: 0.5, ..Response::default() }; 4];
+/// let conditioner = Conditioner::default().with_dark([0.01; 4]).with_response(response);
 /// conditioner.check()?;
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub struct Conditioner {
     /// Dark level per channel, as a fraction of full scale.
     pub dark: [f32; 4],
-    /// Inverse response per captured channel, undone before crosstalk: that of the camera, or of camera and projector
-    /// together where there is no crosstalk to tell them apart.
+    /// Inverse response per captured channel, applied before crosstalk is removed: that of the camera, or that of camera
+    /// and projector together if there is no crosstalk.
     pub response: [Response; 4],
-    /// Captured from projected light: rows captured R, G, B, IR; columns projected R, G, B, IR.
+    /// Captured light from projected light; rows: captured R, G, B, IR; columns: projected R, G, B, IR.
     pub crosstalk: [[f64; 4]; 4],
-    /// Inverse response per projected channel, undone after crosstalk, which mixes light and not what the projector was told.
+    /// Inverse response per projected channel, applied after crosstalk is removed, because crosstalk mixes the light that
+    /// the projector emits.
     pub projector_response: [Response; 4],
     /// Affine map from a visible pixel (x, y, 1) to the infrared pixel (x, y) that sees the same point.
     pub ir_registration: [[f64; 3]; 2],
@@ -67,10 +68,45 @@ impl Default for Conditioner {
 }
 
 impl Conditioner {
-    /// Whether every number can be used.
+    /// The same with these dark levels.
+    #[must_use]
+    pub const fn with_dark(mut self, dark: [f32; 4]) -> Self {
+        self.dark = dark;
+        self
+    }
+
+    /// The same with these responses of the captured channels.
+    #[must_use]
+    pub const fn with_response(mut self, response: [Response; 4]) -> Self {
+        self.response = response;
+        self
+    }
+
+    /// The same with this crosstalk.
+    #[must_use]
+    pub const fn with_crosstalk(mut self, crosstalk: [[f64; 4]; 4]) -> Self {
+        self.crosstalk = crosstalk;
+        self
+    }
+
+    /// The same with these responses of the projected channels.
+    #[must_use]
+    pub const fn with_projector_response(mut self, projector_response: [Response; 4]) -> Self {
+        self.projector_response = projector_response;
+        self
+    }
+
+    /// The same with this registration of the infrared image.
+    #[must_use]
+    pub const fn with_ir_registration(mut self, ir_registration: [[f64; 3]; 2]) -> Self {
+        self.ir_registration = ir_registration;
+        self
+    }
+
+    /// Check the range of every number.
     ///
     /// # Errors
-    /// [`Error::Value`] that names the first number out of range, a crosstalk matrix without inverse included.
+    /// [`Error::Value`] that names the first number out of range, or a crosstalk matrix without inverse.
     pub fn check(&self) -> Result<()> {
         for (channel, dark) in Channel::ALL.iter().zip(self.dark) {
             if !(0.0..1.0).contains(&dark) {
@@ -106,7 +142,8 @@ impl Conditioner {
     }
 }
 
-/// The four channels as linear light at every pixel, a fraction of full scale; NaN where the infrared chip does not see the point.
+/// R, G, B and IR as linear light at every pixel, `(rows, columns)`, fractions of full scale (S1). IR is NaN where its chip
+/// does not see the point.
 ///
 /// # Errors
 /// As [`Conditioner::check`].
@@ -130,7 +167,7 @@ pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Re
     Ok(planes)
 }
 
-/// Gauss-Jordan with row pivoting; `None` when singular or badly conditioned.
+/// Inverse by Gauss-Jordan elimination with row pivoting; `None` for a singular or badly conditioned matrix.
 fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
     let mut a = [[0.0; 8]; 4];
     for i in 0..4 {
@@ -187,9 +224,9 @@ mod tests {
         }
     }
 
-    /// The light of a projector of gamma 2.2, mixed, seen by a camera of gamma 1.5.
+    /// Light of a projector of gamma 2.2, mixed by crosstalk, seen by a camera of gamma 1.5.
     #[test]
-    fn projector_and_camera_responses_are_undone_on_their_own_sides_of_crosstalk() {
+    fn projector_and_camera_responses_are_undone_on_either_side_of_crosstalk() {
         let mut crosstalk = [[0.15; 4]; 4];
         (0..4).for_each(|i| crosstalk[i][i] = 1.0);
         let response = |exponent: f32| [Response { exponent, ..Response::default() }; 4];
@@ -232,7 +269,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_infrared_chip_does_not_see_spreads_to_no_other_channel() {
+    fn gaps_in_the_infrared_image_stay_in_it() {
         let image = Array2::from_elem((3, 5), 0.5f32);
         let mut crosstalk = Conditioner::default().crosstalk;
         (crosstalk[0][1], crosstalk[3][0]) = (0.1, 0.2);

@@ -1,17 +1,15 @@
-//! Conditioning row by row, with what can be computed beforehand.
+//! Conditioning row by row, with tables and interpolated images prepared once per shot.
 
 use super::linear::{Linear, row_of};
 use super::mosaic::{self, Mosaic};
+use super::params::CLIPPED;
 use super::registered::Registered;
 use super::shot::Images;
 use super::unmix::Unmix;
 use super::{Conditioner, Sample, Shot};
 use crate::Result;
 
-/// Fraction of full scale from which on an intensity counts as saturated.
-const CLIPPED: f32 = 0.998;
-
-/// A conditioner made ready for shots.
+/// A conditioner prepared for shots of one kind.
 #[derive(Debug, Clone)]
 pub(crate) struct Plan {
     linear: Linear,
@@ -34,7 +32,7 @@ impl Plan {
         })
     }
 
-    /// Take in a shot, before its rows are asked for: what is interpolated is made linear here, once for all rows.
+    /// Prepare a shot before its rows are read: images that will be interpolated are linearised here.
     pub fn prepare<T: Sample>(&mut self, shot: &Shot<'_, T>) {
         self.linear.prepare::<T>(shot.full_scale());
         if let Some((raw, pattern)) = shot.mosaic() {
@@ -66,15 +64,15 @@ impl Plan {
         }
     }
 
-    /// Infrared light beyond what its chip sees, for steps that look at neighbours: that of the nearest pixel.
+    /// Fill gaps in a row of infrared light with the nearest pixel of its chip, for steps that use neighbours.
     pub fn continue_infrared(&self, y: usize, infrared: &mut [f32]) {
         if let Some(registered) = &self.registered {
             registered.continue_row(y, infrared);
         }
     }
 
-    /// Which pixels of a row are saturated in no channel, and which are glare: saturated in R and in B, which on a lit
-    /// surface, a quarter period apart, are never both at the crest of their fringes.
+    /// Mark the pixels of a row that are saturated in no channel, and those with glare: saturated in R and in B, whose
+    /// fringes are a quarter period apart and never both at their crest.
     #[inline(always)]
     pub fn saturation_row<T: Sample>(
         &self,

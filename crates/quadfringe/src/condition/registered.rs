@@ -1,4 +1,4 @@
-//! The infrared image at the visible pixels.
+//! Registration: the infrared image at the visible pixels.
 
 use super::linear::{Linear, extend, row_of};
 use super::{Sample, Shot};
@@ -11,10 +11,10 @@ const INFRARED: usize = 3;
 /// Pixels beyond the image that the interpolation reaches.
 const MARGIN: usize = 2;
 
-/// Linear infrared light with margins, and the affine map from a visible pixel (x, y, 1) to its place there.
+/// Linear infrared light with margins, and the affine map from a visible pixel (x, y, 1) to its place in it.
 ///
-/// Values come from Lagrange's polynomial through four by four pixels around the place, which takes 0.0003 from fringes
-/// with a period of 20 pixels where the mean of neighbours takes 0.012.
+/// Values are interpolated by Lagrange's polynomial through 4 x 4 pixels. It lowers the amplitude of fringes with a period
+/// of 20 pixels by 0.03 %, bilinear interpolation by 1.2 %.
 #[derive(Debug, Clone)]
 pub(super) struct Registered {
     map: [[f64; 3]; 2],
@@ -27,7 +27,7 @@ impl Registered {
         Self { map, light: Vec::new(), size: [0; 2] }
     }
 
-    /// Take in the infrared image of a shot.
+    /// Linearise the infrared image of a shot.
     pub fn fill<T: Sample>(&mut self, infrared: &ArrayView2<'_, T>, linear: &Linear) {
         let (rows, columns) = infrared.dim();
         self.size = [rows, columns];
@@ -45,7 +45,7 @@ impl Registered {
         self.size[1] + 2 * MARGIN
     }
 
-    /// Column by column, as [`extend`] does along rows.
+    /// Extend the columns as [`extend`] extends rows.
     fn extend_rows(&mut self) {
         let (stride, rows) = (self.stride(), self.size[0]);
         let mut line = vec![0.0; rows + 2 * MARGIN];
@@ -91,7 +91,7 @@ impl Registered {
         }
     }
 
-    /// Gives the pixels that the infrared chip does not see the light of the nearest that it sees.
+    /// Fill gaps with the nearest pixel of the infrared chip.
     pub fn continue_row(&self, y: usize, out: &mut [f32]) {
         let [rows, columns] = self.size;
         for (x, value) in out.iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
@@ -101,8 +101,8 @@ impl Registered {
         }
     }
 
-    /// First pixel after `x`, up to `end`, that does not lie between the same infrared pixels moved along with it. Over
-    /// such a run all samples are read side by side.
+    /// End of a run from `x` to at most `end`, along which the infrared position moves by whole pixels with the visible
+    /// one, so that samples are read side by side.
     fn end_of_run(&self, x: usize, mut end: usize, y: usize) -> usize {
         let moved = |x: usize| {
             let [u, v] = self.place(x, y);
@@ -126,16 +126,20 @@ impl Registered {
         interpolate(rows, start, step, out);
     }
 
-    /// Infrared pixels around the place of the first pixel of a run: left, right, top, bottom. Both are the same where the
-    /// run lies on them.
-    fn between(&self, x: usize, end: usize, y: usize) -> [usize; 4] {
+    /// Infrared pixels around the place of the first pixel of a run.
+    fn between(&self, x: usize, end: usize, y: usize) -> Neighbours {
         let (first, last) = (self.place(x, y), self.place(end - 1, y));
         let [left, top] = first.map(|at| at.floor() as usize);
         let on_pixels = |axis: usize| first[axis].fract() == 0.0 && last[axis].fract() == 0.0;
-        [left, left + usize::from(!on_pixels(0)), top, top + usize::from(!on_pixels(1))]
+        Neighbours {
+            left,
+            right: left + usize::from(!on_pixels(0)),
+            top,
+            bottom: top + usize::from(!on_pixels(1)),
+        }
     }
 
-    /// Takes away pixels between infrared pixels of which one is saturated.
+    /// Clear the mark of pixels next to a saturated infrared pixel.
     pub fn saturation_row<T: Sample>(
         &self,
         shot: &Shot<'_, T>,
@@ -148,7 +152,7 @@ impl Registered {
         let mut x = seen.start;
         while x < seen.end {
             let end = self.end_of_run(x, seen.end, y);
-            let [left, right, top, bottom] = self.between(x, end, y);
+            let Neighbours { left, right, top, bottom } = self.between(x, end, y);
             for row in [top, bottom] {
                 let row = row_of(infrared, row);
                 for shift in [left, right] {
@@ -161,7 +165,15 @@ impl Registered {
     }
 }
 
-/// Lagrange's polynomial through four samples, at the fraction `t` between the middle two.
+/// Infrared columns and rows around a place; left and right, or top and bottom, are equal if the place lies on a pixel.
+struct Neighbours {
+    left: usize,
+    right: usize,
+    top: usize,
+    bottom: usize,
+}
+
+/// Weights of Lagrange's polynomial through four samples, at the fraction `t` between the middle two.
 #[inline(always)]
 fn weights(t: f32) -> [f32; 4] {
     let (before, after, beyond) = (t + 1.0, t - 1.0, t - 2.0);
@@ -173,7 +185,7 @@ fn weights(t: f32) -> [f32; 4] {
     ]
 }
 
-/// Values at fractions that begin at `start` and grow by `step` from pixel to pixel, along columns and along rows.
+/// Values at fractions (x, y) that begin at `start` and grow by `step` from pixel to pixel.
 #[multiversion(targets("x86_64+avx2"))]
 fn interpolate(rows: [&[f32]; 4], start: [f32; 2], step: [f32; 2], out: &mut [f32]) {
     let n = out.len();
@@ -201,8 +213,7 @@ mod tests {
         (0.5 + 0.4 * (TAU / period_px * (x + 0.1 * y)).cos()) as f32
     }
 
-    /// A shift by parts of a pixel, a scale and a turn: the light comes back at the visible pixel it belongs to. The mean
-    /// of neighbours errs by 0.005 at 20 px.
+    /// Sub-pixel shift, scale and rotation are undone. Bilinear interpolation would be off by 0.005 at 20 px.
     #[test]
     fn shift_scale_and_turn_are_undone() {
         let maps = [

@@ -1,15 +1,13 @@
 //! The response of a channel and its inverse.
 
+use super::params::KNEE_POWER;
 use crate::{Error, Result};
-
-/// Power of the knee: where highlights begin to be compressed (about 0.85 of full scale).
-const KNEE_POWER: i32 = 20;
 
 /// Inverse response of one channel: captured intensity `I` (fraction of full scale, dark subtracted) to linear light,
 /// `linear = max(I / (1 - knee I^20) - offset, 0) ^ exponent`.
 ///
-/// A power law is the one family that commutes with the albedo of the object: a dark and a bright patch need the same
-/// curve. The knee is the compression of highlights just below saturation. The default is the identity.
+/// Only a power law commutes with the albedo of the object, so that dark and bright patches need the same curve. The knee
+/// is the compression of highlights just below saturation. The default is the identity.
 ///
 /// ```
 /// use quadfringe::Response;
@@ -48,10 +46,10 @@ impl Response {
         (open - self.offset).max(0.0).powf(self.exponent)
     }
 
-    /// Whether every number is in its range.
+    /// Check the range of every number.
     ///
     /// # Errors
-    /// [`Error::Value`] that names the response by `what` it is of and the channel, and the number.
+    /// [`Error::Value`] that names the kind of response (`what`), the channel and the number.
     pub fn check(&self, what: &str, channel: &str) -> Result<()> {
         let numbers = [
             ("offset", self.offset, 0.0..0.5, "[0, 0.5)"),

@@ -1,4 +1,4 @@
-//! The types a camera delivers.
+//! Types of the intensities that a camera delivers.
 
 use crate::{Error, Result};
 use ndarray::ArrayView2;
@@ -12,18 +12,18 @@ mod sealed {
 
 /// An intensity: `u8`, `u16` or `f32`.
 pub trait Sample: sealed::Sealed + Copy + Send + Sync + 'static {
-    /// Number of levels that a look-up table needs; 0 when there are too many.
+    /// Number of levels of a look-up table; 0 for types without one.
     const LEVELS: usize;
-    /// Intensity of white unless told otherwise.
+    /// Default intensity of white.
     const FULL_SCALE: f32;
 
-    /// Index into a look-up table, where there is one.
+    /// Index into the look-up table, if the type has one.
     fn level(self) -> Option<usize>;
 
     /// The intensity as a number.
     fn intensity(self) -> f32;
 
-    /// Refuse NaN and infinity, where the type has them.
+    /// Refuse NaN and infinity.
     ///
     /// # Errors
     /// [`Error::NotFinite`] with the count and the first place.

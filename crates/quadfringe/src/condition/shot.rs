@@ -12,18 +12,18 @@ pub struct Shot<'a, T> {
     full_scale: f32,
 }
 
-/// What the chips delivered.
+/// Images of the chips.
 #[derive(Debug, Clone)]
 pub(super) enum Images<'a, T> {
     /// R, G, B, IR.
     Planes([ArrayView2<'a, T>; 4]),
-    /// One colour at each pixel, and IR.
+    /// Mosaic with one colour at each pixel, and IR.
     Bayer { raw: ArrayView2<'a, T>, pattern: BayerPattern, infrared: ArrayView2<'a, T> },
 }
 
 impl<'a, T: Sample> Shot<'a, T> {
-    /// A shot of four images in the order R, G, B, IR, whose white is the greatest value of the type (255, 65535; 1.0
-    /// for `f32`).
+    /// A shot of four images in the order R, G, B, IR. Full scale is the greatest value of the type (255, 65535; 1.0 for
+    /// `f32`).
     ///
     /// # Errors
     /// [`Error::Shape`] when the four images differ in size or are empty; [`Error::NotFinite`] for NaN or infinity.
@@ -51,11 +51,11 @@ impl<'a, T: Sample> Shot<'a, T> {
         Ok(Self { images: Images::Planes(planes), full_scale: T::FULL_SCALE })
     }
 
-    /// A shot of a camera with two chips: the raw mosaic of the visible one, as it was read out, and the infrared image.
-    /// White is the greatest value of the type.
+    /// A shot of a camera with two chips: the raw mosaic of the visible one and the infrared image. Full scale is the
+    /// greatest value of the type.
     ///
-    /// The colours that a pixel does not see are interpolated after dark level and response, from samples of the same
-    /// colour alone, at the place of the pixel: the phase that is decoded there belongs there.
+    /// Missing colours are interpolated after dark level and response, from samples of the same colour only, at the place
+    /// of the pixel. The decoded phase therefore belongs to that place.
     ///
     /// # Errors
     /// [`Error::Shape`] when the two images differ in size or the mosaic is smaller than 2 x 2; [`Error::NotFinite`] for
@@ -84,7 +84,7 @@ impl<'a, T: Sample> Shot<'a, T> {
         Ok(Self { images: Images::Bayer { raw, pattern, infrared }, full_scale: T::FULL_SCALE })
     }
 
-    /// The value that stands for full scale, for example 4095 for 12 bit data in 16 bit words.
+    /// Set the intensity of full scale, for example 4095 for 12-bit data in 16-bit words.
     ///
     /// # Errors
     /// [`Error::Value`] unless positive and finite.
@@ -122,7 +122,7 @@ impl<'a, T: Sample> Shot<'a, T> {
         }
     }
 
-    /// The intensity that stands for full scale.
+    /// The intensity of full scale.
     #[must_use]
     pub fn full_scale(&self) -> f32 {
         self.full_scale

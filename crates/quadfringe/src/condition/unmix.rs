@@ -1,12 +1,8 @@
-//! Crosstalk undone, and behind it the response of the projector: light mixes after it has left the projector.
+//! Removal of crosstalk, then of the projector response, because light mixes after it has left the projector.
 
+use super::params::{CURVE_ENTRIES, CURVE_STEEP_ENTRIES};
 use super::{Conditioner, Response};
 use crate::Result;
-
-/// Entries of a curve from dark to full scale.
-const ENTRIES: usize = 4096;
-/// Entries above the offset from which on chords stand for the curve: within 2e-5 for a gamma of 2.2.
-const STEEP: f32 = 16.0;
 
 /// The inverse of a crosstalk matrix, and the inverse responses of the projected channels.
 #[derive(Debug, Clone)]
@@ -25,45 +21,45 @@ impl Unmix {
         })
     }
 
-    /// A row of the four channels. Where the infrared chip sees nothing, the others are freed from one another alone: no
-    /// data must not spread to them, as filters along rows would carry it on.
+    /// Remove crosstalk from a row of the four channels. In gaps of the infrared image its light counts as 0 for the other
+    /// channels, because a NaN would spread along their rows in later filters.
     pub fn row(&self, rows: &mut [&mut [f32]; 4]) {
         for x in 0..rows[0].len() {
             let mut seen = [rows[0][x], rows[1][x], rows[2][x], rows[3][x]];
-            let blind = seen[3].is_nan();
-            seen[3] = if blind { 0.0 } else { seen[3] };
+            let gap = seen[3].is_nan();
+            seen[3] = if gap { 0.0 } else { seen[3] };
             for ((row, weights), curve) in rows.iter_mut().zip(&self.inverse).zip(&self.curves) {
                 let light = weights.iter().zip(seen).map(|(w, s)| w * s).sum();
                 row[x] = curve.as_ref().map_or(light, |curve| curve.at(light));
             }
-            rows[3][x] = if blind { f32::NAN } else { rows[3][x] };
+            rows[3][x] = if gap { f32::NAN } else { rows[3][x] };
         }
     }
 }
 
-/// A response as a table, because a power for every pixel and channel would cost more than the published decoding.
+/// A response as a table. A power for every pixel and channel would take longer than the published decoding.
 #[derive(Debug, Clone)]
 struct Curve {
     response: Response,
     table: Vec<f32>,
-    /// Entries that chords stand for.
+    /// Entries between which straight lines replace the response.
     range: std::ops::Range<f32>,
 }
 
 impl Curve {
-    /// `None` for a response that changes nothing.
+    /// `None` for the identity.
     fn new(response: Response) -> Option<Self> {
-        let entry = |i: usize| response.linear(i as f32 / ENTRIES as f32);
-        let range = response.offset * ENTRIES as f32 + STEEP..ENTRIES as f32;
+        let entry = |i: usize| response.linear(i as f32 / CURVE_ENTRIES as f32);
+        let range = response.offset * CURVE_ENTRIES as f32 + CURVE_STEEP_ENTRIES..CURVE_ENTRIES as f32;
         (response != Response::default()).then(|| Self {
             response,
-            table: (0..=ENTRIES).map(entry).collect(),
+            table: (0..=CURVE_ENTRIES).map(entry).collect(),
             range,
         })
     }
 
     fn at(&self, light: f32) -> f32 {
-        let place = light * ENTRIES as f32;
+        let place = light * CURVE_ENTRIES as f32;
         if !self.range.contains(&place) {
             return self.response.linear(light);
         }

@@ -16,9 +16,9 @@
 //!    `d / e = 2 pi L0^2 d cos(theta) / (P0 dphi G^2) - d sin(theta) cos(theta) / G`.
 //! 4. From step 2, `h = L0 / (1 + d / e)`, which is (S5).
 //!
-//! So (S5) as printed is exact, given: both centres at the same height; `theta` not free but `atan(d / L0)`; `P0` taken
-//! on the normal plane through `O`; and `x` the end of the camera ray on the reference plane, not the object point's own
-//! coordinate. The phase must grow away from the projector; if it grows towards it, change the sign of `dphi`.
+//! So (S5) is exact under these conditions: both centres are at the same height; `theta` is `atan(d / L0)`; `P0` is measured
+//! on the normal plane through `O`; and `x` is the end of the camera ray on the reference plane, not the coordinate of the
+//! object point. The phase must grow away from the projector; if it grows towards it, change the sign of `dphi`.
 
 use std::f64::consts::TAU;
 

@@ -1,39 +1,38 @@
-//! Where the infrared projector lights a camera ray, as a function of where the visible one does.
+//! The infrared phase along each camera ray, as a function of the first phase.
 //!
-//! Along a camera ray depth turns into a column of the visible projector, and into one of the infrared projector. The
-//! second is a smooth function of the first: for lenses without distortion a fraction of two straight lines, in which a
-//! translation between the projectors is a straight line and a rotation a slight bend. It is kept as a cubic for each
-//! pixel through four Chebyshev nodes of the part of the ray that can be lit.
+//! Along a camera ray, each depth corresponds to a column of the visible projector and to one of the infrared projector.
+//! The second is a smooth function of the first: without lens distortion a quotient of two linear functions, which a
+//! translation between the projectors leaves linear and a rotation bends slightly. The table stores a cubic for each pixel
+//! through four Chebyshev nodes of the part of the ray that can be lit.
 
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::Triangulator;
+use super::params::RAY_SLACK_PX;
 use crate::encoding::Encoding;
 use crate::error::{Error, Result};
-use crate::optics::{CoaxialPair, Device};
+use crate::optics::{Device, ProjectorPair};
 use crate::stages::{Absolute, AlongRay, Phases, RayRow};
 
-/// Coefficients of the cubic.
+/// Nodes and coefficients of the cubic.
 const NODES: usize = 4;
 /// Rows of numbers for each row of pixels: the cubic, then the ends of the ray.
 const LINES: usize = NODES + 2;
-/// Columns that a candidate may lie beside the ends of the ray: noise must not take the last fringe away.
-const SLACK_PX: f64 = 1.0;
-/// Depths that stand for the camera itself and for infinity, mm.
+/// Depths that represent the camera and infinity, mm.
 const NEAR_MM: f64 = 1.0;
 const FAR_MM: f64 = 1e9;
 
 /// The infrared phase along every camera ray of a calibrated pair of projectors, planned once.
 ///
 /// ```
-/// use quadfringe::{Encoding, height::PairTable, optics::{CoaxialPair, Device}};
+/// use quadfringe::{Encoding, height::PairTable, optics::{ProjectorPair, Device}};
 /// let camera = Device::pinhole(64, 48, [160.0; 2], [31.5, 23.5])?;
 /// let visible = Device::pinhole(912, 1140, [1570.0; 2], [455.5, 569.5])?
 ///     .with_pose(camera.rotation, [-200.0, 0.0, 0.0])?;
 /// let infrared = visible.clone().with_pose(camera.rotation, [-199.5, 0.0, 0.0])?;
-/// let pair = CoaxialPair::new(visible, infrared);
+/// let pair = ProjectorPair::new(visible, infrared);
 /// let table = PairTable::new(&camera, &pair, &Encoding::optimum(36, 912)?, Some([700.0, 900.0]))?;
 /// let (point, row) = (camera.ray([60.0, 20.0]).at(800.0), table.row(20));
 /// let turns = pair.visible().project(point).expect("in front")[0] / 912.0;
@@ -52,15 +51,15 @@ pub struct PairTable {
 
 impl PairTable {
     /// Plan for a camera and two projectors in its frame. Depths along the camera's axis outside `depth_range_mm` are
-    /// not searched; without it all that the visible projector can light are.
+    /// not searched; without it the search covers all that the visible projector can light.
     ///
     /// # Errors
-    /// [`Error::Value`] when the devices are none that [`Triangulator`] can use, when the fringes are for another width
+    /// [`Error::Value`] when [`Triangulator`] cannot use the devices, when the fringes are for another width
     /// than the visible projector's, or when the range is not two growing depths of at least 0;
     /// [`Error::NotFourChannel`] for another encoding.
     pub fn new(
         camera: &Device,
-        pair: &CoaxialPair,
+        pair: &ProjectorPair,
         encoding: &Encoding,
         depth_range_mm: Option<[f64; 2]>,
     ) -> Result<Self> {
@@ -91,7 +90,7 @@ impl PairTable {
         self.shape
     }
 
-    /// What is known of the rays of one row.
+    /// The rays of one row.
     ///
     /// # Panics
     /// When `row` is outside the camera image.
@@ -103,8 +102,8 @@ impl PairTable {
         RayRow { infrared: std::array::from_fn(line), low_rad: line(NODES), high_rad: line(NODES + 1) }
     }
 
-    /// The infrared phase in rad, not wrapped, at every pixel of a map of first absolute phases in rad; NaN in, NaN out,
-    /// and where no ray can be lit.
+    /// The infrared phase in rad, not wrapped, for a map of first absolute phases in rad. NaN in, NaN out; NaN also where no
+    /// ray can be lit.
     ///
     /// # Errors
     /// [`Error::Shape`] when the map has another size than the camera image.
@@ -174,7 +173,7 @@ fn check(name: &str, map: ArrayView2<'_, f32>, shape: (usize, usize)) -> Result<
 
 struct Plan<'a> {
     camera: &'a Device,
-    pair: &'a CoaxialPair,
+    pair: &'a ProjectorPair,
     triangulator: Triangulator,
     range_mm: [f64; 2],
     /// Phase in rad over the whole field, of the first fringe number and of the infrared one.
@@ -192,7 +191,7 @@ impl Plan<'_> {
         let ends_of = |x: usize| self.ends_px(rays[x], edges_mm.each_ref().map(|depths| depths[x]), field);
         let ends: Vec<_> = (0..columns).map(ends_of).collect();
         let node_px = |k: usize, [low, high]: [f64; 2]| {
-            let half = (0.5 * (high - low)).max(SLACK_PX);
+            let half = (0.5 * (high - low)).max(RAY_SLACK_PX);
             0.5 * (low + high) - half * (FRAC_PI_4 * (0.5 + k as f64)).cos()
         };
         let nodes_mm: [Vec<f64>; NODES] = std::array::from_fn(|k| {
@@ -203,7 +202,7 @@ impl Plan<'_> {
             let points = nodes_mm.each_ref().map(|depths| at(*ray, depths[x]));
             let Some(cubic) = self.cubic(points) else { continue };
             let width = self.pair.visible().width as f64;
-            let slack = SLACK_PX.min(0.5 * (width - (ends[1] - ends[0])));
+            let slack = RAY_SLACK_PX.min(0.5 * (width - (ends[1] - ends[0])));
             let range = [ends[0] - slack, ends[1] + slack].map(|px| self.first * px / width);
             for (k, value) in cubic.into_iter().chain(range).enumerate() {
                 out[k * columns + x] = value as f32;

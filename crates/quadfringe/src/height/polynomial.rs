@@ -3,19 +3,34 @@
 use ndarray::{Array2, Array3, ArrayView2, Axis};
 use rayon::prelude::*;
 
+use super::params::DEGREE_MAX;
 use crate::error::{Error, Limit, Result};
 
-const DEGREE_MAX: usize = 6;
+/// A plane at a known height, for [`PolynomialHeight::fit`].
+#[derive(Debug, Clone, Copy)]
+pub struct HeightPlane<'a> {
+    /// Height above the reference plane, mm.
+    pub height_mm: f64,
+    /// Absolute phase, `(rows, columns)`, rad; NaN is no data.
+    pub phase_rad: ArrayView2<'a, f32>,
+}
+
+/// Phase difference and height of one pixel on one plane.
+struct Sample {
+    difference_rad: f64,
+    height_mm: f64,
+}
 
 /// Per-pixel polynomial `h = sum_n a_n dphi^n`, with `dphi` the phase minus that of the reference plane.
 ///
 /// ```
 /// use ndarray::Array2;
-/// use quadfringe::height::PolynomialHeight;
-/// let plane = |h: f64| (h, Array2::from_elem((2, 3), 0.2 * h as f32));
-/// let planes = [plane(0.0), plane(10.0), plane(20.0)];
-/// let views: Vec<_> = planes.iter().map(|(h, p)| (*h, p.view())).collect();
-/// let height = PolynomialHeight::fit(planes[0].1.view(), &views, 1)?;
+/// use quadfringe::height::{HeightPlane, PolynomialHeight};
+/// let phase = |height_mm: f64| Array2::from_elem((2, 3), 0.2 * height_mm as f32);
+/// let maps = [0.0, 10.0, 20.0].map(|height_mm| (height_mm, phase(height_mm)));
+/// let planes: Vec<_> =
+///     maps.iter().map(|(height_mm, map)| HeightPlane { height_mm: *height_mm, phase_rad: map.view() }).collect();
+/// let height = PolynomialHeight::fit(maps[0].1.view(), &planes, 1)?;
 /// let map = height.height_from_phase(Array2::from_elem((2, 3), 1.0f32).view())?;
 /// assert!((map[[1, 2]] - 5.0).abs() < 1e-4);
 /// # Ok::<(), quadfringe::error::Error>(())
@@ -28,7 +43,7 @@ pub struct PolynomialHeight {
 }
 
 impl PolynomialHeight {
-    /// Least-squares fit of degree `degree` (1 to 6) to planes given as (height in mm, absolute phase map in rad).
+    /// Least-squares fit of degree `degree` (1 to 6) to planes at known heights.
     ///
     /// A pixel that is NaN in the reference or has fewer than `degree + 1` planes with data has no polynomial, and its
     /// height is NaN.
@@ -39,7 +54,7 @@ impl PolynomialHeight {
     /// has another size than the reference.
     pub fn fit(
         reference_rad: ArrayView2<'_, f32>,
-        planes: &[(f64, ArrayView2<'_, f32>)],
+        planes: &[HeightPlane<'_>],
         degree: usize,
     ) -> Result<Self> {
         check_planes(reference_rad, planes, degree)?;
@@ -50,8 +65,11 @@ impl PolynomialHeight {
                 let origin = f64::from(reference_rad[[row, column]]);
                 let samples: Vec<_> = planes
                     .iter()
-                    .map(|(height, map)| (f64::from(map[[row, column]]) - origin, *height))
-                    .filter(|(difference, _)| difference.is_finite())
+                    .map(|plane| Sample {
+                        difference_rad: f64::from(plane.phase_rad[[row, column]]) - origin,
+                        height_mm: plane.height_mm,
+                    })
+                    .filter(|sample| sample.difference_rad.is_finite())
                     .collect();
                 if let Some(fitted) = fit_pixel(&samples, degree) {
                     line.row_mut(column).iter_mut().zip(fitted).for_each(|(c, f)| *c = f);
@@ -66,8 +84,7 @@ impl PolynomialHeight {
         Ok(Self { reference_rad: reference_rad.to_owned(), coefficients })
     }
 
-    /// A calibration that was fitted earlier: the phase of the reference plane, and coefficients as
-    /// [`PolynomialHeight::coefficients`] gave them.
+    /// An earlier fit from the phase of its reference plane and its [`PolynomialHeight::coefficients`].
     ///
     /// # Errors
     /// [`Error::Shape`] unless the coefficients are `(rows, columns, degree + 1)` of degree 1 to 6 for the size of the reference.
@@ -114,25 +131,21 @@ impl PolynomialHeight {
     }
 }
 
-fn check_planes(
-    reference_rad: ArrayView2<'_, f32>,
-    planes: &[(f64, ArrayView2<'_, f32>)],
-    degree: usize,
-) -> Result<()> {
+fn check_planes(reference_rad: ArrayView2<'_, f32>, planes: &[HeightPlane<'_>], degree: usize) -> Result<()> {
     if !(1..=DEGREE_MAX).contains(&degree) {
         let expected = format!("1 to {DEGREE_MAX}");
         return Err(Error::value("degree of the polynomial", expected, degree));
     }
-    for (index, (height, map)) in planes.iter().enumerate() {
-        if !height.is_finite() {
-            return Err(Error::value("height of a plane (mm)", Limit::Finite, height));
+    for (index, HeightPlane { height_mm, phase_rad: map }) in planes.iter().enumerate() {
+        if !height_mm.is_finite() {
+            return Err(Error::value("height of a plane (mm)", Limit::Finite, height_mm));
         }
         if map.dim() != reference_rad.dim() {
             let what = format!("phase map of plane {index}");
             return Err(Error::shape(what, reference_rad.shape(), map.shape()));
         }
     }
-    let mut heights: Vec<f64> = planes.iter().map(|(height, _)| *height).collect();
+    let mut heights: Vec<f64> = planes.iter().map(|plane| plane.height_mm).collect();
     heights.sort_by(f64::total_cmp);
     heights.dedup_by(|a, b| (*a - *b).abs() < 1e-9);
     if heights.len() <= degree {
@@ -142,20 +155,21 @@ fn check_planes(
     Ok(())
 }
 
-/// Least squares by modified Gram-Schmidt on the phase scaled to [-1, 1]; `None` when the phases do not determine it.
-fn fit_pixel(samples: &[(f64, f64)], degree: usize) -> Option<[f64; DEGREE_MAX + 1]> {
+/// Least squares by modified Gram-Schmidt on the phase scaled to [-1, 1]; `None` if the phases do not determine it.
+fn fit_pixel(samples: &[Sample], degree: usize) -> Option<[f64; DEGREE_MAX + 1]> {
     let terms = degree + 1;
-    let scale = samples.iter().fold(0f64, |s, (difference, _)| s.max(difference.abs()));
+    let scale = samples.iter().fold(0f64, |s, sample| s.max(sample.difference_rad.abs()));
     if samples.len() < terms || scale < 1e-9 {
         return None;
     }
+    let power = |sample: &Sample, n: usize| (sample.difference_rad / scale).powi(n as i32);
     let mut basis: Vec<Vec<f64>> =
-        (0..terms).map(|n| samples.iter().map(|(d, _)| (d / scale).powi(n as i32)).collect()).collect();
-    let mut rest: Vec<f64> = samples.iter().map(|(_, height)| *height).collect();
+        (0..terms).map(|n| samples.iter().map(|sample| power(sample, n)).collect()).collect();
+    let mut rest: Vec<f64> = samples.iter().map(|sample| sample.height_mm).collect();
     let mut upper = [[0.0; DEGREE_MAX + 1]; DEGREE_MAX + 1];
     let mut weights = [0.0; DEGREE_MAX + 1];
     for i in 0..terms {
-        let before = samples.iter().map(|(d, _)| (d / scale).powi(2 * i as i32)).sum::<f64>();
+        let before = samples.iter().map(|sample| power(sample, 2 * i)).sum::<f64>();
         let length = inner(&basis[i], &basis[i]).sqrt();
         if length < 1e-7 * before.sqrt() {
             return None;
@@ -171,7 +185,7 @@ fn fit_pixel(samples: &[(f64, f64)], degree: usize) -> Option<[f64; DEGREE_MAX +
     Some(solve_upper(&upper, weights, terms, scale))
 }
 
-/// Takes from `vector` its part along the unit vector `unit`, and returns the length of that part.
+/// Subtract the part of `vector` along the unit vector `unit`, and return the length of that part.
 fn remove_component(unit: &[f64], vector: &mut [f64]) -> f64 {
     let part = inner(unit, vector);
     vector.iter_mut().zip(unit).for_each(|(v, u)| *v -= part * u);
@@ -210,7 +224,8 @@ mod tests {
     }
 
     fn fitted(planes: &[(f64, Array2<f32>)], degree: usize) -> Result<PolynomialHeight> {
-        let views: Vec<_> = planes.iter().map(|(h, p)| (*h, p.view())).collect();
+        let views: Vec<_> =
+            planes.iter().map(|(h, p)| HeightPlane { height_mm: *h, phase_rad: p.view() }).collect();
         PolynomialHeight::fit(Array2::zeros((3, 4)).view(), &views, degree)
     }
 

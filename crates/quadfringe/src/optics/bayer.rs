@@ -1,4 +1,4 @@
-//! The colour filters of a chip that sees one colour at each pixel.
+//! Colour filters of a chip that measures one colour at each pixel.
 
 use crate::encoding::Channel;
 use crate::error::{Error, Limit, Result};
@@ -25,10 +25,10 @@ pub enum BayerPattern {
 }
 
 impl BayerPattern {
-    /// The four that there are.
+    /// All four patterns.
     pub const ALL: [Self; 4] = [Self::Rggb, Self::Grbg, Self::Gbrg, Self::Bggr];
 
-    /// The pattern of this name: rggb, grbg, gbrg or bggr.
+    /// Parse a name: rggb, grbg, gbrg or bggr.
     ///
     /// # Errors
     /// [`Error::Value`] that lists the four for any other name.
@@ -38,7 +38,7 @@ impl BayerPattern {
         found.ok_or_else(|| Error::value("Bayer pattern", known, format!("{name:?}")))
     }
 
-    /// Its name, four letters in the order of the pixels.
+    /// Name of the pattern: four letters in the order of the pixels.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {

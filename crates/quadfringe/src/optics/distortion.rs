@@ -14,7 +14,7 @@ pub(super) fn apply(k: &[f64; 5], [x, y]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-/// Whether radial distortion still grows everywhere between the axis and the point, so that the model is one to one.
+/// Whether the distorted radius increases everywhere between the axis and the point, so that the model is one to one.
 pub(super) fn is_before_fold(k: &[f64; 5], [x, y]: [f64; 2]) -> bool {
     let [k1, k2, _, _, k3] = *k;
     if k1 >= 0.0 && k2 >= 0.0 && k3 >= 0.0 {
@@ -59,7 +59,7 @@ pub(super) fn remove(k: &[f64; 5], distorted: [f64; 2]) -> Option<[f64; 2]> {
             }
             scale *= 0.5;
             if scale < 1e-6 {
-                // No progress: either rounding is reached, or there is no such point.
+                // No progress: the result is exact to rounding, or there is no such point.
                 return (size < 1e-10).then_some(point);
             }
         }
@@ -67,7 +67,7 @@ pub(super) fn remove(k: &[f64; 5], distorted: [f64; 2]) -> Option<[f64; 2]> {
     (norm(miss) < 1e-10).then_some(point)
 }
 
-/// The distorted point itself, drawn towards the axis until it lies before the fold.
+/// Start value: the distorted point, moved towards the axis until it lies before the fold.
 fn start(k: &[f64; 5], distorted: [f64; 2]) -> [f64; 2] {
     let mut point = distorted;
     for _ in 0..60 {

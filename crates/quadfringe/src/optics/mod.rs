@@ -1,4 +1,4 @@
-//! The pinhole device with lens distortion (S8). A projector is an inverse camera and uses the same type.
+//! The pinhole model with lens distortion (S8). A projector is an inverse camera and has the same type.
 //!
 //! `s [u v 1]^T = A [R T] P`: a point `P` of the camera frame (mm) becomes `R P + T` in the device frame, is divided by
 //! its depth, distorted, scaled by the focal length and moved to the principal point. Pixel centres are integers.
@@ -12,7 +12,7 @@ mod pose;
 mod rotation;
 
 pub use bayer::BayerPattern;
-pub use pair::CoaxialPair;
+pub use pair::ProjectorPair;
 pub(crate) use pair::check_plane;
 pub use pose::Pose;
 pub use rotation::rotation_from_vector;
@@ -71,7 +71,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// Device from all its parameters; `rotation` and `translation_mm` take points of the camera frame to the device.
+    /// Device from all parameters; `rotation` and `translation_mm` map points from the camera frame to the device frame.
     ///
     /// # Errors
     /// [`Error::Value`] when the size is zero, a focal length is not positive, a number is not finite, or the rotation is
@@ -134,8 +134,8 @@ impl Device {
         Ok(Self { rotation, translation_mm, ..self })
     }
 
-    /// Pixel (column, row) at which a point of the camera frame (mm) is seen, inside the image or not; `None` when the
-    /// point is not in front of the device, or so far off axis that the distortion model folds back.
+    /// Project a point of the camera frame (mm) to a pixel (column, row), inside the image or not. `None` if the point is not
+    /// in front of the device, or so far off axis that the distortion model folds back.
     #[must_use]
     pub fn project(&self, p_mm: [f64; 3]) -> Option<[f64; 2]> {
         let [x, y, z] = self.device_from_camera(p_mm);

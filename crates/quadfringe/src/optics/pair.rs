@@ -1,11 +1,11 @@
-//! Two projectors that are meant to be one, and what the infrared one really shows.
+//! A pair of calibrated projectors, coaxial or not, and the infrared fringes that they show.
 
 use super::Device;
 use crate::error::{Error, Limit, Result};
 
 impl Device {
-    /// Position (column, row) in `other` of what a position of this device sees, or lights, on the plane z = `z_mm` of the
-    /// camera frame; `None` when its ray does not meet the plane or `other` does not reach that point.
+    /// Map a position (column, row) of this device to `other` through the plane z = `z_mm` of the camera frame. `None` if its
+    /// ray does not meet the plane, or if the point is outside the field of `other`.
     ///
     /// ```
     /// use quadfringe::optics::{Device, rotation_from_vector};
@@ -25,13 +25,14 @@ impl Device {
     }
 }
 
-/// The calibrated pair: where both projectors really stand, and whether the infrared image makes up for it (S10, S11).
+/// A calibrated pair of projectors with their poses, and whether the infrared image is pre-deformed to correct for them
+/// (S10, S11).
 ///
 /// ```
-/// use quadfringe::optics::{CoaxialPair, Device};
+/// use quadfringe::optics::{ProjectorPair, Device};
 /// let visible = Device::pinhole(912, 1140, [1570.0; 2], [455.5, 569.5])?;
 /// let infrared = visible.clone().with_pose(visible.rotation, [0.5, 0.0, 0.0])?;
-/// let (plain, point) = (CoaxialPair::new(visible, infrared), [10.0, 20.0, 800.0]);
+/// let (plain, point) = (ProjectorPair::new(visible, infrared), [10.0, 20.0, 800.0]);
 /// let corrected = plain.clone().predeformed(800.0)?;
 /// let column = plain.visible().project(point).expect("in front")[0];
 /// assert!((912.0 * plain.infrared_turns(point).expect("lit") - column - 0.98).abs() < 0.01);
@@ -39,20 +40,20 @@ impl Device {
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
-pub struct CoaxialPair {
+pub struct ProjectorPair {
     visible: Device,
     infrared: Device,
     predeformed_z_mm: Option<f64>,
 }
 
-impl CoaxialPair {
-    /// Two projectors with plain fringes, their poses relative to the camera.
+impl ProjectorPair {
+    /// Two projectors with plain fringes; their poses are relative to the camera.
     #[must_use]
     pub const fn new(visible: Device, infrared: Device) -> Self {
         Self { visible, infrared, predeformed_z_mm: None }
     }
 
-    /// The same pair with an infrared image that is pre-deformed for the plane z = `z_mm`.
+    /// The same pair with an infrared image pre-deformed for the plane z = `z_mm`.
     ///
     /// # Errors
     /// [`Error::Value`] when the depth is not finite and positive.
@@ -67,8 +68,8 @@ impl CoaxialPair {
         &self.visible
     }
 
-    /// How far through the field of infrared fringes a point of the camera frame (mm) is lit from: 0 at the first column,
-    /// 1 after the last. Times the fringe number that is the phase in turns. `None` when the point is not lit.
+    /// Position in the field of infrared fringes that lights a point of the camera frame (mm): 0 at the first column, 1 after
+    /// the last. Times the fringe number it is the phase in turns. `None` if the point is not lit.
     #[must_use]
     pub fn infrared_turns(&self, p_mm: [f64; 3]) -> Option<f64> {
         let mirror = self.infrared.project(p_mm)?;
@@ -82,7 +83,7 @@ impl CoaxialPair {
     }
 }
 
-/// Refuses what is no plane before the camera.
+/// Check that the plane is in front of the camera.
 pub(crate) fn check_plane(z_mm: f64) -> Result<()> {
     if z_mm.is_finite() && z_mm > 0.0 {
         return Ok(());

@@ -1,4 +1,4 @@
-//! Where a body stands.
+//! Poses of bodies.
 
 use super::{check_finite, dot, rotation};
 use crate::error::Result;
@@ -36,7 +36,7 @@ impl Pose {
         std::array::from_fn(|i| dot(self.rotation[i], p_mm) + self.translation_mm[i])
     }
 
-    /// Point of the camera frame in the body's own, mm.
+    /// Point of the camera frame in the body frame, mm.
     #[must_use]
     pub fn body_from_camera(&self, p_mm: [f64; 3]) -> [f64; 3] {
         self.body_from_direction(std::array::from_fn(|i| p_mm[i] - self.translation_mm[i]))
@@ -48,7 +48,7 @@ impl Pose {
         self.rotation.map(|row| dot(row, v))
     }
 
-    /// Direction of the camera frame in the body's own.
+    /// Direction of the camera frame in the body frame.
     #[must_use]
     pub fn body_from_direction(&self, v: [f64; 3]) -> [f64; 3] {
         let r = &self.rotation;

@@ -27,7 +27,7 @@ pub fn rotation_from_vector(vector_rad: [f64; 3]) -> [[f64; 3]; 3] {
     ]
 }
 
-/// Refuses what is not a proper rotation.
+/// Check that a matrix is a proper rotation.
 pub(super) fn check(r: &[[f64; 3]; 3]) -> Result<()> {
     let orthonormal =
         (0..3).all(|i| (0..3).all(|j| (dot(r[i], r[j]) - f64::from(u8::from(i == j))).abs() <= 1e-6));

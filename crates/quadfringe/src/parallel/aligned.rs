@@ -1,21 +1,21 @@
-//! Working memory that begins with a cache line: a wide vector across two lines is read and written in two goes.
+//! Working memory aligned to cache lines. A wide vector that crosses two lines takes two accesses.
 
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vectors.
 const LINE: usize = 64;
 
-/// How many numbers to have more than are wanted, so that [`first_of_line`] leaves enough of them.
+/// Numbers to allocate in addition, so that [`first_of_line`] leaves enough of them.
 pub(crate) const fn spare<T>() -> usize {
     LINE / size_of::<T>()
 }
 
-/// The first place of `memory` that begins a cache line.
+/// Index of the first number of `memory` that begins a cache line.
 pub(crate) fn first_of_line<T>(memory: &[T]) -> usize {
     memory.as_ptr().align_offset(LINE).min(spare::<T>())
 }
 
-/// A row of numbers that keeps its place and its numbers for as long as it need not grow.
+/// A row of numbers that keeps its address and its numbers until it must grow.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned<T> {
     memory: Vec<T>,
@@ -24,14 +24,14 @@ pub(crate) struct Aligned<T> {
 }
 
 impl<T: Copy + Default> Aligned<T> {
-    /// So many zeros.
+    /// A row of zeros.
     pub fn new(count: usize) -> Self {
         let mut row = Self::default();
         row.resize(count);
         row
     }
 
-    /// Hold so many numbers; zeros when the row has to grow.
+    /// Change the number of numbers. If the row must grow, all become zero.
     #[inline(always)]
     pub fn resize(&mut self, count: usize) {
         if self.start + count > self.memory.len() {

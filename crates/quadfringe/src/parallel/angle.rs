@@ -3,7 +3,7 @@
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// atan(a) / a over [0, 1] in powers of a^2: reweighted least squares on 4000 Chebyshev nodes; greatest error of
-/// the polynomial 4e-8 rad, before rounding to `f32`. The test below measures what is left.
+/// the polynomial 4e-8 rad, before rounding to `f32`. The test below measures the total error.
 const ATAN: [f32; 8] = [
     0.999_999_34,
     -0.333_298_62,
@@ -15,24 +15,24 @@ const ATAN: [f32; 8] = [
     -0.004_054_568_5,
 ];
 
-/// The same with fewer terms, greatest error 1.2e-5 rad: for angles that only choose between whole turns.
+/// The same with fewer terms, greatest error 1.2e-5 rad, for angles that only select whole turns.
 const COARSE_ATAN: [f32; 5] = [0.999_866_3, -0.330_304_8, 0.180_159_3, -0.085_156_35, 0.020_845_114];
 
-/// sin(2 pi t) / t over |t| <= 1/4 in powers of t^2, found in the same way; greatest error of the polynomial 4e-9.
+/// sin(2 pi t) / t over |t| <= 1/4 in powers of t^2, fitted in the same way; greatest error of the polynomial 4e-9.
 const SINE: [f32; 5] = [TAU, -41.341_656, 81.601_01, -76.549_85, 39.537_205];
 
-/// 2 pi in two parts: whole turns times the first are exact in `f32`, so that only the small second part rounds.
+/// 2 pi in two parts. Whole turns times the first part are exact in `f32`, so only the small second part rounds.
 const TAU_HIGH: f32 = 6.281_25;
 const TAU_LOW: f32 = 0.001_935_307_2;
 
-/// Sine and cosine, greatest error 4e-7 for |angle| < 1000 rad. Free of branches, so that loops vectorise.
+/// Sine and cosine, greatest error 4e-7 for |angle| < 1000 rad. It has no branches, so loops vectorise.
 #[inline(always)]
 pub(crate) fn sin_cos(angle: f32) -> (f32, f32) {
     let t = wrap(angle) * (1.0 / TAU);
     (sine(t), sine(0.25 - t.abs()))
 }
 
-/// Sine of a part of a turn in [-1/2, 1/2].
+/// Sine of an angle in turns, in [-1/2, 1/2].
 #[inline(always)]
 fn sine(t: f32) -> f32 {
     let half = if t < 0.0 { -0.5 } else { 0.5 };
@@ -41,8 +41,8 @@ fn sine(t: f32) -> f32 {
     five_terms(SINE, square) * folded
 }
 
-/// Four-quadrant arctangent, greatest error 4e-7 rad; `atan2(0, 0)` is 0; NaN in, NaN out. Free of branches,
-/// so that loops vectorise.
+/// Four-quadrant arctangent, greatest error 4e-7 rad; `atan2(0, 0)` is 0; NaN in, NaN out. It has no branches,
+/// so loops vectorise.
 #[inline(always)]
 pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     let a = ratio(y, x);
@@ -56,7 +56,7 @@ pub(crate) fn coarse_atan2(y: f32, x: f32) -> f32 {
     unfold(five_terms(COARSE_ATAN, a * a) * a, y, x)
 }
 
-/// The lesser size over the greater one.
+/// The smaller magnitude over the greater one.
 #[inline(always)]
 fn ratio(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
@@ -67,7 +67,7 @@ fn ratio(y: f32, x: f32) -> f32 {
     low / if tiny { f32::MIN_POSITIVE } else { high }
 }
 
-/// From the first half quadrant, where `angle` lies, to that of the point.
+/// From the first octant, where `angle` lies, to the octant of the point.
 #[inline(always)]
 fn unfold(angle: f32, y: f32, x: f32) -> f32 {
     let folded = if y.abs() > x.abs() { FRAC_PI_2 - angle } else { angle };
@@ -75,7 +75,7 @@ fn unfold(angle: f32, y: f32, x: f32) -> f32 {
     if y < 0.0 { -half } else { half }
 }
 
-/// A polynomial in `t`. Pairs of terms first (Estrin): one after the other, each term would wait for the one before.
+/// A polynomial in `t` by Estrin's scheme, whose terms do not wait for each other as in Horner's scheme.
 #[inline(always)]
 fn eight_terms([a, b, c, d, e, f, g, h]: [f32; 8], t: f32) -> f32 {
     let square = t * t;
@@ -90,7 +90,7 @@ fn five_terms([a, b, c, d, e]: [f32; 5], t: f32) -> f32 {
     (a + b * t) + ((c + d * t) + e * square) * square
 }
 
-/// Round to the nearest whole number for |x| < 2^21 without a call: adding 1.5 * 2^23 leaves no room for a fraction.
+/// Round to the nearest whole number for |x| < 2^21 without a function call: adding 1.5 * 2^23 removes the fraction.
 #[inline(always)]
 pub(crate) fn round(x: f32) -> f32 {
     const SHIFT: f32 = 12_582_912.0;
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arctangents_keep_their_bound_on_the_whole_circle() {
+    fn arctangents_stay_within_their_bounds_on_the_whole_circle() {
         for (found, bound) in [(atan2 as fn(f32, f32) -> f32, 4e-7), (coarse_atan2, 1.3e-5)] {
             let worst = (0..1_000_000)
                 .map(|i| f64::from(i) * std::f64::consts::TAU / 1e6 - std::f64::consts::PI)
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn sine_and_cosine_keep_their_bound() {
+    fn sine_and_cosine_stay_within_their_bounds() {
         for i in -500_000..500_000 {
             let angle = i as f32 * 2e-3;
             let (s, c) = sin_cos(angle);

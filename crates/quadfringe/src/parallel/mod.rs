@@ -1,5 +1,5 @@
-//! Helpers of all code that has to be fast: angles in whole vectors, rows of pixels as vectors, aligned memory, and
-//! working memory that tasks hand on to each other.
+//! Helpers of fast code: angles without branches, rows of pixels as vectors, aligned memory, and working memory that tasks
+//! share one after another.
 
 pub(crate) mod aligned;
 pub(crate) mod angle;

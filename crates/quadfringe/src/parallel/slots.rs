@@ -1,13 +1,13 @@
-//! Working memory of tasks: made for as many as run at once, then handed from one to the next.
+//! Working memory of tasks: one value for each task that runs at the same time, reused by later tasks.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
-/// Values that no task has. Boxes, so that none is copied.
+/// Values that no task holds, in boxes to avoid copies.
 #[derive(Debug)]
 pub(crate) struct Slots<T>(Mutex<Vec<Box<T>>>);
 
-/// A value until the task is done with it.
+/// A value that a task holds; dropping it returns the value.
 #[derive(Debug)]
 pub(crate) struct Lent<'a, T> {
     value: Option<Box<T>>,
@@ -21,7 +21,7 @@ impl<T> Default for Slots<T> {
 }
 
 impl<T: Default> Slots<T> {
-    /// The value given back last, which is still in some cache, or a new one.
+    /// The value returned last, which may still be in the cache, or a new one.
     pub fn take(&self) -> Lent<'_, T> {
         Lent { value: Some(self.free(|free| free.pop()).unwrap_or_default()), slots: self }
     }
@@ -29,14 +29,14 @@ impl<T: Default> Slots<T> {
 
 impl<T> Slots<T> {
     fn free<R>(&self, change: impl FnOnce(&mut Vec<Box<T>>) -> R) -> R {
-        // A panic cannot come between a push and its end.
+        // No panic can interrupt a push.
         change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
 impl<T> Drop for Lent<'_, T> {
     fn drop(&mut self) {
-        // What a panic left behind is working memory: the next task writes it before it reads it.
+        // Working memory is valid even after a panic, because every task writes it before reading it.
         if let Some(value) = self.value.take() {
             self.slots.free(|free| free.push(value));
         }
@@ -47,13 +47,13 @@ impl<T> Deref for Lent<'_, T> {
     type Target = T;
 
     fn deref(&self) -> &T {
-        self.value.as_ref().expect("given back at the end")
+        self.value.as_ref().expect("returned on drop only")
     }
 }
 
 impl<T> DerefMut for Lent<'_, T> {
     fn deref_mut(&mut self) -> &mut T {
-        self.value.as_mut().expect("given back at the end")
+        self.value.as_mut().expect("returned on drop only")
     }
 }
 
@@ -62,15 +62,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_task_has_a_value_of_its_own_and_gives_it_back() {
+    fn every_task_has_a_separate_value_and_returns_it() {
         let slots = Slots::<Vec<u8>>::default();
         {
-            // As many as are asked for, on whatever threads.
             let mut lent = [slots.take(), slots.take(), slots.take()];
-            for (value, own) in lent.iter_mut().zip(1..) {
-                value.push(own);
+            for (value, number) in lent.iter_mut().zip(1..) {
+                value.push(number);
             }
-            assert!(lent.iter().zip(1..).all(|(value, own)| **value == [own]));
+            assert!(lent.iter().zip(1..).all(|(value, number)| **value == [number]));
         }
         let again = [slots.take(), slots.take(), slots.take()];
         let mut kept: Vec<u8> = again.iter().flat_map(|value| value.iter().copied()).collect();
@@ -80,7 +79,7 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_gives_back_too() {
+    fn a_panic_returns_the_value_too() {
         let slots = Slots::<Vec<u8>>::default();
         let failed = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
             slots.take().push(7);

@@ -3,8 +3,7 @@
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 
-/// Reach of the Gaussian in standard deviations.
-const REACH: f64 = 4.0;
+use super::params::BLUR_REACH_SIGMAS;
 
 /// Gaussian blur with a standard deviation in px; the border is continued.
 pub(super) fn blur(image: &Array2<f32>, sigma_px: f64) -> Array2<f32> {
@@ -15,7 +14,7 @@ pub(super) fn blur(image: &Array2<f32>, sigma_px: f64) -> Array2<f32> {
 
 /// Weights of one side of the kernel, the middle first; all together they sum to 1.
 fn gaussian(sigma_px: f64) -> Vec<f32> {
-    let reach = (REACH * sigma_px).ceil() as i32;
+    let reach = (BLUR_REACH_SIGMAS * sigma_px).ceil() as i32;
     let weight = |i: i32| (-0.5 * (f64::from(i) / sigma_px).powi(2)).exp();
     let total: f64 = (-reach..=reach).map(weight).sum();
     (0..=reach).map(|i| (weight(i) / total) as f32).collect()

@@ -1,14 +1,12 @@
-//! One ray through each camera pixel, and where the point it meets is lit from (S9).
+//! One ray through each camera pixel, and the projector position that lights its surface point (S9).
 
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
+use super::params::{SHADOW_GAP_MM, STEP_FOOTPRINTS};
 use super::{Bench, Projector};
 use crate::optics::{Device, Ray, dot};
 use crate::surface::Surface;
-
-/// How far before a point a shadow ray stops, mm, so that the point does not shade itself.
-const SHADOW_GAP_MM: f64 = 1e-3;
 
 /// What one camera pixel sees.
 ///
@@ -61,7 +59,7 @@ impl Hit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cast {
     pub(super) hits: Array2<Hit>,
-    /// The same for the pixels of an infrared chip that sees something else.
+    /// The same for the pixels of an infrared chip that is not registered with the visible one.
     pub(super) infrared_hits: Option<Array2<Hit>>,
     /// Depth difference of neighbouring pixels above which a step lies between them, in mm per mm of depth.
     pub(super) step_per_depth: f64,
@@ -70,12 +68,11 @@ pub struct Cast {
 impl Bench {
     /// Traces the pixels of both chips to the surface and the surface to both projectors; rows in parallel.
     ///
-    /// A point is lit by a projector when it faces it, lies within the projected image and nothing stands between.
+    /// A projector lights a point that faces it, lies within the projected image, and is not in the shadow of another point.
     #[must_use]
     pub fn cast(&self, surface: &dyn Surface) -> Cast {
         let infrared = self.visible_from_infrared();
-        // Four pixels' footprint per pixel: a wall steeper than 76 degrees.
-        let step_per_depth = 4.0 / self.camera.focal_px[0].min(self.camera.focal_px[1]);
+        let step_per_depth = STEP_FOOTPRINTS / self.camera.focal_px[0].min(self.camera.focal_px[1]);
         Cast {
             hits: self.hits(surface, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]),
             infrared_hits: infrared.map(|from_infrared| self.hits(surface, from_infrared)),
@@ -83,7 +80,7 @@ impl Bench {
         }
     }
 
-    /// What the pixels (x, y) of a chip see, which look where `visible` takes (x, y, 1).
+    /// Hits of the pixels (x, y) of a chip; `visible` maps (x, y, 1) to the visible pixel that sees the same point.
     fn hits(&self, surface: &dyn Surface, visible: [[f64; 3]; 2]) -> Array2<Hit> {
         let size = (self.camera.height, self.camera.width);
         let mut hits = Array2::from_elem(size, Hit::NOTHING);
@@ -108,9 +105,9 @@ impl Bench {
                         hit.facing[1] = hit.facing[0];
                         continue;
                     }
-                    let (facing, lit_from) = light_at(surface, device, *centre, point, normal);
-                    hit.facing[index] = facing;
-                    hit.lit_from_px[index] = lit_from.unwrap_or([f64::NAN; 2]);
+                    let lit = light_at(surface, device, *centre, point, normal);
+                    hit.facing[index] = lit.facing;
+                    hit.lit_from_px[index] = lit.from_px.unwrap_or([f64::NAN; 2]);
                 }
             }
         });
@@ -118,19 +115,27 @@ impl Bench {
     }
 }
 
-/// Cosine towards the projector, and the projector pixel that lights the point.
+/// Light of a projector at a point of the surface.
+struct Lit {
+    /// Cosine between the surface normal and the direction to the projector.
+    facing: f64,
+    /// Projector column and row that light the point; `None` in shadow and outside the image.
+    from_px: Option<[f64; 2]>,
+}
+
+/// Light of a projector at a point with this normal.
 fn light_at(
     surface: &dyn Surface,
     projector: &Device,
     centre: [f64; 3],
     point: [f64; 3],
     normal: [f64; 3],
-) -> (f64, Option<[f64; 2]>) {
+) -> Lit {
     let away: [f64; 3] = std::array::from_fn(|i| point[i] - centre[i]);
     let distance = dot(away, away).sqrt();
     let ray = Ray { origin_mm: centre, direction: away.map(|c| c / distance) };
     let facing = -dot(normal, ray.direction);
     let pixel = projector.project(point).filter(|pixel| facing > 0.0 && projector.contains(*pixel));
     let lit = pixel.filter(|_| surface.hit(&ray, [0.0, distance - SHADOW_GAP_MM]).is_none());
-    (facing, lit)
+    Lit { facing, from_px: lit }
 }

@@ -1,4 +1,4 @@
-//! From light on the sensor to numbers: noise, saturation, response and rounding.
+//! From light on the sensor to intensities: noise, response, saturation and rounding.
 
 use ndarray::{Array2, Axis};
 use rand_distr::{Distribution, StandardNormal};

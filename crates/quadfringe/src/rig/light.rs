@@ -1,4 +1,4 @@
-//! What a projector shows in one channel.
+//! The pattern that a projector shows in one channel.
 
 use std::f64::consts::TAU;
 
@@ -31,7 +31,7 @@ pub enum Light<'a> {
         /// Whether they count over columns or rows.
         axis: Axis,
     },
-    /// An image of the projector's size (rows, columns), read between mirrors by straight interpolation.
+    /// An image of the projector's size (rows, columns), interpolated bilinearly between mirrors.
     Image(ArrayView2<'a, f32>),
 }
 

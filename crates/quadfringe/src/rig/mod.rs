@@ -1,8 +1,8 @@
-//! The virtual bench: two coaxial projectors, a camera, and any surface before them (S8, S9).
+//! The virtual bench: a camera, two projectors, and any surface in front of them (S8, S9).
 //!
-//! [`Bench::cast`] sends one ray through each camera pixel and two more to look for shadow, and keeps where each pixel is
-//! lit from: this is done once for a scene. [`Bench::render`] then takes any four patterns to a shot, with what a real
-//! bench adds. [`Bench::predeform`] gives the infrared pattern that makes up for a deviated infrared projector (S11).
+//! [`Bench::cast`] traces one ray through each camera pixel and two shadow rays, and stores the projector position that
+//! lights each pixel; a scene needs this once. [`Bench::render`] then renders a shot for any four patterns, with the effects
+//! of a real bench. [`Bench::predeform`] gives the infrared pattern that corrects a deviated infrared projector (S11).
 
 mod blur;
 mod cast;
@@ -10,6 +10,7 @@ mod expose;
 mod light;
 mod mosaic;
 mod options;
+mod params;
 mod predeform;
 mod print;
 mod render;
@@ -48,10 +49,10 @@ pub struct Bench {
     pub visible: Device,
     /// The infrared light projector, P2: coaxial with P1 when both are equal.
     pub infrared: Device,
-    /// How the mirrors of both projectors lie, which decides where pattern images are sampled.
+    /// Layout of the mirrors of both projectors, which determines where pattern images are sampled.
     pub layout: DmdLayout,
-    /// Where the point seen at the visible pixel (x, y) falls on the infrared chip: rows of an affine map of (x, y, 1) that
-    /// has an inverse. `None`: both chips see the same.
+    /// Position on the infrared chip of the point seen at the visible pixel (x, y): rows of an invertible affine map of
+    /// (x, y, 1). `None` if both chips see the same.
     pub infrared_from_visible: Option<[[f64; 3]; 2]>,
 }
 
@@ -60,10 +61,10 @@ const FOCAL_MM: f64 = 12.0;
 const CAMERA_PITCH_UM: f64 = 4.65;
 const CAMERA_SIZE: [usize; 2] = [1024, 768];
 const PROJECTOR_SIZE: [usize; 2] = [912, 1140];
-/// Where the projectors of the reference bench stand and what they look at, mm.
+/// Position of the projectors of the reference bench and the point on their axis, mm.
 const PROJECTOR_CENTRE_MM: [f64; 3] = [200.0, -15.0, 200.0];
 const PROJECTOR_TARGET_MM: [f64; 3] = [0.0, 0.0, 800.0];
-/// Turn of the projectors about their axis, rad.
+/// Rotation of the projectors about their axis, rad.
 const PROJECTOR_ROLL_RAD: f64 = std::f64::consts::PI / 180.0;
 
 impl Bench {
@@ -86,10 +87,9 @@ impl Bench {
     pub fn reference_with(layout: DmdLayout) -> Self {
         let reason = "the published geometry is valid";
         let camera = centred(CAMERA_SIZE, [CAMERA_PITCH_UM; 2]).expect(reason);
-        let (rotation, translation_mm) =
-            pose_towards(PROJECTOR_CENTRE_MM, PROJECTOR_TARGET_MM, PROJECTOR_ROLL_RAD);
+        let pose = DevicePose::towards(PROJECTOR_CENTRE_MM, PROJECTOR_TARGET_MM, PROJECTOR_ROLL_RAD);
         let projector = centred(PROJECTOR_SIZE, layout.pitch_um())
-            .and_then(|device| device.with_pose(rotation, translation_mm))
+            .and_then(|device| device.with_pose(pose.rotation, pose.translation_mm))
             .expect(reason);
         Self { camera, visible: projector.clone(), infrared: projector, layout, infrared_from_visible: None }
     }
@@ -116,8 +116,8 @@ impl Bench {
         Ok(Self { infrared, ..self })
     }
 
-    /// The same bench with an infrared chip that sees the point of the visible pixel (x, y) where the rows of this affine
-    /// map of (x, y, 1) say.
+    /// The same bench with an infrared chip that sees the point of the visible pixel (x, y) at the position that the rows of
+    /// this affine map of (x, y, 1) give.
     ///
     /// # Errors
     /// [`crate::Error::Value`] when the map has no inverse.
@@ -133,12 +133,12 @@ impl Bench {
         Ok(Self { infrared_from_visible: Some(infrared_from_visible), ..self })
     }
 
-    /// Where a pixel of the infrared chip looks, in pixels of the visible one.
+    /// Affine map from a pixel of the infrared chip to the visible pixel that sees the same point.
     fn visible_from_infrared(&self) -> Option<[[f64; 3]; 2]> {
         self.infrared_from_visible.and_then(|affine| inverse(affine).ok())
     }
 
-    /// The device that is one of the two projectors.
+    /// The device of a projector.
     #[must_use]
     pub const fn projector(&self, projector: Projector) -> &Device {
         match projector {
@@ -166,23 +166,30 @@ fn centred([width, height]: [usize; 2], pitch_um: [f64; 2]) -> Result<Device> {
     Device::pinhole(width, height, focal_px, centre_px)
 }
 
-/// Pose of a device at `centre` whose axis goes through `target`, rows level but for a turn about the axis.
-fn pose_towards(centre: [f64; 3], target: [f64; 3], roll_rad: f64) -> ([[f64; 3]; 3], [f64; 3]) {
-    let unit = |v: [f64; 3]| {
-        let length = dot(v, v).sqrt();
-        v.map(|c| c / length)
-    };
-    let cross = |a: [f64; 3], b: [f64; 3]| {
-        [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-    };
-    let forward = unit(std::array::from_fn(|i| target[i] - centre[i]));
-    let level = unit(cross([0.0, 1.0, 0.0], forward));
-    let down = cross(forward, level);
-    let (s, c) = roll_rad.sin_cos();
-    let right: [f64; 3] = std::array::from_fn(|i| c * level[i] + s * down[i]);
-    let rotation = [right, cross(forward, right), forward];
-    let translation_mm = rotation.map(|row| -dot(row, centre));
-    (rotation, translation_mm)
+/// Pose `T_device_camera` of a device.
+struct DevicePose {
+    rotation: [[f64; 3]; 3],
+    translation_mm: [f64; 3],
+}
+
+impl DevicePose {
+    /// A device at `centre` whose axis goes through `target`, with level rows and then rotated about the axis.
+    fn towards(centre: [f64; 3], target: [f64; 3], roll_rad: f64) -> Self {
+        let unit = |v: [f64; 3]| {
+            let length = dot(v, v).sqrt();
+            v.map(|c| c / length)
+        };
+        let cross = |a: [f64; 3], b: [f64; 3]| {
+            [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+        };
+        let forward = unit(std::array::from_fn(|i| target[i] - centre[i]));
+        let level = unit(cross([0.0, 1.0, 0.0], forward));
+        let down = cross(forward, level);
+        let (s, c) = roll_rad.sin_cos();
+        let right: [f64; 3] = std::array::from_fn(|i| c * level[i] + s * down[i]);
+        let rotation = [right, cross(forward, right), forward];
+        Self { rotation, translation_mm: rotation.map(|row| -dot(row, centre)) }
+    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,11 @@
-//! The Bayer chip: one colour at each pixel, and the others as a plain camera interpolates them.
+//! The Bayer chip: one colour at each pixel, and bilinear interpolation of the others as in common cameras.
 
 use ndarray::{Array2, Zip};
 
 use crate::encoding::Channel;
 use crate::optics::BayerPattern;
 
-/// What the chip delivers: at each pixel the one of R, G and B that it sees.
+/// The mosaic: at each pixel the one of R, G and B that its filter passes.
 pub(super) fn sample(colours: &[Array2<f32>], pattern: BayerPattern) -> Array2<f32> {
     let mut raw = Array2::zeros(colours[0].dim());
     Zip::indexed(&mut raw).par_for_each(|(row, column), raw| {
@@ -25,7 +25,7 @@ pub(super) fn bilinear(raw: &Array2<f32>, pattern: BayerPattern) -> [Array2<f32>
     })
 }
 
-/// The pixel itself, or the mean of the neighbours of that colour, those across a corner at half weight.
+/// The pixel, or the mean of its neighbours of that colour, of which diagonal ones have half the weight.
 fn interpolated(raw: &Array2<f32>, pattern: BayerPattern, colour: Channel, row: usize, column: usize) -> f32 {
     if pattern.channel(row, column) == colour {
         return raw[[row, column]];

@@ -1,4 +1,4 @@
-//! What a real bench adds to the ideal image.
+//! Effects of a real bench on the ideal image.
 
 use ndarray::Array3;
 
@@ -7,7 +7,7 @@ use crate::optics::BayerPattern;
 
 use super::Projector;
 
-/// Share of light that the surface gives back in each channel.
+/// Albedo of the surface in each channel.
 ///
 /// ```
 /// use quadfringe::rig::{Albedo, RenderOptions};
@@ -26,8 +26,8 @@ pub enum Albedo {
         /// Albedo of the lightest square: R, G, B, IR.
         albedo: [f32; 4],
     },
-    /// One albedo for each camera pixel and channel, `(rows, columns, 4)`; or `(rows, columns, 8)`, the last four as the
-    /// infrared chip sees them.
+    /// One albedo for each camera pixel and channel, `(rows, columns, 4)`; or `(rows, columns, 8)`, of which the last
+    /// four are for the pixels of the infrared chip.
     Image(Array3<f32>),
 }
 
@@ -82,7 +82,7 @@ impl Albedo {
     }
 }
 
-/// What the camera delivers.
+/// Type and rounding of the camera's intensities.
 ///
 /// ```
 /// assert_eq!(quadfringe::rig::BitDepth::Ten.full_scale(), 1023.0);
@@ -136,7 +136,7 @@ impl BitDepth {
     }
 }
 
-/// How a camera makes three planes of its mosaic.
+/// How a camera turns its mosaic into three colour planes.
 ///
 /// ```
 /// use quadfringe::BayerPattern;
@@ -160,7 +160,7 @@ pub enum Demosaic {
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct RenderOptions {
-    /// Share of light given back by the surface.
+    /// Albedo of the surface.
     pub albedo: Albedo,
     /// Room light in each channel, as a share of the brightest projected light.
     pub ambient: [f64; 4],
@@ -180,9 +180,9 @@ pub struct RenderOptions {
     pub camera_offset: [f64; 4],
     /// Response of the camera: captured = offset + linear ^ (1 / exponent).
     pub camera_exponent: [f64; 4],
-    /// The visible chip sees one colour per pixel and delivers a raw mosaic. `None`: all colours at every pixel.
+    /// Pattern of a visible chip with one colour per pixel. `None`: all colours at every pixel.
     pub bayer: Option<BayerPattern>,
-    /// The camera makes three planes of the mosaic. `None`: it delivers the mosaic.
+    /// How the camera interpolates three planes from the mosaic. `None`: it delivers the mosaic.
     pub demosaic: Option<Demosaic>,
     /// Rounding of the camera.
     pub bit_depth: BitDepth,
@@ -216,7 +216,7 @@ impl Default for RenderOptions {
 }
 
 impl RenderOptions {
-    /// Refuses what no bench can have, for images of `shape` (rows, columns).
+    /// Check the range of every option for images of `shape` (rows, columns).
     pub(super) fn check(&self, shape: (usize, usize)) -> Result<()> {
         let non_negative = |v: f64| v.is_finite() && v >= 0.0;
         let groups: [(&str, Vec<f64>, bool); 7] = [

@@ -1,4 +1,4 @@
-//! The infrared pattern that makes a deviated projector show what an undeviated one would (S11).
+//! The pre-deformed infrared pattern that corrects a deviated projector (S11).
 
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
@@ -9,9 +9,9 @@ use crate::error::Result;
 use crate::optics::check_plane;
 
 impl Bench {
-    /// Image for the infrared projector, `(rows, columns)`, linear light 0 to 1, that puts on the plane z = `plane_z_mm`
-    /// what the visible projector would put there with `light`: what a virtual camera in the place of the infrared
-    /// projector sees of the lit plane. Mirrors whose ray misses the plane stay dark.
+    /// Image for the infrared projector, `(rows, columns)`, linear light 0 to 1, that lights the plane z = `plane_z_mm` as the
+    /// visible projector would with `light`: the image that a virtual camera at the infrared projector takes of the lit
+    /// plane. Mirrors whose ray misses the plane stay dark.
     ///
     /// The result is exact on that plane. Where the centres of the projectors differ it drifts with depth.
     ///

@@ -1,14 +1,12 @@
-//! What is printed on a flat board, as the camera sees it.
+//! A print on a flat board, as the camera sees it.
 
 use ndarray::{Array2, Array3, Axis};
 use rayon::prelude::*;
 
 use super::Bench;
+use super::params::PRINT_SAMPLES_MAX;
 use crate::error::{Error, Result};
 use crate::optics::{Device, Pose};
-
-/// Most samples of a print along one side of a camera pixel.
-const SAMPLES_MAX: f64 = 8.0;
 
 /// A print on the plane z = 0 of a posed board: ink on paper.
 ///
@@ -62,7 +60,7 @@ impl Print {
         Err(Error::value("print", expected, actual))
     }
 
-    /// Texel coordinates (column, row) of what a camera pixel looks at on the plane of the board; NaN where it never meets it.
+    /// Texel coordinates (column, row) at which the ray of a camera pixel meets the plane of the board; NaN if it does not.
     fn texel(&self, camera: &Device, pixel: [f64; 2]) -> [f64; 2] {
         let ray = camera.ray(pixel);
         let origin = self.pose.body_from_camera(ray.origin_mm);
@@ -82,7 +80,7 @@ impl Print {
         if largest.is_nan() {
             return 0.0;
         }
-        let samples = (largest + 1.0).min(SAMPLES_MAX) as usize;
+        let samples = (largest + 1.0).min(PRINT_SAMPLES_MAX) as usize;
         let place = |i: usize| (i as f64 + 0.5) / samples as f64;
         let mut sum = 0.0;
         for v in (0..samples).map(place) {
@@ -114,12 +112,12 @@ impl Print {
 }
 
 impl Bench {
-    /// Albedo that the camera sees of a print, `(rows, columns, 4)` for [`super::Albedo::Image`], or `(rows, columns, 8)`
-    /// with an infrared chip that sees something else: the mean over each pixel, so that edges lie where they are to a
-    /// fraction of a pixel.
+    /// Albedo of a print at each camera pixel, `(rows, columns, 4)` for [`super::Albedo::Image`], or `(rows, columns, 8)` if
+    /// the infrared chip is not registered with the visible one. The mean over each pixel places edges to a fraction of a
+    /// pixel.
     ///
     /// # Errors
-    /// [`Error::Value`] when the print is not one.
+    /// [`Error::Value`] when a number of the print is out of range.
     pub fn printed(&self, print: &Print) -> Result<Array3<f32>> {
         print.check()?;
         let straight = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];

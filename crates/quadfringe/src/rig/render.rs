@@ -1,4 +1,4 @@
-//! A cast scene under four patterns, as the camera delivers it.
+//! Rendering: the images of a cast scene under four patterns.
 
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
@@ -130,7 +130,7 @@ impl Bench {
     }
 
     /// The shot of a scene that moves while the visible projector shows R, then G, then B: one cast for each of the three
-    /// instants. The infrared projector shows its pattern throughout, so that the infrared image is their mean.
+    /// instants. The infrared projector shows its pattern throughout, so the infrared image is the mean of the three.
     ///
     /// # Errors
     /// As [`Bench::render`].
@@ -200,9 +200,9 @@ impl Bench {
                     red[column] = painter.captured(Channel::R, light);
                     green[column] = painter.captured(Channel::G, light);
                     blue[column] = painter.captured(Channel::B, light);
-                    let own = infrared_hits.map(|all| all.map(|hits| &hits[pixel]));
+                    let hits = infrared_hits.map(|all| all.map(|hits| &hits[pixel]));
                     let light =
-                        own.map_or(light, |own| painter.light(Projector::Infrared, pixel, own, moving));
+                        hits.map_or(light, |hits| painter.light(Projector::Infrared, pixel, hits, moving));
                     infrared[column] = painter.captured(Channel::Ir, light);
                 }
             });
@@ -210,7 +210,7 @@ impl Bench {
     }
 }
 
-/// What one pixel receives.
+/// Computes the light that one pixel receives.
 struct Painter<'a, 'image> {
     bench: &'a Bench,
     lights: &'a [Light<'image>; 4],
@@ -218,7 +218,7 @@ struct Painter<'a, 'image> {
 }
 
 impl Painter<'_, '_> {
-    /// Light of the four projected channels on a pixel of a chip; R, G and B each have their own instant.
+    /// Light of the four projected channels at a pixel of a chip, with one hit for the instant of each of R, G and B.
     fn light(&self, chip: Projector, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f64; 4] {
         let mut light = [0.0; 4];
         for (channel, hit) in Channel::ALL.into_iter().zip(hits) {
@@ -229,7 +229,7 @@ impl Painter<'_, '_> {
         light
     }
 
-    /// What a channel captures of the light of all.
+    /// Light that a captured channel receives from all projected channels.
     fn captured(&self, channel: Channel, light: [f64; 4]) -> f32 {
         let row = &self.options.crosstalk[channel.index()];
         let mixed = row.iter().zip(light).map(|(share, light)| share * light).sum::<f64>();

@@ -1,4 +1,4 @@
-//! The truth of a cast scene, as maps.
+//! Ground truth of a cast scene, as maps.
 
 use ndarray::{Array2, Array3};
 
@@ -12,24 +12,24 @@ impl Cast {
         self.hits.dim()
     }
 
-    /// What each pixel sees, in double precision.
+    /// The hit of each pixel, in double precision.
     #[must_use]
     pub const fn hits(&self) -> &Array2<Hit> {
         &self.hits
     }
 
-    /// What each pixel of the infrared chip sees.
+    /// The hit of each pixel of the infrared chip.
     pub(super) fn infrared_hits(&self) -> &Array2<Hit> {
         self.infrared_hits.as_ref().unwrap_or(&self.hits)
     }
 
-    /// Depth z in mm, NaN where nothing is seen.
+    /// Depth z in mm, NaN where the pixel sees no surface.
     #[must_use]
     pub fn depth_mm(&self) -> Array2<f32> {
         self.hits.map(|hit| hit.xyz_mm[2] as f32)
     }
 
-    /// Points in the camera frame, `(rows, columns, 3)` in mm, NaN where nothing is seen.
+    /// Points in the camera frame, `(rows, columns, 3)` in mm, NaN where the pixel sees no surface.
     #[must_use]
     pub fn xyz_mm(&self) -> Array3<f32> {
         let (rows, columns) = self.shape();
@@ -38,13 +38,13 @@ impl Cast {
         })
     }
 
-    /// Projector column that lights each pixel, NaN where the projector lights nothing that is seen.
+    /// Projector column that lights each pixel, NaN where the projector does not light it.
     #[must_use]
     pub fn column_px(&self, projector: Projector) -> Array2<f32> {
         self.hits.map(|hit| hit.lit_from_px[projector.index()][0] as f32)
     }
 
-    /// Projector row that lights each pixel, NaN where the projector lights nothing that is seen.
+    /// Projector row that lights each pixel, NaN where the projector does not light it.
     #[must_use]
     pub fn row_px(&self, projector: Projector) -> Array2<f32> {
         self.hits.map(|hit| hit.lit_from_px[projector.index()][1] as f32)
@@ -63,7 +63,7 @@ impl Cast {
         self.hits.map(|hit| (hit.lit_from_px[0][0] / period).floor() as f32)
     }
 
-    /// Where a surface is seen that at least one projector does not light.
+    /// Whether the pixel sees a surface that at least one projector does not light.
     #[must_use]
     pub fn shadow(&self) -> Array2<bool> {
         self.hits
@@ -116,14 +116,23 @@ impl Cast {
     }
 }
 
+/// A parabola of the lower envelope.
+#[derive(Clone, Copy)]
+struct Parabola {
+    /// Position of its apex.
+    at: usize,
+    /// Where its part of the envelope begins.
+    from: f32,
+}
+
 /// Squared distance transform along a line: the lower envelope of the parabolas `values[q] + (p - q)^2`
 /// (Felzenszwalb and Huttenlocher, 2012).
 fn squared_distance(values: &[f32]) -> Vec<f32> {
-    let mut hull: Vec<(usize, f32)> = Vec::new();
+    let mut hull: Vec<Parabola> = Vec::new();
     for (q, value) in values.iter().enumerate().filter(|(_, value)| value.is_finite()) {
         let height = |at: usize, value: f32| value + (at * at) as f32;
         let mut from = f32::NEG_INFINITY;
-        while let Some((last, start)) = hull.last().copied() {
+        while let Some(Parabola { at: last, from: start }) = hull.last().copied() {
             from = (height(q, *value) - height(last, values[last])) / (2 * (q - last)) as f32;
             if from > start {
                 break;
@@ -131,17 +140,17 @@ fn squared_distance(values: &[f32]) -> Vec<f32> {
             hull.pop();
             from = f32::NEG_INFINITY;
         }
-        hull.push((q, from));
+        hull.push(Parabola { at: q, from });
     }
     let mut segment = 0;
     (0..values.len())
         .map(|p| {
-            while segment + 1 < hull.len() && hull[segment + 1].1 < p as f32 {
+            while segment + 1 < hull.len() && hull[segment + 1].from < p as f32 {
                 segment += 1;
             }
-            hull.get(segment).map_or(f32::INFINITY, |(q, _)| {
-                let step = p.abs_diff(*q) as f32;
-                values[*q] + step * step
+            hull.get(segment).map_or(f32::INFINITY, |parabola| {
+                let step = p.abs_diff(parabola.at) as f32;
+                values[parabola.at] + step * step
             })
         })
         .collect()

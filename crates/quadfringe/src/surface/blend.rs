@@ -1,4 +1,4 @@
-//! Smooth bodies and how they blend. Every function here changes by at most 1 per mm, and so does every blend of them.
+//! Smooth bodies and their blends. The value of every function here, and of every blend, changes by at most 1 per mm.
 
 use crate::optics::dot;
 

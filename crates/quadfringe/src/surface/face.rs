@@ -32,7 +32,7 @@ impl Default for Face {
     }
 }
 
-/// How a part meets the parts before it, rounded over a length in mm.
+/// How a part is joined to the previous parts, rounded over a length in mm.
 #[derive(Clone, Copy)]
 enum Blend {
     Add(f64),
@@ -49,7 +49,7 @@ const fn take(centre: [f64; 3], radii: [f64; 3], rounding: f64) -> (Ellipsoid, B
 
 const HEAD: Ellipsoid = Ellipsoid::new([0.0; 3], [72.0, 98.0, 62.0]);
 
-/// Parts from the middle of the back of the head, mm: both sides of a part that lies beside the middle are meant.
+/// Parts relative to the centre of the back of the head, mm. Parts off the centre line are mirrored.
 const PARTS: [(Ellipsoid, Blend); 10] = [
     // Cheeks, brow, chin.
     add([34.0, 20.0, -40.0], [24.0, 26.0, 18.0], 12.0),
@@ -67,7 +67,7 @@ const PARTS: [(Ellipsoid, Blend); 10] = [
     take([0.0, 48.5, -62.0], [24.0, 2.5, 5.0], 4.0),
 ];
 
-/// Rounding of the crease that mirroring leaves in the middle of the face, mm.
+/// Rounding of the crease that mirroring leaves on the centre line, mm.
 const CREASE_MM: f64 = 4.0;
 
 impl Surface for Face {

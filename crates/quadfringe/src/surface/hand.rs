@@ -1,4 +1,4 @@
-//! A hand that moves, composed of capsules.
+//! A moving hand, composed of capsules.
 
 use std::f64::consts::TAU;
 
@@ -6,8 +6,8 @@ use super::Surface;
 use super::blend::{Capsule, join};
 use crate::error::{Error, Limit, Result};
 
-/// A hand in front of the reference plane, as it stands at one instant: it waves about the wrist once in 2 s, the
-/// fingers close and open once in 3 s, and it comes nearer and goes back once in 4 s.
+/// A hand in front of the reference plane at one instant. It waves about the wrist with a period of 2 s, its fingers close
+/// and open with a period of 3 s, and it approaches and recedes with a period of 4 s.
 ///
 /// ```
 /// use quadfringe::surface::{Hand, Surface};
@@ -24,12 +24,27 @@ pub struct Hand {
 const WRIST_MM: [f64; 3] = [0.0, 82.0, 752.0];
 /// Rounding where capsules meet, mm.
 const ROUNDING_MM: f64 = 7.0;
-/// Knuckle (x, y from the wrist), length of the first joint, spread angle in rad, radius; index finger to little finger.
-const FINGERS: [([f64; 2], f64, f64, f64); 4] = [
-    ([-31.0, -78.0], 36.0, -0.16, 9.5),
-    ([-10.0, -84.0], 40.0, -0.04, 10.0),
-    ([11.0, -80.0], 37.0, 0.07, 9.5),
-    ([30.0, -70.0], 29.0, 0.20, 8.0),
+/// A finger of the resting hand.
+struct Finger {
+    /// Knuckle (x, y) from the wrist, mm.
+    knuckle_mm: [f64; 2],
+    /// Length of the first joint, mm.
+    length_mm: f64,
+    /// Sideways angle, rad.
+    spread_rad: f64,
+    radius_mm: f64,
+}
+
+const fn finger(knuckle_mm: [f64; 2], length_mm: f64, spread_rad: f64, radius_mm: f64) -> Finger {
+    Finger { knuckle_mm, length_mm, spread_rad, radius_mm }
+}
+
+/// Index finger to little finger.
+const FINGERS: [Finger; 4] = [
+    finger([-31.0, -78.0], 36.0, -0.16, 9.5),
+    finger([-10.0, -84.0], 40.0, -0.04, 10.0),
+    finger([11.0, -80.0], 37.0, 0.07, 9.5),
+    finger([30.0, -70.0], 29.0, 0.20, 8.0),
 ];
 /// Length of each joint of a finger over that of the first.
 const JOINTS: [f64; 3] = [1.0, 0.68, 0.5];
@@ -50,7 +65,8 @@ impl Hand {
         let mut add = |start: [f64; 3], end: [f64; 3], radius: f64| {
             capsules.push(Capsule::new(placed(start, wave, nearer), placed(end, wave, nearer), radius));
         };
-        for ([x, y], length, spread, radius) in FINGERS {
+        for Finger { knuckle_mm: [x, y], length_mm: length, spread_rad: spread, radius_mm: radius } in FINGERS
+        {
             add([0.45 * x, -6.0, 0.0], [x, y, 0.0], radius + 3.5);
             let mut joint = [x, y, 0.0];
             for (index, share) in JOINTS.into_iter().enumerate() {
@@ -68,7 +84,7 @@ impl Hand {
     }
 
     fn from_capsules(capsules: Vec<Capsule>) -> Self {
-        // Blending swells the body by a fraction of the rounding.
+        // Blending enlarges the body by a fraction of the rounding.
         let extreme = |axis: usize, end: usize, pick: fn(f64, f64) -> f64| {
             let ends = capsules.iter().map(|capsule| capsule.extent(axis)[end]);
             ends.reduce(pick).unwrap_or(0.0)

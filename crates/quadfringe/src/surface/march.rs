@@ -1,13 +1,8 @@
 //! First crossing of a ray and an implicit surface.
 
 use super::Surface;
+use super::params::{CLOSED_MM, REFINEMENTS_MAX, STEP_MIN_MM};
 use crate::optics::Ray;
-
-/// Shortest step of the march, mm: what is thinner along the ray may be missed, what is not is found.
-const STEP_MIN_MM: f64 = 0.05;
-/// Width at which the bracket counts as closed, mm.
-const CLOSED_MM: f64 = 1e-10;
-const REFINEMENTS_MAX: usize = 100;
 
 /// Distance at which the value stops being positive, within the range and the bounds of the surface.
 pub(super) fn first_crossing<S: Surface + ?Sized>(surface: &S, ray: &Ray, range_mm: [f64; 2]) -> Option<f64> {

@@ -1,13 +1,14 @@
-//! What is measured: implicit surfaces in the camera frame, composed, not meshed.
+//! The measured object: implicit surfaces in the camera frame, composed without a mesh.
 //!
-//! A [`Surface`] is a function that is positive in free space and negative inside the body (S9). Boxes, spheres and planes
-//! are met in closed form; all others by marching along the ray in steps that cannot pass the surface, then closing a
-//! bracket around the crossing to far below 1e-6 mm. [`scene`] gives the ready scenes by name, near z = 800 mm.
+//! A [`Surface`] is a function that is positive in free space and negative inside the body (S9). Rays meet
+//! boxes, spheres and planes in closed form. For all others they march in steps that cannot pass the surface, and then
+//! close a bracket around the crossing to far below 1e-6 mm. [`scene`] gives the ready scenes by name, near z = 800 mm.
 
 mod blend;
 mod face;
 mod hand;
 mod march;
+mod params;
 mod peaks;
 mod posed;
 mod relief;
@@ -22,15 +23,13 @@ pub use solids::{Cuboid, Plane, Sphere};
 
 use crate::error::{Error, Result};
 use crate::optics::Ray;
+use params::NORMAL_STEP_MM;
 
 /// Distance of the reference plane of the ready scenes from the camera, mm.
 pub const REFERENCE_Z_MM: f64 = 800.0;
 
-/// Names that [`scene`] knows.
+/// Names of the scenes of [`scene`].
 pub const SCENES: [&str; 6] = ["plane", "peaks", "steps", "sphere", "face", "hand"];
-
-/// Step of the finite differences behind the default normal, mm.
-const NORMAL_STEP_MM: f64 = 1e-3;
 
 /// A body bounded by an implicit surface.
 ///
@@ -82,7 +81,7 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// Several bodies as one: a ray meets the nearest.
+/// Several bodies as one; a ray meets the nearest.
 ///
 /// ```
 /// use quadfringe::surface::{Plane, Sphere, Surface, Union};
@@ -128,7 +127,7 @@ impl Surface for Union {
 ///
 /// `plane`: z = 800. `peaks`: the peaks function, 40 mm from peak to valley. `steps`: twelve blocks of 5 to 50 mm with
 /// vertical walls on the plane. `sphere`: radius 34 mm, in front of the plane. `face`: a mask 140 x 190 mm on the plane.
-/// `hand`: a hand that waves and closes as `time_s` goes on, in front of the plane; the other scenes stand still.
+/// `hand`: a hand in front of the plane that waves and closes with `time_s`; the other scenes are static.
 ///
 /// # Errors
 /// [`Error::Value`] when there is no scene of that name or the time is not finite.

@@ -1,10 +1,10 @@
-//! Any body in any pose.
+//! A body in a pose.
 
 use super::{Cuboid, Surface};
 use crate::error::Result;
 use crate::optics::{Pose, Ray};
 
-/// A body that was turned and moved.
+/// A rotated and translated body.
 ///
 /// ```
 /// use quadfringe::optics::{Pose, Ray, rotation_from_vector};

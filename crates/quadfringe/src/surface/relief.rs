@@ -10,7 +10,7 @@ pub(super) fn relief_rate(slope: f64, [x, y, z]: [f64; 3]) -> f64 {
     z.abs() + slope * x.hypot(y)
 }
 
-/// How a height map is read between its samples.
+/// Interpolation of a height map between its samples.
 ///
 /// ```
 /// use quadfringe::surface::Interpolation;
@@ -18,9 +18,9 @@ pub(super) fn relief_rate(slope: f64, [x, y, z]: [f64; 3]) -> f64 {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 pub enum Interpolation {
-    /// Straight between samples: creases at the grid lines.
+    /// Bilinear, with creases at the grid lines.
     Bilinear,
-    /// Smooth between samples (Catmull-Rom): continuous slope.
+    /// Bicubic (Catmull-Rom), with a continuous slope.
     #[default]
     Bicubic,
 }

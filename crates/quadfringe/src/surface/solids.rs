@@ -1,4 +1,4 @@
-//! Bodies that a ray meets in closed form: half-space, sphere, cuboid; and the steps made of them.
+//! Bodies with closed-form intersections: half-space, sphere, cuboid; and the steps composed of them.
 
 use super::{REFERENCE_Z_MM, Surface, Union, march, unit};
 use crate::error::{Error, Result};
@@ -120,7 +120,7 @@ impl Surface for Sphere {
     }
 }
 
-/// Solid block with faces along the axes: its walls are truly vertical.
+/// Solid block with faces along the axes; its walls are exactly vertical.
 ///
 /// ```
 /// use quadfringe::surface::{Cuboid, Surface};

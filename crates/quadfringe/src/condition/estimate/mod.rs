@@ -1,9 +1,9 @@
-//! The response of a projector and camera from an N-step capture, with no truth but the capture itself.
+//! The response of projector and camera from an N-step capture, without any ground truth.
 //!
-//! N steps over one period give the phase almost free of the response; two steps a quarter period apart do not. The
-//! response sought is the one whose inverse makes the two agree. That is the error a single-shot measurement suffers,
-//! so noise is weighed against curvature as the measurement will weigh it: on noisy captures the exponent comes out
-//! somewhat above 1 / gamma, on purpose. On gamma in fringe projection: Guo, He and Chen, "Gamma correction for digital
+//! N steps over one period give a phase that hardly depends on the response; two steps a quarter period apart do not. The
+//! estimate is the response whose inverse makes both phases agree. Their difference is the error of a single-shot
+//! measurement, so noise and nonlinearity have the same weights as in the measurement; on noisy captures the exponent is
+//! therefore slightly above 1 / gamma. On gamma in fringe projection: Guo, He and Chen, "Gamma correction for digital
 //! fringe projection profilometry", Applied Optics 43, 2906 (2004).
 
 mod order;
@@ -12,6 +12,7 @@ mod select;
 mod shot;
 mod simplex;
 
+use super::params::{EXPONENTS, KNEE_GAIN, KNEE_GAIN_RAD2, KNEE_MAX, OFFSET_MAX, STEPS_MIN};
 use super::{Response, Sample};
 use crate::{Error, Result};
 use ndarray::ArrayView3;
@@ -21,35 +22,26 @@ use select::select;
 pub use shot::estimate_response_of_shot;
 use simplex::minimise;
 
-/// Fewest steps that show a second harmonic.
-const STEPS_MIN: usize = 5;
-/// Greatest offset that is sought; black above a fifth of full scale leaves no room for fringes.
-const OFFSET_MAX: f64 = 0.2;
-/// Exponents that are sought: gamma 0.4 to 10.
-const EXPONENT: std::ops::Range<f64> = 0.1..2.5;
-const KNEE_MAX: f64 = 0.98;
-/// A knee has to lower the cost by this share, and by the square of 2 mrad, to be believed.
-const KNEE_GAIN: f64 = 0.02;
-const KNEE_GAIN_RAD2: f64 = 4e-6;
-/// A response and what it is worth.
+/// An estimated response and its quality.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[non_exhaustive]
 pub struct ResponseEstimate {
     /// Inverse response, ready for a conditioner.
     pub response: Response,
     /// RMS error of a two-step phase with the intensities as captured, rad.
     pub two_step_rms_before_rad: f64,
-    /// The same after the response is inverted, rad; what remains is noise and drift.
+    /// The same after inversion of the response, rad: noise and drift remain.
     pub two_step_rms_after_rad: f64,
-    /// Pixels that took part.
+    /// Number of pixels (or tiles) that the estimate uses.
     pub pixels: usize,
 }
 
 /// Inverse response from stacks of equally spaced phase steps over one period, each `(steps, rows, columns)`, in
-/// fractions of full scale (255 of 8 bit is 1.0), dark level subtracted if it is known.
+/// fractions of full scale (255 of 8 bit is 1.0), less the dark level if it is known.
 ///
-/// Five steps or more; a multiple of four (8, 12, 16) separates the harmonics best. Several stacks, of other fringe
-/// numbers or other objects but of one size and one exposure, are pooled. Every object will do, best one with dark and
-/// bright areas that fills the image, unsaturated. The knee stays 0 unless the captures show one. The result does not
+/// Take at least five steps; a multiple of four (8, 12, 16) separates the harmonics best. Several stacks of the same size
+/// and exposure are pooled; they may show other fringe numbers or objects. Any object works; one with dark and bright areas
+/// that fills the image without saturation works best. The knee is 0 unless the captures show one. The result does not
 /// depend on the number of threads.
 ///
 /// # Errors
@@ -88,21 +80,21 @@ pub fn estimate_response(stacks: &[ArrayView3<'_, f32>]) -> Result<ResponseEstim
     })
 }
 
-/// Offset, exponent and knee of least cost, the knee only if it pays.
+/// Offset, exponent and knee of least cost; the knee is 0 unless it lowers the cost enough.
 fn fit(samples: &Samples, offset_max: f64) -> Response {
     let cost = |[offset, exponent, knee]: [f64; 3]| {
         let inside = (0.0..=offset_max).contains(&offset)
-            && EXPONENT.contains(&exponent)
+            && EXPONENTS.contains(&exponent)
             && (0.0..=KNEE_MAX).contains(&knee);
         if inside { samples.cost(&response([offset, exponent, knee])) } else { f64::INFINITY }
     };
     let (start, step) = ((offset_max / 2.0).min(0.01), (offset_max / 2.0).min(0.03));
     let bent = minimise([start, 0.5, 0.5], [step, 0.15, 0.3], cost);
     let plain = minimise([start, 0.5], [step, 0.15], |[o, e]| cost([o, e, 0.0]));
-    if plain.1 * (1.0 - KNEE_GAIN) <= bent.1 + KNEE_GAIN_RAD2 {
-        response([plain.0[0], plain.0[1], 0.0])
+    if plain.cost * (1.0 - KNEE_GAIN) <= bent.cost + KNEE_GAIN_RAD2 {
+        response([plain.point[0], plain.point[1], 0.0])
     } else {
-        response(bent.0)
+        response(bent.point)
     }
 }
 
@@ -110,7 +102,7 @@ fn response([offset, exponent, knee]: [f64; 3]) -> Response {
     Response { offset: offset as f32, exponent: exponent as f32, knee: knee as f32 }
 }
 
-/// The offset may make hardly any pixel negative: at most the first percentile of the darkest steps.
+/// Greatest offset: the first percentile of the darkest steps, so that few pixels become negative.
 fn offset_bound(traces: &[samples::Trace<'_>]) -> f64 {
     let darkest = |t: &samples::Trace<'_>| t.steps.iter().copied().fold(1.0, f32::min);
     let mut floor: Vec<f32> = traces.iter().map(darkest).collect();

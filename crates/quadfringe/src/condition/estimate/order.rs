@@ -1,17 +1,13 @@
-//! Whether the images of a stack are what their places say.
+//! Checks that the images of a stack are in the order of their phase steps.
 
+use crate::condition::params::{RMS_MAX_RAD, STEP_EXCESS, STEP_EXCESS_RAD};
 use crate::{Error, Result};
 
-/// Two-step error that may remain after correction, rad; captures in order leave about 0.03.
-const RMS_MAX_RAD: f64 = 0.3;
-/// One step may err this many times the median step, and this much beyond it, before it is out of place.
-const STEP_EXCESS: f64 = 2.0;
-const STEP_EXCESS_RAD: f64 = 0.12;
-/// What every stack has to be.
+/// Requirement on every stack, for messages.
 const ORDERED: &str =
     "images in the order of their phase steps, I_s = a + b cos(Phi + 2 pi s / N), s = 0..N-1";
 
-/// Whatever the response, a stack in order leaves a small error and no step stands out.
+/// Check that the error is small and that no step stands out, as for any ordered stack after correction of the response.
 ///
 /// # Errors
 /// [`Error::Value`] that names the step to look at.
@@ -26,23 +22,23 @@ pub(super) fn check_order(rms_rad: &[f64]) -> Result<()> {
         return Ok(());
     }
     let found = format!(
-        "images that no response explains: two steps give a phase {total:.2} rad (RMS) off that of all steps, \
-         {worst:.2} rad with step {step} and {median:.2} rad with the median step; look for images that are swapped, \
+        "images that no response explains: the two-step phase differs by {total:.2} rad (RMS) from that of all steps, by \
+         {worst:.2} rad with step {step} and by {median:.2} rad with the median step; look for images that are swapped, \
          missing or doubled near step {step}, a scene or exposure that changed, or noise as strong as the fringes"
     );
     Err(Error::value("stack", ORDERED, found))
 }
 
-/// The refusal of a stack most of whose pixels vary in another way than fringes do.
+/// Error for a stack with too many pixels that do not vary like fringes.
 pub(super) fn disordered(disordered: usize, usable: usize) -> Error {
     let found = format!(
-        "{disordered} pixels that vary otherwise and {usable} that vary so; sort the images by their phase step, give \
+        "{disordered} pixels that do not vary in this order and {usable} that do; sort the images by their phase step, give \
          one whole period of one fringe frequency, and keep the scene still"
     );
     Error::value("stack", ORDERED, found)
 }
 
-/// The step most likely to be out of place and its RMS error: it errs both as first step and as partner.
+/// The step most likely to be out of place, which has a large error as first step and as partner, and its RMS error.
 fn suspect(rms_rad: &[f64]) -> (usize, f64) {
     let n = rms_rad.len();
     let both = |s: usize| rms_rad[s].hypot(rms_rad[(s + n - n / 4) % n]);

@@ -1,17 +1,14 @@
-//! Pixels of the stacks, packed for fast scoring, and the error that a two-step measurement of them would have.
+//! Pixels of the stacks, packed for fast evaluation, and the two-step phase error that they would have.
 
 use super::Response;
+use crate::condition::params::{HUBER_RAD, LEVEL_MAX};
 use crate::parallel::angle::atan2;
 use ndarray::{Array2, ArrayView1, Zip};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Levels of the look-up table: sixteen to each grey value of an 8 bit camera, whose values it meets exactly.
-const LEVEL_MAX: f32 = 255.0 * 16.0;
-/// Pixels that are scored together; sums go over blocks in order, so the result is the same for any number of threads.
+/// Pixels that are evaluated together. Sums run over blocks in order, so the result does not depend on the threads.
 const BLOCK: usize = 256;
-/// Errors above this, in rad, count linearly: drift and edges have no say.
-const HUBER_RAD: f32 = 0.1;
 
 /// One pixel over all steps, with its first harmonic.
 #[derive(Clone, Copy)]
@@ -29,7 +26,7 @@ struct Block {
     sin: Vec<f32>,
 }
 
-/// All pixels that take part.
+/// All pixels of an estimate.
 pub(super) struct Samples {
     blocks: Vec<Block>,
     partner: Array2<f32>,
@@ -124,8 +121,8 @@ fn huber_sum(errors_rad: &Array2<f32>) -> f64 {
     sums.into_iter().map(f64::from).sum()
 }
 
-/// Weights `(steps, steps)` of the signal a quarter period after each step: trigonometric interpolation, which for a
-/// multiple of 4 steps is the step N / 4 further on.
+/// Weights `(steps, steps)` of the signal a quarter period after each step, by trigonometric interpolation. For a multiple
+/// of 4 steps it is the step N / 4 later.
 fn quarter_period_later(steps: usize) -> Array2<f32> {
     let n = steps as f64;
     let wave = |k: usize, x: f64| {

@@ -1,28 +1,16 @@
-//! Which pixels tell something about the response, and what is wrong when too few do.
+//! Selection of the pixels that show the response, and the reasons if there are too few.
 
 use super::order;
 use super::samples::Trace;
+use crate::condition::params::{
+    BRIGHT_MAX, DISORDER, PIXELS_MAX, PIXELS_MIN, SPILL_PX, STACK_MODULATION_MIN, USABLE_PER_DISORDERED,
+};
 use crate::{Error, Result};
 use ndarray::{Array2, ArrayView1, ArrayView2, ArrayView3, Axis, s};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Least amplitude of the fringes, fraction of full scale: below, noise decides.
-const MODULATION_MIN: f32 = 0.05;
-/// Brightest step from here on counts as saturated.
-pub(super) const BRIGHT_MAX: f32 = 250.0 / 255.0;
-/// Reach of the light that a saturated pixel spills, pixels.
-const SPILL_PX: usize = 2;
-/// Share of the variance outside the first harmonic that even a gamma of 4 (0.21) does not reach.
-const DISORDER: f32 = 0.3;
-/// One disordered pixel to this many usable ones is too many; edges and moving shadows are one in 10 000.
-const DISORDERED_SHARE: usize = 10;
-/// Pixels that an estimate needs.
-const PIXELS_MIN: usize = 1000;
-/// Pixels that it takes at most, evenly spread: more move the exponent by less than 0.01.
-const PIXELS_MAX: usize = 20_000;
-
-/// What a pixel is good for.
+/// Kind of a pixel.
 #[derive(Clone, Copy)]
 pub(super) enum Mark {
     Usable([f32; 2]),
@@ -35,7 +23,7 @@ pub(super) enum Mark {
 /// The usable pixels of all stacks, thinned by a fixed stride.
 ///
 /// # Errors
-/// [`Error::Value`] when fewer than 1000 are left, with the reasons, or when many pixels vary but not as fringes do.
+/// [`Error::Value`] with the reasons when fewer than 1000 are left, or when too many pixels do not vary like fringes.
 pub(super) fn select<'a>(stacks: &'a [ArrayView3<'a, f32>]) -> Result<Vec<Trace<'a>>> {
     let marks: Vec<Array2<Mark>> = stacks.iter().map(marks_of).collect();
     let usable: Vec<Trace<'a>> = stacks
@@ -60,9 +48,9 @@ fn marks_of(stack: &ArrayView3<'_, f32>) -> Array2<Mark> {
     let mut lines: Vec<_> = marks.outer_iter_mut().collect();
     lines.par_iter_mut().enumerate().for_each(|(y, line)| {
         for (x, mark) in line.iter_mut().enumerate() {
-            *mark = match mark_of(stack.slice(s![.., y, x]), &waves, peak[[y, x]], MODULATION_MIN) {
+            *mark = match mark_of(stack.slice(s![.., y, x]), &waves, peak[[y, x]], STACK_MODULATION_MIN) {
                 Mark::Usable(_) if spilled(&peak.view(), y, x) => Mark::Saturated,
-                own => own,
+                other => other,
             };
         }
     });
@@ -95,14 +83,13 @@ pub(super) fn mark_of(
         variance += change * change / steps.len() as f32;
     }
     let power = harmonic[0] * harmonic[0] + harmonic[1] * harmonic[1];
-    // Twice the amplitude that fringes need: noise on faint fringes is no disorder.
+    // Twice the power of the faintest fringes, because noise on faint fringes is no disorder.
     let strong = variance > 2.0 * modulation_min * modulation_min;
     if strong && variance - power / 2.0 > DISORDER * variance {
         Mark::Disordered
     } else if power > modulation_min * modulation_min {
         Mark::Usable(harmonic)
     } else if peak < 2.0 * modulation_min {
-        // Dark, whatever its fringes.
         Mark::Dark
     } else {
         Mark::Flat
@@ -118,25 +105,28 @@ fn spilled(peak: &ArrayView2<'_, f32>, y: usize, x: usize) -> bool {
 fn check_enough(marks: &[Array2<Mark>], usable: usize) -> Result<()> {
     let count = |is: fn(&Mark) -> bool| marks.iter().flatten().filter(|&m| is(m)).count();
     let disordered = count(|m| matches!(m, Mark::Disordered));
-    if disordered > (usable + PIXELS_MIN) / DISORDERED_SHARE {
+    if disordered > (usable + PIXELS_MIN) / USABLE_PER_DISORDERED {
         return Err(order::disordered(disordered, usable));
     }
     if usable >= PIXELS_MIN {
         return Ok(());
     }
     let reasons = [
-        (count(|m| matches!(m, Mark::Saturated)), "saturated or beside it (shorten the exposure)"),
+        (
+            count(|m| matches!(m, Mark::Saturated)),
+            "saturated or next to a saturated pixel (shorten the exposure)",
+        ),
         (count(|m| matches!(m, Mark::Dark)), "too dark (lengthen the exposure)"),
         (
             count(|m| matches!(m, Mark::Flat)),
-            "lit but without fringes (check that the projector shows them, in focus, and dim the room)",
+            "lit but without fringes (check that the projector shows sharp fringes, and dim the room light)",
         ),
         (disordered, "not sinusoidal over the steps (check the order of the images)"),
     ];
     let listed = reasons.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{n} {why}"));
     let found = format!("{usable}; {}", listed.collect::<Vec<_>>().join(", "));
     let expected = format!(
-        "at least {PIXELS_MIN} pixels with a fringe amplitude above {MODULATION_MIN} of full scale and no step above {BRIGHT_MAX:.2}"
+        "at least {PIXELS_MIN} pixels with a fringe amplitude above {STACK_MODULATION_MIN} of full scale and no step above {BRIGHT_MAX:.2}"
     );
     Err(Error::value("stack", expected, found))
 }

@@ -1,49 +1,28 @@
-//! The response from one shot whose phase is known: sorted by their phase, the pixels of a tile are a stack of steps.
+//! The response from one shot with a known phase: the pixels of a tile, sorted by phase, are a stack of phase steps.
 //!
-//! What an albedo or a shadow does to one tile is no wave of its fringes, so that over many tiles only what the response
-//! does remains. The phase itself is the worse for a response that was not undone; decoding and estimating again, a few
-//! times, ends where both agree.
+//! Albedo and shadows change single tiles at random, but the response changes the fringes of all tiles alike. A wrong
+//! response also makes the phase wrong, so decoding and estimating alternate until both agree.
 
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
+use crate::condition::params::{
+    BRIGHT_MAX, CHANNEL_TILES_MIN, EVENNESS_MIN, GAIN_RAD, KNOWN_MIN, MANY_TILES, PHASE_STEPS, SATURATED_MAX,
+    SINGLE_CHANNEL_TILES_MIN, SLOPE_STRIDE_PX, TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX,
+    TILES_MIN,
+};
 use crate::encoding::{Channel, Encoding};
 use crate::{Error, Result};
 use ndarray::{Array2, ArrayView1, ArrayView2, s};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Steps that a period is sorted into.
-const STEPS: usize = 16;
-/// Side of a tile in fringes: two or more, so that a slope of the albedo is not taken for a harmonic.
-const TILE_FRINGES: f32 = 2.5;
-const SIDE_MIN: usize = 24;
-/// Share of a tile whose phase is known.
-const KNOWN: f32 = 0.5;
-/// Every step has this share of the pixels that it would have if all had as many.
-const EVEN: f32 = 0.25;
-/// Share of a tile that may be saturated.
-const SATURATED: f32 = 0.02;
-/// Least amplitude of a tile, fraction of full scale; the mean of a hundred pixels has little noise.
-const MODULATION_MIN: f32 = 0.02;
-/// Tiles that an estimate for all channels needs, for one that leaves the others alone, and of a channel that takes part; fewer
-/// let the print of a single object decide.
-const TILES_MIN: usize = 48;
-const OWN_TILES_MIN: usize = 60;
-const CHANNEL_TILES_MIN: usize = 6;
-/// Tiles that fit into an image from which on they need not overlap.
-const MANY_TILES: usize = 100;
-/// What undoing the response has to take from the square of the two-step error.
-const GAIN_RAD: f64 = 0.02;
-/// Neighbours whose difference is taken for the slope of the phase: every fourth along rows and columns.
-const STRIDE: usize = 4;
-
-/// Inverse responses of R, G, B and IR from one shot, `light` as captured, in fractions of full scale, and the phase it
-/// was decoded to, rad, of the first fringe number, NaN where there is none; all `(rows, columns)`.
+/// Inverse responses of R, G, B and IR from one shot: `light` as captured, in fractions of full scale, and the decoded
+/// phase of the first fringe number in rad, NaN where there is none; all `(rows, columns)`.
 ///
-/// `None` for a channel that is linear as far as the shot can tell (to a gamma of about 1.1), and where fringes fill too
-/// little of the image; ten fringes by ten are enough. The shot has to be decoded again with what was found, and the
-/// estimate repeated, until it stays: a phase from light that is bent is bent itself. The `pixels` of an estimate are tiles.
+/// `None` for a channel without a measurable nonlinearity (a gamma between about 0.9 and 1.1), and where fringes cover too
+/// little of the image; ten by ten fringes are enough. Decode the shot again with the result and repeat the estimate until
+/// it converges, because a wrong response makes the phase wrong. The `pixels` of an estimate are tiles.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size; [`Error::NotFourChannel`] for another encoding.
@@ -74,10 +53,10 @@ pub fn estimate_response_of_shot(
     }
     let four = encoding.four_channel_view()?;
     let Some(slope) = median_slope(phase_rad) else { return Ok([None; 4]) };
-    let mut means = [(); 4].map(|()| Array2::zeros([0, STEPS]));
+    let mut means = [(); 4].map(|()| Array2::zeros([0, PHASE_STEPS]));
     means.par_iter_mut().zip(Channel::ALL).for_each(|(means, channel)| {
         let scale = (four.fringe_number(channel) / four.quadrature) as f32;
-        let side = ((TILE_FRINGES * TAU / (slope * scale)).ceil() as usize).max(SIDE_MIN);
+        let side = ((TILE_FRINGES * TAU / (slope * scale)).ceil() as usize).max(TILE_SIDE_MIN_PX);
         *means = tiles(light[channel.index()], phase_rad, scale, side);
     });
     let traces = means.each_ref().map(traces_of);
@@ -95,27 +74,34 @@ pub fn estimate_response_of_shot(
     Ok(traces.each_ref().map(|traces| of_channel(traces, shared)))
 }
 
-/// The response that the channel shares with the others, or its own where that is so much better.
+/// The response shared by all channels, or that of a single channel if it is much better.
 ///
-/// One projector and one camera bend all channels alike as a rule, and four times the tiles make a steadier estimate.
+/// One projector and one camera usually have the same response in all channels, and four times as many tiles make a more
+/// stable estimate.
 fn of_channel(traces: &[Trace<'_>], shared: Response) -> Option<ResponseEstimate> {
     if traces.len() < CHANNEL_TILES_MIN {
         return None;
     }
     let samples = Samples::new(traces);
     let before = rms_rad(&samples, &Response::default());
-    let mut best = (shared, rms_rad(&samples, &shared));
-    if traces.len() >= OWN_TILES_MIN && pays(0.0, best.1) {
-        let own = fit(&samples, offset_bound(traces));
-        let after = rms_rad(&samples, &own);
-        best = if pays(after, best.1) { (own, after) } else { best };
+    let mut best = Fitted { response: shared, rms_rad: rms_rad(&samples, &shared) };
+    if traces.len() >= SINGLE_CHANNEL_TILES_MIN && pays(0.0, best.rms_rad) {
+        let response = fit(&samples, offset_bound(traces));
+        let single = Fitted { response, rms_rad: rms_rad(&samples, &response) };
+        best = if pays(single.rms_rad, best.rms_rad) { single } else { best };
     }
-    pays(best.1, before).then_some(ResponseEstimate {
-        response: best.0,
+    pays(best.rms_rad, before).then_some(ResponseEstimate {
+        response: best.response,
         two_step_rms_before_rad: before,
-        two_step_rms_after_rad: best.1,
+        two_step_rms_after_rad: best.rms_rad,
         pixels: traces.len(),
     })
+}
+
+/// A response and the two-step error that remains with it.
+struct Fitted {
+    response: Response,
+    rms_rad: f64,
 }
 
 fn rms_rad(samples: &Samples, response: &Response) -> f64 {
@@ -127,10 +113,10 @@ fn pays(after_rad: f64, before_rad: f64) -> bool {
 }
 
 fn traces_of(means: &Array2<f32>) -> Vec<Trace<'_>> {
-    let waves = select::waves(STEPS);
+    let waves = select::waves(PHASE_STEPS);
     let harmonic_of = |steps: ArrayView1<'_, f32>| {
         let peak = steps.fold(0.0f32, |a, &b| a.max(b));
-        match select::mark_of(steps, &waves, peak, MODULATION_MIN) {
+        match select::mark_of(steps, &waves, peak, TILE_MODULATION_MIN) {
             Mark::Usable(harmonic) => Some(harmonic),
             _ => None,
         }
@@ -138,9 +124,9 @@ fn traces_of(means: &Array2<f32>) -> Vec<Trace<'_>> {
     means.outer_iter().filter_map(|steps| Some(Trace { steps, harmonic: harmonic_of(steps)? })).collect()
 }
 
-/// Mean light by step of phase, `(tiles, steps)`, of the tiles that show every step and are not saturated.
+/// Mean light by phase step, `(tiles, steps)`, of the tiles that have every step and are not saturated.
 fn tiles(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32, side: usize) -> Array2<f32> {
-    // A small image is made the most of: its tiles overlap by half.
+    // The tiles of a small image overlap by half.
     let [rows, columns] = [light.nrows() / side, light.ncols() / side];
     let step = if rows * columns < MANY_TILES { side / 2 } else { side };
     let starts = |length: usize| (0..(length + 1).saturating_sub(side)).step_by(step);
@@ -149,36 +135,40 @@ fn tiles(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32, sid
         let tile = s![y..y + side, x..x + side];
         means.extend(steps_of(light.slice(tile), phase.slice(tile), scale).into_iter().flatten());
     }
-    Array2::from_shape_vec((means.len() / STEPS, STEPS), means).expect("whole tiles")
+    Array2::from_shape_vec((means.len() / PHASE_STEPS, PHASE_STEPS), means).expect("whole tiles")
 }
 
-fn steps_of(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32) -> Option<[f32; STEPS]> {
-    let (mut sums, mut counts) = ([0.0f32; STEPS], [0.0f32; STEPS]);
+fn steps_of(
+    light: ArrayView2<'_, f32>,
+    phase: ArrayView2<'_, f32>,
+    scale: f32,
+) -> Option<[f32; PHASE_STEPS]> {
+    let (mut sums, mut counts) = ([0.0f32; PHASE_STEPS], [0.0f32; PHASE_STEPS]);
     let (mut known, mut saturated) = (0.0, 0.0);
     for (&light, &phase) in light.iter().zip(phase) {
         if !(phase.is_finite() && light.is_finite()) {
             continue;
         }
         let turns = phase * scale / TAU;
-        let step = ((turns - turns.floor()) * STEPS as f32) as usize % STEPS;
+        let step = ((turns - turns.floor()) * PHASE_STEPS as f32) as usize % PHASE_STEPS;
         sums[step] += light;
         counts[step] += 1.0;
         known += 1.0;
-        saturated += if light >= select::BRIGHT_MAX { 1.0 } else { 0.0 };
+        saturated += if light >= BRIGHT_MAX { 1.0 } else { 0.0 };
     }
     let all = light.len() as f32;
-    let even = counts.iter().all(|&count| count >= EVEN * known / STEPS as f32);
-    let told = known >= KNOWN * all && saturated <= SATURATED * known && even;
-    // Light below zero is what a dark level left of noise.
+    let even = counts.iter().all(|&count| count >= EVENNESS_MIN * known / PHASE_STEPS as f32);
+    let told = known >= KNOWN_MIN * all && saturated <= SATURATED_MAX * known && even;
+    // Noise makes light negative where the dark level was subtracted.
     told.then(|| std::array::from_fn(|i| (sums[i] / counts[i]).clamp(0.0, 1.0)))
 }
 
-/// Median length of the phase's gradient, rad per pixel; `None` without a phase.
+/// Median of the phase gradient, rad per pixel; `None` without a phase.
 fn median_slope(phase: ArrayView2<'_, f32>) -> Option<f32> {
     let (rows, columns) = phase.dim();
     let mut slopes = Vec::new();
-    for y in (0..rows.saturating_sub(1)).step_by(STRIDE) {
-        for x in (0..columns.saturating_sub(1)).step_by(STRIDE) {
+    for y in (0..rows.saturating_sub(1)).step_by(SLOPE_STRIDE_PX) {
+        for x in (0..columns.saturating_sub(1)).step_by(SLOPE_STRIDE_PX) {
             let here = phase[[y, x]];
             let slope = (phase[[y, x + 1]] - here).hypot(phase[[y + 1, x]] - here);
             if slope > 0.0 && slope < TAU {

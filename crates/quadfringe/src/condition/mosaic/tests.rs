@@ -1,4 +1,4 @@
-//! Interpolation of mosaics against what was sampled.
+//! Interpolated mosaics against the sampled images.
 
 use super::*;
 use crate::Conditioner;
@@ -6,7 +6,7 @@ use crate::condition::linearise;
 use ndarray::{Array2, ArrayView2, s};
 use std::f32::consts::{FRAC_PI_2, TAU};
 
-/// What a chip of this pattern delivers of three planes.
+/// Mosaic that a chip of this pattern delivers for three planes.
 fn sampled(planes: &[Array2<f32>; 3], pattern: BayerPattern) -> Array2<f32> {
     Array2::from_shape_fn(planes[0].dim(), |at| planes[pattern.channel(at.0, at.1).index()][at])
 }
@@ -18,7 +18,7 @@ fn developed(planes: &[Array2<f32>; 3], pattern: BayerPattern) -> [Array2<f32>; 
     [red, green, blue]
 }
 
-/// What lies `rim` pixels from the border and more.
+/// Pixels at least `rim` pixels from the border.
 fn inner(image: &Array2<f32>, rim: usize) -> ArrayView2<'_, f32> {
     let (rows, columns) = image.dim();
     image.slice(s![rim..rows - rim, rim..columns - rim])
@@ -48,8 +48,8 @@ fn a_ramp_comes_back_up_to_the_borders_in_every_pattern_and_size() {
     }
 }
 
-/// Two-step phase of R and B, amplitude of G, against the truth. The mean of neighbours makes errors of 0.018 rad at
-/// 20 px and 0.075 rad at 10 px.
+/// Two-step phase of R and B, amplitude of G, against the truth. Bilinear interpolation has errors of 0.018 rad at 20 px
+/// and 0.075 rad at 10 px.
 #[test]
 fn fringes_keep_phase_and_modulation() {
     let bounds = [(28.0, 2e-5, 3e-4), (20.0, 1.5e-4, 1e-3), (14.0, 1e-3, 4e-3), (10.0, 6e-3, 0.014)];
@@ -102,7 +102,7 @@ fn a_step_overshoots_by_less_than_a_sixth_and_only_near_by() {
     }
 }
 
-/// Dark level and response belong to raw samples: interpolation comes after.
+/// Dark level and response are applied to raw samples, before interpolation.
 #[test]
 fn samples_are_made_linear_before_they_are_mixed() {
     let light = |shift: f32| {

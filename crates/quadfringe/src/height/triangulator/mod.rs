@@ -1,14 +1,14 @@
-//! Camera ray meets projector column (S7).
+//! Triangulation: intersection of camera rays with projector columns (S7).
 //!
-//! In projector coordinates the points of a camera ray are `A + t B`, with `A` the camera centre and `B` the turned
-//! direction `(x, y, 1)` of the pixel. A column whose normalised coordinate is `k` asks for `A0 + t B0 = k (A2 + t B2)`:
+//! In projector coordinates the points of a camera ray are `A + t B`, with `A` the camera centre and `B` the rotated
+//! direction `(x, y, 1)` of the pixel. A column with the normalised coordinate `k` requires `A0 + t B0 = k (A2 + t B2)`:
 //!
 //! `t = (k A2 - A0) / (B0 - k B2)`, and `X, Y, Z = t x, t y, t`: a rational function of the column for each pixel.
 //!
-//! Camera distortion is removed once, when the table of `x, y` is made. With projector distortion a column is a curved
-//! sheet, but the projector sees the camera ray as a straight line `m = m0 + s k` in ideal coordinates, so the distorted
-//! coordinate is a polynomial in `k` alone. It is solved for `k` by three Newton steps from the measured value: exact to
-//! rounding at every depth, without a table and without a depth range to stay in.
+//! Camera distortion is removed once, in the table of `x, y`. With projector distortion a column is a curved sheet of light,
+//! but the camera ray is a straight line `m = m0 + s k` in ideal projector coordinates, so the distorted coordinate is a
+//! polynomial in `k` alone. Three Newton steps from the measured value solve it: exact to rounding at every depth, without
+//! a table and without a limited depth range.
 
 use multiversion::multiversion;
 use ndarray::{Array2, Array3, ArrayView2, Axis};
@@ -17,10 +17,13 @@ use rayon::prelude::*;
 use crate::error::{Error, Result};
 use crate::optics::Device;
 
-const CHUNK: usize = 64;
-const NEWTON_STEPS: usize = 3;
+mod block;
+mod sheets;
 
-/// Turns projector columns into points of the camera frame, for one calibrated pair of camera and projector.
+use block::{BLOCK, Block, Directions};
+use sheets::ColumnSheets;
+
+/// Points of the camera frame from projector columns, for a calibrated camera and projector (S7).
 ///
 /// ```
 /// use quadfringe::{height::Triangulator, optics::Device};
@@ -51,7 +54,7 @@ impl Triangulator {
     ///
     /// # Errors
     /// [`Error::Value`] when the camera's pose is not the identity (the projector's pose is relative to the camera), or
-    /// when the projector does not stand beside the camera across its columns, so that columns carry no depth.
+    /// when the baseline is not across the columns of the projector, so that columns do not depend on depth.
     pub fn new(camera: &Device, projector: &Device) -> Result<Self> {
         let offset = (0..3).fold(0f64, |worst, i| {
             let turn =
@@ -87,9 +90,9 @@ impl Triangulator {
         points(self, row, columns_px, out);
     }
 
-    /// What an uncertain column means for the depth, of one image row: `uncertainty` holds standard deviations of the columns in
-    /// px and receives those of Z in mm, NaN where [`Self::xyz_row`] has no point. The point moves along its ray, so X and Y
-    /// go with Z.
+    /// Uncertainty of the depth for one image row: `uncertainty` holds standard deviations of the columns in px and receives
+    /// those of Z in mm, NaN where [`Self::xyz_row`] has no point. The point moves along its ray, so X and Y change in
+    /// proportion to Z.
     ///
     /// # Panics
     /// As [`Self::xyz_row`].
@@ -114,7 +117,7 @@ impl Triangulator {
         deviations(self, row, columns_px, uncertainty);
     }
 
-    /// [`Self::xyz_row`] and [`Self::depth_uncertainty_row`] in one go.
+    /// [`Self::xyz_row`] and [`Self::depth_uncertainty_row`] together.
     pub(crate) fn finish_row(
         &self,
         row: usize,
@@ -149,7 +152,8 @@ impl Triangulator {
 
     /// Normalised `x, y` of the pixels of a row from `first` on.
     #[inline(always)]
-    fn directions(&self, row: usize, first: usize, count: usize, [x, y]: &mut [[f32; CHUNK]; 2]) {
+    fn directions(&self, row: usize, first: usize, count: usize, directions: &mut Directions) {
+        let Directions { x, y } = directions;
         if let Some(table) = &self.directions {
             let table = table.row(row).to_slice().expect("the table is in standard layout");
             for ((x, y), entry) in x.iter_mut().zip(y).zip(&table[first..first + count]) {
@@ -166,7 +170,7 @@ impl Triangulator {
         y.fill(((row as f64 - cy) / fy) as f32);
     }
 
-    /// Where the rays of a row, from pixel `first` on, meet the sheets of `columns_px`.
+    /// Intersect the rays of a row, from pixel `first` on, with the sheets of `columns_px`.
     #[inline(always)]
     fn meet(&self, row: usize, first: usize, columns_px: &[f32], block: &mut Block) {
         self.directions(row, first, columns_px.len(), &mut block.directions);
@@ -174,64 +178,29 @@ impl Triangulator {
     }
 }
 
-/// A block of pixels on its way from columns to points: only as much of it as there are columns means anything.
-struct Block {
-    directions: [[f32; CHUNK]; 2],
-    /// Ideal normalised coordinates of the columns, and how they change with the column.
-    ideal: [[f32; CHUNK]; 2],
-    depth: [f32; CHUNK],
-    /// Change of the depth with the column.
-    growth: [f32; CHUNK],
-}
-
-impl Block {
-    fn new() -> Self {
-        let (row, rows) = ([0.0; CHUNK], [[0.0; CHUNK]; 2]);
-        Self { directions: rows, ideal: rows, depth: row, growth: row }
-    }
-
-    /// `t x, t y, t` pixel by pixel.
-    #[inline(always)]
-    fn write_points(&self, xyz: &mut [f32]) {
-        let [x, y] = &self.directions;
-        let (points, _) = xyz.as_chunks_mut::<3>();
-        for (((point, x), y), t) in points.iter_mut().zip(x).zip(y).zip(&self.depth) {
-            *point = [t * x, t * y, *t];
-        }
-    }
-
-    /// Standard deviations of columns become those of depths.
-    #[inline(always)]
-    fn carry(&self, uncertainty: &mut [f32]) {
-        for (value, growth) in uncertainty.iter_mut().zip(&self.growth) {
-            *value *= growth.abs();
-        }
-    }
-}
-
-/// A row of points, a block of pixels at a time.
+/// A row of points, block by block.
 #[multiversion(targets("x86_64+avx2"))]
 fn points(triangulator: &Triangulator, row: usize, columns_px: &[f32], out: &mut [f32]) {
     let mut block = Block::new();
-    let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK));
+    let blocks = columns_px.chunks(BLOCK).zip(out.chunks_mut(3 * BLOCK));
     for (index, (columns, xyz)) in blocks.enumerate() {
-        triangulator.meet(row, index * CHUNK, columns, &mut block);
+        triangulator.meet(row, index * BLOCK, columns, &mut block);
         block.write_points(xyz);
     }
 }
 
-/// A row of standard deviations, a block of pixels at a time.
+/// A row of standard deviations, block by block.
 #[multiversion(targets("x86_64+avx2"))]
 fn deviations(triangulator: &Triangulator, row: usize, columns_px: &[f32], uncertainty: &mut [f32]) {
     let mut block = Block::new();
-    let blocks = columns_px.chunks(CHUNK).zip(uncertainty.chunks_mut(CHUNK));
+    let blocks = columns_px.chunks(BLOCK).zip(uncertainty.chunks_mut(BLOCK));
     for (index, (columns, uncertainty)) in blocks.enumerate() {
-        triangulator.meet(row, index * CHUNK, columns, &mut block);
-        block.carry(uncertainty);
+        triangulator.meet(row, index * BLOCK, columns, &mut block);
+        block.scale_uncertainty(uncertainty);
     }
 }
 
-/// Both, with the work that they have in common done once.
+/// Both, sharing the intersection.
 #[multiversion(targets("x86_64+avx2"))]
 fn points_and_deviations(
     triangulator: &Triangulator,
@@ -241,11 +210,11 @@ fn points_and_deviations(
     uncertainty: &mut [f32],
 ) {
     let mut block = Block::new();
-    let blocks = columns_px.chunks(CHUNK).zip(out.chunks_mut(3 * CHUNK)).zip(uncertainty.chunks_mut(CHUNK));
+    let blocks = columns_px.chunks(BLOCK).zip(out.chunks_mut(3 * BLOCK)).zip(uncertainty.chunks_mut(BLOCK));
     for (index, ((columns, xyz), uncertainty)) in blocks.enumerate() {
-        triangulator.meet(row, index * CHUNK, columns, &mut block);
+        triangulator.meet(row, index * BLOCK, columns, &mut block);
         block.write_points(xyz);
-        block.carry(uncertainty);
+        block.scale_uncertainty(uncertainty);
     }
 }
 
@@ -257,96 +226,4 @@ fn directions_of(camera: &Device) -> Array2<[f32; 2]> {
         }
     });
     table
-}
-
-/// The sheets of light of a projector's columns, as the camera meets them.
-#[derive(Debug, Clone)]
-struct ColumnSheets {
-    rotation: [[f32; 3]; 3],
-    /// Camera centre in projector coordinates, mm.
-    centre: [f32; 3],
-    focal_px: f32,
-    centre_px: f32,
-    distortion: Option<[f32; 5]>,
-}
-
-impl ColumnSheets {
-    fn new(projector: &Device) -> Result<Self> {
-        let a = projector.translation_mm;
-        let middle = (0.5 * (projector.width as f64 - 1.0) - projector.centre_px[0]) / projector.focal_px[0];
-        let across = (a[0] - middle * a[2]).abs() / middle.hypot(1.0);
-        let length = (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt();
-        if across <= 1e-3 * length || length <= 1e-6 {
-            let expected = "a projector that stands beside the camera across its columns";
-            let actual = format!("camera at {a:?} mm in the projector's frame");
-            return Err(Error::value("pose of the projector", expected, actual));
-        }
-        Ok(Self {
-            rotation: projector.rotation.map(|row| row.map(|v| v as f32)),
-            centre: a.map(|v| v as f32),
-            focal_px: projector.focal_px[0] as f32,
-            centre_px: projector.centre_px[0] as f32,
-            distortion: projector.is_distorted().then(|| projector.distortion.map(|v| v as f32)),
-        })
-    }
-
-    /// Depths at which rays `(x, y, 1)` meet the sheets of `columns`, NaN behind the camera, and how they grow with the
-    /// column: `t = (k A2 - A0) / (B0 - k B2)` by `k`, times `dk / du`.
-    #[inline(always)]
-    fn intersect(&self, columns: &[f32], block: &mut Block) {
-        let Block { directions: [x, y], ideal, depth, growth } = block;
-        self.ideal(columns, [x, y], ideal);
-        let ([r0, _, r2], [a0, _, a2]) = (self.rotation, self.centre);
-        let [k, stretch] = ideal;
-        for i in 0..CHUNK {
-            let b0 = r0[0] * x[i] + r0[1] * y[i] + r0[2];
-            let b2 = r2[0] * x[i] + r2[1] * y[i] + r2[2];
-            let inverse = 1.0 / (b0 - k[i] * b2);
-            let t = (k[i] * a2 - a0) * inverse;
-            let seen = (t > 0.0) & (t <= f32::MAX);
-            depth[i] = if seen { t } else { f32::NAN };
-            growth[i] = if seen { (a2 + t * b2) * inverse * stretch[i] } else { f32::NAN };
-        }
-    }
-
-    /// Ideal normalised coordinates of `columns`, and how they change with the column.
-    #[inline(always)]
-    fn ideal(&self, columns: &[f32], [x, y]: [&[f32; CHUNK]; 2], [k, stretch]: &mut [[f32; CHUNK]; 2]) {
-        let scale = 1.0 / self.focal_px;
-        stretch.fill(scale);
-        for (k, u) in k.iter_mut().zip(columns) {
-            *k = (u - self.centre_px) * scale;
-        }
-        if let Some(distortion) = &self.distortion {
-            for i in 0..CHUNK {
-                let (ideal, slope) = self.ideal_coordinate(distortion, k[i], x[i], y[i]);
-                (k[i], stretch[i]) = (ideal, scale / slope);
-            }
-        }
-    }
-
-    /// Ideal normalised column where the projector's image of the ray `(x, y, 1)` has the distorted column `measured`, and how
-    /// the distorted coordinate changes with the ideal one there.
-    #[inline(always)]
-    fn ideal_coordinate(&self, distortion: &[f32; 5], measured: f32, x: f32, y: f32) -> (f32, f32) {
-        let [k1, k2, p1, p2, k3] = *distortion;
-        let b = self.rotation.map(|r| r[0] * x + r[1] * y + r[2]);
-        let a = self.centre;
-        // The projector sees the ray as the line n . (k, m, 1) = 0 with n = A x B.
-        let across = 1.0 / (a[2] * b[0] - a[0] * b[2]);
-        let m0 = (a[1] * b[0] - a[0] * b[1]) * across;
-        let s = (a[2] * b[1] - a[1] * b[2]) * across;
-        let (mut k, mut slope) = (measured, 1.0);
-        for _ in 0..NEWTON_STEPS {
-            let m = m0 + s * k;
-            let r2 = k * k + m * m;
-            let along = k + m * s;
-            let radial = 1.0 + r2 * (k1 + r2 * (k2 + r2 * k3));
-            let growth = 2.0 * (k1 + r2 * (2.0 * k2 + r2 * 3.0 * k3));
-            let value = k * radial + 2.0 * p1 * k * m + p2 * (r2 + 2.0 * k * k);
-            slope = radial + k * growth * along + 2.0 * p1 * (m + k * s) + p2 * (2.0 * along + 4.0 * k);
-            k -= (value - measured) / slope;
-        }
-        (k, slope)
-    }
 }
