@@ -117,7 +117,7 @@ def test_what_cannot_be_done_is_said_before_anything_is_written(take: Path, whol
         prepare([take, take], tmp_path)
     with pytest.raises(InputError, match="no such file"):
         prepare([tmp_path / "no.h5"], tmp_path / "out")
-    other = SYSTEM.model_copy(update={"decode": qf.DecodeConfig(method="best")})
+    other = SYSTEM.model_copy(update={"decode": qf.DecodeConfig(method="joint")})
     with pytest.raises(InputError, match="made with other settings"):
         prepare([take], whole, other)
     (tmp_path / "take.zarr").mkdir()

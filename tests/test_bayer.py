@@ -21,7 +21,7 @@ from quadfringe.errors import DecodeError, InputError
 from quadfringe.io.images import write_image
 
 PATTERNS = ("rggb", "grbg", "gbrg", "bggr")
-METHODS = ("best", "published")
+METHODS = ("joint", "published")
 CODE = ((36.0, 35.0, 30.0), 912)
 CAMERA = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
 FRINGES = ["--fringes", "36", "35", "30", "--projector-width", "912"]
@@ -124,7 +124,7 @@ def test_a_blind_colour_is_named() -> None:
     raw = shot.raw.copy()
     raw[0::2, 1::2] = 0
     with pytest.raises(DecodeError, match="channel red is black"):
-        qf.decode(replace(shot, raw=raw), plan("best"))
+        qf.decode(replace(shot, raw=raw), plan("joint"))
 
 
 @pytest.mark.parametrize("name", ["rgbg", "RGGB", ""])
@@ -185,7 +185,7 @@ def test_the_command_line_simulates_and_decodes_mosaics(tmp_path: Path) -> None:
     done = run("decode", *images, *FRINGES, *calibration, "--out", tmp_path / "x.npz")
     assert done.exit_code == 0, done.output
     shape = qf.Shape.load(tmp_path / "x.npz")
-    same = qf.decode(qf.read_shot({"raw": raw, "ir": ir}, bayer="grbg"), plan("best"))
+    same = qf.decode(qf.read_shot({"raw": raw, "ir": ir}, bayer="grbg"), plan("joint"))
     np.testing.assert_array_equal(shape.phase_rad, same.phase_rad)
     assert shape.xyz_mm is not None
     wrong = run("decode", "--raw", raw, "--bayer", "bggr", "--ir", ir, *FRINGES, "--out", tmp_path / "y.npz")

@@ -36,7 +36,7 @@ def eight_bit(images: Four) -> Four:
     return [np.round(image * 255).astype(np.uint8) for image in images]
 
 
-@pytest.mark.parametrize("method", ["published", "best"])
+@pytest.mark.parametrize("method", ["published", "joint"])
 @pytest.mark.parametrize(("dtype", "full_scale"), [("uint8", 255), ("uint16", 4095), ("float32", 1)])
 def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, full_scale: int) -> None:
     scaled = [image * full_scale for image in images]
@@ -95,7 +95,7 @@ def test_strided_views_are_as_good_as_copies(images: Four) -> None:
         np.testing.assert_array_equal(values, strided[name])
 
 
-@pytest.mark.parametrize("method", ["published", "best"])
+@pytest.mark.parametrize("method", ["published", "joint"])
 def test_any_number_of_threads_gives_the_same_bits(small_bench: Any, method: str) -> None:
     files = {name: small_bench / f"{name}.png" for name in ("red", "green", "blue", "ir")}
     shot = qf.read_shot(files)

@@ -118,7 +118,7 @@ def test_a_colour_file_is_as_good_as_three(small_bench: Path, tmp_path: Path) ->
         np.testing.assert_array_equal(a["phase_rad"], b["phase_rad"])
 
 
-@pytest.mark.parametrize("method", ["published", "best"])
+@pytest.mark.parametrize("method", ["published", "joint"])
 def test_json_on_stdout_is_nothing_but_json(small_bench: Path, tmp_path: Path, method: str) -> None:
     chosen = ["--method", method, "--json", "-", "--out", tmp_path / "x.npz"]
     result = run("decode", *files_of(small_bench), *FRINGES, *chosen)

@@ -77,14 +77,14 @@ def test_times_are_consistent(measured: dict[str, Any]) -> None:
         assert found["returned_percent"] > 80
 
 
-def timed(width_px: int, median_ms: float, method: str = "best") -> timing.Timing:
+def timed(width_px: int, median_ms: float, method: str = "joint") -> timing.Timing:
     case = timing.Case(width_px, 100, method, 1)
     return timing.Timing(case, 3, median_ms, median_ms, 0.0, 1.0, 100.0)
 
 
 def test_cost_is_a_line_with_what_every_shot_costs() -> None:
     cost = timing.cost_of([timed(width, 0.5 + 0.01 * width) for width in (100, 200, 400)])
-    assert cost.method == "best"
+    assert cost.method == "joint"
     assert cost.fixed_ms == pytest.approx(0.5)
     assert cost.ns_per_pixel == pytest.approx(100.0)
     assert cost.off_percent == pytest.approx(0.0, abs=1e-6)
@@ -112,9 +112,9 @@ def test_a_process_keeps_to_its_threads(measured: dict[str, Any]) -> None:
 
 @pytest.mark.skipif(machine.resident_bytes() is None, reason="this system does not tell what is resident")
 def test_a_decoder_weighs_its_results_and_some_maps() -> None:
-    published, best = timing.memory(SIZE, timing.METHODS, 1, scene=PLANE)
+    published, joint = timing.memory(SIZE, timing.METHODS, 1, scene=PLANE)
     map_mb = 4 * SIZE[0] * SIZE[1] / 2**20
-    for found in (published, best):
+    for found in (published, joint):
         assert 8 * map_mb < found.held_mb < 100 * map_mb  # the results alone are eight maps
     assert set(published.record()) == CASE_KEYS | {"held_mb"}
 
@@ -126,7 +126,7 @@ def test_a_shot_that_cannot_be_decoded_is_told() -> None:
 
 @pytest.mark.skipif(machine.resident_bytes() is None, reason="this system does not tell what is resident")
 def test_colours_of_a_print_take_memory() -> None:
-    options = ["--size", "320x240", "--method", "best", "--threads", "1", "--repeats", "3", "--json", "-"]
+    options = ["--size", "320x240", "--method", "joint", "--threads", "1", "--repeats", "3", "--json", "-"]
     records = [json.loads(CliRunner().invoke(app, ["bench", *options, *more]).stdout) for more in ([], PRINT)]
     assert [record["patch_mm"] for record in records] == [None, 20.0]
     white, print_ = (record["memory"][0]["held_mb"] for record in records)

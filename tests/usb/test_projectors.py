@@ -18,7 +18,7 @@ from quadfringe.cli import app
 from quadfringe.config import Fringes, SystemConfig, load_system
 from quadfringe.devices import Projector, open_projector
 from quadfringe.devices.light import projector_images
-from quadfringe.devices.lightcrafter import CoaxialPair, LightCrafter, outputs, udev_rule
+from quadfringe.devices.lightcrafter import ProjectorPair, LightCrafter, outputs, udev_rule
 
 
 def run(*arguments: object) -> Result:
@@ -50,7 +50,7 @@ def test_every_projector_keeps_the_contract(projector: Projector) -> None:
 def test_the_pair_shows_its_fringes(screen: Screen, system: Path) -> None:
     config = load_system(system)
     assert config.projectors is not None
-    with CoaxialPair(config.projectors) as pair:
+    with ProjectorPair(config.projectors) as pair:
         for fringes in (config.fringes, Fringes(layout="regular")):
             pair.show(fringes)
         np.testing.assert_array_equal(screen.rgb(), projector_images(config.fringes.numbers, (912, 1140), "regular")[0])
@@ -167,7 +167,7 @@ def test_the_other_projector_is_stopped_when_one_is_gone(order: Order, flash_sys
     for stop in ("by command", "as a pair"):
         config = load_system(flash_system)
         pair = open_projector(config)
-        assert isinstance(pair, CoaxialPair)
+        assert isinstance(pair, ProjectorPair)
         pair.show(config.fringes)
         if stop == "by command":
             pair.release()
@@ -187,7 +187,7 @@ def test_the_other_projector_is_stopped_when_one_is_gone(order: Order, flash_sys
 def test_a_projector_that_went_to_video_is_shown_again(order: Order, flash_system: Path) -> None:
     config = load_system(flash_system)
     assert config.projectors is not None
-    with CoaxialPair(config.projectors) as pair:
+    with ProjectorPair(config.projectors) as pair:
         pair.show(config.fringes)
         pair.pause()
         order("1-1", "video appears")

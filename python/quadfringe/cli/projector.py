@@ -204,12 +204,12 @@ def start(port: PortOption = None, system: SystemOption = None) -> None:
 
 
 def _start_from_flash(config: SystemConfig, file: Path) -> None:
-    from quadfringe.devices.lightcrafter import CoaxialPair
+    from quadfringe.devices.lightcrafter import ProjectorPair
 
     assert config.projectors is not None
     if any(one.hdmi is not None for one in (config.projectors.visible, config.projectors.infrared)):
         raise InputError(f"{file}: HDMI needs a window that stays open; use quadfringe projector show --system {file}")
-    pair = CoaxialPair(config.projectors)
+    pair = ProjectorPair(config.projectors)
     try:
         pair.show(config.fringes)
     except BaseException:

@@ -187,10 +187,10 @@ def open_projector(config: SystemConfig) -> Projector:
     a device cannot be opened, and ValueError when it does not support the settings.
     """
     if config.projectors is not None:
-        from quadfringe.devices.lightcrafter import CoaxialPair
+        from quadfringe.devices.lightcrafter import ProjectorPair
 
         known = None if config.calibration is None else Calibration.load(config.calibration)
-        return CoaxialPair(config.projectors, known)
+        return ProjectorPair(config.projectors, known)
     if config.capture.kind != "virtual":
         return ExternalLight()
     from quadfringe.devices.virtual import VirtualBench, VirtualProjector

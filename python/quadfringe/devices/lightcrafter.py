@@ -1,7 +1,7 @@
 """The projectors of a real bench: LightCrafter 4500 projectors, with patterns from HDMI or flash memory.
 
 `LightCrafter` is one projector with all its commands; `PatternProjector` shows fringes on one projector by either
-route; `CoaxialPair` is the `Projector` of a scanner. All are context managers. Bad arguments raise ValueError; device
+route; `ProjectorPair` is the `Projector` of a scanner. All are context managers. Bad arguments raise ValueError; device
 faults raise OSError (PermissionError, TimeoutError, ConnectionError, FileNotFoundError).
 """
 
@@ -30,7 +30,7 @@ from quadfringe.devices.light import Light, light_images, predeformation
 
 __all__ = [
     "SIZE_PX",
-    "CoaxialPair",
+    "ProjectorPair",
     "LightCrafter",
     "Pattern",
     "PatternProjector",
@@ -142,13 +142,13 @@ class PatternProjector:
         self.close()
 
 
-class CoaxialPair:
+class ProjectorPair:
     """The visible and the infrared projector as one `Projector`: shows the four fringe images of a shot.
 
     Pre-deformed fringes need the calibration of both projectors.
 
-    >>> from quadfringe.devices.lightcrafter import CoaxialPair
-    >>> with CoaxialPair(config.projectors) as pair:  # doctest: +SKIP
+    >>> from quadfringe.devices.lightcrafter import ProjectorPair
+    >>> with ProjectorPair(config.projectors) as pair:  # doctest: +SKIP
     ...     pair.show(config.fringes)
     """
 

@@ -1,11 +1,11 @@
 //! Step 9: uncertainty and wrong-order probability.
 
-/// Variance of a phase step over `noise^2 / J`. Derived: the albedo of a pixel is the mean of nine with the weights 1 2 1 in both
-/// directions, so of the share `x` of the information that it would take when fitted to the pixel alone,
-/// `1 - (2 * 4/16 - (6/16)^2) x` of the noise is left where `J` counts `1 - x`. Four fringes have
-/// `x = (a^2 + b^2 / 4) / (4 a^2 + 2 b^2)`: 0.21 to 0.25 from full to no contrast, and the variance is 1.17 to 1.21 times as
-/// much. Checked by `cargo test --test uncertainty -- --nocapture`. Varied: errors inside one standard deviation 0.76 -> 0.69 and
-/// 0.82 (peaks).
+/// Variance of a phase step over `noise^2 / J`, on the safe side. The albedo of a pixel is a mean of nine with the weights 1 2 1 in
+/// both directions. Four fringes have `x = (a^2 + b^2 / 4) / (4 a^2 + 2 b^2)`, 0.21 to 0.25 from full to no contrast, as the share
+/// of the information that a free albedo would take. Against an information `1 - x` the variance is 1.17 to 1.21 times as much.
+/// `J` leaves out only `x / 4` (`ALBEDO_SHARE`), which gives 0.97, so the stated deviation is larger than the noise of a smooth
+/// surface (U5). Checked by `cargo test --test uncertainty -- --nocapture`. Varied: errors inside one standard deviation
+/// 0.76 -> 0.69 (x0.7) and 0.82 (x1.4) on peaks.
 pub const ALBEDO_LOSS: f32 = 1.18;
 
 /// Error of the method on a smooth surface without noise, in rad: `python evaluation/round_trip.py`, plane and peaks. Varied:
