@@ -18,7 +18,7 @@ from quadfringe.cli import app
 from quadfringe.config import Fringes, SystemConfig, load_system
 from quadfringe.devices import Projector, open_projector
 from quadfringe.devices.light import projector_images
-from quadfringe.devices.lightcrafter import ProjectorPair, LightCrafter, outputs, udev_rule
+from quadfringe.devices.lightcrafter import LightCrafter, ProjectorPair, outputs, udev_rule
 
 
 def run(*arguments: object) -> Result:

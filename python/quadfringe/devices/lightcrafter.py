@@ -30,12 +30,12 @@ from quadfringe.devices.light import Light, light_images, predeformation
 
 __all__ = [
     "SIZE_PX",
-    "ProjectorPair",
     "LightCrafter",
     "Pattern",
     "PatternProjector",
     "PatternSequence",
     "PatternWindow",
+    "ProjectorPair",
     "lightcrafters",
     "open_device",
     "outputs",
