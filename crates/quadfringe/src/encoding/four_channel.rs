@@ -1,6 +1,7 @@
 //! The four-channel encoding of the paper: R and B in quadrature, G and IR alone.
 
-use super::{ChannelCode, Encoding, Projector, phase_at};
+use super::Encoding;
+use super::channel::{ChannelCode, Projector, phase_at};
 use crate::error::{Error, FourChannelFault, Result};
 use std::f64::consts::FRAC_PI_2;
 

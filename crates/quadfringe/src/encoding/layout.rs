@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use ndarray::Array2;
 
-use super::ChannelCode;
+use super::channel::ChannelCode;
 use crate::error::{Error, Result};
 
 /// How the mirrors of a projector's micromirror array lie.
