@@ -25,7 +25,7 @@ const MEDIAN_OF_NORMAL: f32 = 0.6745;
 /// use ndarray::Array2;
 /// use quadfringe::stages::wrong_order_probability;
 /// let mut quality = Array2::from_shape_fn((32, 90), |(y, x)| 0.8 + 0.01 * ((7 * x + 3 * y) % 20) as f32);
-/// quality[[5, 6]] = 0.01;
+/// quality[[5, 6]] = 0.0; // a beat half way between two orders
 /// let probability = wrong_order_probability(quality.view());
 /// assert!(probability[[5, 6]] > 0.4 && probability[[5, 7]] < 1e-3);
 /// ```
