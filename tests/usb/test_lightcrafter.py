@@ -45,7 +45,7 @@ def test_equal_serial_numbers_are_told_apart_by_port(order: Order) -> None:
 
 def test_a_projector_has_one_owner_and_is_free_after_closing() -> None:
     first = LightCrafter("1-1")
-    with pytest.raises(OSError, match="held by another program"):
+    with pytest.raises(OSError, match="in use by another program"):
         LightCrafter("1-1")
     first.close()
     first.close()

@@ -191,7 +191,7 @@ def test_a_projector_that_went_to_video_is_shown_again(order: Order, flash_syste
         pair.show(config.fringes)
         pair.pause()
         order("1-1", "video appears")
-        with pytest.raises(OSError, match="HDMI data appear"):
+        with pytest.raises(OSError, match="HDMI signal appears"):
             pair.start()
         pair.show(config.fringes)
         assert pair.visible.device.status()["running"]
