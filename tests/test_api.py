@@ -55,6 +55,35 @@ def test_modules_are_there_without_an_import() -> None:
         _ = qf.render
 
 
+def test_every_name_of_a_package_is_there_without_an_import() -> None:
+    import subprocess
+    import sys
+
+    words = """
+import pkgutil, sys
+import quadfringe
+packages = [m.name for m in pkgutil.walk_packages(quadfringe.__path__, "quadfringe.") if m.ispkg]
+assert {"quadfringe.view", "quadfringe.evaluation"} < set(packages)
+missing = []
+for name in sys.argv[1:] or packages:
+    package = __import__(name, fromlist=["_"])
+    for public in getattr(package, "__all__", ()):
+        try:
+            getattr(package, public)
+        except ImportError:
+            pass  # an optional library that is not installed
+        except AttributeError:
+            missing.append(f"{name}.{public}")
+assert not missing, missing
+"""
+    for package in ("quadfringe.view", "quadfringe.evaluation"):  # alone, before another module imports their parts
+        subprocess.run([sys.executable, "-c", words, package], check=True)
+    subprocess.run([sys.executable, "-c", words], check=True)
+    for package in (qf.view, qf.evaluation):
+        with pytest.raises(AttributeError, match="no attribute 'render'"):
+            _ = package.render
+
+
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.name)
 def test_names_of_documents_exist(document: Path) -> None:
     text = document.read_text()

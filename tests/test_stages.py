@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from typing import Any
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -109,3 +112,45 @@ def test_a_row_without_fringes_is_an_error() -> None:
     flat = np.full((32, 256), 0.5, np.float32)
     with pytest.raises(qf.DecodeError, match="no fringes cross the rows"):
         stages.demodulate({"red": flat, "green": flat, "blue": flat, "ir": flat}, NUMBERS)
+
+
+def test_a_response_means_the_same_as_in_a_plan(tmp_path: Path) -> None:
+    shot, calibration = grab("plane", 7)
+    bent = qf.ResponseCalibration(red={"exponent": 0.5})
+    known = calibration.model_copy(update={"response": qf.Response(red={"exponent": 0.5})})
+    bent.save(tmp_path / "response.json")
+    known.save(tmp_path / "calibration.json")
+    expected = stages.linear_light(shot, known)["red"]
+    linear = stages.linear_light(shot, known, "linear")["red"]
+    assert not np.array_equal(expected, linear, equal_nan=True)
+    for arguments in (
+        (known, "auto"),
+        (tmp_path / "calibration.json", "calibration"),
+        (calibration, bent),
+        (calibration, str(tmp_path / "response.json")),
+    ):
+        np.testing.assert_array_equal(stages.linear_light(shot, *arguments)["red"], expected)
+    for arguments in ((None, "linear"), (None, "calibration"), (calibration, "calibration")):
+        np.testing.assert_array_equal(stages.linear_light(shot, *arguments)["red"], linear)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        ({"response": None}, 'response: expected "auto", "linear", .* got None'),
+        ({"response": "foo"}, 'response: expected "auto", "linear"'),
+        ({"response": "auto"}, 'call qf.estimate_response first, or pass response="linear"'),
+        ({"calibration": "no.json"}, "no.json: No such file"),
+        ({"calibration": 5}, "calibration: expected a Calibration"),
+    ],
+)
+def test_linear_light_names_the_argument_at_fault(arguments: dict[str, Any], reason: str) -> None:
+    with pytest.raises(qf.InputError, match=reason):
+        stages.linear_light(qf.Shot(*(np.zeros((8, 8), np.uint8),) * 4), **arguments)
+
+
+def test_both_estimates_say_linear_where_no_response_shows() -> None:
+    shot, _ = grab("plane", 8)
+    assert qf.estimate_response(shot, qf.Plan(WIDTH_PX)) == "linear"
+    flat = np.zeros((64, 64), np.float32)
+    assert stages.response_of_shot(qf.Shot(flat, flat, flat, flat), flat, NUMBERS, WIDTH_PX) == "linear"

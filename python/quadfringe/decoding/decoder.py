@@ -7,8 +7,8 @@ from threading import Lock
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, size_of
-from quadfringe.decoding.plan import Plan
-from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, stated_response
+from quadfringe.decoding.plan import Plan, stated_response
+from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened
 from quadfringe.decoding.verdict import judge
 from quadfringe.errors import InputError
 from quadfringe.io.images import full_scale
@@ -42,7 +42,7 @@ class Decoder:
         self.plan = plan
         self._size, self._full_scale = size_of(like, full_scale)
         self._kernel = KernelDecoder(self._size, self._full_scale, plan)
-        self._known = stated_response(plan) != "auto"
+        self._known = stated_response(plan.response, plan.calibration) != "auto"
         self._tried = 0
         self._estimating = Lock()
 

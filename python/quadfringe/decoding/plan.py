@@ -13,7 +13,7 @@ from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, c
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.errors import InputError
 
-__all__ = ["Plan"]
+__all__ = ["Plan", "calibration_of", "response_of", "stated_response"]
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -51,8 +51,8 @@ class Plan:
         fields = {
             "projector_width_px": _columns(projector_width_px),
             "fringes": _fringes(fringes),
-            "calibration": _calibration(calibration),
-            "response": _response(response, settings.response),
+            "calibration": calibration_of(calibration),
+            "response": response_of(response, settings.response),
             "decode": settings.model_copy(update={"response": "auto"}),
         }
         for name, value in fields.items():
@@ -83,7 +83,8 @@ def _fringes(fringes: Fringes | Sequence[float]) -> Fringes:
     return fringes if isinstance(fringes, Fringes) else Fringes(numbers=tuple(fringes))
 
 
-def _calibration(calibration: Any) -> Calibration | None:
+def calibration_of(calibration: Any) -> Calibration | None:
+    """Give a calibration, read from its file when a path is given; raise `InputError` for anything else but None."""
     if calibration is None or isinstance(calibration, Calibration):
         return calibration
     if isinstance(calibration, (str, Path)):
@@ -91,11 +92,26 @@ def _calibration(calibration: Any) -> Calibration | None:
     raise InputError(f"calibration: expected a Calibration or the path of its file, got {type(calibration).__name__}")
 
 
-def _response(given: Any, setting: Any) -> ResponseChoice:
-    """Give the response that argument and setting agree on, read from its file when a path was given."""
+def response_of(given: Any, setting: Any = "auto") -> ResponseChoice:
+    """Give the response that argument and setting agree on, read from its file when a path was given.
+
+    Raises `InputError` when they differ or are no response.
+    """
     if given is None:
         raise InputError('response: expected "auto", "linear", a Response, or a response file (.json), got None')
     if given != "auto" and setting not in ("auto", given):
         raise InputError(f"response: given as {given!r}, and as {setting!r} among the settings; give it once")
-    found = DecodeConfig(response=setting if given == "auto" else given).response
+    found = checked(DecodeConfig, {"response": setting if given == "auto" else given}, "response").response
     return ResponseCalibration.load(found) if isinstance(found, Path) else found
+
+
+def stated_response(response: ResponseChoice, known: Calibration | None) -> ResponseChoice:
+    """Give the response that a choice and a calibration state; "auto" when neither states one.
+
+    A calibration with crosstalk, or with a response of the projector, and without a response states linear light.
+    """
+    if response != "auto":
+        return response
+    if known is None or (known.response or known.crosstalk or known.projector_response) is None:
+        return "auto"
+    return "linear" if known.response is None else known.response

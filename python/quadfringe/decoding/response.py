@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Literal
 
-from quadfringe.config import Response, ResponseChoice
+from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, size_of
-from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.plan import Plan, stated_response
 from quadfringe.decoding.stages import response_of_shot
 from quadfringe.decoding.verdict import order_margin
 from quadfringe.errors import InputError
 
-__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "stated_response"]
+__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response"]
 
 ROUNDS_MAX = 8  # of decoding and estimating; each takes a part of the distortion out of the phase
 SETTLED = 0.02  # relative change of the exponents at which the rounds end
@@ -42,40 +42,28 @@ def estimate_response(shot: AnyShot, plan: Plan) -> Response | Literal["linear"]
     0.6
     >>> decoder = qf.Decoder(shot, replace(plan, response=response))
     """
-    if stated_response(plan) != "auto":
+    if stated_response(plan.response, plan.calibration) != "auto":
         raise InputError('this plan has a response, from `response` or its calibration; make one with response="auto"')
     return decode_straightened(KernelDecoder(*size_of(shot, None), plan), shot)[0].response
 
 
-def stated_response(plan: Plan) -> ResponseChoice:
-    """Give the response that plan or calibration state; "auto" when neither says how intensities follow the light.
-
-    A calibration with crosstalk, or with a response of the projector, and without a response states linear light.
-    """
-    if plan.response != "auto":
-        return plan.response
-    known = plan.calibration
-    if known is None or (known.response or known.crosstalk or known.projector_response) is None:
-        return "auto"
-    return "linear" if known.response is None else known.response
-
-
 def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[KernelDecoder, Shape]:
-    """Decode with the response that the shot shows, if that makes the orders surer; else as captured.
+    """Decode with the response that the shot shows, if that raises the margin of the fringe orders; else as captured.
 
     Gives the decoder that was used, whose response is the estimate, and the shape.
     """
     linear = as_captured.with_response("linear")
     first = linear.shape(shot)
     found = _estimate(shot, first, as_captured.plan)
-    if found is None:
+    if found == "linear":
         return linear, first
     # The joint method finds a response that is too strong for the published one. It cannot search along camera rays.
     searched = as_captured.plan.decode.unwrapping == "pair"
     finder = as_captured if searched else as_captured.with_method("joint")
     for _ in range(ROUNDS_MAX):
         before = found
-        found = _estimate(shot, finder.with_response(found).shape(shot), as_captured.plan) or found
+        again = _estimate(shot, finder.with_response(before).shape(shot), as_captured.plan)
+        found = before if again == "linear" else again
         if _settled(found, before):
             break
     straight = as_captured.with_response(found)
@@ -83,7 +71,7 @@ def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[Kern
     return (straight, shape) if order_margin(shape) > order_margin(first) else (linear, first)
 
 
-def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | None:
+def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | Literal["linear"]:
     return response_of_shot(shot, shape.phase_rad, plan.fringes.numbers, plan.projector_width_px, plan.calibration)
 
 

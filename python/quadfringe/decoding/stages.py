@@ -21,7 +21,8 @@ True
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from pathlib import Path
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,7 +48,8 @@ from quadfringe._core import (
 )
 from quadfringe.config import ChannelResponse, Response, ResponseChoice
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
-from quadfringe.errors import DecodeError
+from quadfringe.decoding.plan import calibration_of, response_of, stated_response
+from quadfringe.errors import DecodeError, InputError
 
 __all__ = [
     "Wrapped",
@@ -94,9 +96,13 @@ class Wrapped(NamedTuple):
     green_rad: Map
     """Phase of the block means of G, (B, W), rad, up to whole turns (S3)."""
     infrared_rad: Map
-    """The same of IR."""
+    """Phase of the block means of IR, (B, W), rad, up to whole turns (S3)."""
     rows: int
     """Rows of a block."""
+
+    def __repr__(self) -> str:
+        height, width = self.phase_rad.shape
+        return f"Wrapped({width} x {height}, blocks of {self.rows} rows)"
 
     def repeated(self, blocks: Map) -> Map:
         """Give a map of blocks, (B, W), at every pixel, (H, W)."""
@@ -104,15 +110,24 @@ class Wrapped(NamedTuple):
 
 
 def linear_light(
-    shot: AnyShot, calibration: Calibration | None = None, response: ResponseChoice = "auto"
+    shot: AnyShot,
+    calibration: Calibration | Path | str | None = None,
+    response: Response | Literal["calibration", "auto", "linear"] | Path | str = "calibration",
 ) -> dict[str, Map]:
     """Give the channels as linear light, fractions of full scale, (H, W) float32, by name (S1).
 
-    Dark level, response, crosstalk and registration come from the `calibration`; a `response` replaces its response.
-    Without either, intensities are taken as linear. IR is NaN where its chip does not see the point. The colours of a
-    raw mosaic are interpolated at every pixel from linear samples.
+    Dark level, response, crosstalk and registration come from the `calibration`. `response` is
+
+    - "calibration" (default): the response of the calibration. If it has none, or without a calibration, intensities
+      are taken as linear. This stage never estimates a response;
+    - a `Response`, the path of its file, or "linear", which replace that of the calibration;
+    - "auto", as in a `Plan`: the response that the calibration states. Where a `Plan` would estimate it, `InputError`.
+
+    IR is NaN where its chip does not see the point. The colours of a raw mosaic are interpolated at every pixel from
+    linear samples. Raises `InputError` for a calibration or response that is none, or that cannot be read.
     """
-    known = conditioning(calibration, response)
+    calibration = calibration_of(calibration)
+    known = conditioning(calibration, "auto" if response == "calibration" else _known(response, calibration))
     if isinstance(shot, BayerShot):
         return _core.linear_light_bayer(shot.raw, shot.bayer, shot.ir, full_scale=shot.full_scale_value, **known)
     return _core.linear_light(shot.red, shot.green, shot.blue, shot.ir, full_scale=shot.full_scale_value, **known)
@@ -121,11 +136,11 @@ def linear_light(
 def response_of_shot(
     shot: AnyShot,
     phase_rad: Map,
-    fringe_numbers: tuple[float, float, float],
+    fringe_numbers: FringeNumbers,
     projector_width_px: int,
-    calibration: Calibration | None = None,
-) -> Response | None:
-    """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; None for linear light.
+    calibration: Calibration | Path | str | None = None,
+) -> Response | Literal["linear"]:
+    """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; "linear" if it shows none.
 
     Without the right response the phase is wrong too, so decode again with the result and repeat, as
     `quadfringe.estimate_response` does. A channel without fringes stays linear. Dark level and registration come from
@@ -137,7 +152,18 @@ def response_of_shot(
     )
     numbers = ChannelResponse.model_fields
     channels = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
-    return Response(**channels) if channels else None
+    return Response(**channels) if channels else "linear"
+
+
+def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
+    """Read and check a response that means the same as in a `Plan`; raise where a plan would estimate it."""
+    found = response_of(response)
+    if stated_response(found, calibration) == "auto":
+        raise InputError(
+            'response: the stages do not estimate it, and "auto" without a response in the calibration asks for that; '
+            'call qf.estimate_response first, or pass response="linear"'
+        )
+    return found
 
 
 def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:

@@ -150,7 +150,7 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
     """Compute the linear light of a shot and its mean over about a fringe."""
     import cv2
 
-    light = linear_light(shot, plan.calibration, plan.response)
+    light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
     period_px, _ = carrier(np.nan_to_num(light["red"]))
     period_px = period_px if np.isfinite(period_px) else 20.0
     known = shape.returned & np.all([np.isfinite(image) for image in light.values()], axis=0)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
+from quadfringe.decoding.plan import stated_response
 from quadfringe.doctor._fringes import Fit, fit_fringes, infrared_drift
 from quadfringe.doctor.finding import Finding, graded
 from quadfringe.errors import DecodeError
@@ -100,7 +102,7 @@ def _linearity(fit: Fit, plan: Plan) -> Finding:
     worst = int(np.argmax(fit.harmonic))
     value = float(fit.harmonic[worst])
     words = f"the second harmonic of {fit.names[worst]} is {value:.1%} of the first"
-    known = plan.response is not None or (plan.calibration is not None and plan.calibration.response is not None)
+    known = isinstance(stated_response(plan.response, plan.calibration), Response)
     again = "estimate it again" if known else "estimate it"
     fix = f"switch off the gamma table of the projector, or {again}: quadfringe calibrate response"
     return graded("response", value, NOT_LINEAR, words, fix)

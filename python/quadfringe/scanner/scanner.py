@@ -20,7 +20,7 @@ from typing import Any
 from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, load_system
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.response import stated_response
+from quadfringe.decoding.plan import stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.scanner.streaming import LiveStream, Tap
@@ -62,7 +62,9 @@ class Scanner:
     @property
     def response(self) -> ResponseChoice:
         """The response that is corrected, as in `Decoder.response`; "auto" until a sound shot was decoded."""
-        return stated_response(self.plan) if self._decoder is None else self._decoder.response
+        if self._decoder is not None:
+            return self._decoder.response
+        return stated_response(self.plan.response, self.plan.calibration)
 
     def change_decode(self, **settings: Any) -> None:
         """Change settings of `DecodeConfig` from the next shot on; raises `ConfigError` for wrong ones.
@@ -107,7 +109,7 @@ class Scanner:
         if the calibration holds the response. At most 64 shots are decoded; if none of them is sound, the result is
         "linear".
         """
-        if stated_response(self.plan) != "auto":
+        if stated_response(self.plan.response, self.plan.calibration) != "auto":
             return self.plan.response
         for shot in islice(shots, SETTLING_SHOTS):
             with suppress(DecodeError):

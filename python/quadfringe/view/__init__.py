@@ -1,7 +1,26 @@
 """Pictures of shots and shapes: reports, movies, and the live page in the browser.
 
-The modules are imported one by one, because each needs another optional library: `report` needs matplotlib, `viewer`
-needs viser, `movie` and `colours` need OpenCV only.
+The modules are imported when they are first used, because each needs another optional library: `report` needs
+matplotlib, `viewer` needs viser, `movie` and `colours` need OpenCV only.
 """
 
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from quadfringe.view import colours, movie, report, viewer
+
 __all__ = ["colours", "movie", "report", "viewer"]
+
+
+def __getattr__(name: str) -> ModuleType:
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return import_module(f"{__name__}.{name}")
+
+
+def __dir__() -> list[str]:
+    return list(__all__)
