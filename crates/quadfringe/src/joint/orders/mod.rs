@@ -8,7 +8,7 @@ mod wrapped;
 pub(in crate::joint) use wrapped::Wrapped;
 
 use super::params::local_fit;
-use super::params::orders::JUMP_PERIODS;
+use super::params::orders::{JUMP_NODES_MAX, JUMP_NODES_MIN, JUMP_PERIODS};
 use super::scene::Scene;
 use super::uncertainty::{NodeVerdict, WrongOrderModel};
 use crate::Channel;
@@ -126,7 +126,21 @@ impl Orders {
     }
 }
 
-/// Nodes in a row whose contradiction costs as much as a change of surface.
+/// Nodes in a row whose contradicting evidence costs as much as a change of surface (J11).
 fn jump_nodes(scene: &Scene<'_>) -> f64 {
-    JUMP_PERIODS * scene.period_px / scene.grid.step as f64
+    (JUMP_PERIODS * scene.period_px / scene.grid.step as f64).clamp(JUMP_NODES_MIN, JUMP_NODES_MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::cells::Grid;
+    use super::*;
+
+    #[test]
+    fn the_jump_price_scales_with_the_period_between_its_bounds() {
+        let grid = Grid::new([96, 256], 4.0);
+        let scene = |period_px| Scene { light: [&[]; 4], usable: &[], grid: &grid, period_px, factor: 1 };
+        let prices = [1.0, 16.0, 32.0, 1000.0].map(|period_px| jump_nodes(&scene(period_px)));
+        assert_eq!(prices, [JUMP_NODES_MIN, 5.0, 10.0, JUMP_NODES_MAX]);
+    }
 }

@@ -13,7 +13,7 @@ mod sweep;
 pub(super) use evidence::{CosineSums, NodeEvidence};
 
 use crate::encoding::FourChannel;
-use crate::joint::params::orders::{COST_MAX, JUMP_NODES_MAX, JUMP_NODES_MIN};
+use crate::joint::params::orders::COST_MAX;
 use crate::joint::params::tasks::SWEEP_COLUMNS;
 use costs::CostTable;
 use multiversion::multiversion;
@@ -65,7 +65,7 @@ impl Matching {
         evidence: impl Fn(usize, &mut Vec<NodeEvidence>) + Sync,
     ) {
         let (nodes, labels) = (rows * columns, self.table.count());
-        let jump = (jump_nodes.clamp(JUMP_NODES_MIN, JUMP_NODES_MAX) * f64::from(COST_MAX)) as i16;
+        let jump = (jump_nodes * f64::from(COST_MAX)) as i16;
         self.columns = columns;
         self.nodes.resize(nodes, Node::default());
         self.costs.resize(nodes * labels, 0);
