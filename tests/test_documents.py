@@ -1,4 +1,4 @@
-"""The documents: links lead somewhere, commands exist, decision records are complete and listed."""
+"""The documents: links lead somewhere, commands exist (those quoted in the code too), decision records are complete."""
 
 from __future__ import annotations
 
@@ -11,6 +11,12 @@ ROOT = Path(__file__).resolve().parents[1]
 DECISIONS = ROOT / "docs" / "decisions"
 RECORDS = sorted(path for path in DECISIONS.glob("*.md") if path.name != "README.md")
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("crates/*/README.md")])
+SOURCES = sorted(
+    path
+    for folder in ("crates", "python", "evaluation", "benches", "tests")
+    for path in (ROOT / folder).rglob("*")
+    if path.suffix in {".rs", ".py"} and path != Path(__file__) and "target" not in path.parts
+)
 PARTS = ("Context", "Decision", "Alternatives considered", "Consequence", "Command")
 LINES_MAX = 30
 FILE = re.compile(r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+|[\w-]+/[\w./-]+\.(?:py|rs))")
@@ -27,6 +33,12 @@ def commands(text: str) -> list[str]:
     blocks = re.findall(r"^```(?:sh|console)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     spans = re.findall(r"`([^`]+)`", re.sub(r"^```.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL))
     return [" ".join(span.split()) for span in spans] + [line for block in blocks for line in block.splitlines()]
+
+
+def quoted(text: str) -> list[str]:
+    """Give the commands in code spans of a source; a span may continue on the next line of a comment."""
+    joined = re.sub(r"\n[ \t]*(?://[/!]?|#)?[ \t]*", " ", text)
+    return [" ".join(span.split()) for span in re.findall(r"`((?:cargo|make|pytest|python) [^`]+)`", joined)]
 
 
 def missing(command: str) -> list[str]:
@@ -50,6 +62,12 @@ def test_links_lead_to_files(document: Path) -> None:
 def test_commands_exist(document: Path) -> None:
     lost = {command: gone for command in commands(document.read_text()) if (gone := missing(command))}
     assert lost == {}
+
+
+def test_commands_in_the_sources_exist() -> None:
+    cited = [(name(source), command) for source in SOURCES for command in quoted(source.read_text())]
+    assert len(cited) > 30
+    assert [(source, command, gone) for source, command in cited if (gone := missing(command))] == []
 
 
 @pytest.mark.parametrize("record", RECORDS, ids=name)
@@ -85,4 +103,5 @@ def test_what_is_missing_is_found() -> None:
     assert missing("cargo test --test nothing") == ["nothing"]
     assert missing("make nothing") == ["nothing"]
     assert missing("devices/nothing.py") == ["devices/nothing.py"]
+    assert quoted("//! `python\n//! evaluation/nothing.py`") == ["python evaluation/nothing.py"]
     assert missing("make demo") == missing("pytest tests/test_documents.py") == []

@@ -1,6 +1,6 @@
 //! Tuned numbers of conditioning and of the estimate of a response: unit, trade-off, and the command that measures them.
 //!
-//! `python evaluation/own_response.py` shows the effect of the numbers of an estimate, `cargo test -p quadfringe --lib
+//! `python evaluation/auto_response.py` shows the effect of the numbers of an estimate, `cargo test -p quadfringe --lib
 //! condition` holds estimates from known curves to 0.035 of the exponent.
 
 // Conditioning.
