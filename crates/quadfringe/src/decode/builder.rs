@@ -2,6 +2,7 @@
 
 use super::method::Method;
 use super::options::Options;
+use super::params::SIDE_MIN_PX;
 use super::{Decoder, Engine};
 use crate::condition::Conditioner;
 use crate::encoding::Encoding;
@@ -9,9 +10,6 @@ use crate::error::{Error, Result};
 use crate::height::Triangulator;
 use crate::joint::Joint;
 use crate::published::Published;
-
-/// Least size of an image in either direction: fewer pixels hold no neighbourhood to fit.
-const SIDE_MIN_PX: usize = 16;
 
 /// The plan of a [`Decoder`], made by [`Decoder::builder`]. A part that is left out takes its default.
 #[derive(Debug, Clone)]

@@ -2,10 +2,6 @@
 
 use std::f64::consts::{PI, TAU};
 
-/// Least distance in phase space (rad) between two columns that counts as different. It leaves 0.15 rad of joint error to
-/// each of the two; smaller values accept encodings in which noise decides, larger ones refuse encodings that decode.
-pub(super) const MARGIN_NEEDED_RAD: f64 = 0.3;
-
 /// Two columns that are hardest to tell apart.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Closest {

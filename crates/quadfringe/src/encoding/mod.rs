@@ -10,6 +10,7 @@ mod ambiguity;
 mod channel;
 mod four_channel;
 mod layout;
+mod params;
 
 pub use channel::{ChannelCode, Projector};
 pub use four_channel::{Channel, FourChannel};
@@ -17,8 +18,9 @@ pub(crate) use layout::row_shift;
 pub use layout::{Axis, DmdLayout, mirror_column, pattern, step_pattern};
 
 use crate::error::{Error, Limit, Result};
-use ambiguity::{Closest, MARGIN_NEEDED_RAD};
+use ambiguity::Closest;
 use ndarray::Array2;
+use params::MARGIN_NEEDED_RAD;
 use std::f64::consts::FRAC_PI_2;
 
 /// The channels that are projected, with proof that their phases tell all projector columns apart.

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::f64::consts::{FRAC_PI_4, TAU};
 
 use super::Triangulator;
-use super::params::RAY_SLACK_PX;
+use super::params::{FAR_MM, NEAR_MM, RAY_SLACK_PX};
 use crate::encoding::Encoding;
 use crate::error::{Error, Result};
 use crate::optics::{Device, ProjectorPair};
@@ -20,9 +20,6 @@ use crate::stages::{Absolute, AlongRay, Phases, RayRow};
 const NODES: usize = 4;
 /// Rows of numbers for each row of pixels: the cubic, then the ends of the ray.
 const LINES: usize = NODES + 2;
-/// Depths that represent the camera and infinity, mm.
-const NEAR_MM: f64 = 1.0;
-const FAR_MM: f64 = 1e9;
 
 /// The infrared phase along every camera ray of a calibrated pair of projectors, planned once.
 ///

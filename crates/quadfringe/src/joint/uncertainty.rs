@@ -11,7 +11,7 @@
 //! temperature is the cost that the evidence of the shot gives the chosen orders: it contains the noise, texture and
 //! discontinuities of this shot.
 
-use super::params::uncertainty::{ALBEDO_LOSS, METHOD_RAD, TEMPERATURE_MIN};
+use super::params::uncertainty::{ALBEDO_LOSS, EXPONENT_MAX, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN};
 use multiversion::multiversion;
 
 /// Noise of phases that a window has averaged.
@@ -35,7 +35,7 @@ impl PhaseNoise {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn deviations(variance: f32, disagreement: &[f32], row: &mut [f32]) {
     for (value, disagreement) in row.iter_mut().zip(disagreement) {
-        let by_noise = variance / if *value > 1e-12 { *value } else { 1e-12 };
+        let by_noise = variance / if *value > INFORMATION_MIN { *value } else { INFORMATION_MIN };
         *value = (by_noise + disagreement + METHOD_RAD * METHOD_RAD).sqrt();
     }
 }
@@ -84,6 +84,6 @@ impl WrongOrderModel {
     /// has a temperature higher by the excess.
     pub fn probability(&self, NodeVerdict { lead, order_cost, .. }: NodeVerdict) -> f32 {
         let temperature = self.temperature + (order_cost - 2.0 * self.mean).max(0.0);
-        1.0 / (1.0 + (self.nodes_per_lead * lead.max(0.0) / temperature).min(80.0).exp())
+        1.0 / (1.0 + (self.nodes_per_lead * lead.max(0.0) / temperature).min(EXPONENT_MAX).exp())
     }
 }

@@ -1,7 +1,8 @@
 //! Radial and tangential lens distortion in OpenCV's model, and its inverse.
 
-const ITERATIONS_MAX: usize = 30;
-const CONVERGED: f64 = 1e-14;
+use super::params::{
+    CONVERGED, DETERMINANT_MIN, ITERATIONS_MAX, SOLVED, START_FACTOR, START_REDUCTIONS, STEP_PART_MIN,
+};
 
 /// Distorted normalised coordinates from ideal ones; `k` is k1, k2, p1, p2, k3.
 pub(super) fn apply(k: &[f64; 5], [x, y]: [f64; 2]) -> [f64; 2] {
@@ -58,23 +59,23 @@ pub(super) fn remove(k: &[f64; 5], distorted: [f64; 2]) -> Option<[f64; 2]> {
                 break;
             }
             scale *= 0.5;
-            if scale < 1e-6 {
+            if scale < STEP_PART_MIN {
                 // No progress: the result is exact to rounding, or there is no such point.
-                return (size < 1e-10).then_some(point);
+                return (size < SOLVED).then_some(point);
             }
         }
     }
-    (norm(miss) < 1e-10).then_some(point)
+    (norm(miss) < SOLVED).then_some(point)
 }
 
 /// Start value: the distorted point, moved towards the axis until it lies before the fold.
 fn start(k: &[f64; 5], distorted: [f64; 2]) -> [f64; 2] {
     let mut point = distorted;
-    for _ in 0..60 {
+    for _ in 0..START_REDUCTIONS {
         if is_before_fold(k, point) {
             break;
         }
-        point = point.map(|p| 0.7 * p);
+        point = point.map(|p| START_FACTOR * p);
     }
     point
 }
@@ -98,6 +99,6 @@ fn newton_step(k: &[f64; 5], [x, y]: [f64; 2], miss: [f64; 2]) -> Option<[f64; 2
     let xy = slope * x * y + 2.0 * p1 * x + 2.0 * p2 * y;
     let yy = radial + slope * y * y + 6.0 * p1 * y + 2.0 * p2 * x;
     let determinant = xx * yy - xy * xy;
-    (determinant.abs() > 1e-12)
+    (determinant.abs() > DETERMINANT_MIN)
         .then(|| [(yy * miss[0] - xy * miss[1]) / determinant, (xx * miss[1] - xy * miss[0]) / determinant])
 }

@@ -8,6 +8,7 @@ use crate::error::{Error, Limit, Result};
 mod bayer;
 mod distortion;
 mod pair;
+mod params;
 mod pose;
 mod rotation;
 

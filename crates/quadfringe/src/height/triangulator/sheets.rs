@@ -2,7 +2,7 @@
 
 use super::block::{BLOCK, Block, Directions};
 use crate::error::{Error, Result};
-use crate::height::params::NEWTON_STEPS;
+use crate::height::params::{ACROSS_SHARE_MIN, BASELINE_MIN_MM, NEWTON_STEPS};
 use crate::optics::Device;
 
 /// An ideal coordinate, and the derivative of the distorted coordinate by it.
@@ -28,7 +28,7 @@ impl ColumnSheets {
         let middle = (0.5 * (projector.width as f64 - 1.0) - projector.centre_px[0]) / projector.focal_px[0];
         let across = (a[0] - middle * a[2]).abs() / middle.hypot(1.0);
         let length = (a[0] * a[0] + a[1] * a[1] + a[2] * a[2]).sqrt();
-        if across <= 1e-3 * length || length <= 1e-6 {
+        if across <= ACROSS_SHARE_MIN * length || length <= BASELINE_MIN_MM {
             let expected = "a baseline across the columns of the projector";
             let actual = format!("camera at {a:?} mm in the projector's frame");
             return Err(Error::value("pose of the projector", expected, actual));

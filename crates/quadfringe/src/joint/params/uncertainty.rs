@@ -17,6 +17,14 @@ pub const METHOD_RAD: f32 = 8e-4;
 /// 333.
 pub const TEMPERATURE_MIN: f32 = 1.0 / super::orders::COST_MAX as f32;
 
+/// Least information of a window in linear light squared. It bounds the quotient of noise and information where a window holds
+/// no light. Not measured: such pixels are not valid.
+pub const INFORMATION_MIN: f32 = 1e-12;
+
+/// Limit of the exponent of a wrong-order probability. Follows from the arithmetic: `f32` overflows beyond exp(88.7), and
+/// exp(-80) is 2e-35.
+pub const EXPONENT_MAX: f32 = 80.0;
+
 /// Width (sigma) in fringe periods of the windows that give a phase of each pair of channels. Larger: less noise, blurred near
 /// edges. Varied: 0.79 and 0.74 of the errors of peaks inside one standard deviation in place of 0.76.
 pub const PAIR_WINDOW: f32 = 0.125;
