@@ -14,7 +14,15 @@ pub(super) struct Linear {
     projector_response: [Response; 4],
     full_scale: f32,
     tables: [Vec<f32>; 4],
-    tables_for: Option<(usize, f32)>,
+    tables_for: Option<TableKey>,
+}
+
+/// What the look-up tables depend on, apart from the calibration.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct TableKey {
+    /// Levels of the type of sample; 0 for a type without tables.
+    levels: usize,
+    full_scale: f32,
 }
 
 impl Linear {
@@ -31,7 +39,8 @@ impl Linear {
 
     /// Fill the look-up tables when the type or the full scale has changed since the last shot.
     pub fn prepare<T: Sample>(&mut self, full_scale: f32) {
-        if self.tables_for == Some((T::LEVELS, full_scale)) {
+        let key = TableKey { levels: T::LEVELS, full_scale };
+        if self.tables_for == Some(key) {
             return;
         }
         self.full_scale = full_scale;
@@ -39,7 +48,7 @@ impl Linear {
             let linear = |level: usize| self.linear(c, level as f32 * (1.0 / full_scale));
             self.tables[c] = (0..T::LEVELS).map(linear).collect();
         }
-        self.tables_for = Some((T::LEVELS, full_scale));
+        self.tables_for = Some(key);
     }
 
     fn linear(&self, c: usize, fraction: f32) -> f32 {

@@ -4,7 +4,7 @@
 //! image, on textured or moving surfaces) the error of each pair is different, and the mean of both is off by about half of
 //! their difference.
 
-use super::cells::{CellMaps, CellWindow, CellWork, RowMaps, kernel};
+use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork, kernel};
 use super::model::{FringeRows, carriers};
 use super::params::uncertainty::{
     PAIR_EXCESS_MAX_RAD2, PAIR_NEIGHBOURHOOD, PAIR_SAMPLED_ROWS, PAIR_SHARE_MIN, PAIR_WINDOW,
@@ -21,7 +21,7 @@ pub(super) struct Agreement {
     variance: CellMaps,
     excess: CellMaps,
     sums: CellMaps,
-    slots: Slots<(RowMaps, CellWork)>,
+    slots: Slots<TaskWork<RowMaps>>,
 }
 
 impl Default for Agreement {

@@ -32,10 +32,25 @@ pub(super) struct CellWindow {
 
 /// Working memory of one task that sums up rows of cells.
 #[derive(Debug, Default)]
-pub(super) struct CellWork {
+struct CellWork {
     columns: Vec<Lanes>,
     spare: Vec<f32>,
     total: Vec<f32>,
+}
+
+/// Working memory of one task: rows that its caller needs, and those of the cells.
+#[derive(Debug, Default)]
+pub(super) struct TaskWork<S> {
+    pub rows: S,
+    cells: CellWork,
+}
+
+/// Rows of cells above and below a row of the image.
+pub(super) struct CellRows {
+    pub above: usize,
+    pub below: usize,
+    /// Weight of the row below, in [0, 1).
+    pub weight: f32,
 }
 
 impl Grid {
@@ -72,12 +87,12 @@ impl Grid {
         self.stride * self.height
     }
 
-    /// Row of cells above, row below and weight of the one below, for row `y` of the image; level at the borders.
-    pub fn between(&self, y: usize) -> (usize, usize, f32) {
+    /// The rows of cells around row `y` of the image; level at the borders.
+    pub fn between(&self, y: usize) -> CellRows {
         let place = (y as f32 + 0.5) / self.step as f32 - 0.5;
         let above = place.floor();
         let clamp = |row: f32| row.clamp(0.0, (self.rows - 1) as f32) as usize;
-        (clamp(above), clamp(above + 1.0), place - above)
+        CellRows { above: clamp(above), below: clamp(above + 1.0), weight: place - above }
     }
 
     /// Rows of the image that stand for a row of cells: all of them, or `most` spread symmetrically.
@@ -96,7 +111,7 @@ impl Grid {
     pub fn window_sums<const N: usize, S: Default + Send>(
         &self,
         CellWindow { sigma_cells: sigma, sampled_rows: most }: CellWindow,
-        slots: &Slots<(S, CellWork)>,
+        slots: &Slots<TaskWork<S>>,
         sums: &mut CellMaps,
         out: &mut CellMaps,
         add: impl Fn(&mut S, usize, &mut [[Lanes; N]]) + Sync,
@@ -107,7 +122,7 @@ impl Grid {
         sums.data.par_chunks_mut(N * self.columns).enumerate().for_each_init(
             || slots.take(),
             |slot, (cell_row, out)| {
-                let (state, CellWork { columns, spare, .. }) = &mut **slot;
+                let TaskWork { rows: state, cells: CellWork { columns, spare, .. } } = &mut **slot;
                 columns.clear();
                 columns.resize(N * self.stride / LANES, [0.0; LANES]);
                 let columns = columns.as_chunks_mut().0;
@@ -127,7 +142,7 @@ impl Grid {
     pub fn smooth<'a, const N: usize, S: Default + Send>(
         &self,
         sigma: f32,
-        slots: &Slots<(S, CellWork)>,
+        slots: &Slots<TaskWork<S>>,
         sums: &mut CellMaps,
         out: &mut CellMaps,
         line: impl Fn(usize, usize) -> Option<&'a [f32]> + Sync,
@@ -138,7 +153,7 @@ impl Grid {
         sums.data.par_chunks_mut(N * self.columns).enumerate().for_each_init(
             || slots.take(),
             |slot, (row, out)| {
-                let spare = &mut slot.1.spare;
+                let spare = &mut slot.cells.spare;
                 for (k, target) in out.chunks_exact_mut(self.columns).enumerate() {
                     match line(row, k) {
                         Some(source) => target.copy_from_slice(source),
@@ -155,7 +170,7 @@ impl Grid {
     fn sum_down<const N: usize, S: Default + Send>(
         &self,
         kernel: &[f32],
-        slots: &Slots<(S, CellWork)>,
+        slots: &Slots<TaskWork<S>>,
         sums: &CellMaps,
         out: &mut CellMaps,
         finish: impl Fn(usize, [&[f32]; N], &mut [f32]) + Sync,
@@ -165,7 +180,7 @@ impl Grid {
         out.data.par_chunks_mut(length).enumerate().for_each_init(
             || slots.take(),
             |slot, (row, out)| {
-                let total = &mut slot.1.total;
+                let total = &mut slot.cells.total;
                 total.clear();
                 total.resize(N * self.columns, 0.0);
                 for (k, &weight) in kernel.iter().enumerate() {
@@ -185,7 +200,7 @@ impl Grid {
 
     /// A map given on the cells, at row `y` of the image: bilinear, level at the borders.
     fn expand(&self, maps: &CellMaps, map: usize, y: usize, mix: &mut Vec<f32>, out: &mut [f32]) {
-        let (above, below, weight) = self.between(y);
+        let CellRows { above, below, weight } = self.between(y);
         mix.resize(self.columns + 2, 0.0);
         blend(maps.line(above, map), maps.line(below, map), weight, &mut mix[1..=self.columns]);
         (mix[0], mix[self.columns + 1]) = (mix[1], mix[self.columns]);
@@ -224,7 +239,7 @@ impl CellMaps {
     /// The first `N` maps in row `y` of the image at column `x`, between cells as [`Grid::expand`].
     #[inline(always)]
     pub fn at<const N: usize>(&self, grid: &Grid, y: usize, x: f32) -> [f32; N] {
-        let (above, below, down) = grid.between(y);
+        let CellRows { above, below, weight: down } = grid.between(y);
         // One more, so that what is cut off rounds down.
         let place = (x + 0.5) / grid.step as f32 + 0.5;
         let next = place.max(0.0) as usize;

@@ -4,7 +4,7 @@
 //! stand at least 0.15 of their range above it. In a shadow all four channels lie at the bottom. Bottom and range come from
 //! the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
 
-use super::cells::{CellMaps, CellWindow, CellWork, Grid, RowMaps};
+use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::neighbours::{around, least_of_five, least_of_nine, sum_of_nine};
 use super::noise::noise_of_image;
 use super::params::illumination::{HEIGHT_MIN, REACH};
@@ -25,7 +25,7 @@ pub(super) struct LitMask {
     extremes: CellMaps,
     levels: CellMaps,
     sums: CellMaps,
-    slots: Slots<(Rows, CellWork)>,
+    slots: Slots<TaskWork<Rows>>,
     /// Standard deviation of the intensities of the last image, in linear light.
     pub noise: f32,
 }
@@ -69,7 +69,7 @@ impl LitMask {
         let this = &*self;
         lit.par_chunks_mut(ROWS * grid.stride).enumerate().for_each_init(
             || this.slots.take(),
-            |slot, (block, lit)| this.find_rows(grid, light, block * ROWS, &mut slot.0, lit),
+            |slot, (block, lit)| this.find_rows(grid, light, block * ROWS, &mut slot.rows, lit),
         );
     }
 
@@ -115,7 +115,7 @@ impl LitMask {
                 |slot, (y, lit)| {
                     let near = around(y, grid.height).map(|row| &before[row * stride..][..stride]);
                     if corners {
-                        least_of_nine(near, grid.width, 0.5, &mut slot.0.spare, lit);
+                        least_of_nine(near, grid.width, 0.5, &mut slot.rows.spare, lit);
                     } else {
                         least_of_five(near, grid.width, 0.5, lit);
                     }

@@ -5,7 +5,7 @@
 //! so that `p - i q = b exp(i (Phi_c - Phi))` is their *beat* against it, six to thirty times slower than a fringe.
 //! Unlike a Fourier filter along rows, the fit prefers no direction, no band and no slope. Sums are kept once per cell.
 
-use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{CellFringes, FringeRows};
 use super::neighbours::{around, binomial};
 use super::params::local_fit::{CONTRAST_MIN, FIRST_WINDOW, RIDGE, SAMPLED_ROWS, SPREAD_MIN, WINDOW};
@@ -39,7 +39,7 @@ pub(super) struct LocalFit {
     start: CellMaps,
     maps: CellMaps,
     sums: CellMaps,
-    slots: Slots<(Rows, CellWork)>,
+    slots: Slots<TaskWork<Rows>>,
 }
 
 /// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, and their modulation in linear light (0 where
@@ -161,7 +161,7 @@ impl LocalFit {
         out.for_each_init(
             || self.slots.take(),
             |slot, (block_row, out)| {
-                let rows = &mut slot.0;
+                let rows = &mut slot.rows;
                 let first = block_row * block;
                 for row in &mut rows.albedo {
                     row.resize(grid.stride, 0.0);

@@ -7,7 +7,7 @@
 //! two of the four intensities of a pixel remain, and they give `v` over a window. With it, every plane is brought to the instant
 //! 0 by the change that the model predicts.
 
-use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{FringeRows, carriers};
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
@@ -27,6 +27,13 @@ pub(super) struct Timing {
     pub ratios: [f32; 3],
 }
 
+/// Rows of one task.
+#[derive(Debug, Default)]
+struct Rows {
+    fringes: RowMaps,
+    velocity: RowMaps,
+}
+
 /// Velocity of the phase on the cells, with working maps.
 #[derive(Debug)]
 pub(super) struct Motion {
@@ -34,7 +41,7 @@ pub(super) struct Motion {
     velocity: CellMaps,
     change: CellMaps,
     sums: CellMaps,
-    slots: Slots<([RowMaps; 2], CellWork)>,
+    slots: Slots<TaskWork<Rows>>,
 }
 
 impl Default for Motion {
@@ -57,13 +64,13 @@ impl Motion {
     /// Improve the velocity by a Gauss-Newton step on compensated light, at an absolute phase.
     pub fn measure(&mut self, scene: &Scene<'_>, timing: Timing, photometry: &Photometry, map: PhaseMap<'_>) {
         let grid = scene.grid;
-        grid.window_sums::<2, [RowMaps; 2]>(
+        grid.window_sums::<2, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.change,
-            |maps, y, sums| {
-                let fringes = photometry.sample(scene, y, &mut maps[0]);
+            |rows, y, sums| {
+                let fringes = photometry.sample(scene, y, &mut rows.fringes);
                 let pixels = PixelRows {
                     phase: scene.row(map.phase, y),
                     modulation: scene.row(map.modulation, y),
@@ -98,9 +105,9 @@ impl Motion {
         rows.for_each_init(
             || self.slots.take(),
             |slot, (y, ((red, green), (blue, infrared)))| {
-                let [fringes, velocities] = &mut slot.0;
+                let Rows { fringes, velocity } = &mut slot.rows;
                 let fringes = photometry.sample(scene, y, fringes);
-                let [velocity] = velocities.sample(grid, &self.velocity, 0, y);
+                let [velocity] = velocity.sample(grid, &self.velocity, 0, y);
                 let moving = MovingRow { phase: scene.row(phase, y), velocity };
                 compensate_row(&fringes, &moving, scene.rows(y), timing, [red, green, blue, infrared]);
             },
@@ -115,7 +122,7 @@ impl Motion {
         valid.par_chunks_mut(grid.stride).enumerate().for_each_init(
             || self.slots.take(),
             |slot, (y, valid)| {
-                let [velocity] = slot.0[0].sample(grid, &self.velocity, 0, y);
+                let [velocity] = slot.rows.velocity.sample(grid, &self.velocity, 0, y);
                 valid.iter_mut().zip(velocity).for_each(|(valid, v)| *valid &= u8::from(v.abs() <= most));
             },
         );

@@ -8,7 +8,7 @@ use crate::parallel::angle::wrap;
 /// Median of the size of normal values over their standard deviation.
 const MEDIAN_OF_NORMAL: f32 = 0.6745;
 
-/// Noise of a plane of light, from a mask that is blind to anything that varies along rows alone or along columns alone
+/// Noise of a plane of light, from a mask that cancels every variation along rows alone or along columns alone
 /// (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)); in the unit of the light.
 pub(super) fn noise_of_image(red: &[f32], grid: &Grid) -> f32 {
     let stride = grid.stride;

@@ -1,7 +1,7 @@
 //! Residuals around every cell. Near an edge of the texture, where offsets and amplitudes are not right yet, they exceed the noise,
 //! and neighbouring phases differ accordingly.
 
-use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::params::phase::{RESIDUAL_SAMPLED_ROWS, RESIDUAL_WIDTH};
 use super::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
@@ -13,7 +13,7 @@ use multiversion::multiversion;
 pub(super) struct Residuals {
     maps: CellMaps,
     sums: CellMaps,
-    slots: Slots<((), CellWork)>,
+    slots: Slots<TaskWork<()>>,
 }
 
 impl Default for Residuals {

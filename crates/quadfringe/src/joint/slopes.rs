@@ -1,6 +1,6 @@
 //! Slopes of the phase on the cells, from a phase that may be wrapped.
 
-use super::cells::{CellMaps, CellWindow, CellWork, RowMaps};
+use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::params::slopes::{FINE_WIDTH, SAMPLED_ROWS, WIDE_SHARE, WIDTH};
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
@@ -12,6 +12,13 @@ use std::f32::consts::PI;
 /// Weights and weighted steps along and down, and lit pixels.
 const TERMS: usize = 5;
 
+/// The pixels to the right of those of a row.
+#[derive(Debug, Default)]
+struct ShiftedRows {
+    phase: Vec<f32>,
+    modulation: Vec<f32>,
+}
+
 /// Slopes of the phase in rad per cell, which stays right when the cells are laid over another image.
 #[derive(Debug)]
 pub(super) struct Slopes {
@@ -19,7 +26,7 @@ pub(super) struct Slopes {
     /// Slopes of the wide window, which join those of the fine one.
     wide: CellMaps,
     sums: CellMaps,
-    slots: Slots<([Vec<f32>; 2], CellWork)>,
+    slots: Slots<TaskWork<ShiftedRows>>,
 }
 
 impl Default for Slopes {
@@ -48,20 +55,20 @@ impl Slopes {
         let Self { maps, wide, sums, slots } = self;
         let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
         let wide_weight = wide_share * whole;
-        grid.window_sums::<TERMS, [Vec<f32>; 2]>(
+        grid.window_sums::<TERMS, ShiftedRows>(
             CellWindow { sigma_cells: scene.cells(width), sampled_rows: SAMPLED_ROWS },
             slots,
             sums,
             maps,
             |right, y, sums| {
                 let below = (y + 1).min(grid.height - 1);
-                for (shifted, plane) in right.iter_mut().zip([phase, modulation]) {
+                for (shifted, plane) in [(&mut right.phase, phase), (&mut right.modulation, modulation)] {
                     shifted.clear();
                     shifted.extend_from_slice(&scene.row(plane, y)[1..grid.width]);
                     shifted.resize(grid.stride, 0.0);
                 }
                 let here = [scene.row(phase, y), scene.row(modulation, y)];
-                add_steps(here, [&right[0], &right[1]], [0, 1], sums);
+                add_steps(here, [&right.phase, &right.modulation], [0, 1], sums);
                 add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
                 add_lit(scene.row(modulation, y), sums);
             },

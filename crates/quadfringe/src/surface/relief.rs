@@ -84,8 +84,9 @@ impl HeightMap {
 
     fn height(&self, x_mm: f64, y_mm: f64) -> f64 {
         let (rows, columns) = self.heights_mm.dim();
-        let (row, v) = cell((y_mm - self.origin_mm[1]) / self.pitch_mm[1], rows);
-        let (column, u) = cell((x_mm - self.origin_mm[0]) / self.pitch_mm[0], columns);
+        let GridPlace { cell: row, part: v } = place((y_mm - self.origin_mm[1]) / self.pitch_mm[1], rows);
+        let GridPlace { cell: column, part: u } =
+            place((x_mm - self.origin_mm[0]) / self.pitch_mm[0], columns);
         match self.interpolation {
             Interpolation::Bilinear => {
                 let line = |r: usize| {
@@ -143,11 +144,19 @@ fn steepest(heights_mm: &Array2<f64>, pitch_mm: [f64; 2], interpolation: Interpo
     factor * (worst[0] / pitch_mm[0]).hypot(worst[1] / pitch_mm[1])
 }
 
-/// Cell that holds a grid position, and the place within it; the border continues beyond the grid.
-fn cell(position: f64, samples: usize) -> (usize, f64) {
+/// A position along one axis of the grid.
+struct GridPlace {
+    /// Number of the sample before the position.
+    cell: usize,
+    /// Distance from that sample as a part of the pitch, in [0, 1].
+    part: f64,
+}
+
+/// The cell that holds a position in samples; the border continues beyond the grid.
+fn place(position: f64, samples: usize) -> GridPlace {
     let held = position.clamp(0.0, (samples - 1) as f64);
     let index = (held as usize).min(samples - 2);
-    (index, held - index as f64)
+    GridPlace { cell: index, part: held - index as f64 }
 }
 
 /// Cubic through the two middle samples with slopes from their neighbours.

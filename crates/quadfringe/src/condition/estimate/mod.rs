@@ -82,24 +82,40 @@ pub fn estimate_response(stacks: &[ArrayView3<'_, f32>]) -> Result<ResponseEstim
 
 /// Offset, exponent and knee of least cost; the knee is 0 unless it lowers the cost enough.
 fn fit(samples: &Samples, offset_max: f64) -> Response {
-    let cost = |[offset, exponent, knee]: [f64; 3]| {
-        let inside = (0.0..=offset_max).contains(&offset)
-            && EXPONENTS.contains(&exponent)
-            && (0.0..=KNEE_MAX).contains(&knee);
-        if inside { samples.cost(&response([offset, exponent, knee])) } else { f64::INFINITY }
+    let cost = |trial: Trial| {
+        if trial.is_inside(offset_max) { samples.cost(&trial.response()) } else { f64::INFINITY }
     };
+    let with_knee = |[offset, exponent, knee]: [f64; 3]| Trial { offset, exponent, knee };
+    let without = |[offset, exponent]: [f64; 2]| Trial { offset, exponent, knee: 0.0 };
     let (start, step) = ((offset_max / 2.0).min(0.01), (offset_max / 2.0).min(0.03));
-    let bent = minimise([start, 0.5, 0.5], [step, 0.15, 0.3], cost);
-    let plain = minimise([start, 0.5], [step, 0.15], |[o, e]| cost([o, e, 0.0]));
+    let bent = minimise([start, 0.5, 0.5], [step, 0.15, 0.3], |point| cost(with_knee(point)));
+    let plain = minimise([start, 0.5], [step, 0.15], |point| cost(without(point)));
     if plain.cost * (1.0 - KNEE_GAIN) <= bent.cost + KNEE_GAIN_RAD2 {
-        response([plain.point[0], plain.point[1], 0.0])
+        without(plain.point).response()
     } else {
-        response(bent.point)
+        with_knee(bent.point).response()
     }
 }
 
-fn response([offset, exponent, knee]: [f64; 3]) -> Response {
-    Response { offset: offset as f32, exponent: exponent as f32, knee: knee as f32 }
+/// A response that the search tries, in the double precision of the search.
+#[derive(Clone, Copy)]
+struct Trial {
+    offset: f64,
+    exponent: f64,
+    knee: f64,
+}
+
+impl Trial {
+    fn is_inside(self, offset_max: f64) -> bool {
+        (0.0..=offset_max).contains(&self.offset)
+            && EXPONENTS.contains(&self.exponent)
+            && (0.0..=KNEE_MAX).contains(&self.knee)
+    }
+
+    fn response(self) -> Response {
+        let Self { offset, exponent, knee } = self;
+        Response { offset: offset as f32, exponent: exponent as f32, knee: knee as f32 }
+    }
 }
 
 /// Greatest offset: the first percentile of the darkest steps, so that few pixels become negative.

@@ -16,7 +16,7 @@ pub(super) fn check_order(rms_rad: &[f64]) -> Result<()> {
     let mut sorted = rms_rad.to_vec();
     sorted.sort_by(f64::total_cmp);
     let median = sorted[sorted.len() / 2];
-    let (step, worst) = suspect(rms_rad);
+    let Suspect { step, rms_rad: worst } = suspect(rms_rad);
     let excess = (worst * worst - median * median).max(0.0).sqrt();
     if total <= RMS_MAX_RAD && (worst <= STEP_EXCESS * median || excess <= STEP_EXCESS_RAD) {
         return Ok(());
@@ -38,12 +38,18 @@ pub(super) fn disordered(disordered: usize, usable: usize) -> Error {
     Error::value("stack", ORDERED, found)
 }
 
-/// The step most likely to be out of place, which has a large error as first step and as partner, and its RMS error.
-fn suspect(rms_rad: &[f64]) -> (usize, f64) {
+/// The step most likely to be out of place, and the RMS error of its two-step phase.
+struct Suspect {
+    step: usize,
+    rms_rad: f64,
+}
+
+/// A step out of place has a large error as first step and as partner.
+fn suspect(rms_rad: &[f64]) -> Suspect {
     let n = rms_rad.len();
     let both = |s: usize| rms_rad[s].hypot(rms_rad[(s + n - n / 4) % n]);
     let step = (0..n).max_by(|&a, &b| both(a).total_cmp(&both(b)));
-    step.map_or((0, 0.0), |s| (s, rms_rad[s]))
+    step.map_or(Suspect { step: 0, rms_rad: 0.0 }, |step| Suspect { step, rms_rad: rms_rad[step] })
 }
 
 pub(super) fn root_mean_square(values: &[f64]) -> f64 {

@@ -11,7 +11,7 @@ mod edge;
 mod solve;
 mod texture;
 
-use super::cells::{CellMaps, CellWindow, CellWork, Grid, RowMaps};
+use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::local_fit::LocalFit;
 use super::model::{CellFringes, FringeRows, carriers, contrast};
 use super::params::photometry::{CELL, NEIGHBOURHOOD, OTHER_TEXTURE_MIN, OTHER_TEXTURE_NOISES, WINDOW};
@@ -33,7 +33,7 @@ pub(in crate::joint) struct Photometry {
     sums: CellMaps,
     choice: Choice,
     albedo: PixelAlbedo,
-    slots: Slots<(Rows, CellWork)>,
+    slots: Slots<TaskWork<Rows>>,
 }
 
 /// Working rows.

@@ -5,7 +5,7 @@
 //! with the brightness of its fringe. The mean runs over the surrounding pixels whose albedo agrees in all channels within the noise,
 //! so that no window mixes two albedos (a bilateral mean; Tomasi and Manduchi, ICCV 1998).
 
-use crate::joint::cells::{CellMaps, CellWork, Grid, RowMaps};
+use crate::joint::cells::{CellMaps, Grid, RowMaps, TaskWork};
 use crate::joint::model::carriers;
 use crate::joint::neighbours::binomial;
 use crate::joint::params::photometry::{
@@ -33,7 +33,7 @@ pub(super) struct PixelAlbedo {
     stride: usize,
     /// 1 and the contrast of every channel.
     contrasts: CellMaps,
-    slots: Slots<(Rows, CellWork)>,
+    slots: Slots<TaskWork<Rows>>,
 }
 
 impl Default for PixelAlbedo {
@@ -100,7 +100,7 @@ impl PixelAlbedo {
         red.zip(green).zip(blue.zip(infrared)).enumerate().for_each_init(
             || slots.take(),
             |slot, (block, ((red, green), (blue, infrared)))| {
-                let Rows { maps, losses, models, spare, ring, places } = &mut slot.0;
+                let Rows { maps, losses, models, spare, ring, places } = &mut slot.rows;
                 let mut out = [red, green, blue, infrared].map(|rows| rows.chunks_mut(grid.stride));
                 let (first, count) = ((block * rows) as isize, out[0].len());
                 ring.clear();

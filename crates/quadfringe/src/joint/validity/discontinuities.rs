@@ -1,4 +1,4 @@
-//! Step 8: pixels that their nearest neighbours make doubtful: order jumps of the absolute phase, and slivers.
+//! Step 8: pixels that their nearest neighbours make doubtful: order jumps of the absolute phase, and narrow strips.
 
 use crate::joint::cells::Grid;
 use crate::joint::params::validity::{AMBIGUOUS_RAD, AMBIGUOUS_REACH};
@@ -91,8 +91,8 @@ impl Near {
 }
 
 /// Keeps of `pixels` those with at least `least` like them, themselves included, among the 5 x 5 around; pixels beyond the border of
-/// the image count as present. This removes slivers near edges, where two surfaces share a pixel.
-pub(super) fn remove_slivers(grid: &Grid, least: u8, pixels: &[u8], out: &mut Vec<u8>) {
+/// the image count as present. This removes narrow strips near edges, where two surfaces share a pixel.
+pub(super) fn remove_narrow(grid: &Grid, least: u8, pixels: &[u8], out: &mut Vec<u8>) {
     out.resize(grid.pixels(), 0);
     out.par_chunks_mut(grid.stride).enumerate().for_each_init(Vec::new, |sums, (y, out)| {
         let near = Near { y, reach: 2 };
@@ -166,11 +166,11 @@ mod tests {
     }
 
     #[test]
-    fn slivers_go_and_straight_edges_stay() {
+    fn narrow_strips_go_and_straight_edges_stay() {
         let grid = Grid::new([20, 32], 4.0);
         let pixels: Vec<u8> = (0..grid.pixels()).map(|i| u8::from(i % 32 == 5 || i % 32 >= 20)).collect();
         let mut out = Vec::new();
-        remove_slivers(&grid, 10, &pixels, &mut out);
+        remove_narrow(&grid, 10, &pixels, &mut out);
         assert!(out[7 * 32 + 5] == 0 && out[7 * 32 + 20] == 1 && out[31] == 1);
     }
 }

@@ -6,7 +6,7 @@ mod propagate;
 mod regrow;
 mod support;
 
-use super::cells::{CellWork, Grid, RowMaps};
+use super::cells::{Grid, RowMaps, TaskWork};
 use super::neighbours::around;
 use super::orders::Orders;
 use super::params::validity::{
@@ -17,7 +17,7 @@ use super::scene::{PhaseMap, Scene};
 use crate::decode::output::hole_unless;
 use crate::parallel::slots::Slots;
 use components::{Components, SizeLimits};
-use discontinuities::{Discontinuities, remove_slivers};
+use discontinuities::{Discontinuities, remove_narrow};
 use multiversion::multiversion;
 use propagate::Propagation;
 use rayon::prelude::*;
@@ -58,7 +58,7 @@ pub(super) struct Validity {
     labelling: Components,
     regrow: Regrow,
     propagation: Propagation,
-    slots: Slots<(Rows, CellWork)>,
+    slots: Slots<TaskWork<Rows>>,
 }
 
 /// Working rows of one task.
@@ -85,7 +85,7 @@ impl Validity {
         self.discontinuities.mark(grid, map, &mut self.excluded);
         self.support.measure(scene, orders);
         self.check_pixels(scene, map, pixel, orders, limits, quality);
-        remove_slivers(grid, NEIGHBOURS_MIN, &self.components, &mut self.valid);
+        remove_narrow(grid, NEIGHBOURS_MIN, &self.components, &mut self.valid);
         let pixels = |side: f64| (side * scene.period_px).powi(2) as usize;
         let limits = SizeLimits { least: pixels(COMPONENT_SIDE), seed: pixels(SEED_SIDE) };
         self.labelling.remove_small(grid, map.phase, limits, &mut self.valid, &mut self.components);
@@ -122,7 +122,7 @@ impl Validity {
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (quality, (passed, consistent)))| {
-                let Rows { maps, sums, lead } = &mut slot.0;
+                let Rows { maps, sums, lead } = &mut slot.rows;
                 lead.clear();
                 for node in orders.verdicts(scene, y / grid.step) {
                     lead.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));

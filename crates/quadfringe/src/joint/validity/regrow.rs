@@ -2,7 +2,7 @@
 //!
 //! At an order jump one of two sides is wrong, or a pixel sees both surfaces, and the exclusion removes a strip from each side. Orders
 //! are known by cells, and one cell across the rim of a surface makes all of its pixels doubtful. A side that is wrong is mostly a
-//! sliver that is removed entirely. The remaining component takes back the pixels into which its phase continues straight and whose
+//! narrow strip that is removed entirely. The remaining component takes back the pixels into which its phase continues straight and whose
 //! intensities agree with that. Between two surfaces that meet, holes remain.
 
 use crate::joint::cells::Grid;
@@ -181,7 +181,7 @@ mod tests {
         let mut step = Step::new();
         let mut consistent = step.all();
         consistent[step.place(14, 7)] = 0;
-        // Next to the step a sliver has an order too few, so that no pixel is valid near the other side; below, column 13 bends.
+        // Next to the step a narrow strip has an order too few, so that no pixel is valid near the other side; below, column 13 bends.
         for y in 0..20 {
             for x in 17..19 {
                 let at = step.place(x, y);

@@ -1,6 +1,6 @@
 //! Step 8: support. The share of the neighbourhood whose evidence agrees with the order chosen there.
 
-use crate::joint::cells::{CellMaps, CellWork, Grid, RowMaps};
+use crate::joint::cells::{CellMaps, Grid, RowMaps, TaskWork};
 use crate::joint::orders::Orders;
 use crate::joint::params::validity::SUPPORT_WIDTH;
 use crate::joint::scene::Scene;
@@ -12,7 +12,7 @@ pub(super) struct Support {
     support: CellMaps,
     agreement: CellMaps,
     sums: CellMaps,
-    slots: Slots<((), CellWork)>,
+    slots: Slots<TaskWork<()>>,
 }
 
 impl Support {
