@@ -1,6 +1,6 @@
-//! Times of the whole of both methods and of each stage, on one shot of the virtual bench: 1024 x 768, 8 bit, 3 % noise.
-//! Beside them the floor: what no Fourier decoder does without. The ratios to it are taken in turns and printed at the
-//! end, so that they hold on a busy machine too.
+//! Times of the whole of both methods and of each stage, on one shot of the virtual bench: 1024 x 768, 8 bit, 3 %
+//! noise. With them the floor: the transforms and memory traffic that every Fourier decoder needs. The ratios to it are
+//! taken in turns and printed at the end, so that they hold on a busy machine too.
 //!
 //! ```text
 //! cargo bench -p quadfringe                      everything
@@ -66,8 +66,8 @@ impl Scene {
     }
 }
 
-/// What no Fourier decoder does without: every row of two channels forward and back through the transform, every byte of
-/// a shot read and every byte of its maps written once.
+/// What no Fourier decoder does without: every row of two channels forward and back through the transform, every byte
+/// of a shot read and every byte of its maps written once.
 struct Floor {
     forward: Arc<dyn RealToComplex<f32>>,
     inverse: Arc<dyn ComplexToReal<f32>>,

@@ -1,4 +1,4 @@
-//! The floor under a decoder that filters two channels along rows, beside both methods, on one shot: 1024 x 768, 8 bit.
+//! The floor under a decoder that filters two channels along rows, with both methods, on one shot: 1024 x 768, 8 bit.
 //!
 //! The floor reads every byte of the four images, takes two channels forward (real) and back (complex: the analytic
 //! signal that a phase needs) by Fourier transforms along rows, and writes as many bytes as a decoded shot has, eight

@@ -10,7 +10,7 @@ use std::f32::consts::PI;
 
 /// One fringe of the reference bench in camera pixels.
 const FRINGE_PX: f32 = 28.0;
-/// The infrared chip beside the visible one: parts of a pixel, a turn by a quarter of a degree, a scale.
+/// Offset of the infrared chip from the visible one: parts of a pixel, a turn by a quarter of a degree, a scale.
 const MISALIGNED: [[f64; 3]; 2] = [[1.002, -0.0044, 0.37], [0.0044, 1.002, -1.62]];
 
 fn mosaic(plain: &RenderOptions) -> RenderOptions {
@@ -70,7 +70,7 @@ fn a_mosaic_loses_no_orders_at_edges() {
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
     assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
-    // A pixel beside every shadow is left out, into which light is interpolated: five in a thousand.
+    // A pixel next to every shadow is left out, into which light is interpolated: five in a thousand.
     assert!(raw.returned_share() > full.returned_share() - 5e-3, "{raw:?}");
 }
 
@@ -142,7 +142,7 @@ fn registration_costs_neither_phase_nor_orders() {
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
         // Or so little that noise of a thousandth of full scale would hide it.
         assert!(rms[1] < (1.1 * rms[0]).max(2e-3), "{rms:?}");
-        // The published filter runs along whole rows, and errs beside what the infrared chip does not see.
+        // The published filter runs along whole rows, and errs near pixels that the infrared chip does not see.
         assert!(
             registered.wrong_orders() <= aligned.wrong_orders() + registered.lit / 20_000,
             "{registered:?}"

@@ -7,7 +7,7 @@ use quadfringe::Method;
 
 /// One fringe of the reference bench in camera pixels.
 const FRINGE_PX: f32 = 28.0;
-/// Share of returned pixels whose order may be wrong without noise: a few beside edges where R and B see the same phase
+/// Share of returned pixels whose order may be wrong without noise: a few near edges where R and B see the same phase
 /// on both sides, and a few that the lens blurs into a shadow, out of 780 thousand.
 const WRONG_MAX: f64 = 2e-5;
 

@@ -27,8 +27,8 @@ fn seen(code: &Encoding, shape: [usize; 2], source: impl Fn(usize, usize) -> f64
     })
 }
 
-/// Decode what is `seen` by both methods; every pixel more than `border` from the sides must have its column. Beside the border there is
-/// less than a fringe to know the background by.
+/// Decode what is `seen` by both methods; every pixel more than `border` from the sides must have its column. Near the border, less than
+/// a fringe determines the background.
 fn columns_come_back(
     numbers: [f64; 3],
     shape: [usize; 2],
@@ -70,7 +70,7 @@ fn every_size_and_period_gives_every_pixel_its_column() {
             for ((_, x), phase) in phase.indexed_iter().filter(|(_, phase)| phase.is_finite()) {
                 let column = if x < step { x } else { x + shift };
                 let error = f64::from(*phase) - TAU * numbers[0] * column as f64 / 912.0;
-                // A fringe from the sides; beside the step pixels of both sides are averaged.
+                // A fringe from the sides; next to the step, pixels of both sides are averaged.
                 let inside = usize::from(x.min(shape[1] - 1 - x) as f64 > 912.0 / numbers[0]);
                 let weight = if x.abs_diff(step) > 8 { 1.0 } else { 0.1 };
                 worst[inside] = worst[inside].max(weight * error.abs());

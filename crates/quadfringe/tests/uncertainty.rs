@@ -73,8 +73,8 @@ fn hold_shares(method: &Method, surfaces: &[&str], below: [f64; 3], above: [f64;
 }
 
 #[test]
-fn errors_of_the_best_method_are_as_large_as_it_says() {
-    // With little noise it is the method that is off: by less than is said on a plane, by more beside the shadows of the steps.
+fn errors_of_the_joint_method_are_as_large_as_it_says() {
+    // With little noise the error of the method dominates: below the uncertainty on a plane, above it near the shadows of steps.
     let surfaces = ["plane", "peaks", "steps", "sphere"];
     hold_shares(&Method::joint(), &surfaces, [0.04, 0.04, 0.03], [0.11, 0.035, 0.003]);
 }
@@ -136,7 +136,7 @@ fn promise(method: &Method, name: &str, light: (f64, f32, f64)) -> Promise {
 }
 
 #[test]
-fn wrong_orders_of_the_best_method_are_not_more_than_promised() {
+fn wrong_orders_of_the_joint_method_are_not_more_than_promised() {
     for name in ["plane", "steps", "sphere", "face"] {
         for light in [LIGHTS[0], LIGHTS[1], LIGHTS[2]] {
             let found = promise(&Method::joint(), name, light);

@@ -152,7 +152,7 @@ impl<'a, T: Sample> TryFrom<&'a [Array2<T>; 4]> for Shot<'a, T> {
     }
 }
 
-/// The same of a list of four images.
+/// A shot from a list of four images.
 impl<'a, T: Sample> TryFrom<&'a [Array2<T>]> for Shot<'a, T> {
     type Error = Error;
 

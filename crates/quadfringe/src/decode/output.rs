@@ -52,7 +52,7 @@ fn fit<D: Dimension>(map: &mut Array<f32, D>, shape: D) {
     }
 }
 
-/// The same of a map that is wanted or not.
+/// As [`fit`] for a map that may not be wanted.
 fn fit_if<D: Dimension>(wanted: bool, map: &mut Option<Array<f32, D>>, shape: D) {
     match map {
         Some(map) if wanted => fit(map, shape),

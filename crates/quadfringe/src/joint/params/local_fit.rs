@@ -19,7 +19,7 @@ pub const SAMPLED_ROWS: usize = 2;
 pub const RIDGE: f32 = 1e-3;
 
 /// Least contrast (amplitude over offset) of light from the projector. Larger: surfaces under room light are lost. Smaller: room
-/// light passes for fringes. Varied: no effect, but 4 % near edges of dim steps at x1.4.
+/// light counts as fringes. Varied: no effect, but 4 % near edges of dim steps at x1.4.
 pub const CONTRAST_MIN: f32 = 0.1;
 
 /// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 when B repeats R. Larger: surfaces along

@@ -53,7 +53,7 @@ pub const TEXTURED_SHARE: f32 = 0.03;
 pub const PHASE_TRUST: f32 = 0.08;
 
 /// The same when the channels saw the surface at different instants. Larger: the ripple of slow motion goes sooner, but motion
-/// that is too fast to be recognised passes for something slower. (`cargo test --test motion -- --nocapture`) Varied on shots of
+/// that is too fast to be measured appears slower than it is. (`cargo test --test motion -- --nocapture`) Varied on shots of
 /// planes that move by 100, 300 and 600 mm/s: phase RMS of the first 0.0059 -> 0.0066 and 0.0054 rad, of the second 0.023 ->
 /// 0.027 and 0.020 rad, wrong orders of the third 0.87 -> 0.74 and 0.95 %.
 pub const MOVING_PHASE_TRUST: f32 = 0.01;
