@@ -129,7 +129,7 @@ def test_read_shot_says_what_is_wrong(source: Any, reason: str) -> None:
 
 
 def test_read_shot_names_an_empty_folder(tmp_path: Path) -> None:
-    with pytest.raises(qf.InputError, match=rf"{tmp_path}: no image for ir"):
+    with pytest.raises(qf.InputError, match=rf"{tmp_path}: no image for ir, the infrared channel: add ir.png"):
         qf.read_shot(tmp_path)
     (tmp_path / "file.png").write_bytes(b"")
     with pytest.raises(qf.InputError, match="a file, not a folder"):
@@ -165,7 +165,12 @@ def test_a_plan_takes_what_a_person_types(shot_folder: Path, tmp_path: Path) -> 
         ({"response": "no.json"}, "no.json: No such file"),
         ({"response": "linear", "decode": {"response": {"red": {"exponent": 2.0}}}}, "give it once"),
         ({"decode": {"methd": "x"}}, "methd: this key is not known"),
-        ({"fringes": (36, 35)}, "numbers"),
+        ({"response": "liner"}, "^response: 1 problem"),
+        ({"fringes": (36, 35)}, "expected three fringe numbers"),
+        ({"fringes": 36}, "expected three fringe numbers, .* got 36"),
+        ({"projector_width_px": -1}, "projector_width_px: .* from 2 to 65536, got -1"),
+        ({"projector_width_px": 10**9}, "projector_width_px: .* got 1000000000"),
+        ({"decode": {"quality_min": 7}}, "quality_min: Input should be less than 1"),
     ],
 )
 def test_a_plan_names_the_argument_at_fault(arguments: dict[str, Any], reason: str) -> None:

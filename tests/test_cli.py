@@ -108,6 +108,22 @@ def test_a_calibrated_decode_has_millimetres(small_bench: Path, tmp_path: Path) 
         assert "projector" in json.loads(str(stored["calibration"]))
 
 
+def test_a_folder_is_as_good_as_four_files(small_bench: Path, tmp_path: Path) -> None:
+    options = [*FRINGES, "--method", "published", "--linear", "--out"]
+    for source, out in (([small_bench], "folder.npz"), (files_of(small_bench), "files.npz")):
+        result = run("decode", *source, *options, tmp_path / out)
+        assert result.exit_code == 0, result.output
+    with np.load(tmp_path / "folder.npz") as first, np.load(tmp_path / "files.npz") as second:
+        np.testing.assert_array_equal(first["phase_rad"], second["phase_rad"])
+
+
+def test_a_folder_is_given_alone(small_bench: Path, tmp_path: Path) -> None:
+    out = ["--out", tmp_path / "x.npz"]
+    result = run("decode", small_bench, "--ir", small_bench / "ir.png", *FRINGES, *out)
+    refused(result, 2, "leave out --ir, or the folder")
+    refused(run("decode", tmp_path, *FRINGES, *out), 2, "no image for ir, the infrared channel: add ir.png")
+
+
 def test_a_colour_file_is_as_good_as_three(small_bench: Path, tmp_path: Path) -> None:
     rgb = np.stack([read_image(small_bench / f"{name}.png") for name in ("red", "green", "blue")], axis=2)
     write_image(tmp_path / "rgb.png", rgb)

@@ -225,9 +225,8 @@ def test_the_search_needs_both_projectors_and_says_so() -> None:
     for known in (None, single):
         with pytest.raises(InputError, match="both projectors"):
             Decoder(shot, Plan(912, calibration=known, decode=searched))
-    joint = DecodeConfig(method="joint", unwrapping="pair")
-    with pytest.raises(ValueError, match="option of the published method, and the method is joint"):
-        Decoder(shot, Plan(912, calibration=pair.calibration, decode=joint))
+    with pytest.raises(ValueError, match=r'needs method = "published", and the method is joint'):
+        DecodeConfig(method="joint", unwrapping="pair")
     with pytest.raises(ValueError, match="depth_range_mm"):
         DecodeConfig(depth_range_mm=(600.0, 900.0))
 

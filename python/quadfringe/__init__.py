@@ -25,6 +25,7 @@ if TYPE_CHECKING:
         decoding,
         devices,
         doctor,
+        encoding,
         errors,
         evaluation,
         io,
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
         scanner,
         view,
     )
-    from quadfringe._core import __version__, check_code, optimum, pattern
+    from quadfringe._core import __version__
     from quadfringe.config import DecodeConfig, Device, Fringes, Response, SceneConfig, SystemConfig
     from quadfringe.data import (
         BayerShot,
@@ -46,6 +47,7 @@ if TYPE_CHECKING:
     )
     from quadfringe.decoding import Decoder, Plan, decode, estimate_response, stages
     from quadfringe.devices import open_camera, open_projector
+    from quadfringe.encoding import check_code, optimum, pattern
     from quadfringe.errors import (
         BatchError,
         CalibrationError,
@@ -110,7 +112,8 @@ __all__ = [
 ]
 
 _NAMES_IN = {
-    "_core": ("__version__", "check_code", "optimum", "pattern"),
+    "_core": ("__version__",),
+    "encoding": ("check_code", "optimum", "pattern"),
     "config": ("DecodeConfig", "Device", "Fringes", "Response", "SceneConfig", "SystemConfig"),
     "data": (
         "BayerShot",
@@ -135,6 +138,7 @@ _PACKAGES = (
     "decoding",
     "devices",
     "doctor",
+    "encoding",
     "errors",
     "evaluation",
     "io",

@@ -47,6 +47,14 @@ class Bits(StrEnum):
 ResultOption = Annotated[
     Path, typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply or .tif.")
 ]
+FolderArgument = Annotated[
+    Path | None,
+    typer.Argument(
+        metavar="[FOLDER]",
+        help="Folder with red.png, green.png, blue.png and ir.png (or rgb.png and ir.png; with --bayer raw.png and "
+        "ir.png), in place of the options of single images.",
+    ),
+]
 ImageOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Image of this channel: PNG, TIFF or BMP, 8 or 16 bit.")
 ]
@@ -58,7 +66,8 @@ RawOption = Annotated[
     typer.Option(metavar="FILE", help="Raw Bayer mosaic in place of --red, --green and --blue; needs --bayer."),
 ]
 BayerOption = Annotated[
-    Bayer | None, typer.Option(help="Filter colours of the first 2 x 2 pixels of --raw, row by row.")
+    Bayer | None,
+    typer.Option(help="Filter colours of the first 2 x 2 pixels of --raw, or of raw.png in FOLDER, row by row."),
 ]
 ResponseOption = Annotated[
     str | None,
@@ -105,6 +114,7 @@ def decode(
     fringes: Fringes3,
     projector_width: ColumnsOption,
     out: ResultOption,
+    folder: FolderArgument = None,
     red: ImageOption = None,
     green: ImageOption = None,
     blue: ImageOption = None,
@@ -138,7 +148,7 @@ def decode(
         checked(DecodeConfig, settings, "options"),
     )
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    shape = decoding.decode(_shot(files, bayer, bits), plan)
+    shape = decoding.decode(_shot(folder, files, bayer, bits), plan)
     _save(shape, out, json)
 
 
@@ -161,12 +171,16 @@ def _response(response: str | None, linear: bool) -> str:
     return "linear" if linear else response or "auto"
 
 
-def _shot(files: Mapping[str, Path | None], bayer: Bayer | None, bits: Bits | None) -> AnyShot:
-    """Read the shot from separate images, a colour image, or a raw mosaic."""
+def _shot(folder: Path | None, files: Mapping[str, Path | None], bayer: Bayer | None, bits: Bits | None) -> AnyShot:
+    """Read the shot from a folder, or from separate images, a colour image, or a raw mosaic."""
     from quadfringe.data import read_shot
+    from quadfringe.errors import InputError
 
+    given = [f"--{name}" for name, path in files.items() if path is not None]
+    if folder is not None and given:
+        raise InputError(f"{folder}: a folder holds all images; leave out {', '.join(given)}, or the folder")
     pattern: BayerPattern | None = None if bayer is None else bayer.value
-    return read_shot(files, None if bits is None else int(bits), bayer=pattern)
+    return read_shot(files if folder is None else folder, None if bits is None else int(bits), bayer=pattern)
 
 
 def _save(shape: Shape, out: Path, json: Path | None) -> None:

@@ -36,8 +36,11 @@ class _ReportingMeta(ModelMetaclass):
     if not TYPE_CHECKING:  # type checkers go on to read the fields as arguments
 
         def __call__(cls, *args, **values):  # noqa: N805 - that of a metaclass
+            if args:
+                first = next(iter(cls.model_fields), "field")
+                raise ConfigError(f"{cls.__name__}: expected fields by name, such as {first}=..., got {brief(args[0])}")
             try:
-                return super().__call__(*args, **values)
+                return super().__call__(**values)
             except ValidationError as error:
                 raise ConfigError(_report(cls, error, cls.__name__)) from error
 
@@ -116,7 +119,7 @@ def _reason(model: type[BaseModel], problem: Any) -> str:
         return f"this key is not known{_suggestion(model, parents, str(key))}"
     if problem["type"] == "missing":
         return "this key is required and missing"
-    return f"{problem['msg']}, got {shortened(repr(problem['input']))}"
+    return f"{problem['msg'].removeprefix('Value error, ')}, got {shortened(repr(problem['input']))}"
 
 
 def _suggestion(model: type[BaseModel], parents: list[int | str], key: str) -> str:

@@ -78,10 +78,19 @@ ResponseSetting = Annotated[
 ResponseChoice = Response | Literal["auto", "linear"]  # a setting whose file has been read
 
 
+def _three(numbers: Any) -> Any:
+    if isinstance(numbers, (str, bytes)) or not isinstance(numbers, Iterable):
+        raise ValueError("expected three fringe numbers, such as (36, 35, 30)")
+    found = tuple(numbers)
+    if len(found) != 3:
+        raise ValueError("expected three fringe numbers, such as (36, 35, 30)")
+    return found
+
+
 class Fringes(Model):
     """What the projectors show. The kernel checks that the fringe numbers tell all columns apart."""
 
-    numbers: tuple[float, float, float] = Field(
+    numbers: Annotated[tuple[float, float, float], BeforeValidator(_three)] = Field(
         default=(36.0, 35.0, 30.0),
         description="Fringes over the full projector width: of red and blue, of green, of infrared.",
     )
@@ -123,9 +132,10 @@ class DecodeConfig(Model):
         default=None,
         description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels.",
     )
-    quality_min: NotNegative | None = Field(
+    quality_min: Annotated[float, Field(ge=0, lt=1)] | None = Field(
         default=None,
-        description="Least quality (0 to 1) of a valid pixel. Raise it for fewer wrong orders and fewer pixels.",
+        description="Least quality of a valid pixel, from 0 to below 1. Raise it for fewer wrong orders and fewer "
+        "pixels.",
     )
     channel_instants_us: Row4 | None = Field(
         default=None,
@@ -135,6 +145,21 @@ class DecodeConfig(Model):
     threads: Annotated[int, Field(gt=0)] | None = Field(
         default=None, description="Threads of one decoder. Absent: as many as the machine has cores."
     )
+
+    @model_validator(mode="after")
+    def _method_has_the_options(self) -> DecodeConfig:
+        if self.unwrapping == "pair" and self.method != "published":
+            got = "the default, joint" if self.method is None else self.method
+            raise ValueError(
+                f'unwrapping = "pair" needs method = "published", and the method is {got}: '
+                "change the method, or leave unwrapping out"
+            )
+        if self.channel_instants_us is not None and self.method == "published":
+            raise ValueError(
+                'channel_instants_us needs method = "joint", and the method is published: '
+                "change the method, or leave channel_instants_us out"
+            )
+        return self
 
     @model_validator(mode="after")
     def _range_is_searched(self) -> DecodeConfig:

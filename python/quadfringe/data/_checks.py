@@ -9,7 +9,7 @@ import numpy as np
 
 from quadfringe.errors import InputError
 
-__all__ = ["check_full_scale", "check_images", "check_maps"]
+__all__ = ["check_full_scale", "check_images", "check_maps", "check_stamp"]
 
 DTYPES = ("uint8", "uint16", "float32")
 
@@ -44,6 +44,15 @@ def check_maps(maps: Mapping[str, Any]) -> None:
             got = type(values).__name__ if shape is None else f"an array of shape {shape}"
             raise InputError(f"{name}: expected an array {'(H, W, 3)' if last else '(H, W)'}, got {got}")
     _check_equal("size", {name: f"{values.shape[1]} x {values.shape[0]}" for name, values in maps.items()})
+
+
+def check_stamp(number: Any, time_us: Any, device: Any) -> None:
+    """Raise `InputError` unless number and time are integers and the device is a name."""
+    for name, value in (("id", number), ("time_us", time_us)):
+        if not isinstance(value, (int, np.integer)):
+            raise InputError(f"{name}: expected an integer, got {value!r}")
+    if not isinstance(device, str):
+        raise InputError(f"device: expected the name of a camera, got {device!r}")
 
 
 def _check_equal(what: str, found: Mapping[str, str]) -> None:

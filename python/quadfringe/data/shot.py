@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import BayerPattern
-from quadfringe.data._checks import check_full_scale, check_images, check_maps
+from quadfringe.data._checks import check_full_scale, check_images, check_maps, check_stamp
 from quadfringe.errors import InputError
 from quadfringe.io.images import full_scale
 
@@ -72,6 +72,9 @@ class Stamp:
     time_us: int
     device: str
     frames: Mapping[str, FrameStamp] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        check_stamp(self.id, self.time_us, self.device)
 
 
 class Stamped:

@@ -47,7 +47,7 @@ def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | 
     """
     given = _files_of(source, bayer)
     try:
-        _check_names(given, bayer)
+        _check_names(given, bayer, folder=not isinstance(source, Mapping))
     except InputError as error:
         raise error if isinstance(source, Mapping) else InputError(f"{source}: {error}") from None
     images = _read(given)
@@ -84,7 +84,7 @@ def _image_of(folder: Path, name: str) -> Path | None:
     return found[0] if found else None
 
 
-def _check_names(given: Mapping[str, Path], bayer: BayerPattern | None) -> None:
+def _check_names(given: Mapping[str, Path], bayer: BayerPattern | None, *, folder: bool) -> None:
     """Raise unless the images make a shot, and no colour is given twice."""
     colours = [name for name in (*COLOURS, "rgb") if name in given]
     if bayer is not None and bayer not in get_args(BayerPattern):
@@ -94,14 +94,19 @@ def _check_names(given: Mapping[str, Path], bayer: BayerPattern | None) -> None:
     if bayer is not None and "raw" not in given:
         raise InputError("bayer needs the image raw, the mosaic of the Bayer chip, in place of the colours")
     if "ir" not in given:
-        raise InputError("no image for ir, the infrared channel: give ir")
+        raise InputError(f"no image for ir, the infrared channel: {_advice('ir', folder)}")
     if "raw" in given and colours:
         raise InputError(f"raw already holds red, green and blue; leave out {', '.join(colours)}")
     if "rgb" in given and len(colours) > 1:
         raise InputError(f"rgb already holds red, green and blue; leave out {', '.join(colours[:-1])}")
     if not {"raw", "rgb"} & given.keys() and len(colours) < 3:
         missing = ", ".join(name for name in COLOURS if name not in given)
-        raise InputError(f"no image for {missing}: give {missing}, or one colour image rgb")
+        raise InputError(f"no image for {missing}: {_advice(missing, folder)}, or one colour image rgb")
+
+
+def _advice(missing: str, folder: bool) -> str:
+    """Say what to do about images that are missing: add files to a folder, or give them by name."""
+    return f"add {missing.replace(',', '.png,')}.png" if folder else f"give {missing}"
 
 
 def _read(given: Mapping[str, Path]) -> dict[str, NDArray[Any]]:

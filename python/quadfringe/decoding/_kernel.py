@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Literal
 
 from quadfringe import _core
-from quadfringe.config import Response
+from quadfringe.config import Response, brief
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot, conditioning, core_device
 from quadfringe.decoding.plan import Plan
 from quadfringe.errors import InputError
 
-__all__ = ["KernelDecoder", "Size", "size_of"]
+__all__ = ["KernelDecoder", "Size", "check_shot", "size_of"]
 
 Size = tuple[int, int]
 
@@ -39,6 +40,11 @@ class KernelDecoder:
             return self.plan.response
         calibration = self.plan.calibration
         return "linear" if calibration is None or calibration.response is None else calibration.response
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Settings in force, with the defaults of the kernel."""
+        return dict(self._described["decode"])
 
     def with_response(self, response: Response | Literal["linear"]) -> KernelDecoder:
         """Give a decoder of the same plan with a response that was estimated from shots."""
@@ -89,6 +95,14 @@ class KernelDecoder:
         }
 
 
+def check_shot(shot: object) -> None:
+    """Raise `InputError` unless this is a shot, and say how to get one."""
+    if isinstance(shot, (str, Path)):
+        raise InputError(f"expected a shot, got the path {str(shot)!r}; read it with qf.read_shot")
+    if not isinstance(shot, (Shot, BayerShot)):
+        raise InputError(f"expected a shot, got {brief(shot)}; make one with qf.read_shot, qf.Shot or Scanner.grab")
+
+
 def size_of(like: AnyShot | Size, full_scale: float | None) -> tuple[Size, float | None]:
     """Give rows and columns, and the full scale if it is known."""
     if isinstance(like, (Shot, BayerShot)):
@@ -97,7 +111,8 @@ def size_of(like: AnyShot | Size, full_scale: float | None) -> tuple[Size, float
     try:
         rows, columns = (int(length) for length in like)
     except (TypeError, ValueError):
-        raise InputError(f"expected a shot or a size (rows, columns), got {like!r}") from None
+        advice = "; read it with qf.read_shot" if isinstance(like, (str, Path)) else ""
+        raise InputError(f"expected a shot or a size (rows, columns), got {brief(like)}{advice}") from None
     return (rows, columns), full_scale
 
 

@@ -6,7 +6,7 @@ from threading import Lock
 
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
-from quadfringe.decoding._kernel import KernelDecoder, Size, size_of
+from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
 from quadfringe.decoding.plan import Plan, stated_response
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened
 from quadfringe.decoding.verdict import judge
@@ -46,6 +46,11 @@ class Decoder:
         self._tried = 0
         self._estimating = Lock()
 
+    def __repr__(self) -> str:
+        method = self._kernel.settings["method"]
+        response = self.response if isinstance(self.response, str) else "known"
+        return f"Decoder({self._size[1]} x {self._size[0]}, method {method}, response {response})"
+
     @property
     def response(self) -> ResponseChoice:
         """The response that is corrected; "linear" for none, "auto" as long as no sound shot was decoded."""
@@ -78,6 +83,7 @@ class Decoder:
         return shape
 
     def _check(self, shot: AnyShot) -> None:
+        check_shot(shot)
         planned = self._size, self._full_scale or float(full_scale(shot.ir))
         if (shot.ir.shape, shot.full_scale_value) != planned:
             (rows, columns), full = planned
@@ -98,4 +104,5 @@ def decode(shot: AnyShot, plan: Plan) -> Shape:
     `config` of the shape holds the settings in force, the response that was corrected, and where that comes from.
     Errors as `Decoder`.
     """
+    check_shot(shot)
     return Decoder(shot, plan).decode(shot)

@@ -15,6 +15,9 @@ from quadfringe.errors import InputError
 
 __all__ = ["Plan", "calibration_of", "response_of", "stated_response"]
 
+# Column coordinates are float32: up to 2^16 they are exact to 1/256 of a column. No projector has as many.
+COLUMNS_MAX = 65536
+
 
 @dataclass(frozen=True, init=False, repr=False)
 class Plan:
@@ -73,14 +76,18 @@ class Plan:
 
 
 def _columns(width: Any) -> int:
+    wanted = "projector_width_px: expected a number of columns, such as 912"
     try:
-        return index(width)
+        columns = index(width)
     except TypeError:
-        raise InputError(f"projector_width_px: expected a number of columns, such as 912, got {width!r}") from None
+        raise InputError(f"{wanted}, got {width!r}") from None
+    if not 2 <= columns <= COLUMNS_MAX:
+        raise InputError(f"{wanted}, from 2 to {COLUMNS_MAX}, got {columns}")
+    return columns
 
 
 def _fringes(fringes: Fringes | Sequence[float]) -> Fringes:
-    return fringes if isinstance(fringes, Fringes) else Fringes(numbers=tuple(fringes))
+    return fringes if isinstance(fringes, Fringes) else checked(Fringes, {"numbers": fringes}, "fringes")
 
 
 def calibration_of(calibration: Any) -> Calibration | None:

@@ -46,7 +46,7 @@ from quadfringe._core import (
     unwrap,
     wrong_order_probability,
 )
-from quadfringe.config import ChannelResponse, Response, ResponseChoice
+from quadfringe.config import ChannelResponse, Fringes, Response, ResponseChoice
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.decoding.plan import calibration_of, response_of, stated_response
 from quadfringe.errors import DecodeError, InputError
@@ -171,11 +171,11 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
 
     The fringe period comes from the red image. Raises `DecodeError` when no fringes cross the rows.
     """
+    first, second, third = _three(fringe_numbers)
     red, blue = light["red"], light["blue"]
     period_px = row_period(red)
     if not np.isfinite(carrier(red)[0]):
         raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
-    first, second, third = fringe_numbers
     green_px, infrared_px = period_px * first / second, period_px * first / third
     rows, columns = block_size(green_px, infrared_px, red.shape[1])
     red_means, red_level = _fringes(red, rows, 1, period_px)
@@ -228,6 +228,10 @@ def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tupl
     wrapped = demodulate(light, fringe_numbers)
     green_rad, infrared_rad = (_wrap(wrapped.repeated(phase)) for phase in (wrapped.green_rad, wrapped.infrared_rad))
     return wrapped.phase_rad, green_rad, infrared_rad
+
+
+def _three(fringe_numbers: FringeNumbers) -> FringeNumbers:
+    return Fringes.model_validate({"numbers": fringe_numbers}).numbers
 
 
 def _wrap(phase_rad: Map) -> Map:

@@ -17,7 +17,7 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, load_system
+from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, load_system, shortened
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.plan import stated_response
@@ -52,6 +52,10 @@ class Scanner:
         self._planning = Lock()
         self._live: LiveStream | None = None
         self._use(config)
+
+    def __repr__(self) -> str:
+        known = "uncalibrated" if self.calibration is None else "calibrated"
+        return shortened(f"Scanner({self.camera!r}, {self.projector!r}, {known})")
 
     @property
     def projector_width_px(self) -> int:
@@ -196,8 +200,10 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
         config = SystemConfig()
     elif isinstance(system, SystemConfig):
         config = system
-    else:
+    elif isinstance(system, (str, Path)):
         config = load_system(system)
+    else:
+        raise InputError(f"expected a system file (.toml), its folder, or a SystemConfig, got {brief(system)}")
     # All files are read before a device is opened: a device that an error leaves open stays busy.
     calibration = None if config.calibration is None else Calibration.load(config.calibration)
     devices = open_devices(_with_response_read(config))

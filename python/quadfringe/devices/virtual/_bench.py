@@ -67,6 +67,16 @@ class VirtualBench:
         self.capped = False  # whether the lens is covered
         self._infrared_image: NDArray[np.float32] | None = None
 
+    @property
+    def camera_size_px(self) -> tuple[int, int]:
+        """Width and height of the images of the camera."""
+        return self._bench.camera.width, self._bench.camera.height
+
+    @property
+    def projector_size_px(self) -> tuple[int, int]:
+        """Width and height of the visible projector."""
+        return self._bench.visible.width, self._bench.visible.height
+
     def resolved(self, config: SystemConfig) -> SystemConfig:
         """Return the config with every device written out."""
         devices = {"camera": self._bench.camera, "projector": self._bench.visible, "infrared": self._bench.infrared}

@@ -26,6 +26,10 @@ class VirtualProjector:
         self._bench = bench
         self._calibration = calibration
 
+    def __repr__(self) -> str:
+        width, height = self._bench.projector_size_px
+        return f"VirtualProjector({width} x {height})"
+
     def show(self, light: Light) -> None:
         """Project this light; raises ValueError for fringe numbers that are ambiguous over the projector width."""
         if isinstance(light, Fringes):
@@ -55,6 +59,10 @@ class VirtualCamera:
         self._rate_hz = (settings or VirtualConfig()).frame_rate_hz
         self._exposures = 0
         self._closed = False
+
+    def __repr__(self) -> str:
+        width, height = self._bench.camera_size_px
+        return f"VirtualCamera({width} x {height})"
 
     @property
     def bench(self) -> VirtualBench:

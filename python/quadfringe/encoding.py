@@ -1,0 +1,71 @@
+"""Fringe numbers and ideal images of the encoding, with arguments that are checked before the kernel takes them.
+
+>>> import quadfringe as qf
+>>> numbers = qf.optimum(36, 912)
+>>> numbers, qf.pattern("red", numbers, 912, 2).shape
+([36.0, 35.0, 30.0], (2, 912))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from operator import index
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe import _core
+from quadfringe.config import Fringes
+from quadfringe.errors import InputError
+
+__all__ = ["check_code", "optimum", "pattern"]
+
+CHANNELS = {"red": "R", "green": "G", "blue": "B", "ir": "IR"}
+SIZE_MAX = 65536  # pixels along one side of an image; beyond it an image would not fit into memory
+
+
+def optimum(n: int, projector_width: int) -> list[float]:
+    """Give the fringe numbers N, N - 1, N - sqrt(N) of the optimum three-frequency selection.
+
+    ValueError unless N is a perfect square that fits `projector_width` columns.
+    """
+    return list(_core.optimum(_whole("n", n), _whole("projector_width", projector_width)))
+
+
+def check_code(fringe_numbers: Sequence[float], projector_width: int) -> float:
+    """Give the ambiguity margin in rad; ValueError when the joint range does not cover the projector."""
+    return _core.check_code(_numbers(fringe_numbers), _whole("projector_width", projector_width))
+
+
+def pattern(
+    channel: str,
+    fringe_numbers: Sequence[float],
+    width: int,
+    height: int,
+    *,
+    layout: Literal["regular", "diamond"] = "regular",
+) -> NDArray[np.float32]:
+    """Give the ideal image of a channel, (height, width) float32, linear light from 0 to 1.
+
+    `channel` is "red", "green", "blue" or "ir", or R, G, B or IR. ValueError for other names and wrong sizes.
+    """
+    letters = CHANNELS.get(channel, channel)
+    if letters not in CHANNELS.values():
+        raise InputError(f"channel: expected one of {', '.join(CHANNELS)}, or R, G, B, IR, got {channel!r}")
+    size = _whole("width", width), _whole("height", height)
+    return _core.pattern(letters, _numbers(fringe_numbers), *size, layout=layout)
+
+
+def _numbers(given: Any) -> tuple[float, float, float]:
+    return Fringes.model_validate({"numbers": given}).numbers
+
+
+def _whole(name: str, value: Any) -> int:
+    try:
+        number = index(value)
+    except TypeError:
+        raise InputError(f"{name}: expected a whole number, got {value!r}") from None
+    if not 1 <= number <= SIZE_MAX:
+        raise InputError(f"{name}: expected a number from 1 to {SIZE_MAX}, got {number}")
+    return number
