@@ -57,7 +57,7 @@ def main() -> None:
     parser.add_argument("--poses", type=int, default=12)
     parser.add_argument("--steps", type=int, default=8)
     parser.add_argument("--camera-scale", type=float, default=1.0, help="0.5: a camera of half the size, quicker")
-    parser.add_argument("--seeds", type=int, default=1, help="calibrations, each with noise and poses of its own")
+    parser.add_argument("--seeds", type=int, default=1, help="calibrations, each with new noise and poses")
     given = parser.parse_args()
     settings = (given.layout, given.camera_scale, given.poses, given.steps)
     figures = over_seeds(*settings, given.seeds) | light_figures()

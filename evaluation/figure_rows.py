@@ -229,7 +229,7 @@ RECORDING = (
     ("kills_shots_lost", "shots reported as written that 20 kill -9 took away", "0"),
 )
 LIVE = (
-    ("live_client_clouds_per_s", "live view beside decoding: full-resolution clouds/s to a client", "10"),
+    ("live_client_clouds_per_s", "live view while decoding: full-resolution clouds/s to a client", "10"),
     ("live_client_memory_growth_mb", "memory of the server, last third against the middle one, MB", "flat"),
 )
 BROWSER = tuple(

@@ -148,3 +148,4 @@ def test_a_result_carries_the_settings_in_force() -> None:
     assert settings["method"] == "joint"
     assert 0 < settings["quality_min"] < 1
     assert settings["period_px"] is None
+    assert settings["modulation_min"] == 0.02, "written with the digits that a person types"

@@ -47,7 +47,7 @@ class ProjectorConfig(Model):
     hdmi: HdmiRoute | None = Field(default=None, description="Patterns by HDMI.")
     flash: FlashRoute | None = Field(default=None, description="Patterns from flash.")
     light: Literal["evm", "external"] = Field(
-        default="evm", description='"evm" is the light engine of TI; "external" is another, with limits of its own.'
+        default="evm", description='"evm" is the light engine of TI; "external" is another, with other limits.'
     )
     leds: Literal["r", "g", "b", "rg", "rb", "gb", "rgb"] = Field(
         default="rgb", description="LEDs that light a grey pattern; a colour pattern has one LED for each colour."

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
+
+import numpy as np
 
 from quadfringe import _core
 from quadfringe.config import Response, brief
@@ -31,7 +34,9 @@ class KernelDecoder:
         _check_size(size, plan)
         self._size, self._full_scale, self.plan = size, full_scale, plan
         self._idle = idle or [self._planned()]
-        self._described = plan.described() | self._response_described(source) | {"decode": self._idle[0].settings()}
+        self._described = (
+            plan.described() | self._response_described(source) | {"decode": _rounded(self._idle[0].settings())}
+        )
 
     @property
     def response(self) -> Response | Literal["linear"]:
@@ -93,6 +98,14 @@ class KernelDecoder:
             "response": None if response == "linear" else response.model_dump(include=set(Response.model_fields)),
             "response_from": source or given,
         }
+
+
+def _rounded(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Give the settings with the shortest decimals of the kernel's float32: 0.02 in place of 0.0199999995529..."""
+    return {
+        name: float(str(np.float32(value))) if isinstance(value, float) and float(np.float32(value)) == value else value
+        for name, value in settings.items()
+    }
 
 
 def check_shot(shot: object) -> None:

@@ -20,7 +20,7 @@ class Decoder:
     """Decodes shots of one size; planned and checked when made. Every shot is judged by the same rule.
 
     `like` is a shot, or a size (rows, columns); `full_scale` is that of the shot, or with a size the largest value of
-    the dtype unless it is given. Threads may decode at the same time: each then has buffers of its own.
+    the dtype unless it is given. Threads may decode at the same time: each then uses separate buffers.
 
     With `plan.response` "auto" and no response in the calibration, the response is estimated from the first sound
     shots: each of up to three shots is decoded with the estimate from itself, the first estimate that shows a response

@@ -24,8 +24,8 @@ STEPS = 12
 
 def data_folder() -> Path:
     """Give the folder of captures and renders: QUADFRINGE_DATA, or shared/data next to the checkout."""
-    beside = ROOT.parent / "shared" / "data"
-    return Path(os.environ.get("QUADFRINGE_DATA", beside))
+    default = ROOT.parent / "shared" / "data"
+    return Path(os.environ.get("QUADFRINGE_DATA", default))
 
 
 def capture(data: Path, name: str) -> Scene:
