@@ -25,7 +25,6 @@ if TYPE_CHECKING:
         decoding,
         devices,
         doctor,
-        encoding,
         errors,
         evaluation,
         io,
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
     )
     from quadfringe._core import __version__
     from quadfringe.config import DecodeConfig, Device, Fringes, Response, SceneConfig, SystemConfig
+    from quadfringe.config.encoding import check_code, optimum, pattern
     from quadfringe.data import (
         BayerShot,
         Calibration,
@@ -47,7 +47,6 @@ if TYPE_CHECKING:
     )
     from quadfringe.decoding import Decoder, Plan, decode, estimate_response, stages
     from quadfringe.devices import open_camera, open_projector
-    from quadfringe.encoding import check_code, optimum, pattern
     from quadfringe.errors import (
         BatchError,
         CalibrationError,
@@ -113,7 +112,7 @@ __all__ = [
 
 _NAMES_IN = {
     "_core": ("__version__",),
-    "encoding": ("check_code", "optimum", "pattern"),
+    "config.encoding": ("check_code", "optimum", "pattern"),
     "config": ("DecodeConfig", "Device", "Fringes", "Response", "SceneConfig", "SystemConfig"),
     "data": (
         "BayerShot",
@@ -138,7 +137,6 @@ _PACKAGES = (
     "decoding",
     "devices",
     "doctor",
-    "encoding",
     "errors",
     "evaluation",
     "io",

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config import Fringes
+from quadfringe.config.decode import Fringes
 from quadfringe.errors import InputError
 
 __all__ = ["check_code", "optimum", "pattern"]
