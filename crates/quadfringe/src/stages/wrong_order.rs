@@ -27,7 +27,7 @@ const MEDIAN_OF_NORMAL: f32 = 0.6745;
 /// let mut quality = Array2::from_shape_fn((32, 90), |(y, x)| 0.8 + 0.01 * ((7 * x + 3 * y) % 20) as f32);
 /// quality[[5, 6]] = 0.0; // a beat half way between two orders
 /// let probability = wrong_order_probability(quality.view());
-/// assert!(probability[[5, 6]] > 0.4 && probability[[5, 7]] < 1e-3);
+/// assert!(probability[[5, 6]] > 0.9 && probability[[5, 7]] < 0.01);
 /// ```
 #[must_use]
 pub fn wrong_order_probability(quality: ArrayView2<'_, f32>) -> Array2<f32> {
