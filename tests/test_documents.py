@@ -1,4 +1,7 @@
-"""The documents: links lead somewhere, commands exist (those quoted in the code too), decision records are complete."""
+"""The documents: links lead somewhere, commands exist (those quoted in the code too), decision records are complete.
+
+Figures that docs/method/approximations.md takes from the table of the README equal those of the table.
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,70 @@ LINES_MAX = 30
 FILE = re.compile(r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+|[\w-]+/[\w./-]+\.(?:py|rs))")
 FOLDERS = (ROOT, ROOT / "python" / "quadfringe", ROOT / "crates" / "quadfringe" / "src")
 MAKEFILE = (ROOT / "Makefile").read_text()
+
+APPROXIMATIONS = (ROOT / "docs" / "method" / "approximations.md").read_text()
+README = (ROOT / "README.md").read_text()
+# A figure of the page, as {} in its words, and its row of the README table. "A > B" is the first row B after the row A.
+# "below {}" is a limit; words without {} state that the figure is 0.
+FIGURES = (
+    ("{} % of full scale of stray light", "gamma 2.2, crosstalk 15 % each way: stray light left, % of full scale"),
+    ("levels within {} % RMS", "the same: RMS of the levels, % of full scale"),
+    ("fringes of 20 px: {} rad RMS", "raw mosaic, fringes of 20 px: phase RMS, rad"),
+    ("(bilinear {})", "raw mosaic, fringes of 20 px: phase RMS, rad > the same mosaic interpolated by OpenCV, rad"),
+    ("of 10 px: {} rad", "raw mosaic, fringes of 10 px: phase RMS, rad"),
+    ("(bilinear {} rad)", "raw mosaic, fringes of 10 px: phase RMS, rad > the same mosaic interpolated by OpenCV, rad"),
+    ("coloured shades, 3 % noise: {} rad RMS", "the same with coloured shades, rad"),
+    ("against {} rad on white", "peaks, 3 % noise, white: phase RMS, rad"),
+    ("random colours, 3 % noise: {} rad RMS", "the same with shades and sharp random colours, rad"),
+    ("median {} rad", "the same with shades and sharp random colours, rad > the same, median, rad"),
+    ("{} degrees about x", "allowable deviation of the infrared projector, rx, deg"),
+    ("{} degrees about y", "allowable deviation of the infrared projector, ry, deg"),
+    ("{} degrees about z", "allowable deviation of the infrared projector, rz, deg"),
+    ("{} mm along x", "allowable deviation of the infrared projector, tx, mm"),
+    ("{} mm along z", "allowable deviation of the infrared projector, tz, mm"),
+    ("{} mm and more along the fringes", "allowable deviation of the infrared projector, ty, mm"),
+    (
+        "up to {} rad, no wrong order",
+        "pre-deformed image, 700 to 900 mm: infrared against expectation, worst, rad",
+    ),
+    ("no wrong order;", "pre-deformed image, 1 degree and 0.5 mm apart: wrong orders, worst, %"),
+    ("up to {} % wrong orders", "pre-deformed image, 1 degree and 5 mm apart: wrong orders, worst, %"),
+    ("{} rad RMS on a plane", "plane without noise: phase RMS a fringe away from edges, rad"),
+    ("{} rad on peaks", "peaks without noise: phase RMS a fringe away from edges, rad"),
+    ("{} rad on steps", "steps without noise: phase RMS a fringe away from edges, rad"),
+    *(
+        ("no wrong order on these surfaces", f"{surface} without noise: wrong orders among returned pixels, pixels")
+        for surface in ("plane", "peaks", "steps")
+    ),
+    ("a face with 3 % noise has {} rad RMS", "face, 3 % noise, all colours: phase RMS, rad"),
+    ("peaks {} rad", "peaks, 3 % noise, white: phase RMS, rad"),
+    ("{} % wrong orders among returned", "steps: wrong fringe orders among returned pixels, %"),
+    ("{} % wrong orders among returned", "face: wrong fringe orders among returned pixels, %"),
+    ("{} % of the lit pixels of steps", "steps: lit pixels returned, %"),
+    ("{} % of a face returned", "face: lit pixels returned, %"),
+    ("traditional {} rad RMS", "peaks, 3 % noise: traditional FTP, full field, rad"),
+    ("improved {} rad,", "improved FTP, full field, rad"),
+    ("joint {} rad", "proposed, full field, rad"),
+    ("worst focal length {} %", "worst focal length, %"),
+    ("worst principal point {} px", "worst principal point, px"),
+    *(
+        ("reprojection below {} px", row)
+        for row in (
+            "mean reprojection error, camera, px",
+            "the same, visible projector, px (published 0.269)",
+            "the same, infrared projector, px (published 0.221)",
+        )
+    ),
+)
+CONDITIONS = (
+    r"gamma 2\.2 and crosstalk of 15 %",
+    "3 % noise",
+    "noise of 3 %",
+    "fringes of 20 px",
+    "of 10 px",
+    r"1 degree and (0\.5|5) mm apart",
+    "700 to 900 mm",
+)
 
 
 def name(path: Path) -> str:
@@ -49,6 +116,68 @@ def missing(command: str) -> list[str]:
     if made := re.match(r"make ([\w-]+)", command):
         lost += [] if re.search(rf"^{made[1]}:", MAKEFILE, re.MULTILINE) else [made[1]]
     return lost + [file for file in files if not any((folder / file).exists() for folder in FOLDERS)]
+
+
+def table(text: str) -> list[tuple[str, str, str]]:
+    """Give figure, value and command of the rows of the README table."""
+    rows = text.partition("<!-- figures -->")[2].partition("<!-- /figures -->")[0].splitlines()
+    return [
+        (c[0], c[1], c[3].strip("`"))
+        for row in rows
+        if len(c := row.strip("| ").split(" | ")) == 4 and "---" not in row
+    ]
+
+
+def measured(rows: list[tuple[str, str, str]], figure: str) -> float:
+    """Give the value of a row, named as in `FIGURES`."""
+    start = 0
+    for part in figure.split(" > "):
+        start = next(i for i, row in enumerate(rows) if i >= start and row[0] == part)
+    return float(rows[start][1])
+
+
+def stated_wrongly(page: str, readme: str) -> list[str]:
+    """Name the figures of the page that differ from the table, by more than the rounding of the page."""
+    rows, faults = table(readme), []
+    for words, figure in FIGURES:
+        found = re.search(re.escape(words).replace(r"\{\}", r"(\d+(?:\.\d+)?)"), page)
+        if found is None:
+            faults.append(f"the page does not say {words!r}")
+            continue
+        value, stated = measured(rows, figure), found[1] if "{}" in words else "0"
+        half_a_unit = 0.501 * 10.0 ** -len(stated.partition(".")[2])
+        right = value < float(stated) if "below {}" in words else abs(value - float(stated)) <= half_a_unit
+        if not (right and ("{}" in words or value == 0)):
+            faults.append(f"{figure}: {value}, the page says {found[0]!r}")
+    return faults
+
+
+def untied(page: str, readme: str) -> list[str]:
+    """Give the costs with a number that is not in `FIGURES` or `CONDITIONS`, in rows with a command of the table."""
+    commands_of_figures, faults = {command for _, _, command in table(readme)}, []
+    for line in page.splitlines():
+        cells = line.strip("| ").split(" | ")
+        if len(cells) != 4 or not commands_of_figures & set(re.findall(r"`([^`]+)`", cells[3])):
+            continue
+        rest = re.sub(r"\[[^\]]*\]\([^)]*\)", "", cells[2])
+        for words, _ in FIGURES:
+            rest = re.sub(re.escape(words).replace(r"\{\}", r"\d+(?:\.\d+)?"), "", rest)
+        if re.search(r"\d", re.sub("|".join(CONDITIONS), "", rest)):
+            faults.append(cells[2])
+    return faults
+
+
+def test_the_page_of_approximations_has_the_figures_of_the_table() -> None:
+    assert stated_wrongly(APPROXIMATIONS, README) == []
+    assert untied(APPROXIMATIONS, README) == []
+
+
+def test_a_figure_that_parts_from_the_table_is_found() -> None:
+    assert len(stated_wrongly(APPROXIMATIONS.replace("0.068 rad", "0.069 rad"), README)) == 1
+    assert len(stated_wrongly(APPROXIMATIONS, README.replace("| 0.06799 |", "| 0.06899 |"))) == 1
+    assert len(stated_wrongly(APPROXIMATIONS, README.replace("| 0.004284 |", "| 0.005284 |"))) == 1
+    assert len(stated_wrongly(APPROXIMATIONS.replace("traditional 0.068", "the first 0.068"), README)) == 1
+    assert len(untied(APPROXIMATIONS.replace("99.9 % of a face", "99.9 % of a face, 98 % of peaks"), README)) == 1
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=name)
