@@ -16,7 +16,7 @@ mod builder;
 pub(crate) mod method;
 pub(crate) mod options;
 pub(crate) mod output;
-mod params;
+pub(crate) mod params;
 
 pub use builder::DecoderBuilder;
 pub use method::{JointOptions, Method, PublishedOptions};

@@ -1,5 +1,6 @@
 //! The maps of a decoded shot, and the last step of every method: columns and points from the absolute phase.
 
+use super::params::ROWS_AT_ONCE;
 use crate::encoding::FourChannel;
 use crate::height::Triangulator;
 use crate::parallel::{first_of_line, spare};
@@ -125,9 +126,6 @@ impl Decoded {
         std::iter::from_fn(&mut next).collect()
     }
 }
-
-/// Fewest rows that a thread takes at once.
-pub(crate) const ROWS_AT_ONCE: usize = 8;
 
 /// One row of every map.
 pub(crate) struct OutputRow<'a> {

@@ -2,51 +2,54 @@
 //!
 //! `python evaluation/accuracy.py` (method `published`) measures the effect of a change on noise, texture and edges.
 
-/// Rows of the image that the fringe period and the statistics of a shot are taken from. More rows average out objects and
-/// shadows; fewer rows take less time. On shots of the virtual bench and real captures, the period from 16 rows is within
-/// 0.5 % of that from all rows; from 8 rows it is up to 2 % off.
+/// Rows of the image that the fringe period and the statistics of a shot are taken from. More rows average out objects
+/// and shadows; fewer rows take less time (`python evaluation/accuracy.py`).
 pub(crate) const SAMPLE_ROWS: usize = 16;
 
-/// Lines, in each direction, that [`carrier`](super::carrier()) takes its spectrum from. More lines average out objects;
-/// fewer take less time.
+/// Lines, in each direction, that [`carrier`](super::carrier()) takes its spectrum from. More lines average out
+/// objects; fewer take less time. Not measured.
 pub(crate) const CARRIER_LINES: usize = 48;
 
 /// Fewest fringes over the image that count as a carrier. A larger number ignores slow shading better; a smaller number
-/// accepts coarser fringes. Fewer than 4 fringes lie in the spectrum of the illumination.
+/// accepts coarser fringes. Fewer than 4 fringes lie in the spectrum of the illumination. Not measured.
 pub(crate) const CARRIER_CYCLES_MIN: usize = 4;
 
 /// Least share of the power above [`CARRIER_CYCLES_MIN`] that the carrier must have. A larger share rejects fringes on
-/// textured or broken surfaces; a smaller one accepts noise. Shots of the virtual bench and real captures have 0.42 to
-/// 0.98, white noise has 0.02. Coarse texture without fringes can have 0.5, which the share cannot tell apart.
+/// textured or broken surfaces; a smaller one accepts noise. Coarse texture without fringes can have more, which the
+/// share cannot tell apart. `python evaluation/captures_report.py` and `cargo test -p quadfringe --test sizes` decode
+/// shots whose carriers must be found.
 pub(crate) const CARRIER_SHARE_MIN: f32 = 0.2;
 
-/// Least power of a carrier over the power of the mean level. Rounding of a flat line to `f32` leaves less than 1e-12;
-/// fringes with an amplitude of 0.1 % of the level have 9e-8.
+/// Least power of a carrier over the power of the mean level. Follows from the rounding of `f32`, which leaves less
+/// than 1e-12 of a flat line; fringes with an amplitude of 0.1 % of the level have 9e-8.
 pub(crate) const CARRIER_POWER_MIN: f32 = 1e-8;
 
 /// Least number of samples per fringe of G and IR after averaging over columns. The improved band ends at 2.3 times the
-/// carrier, where 13 samples per fringe leave more than five: the phase moves by far less than half a turn from sample to
-/// sample, and straight lines between samples stay within 4e-3 rad (test `the_phase_is_known_at_every_pixel`). A larger
-/// number averages less and takes longer.
+/// carrier, where 13 samples per fringe leave more than five: the phase moves by far less than half a turn from sample
+/// to sample, and straight lines between samples stay within 4e-3 rad (`cargo test -p quadfringe --lib
+/// the_phase_is_known_at_every_pixel`). A larger number averages less and takes longer.
 pub(crate) const SAMPLES_PER_FRINGE_MIN: f32 = 13.0;
 
-/// Shortest fringe period in camera pixels that is accepted. Two-step and Fourier analysis need at least 3 samples per
-/// fringe: the third sample separates background, modulation and phase.
+/// Shortest fringe period in camera pixels that is accepted. Follows from sampling: two-step and Fourier analysis need
+/// at least 3 samples per fringe, because the third sample separates background, modulation and phase.
 pub(crate) const PERIOD_MIN_PX: f64 = 3.0;
 
 /// Rows of a block for each of its columns. More rows average more noise away and blur the orders at edges across the
-/// rows.
+/// rows. `python evaluation/accuracy.py` shows the effect on noise and edges.
 pub(crate) const ROWS_PER_COLUMN: usize = 2;
 
-/// Columns of the widest block: 1, 2 or 4. Wider blocks save time and blur edges along the rows.
+/// Columns of the widest block: 1, 2 or 4. Wider blocks save time and blur edges along the rows. `python
+/// evaluation/accuracy.py` shows the effect on edges, `cargo bench -p quadfringe -- shot` the time.
 pub(crate) const BLOCK_COLUMNS_MAX: usize = 4;
 
 /// Least number of samples per fringe in which the envelope looks for extrema. More samples place an extremum more
-/// exactly; fewer average more noise away. An extremum between samples is the top of a parabola.
+/// exactly; fewer average more noise away. An extremum between samples is the top of a parabola. `python
+/// evaluation/accuracy.py` shows the effect on both.
 pub(crate) const ENVELOPE_SAMPLES_PER_FRINGE: f32 = 8.0;
 
-/// Width of the smoothing before the search for extrema, and the shortest half wave, as shares of a fringe period. Larger
-/// values remove more false extrema by noise; smaller ones keep steep fringes.
+/// Width of the smoothing before the search for extrema, and the shortest half wave, as shares of a fringe period.
+/// Larger values remove more false extrema by noise; smaller ones keep steep fringes. `python evaluation/accuracy.py`
+/// shows the effect on both.
 pub(crate) const ENVELOPE_SMOOTHING: f32 = 0.2;
 
 /// Flanks of the Fourier bands, as multiples of the carrier frequency. A wider band follows steeper slopes (S3); a
@@ -62,26 +65,28 @@ pub(crate) struct BandEdges {
     pub zero_above: f32,
 }
 
-/// Half a carrier to each side of the carrier.
+/// Half a carrier to each side of the carrier. `quadfringe reproduce peaks` compares both bands.
 pub(crate) const TRADITIONAL_BAND: BandEdges =
     BandEdges { zero_below: 0.4, full_from: 0.6, full_to: 1.4, zero_above: 1.6 };
 
-/// From zero to about twice the carrier.
+/// From zero to about twice the carrier. See [`TRADITIONAL_BAND`].
 pub(crate) const IMPROVED_BAND: BandEdges =
     BandEdges { zero_below: 0.0, full_from: 0.3, full_to: 1.8, zero_above: 2.3 };
 
 /// Length of the passage from the end of a row to its beginning, as one part in so many of the row. A longer passage
-/// makes the ring of the transform smoother; a shorter one takes less time.
+/// makes the ring of the transform smoother; a shorter one takes less time. `cargo test -p quadfringe --lib
+/// fringes_go_on_in_phase_at_both_ends` checks the passage.
 pub(crate) const PASSAGE_PART: usize = 10;
 
 /// Least margin below which an order counts as a stray. A larger value counts noise as strays; a smaller one misses
 /// strays on noisy shots. `cargo test -p quadfringe --test uncertainty` bounds the probabilities that follow.
 pub(crate) const STRAY_MARGIN_MIN: f32 = 0.25;
 
-/// Least standard deviation of a beat in rad. It keeps the probabilities of shots without noise away from 0 and 1. A larger
-/// value overestimates the probability on clean shots.
+/// Least standard deviation of a beat in rad. It keeps the probabilities of shots without noise away from 0 and 1. A
+/// larger value overestimates the probability on clean shots. Not measured.
 pub(crate) const BEAT_SIGMA_MIN_RAD: f32 = 0.02;
 
-/// One pixel in so many of a sampled row enters the statistics of a shot. Fewer pixels take less time and make the median
-/// less exact: 16 rows of 1024 columns give 5,500 pixels, whose median has a standard error of 2 %.
+/// One pixel in so many of a sampled row enters the statistics of a shot. Fewer pixels take less time and make the
+/// median less exact. Follows from the standard error of a median: 16 rows of 1024 columns give 5,500 pixels, whose
+/// median is certain to 2 %.
 pub(crate) const SAMPLE_STRIDE: usize = 3;

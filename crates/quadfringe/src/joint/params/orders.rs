@@ -26,7 +26,7 @@ pub const COSINE_UNIT: f32 = 2048.0;
 pub const SAMPLED_ROWS: usize = 4;
 
 /// Weight of a lit pixel in the number of pixels of a node if it is saturated, so that a node of such pixels is lit without
-/// evidence. Any number works whose sum over a cell (4 rows of 16) stays below 1.
+/// evidence. Follows from the size of a cell (4 rows of 16), over which the sum of the weights must stay below 1.
 pub const LIT_WEIGHT: f32 = 1.0 / 1024.0;
 
 /// Limit of an observed cosine. Beyond 1 it is noise or glare. Not measured: 2 lets a deviation of a whole amplitude count, and

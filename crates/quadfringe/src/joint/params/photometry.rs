@@ -28,7 +28,7 @@ pub const CELL: f64 = 0.35;
 /// no effect at x0.7; peaks without noise +2 % and near edges of dim steps -22 % at x1.4.
 pub const RIDGE: f32 = 1.7e-2;
 
-/// Greatest misfit of a pixel that takes part: that of a valid pixel.
+/// Greatest misfit of a pixel that takes part. Follows from the limit of a valid pixel.
 pub const MISFIT_MAX: f32 = super::validity::MISFIT_MAX;
 
 /// Rows of pixels that stand for a row of cells, in the fit before the last choice of orders and after it. More: time. Not

@@ -11,18 +11,20 @@ pub const CELLS_PER_PERIOD: f64 = 3.4;
 /// edges of steps -25 %; x0.7 has the same level.
 pub const COARSE_PERIOD_MIN_PX: f64 = 6.0;
 
-/// Greatest factor between the two levels; means are written for 2 and 4. With 4 the coarse level takes a sixteenth of the time.
+/// Greatest factor between the two levels. Follows from the code, which writes out means for 2 and 4. With 4 the coarse
+/// level has a sixteenth of the pixels.
 pub const FACTOR_MAX: usize = 4;
 
 /// Pixels that interpolated light of a mosaic reaches into a shadow: a missing sample is a mean of neighbours one pixel away
 /// (`cargo test --test bayer`).
 pub const MOSAIC_REACH_PX: usize = 1;
 
-/// Least fringe period that is looked for, in pixels: a fringe needs four samples for its shape (Nyquist with a margin of two).
+/// Least fringe period that is looked for, in pixels. Follows from sampling: a fringe needs four samples for its shape
+/// (Nyquist with a margin of two).
 pub const PERIOD_MIN_PX: f64 = 4.0;
 
-/// Fringe period as a share of the width of the image when no carrier stands out: 16 fringes. Such a shot has no fringes to
-/// decode; the number only has to be sound.
+/// Fringe period as a share of the width of the image when no carrier stands out: 16 fringes. Not measured: such a shot has
+/// no fringes to decode, and the number only has to be a possible period.
 pub const PERIOD_FALLBACK_SHARE: f64 = 1.0 / 16.0;
 
 /// Surfaces whose phases differ by less than this, in rad, count as one in upsampling. Larger: small steps are smoothed. Smaller:

@@ -1,17 +1,18 @@
 //! Sizes of tasks and blocks. They change no result, only the time (`cargo bench -p quadfringe -- shot`).
 
 /// Rows of pixels that one task works on. More: fewer rows at the border of blocks are computed twice. Fewer: less working
-/// memory, and more tasks to share among threads.
+/// memory, and more tasks to share among threads. Time: `cargo bench -p quadfringe -- shot`.
 pub const ROWS: usize = 32;
 
-/// The same for the choice of places, which holds several rows of every place.
+/// As [`ROWS`] for the choice of places, which holds several rows of every place.
 pub const PLACE_ROWS: usize = 16;
 
-/// The same for the propagation of probabilities, which also looks at rows within its reach.
+/// As [`ROWS`] for the propagation of probabilities, which also looks at rows within its reach.
 pub const PROPAGATION_ROWS: usize = 64;
 
-/// Columns of nodes that one task sweeps vertically. Their costs in one row are read one after the other.
+/// Columns of nodes that one task sweeps vertically. Their costs in one row are read one after the other. More: fewer tasks
+/// to share among threads. Time: `cargo bench -p quadfringe -- shot`.
 pub const SWEEP_COLUMNS: usize = 16;
 
-/// Pixels of a row that are looked through at once, four vectors of bytes.
+/// Pixels of a row that are looked through at once. Follows from the vectors: four of 16 bytes.
 pub const GROUP: usize = 64;

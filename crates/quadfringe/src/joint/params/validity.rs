@@ -47,6 +47,6 @@ pub const AMBIGUOUS_RAD: f32 = 0.3;
 /// at 3.
 pub const AMBIGUOUS_REACH: usize = 2;
 
-/// Pixels around which no other surface may be valid, where a component grew further than exclusion reaches: one more than the
-/// reach.
+/// Pixels around which no other surface may be valid, where a component grew further than exclusion reaches. Follows from
+/// the reach, of which it is one more.
 pub const FACING_REACH: usize = AMBIGUOUS_REACH + 1;
