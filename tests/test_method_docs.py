@@ -12,7 +12,11 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
+from scipy.optimize import brentq
+
+import quadfringe as qf
 
 ROOT = Path(__file__).resolve().parents[1]
 THIS = Path(__file__).name
@@ -210,6 +214,24 @@ def test_the_recipe_and_its_page_have_the_same_steps() -> None:
     recipe = steps((ROOT / "crates/quadfringe/src/joint/mod.rs").read_text(), r"^//! (\d+) +\w")
     page = steps((ROOT / "docs/method/joint.md").read_text(), r"^\| \[(\d+)\]\(")
     assert recipe == page == list(range(1, 11))
+
+
+def test_a_wrong_order_displaces_a_point_by_what_the_geometry_page_says() -> None:
+    page = (ROOT / "docs/method/geometry.md").read_text()
+    stated = re.search(r"an? point in the middle of the image, 800 mm away, by (\d+) to (\d+) mm", page)
+    assert stated is not None
+    with qf.open_system() as scanner:
+        projector = scanner.calibration.projector if scanner.calibration else None
+    assert projector is not None
+    rotation, translation = np.asarray(projector.rotation), np.asarray(projector.translation_mm)
+
+    def column(depth_mm: float) -> float:
+        x, _, z = rotation @ (0.0, 0.0, depth_mm) + translation
+        return float(projector.centre_px[0] + projector.focal_px[0] * x / z)
+
+    period = projector.width_px / qf.Fringes().numbers[0]
+    moved = [brentq(lambda d, s=s: column(800 + d) - column(800) - s * period, -200, 200) for s in (-1, 1)]
+    assert sorted(round(abs(mm)) for mm in moved) == [int(stated[1]), int(stated[2])]
 
 
 # Planted faults: each check fails on a small tree with one mistake in it.

@@ -23,7 +23,10 @@ def tolerance(key: str) -> float:
 
 
 def hold(key: str, values: ArrayLike) -> None:
-    """Fail unless every value keeps the bar."""
+    """Print the values (`pytest -rP` shows them) and fail unless every value keeps the bar."""
     limits = bar(key)
-    missed = [value for value in np.ravel(np.asarray(values, dtype=np.float64)).tolist() if not limits.holds(value)]
+    measured = np.ravel(np.asarray(values, dtype=np.float64)).tolist()
+    unit = "" if limits.unit == "1" else f" {limits.unit}"
+    print(f"{key}: {', '.join(f'{value:.4g}' for value in measured[:5])}{unit}, bar {limits.text}")
+    missed = [value for value in measured if not limits.holds(value)]
     assert not missed, f"{key}: {limits.figure}: {missed[:5]} {limits.unit}, bar {limits.text}"
