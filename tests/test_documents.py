@@ -26,6 +26,9 @@ FILE = re.compile(r"(?<!\S)((?:evaluation|benches|tests|scripts|docs)/[\w./-]+|[
 FOLDERS = (ROOT, ROOT / "python" / "quadfringe", ROOT / "crates" / "quadfringe" / "src")
 MAKEFILE = (ROOT / "Makefile").read_text()
 
+# Turns of phrase that CONTRIBUTING rules out: plain words say the same.
+AVOIDED = re.compile(r"\b(?:(?:its|their|your) own|beside|as far as|(?:is|are) told|asked of)\b", re.IGNORECASE)
+
 APPROXIMATIONS = (ROOT / "docs" / "method" / "approximations.md").read_text()
 README = (ROOT / "README.md").read_text()
 # A figure of the page, as {} in its words, and its row of the README table. "A > B" is the first row B after the row A.
@@ -216,6 +219,11 @@ def test_the_list_of_records_is_whole() -> None:
         rows.append(f"| [{head[1]}]({record.name}) | {head[3]} | {head[2]} |")
     lines = (DECISIONS / "README.md").read_text().splitlines()
     assert [line for line in lines if line.startswith("| [")] == rows
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=name)
+def test_a_document_avoids_words_that_puzzle(document: Path) -> None:
+    assert AVOIDED.findall(" ".join(document.read_text().split())) == []
 
 
 def test_names_in_the_glossary_exist() -> None:

@@ -75,7 +75,7 @@ def envelope_mean_and_half(image: Map, period_px: float) -> tuple[Map, Map]:
 def two_step(red: Map, blue: Map, period_px: float) -> tuple[Map, Map]:
     """Give wrapped phase and modulation from two frames a quarter period apart (S2).
 
-    Backgrounds are subtracted, modulations made equal by dividing each by its own; then
+    Backgrounds are subtracted, signals divided by their modulations, which makes them equal; then
     R = cos(Phi), B = -sin(Phi), Phi = atan2(-B, R).
     """
     red_mean, red_half = envelope_mean_and_half(red, period_px)

@@ -1,7 +1,7 @@
 //! Height from a phase difference in the ideal crossed-axes layout (S5).
 //!
 //! Layout, in the plane through both optical centres: the camera looks straight down on the reference plane from `L0`
-//! above the point `O`; the projector stands at the same height `L0`, a distance `d` beside the camera, and its axis
+//! above the point `O`; the projector stands at the same height `L0`, a distance `d` to the side of the camera, and its axis
 //! goes through `O`, so that `tan(theta) = d / L0`. `x` is measured on the reference plane from `O`, positive away from
 //! the projector.
 //!
@@ -24,7 +24,7 @@ use std::f64::consts::TAU;
 
 use crate::error::{Error, Result};
 
-/// The ideal crossed-axes layout: camera normal to the reference plane, projector beside it at the same height.
+/// The ideal crossed-axes layout: camera normal to the reference plane, projector to its side at the same height.
 ///
 /// ```
 /// use quadfringe::height::CrossedAxes;
@@ -43,7 +43,7 @@ pub struct CrossedAxes {
 }
 
 impl CrossedAxes {
-    /// Layout with the camera `distance_mm` (L0) above the reference plane, the projector `baseline_mm` (d) beside it,
+    /// Layout with the camera `distance_mm` (L0) above the reference plane, the projector `baseline_mm` (d) to its side,
     /// and fringes of `period_mm` (P0) on the plane normal to the projector axis where the two axes cross.
     ///
     /// # Errors

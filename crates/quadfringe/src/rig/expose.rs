@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use super::RenderOptions;
 
-/// Turns linear light (1 = full scale) into counts, in place. Every row has its own random numbers, drawn from the seed,
+/// Turns linear light (1 = full scale) into counts, in place. Every row has separate random numbers, drawn from the seed,
 /// the channel and the row, so that the result does not depend on the number of threads.
 pub(super) fn expose(plane: &mut Array2<f32>, channel: usize, options: &RenderOptions) {
     let full_scale = options.bit_depth.full_scale();

@@ -69,8 +69,8 @@ const PROJECTOR_ROLL_RAD: f64 = std::f64::consts::PI / 180.0;
 
 impl Bench {
     /// The published geometry with a regular mirror grid: camera 1024 x 768, 4.65 um, 12 mm; coaxial projectors
-    /// 912 x 1140, 7.63 um, 12 mm, beside and before the camera at (200, -15, 200) mm, turned by one degree, towards the
-    /// middle of the plane z = 800 mm.
+    /// 912 x 1140, 7.63 um, 12 mm, to the side of the camera and in front of it, at (200, -15, 200) mm, turned by one
+    /// degree, towards the middle of the plane z = 800 mm.
     #[must_use]
     pub fn reference() -> Self {
         Self::reference_with(DmdLayout::Regular)

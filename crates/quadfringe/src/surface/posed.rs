@@ -26,7 +26,7 @@ pub struct Posed {
 const PLATE_MM: f64 = 4.0;
 
 impl Posed {
-    /// The body, given in its own frame, in a pose.
+    /// A body in a pose; the body is given in the frame of the body.
     #[must_use]
     pub fn new(body: Box<dyn Surface>, pose: Pose) -> Self {
         Self { body, pose }
