@@ -109,6 +109,7 @@ PAIR_DEPTH = tuple(
             f"{words}, 1 degree and 5 mm apart: wrong orders, worst, %",
             "pair.wrong_order_percent" if way == "searched" else "",
         ),
+        (f"{way}_5mm_returned_percent", f"{words}, 1 degree and 5 mm apart: returned, least, %", ""),
     )
 )
 CAPTURES = (

@@ -55,6 +55,7 @@ FIGURES = (
         "pre-deformed image, 700 to 900 mm: infrared against expectation, worst, rad",
     ),
     ("no wrong order;", "pre-deformed image, 1 degree and 0.5 mm apart: wrong orders, worst, %"),
+    ("as few as {} % of the pixels", "pre-deformed image, 1 degree and 5 mm apart: returned, least, %"),
     ("up to {} % wrong orders", "pre-deformed image, 1 degree and 5 mm apart: wrong orders, worst, %"),
     ("{} rad RMS on a plane", "plane without noise: phase RMS a fringe away from edges, rad"),
     ("{} rad on peaks", "peaks without noise: phase RMS a fringe away from edges, rad"),
