@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 /// Rooms in the order of `lib.rs`. A file belongs to the longest name that its path begins with: what every method of
 /// decoding takes and gives stands above the methods, the decoder that chooses between them below.
-const ORDER: [&str; 15] = [
+const ORDER: [&str; 16] = [
     "error",
     "parallel",
     "encoding",
@@ -20,6 +20,7 @@ const ORDER: [&str; 15] = [
     "condition",
     "stages",
     "height",
+    "decode/params",
     "decode/method",
     "decode/options",
     "decode/output",
@@ -28,10 +29,11 @@ const ORDER: [&str; 15] = [
     "decode",
 ];
 const FORWARD: [&str; 2] = ["surface", "rig"];
-const INVERSE: [&str; 9] = [
+const INVERSE: [&str; 10] = [
     "condition",
     "stages",
     "height",
+    "decode/params",
     "decode/method",
     "decode/options",
     "decode/output",
