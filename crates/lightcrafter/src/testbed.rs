@@ -11,9 +11,10 @@ mod control;
 mod descriptors;
 mod ioctl;
 mod node;
+mod socket;
 mod usbfs;
 
-pub use control::Control;
+pub use control::{CONTROL, Control};
 
 use crate::emulator::Dlpc350;
 use node::Node;
@@ -21,10 +22,8 @@ use std::io;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
-/// The environment variable with the path of the control socket.
-pub const CONTROL: &str = "LIGHTCRAFTER_TESTBED";
 const PRELOAD: &str = "libumockdev-preload.so.0";
 const KNOWN_VERSION: &str = "0.17.";
 
@@ -46,7 +45,9 @@ impl Testbed {
         let mut nodes = Vec::new();
         for (i, port) in ports.iter().enumerate() {
             let model = Dlpc350::new(&format!("QF-EMULATOR-1-{port}"), 3);
-            nodes.push(Node::start(&root, 1, 5 + i as u8, *port, Mutex::new(model))?);
+            let node = Arc::new(Node::new(&root, 1, 5 + i as u8, *port, model)?);
+            usbfs::listen(&node)?;
+            nodes.push(node);
         }
         control::listen(&root.join("control"), nodes.clone())?;
         Ok(Self { root, nodes })

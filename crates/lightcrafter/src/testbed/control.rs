@@ -1,27 +1,22 @@
 //! Control of the testbed by lines of text over a socket: faults, unplugging, permissions.
 
-use super::CONTROL;
 use super::node::Node;
+use super::socket;
 use crate::emulator::Fault;
-use std::fs::{Permissions, set_permissions};
 use std::io::{self, BufRead, BufReader, Write};
-use std::os::unix::fs::PermissionsExt;
-use std::os::unix::net::{UnixListener, UnixStream};
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::Arc;
-use std::thread;
+
+/// The environment variable with the path of the control socket.
+pub const CONTROL: &str = "LIGHTCRAFTER_TESTBED";
 
 /// Serve lines "PORT VERB [ARGUMENT] [COUNT]" and answer each with "ok [VALUE]" or "error REASON".
 pub fn listen(path: &Path, nodes: Vec<Arc<Node>>) -> io::Result<()> {
-    let listener = UnixListener::bind(path)?;
-    set_permissions(path, Permissions::from_mode(0o777))?;
-    thread::spawn(move || {
-        for stream in listener.incoming().flatten() {
-            let nodes = nodes.clone();
-            thread::spawn(move || serve(&nodes, stream));
-        }
-    });
-    Ok(())
+    socket::listen(path, move |_, stream| {
+        // A client that goes away ends its connection.
+        let _ = serve(&nodes, stream);
+    })
 }
 
 fn serve(nodes: &[Arc<Node>], stream: UnixStream) -> io::Result<()> {

@@ -1,18 +1,18 @@
 //! USB descriptors of the device: a composite HID with two interfaces, commands on the first.
 
 /// Report descriptor: 64 bytes in, 64 bytes out, vendor page 0xFF00.
-pub const REPORT_DESCRIPTOR: [u8; 32] = [
+const REPORT_DESCRIPTOR: [u8; 32] = [
     0x06, 0x00, 0xFF, 0x0A, 0x00, 0xFF, 0xA1, 0x01, 0x09, 0x01, 0x15, 0x00, 0x26, 0xFF, 0x00, 0x75, 0x08,
     0x95, 0x40, 0x81, 0x02, 0x09, 0x02, 0x15, 0x00, 0x75, 0x08, 0x95, 0x40, 0x91, 0x02, 0xC0,
 ];
 
 /// USB 1.1, 0451:6401, strings 1 to 3, one configuration.
-pub const DEVICE: [u8; 18] = [18, 1, 0x10, 0x01, 0, 0, 0, 64, 0x51, 0x04, 0x01, 0x64, 0, 0, 1, 2, 3, 1];
+const DEVICE: [u8; 18] = [18, 1, 0x10, 0x01, 0, 0, 0, 64, 0x51, 0x04, 0x01, 0x64, 0, 0, 1, 2, 3, 1];
 
 const CONFIGURATION_HEADER: usize = 9;
 
 /// The configuration with both interfaces and their endpoints.
-pub fn configuration() -> Vec<u8> {
+fn configuration() -> Vec<u8> {
     let interfaces = [interface(0, 1), interface(1, 2)].concat();
     let total = ((CONFIGURATION_HEADER + interfaces.len()) as u16).to_le_bytes();
     let mut bytes = vec![9, 2, total[0], total[1], 2, 1, 0, 0xC0, 50];
@@ -27,6 +27,11 @@ fn interface(number: u8, endpoint: u8) -> Vec<u8> {
     bytes.extend([7, 5, 0x80 | endpoint, 3, 64, 0, 1]);
     bytes.extend([7, 5, endpoint, 3, 64, 0, 1]);
     bytes
+}
+
+/// The descriptors as Linux stores them in `/sys` and in the device node.
+pub fn stored() -> Vec<u8> {
+    [DEVICE.to_vec(), configuration()].concat()
 }
 
 /// Reply to a control request; `None` is a stall.

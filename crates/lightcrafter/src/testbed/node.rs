@@ -1,16 +1,13 @@
 //! One device in the testbed: its folder in `/sys`, its node in `/dev`, and the holders of its interfaces.
 
-use super::descriptors::{DEVICE, configuration};
-use super::usbfs;
+use super::descriptors;
 use crate::emulator::Dlpc350;
 use std::collections::VecDeque;
 use std::fs;
 use std::io;
 use std::os::unix::fs::{PermissionsExt, symlink};
-use std::os::unix::net::UnixListener;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// A file that nobody may open for writing, not even root. It stands in for a node without permission.
 const FORBIDDEN: &str = "/sys/kernel/uevent_seqnum";
@@ -39,6 +36,8 @@ pub struct Shared {
 #[derive(Debug)]
 pub struct Node {
     pub place: String,
+    /// Path of the socket that umockdev sends the ioctls on the device node to.
+    pub socket: PathBuf,
     model: Mutex<Dlpc350>,
     shared: Mutex<Shared>,
     link: PathBuf,
@@ -47,45 +46,26 @@ pub struct Node {
 }
 
 impl Node {
-    /// Write the files and serve the socket until the process ends.
-    pub fn start(
-        root: &Path,
-        bus: u8,
-        address: u8,
-        port: u8,
-        model: Mutex<Dlpc350>,
-    ) -> io::Result<Arc<Self>> {
+    /// Write the files of a device on this bus.
+    pub fn new(root: &Path, bus: u8, address: u8, port: u8, model: Dlpc350) -> io::Result<Self> {
         let place = format!("{bus}-{port}");
         let parent = format!("devices/pci0000:00/0000:00:14.0/usb{bus}/{place}");
         let device = format!("dev/bus/usb/{bus:03}/{address:03}");
-        let node = Arc::new(Self {
+        let node = Self {
+            socket: root.join("ioctl").join(&device),
             link: root.join(format!("sys/bus/usb/devices/{place}")),
             target: PathBuf::from(format!("../../../{parent}")),
-            device: root.join(&device),
+            device: root.join(device),
             place,
-            model,
+            model: Mutex::new(model),
             shared: Mutex::new(Shared { holders: [Holder::Kernel; 2], incoming: VecDeque::new() }),
-        });
+        };
         write_sysfs(&root.join("sys").join(parent), bus, address)?;
         fs::create_dir_all(node.device.parent().unwrap_or(root))?;
         node.allow()?;
         node.reflect()?;
-        let socket = root.join("ioctl").join(device);
-        fs::create_dir_all(socket.parent().unwrap_or(root))?;
-        node.clone().listen(&UnixListener::bind(&socket)?, &socket)?;
+        fs::create_dir_all(node.socket.parent().unwrap_or(root))?;
         Ok(node)
-    }
-
-    fn listen(self: Arc<Self>, listener: &UnixListener, socket: &Path) -> io::Result<()> {
-        fs::set_permissions(socket, fs::Permissions::from_mode(0o777))?;
-        let listener = listener.try_clone()?;
-        thread::spawn(move || {
-            for (number, stream) in listener.incoming().flatten().enumerate() {
-                let node = Arc::clone(&self);
-                thread::spawn(move || usbfs::serve(&node, number as u64, stream));
-            }
-        });
-        Ok(())
     }
 
     pub fn model(&self) -> MutexGuard<'_, Dlpc350> {
@@ -109,7 +89,7 @@ impl Node {
     /// A node that every user may open.
     pub fn allow(&self) -> io::Result<()> {
         let _ = fs::remove_file(&self.device);
-        fs::write(&self.device, [DEVICE.to_vec(), configuration()].concat())?;
+        fs::write(&self.device, descriptors::stored())?;
         fs::set_permissions(&self.device, fs::Permissions::from_mode(DEVICE_MODE))
     }
 
@@ -135,7 +115,7 @@ fn write_sysfs(folder: &Path, bus: u8, address: u8) -> io::Result<()> {
     for (name, value) in attributes {
         fs::write(folder.join(name), format!("{value}\n"))?;
     }
-    fs::write(folder.join("descriptors"), [DEVICE.to_vec(), configuration()].concat())?;
+    fs::write(folder.join("descriptors"), descriptors::stored())?;
     let name = format!("bus/usb/{bus:0>3}/{address:0>3}");
     let properties = format!(
         "DEVTYPE=usb_device\nBUSNUM={bus:0>3}\nDEVNUM={address:0>3}\nDEVNAME={name}\nPRODUCT=451/6401/0\n"

@@ -7,10 +7,12 @@
 use super::descriptors::control_answer;
 use super::ioctl::*;
 use super::node::{Holder, Node};
+use super::socket;
 use crate::packet::REPORT_BYTES;
 use std::collections::VecDeque;
 use std::io::{self, Read, Write};
 use std::os::unix::net::UnixStream;
+use std::sync::Arc;
 use std::thread::sleep;
 use std::time::Duration;
 
@@ -49,8 +51,14 @@ struct Connection<'a> {
 /// Result of an ioctl: its value, or an errno.
 type Answer = Result<i64, i32>;
 
+/// Answer the ioctls on a device node until the process ends.
+pub fn listen(node: &Arc<Node>) -> io::Result<()> {
+    let served = Arc::clone(node);
+    socket::listen(&node.socket, move |number, stream| serve(&served, number, stream))
+}
+
 /// Serve until the program closes the file, then release its interfaces, as usbfs does.
-pub fn serve(node: &Node, number: u64, stream: UnixStream) {
+fn serve(node: &Node, number: u64, stream: UnixStream) {
     let mut connection = Connection { node, number, stream, pending: Vec::new(), finished: VecDeque::new() };
     while connection.answer_one().is_ok() {}
     for holder in &mut node.shared().holders {
