@@ -204,7 +204,7 @@ impl<T: Transport> LightCrafter<T> {
         self.wait_for_power(power)
     }
 
-    /// Like [`wait_for`](Self::wait_for), for a controller that may not reply yet.
+    /// Read the power mode until it is this one; a controller that wakes up may not reply yet.
     fn wait_for_power(&mut self, power: PowerMode) -> Result<()> {
         let deadline = Instant::now() + self.waits.power;
         loop {
@@ -233,34 +233,29 @@ impl<T: Transport> LightCrafter<T> {
 
     /// Wait until the video input is locked. The error contains the present signal.
     pub fn wait_for_lock(&mut self) -> Result<VideoSignal> {
-        let deadline = Instant::now() + self.waits.lock;
-        loop {
-            let signal = self.video_signal()?;
-            if signal.locked() {
-                return Ok(signal);
-            }
-            if Instant::now() >= deadline {
-                return Err(Error::NotLocked { place: self.place(), signal: signal.to_string() });
-            }
-            sleep(self.waits.poll);
+        let Waits { poll, lock, .. } = self.waits;
+        let signal = self.repeat(poll, lock, Self::video_signal, VideoSignal::locked)?;
+        if signal.locked() {
+            return Ok(signal);
         }
+        Err(Error::NotLocked { place: self.place(), signal: signal.to_string() })
     }
 
-    /// Read a register until it has this value.
-    fn wait_for<M>(&mut self, wanted: M, bound: Duration) -> Result<()>
-    where
-        M: Readable + PartialEq + std::fmt::Debug,
-    {
-        let deadline = Instant::now() + bound;
+    /// Repeat a step at this interval until its result is final or the time limit is reached. Returns the last result.
+    fn repeat<S>(
+        &mut self,
+        interval: Duration,
+        limit: Duration,
+        step: impl Fn(&mut Self) -> Result<S>,
+        is_final: impl Fn(&S) -> bool,
+    ) -> Result<S> {
+        let deadline = Instant::now() + limit;
         loop {
-            let actual = self.read::<M>()?;
-            if actual == wanted {
-                return Ok(());
+            let state = step(self)?;
+            if is_final(&state) || Instant::now() >= deadline {
+                return Ok(state);
             }
-            if Instant::now() >= deadline {
-                return Err(self.stuck(&wanted, &actual, bound));
-            }
-            sleep(self.waits.poll);
+            sleep(interval);
         }
     }
 

@@ -1,6 +1,6 @@
 //! Display modes, and loading, starting and stopping of pattern sequences.
 
-use super::LightCrafter;
+use super::{LightCrafter, Waits};
 use crate::command::{
     DisplayMode, FlashImage, Gamma, ImageTable, InputPort, InputSource, LedEnable, Mailbox, MailboxOffset,
     PatternSource, PatternTable, PowerMode, RunState, TestPattern, TestPatternColours, Timing, Validate,
@@ -9,8 +9,9 @@ use crate::command::{
 use crate::error::{Error, Result};
 use crate::sequence::{Exposures, Sequence, Source};
 use crate::transport::Transport;
+use std::fmt::Debug;
 use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 impl<T: Transport> LightCrafter<T> {
     /// Show the video input in linear light. An input that does not lock is an error.
@@ -62,7 +63,7 @@ impl<T: Transport> LightCrafter<T> {
         }
         self.loaded = None;
         self.write(&mode)?;
-        self.wait_for(mode, self.waits.change)
+        self.reach(mode, Self::read)
     }
 
     /// Send a sequence to the projector and validate it without starting it. Warnings are in the result; a sequence
@@ -162,14 +163,10 @@ impl<T: Transport> LightCrafter<T> {
     fn validate(&mut self) -> Result<Validation> {
         self.write(&Validate)?;
         sleep(self.waits.verdict);
-        let deadline = Instant::now() + self.waits.change;
-        let mut verdict = self.read::<Validation>()?;
-        while verdict.busy {
-            if Instant::now() >= deadline {
-                return Err(self.stuck(&Validate, &verdict, self.waits.change));
-            }
-            sleep(self.waits.poll / 4);
-            verdict = self.read()?;
+        let Waits { poll, change, .. } = self.waits;
+        let verdict = self.repeat(poll / 4, change, Self::read::<Validation>, |verdict| !verdict.busy)?;
+        if verdict.busy {
+            return Err(self.stuck(&Validate, &verdict, change));
         }
         let errors = verdict.errors();
         if errors.is_empty() {
@@ -244,17 +241,20 @@ impl<T: Transport> LightCrafter<T> {
 
     /// Write a run state repeatedly until the projector reports it.
     fn run(&mut self, state: RunState) -> Result<()> {
-        let deadline = Instant::now() + self.waits.change;
-        loop {
-            self.write(&state)?;
-            let actual = self.read::<RunState>()?;
-            if actual == state {
-                return Ok(());
-            }
-            if Instant::now() >= deadline {
-                return Err(self.stuck(&state, &actual, self.waits.change));
-            }
-            sleep(self.waits.poll);
-        }
+        self.reach(state, |projector| {
+            projector.write(&state)?;
+            projector.read()
+        })
+    }
+
+    /// Repeat a step until it reads this state.
+    fn reach<M: PartialEq + Debug>(
+        &mut self,
+        wanted: M,
+        step: impl Fn(&mut Self) -> Result<M>,
+    ) -> Result<()> {
+        let Waits { poll, change, .. } = self.waits;
+        let actual = self.repeat(poll, change, step, |actual| *actual == wanted)?;
+        if actual == wanted { Ok(()) } else { Err(self.stuck(&wanted, &actual, change)) }
     }
 }
