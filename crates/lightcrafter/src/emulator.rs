@@ -178,7 +178,7 @@ impl Dlpc350 {
     fn execute(&mut self, request: &Request) -> Option<Vec<u8>> {
         match request.access {
             Access::Read => self.read(request.word),
-            _ => self.write(request.word, &request.data).map(|()| request.word.to_le_bytes().to_vec()),
+            _ => self.write(request.word, &request.data).map(|()| echo(request)),
         }
     }
 

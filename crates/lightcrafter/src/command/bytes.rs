@@ -1,5 +1,6 @@
-//! Encoding and decoding of message bytes, and macros for the three kinds of register.
+//! Encoding and decoding of message bytes, and macros for the registers that hold one value.
 
+use super::Message;
 use crate::error::{Error, Result};
 
 /// Reads fields from the front of a message. The remaining bytes are padding.
@@ -17,8 +18,8 @@ impl<'a> Bytes<'a> {
     fn take<const N: usize>(&mut self) -> Result<[u8; N]> {
         let Some((head, rest)) = self.rest.split_first_chunk::<N>() else {
             let needed = self.data.len() - self.rest.len() + N;
-            let (expected, actual) = (format!("at least {needed} bytes"), self.data.len());
-            return Err(Error::malformed(self.name, expected, actual));
+            let unit = if needed == 1 { "byte" } else { "bytes" };
+            return Err(Error::malformed(self.name, format!("at least {needed} {unit}"), self.data.len()));
         };
         self.rest = rest;
         Ok(*head)
@@ -63,6 +64,12 @@ pub fn in_range(name: &str, value: u32, low: u32, high: u32) -> Result<u32> {
     Err(Error::value(name, format!("{low} to {high}"), value))
 }
 
+/// Refuse a decoded message with a field out of range, which could not be encoded.
+pub fn checked<M: Message>(message: M) -> Result<M> {
+    message.encode()?;
+    Ok(message)
+}
+
 /// Declare whether a message can be read, written, or both.
 macro_rules! direction {
     ($name:ident, read) => {
@@ -77,13 +84,32 @@ macro_rules! direction {
     };
 }
 
-/// A register of one byte that chooses among named values.
-macro_rules! choice {
-    ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident,
-     { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {
+/// Named values of a field of some bits.
+macro_rules! values {
+    ($(#[$doc:meta])* $name:ident { $($(#[$variant_doc:meta])* $variant:ident = $value:literal),+ $(,)? }) => {
         $(#[$doc])*
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
         pub enum $name { $($(#[$variant_doc])* $variant = $value),+ }
+
+        impl $name {
+            /// The value of these bits; the error names `field` and the known values.
+            fn from_bits(field: &str, bits: u8) -> crate::error::Result<Self> {
+                match bits {
+                    $($value => Ok(Self::$variant),)+
+                    other => {
+                        let known = [$(concat!(stringify!($value), " ", stringify!($variant))),+].join(", ");
+                        Err(crate::error::Error::malformed(field, known, other))
+                    }
+                }
+            }
+        }
+    };
+}
+
+/// A register of one byte that chooses among named values.
+macro_rules! choice {
+    ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident, { $($values:tt)+ }) => {
+        crate::command::bytes::values! { $(#[$doc])* $name { $($values)+ } }
 
         impl crate::command::Message for $name {
             const WORD: u16 = $word;
@@ -94,13 +120,33 @@ macro_rules! choice {
             }
 
             fn decode(data: &[u8]) -> crate::error::Result<Self> {
-                match crate::command::bytes::Bytes::new($title, data).u8()? {
-                    $($value => Ok(Self::$variant),)+
-                    other => {
-                        let known = [$(concat!(stringify!($value), " ", stringify!($variant))),+].join(", ");
-                        Err(crate::error::Error::malformed($title, known, other))
-                    }
-                }
+                Self::from_bits($title, crate::command::bytes::Bytes::new($title, data).u8()?)
+            }
+        }
+
+        direction!($name, $direction);
+    };
+}
+
+/// A register that holds one number, of type `u8` or `u16`, up to a greatest value.
+macro_rules! number {
+    ($(#[$doc:meta])* $name:ident, $word:literal, $title:literal, $direction:ident, $kind:ident up to $last:literal) => {
+        $(#[$doc])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+        pub struct $name(pub $kind);
+
+        impl crate::command::Message for $name {
+            const WORD: u16 = $word;
+            const NAME: &'static str = $title;
+
+            fn encode(&self) -> crate::error::Result<Vec<u8>> {
+                crate::command::bytes::in_range($title, self.0.into(), 0, $last)?;
+                Ok(self.0.to_le_bytes().to_vec())
+            }
+
+            fn decode(data: &[u8]) -> crate::error::Result<Self> {
+                let number = crate::command::bytes::Bytes::new($title, data).$kind()?;
+                crate::command::bytes::checked(Self(number))
             }
         }
 
@@ -158,4 +204,4 @@ macro_rules! switch {
     };
 }
 
-pub(crate) use {bits, choice, direction, switch};
+pub(crate) use {bits, choice, direction, number, switch, values};

@@ -1,7 +1,7 @@
 //! The display path: mode, area, flips, gamma.
 
 use super::Message;
-use super::bytes::{Bytes, choice, direction, from_u16s, in_range, switch};
+use super::bytes::{Bytes, checked, choice, direction, from_u16s, in_range, switch};
 use crate::error::Result;
 
 choice! {
@@ -58,9 +58,7 @@ impl Message for DisplayArea {
                 height_px,
             })
         };
-        let area = Self { input: next()?, display: next()? };
-        area.encode()?;
-        Ok(area)
+        checked(Self { input: next()?, display: next()? })
     }
 }
 

@@ -1,37 +1,39 @@
 //! The video input: source, colour coding, port clock, channel order.
 
 use super::Message;
-use super::bytes::{Bytes, choice, direction, in_range};
-use crate::error::{Error, Result};
+use super::bytes::{Bytes, choice, direction, in_range, values};
+use crate::error::Result;
 
-/// Where the image of the video mode comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum InputPort {
-    /// The parallel port, which on the LightCrafter 4500 is HDMI.
-    Parallel = 0,
-    /// The generator of test patterns.
-    TestPattern = 1,
-    /// An image in flash.
-    Flash = 2,
-    /// The FPD-link connector.
-    FpdLink = 3,
+values! {
+    /// Where the image of the video mode comes from.
+    InputPort {
+        /// The parallel port, which on the LightCrafter 4500 is HDMI.
+        Parallel = 0,
+        /// The generator of test patterns.
+        TestPattern = 1,
+        /// An image in flash.
+        Flash = 2,
+        /// The FPD-link connector.
+        FpdLink = 3,
+    }
 }
 
-/// Bits per pixel on the parallel port.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ParallelWidth {
-    /// 30 bit.
-    Bits30 = 0,
-    /// 24 bit: HDMI on the LightCrafter 4500.
-    Bits24 = 1,
-    /// 20 bit.
-    Bits20 = 2,
-    /// 16 bit.
-    Bits16 = 3,
-    /// 10 bit.
-    Bits10 = 4,
-    /// 8 bit.
-    Bits8 = 5,
+values! {
+    /// Bits per pixel on the parallel port.
+    ParallelWidth {
+        /// 30 bit.
+        Bits30 = 0,
+        /// 24 bit: HDMI on the LightCrafter 4500.
+        Bits24 = 1,
+        /// 20 bit.
+        Bits20 = 2,
+        /// 16 bit.
+        Bits16 = 3,
+        /// 10 bit.
+        Bits10 = 4,
+        /// 8 bit.
+        Bits8 = 5,
+    }
 }
 
 /// The input and its width.
@@ -62,23 +64,8 @@ impl Message for InputSource {
 
     fn decode(data: &[u8]) -> Result<Self> {
         let byte = Bytes::new(Self::NAME, data).u8()?;
-        let wrong = || Error::malformed(Self::NAME, "port 0 to 3 and width 0 to 5", format!("{byte:#04x}"));
-        let port = match byte & 7 {
-            0 => InputPort::Parallel,
-            1 => InputPort::TestPattern,
-            2 => InputPort::Flash,
-            3 => InputPort::FpdLink,
-            _ => return Err(wrong()),
-        };
-        let width = match byte >> 3 & 7 {
-            0 => ParallelWidth::Bits30,
-            1 => ParallelWidth::Bits24,
-            2 => ParallelWidth::Bits20,
-            3 => ParallelWidth::Bits16,
-            4 => ParallelWidth::Bits10,
-            5 => ParallelWidth::Bits8,
-            _ => return Err(wrong()),
-        };
+        let port = InputPort::from_bits("port of the input source", byte & 7)?;
+        let width = ParallelWidth::from_bits("width of the input source", byte >> 3 & 7)?;
         Ok(Self { port, width })
     }
 }
@@ -109,30 +96,32 @@ choice! {
     }
 }
 
-/// Port whose channels are swapped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum SwapPort {
-    /// The parallel port.
-    Parallel = 0,
-    /// The FPD-link connector.
-    FpdLink = 1,
+values! {
+    /// Port whose channels are swapped.
+    SwapPort {
+        /// The parallel port.
+        Parallel = 0,
+        /// The FPD-link connector.
+        FpdLink = 1,
+    }
 }
 
-/// Order of the data channels A (green), B (red), C (blue).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum ChannelOrder {
-    /// A, B, C: no swap.
-    Abc = 0,
-    /// C, A, B.
-    Cab = 1,
-    /// B, C, A.
-    Bca = 2,
-    /// A, C, B.
-    Acb = 3,
-    /// B, A, C: HDMI of the LightCrafter 4500.
-    Bac = 4,
-    /// C, B, A.
-    Cba = 5,
+values! {
+    /// Order of the data channels A (green), B (red), C (blue).
+    ChannelOrder {
+        /// A, B, C: no swap.
+        Abc = 0,
+        /// C, A, B.
+        Cab = 1,
+        /// B, C, A.
+        Bca = 2,
+        /// A, C, B.
+        Acb = 3,
+        /// B, A, C: HDMI of the LightCrafter 4500.
+        Bac = 4,
+        /// C, B, A.
+        Cba = 5,
+    }
 }
 
 /// Swap of the data channels of one port.
@@ -154,16 +143,8 @@ impl Message for ChannelSwap {
 
     fn decode(data: &[u8]) -> Result<Self> {
         let byte = Bytes::new(Self::NAME, data).u8()?;
-        let order = match byte & 7 {
-            0 => ChannelOrder::Abc,
-            1 => ChannelOrder::Cab,
-            2 => ChannelOrder::Bca,
-            3 => ChannelOrder::Acb,
-            4 => ChannelOrder::Bac,
-            5 => ChannelOrder::Cba,
-            _ => return Err(Error::malformed(Self::NAME, "an order from 0 to 5", byte & 7)),
-        };
-        let port = if byte & 0x80 == 0 { SwapPort::Parallel } else { SwapPort::FpdLink };
+        let port = SwapPort::from_bits("port of the channel swap", byte >> 7)?;
+        let order = ChannelOrder::from_bits("order of the channel swap", byte & 7)?;
         Ok(Self { port, order })
     }
 }

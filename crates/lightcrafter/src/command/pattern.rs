@@ -1,8 +1,8 @@
 //! Pattern mode: source, timing, tables, validation, run state.
 
 use super::Message;
-use super::bytes::{Bytes, bits, choice, direction, in_range, switch};
-use crate::error::{Error, Result};
+use super::bytes::{Bytes, bits, checked, choice, direction, in_range, number, switch};
+use crate::error::Result;
 
 choice! {
     /// Where patterns come from.
@@ -39,6 +39,12 @@ pub struct Timing {
     pub period_us: u32,
 }
 
+impl Timing {
+    pub(super) fn take(bytes: &mut Bytes<'_>) -> Result<Self> {
+        Ok(Self { exposure_us: bytes.u32()?, period_us: bytes.u32()? })
+    }
+}
+
 impl Message for Timing {
     const WORD: u16 = 0x1A29;
     const NAME: &'static str = "exposure and period";
@@ -48,8 +54,7 @@ impl Message for Timing {
     }
 
     fn decode(data: &[u8]) -> Result<Self> {
-        let mut bytes = Bytes::new(Self::NAME, data);
-        Ok(Self { exposure_us: bytes.u32()?, period_us: bytes.u32()? })
+        Self::take(&mut Bytes::new(Self::NAME, data))
     }
 }
 
@@ -83,14 +88,12 @@ impl Message for LutControl {
         let mut bytes = Bytes::new(Self::NAME, data);
         let (entries, repeat, patterns, images) = (bytes.u8()?, bytes.u8()?, bytes.u8()?, bytes.u8()?);
         let count = |last: u8| u16::from(last) + 1;
-        let control = Self {
+        checked(Self {
             entries: count(entries),
             repeat: repeat & 1 != 0,
             patterns: count(patterns),
             images: count(images),
-        };
-        control.encode()?;
-        Ok(control)
+        })
     }
 }
 
@@ -110,26 +113,10 @@ choice! {
     }
 }
 
-/// Entry that the next mailbox data are written to, 0 to 127.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct MailboxOffset(pub u8);
-
-impl Message for MailboxOffset {
-    const WORD: u16 = 0x1A32;
-    const NAME: &'static str = "mailbox offset";
-
-    fn encode(&self) -> Result<Vec<u8>> {
-        Ok(vec![in_range(Self::NAME, self.0.into(), 0, 127)? as u8])
-    }
-
-    fn decode(data: &[u8]) -> Result<Self> {
-        let offset = Self(Bytes::new(Self::NAME, data).u8()?);
-        offset.encode()?;
-        Ok(offset)
-    }
+number! {
+    /// Entry that the next mailbox data are written to, 0 to 127.
+    MailboxOffset, 0x1A32, "mailbox offset", write, u8 up to 127
 }
-
-direction!(MailboxOffset, write);
 
 switch! {
     /// Invert all patterns.
@@ -149,10 +136,7 @@ impl Message for Validate {
     }
 
     fn decode(data: &[u8]) -> Result<Self> {
-        match data {
-            [_, ..] => Ok(Self),
-            [] => Err(Error::malformed(Self::NAME, "at least 1 bytes", 0)),
-        }
+        Bytes::new(Self::NAME, data).u8().map(|_| Self)
     }
 }
 

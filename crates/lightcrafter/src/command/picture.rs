@@ -1,7 +1,7 @@
 //! Images that the controller provides: test patterns, flash images, the curtain.
 
 use super::Message;
-use super::bytes::{Bytes, choice, direction, from_u16s, in_range};
+use super::bytes::{Bytes, checked, choice, direction, from_u16s, in_range, number};
 use crate::error::Result;
 
 choice! {
@@ -51,9 +51,7 @@ impl Message for TestPatternColours {
 
     fn decode(data: &[u8]) -> Result<Self> {
         let mut bytes = Bytes::new(Self::NAME, data);
-        let colours = Self { foreground: bytes.u16s()?, background: bytes.u16s()? };
-        colours.encode()?;
-        Ok(colours)
+        checked(Self { foreground: bytes.u16s()?, background: bytes.u16s()? })
     }
 }
 
@@ -66,24 +64,10 @@ fn colour_bytes(colour: [u16; 3]) -> Result<Vec<u8>> {
     Ok(from_u16s(&colour))
 }
 
-/// Show the flash image of this number (video mode with the input from flash).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FlashImage(pub u8);
-
-impl Message for FlashImage {
-    const WORD: u16 = 0x1A39;
-    const NAME: &'static str = "flash image";
-
-    fn encode(&self) -> Result<Vec<u8>> {
-        Ok(vec![self.0])
-    }
-
-    fn decode(data: &[u8]) -> Result<Self> {
-        Ok(Self(Bytes::new(Self::NAME, data).u8()?))
-    }
+number! {
+    /// Show the flash image of this number (video mode with the input from flash).
+    FlashImage, 0x1A39, "flash image", both, u8 up to 255
 }
-
-direction!(FlashImage, both);
 
 /// Measure how long flash images take to load; read [`ImageLoadTime`] for the result.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -152,9 +136,7 @@ impl Message for Curtain {
     }
 
     fn decode(data: &[u8]) -> Result<Self> {
-        let curtain = Self(Bytes::new(Self::NAME, data).u16s()?);
-        curtain.encode()?;
-        Ok(curtain)
+        checked(Self(Bytes::new(Self::NAME, data).u16s()?))
     }
 }
 

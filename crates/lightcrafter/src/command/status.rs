@@ -2,7 +2,7 @@
 
 use super::Message;
 use super::Writable;
-use super::bytes::{Bytes, bits, direction, switch};
+use super::bytes::{Bytes, bits, direction, number, switch};
 use crate::error::{Error, Result};
 use crate::packet::Access;
 
@@ -133,24 +133,10 @@ impl Message for FirmwareTag {
 
 direction!(FirmwareTag, read);
 
-/// Number of 24-bit images in flash.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct FlashImageCount(pub u8);
-
-impl Message for FlashImageCount {
-    const WORD: u16 = 0x1A42;
-    const NAME: &'static str = "number of images in flash";
-
-    fn encode(&self) -> Result<Vec<u8>> {
-        Ok(vec![self.0])
-    }
-
-    fn decode(data: &[u8]) -> Result<Self> {
-        Ok(Self(Bytes::new(Self::NAME, data).u8()?))
-    }
+number! {
+    /// Number of 24-bit images in flash.
+    FlashImageCount, 0x1A42, "number of images in flash", read, u8 up to 255
 }
-
-direction!(FlashImageCount, read);
 
 /// Power of the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]

@@ -1,21 +1,22 @@
 //! Tables of pattern mode: patterns, images, and patterns with individual exposures.
 
 use super::Message;
-use super::bytes::{Bytes, direction, in_range};
+use super::bytes::{Bytes, checked, direction, in_range, number, values};
 use super::pattern::Timing;
 use crate::error::Result;
 
-/// What starts an entry of the pattern table.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum EntryTrigger {
-    /// The internal clock.
-    Internal = 0,
-    /// The rising edge of an external signal, or the start of a video frame.
-    Rising = 1,
-    /// The falling edge of an external signal.
-    Falling = 2,
-    /// The end of the previous entry.
-    Continue = 3,
+values! {
+    /// What starts an entry of the pattern table.
+    EntryTrigger {
+        /// The internal clock.
+        Internal = 0,
+        /// The rising edge of an external signal, or the start of a video frame.
+        Rising = 1,
+        /// The falling edge of an external signal.
+        Falling = 2,
+        /// The end of the previous entry.
+        Continue = 3,
+    }
 }
 
 /// One pattern: its bit planes, its LEDs, and its transitions.
@@ -52,14 +53,8 @@ impl LutEntry {
     }
 
     fn from_word(word: u32) -> Result<Self> {
-        let trigger = match word & 3 {
-            0 => EntryTrigger::Internal,
-            1 => EntryTrigger::Rising,
-            2 => EntryTrigger::Falling,
-            _ => EntryTrigger::Continue,
-        };
         let entry = Self {
-            trigger,
+            trigger: EntryTrigger::from_bits("trigger of a pattern", (word & 3) as u8)?,
             number: (word >> 2 & 63) as u8,
             bit_depth: (word >> 8 & 15) as u8,
             leds: (word >> 12 & 7) as u8,
@@ -91,9 +86,7 @@ impl Message for PatternTable {
         let mut bytes = Bytes::new(Self::NAME, data);
         let entries: Result<Vec<_>> =
             (0..data.len() / 3).map(|_| bytes.u24().and_then(LutEntry::from_word)).collect();
-        let table = Self(entries?);
-        table.encode()?;
-        Ok(table)
+        checked(Self(entries?))
     }
 }
 
@@ -123,35 +116,16 @@ impl Message for ImageTable {
     }
 
     fn decode(data: &[u8]) -> Result<Self> {
-        let table = Self(Self::exchanged(data.to_vec()));
-        table.encode()?;
-        Ok(table)
+        checked(Self(Self::exchanged(data.to_vec())))
     }
 }
 
 direction!(ImageTable, both);
 
-/// Index of the next [`VariableEntry`], 0 to 1823; send it before each entry.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct VariableOffset(pub u16);
-
-impl Message for VariableOffset {
-    const WORD: u16 = 0x1A3F;
-    const NAME: &'static str = "offset in the variable table";
-
-    fn encode(&self) -> Result<Vec<u8>> {
-        in_range(Self::NAME, self.0.into(), 0, 1823)?;
-        Ok(self.0.to_le_bytes().to_vec())
-    }
-
-    fn decode(data: &[u8]) -> Result<Self> {
-        let offset = Self(Bytes::new(Self::NAME, data).u16()?);
-        offset.encode()?;
-        Ok(offset)
-    }
+number! {
+    /// Index of the next [`VariableEntry`], 0 to 1823; send it before each entry.
+    VariableOffset, 0x1A3F, "offset in the variable table", write, u16 up to 1823
 }
-
-direction!(VariableOffset, write);
 
 /// A pattern with an individual exposure; needs firmware 3.0 or newer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -173,7 +147,7 @@ impl Message for VariableEntry {
     fn decode(data: &[u8]) -> Result<Self> {
         let mut bytes = Bytes::new(Self::NAME, data);
         let entry = LutEntry::from_word(bytes.u32()?)?;
-        Ok(Self { entry, timing: Timing { exposure_us: bytes.u32()?, period_us: bytes.u32()? } })
+        Ok(Self { entry, timing: Timing::take(&mut bytes)? })
     }
 }
 
@@ -208,14 +182,12 @@ impl Message for VariableControl {
     fn decode(data: &[u8]) -> Result<Self> {
         let mut bytes = Bytes::new(Self::NAME, data);
         let (entries, patterns, images, repeat) = (bytes.u16()?, bytes.u16()?, bytes.u8()?, bytes.u8()?);
-        let control = Self {
+        checked(Self {
             entries: entries.saturating_add(1),
             patterns: patterns.saturating_add(1),
             images: u16::from(images) + 1,
             repeat: repeat & 1 != 0,
-        };
-        control.encode()?;
-        Ok(control)
+        })
     }
 }
 

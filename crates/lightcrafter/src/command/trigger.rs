@@ -1,7 +1,7 @@
 //! Triggers in and out, and their delays.
 
 use super::Message;
-use super::bytes::{Bytes, choice, direction, in_range};
+use super::bytes::{Bytes, checked, choice, direction, in_range};
 use crate::error::{Error, Result};
 
 /// Time of an edge relative to the start of an exposure: one byte, 107.2 ns per step, 0xBB is 0.
@@ -64,9 +64,7 @@ impl Message for TriggerOut1 {
         let mut bytes = Bytes::new(Self::NAME, data);
         let (invert_byte, rising, falling) =
             (bytes.u8()? & 3, EdgeDelay(bytes.u8()?), EdgeDelay(bytes.u8()?));
-        let output = Self { invert_byte, rising, falling };
-        output.encode()?;
-        Ok(output)
+        checked(Self { invert_byte, rising, falling })
     }
 }
 

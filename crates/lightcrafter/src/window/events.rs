@@ -44,8 +44,7 @@ pub fn ask<T>(order: impl FnOnce(Reply<T>) -> Order) -> Result<T> {
     if !sent {
         return Err(lost("the connection to the display is closed"));
     }
-    let silent = || lost(&format!("the display did not answer within {} s", PATIENCE.as_secs()));
-    answer.recv_timeout(PATIENCE).unwrap_or_else(|_| Err(silent()))
+    answer.recv_timeout(PATIENCE).unwrap_or_else(|_| Err(lost(&silent())))
 }
 
 fn start() -> std::result::Result<Mutex<EventLoopProxy<Order>>, String> {
@@ -61,8 +60,11 @@ fn start() -> std::result::Result<Mutex<EventLoopProxy<Order>>, String> {
     };
     let thread = thread::Builder::new().name("pattern windows".into()).spawn(run);
     thread.map_err(|error| error.to_string())?;
-    let silent = |_| format!("the display did not answer within {} s", PATIENCE.as_secs());
-    started.recv_timeout(PATIENCE).map_err(silent)?
+    started.recv_timeout(PATIENCE).map_err(|_| silent())?
+}
+
+fn silent() -> String {
+    format!("the display did not answer within {} s", PATIENCE.as_secs())
 }
 
 /// Error text of the window system without the source location that winit puts before it.
