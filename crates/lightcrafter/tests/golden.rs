@@ -2,6 +2,7 @@
 
 use lightcrafter::command::*;
 use lightcrafter::packet::{Access, Assembler, REPORT_BYTES, Reply, Request};
+use lightcrafter::sequence::{Colour, channel};
 use std::collections::BTreeMap;
 
 /// Meaning to bytes, of one direction.
@@ -34,16 +35,7 @@ fn write<M: Writable>(message: M) -> Vec<u8> {
 }
 
 fn entry(trigger: EntryTrigger, number: u8, bit_depth: u8, leds: u8) -> LutEntry {
-    LutEntry {
-        trigger,
-        number,
-        bit_depth,
-        leds,
-        invert: false,
-        black_after: false,
-        next_image: false,
-        shares_exposure: false,
-    }
+    LutEntry { trigger, number, ..channel(Colour::Green, bit_depth, leds) }
 }
 
 fn sent() -> Vec<(&'static str, Vec<u8>)> {

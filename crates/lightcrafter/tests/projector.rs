@@ -115,21 +115,24 @@ fn timing_changes_while_it_runs_and_while_it_rests() {
     assert_eq!(bench.projector.read::<Timing>().unwrap().exposure_us, 9000);
 }
 
+/// So many patterns, each with its image and its exposure.
+fn one_image_each(patterns: u8) -> Sequence {
+    let mut entries = vec![channel(Colour::Green, 8, RED); patterns.into()];
+    entries[1..].iter_mut().for_each(|pattern| pattern.next_image = true);
+    let timing = |i: u32| Timing { exposure_us: 250_000 + i, period_us: 250_000 + i };
+    Sequence {
+        source: Source::Flash { images: (0..patterns).map(|i| i % 3).collect(), load_us: WORST_LOAD_US },
+        trigger_mode: TriggerMode::VariableInternal,
+        patterns: entries,
+        exposures: Exposures::Each((0..patterns.into()).map(timing).collect()),
+        repeat: false,
+    }
+}
+
 #[test]
 fn an_exposure_for_each_pattern_and_many_images() {
     let mut bench = Bench::new();
-    let mut patterns = vec![channel(Colour::Green, 8, RED); 70];
-    patterns[1..].iter_mut().for_each(|pattern| pattern.next_image = true);
-    let sequence = Sequence {
-        source: Source::Flash { images: (0..70).map(|i| i % 3).collect(), load_us: WORST_LOAD_US },
-        trigger_mode: TriggerMode::VariableInternal,
-        patterns,
-        exposures: Exposures::Each(
-            (0..70).map(|i| Timing { exposure_us: 250_000 + i, period_us: 250_000 + i }).collect(),
-        ),
-        repeat: false,
-    };
-    bench.projector.play(&sequence).unwrap();
+    bench.projector.play(&one_image_each(70)).unwrap();
     assert_eq!(bench.writes(0x1A3E), 70);
     assert_eq!(bench.writes(0x1A34), 2, "64 images and 6");
     assert_eq!(bench.projector.read::<VariableControl>().unwrap().images, 70);
@@ -139,16 +142,7 @@ fn an_exposure_for_each_pattern_and_many_images() {
 #[test]
 fn a_table_of_66_images_ends_in_more_than_two() {
     let mut bench = Bench::new();
-    let mut patterns = vec![channel(Colour::Green, 8, RED); 66];
-    patterns[1..].iter_mut().for_each(|pattern| pattern.next_image = true);
-    let sequence = Sequence {
-        source: Source::Flash { images: (0..66).map(|i| i % 3).collect(), load_us: WORST_LOAD_US },
-        trigger_mode: TriggerMode::VariableInternal,
-        patterns,
-        exposures: Exposures::Each(vec![Timing { exposure_us: 250_000, period_us: 250_000 }; 66]),
-        repeat: true,
-    };
-    bench.projector.load(&sequence).unwrap();
+    bench.projector.load(&one_image_each(66)).unwrap();
     let sent: Vec<u8> =
         bench.device().log().filter(|request| request.word == 0x1A34).flat_map(|r| r.data.clone()).collect();
     assert_eq!(sent, (0..66).map(|i| i % 3).collect::<Vec<u8>>());
