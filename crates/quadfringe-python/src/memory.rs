@@ -1,23 +1,24 @@
-//! Memory of the maps that go to Python, used again once Python has dropped them: to find fresh memory takes the system
-//! longer than the kernel needs to fill it.
+//! Memory of the maps that go to Python. It is reused once Python has dropped them, because the system needs longer to
+//! provide fresh memory than the kernel needs to fill it.
 
-use ndarray::{Array, Array1, Dimension, Ix2, Ix3};
+use ndarray::{Array, Array1, Dimension, Ix2, Ix3, ShapeError};
 use numpy::PyArray;
+use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
 use quadfringe::Decoded;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Most maps that wait for a shot: those of two shots.
+/// Largest number of maps kept for later shots: those of two shots.
 const WAITING: usize = 16;
 
-/// Maps that wait for the next shot.
+/// Maps kept for the next shot.
 #[derive(Default)]
 pub struct Memory {
     waiting: Mutex<Vec<Array1<f32>>>,
 }
 
 impl Memory {
-    /// Maps for the kernel to fill, in memory of earlier shots; the kernel replaces those that are left empty.
+    /// Maps for the kernel to fill, in memory of earlier shots. The kernel allocates those for which no memory is left.
     pub fn maps(&self, [rows, columns]: [usize; 2], calibrated: bool) -> Decoded {
         let map = || self.take(Ix2(rows, columns)).unwrap_or_default();
         let mut maps = Decoded::default();
@@ -35,16 +36,16 @@ impl Memory {
         maps
     }
 
-    /// An array left over from another shot.
+    /// Memory of an earlier shot, if there is an array of this size.
     fn take<D: Dimension>(&self, shape: D) -> Option<Array<f32, D>> {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
-        // The latest first: some of it may still be in a cache.
+        // The latest comes first, because part of it may still be in a cache.
         let fitting = waiting.iter().rposition(|values| values.len() == shape.size())?;
         let values = waiting.remove(fitting);
-        Some(values.into_shape_with_order(shape).expect("as many values as the shape has"))
+        values.into_shape_with_order(shape).ok()
     }
 
-    /// Lend an array to Python; its memory comes back when the last NumPy array that looks at it is gone.
+    /// Lend an array to Python. Its memory comes back when the last NumPy array that shows it is gone.
     pub fn lend<'py, D: Dimension>(
         self: &Arc<Self>,
         py: Python<'py>,
@@ -52,12 +53,14 @@ impl Memory {
     ) -> PyResult<Bound<'py, PyArray<f32, D>>> {
         let shape = array.raw_dim();
         let count = array.len();
-        let values = array.into_shape_with_order(count).expect("maps are contiguous");
+        let values = array.into_shape_with_order(count).map_err(wrong_layout)?;
         let loan = Bound::new(py, Loan { values, owner: Arc::clone(self) })?;
-        let view =
-            loan.get().values.view().into_shape_with_order(shape).expect("as many values as the shape has");
-        // SAFETY: the array keeps the loan alive, which neither moves, changes nor shows its values to anyone else.
-        #[expect(unsafe_code, reason = "the only way to a NumPy array that tells when it is gone")]
+        let view = loan.get().values.view().into_shape_with_order(shape).map_err(wrong_layout)?;
+        // SAFETY: the array keeps the loan alive, and the loan neither moves nor changes its values nor gives others access.
+        #[expect(
+            unsafe_code,
+            reason = "no safe call lends memory to NumPy and notices when the array is gone"
+        )]
         Ok(unsafe { PyArray::borrow_from_array(&view, loan.clone().into_any()) })
     }
 
@@ -67,6 +70,11 @@ impl Memory {
             waiting.push(values);
         }
     }
+}
+
+/// The error of a map that is not contiguous. The kernel makes none, so a caller never sees it.
+fn wrong_layout(error: ShapeError) -> PyErr {
+    PyRuntimeError::new_err(format!("a map of the kernel is not contiguous: {error}"))
 }
 
 /// Memory lent to Python: the base of a NumPy array.
