@@ -1,4 +1,4 @@
-//! NumPy arrays, borrowed for the kernel and never copied; an array of the wrong type is an error that names its argument.
+//! NumPy arrays, borrowed for the kernel without a copy. An array of the wrong type is an error that names its argument.
 
 use numpy::ndarray::{ArrayView2, Dim, Dimension, Ix};
 use numpy::{Element, PyArray, PyArrayMethods, PyReadonlyArray, PyUntypedArray, PyUntypedArrayMethods};
@@ -11,12 +11,12 @@ pub const CHANNELS: [&str; 4] = ["red", "green", "blue", "ir"];
 /// The images of a shot of a Bayer chip.
 pub const BAYER_IMAGES: [&str; 2] = ["raw", "ir"];
 
-/// Every error of the kernel is a ValueError: it concerns a value of the caller.
+/// Every error of the kernel is a ValueError, because it concerns a value from the caller.
 pub fn value_error(error: quadfringe::Error) -> PyErr {
     PyValueError::new_err(error.to_string())
 }
 
-/// Borrow `object` as an array of this type and number of axes; `None` when it is something else.
+/// Borrow `object` as an array of this type and number of axes; `None` if it is something else.
 pub fn borrowed<'py, T: Element, const N: usize>(
     object: &Bound<'py, PyAny>,
 ) -> PyResult<Option<PyReadonlyArray<'py, T, Dim<[Ix; N]>>>>

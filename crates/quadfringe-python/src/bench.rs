@@ -1,4 +1,4 @@
-//! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` knows the truth.
+//! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` holds the true geometry.
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, expected, value_error};
 use crate::device::{Device, axis_named, layout_named, unknown};
@@ -12,7 +12,7 @@ use quadfringe::optics::Pose;
 use quadfringe::rig::{self, Light, Planes, Print, Projector};
 use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
 
-/// Camera and two projectors before a surface.
+/// A camera and two projectors in front of a surface.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct Bench(rig::Bench);
 
@@ -54,28 +54,28 @@ impl Bench {
         Device(self.0.infrared.clone())
     }
 
-    /// One ray through each pixel of a scene with this name.
+    /// Cast one ray through each pixel onto the scene of this name.
     #[pyo3(signature = (surface, *, time_s = 0.0))]
     fn cast(&self, py: Python<'_>, surface: &str, time_s: f64) -> PyResult<Cast> {
         let surface = scene(surface, time_s).map_err(value_error)?;
         Ok(self.cast_surface(py, surface.as_ref()))
     }
 
-    /// One ray through each pixel of the peaks function over the plane z.
+    /// Cast one ray through each pixel onto the peaks function over the plane z.
     #[pyo3(signature = (*, z_mm, scale_mm))]
     fn cast_peaks(&self, py: Python<'_>, z_mm: f64, scale_mm: f64) -> PyResult<Cast> {
         let surface = Peaks::new(z_mm, scale_mm).map_err(value_error)?;
         Ok(self.cast_surface(py, &surface))
     }
 
-    /// One ray through each pixel of a plane through a point, whose normal points to the camera.
+    /// Cast one ray through each pixel onto a plane through a point. The normal of the plane points to the camera.
     #[pyo3(signature = (*, point_mm, normal))]
     fn cast_plane(&self, py: Python<'_>, point_mm: [f64; 3], normal: [f64; 3]) -> PyResult<Cast> {
         let surface = Plane::new(point_mm, normal).map_err(value_error)?;
         Ok(self.cast_surface(py, &surface))
     }
 
-    /// One ray through each pixel of a relief.
+    /// Cast one ray through each pixel onto a height map.
     #[pyo3(signature = (heights_mm, *, pitch_mm, origin_mm, z_mm))]
     fn cast_height_map(
         &self,
@@ -90,7 +90,7 @@ impl Bench {
         Ok(self.cast_surface(py, &surface.map_err(value_error)?))
     }
 
-    /// One ray through each pixel of a plate between two corners (x, y) on the plane z = 0 of a posed board.
+    /// Cast one ray through each pixel onto a plate between two corners (x, y) on the plane z = 0 of a posed board.
     fn cast_plate(
         &self,
         py: Python<'_>,
@@ -144,7 +144,7 @@ impl Bench {
         self.render_lights(py, cast, &lights, options)
     }
 
-    /// The images with the same fringes in all channels, or in those of one projector: one step of an N-step capture.
+    /// The images of one step of an N-step capture, with the same fringes in all channels or in those of one projector.
     #[pyo3(signature = (cast, fringe_number, shift_rad, *, axis = "columns", beam = None, **options))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
     fn render_step<'py>(
@@ -162,7 +162,7 @@ impl Bench {
         self.render_lights(py, cast, &lights, options)
     }
 
-    /// The images with each channel lit evenly at its level, 0 to 1.
+    /// The images under even light, with a level from 0 to 1 for each channel.
     #[pyo3(signature = (cast, levels, **options))]
     fn render_levels<'py>(
         &self,
@@ -223,14 +223,14 @@ impl Cast {
         py.detach(|| self.0.xyz_mm()).into_pyarray(py)
     }
 
-    /// Column of a projector that lights each pixel, (H, W) float32.
+    /// Projector column that lights each pixel, (H, W) float32.
     #[pyo3(signature = (*, infrared = false))]
     fn column_px<'py>(&self, py: Python<'py>, infrared: bool) -> Bound<'py, PyArray2<f32>> {
         let projector = if infrared { Projector::Infrared } else { Projector::Visible };
         py.detach(|| self.0.column_px(projector)).into_pyarray(py)
     }
 
-    /// Where a surface is seen that a projector does not light, (H, W) bool.
+    /// Pixels that see a surface which at least one projector does not light, (H, W) bool.
     fn shadow<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<bool>> {
         py.detach(|| self.0.shadow()).into_pyarray(py)
     }

@@ -17,7 +17,7 @@ impl<'a, 'py> FromPyObject<'a, 'py> for ResponseNumbers {
     }
 }
 
-/// The shot with its white, where that is not the greatest value of the type.
+/// The shot with this full scale, or with the greatest value of its type if none is given.
 pub fn scaled<T: Sample>(shot: Shot<'_, T>, full_scale: Option<f32>) -> quadfringe::Result<Shot<'_, T>> {
     match full_scale {
         Some(full_scale) => shot.with_full_scale(full_scale),
@@ -25,7 +25,7 @@ pub fn scaled<T: Sample>(shot: Shot<'_, T>, full_scale: Option<f32>) -> quadfrin
     }
 }
 
-/// The kernel's conditioner; an argument that is absent takes its default, an ideal camera.
+/// The kernel's conditioner. The defaults of absent arguments describe an ideal camera.
 pub fn conditioner_of(
     dark: Option<[f32; 4]>,
     response: Option<[ResponseNumbers; 4]>,

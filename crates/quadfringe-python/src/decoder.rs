@@ -13,7 +13,7 @@ use quadfringe::{BayerPattern, Decoded, Encoding, Shot};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// Decodes shots of one size; planned and checked when made.
+/// Decodes shots of one size. All settings are checked when it is made.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct Decoder {
     kernel: Mutex<quadfringe::Decoder>,
@@ -71,7 +71,7 @@ impl Decoder {
         Ok(Self { kernel, pool, full_scale, shape, calibrated, memory: Arc::default() })
     }
 
-    /// The settings in force, the kernel's defaults included.
+    /// The settings in use, including the kernel's defaults.
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let kernel = self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
         let options = kernel.options();
@@ -86,7 +86,7 @@ impl Decoder {
         Ok(named)
     }
 
-    /// Maps by name, float32.
+    /// Decode a shot into maps by name, float32.
     fn decode<'py>(
         &self,
         py: Python<'py>,
@@ -103,7 +103,7 @@ impl Decoder {
         self.maps_by_name(py, decoded)
     }
 
-    /// The same from the raw mosaic of a Bayer chip and an infrared image.
+    /// Decode the raw mosaic of a Bayer chip and an infrared image into maps by name.
     fn decode_bayer<'py>(
         &self,
         py: Python<'py>,

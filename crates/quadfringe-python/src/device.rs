@@ -66,7 +66,7 @@ impl Device {
         self.0.translation_mm
     }
 
-    /// Pixel (column, row) at which a point of the camera frame is seen; None when it is not in front.
+    /// Pixel (column, row) of a point in the camera frame; None if the point is not in front of the device.
     fn project(&self, point_mm: [f64; 3]) -> Option<[f64; 2]> {
         self.0.project(point_mm)
     }
@@ -77,7 +77,7 @@ impl Device {
         (ray.origin_mm, ray.direction)
     }
 
-    /// Position in another device of the point of the plane z that a position sees or lights; None without such a point.
+    /// Position in another device of the point on the plane z that this position sees or lights; None if there is none.
     #[pyo3(signature = (position, other, z_mm))]
     fn through_plane(&self, position: [f64; 2], other: &Self, z_mm: f64) -> Option<[f64; 2]> {
         self.0.through_plane(position, &other.0, z_mm)
@@ -143,7 +143,7 @@ fn channel_named(name: &str) -> PyResult<Channel> {
     found.ok_or_else(|| unknown("channel", name, "R, G, B or IR"))
 }
 
-/// The direction in which fringes count, of this name.
+/// The axis of this name, along which fringes are counted.
 pub fn axis_named(name: &str) -> PyResult<Axis> {
     match name {
         "columns" => Ok(Axis::Columns),
@@ -161,7 +161,7 @@ pub fn layout_named(name: &str) -> PyResult<DmdLayout> {
     }
 }
 
-/// The error for a name that is not in a list.
+/// The error for an unknown name, with the known ones.
 pub fn unknown(what: &str, name: &str, known: &str) -> PyErr {
     PyValueError::new_err(format!("{what}: expected {known}, got {name:?}"))
 }

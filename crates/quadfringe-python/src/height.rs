@@ -1,4 +1,4 @@
-//! Absolute phase to millimetres outside the decoder: `PolynomialHeight`, `xyz_from_column`.
+//! Conversion of absolute phase to millimetres outside the decoder: `PolynomialHeight`, `xyz_from_column`.
 
 use crate::arrays::{expected, value_error};
 use crate::device::Device;
@@ -12,7 +12,7 @@ pub struct PolynomialHeight(height::PolynomialHeight);
 
 #[pymethods]
 impl PolynomialHeight {
-    /// From the phase of the reference plane and coefficients, as `coefficients` gave them.
+    /// Make one from the phase of the reference plane and the coefficients that `coefficients` returned.
     #[new]
     fn new(reference_rad: &Bound<'_, PyAny>, coefficients: &Bound<'_, PyAny>) -> PyResult<Self> {
         let reference_rad = expected::<f32, 2>("reference_rad", reference_rad)?.to_owned_array();
@@ -22,7 +22,7 @@ impl PolynomialHeight {
             .map_err(value_error)
     }
 
-    /// Fitted to planes at known heights.
+    /// Fit the polynomials to planes at known heights.
     #[staticmethod]
     fn fit(
         py: Python<'_>,

@@ -1,4 +1,5 @@
-//! The Python border of quadfringe: borrow, release the GIL, call the kernel, map the error, hand over. No decisions.
+//! The Python binding of quadfringe. A function borrows its arrays, releases the GIL, calls the kernel, maps the error and
+//! returns the result; it decides nothing.
 
 mod arrays;
 mod bench;

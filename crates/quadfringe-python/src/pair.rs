@@ -22,7 +22,7 @@ pub fn pair_of(
     predeformed_z_mm.map_or(Ok(pair.clone()), |z_mm| pair.predeformed(z_mm))
 }
 
-/// Image with which the infrared projector lights a plane as the visible one would, (height, width) float32.
+/// Infrared image that puts the fringes on a plane where the visible projector would put them, (height, width) float32.
 #[pyfunction]
 #[pyo3(signature = (visible, infrared, fringe_number, *, z_mm, layout = "regular"))]
 pub fn predeform<'py>(
@@ -66,7 +66,7 @@ impl PairTable {
         py.detach(plan).map(Self).map_err(value_error)
     }
 
-    /// The infrared phase in rad, not wrapped, where the first absolute phase is known.
+    /// The infrared phase in rad, not wrapped, at the points with this first absolute phase.
     fn infrared_rad<'py>(&self, py: Python<'py>, phase_rad: &Bound<'py, PyAny>) -> PyResult<Map<'py>> {
         let phase = expected::<f32, 2>("phase_rad", phase_rad)?;
         let view = phase.as_array();

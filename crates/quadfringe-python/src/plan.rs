@@ -1,4 +1,4 @@
-//! The plan of a decoder from keyword arguments; an argument that is absent takes the kernel's default.
+//! The plan of a decoder from keyword arguments. An absent argument takes the kernel's default.
 
 use crate::device::Device;
 use crate::pair::pair_of;
@@ -30,7 +30,7 @@ impl Geometry {
     }
 }
 
-/// Add choices and devices to a plan, and make the decoder.
+/// Add choices and devices to a builder, and make the decoder.
 pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geometry) -> Result<Decoder> {
     let mut method = choices.method.map_or(Ok(Method::default()), Method::from_name)?;
     if let Some(instants) = choices.channel_instants_us {

@@ -1,4 +1,4 @@
-//! The projectors of a real bench: `LightCrafter`, its sequences, the window of the HDMI route, the packer for flash.
+//! The projectors of a real bench: `LightCrafter`, its sequences, the window on its HDMI output, the packer for flash.
 
 mod errors;
 mod names;
@@ -27,7 +27,7 @@ pub struct LightCrafter {
 }
 
 impl LightCrafter {
-    /// Call the driver without the GIL; one call at a time, because the driver has one transaction in flight.
+    /// Call the driver without the GIL, one call at a time, because the driver has one transaction in flight.
     fn call<T: Send>(
         &self,
         py: Python<'_>,
@@ -205,7 +205,7 @@ impl LightCrafter {
         self.call(py, |driver| driver.set_led_drive(drive))
     }
 
-    /// None leaves the choice to the patterns.
+    /// With None the patterns select the LEDs.
     fn set_leds(&self, py: Python<'_>, leds: Option<&str>) -> PyResult<()> {
         let enable = names::led_enable(leds)?;
         self.call(py, |driver| driver.set_leds(enable))
@@ -260,7 +260,7 @@ impl LightCrafter {
         self.call(py, |driver| driver.set_flips(long_axis, short_axis))
     }
 
-    /// None is linear light.
+    /// None means linear light.
     fn set_gamma(&self, py: Python<'_>, table: Option<u8>) -> PyResult<()> {
         let gamma = table.map_or(Gamma::LINEAR, |table| Gamma { enabled: true, table });
         self.call(py, |driver| driver.set_gamma(gamma))
@@ -286,7 +286,7 @@ pub fn lightcrafters(py: Python<'_>) -> PyResult<Vec<(String, u8, Option<String>
     Ok(found.into_iter().map(|device| (device.port.to_string(), device.address, device.serial)).collect())
 }
 
-/// The file and the line that give users permission.
+/// The udev file and the line in it that give users permission.
 #[pyfunction]
 pub fn udev_rule() -> (&'static str, &'static str) {
     (lightcrafter::error::UDEV_FILE, lightcrafter::error::UDEV_RULE)

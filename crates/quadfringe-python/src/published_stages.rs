@@ -1,4 +1,4 @@
-//! The stages that the published decoder is composed of, beyond the basic ones of `stages`.
+//! Further stages of the published decoder. The basic ones are in `stages`.
 
 use crate::arrays::{expected, value_error};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
@@ -41,7 +41,7 @@ fn block_means<'py>(
     Ok(found.into_pyarray(py))
 }
 
-/// Image whose gaps (NaN) hold the last value to their left.
+/// Image whose gaps (NaN) are filled with the last value to their left.
 #[pyfunction]
 fn fill_gaps<'py>(py: Python<'py>, image: &Bound<'py, PyAny>) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
@@ -79,7 +79,7 @@ fn fourier_pair<'py>(
     Ok(found.map(|found| (found.phase_rad.into_pyarray(py), found.modulation.into_pyarray(py))))
 }
 
-/// Wrapped phase with the turns that bring it nearest to an estimate of the absolute phase.
+/// Wrapped phase plus the whole turns that bring it nearest to an estimate of the absolute phase.
 #[pyfunction]
 fn nearest_turn<'py>(
     py: Python<'py>,

@@ -9,7 +9,7 @@ use pyo3::types::PyDict;
 use quadfringe::BayerPattern;
 use quadfringe::rig::{Albedo, BitDepth, Demosaic, RenderOptions};
 
-/// The kernel's defaults, with the options that are given in their place.
+/// The kernel's defaults, replaced by the given options.
 pub fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptions> {
     let mut options = RenderOptions::default();
     let mut patch_mm = None;
@@ -34,7 +34,7 @@ pub fn render_options(given: Option<&Bound<'_, PyDict>>) -> PyResult<RenderOptio
             "bit_depth" => options.bit_depth = BitDepth::from_bits(value.extract()?).map_err(value_error)?,
             "seed" => options.seed = value.extract()?,
             _ => {
-                return Err(PyTypeError::new_err(format!("render: no option is called {name:?}")));
+                return Err(PyTypeError::new_err(format!("render: {name:?} is not an option")));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! The stages one by one, for those who teach or debug; all on (H, W) float32.
+//! The stages one by one, for teaching and debugging. All images are (H, W) float32.
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, expected, value_error, views};
 use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
@@ -113,7 +113,7 @@ pub fn carrier(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(f64, f64)>
     Ok((found.row_px, found.column_px))
 }
 
-/// Wrapped phase from R and B without their backgrounds, of equal modulation.
+/// Wrapped phase from R and B, after their backgrounds are removed and their modulations are made equal.
 #[pyfunction]
 #[pyo3(signature = (red, blue, *, coarse = false))]
 pub fn two_step<'py>(
@@ -186,7 +186,7 @@ pub fn estimate_response<'py>(
     figures_of(py, &found)
 }
 
-/// Response of each channel from one shot and its phase, by name; a channel that shows none is left out.
+/// Response of each channel from one shot and its phase, by name. A channel for which none was found is left out.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "four channels, their phase and their fringes")]
 pub fn estimate_response_of_shot<'py>(

@@ -1,4 +1,4 @@
-//! Each error of the driver as the Python exception that a caller would look for.
+//! Each error of the driver as a Python exception of the fitting type.
 
 use lightcrafter::Error;
 use pyo3::exceptions::{

@@ -1,4 +1,4 @@
-//! Names of Python for the choices of the driver.
+//! Python names of the driver's enum values.
 
 use crate::device::unknown;
 use lightcrafter::Profile;
@@ -27,14 +27,14 @@ pub fn leds(letters: &str) -> PyResult<u8> {
     })
 }
 
-/// LEDs set by hand, or left to the patterns.
+/// The LEDs of these letters, switched on; with None the patterns select the LEDs.
 pub fn led_enable(letters: Option<&str>) -> PyResult<LedEnable> {
     let Some(letters) = letters else { return Ok(LedEnable::SEQUENCER) };
     let on = leds(letters)?;
     Ok(LedEnable { red: on & RED != 0, green: on & GREEN != 0, blue: on & BLUE != 0, sequencer: false })
 }
 
-/// The start of a pattern.
+/// The trigger of a pattern.
 pub fn entry_trigger(name: &str) -> PyResult<EntryTrigger> {
     match name {
         "internal" => Ok(EntryTrigger::Internal),
@@ -60,7 +60,7 @@ pub fn trigger_mode(name: &str) -> PyResult<TriggerMode> {
     }
 }
 
-/// The picture of the generator of this name.
+/// The test pattern of this name.
 pub fn test_pattern(name: &str) -> PyResult<TestPattern> {
     match name {
         "solid" => Ok(TestPattern::Solid),
@@ -83,7 +83,7 @@ pub fn test_pattern(name: &str) -> PyResult<TestPattern> {
     }
 }
 
-/// normal or standby.
+/// `normal` or `standby`.
 pub fn of_power(power: PowerMode) -> &'static str {
     match power {
         PowerMode::Normal => "normal",
@@ -91,7 +91,7 @@ pub fn of_power(power: PowerMode) -> &'static str {
     }
 }
 
-/// video or patterns.
+/// `video` or `patterns`.
 pub fn of_mode(mode: DisplayMode) -> &'static str {
     match mode {
         DisplayMode::Video => "video",
@@ -99,7 +99,7 @@ pub fn of_mode(mode: DisplayMode) -> &'static str {
     }
 }
 
-/// stopped, paused or running.
+/// `stopped`, `paused` or `running`.
 pub fn of_run(run: RunState) -> &'static str {
     match run {
         RunState::Stop => "stopped",
@@ -108,7 +108,7 @@ pub fn of_run(run: RunState) -> &'static str {
     }
 }
 
-/// hdmi, test-pattern, flash or fpd-link.
+/// `hdmi`, `test-pattern`, `flash` or `fpd-link`.
 pub fn of_port(port: InputPort) -> &'static str {
     match port {
         InputPort::Parallel => "hdmi",

@@ -1,4 +1,4 @@
-//! Sequences and images for flash: values, translated.
+//! Pattern sequences and images for flash, translated from Python values.
 
 use super::errors::device_error;
 use super::names;
@@ -86,7 +86,7 @@ impl PatternSequence {
         Ok(Self(sequence))
     }
 
-    /// Patterns of every video frame.
+    /// Make a sequence that shows these patterns in every video frame.
     #[staticmethod]
     fn from_video(patterns: Vec<Pattern>, frame_rate_hz: f64, exposure_us: u32) -> PyResult<Self> {
         let sequence = Sequence::from_video(entries(patterns), frame_rate_hz, exposure_us);
@@ -94,7 +94,7 @@ impl PatternSequence {
         Ok(Self(sequence))
     }
 
-    /// Patterns of one flash image.
+    /// Make a sequence of the patterns of one flash image.
     #[staticmethod]
     fn from_flash(image: u8, patterns: Vec<Pattern>, exposure_us: u32) -> PyResult<Self> {
         let sequence = Sequence::from_flash(image, entries(patterns), exposure_us);

@@ -1,4 +1,4 @@
-//! The window of the HDMI route.
+//! The window on an HDMI output.
 
 use super::errors::device_error;
 use crate::arrays::expected;
@@ -61,10 +61,10 @@ impl PatternWindow {
     }
 }
 
-/// One output, as the row below names it.
+/// One output, in the order that `outputs` documents.
 type Row = (String, u32, u32, Option<f64>, Option<String>);
 
-/// Name, width, height, frame rate in Hz, and why it cannot carry a pattern, of every output that is on.
+/// Name, width, height, frame rate in Hz, and why the output cannot show a pattern, for every active output.
 #[pyfunction]
 pub fn outputs(py: Python<'_>) -> PyResult<Vec<Row>> {
     let outputs = py.detach(lightcrafter::window::outputs).map_err(device_error)?;
