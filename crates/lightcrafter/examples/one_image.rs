@@ -1,6 +1,6 @@
-//! Show one colour image from flash, watch a fault, and stop; on an emulated projector, so that it runs anywhere.
+//! Show one colour image from flash, provoke two errors, and stop. The projector is emulated, so the example runs anywhere.
 //!
-//! With a real one, `LightCrafter::open(&Selector::Port("1-2".parse()?))` takes the place of the emulator.
+//! For a real projector, replace the emulator by `LightCrafter::open(&Selector::Port("1-2".parse()?))`.
 
 use lightcrafter::emulator::{Dlpc350, EmulatedTransport, Fault};
 use lightcrafter::sequence::colour_channels;
@@ -16,8 +16,8 @@ fn main() -> Result<(), Error> {
         projector.versions()?.application,
         projector.flash_image_count()?
     );
-    let verdict = projector.play(&Sequence::from_flash(0, colour_channels(8), 8333))?;
-    println!("running: {}, warnings: {:?}", projector.status()?.main.running, verdict.warnings());
+    let validation = projector.play(&Sequence::from_flash(0, colour_channels(8), 8333))?;
+    println!("running: {}, warnings: {:?}", projector.status()?.main.running, validation.warnings());
 
     // Too short for 8 bit: refused before anything is sent.
     let error = projector.load(&Sequence::from_flash(0, colour_channels(8), 5000)).unwrap_err();

@@ -48,7 +48,7 @@ pub trait Message: Sized {
     /// Encode the data bytes. A field outside its range is an error.
     fn encode(&self) -> Result<Vec<u8>>;
 
-    /// Decode the data bytes. Too few bytes, or a byte without meaning, are an error.
+    /// Decode the data bytes. Too few bytes are an error, and so is a byte without a meaning.
     fn decode(data: &[u8]) -> Result<Self>;
 }
 
@@ -57,12 +57,12 @@ pub trait Readable: Message {}
 
 /// A message that can be written to the device.
 pub trait Writable: Message {
-    /// Whether the device acknowledges it; a device that resets does not.
+    /// Whether the device acknowledges the message. It does not if the message resets it.
     const ACCESS: Access = Access::Write;
 }
 
-/// Call a macro with every message of [`command`](crate::command), whose names must be in scope: `$visit!(Type, read)`,
-/// `(Type, write)` or `(Type, both)`.
+/// Call the macro `visit` once for each message of [`command`](crate::command), as `visit!(Type, read)`,
+/// `visit!(Type, write)` or `visit!(Type, both)`. The types of the messages must be in scope.
 #[macro_export]
 macro_rules! for_each_message {
     ($visit:ident) => {

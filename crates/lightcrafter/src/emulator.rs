@@ -1,8 +1,8 @@
 //! A DLPC350 in memory: registers, mailbox, validator, busy states, quirks of the real chip, and faults on demand.
 //!
-//! Its tables are written from the programmer's guide, byte by byte, and share only the framing with
-//! [`command`](crate::command), so a wrong encoding in the driver shows up as a difference. It takes and gives reports of
-//! 64 bytes: in memory through [`EmulatedTransport`], behind the real libusb through the `testbed` feature.
+//! Its registers follow the programmer's guide byte by byte and share only the framing with
+//! [`command`](crate::command), so a wrong encoding in the driver shows up as a difference. It receives and sends reports
+//! of 64 bytes: in memory through [`EmulatedTransport`], behind the real libusb through the `testbed` feature.
 //!
 //! ```
 //! use lightcrafter::emulator::{Dlpc350, EmulatedTransport, Fault};
@@ -97,7 +97,8 @@ impl Dlpc350 {
         self.plugged = false;
     }
 
-    /// Switch power off and on: registers are as after power-on, faults are gone, and the device is plugged in.
+    /// Switch power off and on. The registers have their values after power-on, no fault is left, and the device is
+    /// plugged in.
     pub fn power_cycle(&mut self) {
         let registers = Registers::new(&self.registers.tag(), self.registers.image_count());
         let (quirks, video, transactions) = (self.quirks, self.video, self.transactions);
@@ -151,7 +152,7 @@ impl Dlpc350 {
         answers(&request, outcome, fault)
     }
 
-    /// Whether this request gets no reply: waking and some commands after it.
+    /// Whether this request gets no reply, as when the device wakes, and some commands after that.
     fn silent(&mut self, unheard: bool) -> bool {
         if unheard {
             self.silent_left = self.quirks.silent_reads_after_waking;
@@ -187,7 +188,7 @@ impl Dlpc350 {
             0x1A0C => Some(vec![self.main_status()]),
             0x071C => Some(registers::video_signal(self.video, self.registers.byte(0x1A1B) == 0)),
             0x1A34 => self.tables.read(&self.registers),
-            0x1A1A => Some(vec![self.tables.verdict()]),
+            0x1A1A => Some(vec![self.tables.result()]),
             _ => self.registers.read(word),
         }
     }

@@ -67,14 +67,14 @@ pub enum Error {
         /// Error text of libusb.
         reason: String,
     },
-    /// the LightCrafter 4500 at {place} refused {doing}: the command is unknown to its firmware, or not allowed in its present state
+    /// the LightCrafter 4500 at {place} refused the command for {doing}: its firmware does not know the command, or does not allow it in the current state
     Refused {
         /// Bus and port path.
         place: String,
         /// The operation that failed, such as `reading the versions`.
         doing: String,
     },
-    /// the reply to {doing} from {place} carries sequence number {actual}, expected {expected}, and no other reply came in time; close any other program that talks to this projector
+    /// the reply of {place} while {doing} has sequence number {actual}, expected {expected}, and no other reply came in time; close any other program that talks to this projector
     Sequence {
         /// Bus and port path.
         place: String,
@@ -110,20 +110,20 @@ pub enum Error {
         /// Every fault that the validator reports, by name.
         faults: String,
     },
-    /// the video input of the projector at {place} is not locked: {signal}; connect and enable the HDMI output at 912 x 1140, without scaling, before the pattern sequence
+    /// the video input of the projector at {place} is not locked: {signal}; connect and enable the HDMI output at 912 x 1140, without scaling, then load the pattern sequence again
     NotLocked {
         /// Bus and port path.
         place: String,
         /// State of the input signal.
         signal: String,
     },
-    /// the projector at {place} is still in the state {actual} {waited_ms} ms after the command {asked}; if this repeats, switch its power off and on
+    /// the projector at {place} was still in the state {actual} {waited_ms} ms after the command {asked}; if this repeats, switch its power off and on
     Stuck {
         /// Bus and port path.
         place: String,
         /// The commanded state.
         asked: String,
-        /// The present state.
+        /// The state that the projector reports.
         actual: String,
         /// Time waited, ms.
         waited_ms: u64,

@@ -33,8 +33,8 @@ pub struct Placement {
 
 /// Pack patterns in order. Returns the BMP files and the place of each pattern.
 ///
-/// A new image begins when the next pattern does not fit into the remaining planes. Errors: a pattern of the wrong
-/// size, a value that needs more bits, more than 256 images.
+/// A new image begins when the next pattern does not fit into the remaining planes. A pattern of the wrong size, a value
+/// that needs more bits, and more than 256 images are errors.
 pub fn pack(patterns: &[FlashPattern<'_>]) -> Result<(Vec<Vec<u8>>, Vec<Placement>)> {
     let placements = place(patterns)?;
     let count = placements.last().map_or(0, |placement| placement.image + 1);
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn a_new_image_is_begun_when_planes_run_out_and_depths_may_mix() {
+    fn a_new_image_begins_when_planes_run_out_and_depths_may_mix() {
         let zero = vec![0; PIXELS];
         let depths = [8, 7, 1, 5, 8, 6];
         let patterns = depths.map(|bit_depth| FlashPattern { values: &zero, bit_depth });

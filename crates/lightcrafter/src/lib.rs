@@ -11,8 +11,8 @@
 //! | [`transport`] | the USB link, real or emulated |
 //! | [`sequence`] | pattern sequences and their rules |
 //! | [`profile`] | the light engine: current limits and polarities |
-//! | [`projector`] | the projector with one method for each thing a user does |
-//! | [`flash`] | 24-bit images for TI's program |
+//! | [`projector`] | a projector, with one method for each task |
+//! | [`flash`] | images for the flash, to be written by TI's program |
 //! | `usb` | real devices (feature `usb`) |
 //! | `window` | HDMI: a window on the output that feeds a projector (feature `window`, Linux) |
 //! | `emulator` | a DLPC350 in memory (feature `emulator`) |

@@ -6,7 +6,7 @@ use crate::packet::{Access, Assembler, REPORT_BYTES, Reply, Request};
 use crate::transport::Transport;
 use std::time::{Duration, Instant};
 
-/// Most stale reports that are discarded before a command that follows an error.
+/// Largest number of stale reports that are discarded before the command that follows an error.
 const DRAIN_REPORTS: usize = 16;
 const DRAIN_WAIT: Duration = Duration::from_millis(20);
 
@@ -16,11 +16,12 @@ pub struct Link<T> {
     transport: T,
     reply_timeout: Duration,
     sequence: u8,
+    /// Whether replies to earlier commands may still arrive.
     residue: bool,
 }
 
 impl<T: Transport> Link<T> {
-    /// The first command discards replies that an earlier owner of the device did not fetch.
+    /// The first command discards replies that the previous program did not fetch.
     pub fn new(transport: T, reply_timeout: Duration) -> Self {
         Self { transport, reply_timeout, sequence: 0, residue: true }
     }

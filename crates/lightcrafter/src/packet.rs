@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn an_acknowledgement_of_any_length_shows_its_echo() {
+    fn an_acknowledgement_of_any_stated_length_has_its_echo() {
         for length in 0..=2 {
             let mut message = vec![0x40, 3, length, 0, 0x1B, 0x1A];
             message.resize(REPORT_BYTES, 0);
@@ -208,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_message_without_a_word_is_none() {
+    fn a_message_without_a_command_word_is_refused() {
         assert!(Request::from_message(&[0x40, 0, 1, 0, 5, 0]).is_err());
         assert!(Request::from_message(&[0x40, 0]).is_err());
         assert!(Reply::from_message(&[0xC0, 0, 9, 0, 5, 0]).is_err());

@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 /// The light engine behind the controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Profile {
-    /// Whether the byte of the LED current is inverted (0 is full current), as on TI's board.
+    /// Whether the byte of the LED current is inverted, as on TI's board, where 0 is full current.
     pub current_inverted: bool,
     /// Highest allowed drive of red, green and blue, 0 to 255; with `None` no drive can be set.
     pub drive_limit: Option<[u8; 3]>,
@@ -17,8 +17,8 @@ impl Profile {
     /// Drive of TI's board after power-on: register bytes 0x97, 0x78, 0x7D, inverted.
     pub const POWER_ON_DRIVE: [u8; 3] = [104, 135, 130];
 
-    /// The LightCrafter 4500 with TI's own light engine. Its limit is the drive after power-on. Whether
-    /// the LEDs stand more depends on power supply and cooling; state a higher limit in `drive_limit`.
+    /// The LightCrafter 4500 with the light engine of TI. Its limit is the drive after power-on. Power supply and
+    /// cooling decide whether the LEDs can take more; if they can, state a higher limit in `drive_limit`.
     pub const EVM: Self =
         Self { current_inverted: true, drive_limit: Some(Self::POWER_ON_DRIVE), trigger_invert_byte: 1 };
 
@@ -35,15 +35,16 @@ impl Profile {
             let expected = format!("at most {limit:?} (red, green, blue), the limit of this light engine");
             return Err(Error::value("LED drive", expected, format!("{drive:?}")));
         }
-        Ok(drive.map(|value| self.exchanged(value)))
+        Ok(drive.map(|value| self.converted(value)))
     }
 
     /// Drive for register bytes.
     pub fn drive(&self, raw: [u8; 3]) -> [u8; 3] {
-        raw.map(|value| self.exchanged(value))
+        raw.map(|value| self.converted(value))
     }
 
-    fn exchanged(&self, value: u8) -> u8 {
+    /// Register byte of a drive, or drive of a register byte: the conversion is the same both ways.
+    fn converted(&self, value: u8) -> u8 {
         if self.current_inverted { 255 - value } else { value }
     }
 }

@@ -1,4 +1,4 @@
-//! A LightCrafter 4500, with one method for each thing that a user does.
+//! A LightCrafter 4500, with one method for each task.
 
 mod configure;
 mod play;
@@ -17,18 +17,18 @@ use crate::transport::Transport;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-/// Time limits and intervals of all waits; the defaults are those of the README.
+/// Time limits and intervals of all waits. The README lists the default limits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Waits {
-    /// Limit for a reply. A read without a reply is repeated once.
+    /// Limit for a reply. The driver repeats a read without a reply once.
     pub reply: Duration,
     /// Interval between two reads of a state that is about to change.
     pub poll: Duration,
     /// Limit for a change of mode or run state, and for a validation.
     pub change: Duration,
     /// Interval between starting a validation and reading its result.
-    pub verdict: Duration,
-    /// Interval between waking and the first read; the controller may not reply during it.
+    pub validation: Duration,
+    /// Interval between waking and the first read, during which the controller may not reply.
     pub wake: Duration,
     /// Limit for waking and going to sleep.
     pub power: Duration,
@@ -43,7 +43,7 @@ impl Default for Waits {
             reply: ms(2000),
             poll: ms(100),
             change: ms(10_000),
-            verdict: ms(100),
+            validation: ms(100),
             wake: ms(2000),
             power: ms(10_000),
             lock: ms(5000),
@@ -106,13 +106,13 @@ impl<T: Transport> LightCrafter<T> {
         Self { link: Link::new(transport, waits.reply), profile: Profile::EVM, waits, loaded: None }
     }
 
-    /// Set another light engine.
+    /// Replace the light engine.
     pub fn with_profile(mut self, profile: Profile) -> Self {
         self.profile = profile;
         self
     }
 
-    /// Set other waits.
+    /// Replace the waits.
     pub fn with_waits(mut self, waits: Waits) -> Self {
         self.link.set_reply_timeout(waits.reply);
         self.waits = waits;
@@ -129,7 +129,7 @@ impl<T: Transport> LightCrafter<T> {
         self.profile
     }
 
-    /// Return the transport; the projector keeps its image.
+    /// Return the transport. This sends no command, so the projector keeps its image.
     pub fn into_transport(self) -> T {
         self.link.into_transport()
     }
@@ -163,7 +163,7 @@ impl<T: Transport> LightCrafter<T> {
         self.read()
     }
 
-    /// Tag of the firmware image, given when the image was built.
+    /// Tag that the firmware image was given when it was built.
     pub fn firmware_tag(&mut self) -> Result<String> {
         self.read().map(|FirmwareTag(tag)| tag)
     }
@@ -173,7 +173,8 @@ impl<T: Transport> LightCrafter<T> {
         self.read().map(|FlashImageCount(count)| count)
     }
 
-    /// Check that flash holds at least so many images and has this firmware tag. The error names the difference.
+    /// Check that flash holds at least this number of images and that the firmware has this tag. The error names the
+    /// difference.
     pub fn check_flash(&mut self, images: u8, tag: Option<&str>) -> Result<()> {
         let present = self.flash_image_count()?;
         if present < images {
@@ -190,7 +191,7 @@ impl<T: Transport> LightCrafter<T> {
         Err(Error::value(name, format!("{wanted:?}"), format!("{found:?}")))
     }
 
-    /// Wake the projector or send it to sleep, and wait until it is done. The device may not acknowledge waking.
+    /// Wake the projector or put it to sleep, and wait until it reports the new state. It may not acknowledge waking.
     pub fn set_power(&mut self, power: PowerMode) -> Result<()> {
         if self.read::<PowerMode>()? == power {
             return Ok(());
@@ -231,7 +232,7 @@ impl<T: Transport> LightCrafter<T> {
         self.read()
     }
 
-    /// Wait until the video input is locked. The error contains the present signal.
+    /// Wait until the video input is locked. The error describes the signal.
     pub fn wait_for_lock(&mut self) -> Result<VideoSignal> {
         let Waits { poll, lock, .. } = self.waits;
         let signal = self.repeat(poll, lock, Self::video_signal, VideoSignal::locked)?;

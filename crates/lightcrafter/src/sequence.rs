@@ -13,7 +13,7 @@ pub const HEIGHT_PX: usize = 1140;
 pub const MAX_EXPOSURE_US: u32 = 200_000_000;
 /// Shortest black time between two patterns, us.
 pub const MIN_GAP_US: u32 = 230;
-/// Longest time that loading a flash image takes, us; used unless measured.
+/// Longest time that a flash image takes to load, us, to be used until the time is measured.
 pub const WORST_LOAD_US: u32 = 200_000;
 
 /// The LED selection red of [`LutEntry::leds`].
@@ -28,7 +28,7 @@ pub const BLUE: u8 = 4;
 pub struct DepthLimits {
     /// The shortest exposure, us.
     pub min_exposure_us: u32,
-    /// The highest pattern number; at 1 bit, 24 is a pattern without planes: black, and white when inverted.
+    /// The highest pattern number. At 1 bit, number 24 has no bit plane: it is black, or white if inverted.
     pub last_number: u8,
     /// Patterns that fit into the two buffers for flash images and need no loading.
     pub preloaded: u8,
@@ -91,7 +91,7 @@ pub enum Source {
     Flash {
         /// Image numbers in the order of use: one for the first pattern and one for each pattern with `next_image`.
         images: Vec<u8>,
-        /// Time to load an image, us: [`WORST_LOAD_US`] unless measured.
+        /// Time to load an image, us: measured, or [`WORST_LOAD_US`].
         load_us: u32,
     },
 }
@@ -141,7 +141,7 @@ pub fn colour_channels(bit_depth: u8) -> Vec<LutEntry> {
 }
 
 impl Sequence {
-    /// Show the patterns in every video frame. The first pattern waits for the frame, the others follow it.
+    /// Show the patterns in every video frame. The first one starts with the frame, and the others follow it.
     pub fn from_video(mut patterns: Vec<LutEntry>, frame_rate_hz: f64, exposure_us: u32) -> Self {
         for (i, pattern) in patterns.iter_mut().enumerate() {
             pattern.trigger = if i == 0 { EntryTrigger::Rising } else { EntryTrigger::Continue };
@@ -167,7 +167,7 @@ impl Sequence {
         }
     }
 
-    /// Exposure and period of pattern `i`, or the last ones if fewer are given.
+    /// Exposure and period of pattern `i`, or the last ones if there are fewer.
     fn timing(&self, i: usize) -> Timing {
         match &self.exposures {
             Exposures::Fixed(timing) => *timing,
@@ -205,8 +205,7 @@ impl Sequence {
     }
 }
 
-/// Exposure of each pattern, us, if `count` patterns of this bit depth share a frame. Patterns that do not fit are an
-/// error.
+/// Exposure of each pattern, us, if `count` patterns of this bit depth share a frame. It is an error if they do not fit.
 pub fn exposure_in_frame_us(count: usize, bit_depth: u8, frame_rate_hz: f64) -> Result<u32> {
     let least = depth_limits(bit_depth)?.min_exposure_us;
     check_frame_rate(frame_rate_hz)?;
@@ -215,7 +214,7 @@ pub fn exposure_in_frame_us(count: usize, bit_depth: u8, frame_rate_hz: f64) -> 
         return Ok(share);
     }
     let name = format!("time in us for each of {count} patterns of {bit_depth} bit at {frame_rate_hz} Hz");
-    Err(Error::value(name, format!("at least {least}; take fewer bits"), share))
+    Err(Error::value(name, format!("at least {least}; use fewer bits"), share))
 }
 
 fn check_frame_rate(frame_rate_hz: f64) -> Result<()> {

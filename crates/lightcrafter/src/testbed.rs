@@ -1,11 +1,11 @@
 //! The emulator behind the real libusb: a umockdev testbed with projectors in chosen ports (Linux).
 //!
-//! umockdev's preload library shows a program fake `/sys` and `/dev` folders and sends each ioctl on a device node to a
-//! socket, where this module answers like usbfs. libusb and everything above it run unmodified. Programs find the
+//! The preload library of umockdev shows a program fake `/sys` and `/dev` folders and sends each ioctl on a device node to
+//! a socket, where this module answers like usbfs. libusb and everything above it run unmodified. Programs find the
 //! control socket of the testbed through the environment variable [`CONTROL`] and inject faults with [`Control`].
 //!
-//! The protocol between the preload library and the socket is internal to umockdev: this module
-//! knows that of version 0.17, and [`Testbed::command`] refuses any other version.
+//! The protocol between the preload library and the socket is internal to umockdev. This module uses that of version
+//! 0.17, and [`Testbed::command`] refuses any other version.
 
 mod control;
 mod descriptors;
@@ -27,7 +27,7 @@ use std::sync::Arc;
 const PRELOAD: &str = "libumockdev-preload.so.0";
 const KNOWN_VERSION: &str = "0.17.";
 
-/// Emulated projectors on a fake bus, which is removed when dropped.
+/// Emulated projectors on a fake bus. Dropping it removes the bus.
 #[derive(Debug)]
 pub struct Testbed {
     root: PathBuf,
@@ -87,8 +87,7 @@ fn check_umockdev() -> io::Result<()> {
     if version.starts_with(KNOWN_VERSION) {
         return Ok(());
     }
-    let message = format!(
-        "umockdev {version} has another ioctl protocol than {KNOWN_VERSION}x: install version {KNOWN_VERSION}x"
-    );
+    let message =
+        format!("the ioctl protocol of umockdev {version} is unknown: install version {KNOWN_VERSION}x");
     Err(io::Error::new(io::ErrorKind::Unsupported, message))
 }

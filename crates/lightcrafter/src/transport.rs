@@ -4,7 +4,7 @@ use crate::error::Result;
 use crate::packet::Report;
 use std::time::Duration;
 
-/// Sends and receives the reports of one device. It has one owner at a time, so only one transaction is in flight.
+/// Sends and receives the reports of one device. Its methods take `&mut self`, so only one transaction is in flight.
 pub trait Transport: Send {
     /// Send one report to the device within `timeout`.
     fn send(&mut self, report: &Report, timeout: Duration) -> Result<()>;

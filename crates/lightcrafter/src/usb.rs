@@ -1,8 +1,8 @@
 //! Real devices, through libusb.
 //!
 //! All units may carry the same serial number (`LCR2`), so a projector is identified by bus and port path, such as `1-2`
-//! or `3-1.4`: the socket that its cable is plugged into. On Linux the kernel's HID driver owns both interfaces; the driver detaches it
-//! from interface 0 only and attaches it again. It never sets the configuration and never resets the device.
+//! or `3-1.4`: the socket that its cable is plugged into. On Linux the HID driver of the kernel holds both interfaces. This driver
+//! detaches it from interface 0 only and attaches it again at the end. It never sets the configuration or resets the device.
 
 use crate::error::{Error, Result, UDEV_FILE, UDEV_RULE};
 use crate::packet::Report;
@@ -21,7 +21,7 @@ const INTERFACE: u8 = 0;
 const OUT: u8 = 0x01;
 const IN: u8 = 0x81;
 const STRINGS_TIMEOUT: Duration = Duration::from_millis(1000);
-/// libusb counts in ms and takes 0 for "no timeout".
+/// libusb counts in ms, and 0 means "no timeout".
 const LEAST_TIMEOUT: Duration = Duration::from_millis(1);
 
 /// Bus and port path of the socket that the cable is plugged into.
@@ -92,9 +92,9 @@ impl Selector {
 pub struct Found {
     /// Where it is plugged in.
     pub port: PortPath,
-    /// Its address on the bus, which changes whenever it is plugged in.
+    /// Its address on the bus, which changes each time it is plugged in.
     pub address: u8,
-    /// Its serial number, or `None` without permission to open it.
+    /// Its serial number, or `None` if this user has no permission to open it.
     pub serial: Option<String>,
 }
 
@@ -107,7 +107,7 @@ impl fmt::Display for Found {
     }
 }
 
-/// All connected projectors in the order of their ports. Only the serial numbers need permission.
+/// All connected projectors in the order of their ports. Only reading the serial numbers needs permission.
 pub fn list() -> Result<Vec<Found>> {
     Ok(devices()?.into_iter().map(|(found, _)| found).collect())
 }
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn errors_of_libusb_become_ours() {
+    fn errors_of_libusb_become_those_of_the_driver() {
         let of = |error| from_libusb(error, "1-2", "opening the device");
         assert!(of(rusb::Error::Access).to_string().contains("idVendor"));
         assert!(of(rusb::Error::Busy).to_string().contains("TI's LightCrafter GUI"));

@@ -1,7 +1,7 @@
 //! The HDMI route: a borderless window of exactly 912 x 1140 pixels on the output that feeds a projector.
 //!
-//! Scaling destroys a pattern. The window therefore refuses an output of another size, and one that is scaled, rotated
-//! or transformed, and names the reason. [`PatternWindow::show`] checks the size again and returns once the display has
+//! Scaling destroys a pattern. Therefore an output that has another size, or is scaled, rotated or transformed, is an
+//! error that names the reason. [`PatternWindow::show`] checks the size again and returns once the display has
 //! the image. Pixels are copied without colour management or OpenGL.
 //!
 //! A process can have one event loop of the window system. The first call starts a thread for it, which serves all
@@ -34,7 +34,7 @@ pub struct Output {
 }
 
 impl Output {
-    /// Why it cannot show a pattern; `None` if it can.
+    /// Why the output cannot show a pattern; `None` if it can.
     pub fn unfit(&self) -> Option<String> {
         let (width, height) = self.size_px;
         if (width as usize, height as usize) != (WIDTH_PX, HEIGHT_PX) {
@@ -62,7 +62,7 @@ pub fn outputs() -> Result<Vec<Output>> {
     ask(Order::Outputs)
 }
 
-/// Choose the output of this name, or without a name the only suitable one.
+/// Choose the output of this name or, without a name, the only suitable one.
 fn choose(outputs: &[Output], name: Option<&str>) -> Result<usize> {
     let names: Vec<String> = outputs.iter().map(Output::to_string).collect();
     let present = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
@@ -126,7 +126,7 @@ impl PatternWindow {
 
 impl Drop for PatternWindow {
     fn drop(&mut self) {
-        // If the display is gone, the window is closed already.
+        // If the display is gone, the window is already closed.
         let _ = ask(|reply| Order::Close { number: self.number, reply });
     }
 }

@@ -1,11 +1,11 @@
-//! The golden packets: composed by the driver, read by the driver, byte for byte as the protocol has them.
+//! The golden packets: the driver composes and reads each packet exactly as the protocol prescribes.
 
 use lightcrafter::command::*;
 use lightcrafter::packet::{Access, Assembler, REPORT_BYTES, Reply, Request};
 use lightcrafter::sequence::{Colour, channel};
 use std::collections::BTreeMap;
 
-/// Meaning to bytes, of one direction.
+/// Bytes of the packets of one direction, by meaning.
 fn golden(direction: &str) -> BTreeMap<String, Vec<u8>> {
     let mut packets = BTreeMap::new();
     for line in include_str!("golden.txt").lines().filter(|line| line.starts_with(direction)) {
@@ -98,10 +98,7 @@ fn sent() -> Vec<(&'static str, Vec<u8>)> {
         ("patterns from flash", write(PatternSource::Flash)),
         ("trigger mode internal", write(TriggerMode::Internal)),
         ("exposure 8333 us, period 8563 us", write(Timing { exposure_us: 8333, period_us: 8563 })),
-        (
-            "three entries, again and again",
-            write(LutControl { entries: 3, repeat: true, patterns: 3, images: 1 }),
-        ),
+        ("three entries, repeated", write(LutControl { entries: 3, repeat: true, patterns: 3, images: 1 })),
         ("open the mailbox for patterns", write(Mailbox::Patterns)),
         ("mailbox offset 0", write(MailboxOffset(0))),
         (
@@ -135,7 +132,7 @@ fn sent() -> Vec<(&'static str, Vec<u8>)> {
 }
 
 #[test]
-fn what_is_sent_is_golden() {
+fn sent_packets_are_golden() {
     let mut golden = golden(">");
     for (meaning, bytes) in sent() {
         let expected = golden.remove(meaning).unwrap_or_else(|| panic!("no golden packet: {meaning}"));
@@ -145,7 +142,7 @@ fn what_is_sent_is_golden() {
 }
 
 #[test]
-fn what_comes_is_read() {
+fn golden_replies_are_read() {
     let mut golden = golden("<");
     let mut reply = |meaning: &str| {
         let bytes = golden.remove(meaning).unwrap_or_else(|| panic!("no golden packet: {meaning}"));
@@ -173,8 +170,9 @@ fn what_comes_is_read() {
     assert_eq!(FirmwareTag::decode(&reply("firmware tag PLAY").data).unwrap().0, "PLAY");
     let time = ImageLoadTime::decode(&reply("load time 37334 ticks: 2 ms").data).unwrap();
     assert!((time.milliseconds() - 2.0).abs() < 1e-9);
-    let verdict = Validation::decode(&reply("verdict: busy; timing, number and gap at fault").data).unwrap();
-    assert!(verdict.busy && verdict.errors().len() == 2 && verdict.warnings().len() == 1);
+    let validation =
+        Validation::decode(&reply("validation: busy; timing, number and gap at fault").data).unwrap();
+    assert!(validation.busy && validation.errors().len() == 2 && validation.warnings().len() == 1);
     let signal = VideoSignal::decode(&reply("video locked, 912 x 1140").data).unwrap();
     assert!(signal.locked() && signal.hsync_polarity == 1 && signal.pixel_clock == 73_008);
     assert_eq!((signal.line_rate, signal.frame_rate, signal.total_px), (7020, 6000, 1040));

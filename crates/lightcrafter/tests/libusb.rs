@@ -1,7 +1,7 @@
 //! The driver over the real libusb: two projectors with equal vendor, product and serial number in a umockdev testbed.
 //!
-//! `under_umockdev` builds the testbed and runs the other tests, which are ignored outside of it, in a process of their
-//! own: within the testbed all of `/sys` is replaced.
+//! `under_umockdev` builds the testbed and runs the other tests, which are ignored outside of it, in a separate process,
+//! because the testbed replaces all of `/sys`.
 #![cfg(all(feature = "usb", feature = "testbed", target_os = "linux"))]
 
 use lightcrafter::command::*;
@@ -16,7 +16,7 @@ mod registers;
 
 type Projector = LightCrafter<UsbTransport>;
 
-/// More than a loaded machine needs beyond the waits of the driver.
+/// Time that a loaded machine may need in addition to the waits of the driver.
 const SLACK: Duration = Duration::from_secs(3);
 
 fn at(port: &str) -> Selector {
@@ -27,7 +27,7 @@ fn open(port: &str) -> Projector {
     LightCrafter::open(&at(port)).unwrap()
 }
 
-/// With a short wait for replies, for faults that end in silence.
+/// With a short limit for replies, for faults that end in a timeout.
 fn impatient(port: &str) -> (Projector, Duration) {
     let reply = Duration::from_millis(300);
     (open(port).with_waits(Waits { reply, ..Waits::default() }), reply)
@@ -51,7 +51,7 @@ fn under_umockdev() {
 
 #[test]
 #[ignore = "run by under_umockdev"]
-fn equal_serial_numbers_are_told_apart_by_port() {
+fn equal_serial_numbers_are_distinguished_by_port() {
     let found = list().unwrap();
     let ports: Vec<String> = found.iter().map(|device| device.port.to_string()).collect();
     assert_eq!(ports, ["1-1", "1-2"]);
@@ -112,7 +112,7 @@ fn an_unplug_in_the_middle_is_an_error_at_once() {
     let start = Instant::now();
     let error = projector.load(&Sequence::from_flash(0, colour_channels(8), 8333)).unwrap_err();
     assert!(matches!(error, Error::Disconnected { .. }), "{error}");
-    assert!(start.elapsed() < Waits::default().reply, "no wait ended by its bound");
+    assert!(start.elapsed() < Waits::default().reply, "no wait reached its limit");
     assert!(matches!(projector.versions(), Err(Error::Disconnected { .. })));
     assert!(matches!(LightCrafter::open(&at("1-2")), Err(Error::NotFound { .. })));
     drop(projector);
@@ -122,7 +122,7 @@ fn an_unplug_in_the_middle_is_an_error_at_once() {
 
 #[test]
 #[ignore = "run by under_umockdev"]
-fn faults_end_in_their_errors_within_their_time() {
+fn each_fault_gives_its_error_within_its_time_limit() {
     type Check = fn(&Error) -> bool;
     let cases: [(&str, u32, Check); 4] = [
         ("refuse", 0, |error| matches!(error, Error::Refused { .. })),
@@ -132,7 +132,7 @@ fn faults_end_in_their_errors_within_their_time() {
     ];
     let (mut projector, reply) = impatient("1-1");
     for (fault, waits, expected) in cases {
-        // A read is asked twice, so that it takes two faults to fail.
+        // The driver repeats a read once, so a read fails only with two faults.
         let times = if fault == "refuse" { 1 } else { 2 };
         order("1-1", &format!("fault {fault} {times}"));
         let start = Instant::now();
@@ -150,7 +150,7 @@ fn faults_end_in_their_errors_within_their_time() {
 
 #[test]
 #[ignore = "run by under_umockdev"]
-fn what_an_owner_left_behind_is_drained_by_the_next() {
+fn replies_left_by_one_owner_are_discarded_by_the_next() {
     let (mut projector, _) = impatient("1-1");
     order("1-1", "fault stale 1");
     projector.write(&DisplayFreeze(false)).unwrap();
@@ -160,7 +160,7 @@ fn what_an_owner_left_behind_is_drained_by_the_next() {
     assert_eq!(open("1-1").firmware_tag().unwrap(), "QF-EMULATOR-1-1");
 }
 
-/// Every command of the guide once, read or written, with its value coming back where it can be read.
+/// Every command of the guide once. A register that can be read and written must return the value written.
 #[test]
 #[ignore = "run by under_umockdev"]
 fn every_command_crosses_libusb() {
@@ -183,7 +183,7 @@ fn every_command_crosses_libusb() {
     }
     registers::every_register_returns(&mut projector);
     order("1-1", "plug");
-    // Writing the mode again is what freezes the chip, so the projector rests in pattern mode meanwhile.
+    // Writing video mode again can freeze the chip, so this test runs in pattern mode.
     projector.write(&DisplayMode::PatternSequence).unwrap();
     let arrived = |_| projector.read::<DisplayMode>().unwrap() == DisplayMode::PatternSequence;
     assert!((0..100).any(arrived), "pattern mode");

@@ -1,4 +1,4 @@
-//! Every message: what is decoded is encoded to the same meaning; no bytes make driver or emulator panic.
+//! Every message keeps its meaning when it is decoded and encoded again, and no bytes make driver or emulator panic.
 #![cfg(feature = "emulator")]
 
 use lightcrafter::command::*;
@@ -18,7 +18,7 @@ fn survives<M: Message + PartialEq + Debug>(data: &[u8]) -> bool {
     true
 }
 
-/// Mostly small: fields of 16 bit have narrow ranges.
+/// Mostly small values, because fields of 16 bit have narrow ranges.
 fn byte() -> impl Strategy<Value = u8> {
     prop_oneof![3 => 0_u8..4, 1 => any::<u8>()]
 }
@@ -59,9 +59,9 @@ proptest! {
     }
 }
 
-/// Small values too, of which random bytes are rarely made: every message is reached.
+/// Random bytes rarely form the small values of some messages. Here every message is decoded at least once.
 #[test]
-fn no_message_is_never_decoded() {
+fn every_message_is_decoded_from_some_bytes() {
     macro_rules! visit {
         ($name:ident, $direction:ident) => {
             let reached = (0..=255_u8).filter(|byte| {
@@ -104,7 +104,7 @@ fn words() -> BTreeSet<u16> {
 
 #[test]
 fn every_command_of_the_guide_has_a_message() {
-    // Tables A3 to A6 without what is left out there.
+    // The commands of tables A3 to A6.
     let guide: BTreeSet<u16> = [
         0x1A0A, 0x1A0B, 0x1A0C, 0x0205, 0x1AFF, 0x1A42, 0x0200, 0x0802, 0x0609, 0x100A, 0x071C, 0x1A1B,
         0x1A00, 0x1A02, 0x1A03, 0x1A37, 0x1A04, 0x1000, 0x1203, 0x1204, 0x1A39, 0x1A3A, 0x1008, 0x1009,
@@ -125,7 +125,7 @@ fn faults_are_named() {
 }
 
 #[test]
-fn what_the_emulator_answers_the_driver_can_read() {
+fn the_driver_can_read_every_reply_of_the_emulator() {
     let mut projector = LightCrafter::new(EmulatedTransport::new(Dlpc350::default()));
     projector.write(&Mailbox::Patterns).unwrap();
     macro_rules! visit {

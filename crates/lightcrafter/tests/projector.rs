@@ -1,4 +1,4 @@
-//! The driver and the emulator in one process: verbs and quirks.
+//! The driver and the emulator in one process: every method, and the quirks.
 #![cfg(feature = "emulator")]
 
 mod bench;
@@ -11,7 +11,7 @@ use lightcrafter::{Error, Sequence};
 use registers::every_register_returns;
 
 #[test]
-fn every_register_takes_what_is_written_and_gives_it_back() {
+fn every_register_returns_the_value_written() {
     let mut bench = Bench::new();
     every_register_returns(&mut bench.projector);
 }
@@ -70,10 +70,10 @@ fn faults_of_the_hardware_are_named() {
 }
 
 #[test]
-fn a_colour_image_from_video_is_started_though_the_first_start_is_ignored() {
+fn a_colour_image_from_video_starts_although_the_first_start_is_ignored() {
     let mut bench = Bench::new();
-    let verdict = bench.projector.load(&colour_video()).unwrap();
-    assert!(verdict.warnings().is_empty());
+    let validation = bench.projector.load(&colour_video()).unwrap();
+    assert!(validation.warnings().is_empty());
     assert_eq!(bench.writes(0x1A24), 1, "stopped once");
     bench.projector.start().unwrap();
     assert!(bench.writes(0x1A24) >= 3, "the first start was ignored, the second was not");
@@ -86,7 +86,7 @@ fn a_colour_image_from_video_is_started_though_the_first_start_is_ignored() {
 }
 
 #[test]
-fn pause_goes_on_and_stop_sends_the_tables_again() {
+fn a_start_resumes_after_a_pause_and_sends_the_tables_again_after_a_stop() {
     let mut bench = Bench::new();
     bench.projector.play(&colour_flash()).unwrap();
     bench.projector.pause().unwrap();
@@ -102,7 +102,7 @@ fn pause_goes_on_and_stop_sends_the_tables_again() {
 }
 
 #[test]
-fn timing_changes_while_it_runs_and_while_it_rests() {
+fn timing_changes_while_patterns_run_and_while_they_are_stopped() {
     let mut bench = Bench::new();
     let timing = Timing { exposure_us: 10_000, period_us: 12_000 };
     assert!(bench.projector.set_timing(timing).unwrap_err().to_string().contains("a sequence from load()"));
@@ -115,7 +115,7 @@ fn timing_changes_while_it_runs_and_while_it_rests() {
     assert_eq!(bench.projector.read::<Timing>().unwrap().exposure_us, 9000);
 }
 
-/// So many patterns, each with its image and its exposure.
+/// A sequence of this number of patterns, each with its image and its exposure.
 fn one_image_each(patterns: u8) -> Sequence {
     let mut entries = vec![channel(Colour::Green, 8, RED); patterns.into()];
     entries[1..].iter_mut().for_each(|pattern| pattern.next_image = true);
@@ -138,7 +138,7 @@ fn an_exposure_for_each_pattern_and_many_images() {
     assert_eq!(bench.projector.read::<VariableControl>().unwrap().images, 70);
 }
 
-/// A message of two images is exchanged by the firmware, so that the last chunk must not be one.
+/// The firmware swaps the images of a message that has exactly two, so no message may have two.
 #[test]
 fn a_table_of_66_images_ends_in_more_than_two() {
     let mut bench = Bench::new();
@@ -149,7 +149,7 @@ fn a_table_of_66_images_ends_in_more_than_two() {
 }
 
 #[test]
-fn the_lock_is_asked_for_before_pattern_mode() {
+fn the_lock_is_checked_before_pattern_mode() {
     let mut bench = Bench::new();
     bench.device().video = false;
     let error = bench.projector.load(&colour_video()).unwrap_err();
@@ -169,34 +169,34 @@ fn the_lock_is_asked_for_before_pattern_mode() {
 }
 
 #[test]
-fn verdicts_name_every_fault_bit() {
+fn validations_name_every_fault_bit() {
     let mut bench = Bench::new();
     // The rules of the driver accept this sequence; the emulator finds black without time for it.
     let mut sequence = colour_flash();
     sequence.patterns[0].black_after = true;
     sequence.patterns[1].trigger = EntryTrigger::Rising;
     sequence.patterns[2].trigger = EntryTrigger::Falling;
-    let verdict = bench.projector.load(&sequence).unwrap();
-    assert!(verdict.trigger_overlap && verdict.no_black_before_trigger && !verdict.short_gap);
-    assert_eq!(verdict.warnings().len(), 2);
-    // Past the rules of the driver: a validation with errors.
+    let validation = bench.projector.load(&sequence).unwrap();
+    assert!(validation.trigger_overlap && validation.no_black_before_trigger && !validation.short_gap);
+    assert_eq!(validation.warnings().len(), 2);
+    // Bypass the rules of the driver to get a validation with errors.
     let mut bench = Bench::new();
     bench.projector.load(&colour_flash()).unwrap();
     bench.projector.write(&Timing { exposure_us: 300, period_us: 400 }).unwrap();
     bench.projector.write(&Validate).unwrap();
-    let verdict = loop {
-        let verdict: Validation = bench.projector.read().unwrap();
-        if !verdict.busy {
-            break verdict;
+    let validation = loop {
+        let validation: Validation = bench.projector.read().unwrap();
+        if !validation.busy {
+            break validation;
         }
     };
-    assert!(verdict.bad_timing && verdict.short_gap && !verdict.bad_number);
-    assert_eq!(verdict.errors(), ["exposure or period is out of range for the bit depth"]);
+    assert!(validation.bad_timing && validation.short_gap && !validation.bad_number);
+    assert_eq!(validation.errors(), ["exposure or period is out of range for the bit depth"]);
     assert!(matches!(bench.projector.write(&RunState::Start), Err(Error::Refused { .. })));
 }
 
 #[test]
-fn what_the_rules_forbid_is_never_sent() {
+fn a_sequence_that_breaks_a_rule_is_never_sent() {
     let mut bench = Bench::new();
     let error =
         bench.projector.load(&Sequence::from_flash(0, colour_channels(8), 5000)).unwrap_err().to_string();
@@ -209,7 +209,7 @@ fn what_the_rules_forbid_is_never_sent() {
 }
 
 #[test]
-fn starting_nothing_is_an_error() {
+fn a_start_without_a_sequence_is_an_error() {
     let mut bench = Bench::new();
     assert!(bench.projector.start().unwrap_err().to_string().contains("a sequence from load()"));
     assert!(matches!(bench.projector.pause(), Err(Error::Refused { .. })));
@@ -217,13 +217,13 @@ fn starting_nothing_is_an_error() {
 }
 
 #[test]
-fn waking_goes_without_acknowledgement() {
+fn waking_is_not_acknowledged() {
     let mut bench = Bench::new();
     bench.projector.set_power(PowerMode::Standby).unwrap();
     assert!(bench.projector.status().unwrap().main.parked);
     bench.projector.play(&colour_flash()).unwrap();
     assert_eq!(bench.projector.status().unwrap().power, PowerMode::Normal);
-    // Reads without a reply are no fault while it wakes.
+    // Reads without a reply are not an error while the projector wakes.
     bench.projector.set_power(PowerMode::Standby).unwrap();
     bench.projector.read::<PowerMode>().unwrap();
     bench.device().quirks.silent_reads_after_waking = 4;
@@ -242,7 +242,7 @@ fn a_mode_is_not_set_twice_and_the_chip_does_not_freeze() {
     }
     assert_eq!(bench.writes(0x1A1B), 0);
     assert!(!bench.projector.status().unwrap().main.gamma, "fringes need linear video");
-    // The quirk itself: a program that sets the mode again and again loses the projector.
+    // The quirk: a program that sets the same mode repeatedly freezes the projector.
     for _ in 0..3 {
         let _ = bench.projector.write(&DisplayMode::Video);
     }
@@ -252,7 +252,7 @@ fn a_mode_is_not_set_twice_and_the_chip_does_not_freeze() {
 }
 
 #[test]
-fn test_patterns_are_left_by_their_source_first() {
+fn the_input_changes_before_a_test_pattern_is_left() {
     let mut bench = Bench::new();
     let white = TestPatternColours { foreground: [1023; 3], background: [0; 3] };
     bench.projector.show_test_pattern(TestPattern::Checkerboard, white).unwrap();

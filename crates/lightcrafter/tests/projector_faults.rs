@@ -1,4 +1,4 @@
-//! Faults on demand, states that never come, and the use of several projectors.
+//! Faults on demand, states that are never reached, and several projectors at once.
 #![cfg(feature = "emulator")]
 
 mod bench;
@@ -11,7 +11,7 @@ use lightcrafter::{Error, LightCrafter, Profile};
 use std::sync::Arc;
 
 #[test]
-fn old_firmware_cannot_have_an_exposure_each() {
+fn old_firmware_has_no_individual_exposures() {
     let mut sequence = colour_flash();
     sequence.trigger_mode = TriggerMode::VariableInternal;
     sequence.exposures = Exposures::Each(vec![Timing { exposure_us: 9000, period_us: 9000 }; 3]);
@@ -21,7 +21,6 @@ fn old_firmware_cannot_have_an_exposure_each() {
     assert!(error.contains("3.0 or newer") && error.contains("2.0.0"), "{error}");
 }
 
-/// Each fault gives a specific error, and the next command works.
 #[test]
 fn each_fault_gives_its_error_and_the_next_command_works() {
     type Check = fn(&Error) -> bool;
@@ -48,7 +47,7 @@ fn each_fault_gives_its_error_and_the_next_command_works() {
 }
 
 #[test]
-fn a_read_is_asked_once_more_and_a_write_is_not() {
+fn a_read_is_repeated_once_and_a_write_is_not() {
     let mut bench = Bench::new();
     for fault in [Fault::Silence, Fault::Truncate, Fault::WrongSequence] {
         bench.device().inject(fault, 1);
@@ -65,7 +64,7 @@ fn a_read_is_asked_once_more_and_a_write_is_not() {
 }
 
 #[test]
-fn a_state_that_never_comes_ends_in_an_error() {
+fn a_state_that_is_never_reached_is_an_error() {
     let mut bench = Bench::impatient();
     bench.device().quirks.lag_polls = u32::MAX;
     let error = bench.projector.load(&colour_flash()).unwrap_err();
@@ -82,7 +81,7 @@ fn a_state_that_never_comes_ends_in_an_error() {
 }
 
 #[test]
-fn a_rejected_sequence_says_why() {
+fn the_error_of_a_rejected_sequence_names_the_reason() {
     let mut bench = Bench::new();
     bench.device().quirks.rejects = true;
     let error = bench.projector.load(&colour_flash()).unwrap_err();
@@ -100,7 +99,7 @@ fn a_reset_takes_the_device_off_the_bus() {
 }
 
 #[test]
-fn a_transport_comes_back_and_may_be_boxed() {
+fn a_transport_can_be_taken_back_and_boxed() {
     let bench = Bench::new();
     assert_eq!(bench.projector.profile(), Profile::EVM);
     let boxed: Box<dyn lightcrafter::Transport> = Box::new(bench.projector.into_transport());

@@ -8,7 +8,7 @@ use lightcrafter::command::*;
 use lightcrafter::{Profile, TriggerOut, Triggers};
 
 #[test]
-fn the_drive_of_the_leds_is_what_the_user_means() {
+fn the_drive_of_the_leds_is_in_units_of_brightness() {
     let mut bench = Bench::new();
     assert_eq!(bench.projector.led_drive().unwrap(), Profile::POWER_ON_DRIVE);
     bench.projector.set_led_drive([0, 50, 130]).unwrap();

@@ -1,4 +1,4 @@
-//! The window under Xvfb: what is on the screen is what was shown, pixel for pixel.
+//! The window under Xvfb: the screen has exactly the pixels that were shown.
 //!
 //! `under_xvfb` starts servers of several sizes and runs the other tests, which are ignored outside of it.
 #![cfg(all(feature = "window", target_os = "linux"))]
@@ -22,7 +22,7 @@ struct Server {
     folder: PathBuf,
 }
 
-/// Two outputs of 912 x 1140, side by side, by the dummy driver of Xorg.
+/// Two outputs of 912 x 1140, side by side, from the dummy driver of Xorg.
 const TWO_OUTPUTS: &str = r#"
 Section "ServerFlags"
   Option "AutoAddDevices" "false"
@@ -57,8 +57,8 @@ impl Server {
         Self::start(size, |folder| format!("Xvfb -screen 0 {size}x24 -fbdir {folder}"))
     }
 
-    /// Outputs DUMMY0 and DUMMY1. The server itself and not the wrapper that Debian has for consoles: with the dummy driver
-    /// it needs neither a console nor root.
+    /// Outputs DUMMY0 and DUMMY1. This starts the server without the wrapper that Debian has for consoles, because with the
+    /// dummy driver the server needs neither a console nor root.
     fn two_outputs() -> Self {
         let server = Self::start("two", |folder| {
             fs::write(format!("{folder}/xorg.conf"), TWO_OUTPUTS).unwrap();
@@ -74,7 +74,7 @@ impl Server {
         server
     }
 
-    /// Start a server; it chooses a free display.
+    /// Start a server, which chooses a free display.
     fn start(size: &str, command: impl FnOnce(&str) -> String) -> Self {
         let folder = std::env::temp_dir().join(format!("lightcrafter-xvfb-{}-{size}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
@@ -101,7 +101,8 @@ impl Server {
     }
 }
 
-/// Run one of the ignored tests in a process of its own. A name that no test has any more would run none, and pass.
+/// Run one of the ignored tests in a separate process. A wrong name would run no test and succeed, so the number of
+/// passed tests is checked.
 fn run_alone(test: &str, surroundings: impl FnOnce(&mut Command) -> &mut Command) {
     let mut command = Command::new(std::env::current_exe().unwrap());
     command.args(["--ignored", "--exact", test, "--nocapture"]).env_remove("WAYLAND_DISPLAY");
@@ -127,7 +128,7 @@ fn under_xvfb() {
     run_alone("no_display_is_an_error", |command| command.env_remove("DISPLAY"));
 }
 
-/// Red, green, blue of the screen: the header of xwd is big-endian, the pixels are 32 bit little-endian.
+/// Red, green and blue of the screen. The header of an xwd file is big-endian; its pixels are 32 bit little-endian.
 fn screenshot() -> Vec<u8> {
     let file = fs::read(std::env::var_os(SCREEN).map(PathBuf::from).unwrap_or_else(|| Path::new("").into()))
         .unwrap();
@@ -167,10 +168,10 @@ fn every_pixel_is_on_the_screen() {
     let error = PatternWindow::open(Some("HDMI-7")).unwrap_err();
     assert!(matches!(error, Error::Output { .. }) && error.to_string().contains(&found[0].name), "{error}");
     drop(window);
-    assert!(PatternWindow::open(None).is_ok(), "the only fit output, a second time");
+    assert!(PatternWindow::open(None).is_ok(), "the only suitable output, a second time");
 }
 
-/// Red, green, blue of 912 x 1140 pixels of the desktop, from this column on.
+/// Red, green and blue of 912 x 1140 pixels of the desktop, starting at this column.
 fn desktop_from(column: i16) -> Vec<u8> {
     let (connection, screen) = x11rb::connect(None).unwrap();
     let root = connection.setup().roots[screen].root;
@@ -187,7 +188,7 @@ fn each_of_two_outputs_gets_its_image() {
     assert_eq!(places, [("DUMMY0", (0, 0)), ("DUMMY1", (912, 0))]);
     assert!(PatternWindow::open(None).unwrap_err().to_string().contains("several are suitable"));
     let (left, right) = (noise(10), noise(11));
-    // The second output first: a window that ignored its output would stand on the first.
+    // The second output comes first, because a window that ignored its output would appear on the first.
     let mut windows = ["DUMMY1", "DUMMY0"].map(|name| PatternWindow::open(Some(name)).unwrap());
     windows[0].show(&right).unwrap();
     windows[1].show(&left).unwrap();

@@ -1,4 +1,4 @@
-//! Any bytes, three ways: as reports to the emulator, as replies to the driver, as data of every message.
+//! Random bytes as data of every message, as reports and commands to the emulator, and as replies to the driver.
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
@@ -8,7 +8,7 @@ use lightcrafter::packet::{Access, Assembler, REPORT_BYTES, Reply, Report, Reque
 use lightcrafter::{LightCrafter, Result, Transport, Waits, for_each_message};
 use std::time::Duration;
 
-/// A device that answers with whatever it is given.
+/// A device that replies with the given bytes.
 struct Babble<'a>(std::slice::Chunks<'a, u8>);
 
 impl Transport for Babble<'_> {
@@ -61,7 +61,7 @@ fn drive(data: &[u8]) {
         reply: ms(1),
         poll: ms(0),
         change: ms(0),
-        verdict: ms(0),
+        validation: ms(0),
         wake: ms(0),
         power: ms(0),
         lock: ms(0),

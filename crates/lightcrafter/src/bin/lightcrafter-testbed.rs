@@ -15,7 +15,7 @@ fn main() -> ExitCode {
 
 #[cfg(not(target_os = "linux"))]
 fn main() -> ExitCode {
-    eprintln!("lightcrafter-testbed: umockdev is for Linux");
+    eprintln!("lightcrafter-testbed: umockdev runs on Linux only");
     ExitCode::from(2)
 }
 

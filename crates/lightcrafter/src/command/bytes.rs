@@ -3,7 +3,7 @@
 use super::Message;
 use crate::error::{Error, Result};
 
-/// Reads fields from the front of a message. The remaining bytes are padding.
+/// Reads the fields of a message one after another. Bytes after the last field are padding.
 pub struct Bytes<'a> {
     name: &'static str,
     data: &'a [u8],

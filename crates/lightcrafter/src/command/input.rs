@@ -79,7 +79,7 @@ choice! {
         Rgb444 = 0,
         /// Luma and chroma, full resolution.
         YCrCb444 = 1,
-        /// Luma and chroma, halved chroma.
+        /// Luma and chroma, with half the resolution in chroma.
         YCrCb422 = 2,
     }
 }

@@ -108,13 +108,13 @@ choice! {
         Images = 1,
         /// Patterns.
         Patterns = 2,
-        /// Patterns with an exposure each.
+        /// Patterns with individual exposures.
         Variable = 3,
     }
 }
 
 number! {
-    /// Entry that the next mailbox data are written to, 0 to 127.
+    /// Entry at which the next data of the mailbox start, 0 to 127.
     MailboxOffset, 0x1A32, "mailbox offset", write, u8 up to 127
 }
 
@@ -144,7 +144,7 @@ direction!(Validate, write);
 
 bits! {
     /// Result of the validation of a sequence.
-    Validation, 0x1A1A, "verdict on the sequence", read, {
+    Validation, 0x1A1A, "result of the validation", read, {
         /// Exposure or period is not allowed.
         bad_timing = 0,
         /// A pattern number is not allowed.
@@ -161,7 +161,7 @@ bits! {
 }
 
 impl Validation {
-    /// Faults that forbid starting the sequence, in words.
+    /// Faults that prevent the sequence from running, in words.
     pub fn errors(&self) -> Vec<&'static str> {
         let faults = [
             (self.bad_timing, "exposure or period is out of range for the bit depth"),

@@ -35,9 +35,9 @@ choice! {
 /// The two colours of test patterns: red, green, blue, each from 0 to 1023.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct TestPatternColours {
-    /// Lines, fields and full scale.
+    /// Lines, squares, and the bright end of ramps.
     pub foreground: [u16; 3],
-    /// The areas in between.
+    /// The areas between them.
     pub background: [u16; 3],
 }
 

@@ -31,7 +31,7 @@ bits! {
 }
 
 bits! {
-    /// Present state of the display.
+    /// State of the display.
     MainStatus, 0x1A0C, "main status", read, {
         /// The mirrors are parked, so no image is shown.
         parked = 0,
@@ -76,11 +76,11 @@ impl std::fmt::Display for Version {
 pub struct Versions {
     /// The firmware itself.
     pub application: Version,
-    /// Its programming interface.
+    /// The programming interface of the firmware.
     pub api: Version,
-    /// Its configuration.
+    /// The configuration of the firmware.
     pub software: Version,
-    /// Its sequences.
+    /// The sequences of the firmware.
     pub sequencer: Version,
 }
 
@@ -102,7 +102,7 @@ impl Message for Versions {
 
 direction!(Versions, read);
 
-/// Tag of the firmware image, at most 32 ASCII characters, given when the image was built.
+/// Tag that the firmware image was given when it was built, at most 32 ASCII characters.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct FirmwareTag(pub String);
 
@@ -155,7 +155,7 @@ impl Message for PowerMode {
         Ok(vec![u8::from(*self == Self::Standby)])
     }
 
-    /// Any value but 0 in the two lowest bits means standby.
+    /// Any value except 0 in the two lowest bits means standby.
     fn decode(data: &[u8]) -> Result<Self> {
         let asleep = Bytes::new(Self::NAME, data).u8()? & 3 != 0;
         Ok(if asleep { Self::Standby } else { Self::Normal })
@@ -191,6 +191,6 @@ switch! {
 }
 
 switch! {
-    /// Keep the present image and ignore new ones.
+    /// Keep the image and ignore new ones.
     DisplayFreeze, 0x100A, "display freeze", both
 }

@@ -32,7 +32,7 @@ pub struct LutEntry {
     pub leds: u8,
     /// Whether the pattern is inverted.
     pub invert: bool,
-    /// Insert black after the pattern, which takes 230 us.
+    /// Insert 230 us of black after the pattern.
     pub black_after: bool,
     /// Switch to the next image before this pattern.
     pub next_image: bool,
@@ -98,7 +98,7 @@ direction!(PatternTable, both);
 pub struct ImageTable(pub Vec<u8>);
 
 impl ImageTable {
-    fn exchanged(mut images: Vec<u8>) -> Vec<u8> {
+    fn swapped_if_two(mut images: Vec<u8>) -> Vec<u8> {
         if images.len() == 2 {
             images.swap(0, 1);
         }
@@ -112,11 +112,11 @@ impl Message for ImageTable {
 
     fn encode(&self) -> Result<Vec<u8>> {
         in_range("image entries", self.0.len() as u32, 1, 64)?;
-        Ok(Self::exchanged(self.0.clone()))
+        Ok(Self::swapped_if_two(self.0.clone()))
     }
 
     fn decode(data: &[u8]) -> Result<Self> {
-        checked(Self(Self::exchanged(data.to_vec())))
+        checked(Self(Self::swapped_if_two(data.to_vec())))
     }
 }
 

@@ -13,7 +13,7 @@ impl EdgeDelay {
     pub const NONE: Self = Self(0xBB);
     const STEP_US: f64 = 0.1072;
 
-    /// Step nearest to a delay in us, -20.05 to 7.29; negative delays come before the exposure.
+    /// The step nearest to a delay in us, -20.05 to 7.29. A negative delay puts the edge before the exposure.
     pub fn from_us(delay_us: f64) -> Result<Self> {
         let step = (delay_us / Self::STEP_US).round() + f64::from(Self::NONE.0);
         if (0.0..=255.0).contains(&step) {
@@ -40,9 +40,9 @@ impl Default for EdgeDelay {
 pub struct TriggerOut1 {
     /// Byte with the invert bit; 0 gives a high level during the exposure.
     pub invert_byte: u8,
-    /// Rising edge, at most 2.787 us late.
+    /// Rising edge, with a delay of at most 2.787 us.
     pub rising: EdgeDelay,
-    /// Falling edge, at most 2.787 us late.
+    /// Falling edge, with a delay of at most 2.787 us.
     pub falling: EdgeDelay,
 }
 

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use std::str::FromStr;
 
-/// A fault of the next reply.
+/// A fault in the next reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Fault {
     /// The command is refused and has no effect.
@@ -14,7 +14,7 @@ pub enum Fault {
     Truncate,
     /// The reply carries another sequence number.
     WrongSequence,
-    /// A reply to an earlier command comes first.
+    /// A reply to an earlier command comes before the reply.
     Stale,
     /// The device disappears from the bus instead of replying.
     Unplug,
@@ -39,7 +39,7 @@ impl FromStr for Fault {
     }
 }
 
-/// Quirks of the real chip; the defaults are those that users report.
+/// Quirks of the real chip. The defaults are what users report.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Quirks {
     /// After video mode the first start of a sequence is acknowledged and ignored.

@@ -178,7 +178,7 @@ impl Registers {
     }
 }
 
-/// Detection state of the video input; while patterns run it reports no stable signal.
+/// Reply about the video signal. In pattern mode it reports no stable signal.
 pub fn video_signal(connected: bool, video_mode: bool) -> Vec<u8> {
     let mut data = vec![0; 28];
     if !connected {

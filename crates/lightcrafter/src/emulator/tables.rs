@@ -24,7 +24,7 @@ pub struct Tables {
     patterns: Vec<u8>,
     variable: Vec<[u8; 12]>,
     images: Vec<u8>,
-    verdict: u8,
+    result: u8,
     busy: u32,
     validated: bool,
     written: bool,
@@ -36,7 +36,7 @@ impl Default for Tables {
             patterns: vec![0; 3 * PATTERNS],
             variable: vec![[0; 12]; VARIABLE],
             images: vec![0; IMAGES],
-            verdict: 0,
+            result: 0,
             busy: 0,
             validated: false,
             written: false,
@@ -63,16 +63,16 @@ impl Tables {
     }
 
     pub fn playable(&self) -> bool {
-        self.validated && self.written && self.verdict & 3 == 0
+        self.validated && self.written && self.result & 3 == 0
     }
 
-    /// Busy for some reads, then the result.
-    pub fn verdict(&mut self) -> u8 {
+    /// Result of the last validation; the first reads report that it is still running.
+    pub fn result(&mut self) -> u8 {
         if self.busy > 0 {
             self.busy -= 1;
             return 0x80;
         }
-        self.verdict
+        self.result
     }
 
     pub fn read(&self, registers: &Registers) -> Option<Vec<u8>> {
@@ -120,7 +120,7 @@ impl Tables {
             let before = i.checked_sub(1).map(|i| lines[i].word);
             faults_of(line) | if flash { darkness(line.word, before) } else { 0 }
         });
-        self.verdict = faults.fold(u8::from(unfit) << 1, |all, faults| all | faults);
+        self.result = faults.fold(u8::from(unfit) << 1, |all, faults| all | faults);
         self.busy = quirks.busy_polls;
         self.validated = true;
     }
@@ -157,7 +157,7 @@ fn variable_offset(registers: &Registers) -> usize {
     usize::from(bytes[0]) | usize::from(bytes[1]) << 8
 }
 
-/// Bits 0, 1 and 4 of the result, and bit 2 for black without time for it.
+/// Faults of one entry: bits 0, 1 and 4 of the result, and bit 2 if inserted black has no time.
 fn faults_of(line: &Line) -> u8 {
     let (depth, number) = ((line.word >> 8 & 15) as u8, (line.word >> 2 & 63) as u8);
     let Ok(limits) = depth_limits(depth) else { return 3 };
@@ -174,7 +174,7 @@ fn faults_of(line: &Line) -> u8 {
         | u8::from(short_gap) << 4
 }
 
-/// Bit 3: an external trigger needs black before its pattern.
+/// Bit 3 of the result: a pattern with an external trigger has no black before it.
 fn darkness(word: u32, before: Option<u32>) -> u8 {
     let external = matches!(word & 3, 1 | 2);
     let black_before = before.is_none_or(|before| before & 1 << 17 != 0);

@@ -17,7 +17,7 @@ pub struct TriggerOut {
     pub inverted: bool,
     /// Delay of the rising edge, us, -20.05 to 2.787 (output 2: 7.29).
     pub rising_us: f64,
-    /// Delay of the falling edge, us; output 2 has a fixed length and ignores it.
+    /// Delay of the falling edge, us. Output 2 ignores it, because its pulse has a fixed length.
     pub falling_us: f64,
 }
 
@@ -42,8 +42,8 @@ impl Default for Triggers {
 }
 
 impl<T: Transport> LightCrafter<T> {
-    /// Set the brightness of red, green, blue: 0 is off, 255 is full current, for either
-    /// polarity of the register. A drive above the limit of the [`Profile`](crate::Profile) is an error. The method reads
+    /// Set the brightness of red, green and blue: 0 is off and 255 is full current, whichever
+    /// polarity the register has. A drive above the limit of the [`Profile`](crate::Profile) is an error. The method reads
     /// the register back.
     pub fn set_led_drive(&mut self, drive: [u8; 3]) -> Result<()> {
         let raw = self.profile.raw_current(drive)?;
@@ -137,20 +137,20 @@ impl<T: Transport> LightCrafter<T> {
         Ok((long, short))
     }
 
-    /// De-gamma of the video mode; patterns are always linear.
+    /// Set the gamma table of the video mode. Patterns are always linear.
     pub fn set_gamma(&mut self, gamma: Gamma) -> Result<()> {
         self.write(&gamma)
     }
 
-    /// Dark for bright in all patterns.
+    /// Invert all patterns: bright pixels become dark.
     pub fn set_inverted(&mut self, inverted: bool) -> Result<()> {
         self.write(&InvertData(inverted))
     }
 
-    /// How long images of flash take to load, ms.
+    /// Measure how long `count` flash images take to load, from number `first` on, in ms.
     pub fn measure_image_load_ms(&mut self, first: u8, count: u8) -> Result<f64> {
         self.write(&MeasureImageLoad { first, count })?;
-        sleep(self.waits.verdict);
+        sleep(self.waits.validation);
         Ok(self.read::<ImageLoadTime>()?.milliseconds())
     }
 }

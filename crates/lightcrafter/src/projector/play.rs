@@ -42,13 +42,13 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&FlashImage(image))
     }
 
-    /// Select the input of the video mode unless it is selected already.
+    /// Select the input of the video mode, unless it is the selected one.
     pub fn select_input(&mut self, input: InputSource) -> Result<()> {
         if self.read::<InputSource>()? == input { Ok(()) } else { self.write(&input) }
     }
 
-    /// Change the mode unless it is the present one, because a redundant write can freeze the chip. Changing the mode
-    /// with the test pattern generator as input can freeze it too, so the input changes first.
+    /// Change the mode, unless it is the current one: a redundant write can freeze the chip. Changing the mode while the
+    /// test pattern generator is the input can freeze it too, so the input changes first.
     fn enter(&mut self, mode: DisplayMode) -> Result<()> {
         if self.read::<DisplayMode>()? == mode {
             return Ok(());
@@ -66,17 +66,17 @@ impl<T: Transport> LightCrafter<T> {
         self.reach(mode, Self::read)
     }
 
-    /// Send a sequence to the projector and validate it without starting it. Warnings are in the result; a sequence
-    /// that must not run is an error that names every fault.
+    /// Send a sequence to the projector and validate it without starting it. The result contains warnings. A sequence
+    /// that cannot run is an error that names every fault.
     pub fn load(&mut self, sequence: &Sequence) -> Result<Validation> {
         sequence.check()?;
         self.set_power(PowerMode::Normal)?;
         self.check_against_device(sequence)?;
         self.stop()?;
         self.enter_pattern_mode(sequence)?;
-        let verdict = self.send(sequence)?;
+        let validation = self.send(sequence)?;
         self.loaded = Some(sequence.clone());
-        Ok(verdict)
+        Ok(validation)
     }
 
     fn check_against_device(&mut self, sequence: &Sequence) -> Result<()> {
@@ -103,7 +103,7 @@ impl<T: Transport> LightCrafter<T> {
         Err(Error::value(name, format!("below {present}, the number of images in its flash"), last))
     }
 
-    /// Wait for the lock before entering pattern mode, in which the signal always reads as not locked.
+    /// Wait for the lock of the video input first: in pattern mode the signal always reads as not locked.
     fn enter_pattern_mode(&mut self, sequence: &Sequence) -> Result<()> {
         if sequence.from_the_video_input() {
             self.select_input(InputSource::HDMI)?;
@@ -150,7 +150,7 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&Mailbox::Close)?;
         let Source::Flash { images, .. } = &sequence.source else { return Ok(()) };
         self.write(&Mailbox::Images)?;
-        // One message holds 64 entries. A chunk of exactly two must not occur, because the firmware swaps the two.
+        // One message holds 64 entries. No chunk may have exactly two, because the firmware would swap them.
         let size = if images.len() % 64 == 2 { 63 } else { 64 };
         for (i, chunk) in images.chunks(size).enumerate() {
             self.write(&VariableOffset((size * i) as u16))?;
@@ -162,17 +162,18 @@ impl<T: Transport> LightCrafter<T> {
     /// Validate the tables on the projector.
     fn validate(&mut self) -> Result<Validation> {
         self.write(&Validate)?;
-        sleep(self.waits.verdict);
+        sleep(self.waits.validation);
         let Waits { poll, change, .. } = self.waits;
-        let verdict = self.repeat(poll / 4, change, Self::read::<Validation>, |verdict| !verdict.busy)?;
-        if verdict.busy {
-            return Err(self.stuck(&Validate, &verdict, change));
+        let validation =
+            self.repeat(poll / 4, change, Self::read::<Validation>, |validation| !validation.busy)?;
+        if validation.busy {
+            return Err(self.stuck(&Validate, &validation, change));
         }
-        let errors = verdict.errors();
+        let errors = validation.errors();
         if errors.is_empty() {
-            return Ok(verdict);
+            return Ok(validation);
         }
-        let faults = [errors, verdict.warnings()].concat().join("; ");
+        let faults = [errors, validation.warnings()].concat().join("; ");
         Err(Error::Rejected { place: self.place(), faults })
     }
 
@@ -194,7 +195,7 @@ impl<T: Transport> LightCrafter<T> {
         self.begin()
     }
 
-    /// Run, and check that the board is still in pattern mode, which it leaves when an HDMI signal appears.
+    /// Start, and check that the board is still in pattern mode, which it leaves when an HDMI signal appears.
     fn begin(&mut self) -> Result<()> {
         self.run(RunState::Start)?;
         match self.read::<DisplayMode>()? {
@@ -208,9 +209,9 @@ impl<T: Transport> LightCrafter<T> {
 
     /// Load a sequence and start it.
     pub fn play(&mut self, sequence: &Sequence) -> Result<Validation> {
-        let verdict = self.load(sequence)?;
+        let validation = self.load(sequence)?;
         self.begin()?;
-        Ok(verdict)
+        Ok(validation)
     }
 
     /// Pause at the current pattern.

@@ -26,7 +26,11 @@ impl Sequence {
         if let Exposures::Each(timings) = &self.exposures
             && timings.len() != count
         {
-            return Err(Error::value("exposures of a sequence", format!("{count}, one each"), timings.len()));
+            return Err(Error::value(
+                "exposures of a sequence",
+                format!("{count}, one for each pattern"),
+                timings.len(),
+            ));
         }
         Ok(())
     }
@@ -57,12 +61,12 @@ impl Sequence {
                 return Err(Error::value(format!("LED selection of pattern {i}"), "0 to 7", pattern.leds));
             }
             if pattern.black_after && pattern.shares_exposure {
-                let expected = "black after it or a shared exposure, not both";
+                let expected = "black after it or a shared exposure";
                 return Err(Error::value(format!("pattern {i}"), expected, "both"));
             }
         }
         if self.patterns[0].trigger == EntryTrigger::Continue || self.patterns[0].shares_exposure {
-            let expected = "a trigger that starts it";
+            let expected = "a trigger that starts the sequence";
             return Err(Error::value("pattern 0", expected, "a continuation of the previous pattern"));
         }
         Ok(())
@@ -87,11 +91,12 @@ impl Sequence {
         }
         let Timing { exposure_us, period_us } = self.timing(start);
         if !(least..=MAX_EXPOSURE_US).contains(&exposure_us) {
-            let name = format!("exposure of pattern {start} in us ({group} share it)");
+            let sharing = if group > 1 { format!(", shared by {group} patterns") } else { String::new() };
+            let name = format!("exposure of pattern {start} in us{sharing}");
             return Err(Error::value(name, format!("{least} to {MAX_EXPOSURE_US}"), exposure_us));
         }
         if period_us != exposure_us && period_us < exposure_us.saturating_add(MIN_GAP_US) {
-            let expected = format!("{exposure_us}, or {} and more", exposure_us + MIN_GAP_US);
+            let expected = format!("{exposure_us}, or at least {}", exposure_us + MIN_GAP_US);
             return Err(Error::value(format!("period of pattern {start} in us"), expected, period_us));
         }
         Ok(())

@@ -55,7 +55,7 @@ fn rules_of_exposure_and_period() {
     timed(8333, 8563).check().unwrap();
     timed(MAX_EXPOSURE_US, MAX_EXPOSURE_US).check().unwrap();
     refused(&timed(8332, 8332), &["exposure of pattern 0", "8333 to 200000000", "8332"]);
-    refused(&timed(8333, 8562), &["8333, or 8563 and more", "8562"]);
+    refused(&timed(8333, 8562), &["8333, or at least 8563", "8562"]);
     refused(&timed(8333, 100), &["period of pattern 0"]);
     refused(&timed(MAX_EXPOSURE_US + 1, MAX_EXPOSURE_US + 1), &["200000001"]);
 }
@@ -66,9 +66,12 @@ fn patterns_that_share_an_exposure_divide_it() {
     patterns[1].shares_exposure = true;
     patterns[2].shares_exposure = true;
     Sequence::from_flash(0, patterns.clone(), 25_000).check().unwrap();
-    refused(&Sequence::from_flash(0, patterns.clone(), 24_998), &["3 share it", "24999"]);
+    refused(&Sequence::from_flash(0, patterns.clone(), 24_998), &["shared by 3 patterns", "24999"]);
     patterns[1].black_after = true;
-    refused(&Sequence::from_flash(0, patterns, 25_000), &["pattern 1", "not both"]);
+    refused(
+        &Sequence::from_flash(0, patterns, 25_000),
+        &["pattern 1", "black after it or a shared exposure", "got both"],
+    );
 }
 
 #[test]
@@ -82,7 +85,7 @@ fn first_pattern_numbers_and_leds() {
     refused(&sequence, &["LED selection of pattern 1"]);
     sequence.patterns[1].leds = 1;
     sequence.patterns[0].trigger = EntryTrigger::Continue;
-    refused(&sequence, &["a trigger that starts it"]);
+    refused(&sequence, &["a trigger that starts the sequence"]);
     sequence.patterns.clear();
     refused(&sequence, &["1 to 128", "got 0"]);
     sequence.patterns = vec![channel(Colour::Green, 8, RED); 129];
@@ -100,7 +103,7 @@ fn trigger_modes_go_with_source_and_exposures() {
     variable.trigger_mode = TriggerMode::VariableInternal;
     variable.check().unwrap();
     variable.exposures = Exposures::Each(vec![Timing { exposure_us: 9000, period_us: 9000 }; 2]);
-    refused(&variable, &["3, one each", "got 2"]);
+    refused(&variable, &["3, one for each pattern", "got 2"]);
 }
 
 #[test]

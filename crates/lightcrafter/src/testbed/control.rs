@@ -33,13 +33,17 @@ fn serve(nodes: &[Arc<Node>], stream: UnixStream) -> io::Result<()> {
 
 fn obey(nodes: &[Arc<Node>], line: &str) -> Result<String, String> {
     let words: Vec<&str> = line.split_whitespace().collect();
-    let (place, order) = words.split_first().ok_or("an empty line")?;
-    let node = nodes.iter().find(|node| node.place == *place).ok_or_else(|| format!("no port {place}"))?;
+    let (place, order) = words.split_first().ok_or("expected PORT VERB, got an empty line")?;
+    let node = nodes
+        .iter()
+        .find(|node| node.place == *place)
+        .ok_or_else(|| format!("no projector at port {place}"))?;
     let failed = |error: io::Error| error.to_string();
     match order {
         ["fault", name, count] => {
             let fault: Fault = name.parse().map_err(|error: crate::Error| error.to_string())?;
-            node.model().inject(fault, count.parse().map_err(|_| format!("no count: {count}"))?);
+            node.model()
+                .inject(fault, count.parse().map_err(|_| format!("fault: expected a count, got {count}"))?);
         }
         ["unplug"] => node.model().unplug(),
         ["plug"] => {
@@ -51,7 +55,7 @@ fn obey(nodes: &[Arc<Node>], line: &str) -> Result<String, String> {
         ["deny"] => node.deny().map_err(failed)?,
         ["allow"] => node.allow().map_err(failed)?,
         ["transactions"] => return Ok(node.model().transactions().to_string()),
-        other => return Err(format!("no such order: {}", other.join(" "))),
+        other => return Err(format!("unknown order: {}", other.join(" "))),
     }
     node.reflect().map_err(failed)?;
     Ok(String::new())
@@ -67,7 +71,10 @@ impl Control {
     /// Connect to the testbed named by the environment variable [`CONTROL`]. Outside a testbed this is an error.
     pub fn connect() -> io::Result<Self> {
         let path = std::env::var_os(CONTROL).ok_or_else(|| {
-            io::Error::new(io::ErrorKind::NotFound, format!("{CONTROL} is not set: no testbed"))
+            io::Error::new(
+                io::ErrorKind::NotFound,
+                format!("{CONTROL} is not set: run the program with lightcrafter-testbed"),
+            )
         })?;
         Ok(Self { stream: BufReader::new(UnixStream::connect(path)?) })
     }

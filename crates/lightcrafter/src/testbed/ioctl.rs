@@ -5,12 +5,12 @@ pub const DONE: u64 = 3;
 pub const READ_MEMORY: u64 = 5;
 pub const WRITE_MEMORY: u64 = 6;
 
-// Directions as Linux numbers them in ioctls.
+// Directions of an ioctl, as Linux numbers them.
 pub const NONE: u32 = 0;
 pub const WRITE: u32 = 1;
 pub const READ: u32 = 2;
 
-/// The number of a usbfs ioctl, as Linux composes it.
+/// The number of a usbfs ioctl, composed as in Linux.
 pub const fn ioctl(direction: u32, number: u32, size: u32) -> u32 {
     direction << 30 | size << 16 | 0x55 << 8 | number
 }

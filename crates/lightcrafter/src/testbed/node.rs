@@ -9,9 +9,9 @@ use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// A file that nobody may open for writing, not even root. It stands in for a node without permission.
+/// A file that nobody can open for writing, not even root: it replaces the device node when access is denied.
 const FORBIDDEN: &str = "/sys/kernel/uevent_seqnum";
-/// umockdev takes a file with the sticky bit for a device node.
+/// umockdev treats a file with the sticky bit as a device node.
 const DEVICE_MODE: u32 = 0o1666;
 
 /// Holder of an interface.
@@ -86,14 +86,14 @@ impl Node {
         }
     }
 
-    /// A node that every user may open.
+    /// Let every user open the device.
     pub fn allow(&self) -> io::Result<()> {
         let _ = fs::remove_file(&self.device);
         fs::write(&self.device, descriptors::stored())?;
         fs::set_permissions(&self.device, fs::Permissions::from_mode(DEVICE_MODE))
     }
 
-    /// A node that nobody may open.
+    /// Let nobody open the device.
     pub fn deny(&self) -> io::Result<()> {
         fs::remove_file(&self.device)?;
         symlink(FORBIDDEN, &self.device)

@@ -1,4 +1,4 @@
-//! Replacement for usbfs: ioctls on a device node, answered over umockdev's socket.
+//! Replacement for usbfs: answers to the ioctls on a device node, over the socket of umockdev.
 //!
 //! Messages are three words of 64 bits. The program sends {1, request, argument}. This side may reply
 //! {5, address, length} to read its memory and {6, address, length} with bytes to write it; it ends with
@@ -74,7 +74,7 @@ impl Connection<'_> {
         self.stream.read_exact(&mut words)?;
         let word = |i: usize| u64::from_le_bytes(std::array::from_fn(|byte| words[8 * i + byte]));
         if word(0) != IOCTL {
-            eprintln!("testbed: message {} of umockdev is not known; its protocol has changed", word(0));
+            eprintln!("testbed: umockdev sent the unknown message {}: its protocol has changed", word(0));
             return Err(io::ErrorKind::Unsupported.into());
         }
         let answer = self.ioctl(word(1) as u32, word(2))?;
@@ -258,7 +258,7 @@ impl Connection<'_> {
         Ok(Ok(0))
     }
 
-    /// Hand reports to waiting transfers. After an unplug all transfers end.
+    /// Give the incoming reports to waiting transfers. If the device is unplugged, all transfers end.
     fn deliver(&mut self) -> io::Result<()> {
         if !self.node.model().plugged() {
             let ended =

@@ -1,4 +1,4 @@
-//! The thread that owns the event loop: it takes orders and paints the windows.
+//! The thread of the event loop: it carries out orders and paints the windows.
 
 use super::{Output, choose, scaling};
 use crate::error::{Error, Result};
@@ -20,7 +20,7 @@ use winit::platform::wayland::ActiveEventLoopExtWayland;
 use winit::platform::x11::{EventLoopBuilderExtX11, MonitorHandleExtX11, WindowAttributesExtX11};
 use winit::window::{Fullscreen, Window, WindowId};
 
-/// Time limit of an order. A compositor may never give a window its size.
+/// Time limit of an order. It ends the wait for a compositor that never gives a window its size.
 const PATIENCE: Duration = Duration::from_secs(5);
 const SIZE: PhysicalSize<u32> = PhysicalSize::new(WIDTH_PX as u32, HEIGHT_PX as u32);
 
@@ -124,7 +124,7 @@ impl Panes {
             .with_resizable(false)
             .with_inner_size(SIZE)
             .with_position(monitor.position())
-            // X11: keep the window manager from moving, scaling or covering it.
+            // On X11 this keeps the window manager from moving, scaling or covering the window.
             .with_override_redirect(true);
         if wayland {
             attributes = attributes.with_fullscreen(Some(Fullscreen::Borderless(Some(monitor))));
@@ -185,7 +185,7 @@ impl Pane {
         buffer.copy_from_slice(&self.pixels);
         self.window.pre_present_notify();
         buffer.present().map_err(no_display)?;
-        // Getting the next buffer waits until the server has taken this one.
+        // The next buffer is available only when the server has taken this one.
         self.surface.buffer_mut().map_err(no_display)?;
         Ok(())
     }

@@ -21,15 +21,15 @@ impl Bench {
     }
 
     pub fn with(profile: Profile) -> Self {
-        // Limits that a loaded machine does not reach. A missing reply takes no time in memory.
+        // Limits that a loaded machine does not reach. In memory a missing reply is noticed at once.
         let ms = Duration::from_millis;
-        let waits = Waits { poll: ms(1), verdict: ms(0), wake: ms(0), lock: ms(20), ..Waits::default() };
+        let waits = Waits { poll: ms(1), validation: ms(0), wake: ms(0), lock: ms(20), ..Waits::default() };
         let transport = EmulatedTransport::new(Dlpc350::default());
         let device = transport.device();
         Self { projector: LightCrafter::new(transport).with_waits(waits).with_profile(profile), device }
     }
 
-    /// With short limits, for states that never come.
+    /// With short limits, for states that are never reached.
     pub fn impatient() -> Self {
         let Self { projector, device } = Self::new();
         let short = Duration::from_millis(40);

@@ -1,4 +1,4 @@
-//! A value other than that after power-on for every register that can be read and written.
+//! For every register that can be read and written, a value that differs from the one after power-on.
 
 use lightcrafter::command::*;
 use lightcrafter::{LightCrafter, Transport};
