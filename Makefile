@@ -46,11 +46,12 @@ stubs: $(STAMPS)/built
 	$(BIN)/python -m mypy.stubtest quadfringe._core
 
 # Two projectors in a umockdev testbed: the driver in Rust and through the wheel, over the real libusb, and the window
-# under Xvfb.
+# under Xvfb; then the times of the driver.
 test-usb: $(STAMPS)/built
 	scripts/set-up testbed
 	cargo test $(CARGO_ALL) --test libusb --test window
 	$(BUILT)/lightcrafter-testbed $(BIN)/pytest tests/usb
+	$(BUILT)/lightcrafter-testbed $(BIN)/python benches/projector.py
 
 # Two cameras over GigE Vision, in a network namespace that has only the loopback interface.
 test-camera: $(STAMPS)/camera

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import os
-import socket
 import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from usb_bench import Order, Screen
+from usb_bench import Screen
 
 from quadfringe.devices.lightcrafter import outputs
-
-TESTBED = "LIGHTCRAFTER_TESTBED"
+from quadfringe.evaluation._testbed import TESTBED, Order, orders
 
 if TESTBED not in os.environ:
     collect_ignore_glob = ["test_*.py"]
@@ -23,18 +21,8 @@ if TESTBED not in os.environ:
 @pytest.fixture(scope="session")
 def order() -> Iterator[Order]:
     """Send orders to the testbed: a port and an event."""
-    with socket.socket(socket.AF_UNIX) as wire:
-        wire.connect(os.environ[TESTBED])
-        answers = wire.makefile()
-
-        def send(port: str, what: str) -> str:
-            wire.sendall(f"{port} {what}\n".encode())
-            answer = answers.readline().strip()
-            assert answer.startswith("ok"), answer
-            return answer.removeprefix("ok").strip()
-
+    with orders() as send:
         yield send
-        answers.close()
 
 
 @pytest.fixture(autouse=True)

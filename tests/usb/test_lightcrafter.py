@@ -6,7 +6,7 @@ import threading
 
 import numpy as np
 import pytest
-from usb_bench import Order, Screen
+from usb_bench import Screen
 
 from quadfringe.devices.lightcrafter import (
     LightCrafter,
@@ -18,6 +18,7 @@ from quadfringe.devices.lightcrafter import (
     pack_flash,
     udev_rule,
 )
+from quadfringe.evaluation._testbed import Order
 
 COLOURS = [Pattern(number, 8, led) for number, led in enumerate("grb")]
 

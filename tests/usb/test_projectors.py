@@ -12,13 +12,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from typer.testing import CliRunner, Result
-from usb_bench import Order, Screen
+from usb_bench import Screen
 
 from quadfringe.cli import app
 from quadfringe.config import Fringes, SystemConfig, load_system
 from quadfringe.devices import Projector, open_projector
 from quadfringe.devices.light import projector_images
 from quadfringe.devices.lightcrafter import LightCrafter, ProjectorPair, outputs, udev_rule
+from quadfringe.evaluation._testbed import Order
 
 
 def run(*arguments: object) -> Result:
