@@ -152,7 +152,7 @@ impl Dlpc350 {
         answers(&request, outcome, fault)
     }
 
-    /// Whether this request gets no reply, as when the device wakes, and some commands after that.
+    /// Whether this request gets no reply. The device does not acknowledge waking, nor some commands after it.
     fn silent(&mut self, unheard: bool) -> bool {
         if unheard {
             self.silent_left = self.quirks.silent_reads_after_waking;

@@ -205,7 +205,7 @@ impl<T: Transport> LightCrafter<T> {
         self.wait_for_power(power)
     }
 
-    /// Read the power mode until it is this one; a controller that wakes up may not reply yet.
+    /// Read the power mode until it is `power`. A controller that wakes up may not reply yet.
     fn wait_for_power(&mut self, power: PowerMode) -> Result<()> {
         let deadline = Instant::now() + self.waits.power;
         loop {

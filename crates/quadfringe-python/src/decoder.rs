@@ -129,8 +129,8 @@ impl Decoder {
         shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
     ) -> PyResult<Decoded> {
         let decoded = py.detach(|| {
-            // A poisoned lock is no harm: every shot writes all that it reads. The lock is taken outside the pool: a thread of
-            // the pool that waited for it could not work on the shot that holds it.
+            // A poisoned lock does no harm, because every shot writes all that it reads. The lock is taken outside the pool,
+            // because a thread of the pool that waited for it could not work on the shot that has the lock.
             let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
             let work = || {
                 let shot = scaled(shot(images)?, self.full_scale)?;

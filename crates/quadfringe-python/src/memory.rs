@@ -56,7 +56,7 @@ impl Memory {
         let values = array.into_shape_with_order(count).map_err(wrong_layout)?;
         let loan = Bound::new(py, Loan { values, owner: Arc::clone(self) })?;
         let view = loan.get().values.view().into_shape_with_order(shape).map_err(wrong_layout)?;
-        // SAFETY: the array keeps the loan alive, and the loan neither moves nor changes its values nor gives others access.
+        // SAFETY: the array keeps the loan alive. The loan never moves or changes its values, and nobody else has access.
         #[expect(
             unsafe_code,
             reason = "no safe call lends memory to NumPy and notices when the array is gone"
@@ -72,7 +72,7 @@ impl Memory {
     }
 }
 
-/// The error of a map that is not contiguous. The kernel makes none, so a caller never sees it.
+/// The error of a map that is not contiguous. The kernel makes no such map, so a caller never sees this error.
 fn wrong_layout(error: ShapeError) -> PyErr {
     PyRuntimeError::new_err(format!("a map of the kernel is not contiguous: {error}"))
 }

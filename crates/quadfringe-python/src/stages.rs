@@ -104,7 +104,7 @@ pub fn background<'py>(
     Ok(found.into_pyarray(py))
 }
 
-/// Fringe period in camera pixels along rows and along columns; infinite where no carrier stands out.
+/// Fringe period in camera pixels along rows and along columns; infinite in a direction without a carrier.
 #[pyfunction]
 pub fn carrier(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
     let image = map("image", image)?;

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A [`Transport`] to an emulator in the same process. Replies come at once or never, so timeouts take no time.
+/// A [`Transport`] to an emulator in the same process. Replies come at once or never, so no call waits.
 #[derive(Debug)]
 pub struct EmulatedTransport {
     device: Arc<Mutex<Dlpc350>>,

@@ -11,7 +11,7 @@ enum Kind {
 
 use Kind::{Both, ReadOnly, WriteOnly};
 
-/// Word, direction, value after power-on (its length is that of the register), and the greatest value of each byte.
+/// Word, direction, value after power-on (as long as the register), and the greatest value of each byte.
 type Row = (u16, Kind, &'static [u8], &'static [u8]);
 
 const ANY: &[u8] = &[];
@@ -161,7 +161,7 @@ impl Registers {
         self.write_late(word, data, 0)
     }
 
-    /// A write that becomes visible after some reads.
+    /// Write a value. The next `lag` reads still return the previous one.
     pub fn write_late(&mut self, word: u16, data: &[u8], lag: u32) -> Option<()> {
         if word == 0x1A3A && data.len() == 2 {
             self.load_images = data[1];

@@ -147,7 +147,7 @@ impl<T: Transport> LightCrafter<T> {
         self.write(&InvertData(inverted))
     }
 
-    /// Measure how long `count` flash images take to load, from number `first` on, in ms.
+    /// Measure how long `count` flash images take to load, starting with image `first`, in ms.
     pub fn measure_image_load_ms(&mut self, first: u8, count: u8) -> Result<f64> {
         self.write(&MeasureImageLoad { first, count })?;
         sleep(self.waits.validation);

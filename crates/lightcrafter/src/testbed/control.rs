@@ -14,7 +14,7 @@ pub const CONTROL: &str = "LIGHTCRAFTER_TESTBED";
 /// Serve lines "PORT VERB [ARGUMENT] [COUNT]" and answer each with "ok [VALUE]" or "error REASON".
 pub fn listen(path: &Path, nodes: Vec<Arc<Node>>) -> io::Result<()> {
     socket::listen(path, move |_, stream| {
-        // A client that goes away ends its connection.
+        // An error means that the client closed the connection.
         let _ = serve(&nodes, stream);
     })
 }

@@ -1,7 +1,7 @@
 //! Replacement for usbfs: answers to the ioctls on a device node, over the socket of umockdev.
 //!
 //! Messages are three words of 64 bits. The program sends {1, request, argument}. This side may reply
-//! {5, address, length} to read its memory and {6, address, length} with bytes to write it; it ends with
+//! {5, address, length} to read its memory and {6, address, length} with bytes to write it. The last reply is
 //! {3, result, errno}.
 
 use super::descriptors::control_answer;

@@ -20,7 +20,7 @@ use winit::platform::wayland::ActiveEventLoopExtWayland;
 use winit::platform::x11::{EventLoopBuilderExtX11, MonitorHandleExtX11, WindowAttributesExtX11};
 use winit::window::{Fullscreen, Window, WindowId};
 
-/// Time limit of an order. It ends the wait for a compositor that never gives a window its size.
+/// Time limit of an order, because a compositor may never give a window its size.
 const PATIENCE: Duration = Duration::from_secs(5);
 const SIZE: PhysicalSize<u32> = PhysicalSize::new(WIDTH_PX as u32, HEIGHT_PX as u32);
 

@@ -15,7 +15,7 @@ struct Crtc {
     transform: [i32; 9],
 }
 
-/// Why this CRTC does not show the pixels of the desktop one to one; `None` if it does, or if X11 does not tell.
+/// Why this CRTC does not show the pixels of the desktop one to one; `None` if it does, or if X11 does not report it.
 pub fn of_crtc(crtc: u32) -> Option<String> {
     let (connection, screen) = x11rb::connect(None).ok()?;
     let root = connection.setup().roots.get(screen)?.root;
