@@ -1,4 +1,4 @@
-//! Everything that can be wrong with an input; the doc comment of a variant is the message that the user reads.
+//! Errors of invalid input. `displaydoc` turns the doc comment of each variant into the message that the user reads.
 
 use displaydoc::Display;
 use std::borrow::Cow;
@@ -7,8 +7,8 @@ use std::fmt::{self, Formatter};
 /// Result of every fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Why an input cannot be used. Every message names the expected and the actual value, and the remedy where it is not
-/// obvious.
+/// The reason why an input cannot be used. Every message gives the expected and the actual value, and the remedy if it
+/// is not obvious.
 ///
 /// ```
 /// use quadfringe::error::{Error, Limit};
@@ -30,16 +30,16 @@ pub enum Error {
     Shape {
         /// The array at fault.
         what: Cow<'static, str>,
-        /// The shape that is needed.
+        /// The required shape.
         expected: Vec<usize>,
-        /// The shape that came.
+        /// The actual shape.
         actual: Vec<usize>,
     },
     /// images of {actual:?} (rows, columns) are too small to decode; give at least {least:?}
     TooSmall {
         /// The least size, (rows, columns).
         least: [usize; 2],
-        /// The size that came, (rows, columns).
+        /// The actual size, (rows, columns).
         actual: [usize; 2],
     },
     /// {parameter}: expected {expected}, got {actual}
@@ -48,7 +48,7 @@ pub enum Error {
         parameter: Cow<'static, str>,
         /// The condition that it must meet.
         expected: Limit,
-        /// The value that came.
+        /// The actual value.
         actual: Given,
     },
     /// fringe numbers {fringe_numbers:?} cannot number the fringes of {width_px} columns: columns {first_px:.1} and {second_px:.1} look alike (phases {margin_rad:.3} rad apart, {needed_rad} needed); choose numbers whose joint range covers the field, such as 36, 35, 30
@@ -57,11 +57,11 @@ pub enum Error {
         fringe_numbers: Vec<f64>,
         /// Columns of the projector.
         width_px: usize,
-        /// One column of the confused pair.
+        /// One of two columns with nearly the same phases.
         first_px: f64,
         /// The other column.
         second_px: f64,
-        /// Distance of the two in the space of phases.
+        /// Distance of the two columns in phase space.
         margin_rad: f64,
         /// The least distance that is accepted.
         needed_rad: f64,
@@ -84,18 +84,18 @@ pub enum Error {
     NotFinite {
         /// The array at fault.
         what: Cow<'static, str>,
-        /// How many.
+        /// Number of values that are not finite.
         count: usize,
-        /// Row of the first.
+        /// Row of the first of them.
         row: usize,
-        /// Column of the first.
+        /// Column of the first of them.
         column: usize,
     },
 }
 
 impl std::error::Error for Error {}
 
-/// The first difference between an encoding and the four-channel one.
+/// The first difference between an encoding and the four-channel encoding.
 #[derive(Debug, Clone, Copy, PartialEq, Display)]
 #[non_exhaustive]
 pub enum FourChannelFault {
@@ -132,7 +132,7 @@ pub enum Limit {
     Positive,
     /// A fraction in [0, 1).
     Fraction,
-    /// A number of at least this much.
+    /// A number that is not less than this.
     AtLeast(f64),
     /// A number in a closed range.
     Range {
@@ -148,7 +148,7 @@ pub enum Limit {
     },
     /// One of these names.
     OneOf(&'static [&'static str]),
-    /// A condition that only words can tell.
+    /// Any other condition, in words.
     Words(Cow<'static, str>),
 }
 
@@ -192,7 +192,7 @@ impl From<String> for Limit {
     }
 }
 
-/// The value that came.
+/// The actual value.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Given {
@@ -200,7 +200,7 @@ pub enum Given {
     Number(f64),
     /// Numbers of one parameter.
     Numbers(Vec<f64>),
-    /// A name, or a value of several parts.
+    /// A name or a composite value, as text.
     Text(String),
 }
 
@@ -221,7 +221,7 @@ impl From<f64> for Given {
 }
 
 impl From<f32> for Given {
-    /// The shortest decimal that names the number: 0.1 and not 0.10000000149.
+    /// Takes the shortest decimal that stands for the number, so that messages show 0.1 and not 0.10000000149.
     fn from(number: f32) -> Self {
         Self::Number(number.to_string().parse().unwrap_or(f64::from(number)))
     }
@@ -268,7 +268,7 @@ impl From<String> for Given {
 }
 
 impl Error {
-    /// A parameter outside its limit.
+    /// Error for a parameter outside its limit.
     pub(crate) fn value(
         parameter: impl Into<Cow<'static, str>>,
         expected: impl Into<Limit>,
@@ -277,7 +277,7 @@ impl Error {
         Self::Value { parameter: parameter.into(), expected: expected.into(), actual: actual.into() }
     }
 
-    /// An array of the wrong shape.
+    /// Error for an array of the wrong shape.
     pub(crate) fn shape(what: impl Into<Cow<'static, str>>, expected: &[usize], actual: &[usize]) -> Self {
         Self::Shape { what: what.into(), expected: expected.to_vec(), actual: actual.to_vec() }
     }

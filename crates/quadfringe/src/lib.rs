@@ -2,28 +2,28 @@
 //!
 //! A visible projector shows fringes in red, green and blue, an infrared projector a fourth set, and a camera with a
 //! visible and an infrared chip takes all four at one instant. R and B are in quadrature and give a wrapped phase at every
-//! pixel; G and IR, with other fringe numbers, tell which fringe it is. Phase gives the projector column that lights the
-//! pixel, and column and camera ray give the point.
+//! pixel; G and IR, with other fringe numbers, tell which fringe it is. The absolute phase gives the projector column that
+//! lights the pixel; the camera ray meets the sheet of light of this column in the point.
 //!
-//! # Three doors
+//! # Three entry points
 //! 1. [`Decoder`]: one call from a [`Shot`] to the maps of [`Decoded`]. Start here.
-//! 2. [`stages`]: the steps of the published method one by one, to teach, to inspect, or to build another chain.
+//! 2. [`stages`]: the steps of the published method as separate functions, for teaching, inspection, or another chain.
 //! 3. The parts: [`encoding`], [`condition`], [`height`], and the virtual bench in [`rig`] and [`surface`].
 //!
 //! # Conventions
 //! - **Arrays** are `(rows, columns)` or `(rows, columns, axes)`, row by row. x runs along the columns to the right, y along
 //!   the rows down, and pixel centres lie at whole numbers: the centre of the top-left pixel is the origin.
-//! - **No data** is NaN. No mask goes with a map.
+//! - **No data** is NaN. There is no separate mask.
 //! - **Units** stand in names: `height_mm`, `phase_rad`, `period_px`, `exposure_us`. Light is a fraction of full scale.
 //! - **Precision**: maps of pixels are `f32`, geometry and fits `f64`.
-//! - **Frames** are those of OpenCV: x right, y down, z forward. A device stands at `P_device = R P_camera + T`, and the
-//!   camera frame is the frame of all points. Lens distortion has the order (k1, k2, p1, p2, k3).
+//! - **Frames** follow OpenCV: x right, y down, z forward. A device has the pose `P_device = R P_camera + T`, and all
+//!   points are given in the camera frame. Lens distortion has the order (k1, k2, p1, p2, k3).
 //! - **Channels** of a shot come in the order R, G, B, IR. Channel `c` shows `0.5 + 0.5 cos(Phi_c + delta_c)` with
 //!   `Phi_c = 2 pi N_c u / W` at column `u` of a projector of `W` columns (S1). R and B have the same fringe number `N_c`;
 //!   `delta_c` is `pi/2` for B and 0 for the others. Phase is 0 at column 0.
-//! - **Wrapped phases** lie in `[-pi, pi]`. The absolute phase is that of R and B, counted from column 0.
-//! - **Equation numbers** (S1) to (S11) are those of `docs/method`.
-//! - **Threads**: work is spread over the current pool of rayon, and results are the same bits for any number of threads.
+//! - **Wrapped phases** lie in `[-pi, pi]`. The absolute phase is the phase of R and B, counted from column 0.
+//! - **Equation numbers** (S1) to (S11) refer to `docs/method`.
+//! - **Threads**: work runs in the current thread pool of rayon. Results are bit-identical for any number of threads.
 //!
 //! # Map
 //! A module uses only modules above it in this table.
@@ -42,10 +42,10 @@
 //! | `joint` | inverse: the default method, which fits all four channels together |
 //! | [`decode`] | inverse: one shot through all steps, by either method |
 //!
-//! The forward half (surface, rig) and the inverse half (condition to decode) never import each other. They meet in tests,
-//! where the inverse of a rendered surface is the surface. The two methods never import each other either.
+//! The forward half (surface, rig) and the inverse half (condition to decode) never import each other. Only tests use
+//! both: they render a surface, decode it and compare. The two methods never import each other either.
 //!
-//! # A shot, there and back
+//! # Render a shot and decode it
 //! ```
 //! use quadfringe::rig::{Bench, Light, RenderOptions};
 //! use quadfringe::{Decoder, Device, Encoding, Shot, height::Triangulator, surface::scene};
@@ -68,7 +68,7 @@
 //! # Ok::<(), quadfringe::Error>(())
 //! ```
 
-// Common ground. Comments keep the order: rustfmt sorts neighbours.
+// Used by both halves. Blank lines keep the order, because rustfmt sorts adjacent declarations.
 pub mod error;
 
 mod parallel;
@@ -101,7 +101,7 @@ pub use encoding::{Channel, DmdLayout, Encoding};
 pub use error::{Error, Result};
 pub use optics::{BayerPattern, Device};
 
-/// The Rust of the README is run too.
+/// Runs the Rust blocks of the README as tests.
 #[cfg(doctest)]
 #[doc = include_str!("../../../README.md")]
 struct Readme;

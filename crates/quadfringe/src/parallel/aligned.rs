@@ -1,21 +1,21 @@
-//! Working memory aligned to cache lines. A wide vector that crosses two lines takes two accesses.
+//! Working memory aligned to cache lines. A vector that lies across two cache lines takes two accesses.
 
 use std::ops::{Deref, DerefMut};
 
 /// Bytes of a cache line, and of the widest vectors.
 const LINE: usize = 64;
 
-/// Numbers to allocate in addition, so that [`first_of_line`] leaves enough of them.
+/// Extra elements to allocate, because [`first_of_line`] skips up to this many.
 pub(crate) const fn spare<T>() -> usize {
     LINE / size_of::<T>()
 }
 
-/// Index of the first number of `memory` that begins a cache line.
+/// Index of the first element of `memory` that lies at the start of a cache line.
 pub(crate) fn first_of_line<T>(memory: &[T]) -> usize {
     memory.as_ptr().align_offset(LINE).min(spare::<T>())
 }
 
-/// A row of numbers that keeps its address and its numbers until it must grow.
+/// An aligned row that keeps its address and its content until it must grow.
 #[derive(Debug, Default)]
 pub(crate) struct Aligned<T> {
     memory: Vec<T>,
@@ -31,7 +31,7 @@ impl<T: Copy + Default> Aligned<T> {
         row
     }
 
-    /// Change the number of numbers. If the row must grow, all become zero.
+    /// Changes the length. If the row must grow, all elements become zero.
     #[inline(always)]
     pub fn resize(&mut self, count: usize) {
         if self.start + count > self.memory.len() {

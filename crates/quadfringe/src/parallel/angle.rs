@@ -1,4 +1,4 @@
-//! Angles: a fast arctangent with a stated error, and wrapping.
+//! Fast arctangent, sine and cosine with stated errors, and wrapping of angles.
 
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
@@ -15,7 +15,7 @@ const ATAN: [f32; 8] = [
     -0.004_054_568_5,
 ];
 
-/// The same with fewer terms, greatest error 1.2e-5 rad, for angles that only select whole turns.
+/// A shorter polynomial for atan(a) / a with an error of at most 1.2e-5 rad, for angles that only select whole turns.
 const COARSE_ATAN: [f32; 5] = [0.999_866_3, -0.330_304_8, 0.180_159_3, -0.085_156_35, 0.020_845_114];
 
 /// sin(2 pi t) / t over |t| <= 1/4 in powers of t^2, fitted in the same way; greatest error of the polynomial 4e-9.
@@ -49,25 +49,25 @@ pub(crate) fn atan2(y: f32, x: f32) -> f32 {
     unfold(eight_terms(ATAN, a * a) * a, y, x)
 }
 
-/// As [`atan2`], greatest error 1.3e-5 rad.
+/// Like [`atan2`], with an error of at most 1.3e-5 rad.
 #[inline(always)]
 pub(crate) fn coarse_atan2(y: f32, x: f32) -> f32 {
     let a = ratio(y, x);
     unfold(five_terms(COARSE_ATAN, a * a) * a, y, x)
 }
 
-/// The smaller magnitude over the greater one.
+/// The smaller of |x| and |y| divided by the greater one.
 #[inline(always)]
 fn ratio(y: f32, x: f32) -> f32 {
     let (ax, ay) = (x.abs(), y.abs());
-    // Of a NaN and a number, `low` takes y and `high` takes x: either NaN reaches the result.
+    // Comparisons with NaN are false. Then `low` is y and `high` is x, so that a NaN in either reaches the result.
     let low = if ax < ay { ax } else { ay };
     let high = if ay > ax { ay } else { ax };
     let tiny = high < f32::MIN_POSITIVE;
     low / if tiny { f32::MIN_POSITIVE } else { high }
 }
 
-/// From the first octant, where `angle` lies, to the octant of the point.
+/// Moves `angle`, which lies in the first octant, to the octant of the point.
 #[inline(always)]
 fn unfold(angle: f32, y: f32, x: f32) -> f32 {
     let folded = if y.abs() > x.abs() { FRAC_PI_2 - angle } else { angle };
@@ -75,7 +75,8 @@ fn unfold(angle: f32, y: f32, x: f32) -> f32 {
     if y < 0.0 { -half } else { half }
 }
 
-/// A polynomial in `t` by Estrin's scheme, whose terms do not wait for each other as in Horner's scheme.
+/// A polynomial in `t` by Estrin's scheme: its terms are computed in parallel, while those of Horner's scheme wait for
+/// each other.
 #[inline(always)]
 fn eight_terms([a, b, c, d, e, f, g, h]: [f32; 8], t: f32) -> f32 {
     let square = t * t;
@@ -97,14 +98,14 @@ pub(crate) fn round(x: f32) -> f32 {
     (x + SHIFT) - SHIFT
 }
 
-/// The angle in [-pi, pi] that differs by whole turns, to 3e-7 for |angle| < 1000 rad.
+/// The angle in [-pi, pi] that differs from `angle` by whole turns, exact to 3e-7 rad for |angle| < 1000 rad.
 #[inline(always)]
 pub(crate) fn wrap(angle: f32) -> f32 {
     let turns = round(angle * (1.0 / TAU));
     (angle - turns * TAU_HIGH) - turns * TAU_LOW
 }
 
-/// The angle in [0, 2 pi) that differs by whole turns.
+/// The angle in [0, 2 pi) that differs from `angle` by whole turns.
 #[inline(always)]
 pub(crate) fn wrap_positive(angle: f32) -> f32 {
     let below = wrap(angle);

@@ -1,6 +1,7 @@
-//! Rows of pixels as vectors: arithmetic on arrays by value, which the compiler vectorises.
+//! Rows of pixels as short arrays that are passed by value. The compiler turns arithmetic on them into vector
+//! instructions.
 
-/// Pixels of a vector; rows of planes are padded to a multiple.
+/// Pixels in a vector. Rows of planes are padded to a multiple of this number.
 pub(crate) const LANES: usize = 16;
 /// A vector of pixels.
 pub(crate) type Lanes = [f32; LANES];
@@ -11,13 +12,13 @@ pub(crate) fn lanes(row: &[f32]) -> &[Lanes] {
     row.as_chunks().0
 }
 
-/// A padded row as vectors to write.
+/// A padded row as mutable vectors.
 #[inline(always)]
 pub(crate) fn lanes_mut(row: &mut [f32]) -> &mut [Lanes] {
     row.as_chunks_mut().0
 }
 
-/// Vector `i` of several rows, by value. Loops over values cannot alias memory, so they vectorise.
+/// Vector `i` of several rows, by value. Values do not alias, so that the compiler vectorises loops over them.
 #[inline(always)]
 pub(crate) fn take<const N: usize>(rows: &[&[Lanes]; N], i: usize) -> [Lanes; N] {
     std::array::from_fn(|k| rows[k][i])

@@ -1,5 +1,5 @@
-//! Helpers of fast code: angles without branches, rows of pixels as vectors, aligned memory, and working memory that tasks
-//! share one after another.
+//! Private helpers for vectors and threads: angles without branches, rows of pixels as vectors, memory aligned to cache
+//! lines, and working memory that one task after another uses.
 
 pub(crate) mod aligned;
 pub(crate) mod angle;

@@ -1,13 +1,13 @@
-//! Working memory of tasks: one value for each task that runs at the same time, reused by later tasks.
+//! A pool of working memory. Each running task holds one value; when it ends, another task reuses the value.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
-/// Values that no task holds, in boxes to avoid copies.
+/// The values that no task holds. They are boxed, so that taking one copies only a pointer.
 #[derive(Debug)]
 pub(crate) struct Slots<T>(Mutex<Vec<Box<T>>>);
 
-/// A value that a task holds; dropping it returns the value.
+/// A value that a task holds. It returns to the pool when it is dropped.
 #[derive(Debug)]
 pub(crate) struct Lent<'a, T> {
     value: Option<Box<T>>,
@@ -21,7 +21,7 @@ impl<T> Default for Slots<T> {
 }
 
 impl<T: Default> Slots<T> {
-    /// The value returned last, which may still be in the cache, or a new one.
+    /// The value that was returned last, because it may still be in the cache; a new value if the pool is empty.
     pub fn take(&self) -> Lent<'_, T> {
         Lent { value: Some(self.free(|free| free.pop()).unwrap_or_default()), slots: self }
     }
@@ -29,7 +29,7 @@ impl<T: Default> Slots<T> {
 
 impl<T> Slots<T> {
     fn free<R>(&self, change: impl FnOnce(&mut Vec<Box<T>>) -> R) -> R {
-        // No panic can interrupt a push.
+        // A poisoned lock is harmless: a panic cannot leave the list half-changed.
         change(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }

@@ -5,14 +5,14 @@ use rayon::prelude::*;
 
 use super::params::BLUR_REACH_SIGMAS;
 
-/// Gaussian blur with a standard deviation in px; the border is continued.
+/// Gaussian blur with a standard deviation in px. Pixels at the border are repeated beyond it.
 pub(super) fn blur(image: &Array2<f32>, sigma_px: f64) -> Array2<f32> {
     let kernel = gaussian(sigma_px);
     let along_rows = blur_rows(image.view(), &kernel);
     blur_columns(along_rows.view(), &kernel)
 }
 
-/// Weights of one side of the kernel, the middle first; all together they sum to 1.
+/// Weights from the middle of the kernel to one end. The whole kernel has the sum 1.
 fn gaussian(sigma_px: f64) -> Vec<f32> {
     let reach = (BLUR_REACH_SIGMAS * sigma_px).ceil() as i32;
     let weight = |i: i32| (-0.5 * (f64::from(i) / sigma_px).powi(2)).exp();

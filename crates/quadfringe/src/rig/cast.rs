@@ -1,4 +1,5 @@
-//! One ray through each camera pixel, and the projector position that lights its surface point (S9).
+//! Ray casting: one ray through each camera pixel, and the projector position that lights the surface point it meets
+//! (S9).
 
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
@@ -45,7 +46,8 @@ impl Hit {
     }
 }
 
-/// A scene as the bench sees it: made once by [`Bench::cast`], rendered as often as needed, and the truth to judge by.
+/// A scene as the bench sees it. [`Bench::cast`] makes it once; it can be rendered any number of times and holds the
+/// truth for comparisons.
 ///
 /// ```
 /// use quadfringe::{Device, rig::{Projector, Bench}, surface::Plane};
@@ -59,14 +61,15 @@ impl Hit {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cast {
     pub(super) hits: Array2<Hit>,
-    /// The same for the pixels of an infrared chip that is not registered with the visible one.
+    /// Hits of the infrared pixels, if the infrared chip is not registered with the visible one.
     pub(super) infrared_hits: Option<Array2<Hit>>,
-    /// Depth difference of neighbouring pixels above which a step lies between them, in mm per mm of depth.
+    /// Neighbouring pixels whose depths differ by more than this, in mm per mm of depth, have a step between them.
     pub(super) step_per_depth: f64,
 }
 
 impl Bench {
-    /// Traces the pixels of both chips to the surface and the surface to both projectors; rows in parallel.
+    /// Casts a ray from each pixel of both chips to the surface, and a shadow ray from each projector to the hit; rows
+    /// in parallel.
     ///
     /// A projector lights a point that faces it, lies within the projected image, and is not in the shadow of another point.
     #[must_use]
@@ -123,7 +126,7 @@ struct Lit {
     from_px: Option<[f64; 2]>,
 }
 
-/// Light of a projector at a point with this normal.
+/// Light of a projector at a point of the surface with this normal.
 fn light_at(
     surface: &dyn Surface,
     projector: &Device,

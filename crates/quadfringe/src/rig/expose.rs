@@ -8,8 +8,8 @@ use rayon::prelude::*;
 
 use super::RenderOptions;
 
-/// Turns linear light (1 = full scale) into counts, in place. Every row has separate random numbers, drawn from the seed,
-/// the channel and the row, so that the result does not depend on the number of threads.
+/// Turns linear light (1 = full scale) into counts, in place. Every row has a separate random generator, seeded from
+/// seed, channel and row, so that the result does not depend on the number of threads.
 pub(super) fn expose(plane: &mut Array2<f32>, channel: usize, options: &RenderOptions) {
     let full_scale = options.bit_depth.full_scale();
     let rounds = full_scale > 1.0;

@@ -28,7 +28,7 @@ pub enum Light<'a> {
         number: f64,
         /// Shift, rad.
         shift_rad: f64,
-        /// Whether they count over columns or rows.
+        /// Whether the fringes are counted over columns or rows.
         axis: Axis,
     },
     /// An image of the projector's size (rows, columns), interpolated bilinearly between mirrors.
@@ -45,13 +45,14 @@ impl Light<'_> {
     /// The four channels of a shot: R, G, B, IR.
     ///
     /// # Errors
-    /// [`Error::NotFourChannel`] for another encoding: the camera of the bench has these four channels.
+    /// [`Error::NotFourChannel`] for another encoding, because the camera of the bench has these four channels.
     pub fn shot(encoding: &Encoding) -> Result<[Self; 4]> {
         let four = encoding.four_channel_view()?;
         Ok(Channel::ALL.map(|channel| Self::fringes(four.fringe_number(channel), channel.shift_rad())))
     }
 
-    /// The same fringes in all four channels: one step of an N-step capture. With a projector, the other one is dark.
+    /// The same fringes in all four channels: one step of an N-step capture. If `projector` is given, the other
+    /// projector is dark.
     ///
     /// ```
     /// use quadfringe::rig::{Axis, Projector, Light};
@@ -98,7 +99,7 @@ impl Light<'_> {
     }
 }
 
-/// Straight interpolation along the mirrors of the two nearest rows, then between the rows.
+/// Linear interpolation along each of the two nearest rows of mirrors, then between the rows.
 fn sample(image: &ArrayView2<'_, f32>, layout: DmdLayout, [column, row]: [f64; 2]) -> f64 {
     let (rows, columns) = image.dim();
     let split = |position: f64, n: usize| {

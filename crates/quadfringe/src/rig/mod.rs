@@ -1,8 +1,9 @@
 //! The virtual bench: a camera, two projectors, and any surface in front of them (S8, S9).
 //!
-//! [`Bench::cast`] traces one ray through each camera pixel and two shadow rays, and stores the projector position that
-//! lights each pixel; a scene needs this once. [`Bench::render`] then renders a shot for any four patterns, with the effects
-//! of a real bench. [`Bench::predeform`] gives the infrared pattern that corrects a deviated infrared projector (S11).
+//! [`Bench::cast`] traces one ray through each camera pixel and a shadow ray from each projector, and stores the projector
+//! position that lights the pixel; this is done once for a scene. [`Bench::render`] then renders a shot for any four
+//! patterns, with the effects of a real bench. [`Bench::predeform`] gives the infrared pattern that corrects an infrared
+//! projector that is not coaxial (S11).
 
 mod blur;
 mod cast;
@@ -47,16 +48,16 @@ pub struct Bench {
     pub camera: Device,
     /// The visible light projector, P1.
     pub visible: Device,
-    /// The infrared light projector, P2: coaxial with P1 when both are equal.
+    /// The infrared light projector, P2. It is coaxial with P1 if both are equal.
     pub infrared: Device,
     /// Layout of the mirrors of both projectors, which determines where pattern images are sampled.
     pub layout: DmdLayout,
-    /// Position on the infrared chip of the point seen at the visible pixel (x, y): rows of an invertible affine map of
-    /// (x, y, 1). `None` if both chips see the same.
+    /// Invertible affine map, row by row, from the visible pixel (x, y, 1) to the position on the infrared chip that
+    /// sees the same point. `None` if both chips see the same image.
     pub infrared_from_visible: Option<[[f64; 3]; 2]>,
 }
 
-/// Lens of the camera and of both projectors, mm.
+/// Focal length of the camera and of both projectors, mm.
 const FOCAL_MM: f64 = 12.0;
 const CAMERA_PITCH_UM: f64 = 4.65;
 const CAMERA_SIZE: [usize; 2] = [1024, 768];
@@ -76,7 +77,7 @@ impl Bench {
         Self::reference_with(DmdLayout::Regular)
     }
 
-    /// The published geometry with the mirrors of a given layout.
+    /// The published geometry with a given layout of the mirrors.
     ///
     /// ```
     /// use quadfringe::{DmdLayout, rig::Bench};
@@ -94,8 +95,8 @@ impl Bench {
         Self { camera, visible: projector.clone(), infrared: projector, layout, infrared_from_visible: None }
     }
 
-    /// The same bench with an infrared projector that deviates from the visible one: `T_infrared_visible` is the rotation
-    /// vector (rad) and the translation (mm), as in (S10).
+    /// This bench with an infrared projector that deviates from the visible one by the pose `T_infrared_visible`, given
+    /// as a rotation vector (rad) and a translation (mm), as in (S10).
     ///
     /// # Errors
     /// [`crate::Error::Value`] when a number is not finite.
@@ -116,8 +117,8 @@ impl Bench {
         Ok(Self { infrared, ..self })
     }
 
-    /// The same bench with an infrared chip that sees the point of the visible pixel (x, y) at the position that the rows of
-    /// this affine map of (x, y, 1) give.
+    /// This bench with an infrared chip that is not registered: the affine map takes the visible pixel (x, y, 1) to the
+    /// position on the infrared chip that sees the same point.
     ///
     /// # Errors
     /// [`crate::Error::Value`] when the map has no inverse.

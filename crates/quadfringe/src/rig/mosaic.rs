@@ -1,11 +1,12 @@
-//! The Bayer chip: one colour at each pixel, and bilinear interpolation of the others as in common cameras.
+//! The Bayer chip, which measures one colour at each pixel, and the bilinear interpolation by which common cameras add
+//! the other two.
 
 use ndarray::{Array2, Zip};
 
 use crate::encoding::Channel;
 use crate::optics::BayerPattern;
 
-/// The mosaic: at each pixel the one of R, G and B that its filter passes.
+/// The mosaic: each pixel takes R, G or B, whichever its colour filter passes.
 pub(super) fn sample(colours: &[Array2<f32>], pattern: BayerPattern) -> Array2<f32> {
     let mut raw = Array2::zeros(colours[0].dim());
     Zip::indexed(&mut raw).par_for_each(|(row, column), raw| {
@@ -25,7 +26,8 @@ pub(super) fn bilinear(raw: &Array2<f32>, pattern: BayerPattern) -> [Array2<f32>
     })
 }
 
-/// The pixel, or the mean of its neighbours of that colour, of which diagonal ones have half the weight.
+/// The pixel if it has this colour, else the weighted mean of its neighbours of this colour. Diagonal neighbours have
+/// half the weight of the others.
 fn interpolated(raw: &Array2<f32>, pattern: BayerPattern, colour: Channel, row: usize, column: usize) -> f32 {
     if pattern.channel(row, column) == colour {
         return raw[[row, column]];

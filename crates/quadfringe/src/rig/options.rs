@@ -26,8 +26,8 @@ pub enum Albedo {
         /// Albedo of the lightest square: R, G, B, IR.
         albedo: [f32; 4],
     },
-    /// One albedo for each camera pixel and channel, `(rows, columns, 4)`; or `(rows, columns, 8)`, of which the last
-    /// four are for the pixels of the infrared chip.
+    /// One albedo for each camera pixel and channel, `(rows, columns, 4)`; or `(rows, columns, 8)`, where the last four
+    /// are the albedos at the pixels of the infrared chip.
     Image(Array3<f32>),
 }
 
@@ -103,7 +103,7 @@ pub enum BitDepth {
 }
 
 impl BitDepth {
-    /// Depth with a number of bits: 8, 10, 12 or 16.
+    /// Bit depth from its number of bits: 8, 10, 12 or 16.
     ///
     /// # Errors
     /// [`Error::Value`] for any other number.
@@ -180,9 +180,9 @@ pub struct RenderOptions {
     pub camera_offset: [f64; 4],
     /// Response of the camera: captured = offset + linear ^ (1 / exponent).
     pub camera_exponent: [f64; 4],
-    /// Pattern of a visible chip with one colour per pixel. `None`: all colours at every pixel.
+    /// Pattern of a visible chip that measures one colour at each pixel. `None`: all colours at every pixel.
     pub bayer: Option<BayerPattern>,
-    /// How the camera interpolates three planes from the mosaic. `None`: it delivers the mosaic.
+    /// How the camera interpolates three colour planes from the mosaic. `None`: the camera delivers the mosaic.
     pub demosaic: Option<Demosaic>,
     /// Rounding of the camera.
     pub bit_depth: BitDepth,
@@ -194,7 +194,7 @@ const NO_CROSSTALK: [[f64; 4]; 4] =
     [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, 0.0, 0.0, 1.0]];
 
 impl Default for RenderOptions {
-    /// Fringes fill 5 to 95 % of the range of the camera.
+    /// With these values the fringes on the surface span 5 to 95 % of the range of the camera.
     fn default() -> Self {
         Self {
             albedo: Albedo::Uniform([0.9; 4]),

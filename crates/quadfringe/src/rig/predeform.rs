@@ -9,15 +9,16 @@ use crate::error::Result;
 use crate::optics::check_plane;
 
 impl Bench {
-    /// Image for the infrared projector, `(rows, columns)`, linear light 0 to 1, that lights the plane z = `plane_z_mm` as the
-    /// visible projector would with `light`: the image that a virtual camera at the infrared projector takes of the lit
-    /// plane. Mirrors whose ray misses the plane stay dark.
+    /// Image for the infrared projector, `(rows, columns)`, linear light 0 to 1, that puts the same light on the plane z =
+    /// `plane_z_mm` as the visible projector showing `light`. It is the image that a camera in place of the infrared projector
+    /// would take of that plane. Mirrors whose ray misses the plane stay dark.
     ///
-    /// The result is exact on that plane. Where the centres of the projectors differ it drifts with depth.
+    /// The result is exact on that plane. If the centres of the projectors differ, the error grows with the distance
+    /// from it.
     ///
     /// # Errors
-    /// [`crate::Error::Value`] when the plane is not at a finite positive depth or the light is not valid; [`crate::Error::Shape`] when
-    /// it is an image of another size than the visible projector's.
+    /// [`crate::Error::Value`] when the plane is not at a finite positive depth or the light is not valid;
+    /// [`crate::Error::Shape`] when the light is an image that does not have the size of the visible projector.
     ///
     /// ```
     /// use quadfringe::rig::{Bench, Light};

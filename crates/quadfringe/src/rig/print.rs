@@ -25,7 +25,8 @@ use crate::optics::{Device, Pose};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct Print {
-    /// Share of each texel that is inked, 0 to 1, rows along y; between texels it is interpolated, outside there is paper.
+    /// Inked share of each texel, 0 to 1, rows along y. It is interpolated between texels; outside the image there is
+    /// paper.
     pub coverage: Array2<f32>,
     /// Distance of neighbouring texels, mm.
     pub pitch_mm: f64,
@@ -60,7 +61,8 @@ impl Print {
         Err(Error::value("print", expected, actual))
     }
 
-    /// Texel coordinates (column, row) at which the ray of a camera pixel meets the plane of the board; NaN if it does not.
+    /// Texel coordinates (column, row) of the point where the ray of a camera pixel meets the plane of the board; NaN if it
+    /// does not meet it.
     fn texel(&self, camera: &Device, pixel: [f64; 2]) -> [f64; 2] {
         let ray = camera.ray(pixel);
         let origin = self.pose.body_from_camera(ray.origin_mm);
@@ -113,8 +115,8 @@ impl Print {
 
 impl Bench {
     /// Albedo of a print at each camera pixel, `(rows, columns, 4)` for [`super::Albedo::Image`], or `(rows, columns, 8)` if
-    /// the infrared chip is not registered with the visible one. The mean over each pixel places edges to a fraction of a
-    /// pixel.
+    /// the infrared chip is not registered with the visible one. The albedo is the mean over the area of each pixel, so that
+    /// edges have their place to a fraction of a pixel.
     ///
     /// # Errors
     /// [`Error::Value`] when a number of the print is out of range.
@@ -151,7 +153,7 @@ mod tests {
     use super::*;
     use crate::optics::rotation_from_vector;
 
-    /// A disc of 6 mm, printed finer than the camera sees.
+    /// A disc of 6 mm, printed with a finer resolution than the camera has.
     fn disc(pose: Pose) -> Print {
         let pitch_mm = 0.1;
         let inside = |r: usize, c: usize| (r as f64 - 80.0).hypot(c as f64 - 80.0) * pitch_mm;

@@ -1,4 +1,4 @@
-//! Rendering: the images of a cast scene under four patterns.
+//! Rendering: the images of a cast scene that four patterns light.
 
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
@@ -17,11 +17,11 @@ use crate::error::{Error, Result};
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub enum Planes {
-    /// Four of 8 bit, full scale 255.
+    /// Four images of 8 bit, full scale 255.
     U8([Array2<u8>; 4]),
-    /// Four of 10, 12 or 16 bit, full scale 1023, 4095 or 65535.
+    /// Four images of 10, 12 or 16 bit, full scale 1023, 4095 or 65535.
     U16([Array2<u16>; 4]),
-    /// Four, not rounded, full scale 1.
+    /// Four images, not rounded, full scale 1.
     F32([Array2<f32>; 4]),
     /// Mosaic and IR of 8 bit, full scale 255.
     BayerU8([Array2<u8>; 2]),
@@ -106,10 +106,11 @@ impl Depth {
 }
 
 impl Bench {
-    /// The shot of a scene at rest.
+    /// Renders the shot of a scene at rest.
     ///
-    /// Light, projector response, albedo, shading and room light, crosstalk, exposure, blur, noise, camera response,
-    /// saturation, rounding, Bayer chip: in this order. Bit-identical for any number of threads.
+    /// Applies, in this order: light, projector response, albedo, shading and room light, crosstalk, exposure, blur,
+    /// noise, camera response, saturation, rounding, Bayer chip. The images are bit-identical for any number of
+    /// threads.
     ///
     /// # Errors
     /// [`Error::Shape`] when the cast, a pattern image or an albedo image has the wrong size; [`Error::Value`] when an
@@ -129,8 +130,9 @@ impl Bench {
         self.render_moving([cast; 3], lights, options)
     }
 
-    /// The shot of a scene that moves while the visible projector shows R, then G, then B: one cast for each of the three
-    /// instants. The infrared projector shows its pattern throughout, so the infrared image is the mean of the three.
+    /// Renders the shot of a scene that moves while the visible projector shows R, then G, then B, with one cast for each
+    /// of these instants. The infrared projector shows its pattern throughout, so the infrared image is the mean of the
+    /// three.
     ///
     /// # Errors
     /// As [`Bench::render`].
@@ -218,7 +220,8 @@ struct Painter<'a, 'image> {
 }
 
 impl Painter<'_, '_> {
-    /// Light of the four projected channels at a pixel of a chip, with one hit for the instant of each of R, G and B.
+    /// Light of the four projected channels at a pixel of a chip. `hits` holds the hit of the pixel at the instants of
+    /// R, G and B.
     fn light(&self, chip: Projector, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f64; 4] {
         let mut light = [0.0; 4];
         for (channel, hit) in Channel::ALL.into_iter().zip(hits) {

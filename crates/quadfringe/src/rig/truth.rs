@@ -56,7 +56,7 @@ impl Cast {
         self.hits.map(|hit| encoding.absolute_phase_rad(hit.lit_from_px[0][0]) as f32)
     }
 
-    /// Fringe order of the first fringe number: the whole periods in the absolute phase; NaN where dark.
+    /// Fringe order of the first fringe number: the number of whole turns in the absolute phase; NaN where dark.
     #[must_use]
     pub fn order(&self, encoding: &Encoding) -> Array2<f32> {
         let period = encoding.period_px();
@@ -70,8 +70,8 @@ impl Cast {
             .map(|hit| hit.is_surface() && Projector::ALL.iter().any(|projector| !hit.is_lit(*projector)))
     }
 
-    /// Distance in pixels to the nearest edge: a step in depth, a border of shadow, or a border of the surface. Pixels on
-    /// either side of an edge have 0; without any edge all are infinite.
+    /// Distance in pixels to the nearest edge, which is a step in depth, the border of a shadow, or the border of the
+    /// surface. Pixels on either side of an edge have the distance 0. Without any edge, all distances are infinite.
     #[must_use]
     pub fn edge_distance_px(&self) -> Array2<f32> {
         let edges = self.edges();
@@ -119,9 +119,9 @@ impl Cast {
 /// A parabola of the lower envelope.
 #[derive(Clone, Copy)]
 struct Parabola {
-    /// Position of its apex.
+    /// Position of the apex.
     at: usize,
-    /// Where its part of the envelope begins.
+    /// Position where the envelope starts to follow this parabola.
     from: f32,
 }
 
