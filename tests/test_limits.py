@@ -35,8 +35,6 @@ EXCEPTIONS = {
 # Parts of the joint method that the joint energy replaces: they are moved and named, and not rewritten before that.
 JOINT = "crates/quadfringe/src/joint"
 REPLACED_BY_THE_JOINT_ENERGY = {
-    f"{JOINT}/cells.rs",
-    f"{JOINT}/local_fit.rs",
     f"{JOINT}/photometry/choice.rs",
     f"{JOINT}/photometry/mod.rs",
     f"{JOINT}/photometry/solve.rs",

@@ -10,7 +10,7 @@ use super::params::uncertainty::{
     PAIR_EXCESS_MAX_RAD2, PAIR_NEIGHBOURHOOD, PAIR_SAMPLED_ROWS, PAIR_SHARE_MIN, PAIR_WINDOW,
 };
 use super::photometry::Photometry;
-use super::scene::{PhaseMap, Scene};
+use super::scene::{PhaseMap, PixelRow, Scene};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
@@ -58,12 +58,7 @@ impl Agreement {
             |maps, y, sums| {
                 // Offsets and amplitudes of the place of each pixel: those that it has chosen among many were chosen to agree.
                 let fringes = photometry.sample_in_place(scene, y, maps);
-                let pixels = PixelRows {
-                    phase: scene.row(map.phase, y),
-                    modulation: scene.row(map.modulation, y),
-                    usable: scene.row(scene.usable, y),
-                };
-                add_pairs(&fringes, &pixels, scene.rows(y), ratios, sums);
+                add_pairs(&fringes, &scene.pixel_row(map, y), scene.rows(y), ratios, sums);
             },
             |_, [numerator, information, other_numerator, other_information], out| {
                 let pair = Pair { numerator, information };
@@ -99,13 +94,6 @@ impl Agreement {
     }
 }
 
-/// One row of pixels.
-struct PixelRows<'a> {
-    phase: &'a [f32],
-    modulation: &'a [f32],
-    usable: &'a [f32],
-}
-
 /// Normal equations of a phase step by one pair of channels, cell by cell: the step is numerator over information.
 #[derive(Clone, Copy)]
 struct Pair<'a> {
@@ -117,7 +105,7 @@ struct Pair<'a> {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_pairs(
     fringes: &FringeRows,
-    pixels: &PixelRows,
+    pixels: &PixelRow,
     light: [&[f32]; 4],
     ratios: [f32; 3],
     sums: &mut [[Lanes; 4]],

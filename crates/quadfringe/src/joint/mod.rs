@@ -260,7 +260,8 @@ impl Joint {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
-        self.validity.run(&scene, map, pixel, &self.coarse.orders, limits, quality);
+        let evidence = validity::Evidence { map, pixel, orders: &self.coarse.orders, limits };
+        self.validity.run(&scene, evidence, quality);
         if let Some(instants) = instants {
             self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid);
         }

@@ -11,7 +11,7 @@ use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{FringeRows, carriers};
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
-use super::scene::{PhaseMap, Scene};
+use super::scene::{PhaseMap, PixelRow, Scene};
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
@@ -71,12 +71,7 @@ impl Motion {
             &mut self.change,
             |rows, y, sums| {
                 let fringes = photometry.sample(scene, y, &mut rows.fringes);
-                let pixels = PixelRows {
-                    phase: scene.row(map.phase, y),
-                    modulation: scene.row(map.modulation, y),
-                    usable: scene.row(scene.usable, y),
-                };
-                add_motion(&fringes, &pixels, scene.rows(y), timing, sums);
+                add_motion(&fringes, &scene.pixel_row(map, y), scene.rows(y), timing, sums);
             },
             |_, [numerator, information], out| {
                 let found = out.iter_mut().zip(numerator.iter().zip(information));
@@ -129,13 +124,6 @@ impl Motion {
     }
 }
 
-/// One row of pixels.
-struct PixelRows<'a> {
-    phase: &'a [f32],
-    modulation: &'a [f32],
-    usable: &'a [f32],
-}
-
 /// One row of a moving phase: rad, and rad per unit of time.
 struct MovingRow<'a> {
     phase: &'a [f32],
@@ -146,7 +134,7 @@ struct MovingRow<'a> {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_motion(
     fringes: &FringeRows,
-    pixels: &PixelRows,
+    pixels: &PixelRow,
     light: [&[f32]; 4],
     timing: Timing,
     sums: &mut [[Lanes; 2]],

@@ -61,6 +61,13 @@ pub(super) struct PhaseMap<'a> {
     pub modulation: &'a [f32],
 }
 
+/// One padded row of a [`PhaseMap`], and which of its pixels may take part in a fit.
+pub(super) struct PixelRow<'a> {
+    pub phase: &'a [f32],
+    pub modulation: &'a [f32],
+    pub usable: &'a [f32],
+}
+
 /// Two planes of working memory, as large as the image; their content is lost.
 pub(super) struct Scratch<'a> {
     pub first: &'a mut [f32],
@@ -83,6 +90,15 @@ impl<'a> Scene<'a> {
     /// Row `y` of the four planes.
     pub fn rows(&self, y: usize) -> [&'a [f32]; 4] {
         self.light.map(|plane| self.row(plane, y))
+    }
+
+    /// Row `y` of a map over the scene.
+    pub fn pixel_row<'b>(&'b self, map: PhaseMap<'b>, y: usize) -> PixelRow<'b> {
+        PixelRow {
+            phase: self.row(map.phase, y),
+            modulation: self.row(map.modulation, y),
+            usable: self.row(self.usable, y),
+        }
     }
 
     /// A width given in fringe periods, in cells.

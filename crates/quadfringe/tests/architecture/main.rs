@@ -29,18 +29,8 @@ const ORDER: [&str; 16] = [
     "decode",
 ];
 const FORWARD: [&str; 2] = ["surface", "rig"];
-const INVERSE: [&str; 10] = [
-    "condition",
-    "stages",
-    "height",
-    "decode/params",
-    "decode/method",
-    "decode/options",
-    "decode/output",
-    "published",
-    "joint",
-    "decode",
-];
+/// The inverse half begins here.
+const INVERSE_FROM: &str = "condition";
 const METHODS: [&str; 2] = ["published", "joint"];
 
 /// Rooms in which a child and the module around it may use each other: types that all files of the room share stand in its
@@ -82,11 +72,12 @@ fn faults(graph: &Graph) -> Vec<String> {
 fn fault(from: &str, to: &str) -> Option<&'static str> {
     let Some(there) = room_of(to) else { return Some("the name is not of any room") };
     let here = room_of(from)?;
-    let across = |one: &[&str], other: &[&str]| one.contains(&ORDER[here]) && other.contains(&ORDER[there]);
-    if across(&FORWARD, &INVERSE) || across(&INVERSE, &FORWARD) {
+    let is_forward = |room: usize| FORWARD.contains(&ORDER[room]);
+    let is_inverse = |room: usize| ORDER[..=room].contains(&INVERSE_FROM);
+    if (is_forward(here) && is_inverse(there)) || (is_inverse(here) && is_forward(there)) {
         return Some("the forward and the inverse half must not meet");
     }
-    if here != there && across(&METHODS, &METHODS) {
+    if here != there && [here, there].iter().all(|room| METHODS.contains(&ORDER[*room])) {
         return Some("the two methods must not meet");
     }
     (there > here).then_some("that room stands below")

@@ -7,7 +7,7 @@ use crate::joint::cells::RowMaps;
 use crate::joint::local_fit::Beats;
 use crate::joint::model::FringeRows;
 use crate::joint::params::orders::{LIT_WEIGHT, OBSERVED_COSINE_MAX, SAMPLED_ROWS};
-use crate::joint::scene::Scene;
+use crate::joint::scene::{PixelRow, Scene};
 use crate::parallel::angle::{atan2, sin_cos, wrap, wrap_positive};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
@@ -99,13 +99,8 @@ fn gather(
     sums.resize(grid.stride / LANES, [[0.0; LANES]; SUMS]);
     for y in grid.samples(row, SAMPLED_ROWS) {
         let fringes = wrapped.fringes(scene, y, maps);
-        let pixels = PixelRows {
-            node_phase,
-            phase: scene.row(wrapped.map.phase, y),
-            modulation: scene.row(wrapped.map.modulation, y),
-            usable: scene.row(scene.usable, y),
-        };
-        add_cosines(&pixels, scene.rows(y), &fringes, ratios, sums);
+        let pixels = scene.pixel_row(wrapped.map, y);
+        add_cosines(node_phase, &pixels, scene.rows(y), &fringes, ratios, sums);
     }
     for (k, line) in cells.iter_mut().enumerate() {
         line.resize(grid.columns, 0.0);
@@ -113,24 +108,16 @@ fn gather(
     }
 }
 
-/// One row of pixels.
-struct PixelRows<'a> {
-    /// Phase of the node that each pixel belongs to.
-    node_phase: &'a [f32],
-    phase: &'a [f32],
-    modulation: &'a [f32],
-    usable: &'a [f32],
-}
-
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_cosines(
-    pixels: &PixelRows,
+    node_phase: &[f32],
+    pixels: &PixelRow,
     light: [&[f32]; 4],
     fringes: &FringeRows,
     ratios: [f32; 2],
     sums: &mut [[Lanes; SUMS]],
 ) {
-    let pixels = [pixels.node_phase, pixels.phase, pixels.modulation, pixels.usable].map(lanes);
+    let pixels = [node_phase, pixels.phase, pixels.modulation, pixels.usable].map(lanes);
     let (light, offset, amplitude) =
         (light.map(lanes), fringes.offset.map(lanes), fringes.amplitude.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {

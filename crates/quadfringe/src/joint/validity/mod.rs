@@ -33,6 +33,15 @@ pub(super) struct PixelFit<'a> {
     pub modulation: &'a [f32],
 }
 
+/// What decides the mask of a shot.
+#[derive(Clone, Copy)]
+pub(super) struct Evidence<'a> {
+    pub map: PhaseMap<'a>,
+    pub pixel: PixelFit<'a>,
+    pub orders: &'a Orders,
+    pub limits: Limits,
+}
+
 /// Limits of a shot.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Limits {
@@ -72,19 +81,11 @@ struct Rows {
 impl Validity {
     /// Find the valid pixels of an absolute phase; `quality`, without padding, receives the quality of the orders of lit pixels, NaN
     /// elsewhere.
-    pub fn run(
-        &mut self,
-        scene: &Scene<'_>,
-        map: PhaseMap<'_>,
-        pixel: PixelFit<'_>,
-        orders: &Orders,
-        limits: Limits,
-        quality: &mut [f32],
-    ) {
-        let grid = scene.grid;
+    pub fn run(&mut self, scene: &Scene<'_>, evidence: Evidence<'_>, quality: &mut [f32]) {
+        let (grid, map) = (scene.grid, evidence.map);
         self.discontinuities.mark(grid, map, &mut self.excluded);
-        self.support.measure(scene, orders);
-        self.check_pixels(scene, map, pixel, orders, limits, quality);
+        self.support.measure(scene, evidence.orders);
+        self.check_pixels(scene, evidence, quality);
         remove_narrow(grid, NEIGHBOURS_MIN, &self.components, &mut self.valid);
         let pixels = |side: f64| (side * scene.period_px).powi(2) as usize;
         let limits = SizeLimits { least: pixels(COMPONENT_SIDE), seed: pixels(SEED_SIDE) };
@@ -104,15 +105,8 @@ impl Validity {
     }
 
     /// Limits of every pixel by itself and with its eight neighbours.
-    fn check_pixels(
-        &mut self,
-        scene: &Scene<'_>,
-        map: PhaseMap<'_>,
-        pixel: PixelFit<'_>,
-        orders: &Orders,
-        limits: Limits,
-        quality: &mut [f32],
-    ) {
+    fn check_pixels(&mut self, scene: &Scene<'_>, evidence: Evidence<'_>, quality: &mut [f32]) {
+        let Evidence { map, pixel, orders, limits } = evidence;
         let grid = scene.grid;
         self.components.resize(grid.pixels(), 0);
         self.consistent.resize(grid.pixels(), 0);

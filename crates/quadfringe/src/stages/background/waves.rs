@@ -147,13 +147,14 @@ mod tests {
                 if !(before < here && here >= after) {
                     continue;
                 }
-                match found.last() {
+                let extremum = Extremum { sample: i as u32, sign };
+                match found.last_mut() {
                     Some(last) if last.sign == sign => {
                         if here > sign * row[last.sample as usize] {
-                            *found.last_mut().unwrap() = Extremum { sample: i as u32, sign };
+                            *last = extremum;
                         }
                     }
-                    _ => found.push(Extremum { sample: i as u32, sign }),
+                    _ => found.push(extremum),
                 }
             }
         }

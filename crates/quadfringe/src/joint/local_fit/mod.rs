@@ -5,33 +5,16 @@
 //! so that `p - i q = b exp(i (Phi_c - Phi))` is their *beat* against it, six to thirty times slower than a fringe.
 //! Unlike a Fourier filter along rows, the fit prefers no direction, no band and no slope. Sums are kept once per cell.
 
+mod rows;
+
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{CellFringes, FringeRows};
 use super::neighbours::{around, binomial};
-use super::params::local_fit::{CONTRAST_MIN, FIRST_WINDOW, RIDGE, SAMPLED_ROWS, SPREAD_MIN, WINDOW};
+use super::params::local_fit::{FIRST_WINDOW, SAMPLED_ROWS, WINDOW};
 use super::scene::Scene;
-use crate::parallel::angle::atan2;
-use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
-use multiversion::multiversion;
 use rayon::prelude::*;
-
-/// Sums of one cell: w, wc, ws, wcc, wcs, then w I, w I c, w I s of R, G, B, IR.
-const SUMS: usize = 17;
-
-/// Maps of the fit on the cells. Of R and B: offset and amplitude, four maps in a row; then of all channels the coefficients of
-/// `a + p cos + q sin`; then the least amplitude of all channels and the mean amplitude of R and B.
-mod map {
-    pub const TWO_STEP: usize = 0;
-    pub const P_R: usize = 4;
-    pub const P_B: usize = 6;
-    pub const A_G: usize = 8;
-    pub const A_IR: usize = 11;
-    pub const B_G: usize = 14;
-    pub const B_IR: usize = 15;
-    pub const WEAKEST: usize = 16;
-    pub const COUNT: usize = 18;
-}
+use rows::{SUMS, add_products, add_squares, finish_row, map, relative_albedo, solve_row, two_step};
 
 /// Results of the fit on the cells, and its working maps.
 #[derive(Debug)]
@@ -203,154 +186,5 @@ impl LocalFit {
             [maps[map::A_IR], maps[map::A_IR + 1], maps[map::A_IR + 2]],
         ];
         relative_albedo(model, [cos, sin], scene.rows(y), &mut albedo[at]);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_squares(usable: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
-    let rows = [lanes(usable), lanes(light[0]), lanes(light[2])];
-    for (i, sums) in sums.iter_mut().enumerate() {
-        let [w, red, blue] = take(&rows, i);
-        let mut terms = [w; 5];
-        for x in 0..LANES {
-            let (r, b) = (w[x] * red[x], w[x] * blue[x]);
-            (terms[1][x], terms[2][x]) = (r, r * red[x]);
-            (terms[3][x], terms[4][x]) = (b, b * blue[x]);
-        }
-        add(sums, &terms);
-    }
-}
-
-/// Unit phasor of R and B for offsets and amplitudes `a_r, b_r, a_b, b_b`: (R / rho - a) / b times rho b_r b_b, as
-/// only the direction counts.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn two_step(maps: [&[f32]; 4], albedo: Option<&[f32]>, light: [&[f32]; 4], cos: &mut [f32], sin: &mut [f32]) {
-    let (maps, light) = (maps.map(lanes), [lanes(light[0]), lanes(light[2])]);
-    let mut out = [lanes_mut(cos), lanes_mut(sin)];
-    for i in 0..out[0].len() {
-        let albedo = albedo.map_or([1.0; LANES], |albedo| lanes(albedo)[i]);
-        let ([a_r, b_r, a_b, b_b], [red, blue]) = (take(&maps, i), take(&light, i));
-        let mut phasor = [[0.0; LANES]; 2];
-        for x in 0..LANES {
-            let real = (red[x] - albedo[x] * a_r[x]) * b_b[x];
-            let imaginary = (albedo[x] * a_b[x] - blue[x]) * b_r[x];
-            let length = (real * real + imaginary * imaginary).sqrt();
-            let inverse = 1.0 / if length > 1e-12 { length } else { 1e-12 };
-            (phasor[0][x], phasor[1][x]) = (real * inverse, imaginary * inverse);
-        }
-        put(&mut out, i, &phasor);
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_products(usable: &[f32], phasor: [&[f32]; 2], light: [&[f32]; 4], sums: &mut [[Lanes; SUMS]]) {
-    let (rows, light) = ([lanes(usable), lanes(phasor[0]), lanes(phasor[1])], light.map(lanes));
-    for (i, sums) in sums.iter_mut().enumerate() {
-        let ([w, cos, sin], light) = (take(&rows, i), take(&light, i));
-        let mut terms = [w; SUMS];
-        for x in 0..LANES {
-            let (c, s) = (w[x] * cos[x], w[x] * sin[x]);
-            (terms[1][x], terms[2][x]) = (c, s);
-            (terms[3][x], terms[4][x]) = (c * cos[x], c * sin[x]);
-            for k in 0..4 {
-                let seen = light[k][x];
-                terms[5 + 3 * k][x] = w[x] * seen;
-                terms[6 + 3 * k][x] = c * seen;
-                terms[7 + 3 * k][x] = s * seen;
-            }
-        }
-        add(sums, &terms);
-    }
-}
-
-/// Inverse of the normal matrix by its adjugate, and everything that follows from it, cell by cell.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn solve_row(sums: [&[f32]; SUMS], out: &mut [f32]) {
-    let columns = sums[0].len();
-    let mut maps = out.chunks_exact_mut(columns);
-    let mut maps: [&mut [f32]; map::COUNT] =
-        std::array::from_fn(|_| maps.next().expect("a line for each map"));
-    for i in 0..columns {
-        let [w, wc, ws, wcc, wcs] = [0, 1, 2, 3, 4].map(|k| sums[k][i]);
-        let half = 0.5 * w;
-        let skew = wcc - half;
-        let spread = half - (skew * skew + wcs * wcs).sqrt();
-        let ridge = RIDGE * w + 1e-12;
-        let (a, b, c, d, e, f) = (w + ridge, wc, ws, wcc + ridge, wcs, w - wcc + ridge);
-        let (xx, xy, xz) = (d * f - e * e, c * e - b * f, b * e - c * d);
-        let (yy, yz, zz) = (a * f - c * c, b * c - a * e, a * d - b * b);
-        let scale = 1.0 / (a * xx + b * xy + c * xz).max(f32::MIN_POSITIVE);
-        let mut fits = [[0.0f32; 4]; 4];
-        for (k, fit) in fits.iter_mut().enumerate() {
-            let [u, v, t] = [5 + 3 * k, 6 + 3 * k, 7 + 3 * k].map(|m| sums[m][i] * scale);
-            let (p, q) = (xy * u + yy * v + yz * t, xz * u + yz * v + zz * t);
-            *fit = [xx * u + xy * v + xz * t, p, q, (p * p + q * q).sqrt()];
-        }
-        let [r, g, b, ir] = fits;
-        let strength = |[a, _, _, b]: [f32; 4]| if b > CONTRAST_MIN * a { b } else { 0.0 };
-        let seen = if spread > SPREAD_MIN * w { 1.0 } else { 0.0 };
-        let weakest = strength(r).min(strength(b)).min(strength(g)).min(strength(ir));
-        let values = [
-            r[0],
-            r[3],
-            b[0],
-            b[3],
-            r[1],
-            r[2],
-            b[1],
-            b[2],
-            g[0],
-            g[1],
-            g[2],
-            ir[0],
-            ir[1],
-            ir[2],
-            g[3],
-            ir[3],
-            seen * weakest,
-            0.5 * (r[3] + b[3]),
-        ];
-        for (map, value) in maps.iter_mut().zip(values) {
-            map[i] = value;
-        }
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn relative_albedo(model: [[&[f32]; 3]; 4], phasor: [&[f32]; 2], light: [&[f32]; 4], out: &mut [f32]) {
-    let (model, phasor, light) = (model.map(|maps| maps.map(lanes)), phasor.map(lanes), light.map(lanes));
-    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
-        let ([cos, sin], light) = (take(&phasor, i), take(&light, i));
-        let (mut sum, mut norm) = ([0.0; LANES], [1e-9; LANES]);
-        for c in 0..4 {
-            let [a, p, q] = take(&model[c], i);
-            for x in 0..LANES {
-                let model = a[x] + p[x] * cos[x] + q[x] * sin[x];
-                let model = if model > 0.0 { model } else { 0.0 };
-                sum[x] += model * light[c][x];
-                norm[x] += model * model;
-            }
-        }
-        for x in 0..LANES {
-            let albedo = sum[x] / norm[x];
-            out[x] = if albedo > 1e-4 { albedo } else { 1e-4 };
-        }
-    }
-}
-
-/// Phase, and modulation where there is enough of it.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn finish_row(known: [&[f32]; 4], strengths: [&[f32]; 2], least: f32, [phase, modulation]: [&mut [f32]; 2]) {
-    let rows = [known[0], known[1], strengths[0], strengths[1], known[2], known[3]].map(lanes);
-    let mut out = [lanes_mut(phase), lanes_mut(modulation)];
-    for i in 0..out[0].len() {
-        let [cos, sin, weakest, mean, lit, albedo] = take(&rows, i);
-        let mut found = [[0.0; LANES]; 2];
-        for x in 0..LANES {
-            found[0][x] = atan2(sin[x], cos[x]);
-            let enough = lit[x] * albedo[x] * weakest[x] >= least;
-            found[1][x] = if enough { albedo[x] * mean[x] } else { 0.0 };
-        }
-        put(&mut out, i, &found);
     }
 }
