@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import random
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +17,7 @@ import quadfringe as qf
 from quadfringe.config import ChannelResponse, Device, Response
 from quadfringe.data import Calibration, ResponseCalibration, Shape
 from quadfringe.errors import ConfigError, InputError
+from quadfringe.io.export import read_npz
 
 CALIBRATION = Calibration(
     camera=Device(width_px=8, height_px=6, focal_px=(20.0, 20.0), centre_px=(3.5, 2.5)),
@@ -104,6 +108,22 @@ def test_a_truncated_npz_is_named(tmp_path: Path, shape: Shape, keep: int) -> No
     path.write_bytes(path.read_bytes()[:keep])
     with pytest.raises(InputError, match=r"shape\.npz"):
         Shape.load(path)
+
+
+@pytest.mark.filterwarnings("ignore")  # of the headers, which numpy parses as Python
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_any_damage_to_an_npz_is_named(tmp_path: Path, save: Callable[..., None]) -> None:
+    """Numpy, zipfile and its decompressors have many kinds of errors."""
+    path, noise = tmp_path / "maps.npz", random.Random(0)
+    save(path, phase_rad=np.arange(200, dtype=np.float32).reshape(4, 50), config=np.array("{}"))
+    sound = path.read_bytes()
+    for _ in range(1000):
+        damaged = bytearray(sound[: noise.choice([len(sound), noise.randrange(len(sound))])])
+        for _ in range(min(len(damaged), noise.randrange(4))):
+            damaged[noise.randrange(len(damaged))] = noise.randrange(256)
+        path.write_bytes(damaged)
+        with suppress(InputError):
+            read_npz(path)
 
 
 def test_an_npz_of_something_else_is_named(tmp_path: Path) -> None:

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import lzma
+import struct
+import tokenize
+import zipfile
+import zlib
 from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
@@ -14,6 +19,12 @@ from quadfringe.errors import InputError, require
 from quadfringe.files import atomic, read_bytes
 
 __all__ = ["grey", "read_npy", "read_npz", "write_depth", "write_npz", "write_ply"]
+
+# A damaged file: numpy parses its header as Python, and zipfile and its decompressors have errors of other kinds.
+DAMAGED = (
+    *(OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, RuntimeError, MemoryError, SyntaxError),
+    *(tokenize.TokenError, struct.error, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+)
 
 
 def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -75,5 +86,5 @@ def _load(path: Path, kind: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
     try:
         stored = np.load(stream, allow_pickle=False)
         return stored if isinstance(stored, np.ndarray) else {name: stored[name] for name in stored.files}
-    except Exception as error:  # zipfile, zlib and numpy each raise other exceptions for a damaged file
+    except DAMAGED as error:
         raise InputError(f"{path}: not a readable {kind} file: {error}") from error

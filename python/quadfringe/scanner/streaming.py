@@ -1,4 +1,4 @@
-"""From camera to shape without pause: capture, decoding and the caller run at different speeds.
+"""Continuous measurement: capture, decoding and the caller run at different speeds.
 
 A queue between two of them drops its oldest shot when it is full, and counts it. A slow decoder or a slow view
 therefore loses shots and does not delay them.
@@ -10,6 +10,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Self
 
@@ -50,7 +51,7 @@ class Measured:
 
 @dataclass(frozen=True, repr=False)
 class StreamStatistics:
-    """What a stream has done so far: its camera, its queues ("decode", "view" and the taps), and its rates.
+    """The state of a stream: its camera, its queues ("decode", "view" and the taps), and its rates.
 
     `refused` is the number of shots that could not be trusted; `fault` the error of the camera while the stream tries
     to resume; `response` the response that is corrected, "auto" until a sound shot was decoded.
@@ -83,6 +84,21 @@ class _Rate:
         since = time.monotonic() - RATE_WINDOW_S
         recent = [moment for moment in tuple(self._times) if moment > since]
         return (len(recent) - 1) / (recent[-1] - recent[0]) if len(recent) > 1 else 0.0
+
+
+class _ErrorsTo:
+    """Passes an error that ends its block to `receive`; an error that ended a thread would be lost."""
+
+    def __init__(self, receive: Callable[[BaseException], None]) -> None:
+        self._receive = receive
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, _kind: object, error: BaseException | None, _traceback: object) -> bool:
+        if error is not None:
+            self._receive(error)
+        return error is not None
 
 
 class LiveStream:
@@ -128,6 +144,11 @@ class LiveStream:
             thread.start()
 
     def _capture(self) -> None:
+        with _ErrorsTo(self._end):
+            self._capture_all()
+        self._end(None)
+
+    def _capture_all(self) -> None:
         left = self._count
         while not self._stop.is_set() and left != 0:
             try:
@@ -143,14 +164,9 @@ class LiveStream:
                     break
             except CameraError as error:
                 if not self._resume:
-                    self._end(error)
-                    return
+                    raise
                 self._fault = str(error)
                 self._stop.wait(RETRY_S)
-            except BaseException as error:
-                self._end(error)
-                return
-        self._end(None)
 
     def _end(self, error: BaseException | None) -> None:
         """End the queues behind the camera; shots that wait in them are still processed."""
@@ -160,29 +176,29 @@ class LiveStream:
     def _decode_all(self) -> None:
         """Decode shots as they come; other threads do the same, and every result waits for those of earlier shots."""
         while True:
-            result = None
             with self._taking:
-                try:
+                shot = None
+                with _ErrorsTo(self._leave):
                     shot, turn = self._shots.get(), self._taken
                     self._taken += 1
-                except BaseException as error:
-                    self._leave(error)
+                if shot is None:
                     return
-                if self._response() == "auto":
-                    result = self._result_of(shot)
-            if result is None:
+                one_by_one = self._response() == "auto"
+                result = self._result_of(shot) if one_by_one else None
+            if not one_by_one:
                 result = self._result_of(shot)
-            if not isinstance(result, (Shape, DecodeError)):
-                self._fail(result)
+            if result is None:
                 return
             self._give(shot, result, turn)
 
-    def _result_of(self, shot: AnyShot) -> Shape | BaseException:
-        """Give the shape of a shot, or what `decode` raised."""
-        try:
-            return self._decode(shot)
-        except BaseException as error:
-            return error
+    def _result_of(self, shot: AnyShot) -> Shape | DecodeError | None:
+        """Give the shape of a shot or why it has none; None after any other error, which ends the stream."""
+        with _ErrorsTo(self._fail):
+            try:
+                return self._decode(shot)
+            except DecodeError as error:
+                return error
+        return None
 
     def _give(self, shot: AnyShot, result: Shape | DecodeError, turn: int) -> None:
         """Hand over a result after those of all earlier shots."""
@@ -205,15 +221,10 @@ class LiveStream:
                 self._results.end(None if isinstance(reason, EndOfQueue) else reason)
 
     def _feed(self, tap: Tap, queue: DroppingQueue[AnyShot]) -> None:
-        try:
+        # The error of the camera reaches the caller with the last result.
+        with _ErrorsTo(self._fail), suppress(EndOfQueue, CameraError):
             while True:
                 tap(queue.get())
-        except EndOfQueue:
-            pass
-        except CameraError:
-            pass  # the error of the camera reaches the caller with the last result
-        except BaseException as error:
-            self._fail(error)
 
     def _fail(self, error: BaseException) -> None:
         self._stop.set()
