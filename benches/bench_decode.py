@@ -10,7 +10,6 @@ Planning, which happens once per bench, is not timed.
 from __future__ import annotations
 
 import argparse
-import json
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -23,6 +22,7 @@ import quadfringe as qf
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import numpy_chain, scoring
 from quadfringe.evaluation.timing import warm
+from quadfringe.files import figures_text
 
 Maps = tuple[NDArray[Any], NDArray[Any]]  # phase_rad, xyz_mm
 Contender = Callable[[], Maps]
@@ -129,7 +129,7 @@ def main() -> None:
             f"{name}_phase_rms_rad": score.right_phase_rms_rad,
         }
     if options.json:
-        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+        options.json.write_text(figures_text(figures))
 
 
 if __name__ == "__main__":

@@ -12,13 +12,13 @@ what a decoder loses by holding the response of a single shot.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Literal, NamedTuple
 
 import numpy as np
 
 import quadfringe as qf
+from quadfringe.files import figures_text
 
 WIDTH_PX = 912
 SCENES: tuple[tuple[str, dict[str, object]], ...] = (
@@ -95,7 +95,7 @@ def main() -> None:
         listed = " ".join(f"{exponent:.4f}" for exponent in exponents)
         print(f"{surface}, five shots: {listed}, scatter {figures[f'{surface}_scatter_percent']:.2f} %")
     if options.json:
-        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+        options.json.write_text(figures_text(figures))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,6 @@ to lit ones, are counted apart.
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 import quadfringe as qf
 from quadfringe import _core
 from quadfringe.evaluation import scoring
+from quadfringe.files import figures_text
 
 SURFACES = ("steps", "face", "peaks")
 NOISES = (0.0, 0.03)
@@ -111,7 +111,7 @@ def main() -> None:
     for name, value in figures.items():
         print(f"{name:64}{value:12.5g}")
     if options.json:
-        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+        options.json.write_text(figures_text(figures))
 
 
 if __name__ == "__main__":

@@ -11,7 +11,6 @@ figures marked `inside` leave out the first fringe from the border.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +18,7 @@ import quadfringe as qf
 from quadfringe.calibration.response import estimate_from_files
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
+from quadfringe.files import figures_text
 
 NOISE = 0.03
 HEAD = f"{'':28}{'right %':>9}{'of returned %':>15}{'returned %':>12}{'phase rad':>11}{'depth mm':>10}"
@@ -70,7 +70,7 @@ def main() -> None:
         print(line(name, score))
     if options.json:
         figures = {f"{n}_{k}": v for n, score in scores.items() for k, v in score.as_figures().items()}
-        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+        options.json.write_text(figures_text(figures))
 
 
 if __name__ == "__main__":

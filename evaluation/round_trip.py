@@ -10,7 +10,6 @@ captured image must be the projected one.
 from __future__ import annotations
 
 import argparse
-import json
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +18,7 @@ import quadfringe as qf
 from quadfringe import _core
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
+from quadfringe.files import figures_text
 
 SURFACES = ("plane", "peaks", "steps", "sphere")
 FRINGE_PX = 28
@@ -66,7 +66,7 @@ def main() -> None:
     for name, value in figures.items():
         print(f"{name:32}{value:12.5g}")
     if options.json:
-        options.json.write_text(json.dumps({"figures": figures}, indent=2) + "\n")
+        options.json.write_text(figures_text(figures))
 
 
 if __name__ == "__main__":

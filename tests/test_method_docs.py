@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.optimize import brentq
+from support.trees import write_tree
 
 import quadfringe as qf
 
@@ -24,7 +25,7 @@ SOURCES = ("crates", "python", "evaluation", "benches", "tests")
 TOP_LEVEL = (*SOURCES, "docs", "scripts")
 
 TAG = re.compile(r"\\tag\{([A-Z]\d+)\}")
-# (S4), (S3), (S4), (S8, S9) and "(step 1 of the chain, S1)" in code; other letters only on their own.
+# Code cites (S4), (S8, S9) and "(step 1 of the chain, S1)"; other letters, as in (J2), stand alone in parentheses.
 PARENTHESES = re.compile(r"\(([^()\n]*)\)")
 MAIN = re.compile(r"\bS\d{1,2}\b")
 OTHER = re.compile(r"\b[JU]\d{1,2}\b")
@@ -248,45 +249,35 @@ SOUND = {
 }
 
 
-def tree(folder: Path, **changed: str) -> Path:
-    """Write the sound tree with the text of some files replaced by name, such as `b="..."` for crates/b.rs."""
-    for name, text in SOUND.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(changed.get(path.stem, text))
-    return folder
-
-
 CHECKS = (tag_faults, link_faults, path_faults, quotation_faults, constant_faults)
 
 
 def test_a_sound_tree_has_no_faults(tmp_path: Path) -> None:
-    tree(tmp_path)
+    write_tree(tmp_path, SOUND)
     assert [check(tmp_path) for check in CHECKS] == [[]] * len(CHECKS)
 
 
 @pytest.mark.parametrize(
     ("check", "name", "before", "after"),
     [
-        (tag_faults, "b", "(S1)", "(S2)"),
-        (tag_faults, "b", "(S1)", "(S1) and (J3)"),
-        (tag_faults, "b", "(S1)", "(step 2, S2)"),
-        (tag_faults, "a", "see (S1)", "see (S7)"),
-        (tag_faults, "a", "see (S1)", "$$ y \\tag{S1} $$"),
-        (link_faults, "a", "(../../crates/b.rs)", "(../../crates/c.rs)"),
-        (link_faults, "a", "#one-page-s1", "#one-page-s2"),
-        (path_faults, "a", "`crates/b.rs`", "`crates/c.rs`"),
-        (quotation_faults, "b", "fn go()", "fn gone()"),
-        (constant_faults, "b", "1.25", "1.5"),
-        (constant_faults, "b", "const JUMP", "const LEAP"),
-        (constant_faults, "fit", "1_000.0", "2_000.0"),
-        (constant_faults, "a", "`fit::WIDTH`", "`WIDTH`"),
-        (constant_faults, "a", "`JUMP` = 1.25", "`LIMIT` = 4"),
+        (tag_faults, "crates/b.rs", "(S1)", "(S2)"),
+        (tag_faults, "crates/b.rs", "(S1)", "(S1) and (J3)"),
+        (tag_faults, "crates/b.rs", "(S1)", "(step 2, S2)"),
+        (tag_faults, "docs/method/a.md", "see (S1)", "see (S7)"),
+        (tag_faults, "docs/method/a.md", "see (S1)", "$$ y \\tag{S1} $$"),
+        (link_faults, "docs/method/a.md", "(../../crates/b.rs)", "(../../crates/c.rs)"),
+        (link_faults, "docs/method/a.md", "#one-page-s1", "#one-page-s2"),
+        (path_faults, "docs/method/a.md", "`crates/b.rs`", "`crates/c.rs`"),
+        (quotation_faults, "crates/b.rs", "fn go()", "fn gone()"),
+        (constant_faults, "crates/b.rs", "1.25", "1.5"),
+        (constant_faults, "crates/b.rs", "const JUMP", "const LEAP"),
+        (constant_faults, "crates/fit.rs", "1_000.0", "2_000.0"),
+        (constant_faults, "docs/method/a.md", "`fit::WIDTH`", "`WIDTH`"),
+        (constant_faults, "docs/method/a.md", "`JUMP` = 1.25", "`LIMIT` = 4"),
     ],
 )
 def test_a_planted_fault_is_found(tmp_path: Path, check: object, name: str, before: str, after: str) -> None:
-    text = next(text for path, text in SOUND.items() if Path(path).stem == name)
-    assert text.count(before) >= 1
-    tree(tmp_path, **{name: text.replace(before, after)})
+    assert before in SOUND[name]
+    write_tree(tmp_path, SOUND | {name: SOUND[name].replace(before, after)})
     assert callable(check)
     assert len(check(tmp_path)) == 1

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import pytest
+from support.trees import write_tree
 
 KERNEL = Path(__file__).resolve().parents[1] / "crates" / "quadfringe" / "src"
 
@@ -205,17 +206,8 @@ SOUND = {
 }
 
 
-def tree(folder: Path, **changed: str) -> Path:
-    """Write the sound sources with the text of some files replaced: `stages_params="..."` for stages/params.rs."""
-    for name, text in SOUND.items():
-        path = folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(changed.get(name.removesuffix(".rs").replace("/", "_"), text))
-    return folder
-
-
 def test_a_sound_tree_has_no_fault(tmp_path: Path) -> None:
-    root = tree(tmp_path)
+    root = write_tree(tmp_path, SOUND)
     assert unexplained(root) == [] == stray(root)
 
 
@@ -230,16 +222,18 @@ def test_a_sound_tree_has_no_fault(tmp_path: Path) -> None:
     ],
 )
 def test_a_number_without_a_command_is_found(tmp_path: Path, comment: str) -> None:
-    root = tree(tmp_path, stages_params=f"{comment}pub(crate) const ROWS: usize = 16;\n")
+    files = SOUND | {"stages/params.rs": f"{comment}pub(crate) const ROWS: usize = 16;\n"}
+    root = write_tree(tmp_path, files)
     assert unexplained(root) == ["stages/params.rs: ROWS"]
 
 
 def test_a_reference_to_a_number_without_a_command_is_found(tmp_path: Path) -> None:
     text = "/// Price.\npub const PRICE: f64 = 1.25;\n/// See [`PRICE`].\npub const OTHER: f64 = 1.0;\n"
-    assert len(unexplained(tree(tmp_path, joint_params_orders=text))) == 2
+    assert len(unexplained(write_tree(tmp_path, SOUND | {"joint/params/orders.rs": text}))) == 2
 
 
 @pytest.mark.parametrize("value", ["0.3", "1 << 14", "9.0 / 64.0", "1e-3", "-4", "16usize"])
 def test_a_number_outside_params_files_is_found(tmp_path: Path, value: str) -> None:
-    root = tree(tmp_path, stages_mod=f"/// Threshold.\npub(super) const LIMIT: f32 = {value};\n")
+    text = f"/// Threshold.\npub(super) const LIMIT: f32 = {value};\n"
+    root = write_tree(tmp_path, SOUND | {"stages/mod.rs": text})
     assert [(number.path, number.name) for number in stray(root)] == [("stages/mod.rs", "LIMIT")]

@@ -28,17 +28,6 @@ from quadfringe.evaluation import _rig_bench as bench
 BOARD = ring_board()
 SYSTEM = bench.bench_system()
 POINT_SD_PX = 0.01
-FIGURES = (
-    "ring_centre_rms_px",
-    "camera_mean_px",
-    "visible_mean_px",
-    "infrared_mean_px",
-    "focal_error_percent",
-    "centre_error_px",
-    "pair_rotation_error_deg",
-    "pair_translation_error_mm",
-    "outside_their_interval",
-)
 TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
 
 
@@ -46,7 +35,7 @@ TRUE_PAIR = np.array([*bench.DEVIATION_DEG, *bench.DEVIATION_MM])
 def test_the_bars_hold_on_the_bench(layout: str) -> None:
     """`evaluation/calibration.py` with a camera of half the size, in a fraction of the time."""
     figures = bench.measured(bench.bench_system(layout, camera_scale=0.5), poses=7, steps=5)
-    for name in FIGURES:
+    for name in bench.FIGURES:
         hold(f"calibration.{name}", figures[name])
 
 

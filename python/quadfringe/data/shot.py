@@ -27,7 +27,7 @@ Map = NDArray[np.float32]
 
 @dataclass(frozen=True, repr=False)
 class Truth:
-    """What the virtual bench knows of a shot: maps (H, W) float32, NaN where no surface is seen.
+    """The truth about a shot of the virtual bench: maps (H, W) float32, NaN where no surface is seen.
 
     `column_px` is the projector column that lights the point, `xyz_mm` (H, W, 3) the point in the camera frame.
     `shadow` marks pixels that no projector lights, `edge` those whose values mix two sides of a step of depth or light.
@@ -93,6 +93,27 @@ class Stamped:
         return None if self.stamp is None else self.stamp.time_us
 
 
+class _Exposure(Stamped):
+    """The checks and the full scale that both kinds of shots share."""
+
+    ir: NDArray[Any]
+    full_scale: float | None
+
+    def __post_init__(self) -> None:
+        check_images(self.images)
+        check_full_scale(self.full_scale)
+
+    @property
+    def images(self) -> dict[str, NDArray[Any]]:
+        """The captured images by name."""
+        raise NotImplementedError
+
+    @property
+    def full_scale_value(self) -> float:
+        """The intensity of a saturated pixel: as given, else 255, 65535 or 1.0 by dtype."""
+        return float(full_scale(self.ir)) if self.full_scale is None else self.full_scale
+
+
 def _described(record: Any, image: NDArray[Any], kind: str = "") -> str:
     """Name a record with size, type, full scale and number."""
     number = "" if record.id is None else f", id {record.id}"
@@ -101,11 +122,12 @@ def _described(record: Any, image: NDArray[Any], kind: str = "") -> str:
 
 
 @dataclass(frozen=True, repr=False)
-class Shot(Stamped):
+class Shot(_Exposure):
     """One exposure: four images (H, W) of one size and one dtype (uint8, uint16 or float32), and their full scale.
 
-    `full_scale` is the intensity of a saturated pixel; None stands for 255, 65535 or 1.0 by dtype. `truth` is what the
-    virtual bench knows, `stamp` when and by which camera the shot was taken. Raises `InputError` for anything else.
+    `full_scale` is the intensity of a saturated pixel; None stands for 255, 65535 or 1.0 by dtype. `truth` comes
+    from the virtual bench, `stamp` says when and by which camera the shot was taken. Raises `InputError` for anything
+    else.
     """
 
     red: NDArray[Any]
@@ -115,10 +137,6 @@ class Shot(Stamped):
     full_scale: float | None = None
     truth: Truth | None = None
     stamp: Stamp | None = None
-
-    def __post_init__(self) -> None:
-        check_images(self.images)
-        check_full_scale(self.full_scale)
 
     def __repr__(self) -> str:
         return _described(self, self.red)
@@ -133,14 +151,9 @@ class Shot(Stamped):
         """The captured images by name: the four channels."""
         return self.channels
 
-    @property
-    def full_scale_value(self) -> float:
-        """The intensity of a saturated pixel: as given, else 255, 65535 or 1.0 by dtype."""
-        return float(full_scale(self.red)) if self.full_scale is None else self.full_scale
-
 
 @dataclass(frozen=True, repr=False)
-class BayerShot(Stamped):
+class BayerShot(_Exposure):
     """One exposure of a Bayer chip and an infrared chip: the raw mosaic and the infrared image, (H, W) of one dtype.
 
     `bayer` names the colours of the first two pixels of the first row and of the second row (rggb, grbg, gbrg or
@@ -155,8 +168,7 @@ class BayerShot(Stamped):
     stamp: Stamp | None = None
 
     def __post_init__(self) -> None:
-        check_images(self.images)
-        check_full_scale(self.full_scale)
+        super().__post_init__()
         if self.bayer not in get_args(BayerPattern):
             known = ", ".join(get_args(BayerPattern))
             raise InputError(f"bayer: expected one of {known}, got {self.bayer!r}")
@@ -178,11 +190,6 @@ class BayerShot(Stamped):
         row, column = divmod(self.bayer.index("r"), 2)
         red, green = self.raw[row::2, column::2], self.raw[row::2, 1 - column :: 2]
         return {"red": red, "green": green, "blue": self.raw[1 - row :: 2, 1 - column :: 2], "ir": self.ir}
-
-    @property
-    def full_scale_value(self) -> float:
-        """The intensity of a saturated pixel: as given, else 255, 65535 or 1.0 by dtype."""
-        return float(full_scale(self.raw)) if self.full_scale is None else self.full_scale
 
 
 AnyShot = Shot | BayerShot

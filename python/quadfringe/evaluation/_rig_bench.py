@@ -23,6 +23,18 @@ from quadfringe.data import core_device
 DEVIATION_DEG, DEVIATION_MM = (1.0, 1.0, 1.0), (0.5, 0.5, 0.5)
 SEEDS_APART = 100_003  # every exposure takes the next seed
 CROSSTALK = ((1.0, 0.15, 0.0, 0.02), (0.15, 1.0, 0.15, 0.0), (0.0, 0.15, 1.0, 0.02), (0.15, 0.0, 0.02, 1.0))
+# Figures of `measured` that have a bar, `calibration.NAME`.
+FIGURES = (
+    "ring_centre_rms_px",
+    "camera_mean_px",
+    "visible_mean_px",
+    "infrared_mean_px",
+    "focal_error_percent",
+    "centre_error_px",
+    "pair_rotation_error_deg",
+    "pair_translation_error_mm",
+    "outside_their_interval",
+)
 
 
 def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int = 0) -> SystemConfig:
@@ -50,7 +62,7 @@ def bench_system(layout: str = "regular", camera_scale: float = 1.0, seed: int =
 
 
 def _projectors(layout: str) -> tuple[Device, Device]:
-    """Give both projectors: off the published focal lengths and centres, with lenses, 1 degree and 0.5 mm apart."""
+    """Give both projectors: unlike the published ones in focal length, centre and lens, 1 degree and 0.5 mm apart."""
     published = _core.Bench(layout=layout).visible
     turn = cv2.Rodrigues(np.radians(DEVIATION_DEG))[0]
     rotation = turn @ np.array(published.rotation)
@@ -80,7 +92,7 @@ def _projectors(layout: str) -> tuple[Device, Device]:
 def centre_errors_px(
     views: tuple[View, ...], config: SystemConfig, target: Target, poses: NDArray[Any]
 ) -> NDArray[Any]:
-    """Give what was found less where the points are, (n, 2), over all views."""
+    """Give the found minus the true positions of the points in all views, (n, 2), px."""
     assert config.camera is not None
     camera = core_device(config.camera)
     errors = []
@@ -130,7 +142,7 @@ def measured(config: SystemConfig, poses: int, steps: int, seed: int = 0) -> dic
 
 
 def light_figures() -> dict[str, float]:
-    """Calibrate responses and crosstalk of a bench with gamma 2.2 and 15 % each way, and give what is left."""
+    """Calibrate responses and crosstalk of a bench with gamma 2.2 and 15 % each way, and give the remaining errors."""
     mixed = tuple(tuple(1.0 if i == j else 0.15 for j in range(4)) for i in range(4))
     light = {"crosstalk": mixed, "projector_exponent": 2.2, "noise": 0.01, "gain": 0.6, "ambient": 0.01, "seed": 1}
     captures = VirtualCaptures(SystemConfig(scene=SceneConfig.model_validate(light | {"camera_offset": 0.02})))
