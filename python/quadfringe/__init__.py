@@ -9,7 +9,7 @@ writes, takes arguments, can fail, or computes for long.
 
 Names are loaded when they are first used, so that the import is fast. `quadfringe.open` is `open_system`; a star
 import leaves it out, because it would replace the built-in function, and the packages (`devices`, `recording`, ...)
-because `io` would replace that of Python.
+because `io` would replace the module of Python.
 """
 
 from __future__ import annotations

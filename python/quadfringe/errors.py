@@ -1,4 +1,4 @@
-"""Errors by who can mend them: the caller (`InputError`), or a person at the bench (`DecodeError`, `CameraError`).
+"""Errors, by who can correct them: the caller (`InputError`), or a person at the bench (`DecodeError`, `CameraError`).
 
 >>> from quadfringe.errors import ConfigError, InputError
 >>> issubclass(ConfigError, InputError), issubclass(InputError, ValueError)
@@ -30,7 +30,7 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A file or a value cannot be used; the message says what was expected and what came."""
+    """A file or a value cannot be used; the message says what was expected and what was given."""
 
 
 class ConfigError(InputError):

@@ -37,7 +37,7 @@ def atomic(path: Path | str) -> Iterator[Path]:
     temporary = Path(name)
     try:
         yield temporary
-        temporary.chmod(0o666 & ~_umask())  # mkstemp makes files private; a result is for all
+        temporary.chmod(0o666 & ~_umask())  # mkstemp makes private files, but others may read results
         temporary.replace(path)
     finally:
         temporary.unlink(missing_ok=True)

@@ -39,7 +39,7 @@ def blobs(image: NDArray[np.uint8], target: Target) -> Points:
 
 
 def _similar(sizes: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Mark the largest group of sizes (n,) whose ratio stays within that of one board."""
+    """Mark the largest group of sizes (n,) whose ratio is possible on one board."""
     if not sizes.size:
         return np.zeros(0, np.bool_)
     inside = [(sizes >= low) & (sizes <= BLOB_SIZE_RATIO_MAX * low) for low in sizes]

@@ -1,4 +1,4 @@
-"""The tuned numbers of the calibration: value, unit, what each trades, and what it follows from or what checks it.
+"""The tuned numbers of the calibration: value, unit, trade-off, and the reason or the check of each.
 
 The heading of each group names the tests that exercise its numbers against the exact truth of the virtual bench.
 `python evaluation/calibration.py` measures the accuracy that all of them give together.
@@ -30,8 +30,8 @@ MARK_MIN = 0.35
 CORNERS_MIN = 8
 # Smallest blob, px^2: a disc of 4 px diameter; smaller ones are noise.
 BLOB_AREA_MIN_PX = 12.0
-# Largest over smallest blob diameter of one board: that of a board tilted by 45 degrees and 0.88 times as wide as it is
-# distant. A larger ratio admits more stray blobs.
+# Largest over smallest blob diameter of one board: a board reaches this ratio when it is tilted by 45 degrees and 0.88
+# times as wide as it is distant. A larger ratio admits more stray blobs.
 BLOB_SIZE_RATIO_MAX = 1.9
 # Largest distance of a neighbour from its predicted place, share of the grid step. Below 0.5 no two neighbours compete.
 NEIGHBOUR_OFF_MAX = 0.3
@@ -124,9 +124,9 @@ DARK_LEVEL_MAX = 0.2  # share of full scale: a brighter shot was taken with the 
 HOT = 0.02  # share of full scale above the dark level from which a pixel is hot: 5 of 255
 # Share of full scale from which a captured mean is left out, because the sensor cuts off part of the noise.
 CLIPPED = 0.97
-# Weak priors, share of full scale: what one unit of a camera exponent away from 1, and of a dark level away from the
-# measured one, cost in the fit. They decide only what the captures leave open: a camera is linear unless seen
-# otherwise.
+# Weak priors, share of full scale: the cost in the fit of a camera exponent one unit from 1, and of a dark level one
+# unit from the measured one. They decide only what the captures leave undetermined: a camera is linear unless they
+# show otherwise.
 CAMERA_PRIOR = 2e-3
 DARK_PRIOR = 0.05
 # Residual, share of full scale, from which a capture counts less (soft-L1): half a grey level of 8 bit.

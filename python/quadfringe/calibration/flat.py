@@ -1,7 +1,7 @@
 """Flat field of a camera: vignetting, pixel gain, defects, and the gain map that corrects them.
 
 Decoding does not apply the gain map: phase is insensitive to slow variation, and decoding windows average the gain of
-single pixels. What the correction would gain is measured by `evaluation/flat_field.py`.
+single pixels. `evaluation/flat_field.py` measures what the correction would gain.
 """
 
 from __future__ import annotations

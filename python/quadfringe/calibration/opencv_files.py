@@ -63,7 +63,7 @@ def read_opencv(path: Path) -> Calibration:
     import cv2
 
     require_suffix(path, SUFFIXES)
-    read_bytes(path)  # raises an error that names a missing file; that of OpenCV does not
+    read_bytes(path)  # raises an error that names a missing file, unlike OpenCV
     try:
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         nodes = {key: storage.getNode(key).mat() for key in storage.root().keys()}  # noqa: SIM118 - no mapping

@@ -65,7 +65,7 @@ def run(
     heights: HeightsOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Do every step whose captures exist; report what is missing, what was found and whether it is good.
+    """Do every step whose captures exist; print missing captures, results, and whether the results are good.
 
     The exit status is 1 when a needed step is missing, in which case no file is written, or when a step is not good.
     """

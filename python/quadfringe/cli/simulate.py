@@ -17,12 +17,12 @@ def simulate(
     system: SystemFile = None,
     surface: Annotated[
         str | None,
-        typer.Option(help="Surface in front of the camera, such as face or steps; default: that of the system file."),
+        typer.Option(help="Surface in front of the camera, such as face or steps; default: from the system file."),
     ] = None,
     noise: Annotated[
         float | None,
         typer.Option(
-            min=0, help="Standard deviation of the sensor noise, share of full scale; default: that of the system file."
+            min=0, help="Standard deviation of the sensor noise, share of full scale; default: from the system file."
         ),
     ] = None,
     seed: Annotated[

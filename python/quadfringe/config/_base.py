@@ -1,4 +1,4 @@
-"""What every settings model shares: frozen data, one report of all problems, and a class docstring with every field."""
+"""The base of all settings: frozen data, one report of all problems, and a docstring that lists every field."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ else:
 
 
 class _ReportingMeta(ModelMetaclass):
-    """Reports what is wrong with the arguments of a model as the files do.
+    """Reports wrong arguments of a model in the form that wrong entries of a file have.
 
-    Only a call of the class comes through here. Nested models are made by pydantic itself, so that their problems
-    arrive in one report, with their paths.
+    Only calls of the class come through here. Pydantic makes nested models itself, so that their problems arrive in
+    one report, with their paths.
     """
 
-    if not TYPE_CHECKING:  # type checkers go on to read the fields as arguments
+    if not TYPE_CHECKING:  # type checkers still read the fields as arguments
 
-        def __call__(cls, *args, **values):  # noqa: N805 - that of a metaclass
+        def __call__(cls, *args, **values):  # noqa: N805 - the first argument is a class
             if args:
                 first = next(iter(cls.model_fields), "field")
                 raise ConfigError(f"{cls.__name__}: expected fields by name, such as {first}=..., got {brief(args[0])}")
@@ -123,7 +123,7 @@ def _reason(model: type[BaseModel], problem: Any) -> str:
 
 
 def _suggestion(model: type[BaseModel], parents: list[int | str], key: str) -> str:
-    """Name the key that was probably meant: the nearest one of this table, or the same one of a table inside it."""
+    """Name the key that was probably meant: the most similar one of this table, or the same one of an inner table."""
     models = [model]
     for part in parents:
         fields = [m.model_fields[part] for m in models if part in m.model_fields]

@@ -23,8 +23,8 @@ class VirtualConfig(Model):
     kind: Literal["virtual"] = Field(default="virtual", description="Kind of the camera.")
     frame_rate_hz: Positive | None = Field(
         default=None,
-        description="Frame rate in Hz; the time of the scene, and its noise, then go on from shot to shot. "
-        "Absent: a shot is made when it is asked for, always of the same instant.",
+        description="Frame rate in Hz: each shot then shows the scene one frame later, with new noise. "
+        "Absent: a shot is made on request, always of the same instant.",
     )
 
 
@@ -79,7 +79,7 @@ class AravisConfig(Model):
         default="", description="Part of the name, serial number or IP address. Empty: the only camera that answers."
     )
     profile: Literal["jai-ad-080ge", "generic"] | None = Field(
-        default=None, description="How the chips are told apart. Absent: by the model name."
+        default=None, description="How the two chips are distinguished. Absent: by the model name."
     )
     visible: ChipConfig = Field(default=ChipConfig(), description="The visible chip.")
     infrared: ChipConfig = Field(default=ChipConfig(), description="The infrared chip.")
@@ -103,9 +103,9 @@ class AravisConfig(Model):
     buffers: Annotated[int, Field(ge=4, le=256)] = Field(
         default=12, description="Frames of each chip that may wait; more survive longer pauses and need memory."
     )
-    timeout_s: Positive = Field(default=2.0, description="Longest time in s that a shot is waited for.")
+    timeout_s: Positive = Field(default=2.0, description="Longest time in s to wait for a shot.")
     pair_tolerance_us: Positive = Field(
-        default=2000.0, description="Largest difference in us of the instants of two frames of one shot."
+        default=2000.0, description="Largest difference in us between the exposures of the two frames of a shot."
     )
 
     @model_validator(mode="after")
@@ -115,7 +115,7 @@ class AravisConfig(Model):
         return self
 
 
-# What the word behind the colon is, by kind; None: there is none.
+# The setting that the word after the colon gives, by kind; None: no word may follow.
 WORDS: dict[str, str | None] = {"virtual": None, "aravis": "device", "replay": "file"}
 
 

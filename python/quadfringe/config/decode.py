@@ -18,7 +18,7 @@ from quadfringe.config._base import Finite, Model, NotNegative, Positive
 __all__ = ["ChannelResponse", "DecodeConfig", "Fringes", "Response", "ResponseChoice", "ResponseSetting", "Row4"]
 
 Row4 = tuple[Finite, Finite, Finite, Finite]
-# Settings and files written before the method had its name say "best".
+# Older settings and files call the joint method "best".
 Method = Annotated[Literal["published", "joint"], BeforeValidator(lambda v: "joint" if v == "best" else v)]
 
 
@@ -88,7 +88,7 @@ def _three(numbers: Any) -> Any:
 
 
 class Fringes(Model):
-    """What the projectors show. The kernel checks that the fringe numbers tell all columns apart."""
+    """The fringes that the projectors show. The kernel checks that the fringe numbers distinguish all columns."""
 
     numbers: Annotated[tuple[float, float, float], BeforeValidator(_three)] = Field(
         default=(36.0, 35.0, 30.0),
@@ -106,7 +106,7 @@ class Fringes(Model):
 
 
 class DecodeConfig(Model):
-    """How a shot is decoded. What is absent takes the kernel's default, which `Shape.config` then shows."""
+    """How a shot is decoded. An absent setting takes the kernel's default; `Shape.config` shows the value in use."""
 
     method: Method | None = Field(
         default=None,
@@ -117,7 +117,7 @@ class DecodeConfig(Model):
         default="auto",
         description='How intensities follow the light. "auto" takes the response of the calibration, or, if the '
         'calibration holds none, estimates it from the first sound shots; "linear" corrects no response; a Response, '
-        "or a file of one (.json), replaces that of the calibration.",
+        "or a file of one (.json), replaces the response of the calibration.",
     )
     unwrapping: Literal["coaxial", "pair"] | None = Field(
         default=None,
@@ -139,7 +139,7 @@ class DecodeConfig(Model):
     )
     channel_instants_us: Row4 | None = Field(
         default=None,
-        description="Instants in us at which R, G, B and IR are seen, from the instant that the shape stands for. For "
+        description="Times in us at which R, G, B and IR are exposed, relative to the instant of the shape. For "
         "moving surfaces and a projector that shows its colours one after another (method joint).",
     )
     threads: Annotated[int, Field(gt=0)] | None = Field(

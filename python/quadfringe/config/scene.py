@@ -35,10 +35,10 @@ class HeightMapConfig(Model):
 
 
 class SceneConfig(Model):
-    """What stands on the virtual bench, and the defects of its light and camera.
+    """The scene on the virtual bench, and the defects of its light and camera.
 
     Intensities are fractions of full scale. A setting with one value for each channel (R, G, B, IR) may be one number
-    for all four. What is absent is ideal, or takes the kernel's default.
+    for all four. An absent setting is ideal, or takes the kernel's default.
     """
 
     surface: Surface = Field(
@@ -46,7 +46,7 @@ class SceneConfig(Model):
     )
     height_map: HeightMapConfig | None = Field(default=None, description="A relief in place of `surface`.")
     time_s: Finite | None = Field(default=None, description="Time of the scene in s, for surfaces that move.")
-    albedo: PerChannel | None = Field(default=None, description="Share of the light that the surface gives back.")
+    albedo: PerChannel | None = Field(default=None, description="Share of the light that the surface reflects.")
     patch_mm: Positive | None = Field(
         default=None, description="Side in mm of coloured squares printed on the surface. Absent: no texture."
     )
@@ -65,7 +65,8 @@ class SceneConfig(Model):
         default=None, description="Blur of the lens: standard deviation of a Gaussian, in px."
     )
     infrared_from_visible: Affine | None = Field(
-        default=None, description="Pixel of the infrared chip from that of the visible chip: affine, two rows of three."
+        default=None,
+        description="Affine map from pixels of the visible to pixels of the infrared chip, two rows of three.",
     )
     noise: NotNegative | None = Field(
         default=None, description="Standard deviation of Gaussian sensor noise; 0.03 is the paper's 3 %."

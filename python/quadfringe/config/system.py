@@ -31,7 +31,7 @@ FILE = "system.toml"
 
 
 class SystemConfig(Model):
-    """A whole system: devices, fringes, what is measured, and how it is decoded."""
+    """A whole system: devices, fringes, scene and decoding."""
 
     schema_version: Literal[1] = Field(default=1, description="Version of this format.")
     capture: AnyCapture = Field(
@@ -39,10 +39,10 @@ class SystemConfig(Model):
         description='The camera: a table with its kind, or a word such as "aravis:NAME". Absent: the virtual bench.',
     )
     camera: Device | None = Field(
-        default=None, description="Camera of the virtual bench. Absent: that of the published bench."
+        default=None, description="Camera of the virtual bench. Absent: the published camera."
     )
     projector: Device | None = Field(
-        default=None, description="Visible projector of the virtual bench. Absent: that of the published bench."
+        default=None, description="Visible projector of the virtual bench. Absent: the published projector."
     )
     infrared: Device | None = Field(
         default=None, description="Infrared projector of the virtual bench. Absent: coaxial with `projector`."
@@ -54,7 +54,7 @@ class SystemConfig(Model):
         "camera sees the light that is there.",
     )
     fringes: Fringes = Field(default=Fringes(), description="Fringes that the projectors show.")
-    scene: SceneConfig = Field(default=SceneConfig(), description="What the virtual bench measures.")
+    scene: SceneConfig = Field(default=SceneConfig(), description="The scene of the virtual bench.")
     decode: DecodeConfig = Field(default=DecodeConfig(), description="How shots are decoded.")
 
 

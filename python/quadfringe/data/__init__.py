@@ -1,4 +1,4 @@
-"""The records that flow and are saved: `Shot` or `BayerShot` in, `Calibration` with it, `Shape` out."""
+"""The records of a measurement: `Shot` or `BayerShot` goes in with a `Calibration`, `Shape` comes out."""
 
 from quadfringe.data.calibration import (
     Calibration,

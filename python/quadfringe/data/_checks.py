@@ -1,4 +1,4 @@
-"""What records check when they are made: images and maps of one size, of the types that the kernel takes."""
+"""Checks of new records: images and maps have one size, and types that the kernel takes."""
 
 from __future__ import annotations
 

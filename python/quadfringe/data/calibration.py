@@ -1,4 +1,4 @@
-"""`Calibration`: what turns a raw shot into millimetres, with the record of how it was made."""
+"""`Calibration`: the data that turn a raw shot into millimetres, with a record of how they were measured."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class CalibrationRecord(Model):
 
 
 class Calibration(Stored):
-    """What turns a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
+    """The data that turn a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
 
     `response` is corrected before `crosstalk`, `projector_response` after it.
     """
@@ -99,7 +99,8 @@ class Calibration(Stored):
     )
     projector_response: Response | None = Field(default=None, description="Response of the projectors.")
     ir_registration: Affine | None = Field(
-        default=None, description="Pixel of the infrared chip from that of the visible chip: affine, two rows of three."
+        default=None,
+        description="Affine map from pixels of the visible to pixels of the infrared chip, two rows of three.",
     )
     record: CalibrationRecord | None = Field(default=None, description="How the calibration was made.")
 

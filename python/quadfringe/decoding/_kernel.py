@@ -1,4 +1,4 @@
-"""The kernel's decoder, planned for one response: buffers for every thread, and the description of what it does."""
+"""The kernel's decoder, planned for one response: buffers for every thread, and a description of its settings."""
 
 from __future__ import annotations
 

@@ -19,12 +19,12 @@ __all__ = ["Decoder", "decode"]
 class Decoder:
     """Decodes shots of one size; planned and checked when made. Every shot is judged by the same rule.
 
-    `like` is a shot, or a size (rows, columns); `full_scale` is that of the shot, or with a size the largest value of
-    the dtype unless it is given. Threads may decode at the same time: each then uses separate buffers.
+    `like` is a shot, or a size (rows, columns); `full_scale` defaults to the full scale of the shot, or for a size to
+    the largest value of the dtype. Threads may decode at the same time: each then uses separate buffers.
 
     With `plan.response` "auto" and no response in the calibration, the response is estimated from the first sound
     shots: each of up to three shots is decoded with the estimate from itself, the first estimate that shows a response
-    is held from then on, and if none of them shows any, the light is taken as linear. `response` says what is held.
+    is held from then on, and if none of them shows any, the light is taken as linear. `response` is the one in use.
     A shot that is refused does not count.
 
     Raises `InputError` or ValueError when the plan cannot work: fringes that do not cover the field, a calibration for

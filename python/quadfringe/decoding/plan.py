@@ -1,4 +1,4 @@
-"""`Plan`: what a decoder is made from."""
+"""`Plan`: the fringes, calibration, response and settings from which a decoder is made."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ COLUMNS_MAX = 65536
 
 @dataclass(frozen=True, init=False, repr=False)
 class Plan:
-    """What a decoder is made from: the fringes, the calibration, the response, and settings of the method.
+    """The fringes, the calibration, the response and the settings of the method from which a decoder is made.
 
     `projector_width_px` is the number of projector columns that the fringes cover. `calibration` is a `Calibration` or
     the path of its file; without one, shapes hold phase only. `response` is "auto", "linear", a `Response`, or the
-    path of a response file, with the meaning of `DecodeConfig.response`; given here or there, it means the same, and
-    afterwards it stands here. `fringes` may be given as three numbers, `decode` as a mapping of its keys.
+    path of a response file, with the meaning of `DecodeConfig.response`; it may be given here or in `decode`,
+    and is kept here. `fringes` may be given as three numbers, `decode` as a mapping of its keys.
 
     Raises `InputError` (`ConfigError` for settings) that names the argument at fault.
 

@@ -16,7 +16,7 @@ __all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response"]
 
 # Rounds of decoding and estimating. Each takes a part of the distortion out of the phase: on faces and steps of the
 # virtual bench, gammas of 1.2 to 2.6 settle in one to three rounds. The limit bounds the time of a shot whose estimates
-# do not settle; with more than twice the rounds that any of these scenes takes, it does not end one that would.
+# do not settle; it is more than twice the rounds of any of these scenes, so that it stops none that would settle.
 ROUNDS_MAX = 8
 # Relative change of the exponents, a ratio, at which the rounds end. In the scenes above the change of a round is at
 # most about a fifth of the change before, so that later rounds would change an exponent by less than 0.5 %.
@@ -31,10 +31,10 @@ SHOTS_TRIED = 3
 def estimate_response(shot: AnyShot, plan: Plan) -> Response | Literal["linear"]:
     """Estimate the response (gamma) of the channels from one shot; "linear" when the shot shows none.
 
-    Any object will do that fills a good part of the image: pixels of a tile, sorted by their phase, are what a stack of
-    phase steps is to `quadfringe calibrate response`. The shot is decoded and the response estimated in turn until the
-    estimate settles. The result can be put into a `Plan`, where it means the same. Raises `InputError` when the plan
-    knows a response already, and otherwise as `Decoder`.
+    Any object that fills a good part of the image will do: the pixels of a tile, sorted by their phase, serve as a
+    stack of phase steps serves in `quadfringe calibrate response`. The shot is decoded and the response estimated
+    in turn until the estimate settles. The result can be put into a `Plan`. Raises `InputError` when the plan has a
+    response already, and otherwise as `Decoder`.
 
     >>> import quadfringe as qf
     >>> from dataclasses import replace
@@ -63,7 +63,8 @@ def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[Kern
     found = _estimate(shot, first, as_captured.plan)
     if found == "linear":
         return linear, first
-    # The joint method finds a response that is too strong for the published one. It cannot search along camera rays.
+    # The joint method also finds a response that is too strong for the published method to decode, but it cannot search
+    # along camera rays.
     searched = as_captured.plan.decode.unwrapping == "pair"
     finder = as_captured if searched else as_captured.with_method("joint")
     for _ in range(ROUNDS_MAX):

@@ -120,11 +120,11 @@ def linear_light(
 
     - "calibration" (default): the response of the calibration. If it has none, or without a calibration, intensities
       are taken as linear. This stage never estimates a response;
-    - a `Response`, the path of its file, or "linear", which replace that of the calibration;
+    - a `Response`, the path of its file, or "linear", which replace the response of the calibration;
     - "auto", as in a `Plan`: the response that the calibration states. Where a `Plan` would estimate it, `InputError`.
 
     IR is NaN where its chip does not see the point. The colours of a raw mosaic are interpolated at every pixel from
-    linear samples. Raises `InputError` for a calibration or response that is none, or that cannot be read.
+    linear samples. Raises `InputError` for arguments that are no calibration or response, or cannot be read.
     """
     calibration = calibration_of(calibration)
     known = conditioning(calibration, "auto" if response == "calibration" else _known(response, calibration))
@@ -240,7 +240,7 @@ def _wrap(phase_rad: Map) -> Map:
 
 
 def _fringes(image: Map, rows: int, columns: int, period_px: float) -> tuple[Map, Map]:
-    """Give block means less their background, and the background by the mean envelope."""
+    """Give block means minus their background, and the background by the mean envelope."""
     means = block_means(image, rows, columns)
     level = background(means, period_px / columns, kind="mean_envelope")
     return means - level, level

@@ -15,14 +15,14 @@ from quadfringe.errors import DecodeError
 
 __all__ = ["judge", "order_margin"]
 
-STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles, at no cost
+STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
 MARGIN_ROWS = 48  # least number of rows and columns that the median margin is taken from
 DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
 NEARLY_NONE = 5e-4  # share of the pixels of a black or saturated channel that may differ
 RETURNED_MIN = 0.05  # least share of the lit pixels that must be returned
 # Median order margin of the lit pixels. Sound shots have more than 0.75, by the published method more than 0.4 when the
 # response is not corrected. Exchanged channels have at most 0.44 (joint) and 0.49 (published), other fringe numbers 0.5
-# (joint) and 0.3 (published). `pytest tests/test_verdict.py` holds both sides.
+# (joint) and 0.3 (published). `pytest tests/test_verdict.py` tests both limits.
 COLLAPSED = {"joint": 0.55, "published": 0.35}
 DOUBTFUL = 0.6
 CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged
@@ -33,7 +33,7 @@ Decode = Callable[[AnyShot], Shape]
 def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
     """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
 
-    When the median margin is below 0.6, `again` decodes the shot with each two channels exchanged, or as each other
+    When the median margin is below 0.6, `again` decodes the shot with each pair of channels exchanged, or as each other
     Bayer pattern, to name them; with None that check is left out.
     """
     margin, lit, returned = _margin(shape)

@@ -163,7 +163,8 @@ class ProjectorPair:
         """Show this light until the next call.
 
         Raises ValueError for fringe numbers that are ambiguous over the projector, for light that is not in flash
-        memory (that of a calibration needs HDMI), and for a pre-deformation without a calibration of both projectors.
+        memory (the light of a calibration needs HDMI), and for a pre-deformation without a calibration of both
+        projectors.
         """
         deformed = predeformation(light, self._calibration) if isinstance(light, Fringes) else None
         visible, infrared = light_images(light, SIZE_PX, deformed)

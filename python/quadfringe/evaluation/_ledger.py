@@ -17,7 +17,7 @@ FIELDS = {"figure", "unit", "lower", "upper", "command", "since", "moved"}
 
 @dataclass(frozen=True)
 class Bar:
-    """One figure and the limits that it must keep; the limits themselves are allowed."""
+    """One figure and the limits that it must keep; a figure that equals a limit keeps it."""
 
     key: str
     figure: str

@@ -51,7 +51,7 @@ class Page:
         return self.ask("Runtime.evaluate", expression=expression, returnByValue=True)["result"]["value"]
 
     def picture(self, path: Path) -> None:
-        """Write what the page shows, PNG."""
+        """Write a picture of the page, PNG."""
         path.write_bytes(b64decode(self.ask("Page.captureScreenshot")["data"]))
 
     def close(self) -> None:

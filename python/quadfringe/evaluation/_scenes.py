@@ -88,7 +88,7 @@ def rig(data: Path) -> dict[str, Any]:
 
 
 def calibration_of(devices: dict[str, Any]) -> Calibration:
-    """Make the product's calibration from what `rig` read."""
+    """Make a `Calibration` from the values that `rig` read."""
     from quadfringe import Calibration, Device
 
     def model(device: dict[str, Any]) -> Device:
@@ -113,7 +113,7 @@ def plan_of(
     response: ResponseChoice = "auto",
     **settings: Any,
 ) -> tuple[Shot, Plan]:
-    """Give the product's shot and plan for a scene; `settings` are those of `DecodeConfig`."""
+    """Give the shot of a scene and its plan; `settings` are those of `DecodeConfig`."""
     from quadfringe import DecodeConfig, Fringes, Plan, Shot
 
     plan = Plan(
@@ -127,7 +127,7 @@ def plan_of(
 
 
 def shape_of(scene: Scene, **how: Any) -> Shape:
-    """Decode a scene with the product; `how` as in `plan_of`."""
+    """Decode a scene; `how` as in `plan_of`."""
     from quadfringe import decode
 
     return decode(*plan_of(scene, **how))

@@ -1,4 +1,4 @@
-"""Recordings that prove what was kept: shots that carry their number in every pixel, and writers that get killed."""
+"""Recordings for tests of losses: shots that carry their number in every pixel, and writers that are killed."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def kill_writer(path: Path, after_s: float, shape: tuple[int, int] = (HEIGHT_PX,
 
 
 def run_with_file_limit(path: Path, limit_bytes: int) -> tuple[int, str]:
-    """Write until the system refuses at this file size; give the number of shots reported, and the error text."""
+    """Write until the file reaches this size and the system refuses more; give the number of shots, and the error."""
     with start_writer(path, limit_bytes) as writer:
         out, reason = writer.communicate(timeout=120)
     return int(out.split()[-1]), reason

@@ -16,7 +16,7 @@ from quadfringe.view.report import write_report
 __all__ = ["SCENES", "SceneResult", "run_scene"]
 
 SCENES = ("steps", "face")
-NOISE = 0.03  # standard deviation of the sensor noise, share of full scale: that of the published evaluation
+NOISE = 0.03  # standard deviation of the sensor noise, share of full scale, as in the published evaluation
 REPEATS = 5  # timed decodes, of which the fastest counts: other load only adds time
 
 

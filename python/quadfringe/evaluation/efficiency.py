@@ -68,7 +68,7 @@ class Efficiency:
     variance_rad2: float
     bound_rad2: float  # at the resolution of the estimator
     pixels_per_value: float  # N
-    response_sum: float  # of h; 1 when a flat change of phase comes through
+    response_sum: float  # of h; 1 when a uniform change of phase passes unchanged
     bias_rms_rad: float  # of the mean over the seeds against the truth
 
     @property
@@ -102,18 +102,18 @@ def efficiency(
     `ratios` are k_c of R, G, B, IR. Pixels that any of the runs does not return with the right order are left out.
     Raises ValueError when the estimate does not depend on the phase.
     """
-    plain, changed, coins = [], [], []
+    plain, changed, signs = [], [], []
     for seed in range(seeds):
-        coins.append(np.random.default_rng([seed, 1]).choice((-1.0, 1.0), phase_rad.shape))
+        signs.append(np.random.default_rng([seed, 1]).choice((-1.0, 1.0), phase_rad.shape))
         plain.append(estimate(images(phase_rad, ratios, seed)).astype(np.float64))
-        changed.append(estimate(images(phase_rad + EPSILON_RAD * coins[-1], ratios, seed)).astype(np.float64))
+        changed.append(estimate(images(phase_rad + EPSILON_RAD * signs[-1], ratios, seed)).astype(np.float64))
     stack = np.stack(plain)
     with np.errstate(invalid="ignore"):
         right = (np.abs(np.stack([*plain, *changed]) - phase_rad) < np.pi).all(axis=0)
     counted = inner & right
     responses = [
-        response(np.where(counted, after - before, 0.0), coin, reach_px) / (EPSILON_RAD * counted.sum())
-        for before, after, coin in zip(plain, changed, coins, strict=True)
+        response(np.where(counted, after - before, 0.0), sign, reach_px) / (EPSILON_RAD * counted.sum())
+        for before, after, sign in zip(plain, changed, signs, strict=True)
     ]
     halves = [np.mean(responses[i::2], axis=0) for i in (0, 1)]
     energy = float(np.sum(halves[0] * halves[1]))
@@ -148,9 +148,9 @@ def information(phase_rad: Map, ratios: Ratios) -> Map:
     return np.asarray((MODULATION / SIGMA) ** 2 * np.sum(terms, axis=0))
 
 
-def response(change_rad: Map, coin: Map, reach_px: int) -> Map:
-    """Give the sum over the field of the change times the coin at a distance d, |d| <= reach_px along both axes."""
+def response(change_rad: Map, sign: Map, reach_px: int) -> Map:
+    """Give the sum over the field of the change times the sign at a distance d, |d| <= reach_px along both axes."""
     shape = [fft.next_fast_len(n + 2 * reach_px, real=True) for n in change_rad.shape]
-    correlation = fft.irfft2(fft.rfft2(change_rad, shape) * np.conj(fft.rfft2(coin, shape)), shape)
+    correlation = fft.irfft2(fft.rfft2(change_rad, shape) * np.conj(fft.rfft2(sign, shape)), shape)
     near = np.arange(-reach_px, reach_px + 1)
     return np.asarray(correlation[np.ix_(near, near)])

@@ -28,7 +28,7 @@ MODULATION_MIN = 0.02  # of full scale; darker fringes are no data
 
 @dataclass(frozen=True)
 class Result:
-    """What one shot gives; every map is (H, W), NaN for no data."""
+    """The result of one shot; every map is (H, W), NaN for no data."""
 
     phase_rad: Map  # absolute, of the first fringe number, 0 at projector column 0
     column_px: Map
@@ -104,7 +104,7 @@ def ladder(wrapped: tuple[Map, Map, Map], numbers: tuple[int, int, int]) -> tupl
     """Absolute phase of the first number and a quality 0..1: the ladder 1 -> s -> N, s^2 = N (S4).
 
     The beat of N and N - 1 is one fringe over the field and orders the beat of N and N - s
-    (s fringes), which orders N. Point by point; no neighbour is asked.
+    (s fringes), which orders N. Each point stands alone; neighbours have no influence.
     """
     n = numbers[0]
     root = round(n**0.5)

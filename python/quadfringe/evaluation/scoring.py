@@ -24,7 +24,7 @@ Kind = Literal["absolute", "relative", "wrapped"]
 
 @dataclass(frozen=True)
 class Scene:
-    """One shot (four (H, W) images of one dtype), its fringes, and what is known to be true."""
+    """One shot (four (H, W) images of one dtype), its fringes, and the known truth."""
 
     name: str
     red: Image

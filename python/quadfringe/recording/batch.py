@@ -101,7 +101,7 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
                 f"{recording}: recorded without a calibration, so it has no points; name a calibration in --system, or "
                 "use --no-ply"
             )
-        # Found once here: a response that each process estimated would depend on the shots that it happens to get.
+        # Estimated once here: otherwise each process would estimate it from the shots that it happens to get.
         scanner.change_decode(response=scanner.settle_response(take))
         config = config.model_copy(update={"decode": scanner.config.decode})
         job = Job(recording.resolve(), out.resolve(), config, ply, len(take), ())
@@ -112,7 +112,7 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
 
 
 def _opened(config: SystemConfig) -> Scanner:
-    """Open a recording as a system with one thread: as many processes as cores share the machine."""
+    """Open a recording as a system with one thread, because each core has one process."""
     scanner = open_system(config)
     scanner.change_decode(threads=1)
     return scanner

@@ -55,12 +55,12 @@ class Recording:
 
     @property
     def config(self) -> SystemConfig | None:
-        """The resolved settings of the system that recorded."""
+        """The resolved settings of the system that made the recording."""
         return self.header.config
 
     @property
     def calibration(self) -> Calibration | None:
-        """The calibration of the system that recorded."""
+        """The calibration of the system that made the recording."""
         return self.header.calibration
 
     @property

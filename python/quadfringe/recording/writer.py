@@ -69,7 +69,7 @@ class RecordingWriter:
             place.write_direct_chunk((n, 0, 0), image)
         for name, value in (stamp_values(stamp) | {"crc32": crcs}).items():
             _append_row(datasets[name].id, n, np.asarray(value, self._dtypes[name]))
-        self._file.flush()  # the whole file, because h5clear loses what a flush of single datasets leaves behind
+        self._file.flush()  # the whole file: after a flush of single datasets, h5clear would lose data
 
     def close(self) -> None:
         """Close the file and mark it as closed, unless a write failed; further calls do nothing."""

@@ -28,7 +28,7 @@ from quadfringe.scanner.streaming import LiveStream, Tap
 __all__ = ["Scanner", "open_system"]
 
 LIGHTCRAFTER_COLUMNS = 912  # projector columns that fringes cover if neither calibration nor system file say otherwise
-SETTLING_SHOTS = 64  # shots in which a response is looked for; a refused shot costs some 14 decodes
+SETTLING_SHOTS = 64  # most shots that are decoded to estimate a response; a refused shot costs some 14 decodes
 
 
 class Scanner:
@@ -100,7 +100,7 @@ class Scanner:
     def decode(self, shot: AnyShot) -> Shape:
         """Give the shape of a shot of this system; raises `DecodeError` when it cannot be trusted.
 
-        All shots are decoded by one `Decoder`, so that a response that nobody states is estimated once and then held.
+        All shots are decoded by one `Decoder`, so that a response that is not given is estimated once and then held.
         Threads may call this at the same time.
         """
         shape = self._decoder_for(shot).decode(shot)
@@ -134,7 +134,7 @@ class Scanner:
         taps: Mapping[str, Tap] | None = None,
         resume: bool = False,
     ) -> LiveStream:
-        """Measure without pause: `count` shots, or as many as come until the stream is closed.
+        """Measure continuously: `count` shots, or until the stream is closed.
 
         Capture, decoding and the caller run at different speeds. With keep="latest" the caller gets the newest shape;
         "all" lets up to 64 shots wait. Both drop the oldest shot when they must, and count it. `taps` get every
@@ -193,7 +193,7 @@ class Scanner:
 def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
     """Open the system of a TOML file, of a folder with system.toml, or of a config; without any, the virtual bench.
 
-    Raises `ConfigError` when the file has unknown keys or wrong values, or names devices that do not go together;
+    Raises `ConfigError` when the file has unknown keys or wrong values, or names devices that cannot be combined;
     `InputError` when a file cannot be read; OSError when a device cannot be opened.
     """
     if system is None:

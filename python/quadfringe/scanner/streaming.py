@@ -174,7 +174,7 @@ class LiveStream:
             queue.end(error)
 
     def _decode_all(self) -> None:
-        """Decode shots as they come; other threads do the same, and every result waits for those of earlier shots."""
+        """Decode shots as they come; other threads do the same, and every result waits for all earlier ones."""
         while True:
             with self._taking:
                 shot = None
@@ -201,7 +201,7 @@ class LiveStream:
         return None
 
     def _give(self, shot: AnyShot, result: Shape | DecodeError, turn: int) -> None:
-        """Hand over a result after those of all earlier shots."""
+        """Hand over a result after the results of all earlier shots."""
         shape, error = (None, result) if isinstance(result, DecodeError) else (result, None)
         with self._order:
             while self._given != turn and not self._stop.is_set():

@@ -67,7 +67,7 @@ def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes:
 def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
     """Return the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
 
-    The brightness is the modulation, and the colour is that of the mean light in the neighbourhood.
+    The brightness is the modulation, and the colour comes from the mean light in the neighbourhood.
     """
     top = max(limits_of(shape.modulation)[1], 1e-6)
     modulation = np.nan_to_num(shape.modulation[::stride, ::stride])

@@ -1,4 +1,4 @@
-"""The guided calibration of a bench: it lists the captures, says what is missing, and makes one `Calibration`.
+"""The guided calibration of a bench: it lists the captures and the missing ones, and makes one `Calibration`.
 
 The captures come from a folder, which `take_captures` fills from the camera and the projectors, or from the virtual
 bench. Every step calls functions of `quadfringe.calibration`; the result keeps a record of every step.

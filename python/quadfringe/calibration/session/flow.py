@@ -41,7 +41,7 @@ class Guided:
 
 
 def guide(captures: Captures, say: Callable[[str], None] = lambda _: None) -> Guided:
-    """Do every step whose captures exist; `say` receives what to do, what is missing and what was found.
+    """Do every step whose captures exist; call `say` with instructions, missing captures and results.
 
     Raises `InputError` for captures that cannot be read, and `CalibrationError` for captures that do not give a
     trustworthy calibration. Writes no file.

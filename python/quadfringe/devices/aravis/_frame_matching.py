@@ -22,12 +22,12 @@ __all__ = ["Clock", "FrameMatcher", "FrameNumbers", "SingleChip", "Stamped"]
 WINDOW = 256  # frames of the running minimum: over them a drift of 50 ppm adds 0.4 ms at 30 Hz
 CALM = 8  # consecutive frames whose delays agree within EVEN: the host is then keeping up
 EVEN = 0.25  # share of a frame period
-MANY = 32  # frames after which one without delay is assumed among them, however unevenly they arrive
+MANY = 32  # number of frames among which one had no delay, even if they arrive unevenly
 PENDING = 64  # frames of one chip that may wait for a partner: two seconds at 30 Hz
-DRIFT = 2e-4  # relative rate at which the clocks may part while no match is seen: twice the 100 ppm of a poor crystal
+DRIFT = 2e-4  # relative rate at which the clocks may drift apart without a match: twice the 100 ppm of a poor crystal
 FRESH_NS = 1_000_000_000  # age, ns, above which a clock difference is replaced, not smoothed, by the next match
 MISSES = 8  # consecutive frames without a partner after which the clock difference is discarded
-GAIN = 0.1  # share by which each match corrects the clock difference: more follows drift, less averages jitter
+GAIN = 0.1  # share by which each match corrects the clock difference: larger follows drift, smaller averages jitter
 SHORT_IDS = 65535  # GigE Vision ids without extension run from 1 to this value and then from 1 again
 
 Item = TypeVar("Item")

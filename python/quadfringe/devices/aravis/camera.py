@@ -22,9 +22,8 @@ from quadfringe.errors import CameraError, CameraLostError, ShotTimeoutError, Un
 __all__ = ["AravisCamera", "ChipCamera", "open_devices"]
 
 LENGTH = {"latest": 1, "all": 64}  # shots that wait: with "all" two seconds at 30 Hz
-# How long a busy or missing camera is retried, s: at first briefly, after a loss longer than the 3 s heartbeat for
-# which
-# the camera still holds the lost connection.
+# How long a busy or missing camera is retried, s: at first briefly, after a loss longer than the 3 s heartbeat
+# for which the camera still holds the lost connection.
 FIRST_PATIENCE_S, AGAIN_PATIENCE_S = 1.0, 5.0
 LOOK_S = 0.25  # interval at which a waiting call checks that the camera still answers
 SILENT_S = 0.5  # a chip that has sent nothing for this time is pinged

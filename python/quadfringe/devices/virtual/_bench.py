@@ -1,4 +1,4 @@
-"""The simulated world of the virtual bench: what stands in front of the camera and how it is lit."""
+"""The simulated world of the virtual bench: the scene in front of the camera, and its light."""
 
 from __future__ import annotations
 

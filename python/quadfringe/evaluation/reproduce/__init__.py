@@ -1,7 +1,7 @@
 """Published results computed again: each function writes a picture and returns its figures.
 
 The method: "Single-shot 3D shape measurement of discontinuous objects based on a coaxial fringe projection
-system", Applied Optics (2019). Each result has a module; those of the projector pair share
+system", Applied Optics (2019). Each result has a module; the results of the projector pair share
 the virtual bench of `_deviated_pair`.
 """
 

@@ -193,7 +193,7 @@ def decoded(exposure: Exposure, method: Method = "published", unwrapping: Unwrap
 def infrared_error_rad(exposure: Exposure, unwrapping: Unwrapping = "coaxial") -> Map:
     """Return the error (H, W), rad, of the infrared fringes against the phase that the unwrapping expects.
 
-    The phase is that of the Fourier filter; the error is scaled to the first fringe number (36).
+    The phase comes from the Fourier filter; the error is scaled to the first fringe number (36).
     """
     first, _, third = exposure.fringes.numbers
     light = linear_light(exposure.shot, exposure.calibration)

@@ -45,9 +45,9 @@ def pair_correction(out: Path, shrink: int = 1, calibration: Calibration | None 
 
     The bench has all defects of a real one. `calibration` is the known calibration of the pair, by default the exact
     one. Writes `out`/pair-correction.png. Figures in rad at 36 fringes, over the image and along row 130: `*_rms_rad`
-    is the error of the unwrapped phase against that of a single projector, `infrared_*` that of the infrared fringes
-    against their expected phase. Further figures: wrong orders in per cent, and the deviation that a second calibration
-    would find, deg and mm.
+    is the error of the unwrapped phase against the phase of a single projector, `infrared_*` the error of the infrared
+    fringes against their expected phase. Further figures: wrong orders in per cent, and the deviation that a second
+    calibration would find, deg and mm.
     """
     pair = real_pair(shrink=shrink)
     known = calibration or pair.calibration

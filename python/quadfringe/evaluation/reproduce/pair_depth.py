@@ -46,8 +46,8 @@ def pair_depth(out: Path, shrink: int = 1, depths_mm: Sequence[float] = DEPTHS_M
 
     The bench has all defects of a real one. Writes `out`/pair-depth.png. Figures are the worst over all depths, for
     each translation and way: `infrared_rms_rad` is the error of the infrared fringes against the phase that the
-    unwrapping expects (36 fringes), `rms_rad` that of the unwrapped phase against a single projector; wrong orders are
-    in per cent, and `returned_percent` is relative to the pixels that a single projector returns.
+    unwrapping expects (36 fringes), `rms_rad` the error of the unwrapped phase against a single projector; wrong orders
+    are in per cent, and `returned_percent` is relative to the pixels that a single projector returns.
     """
     figures: dict[str, float] = {}
     graphs: list[list[Graph]] = []

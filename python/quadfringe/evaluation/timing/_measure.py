@@ -24,7 +24,7 @@ from quadfringe.scanner import open_system
 __all__ = ["METHODS", "NOISE", "SCALING_SIZES", "memory", "scaling", "time_decoding"]
 
 METHODS = ("published", "joint")
-NOISE = 0.03  # standard deviation of the sensor noise, share of full scale: that of the published evaluation
+NOISE = 0.03  # standard deviation of the sensor noise, share of full scale, as in the published evaluation
 # (width, height) in px, 4:3, each about twice the pixels of the one before, from 0.25 to 16 million pixels.
 SCALING_SIZES = ((576, 432), (800, 600), (1152, 864), (1600, 1200), (2304, 1728), (3200, 2400), (4608, 3456))
 REPEATS_MIN = 3  # the fewest times of which a median means anything
