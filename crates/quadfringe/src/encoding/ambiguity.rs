@@ -1,18 +1,19 @@
-//! How well the phases of an encoding tell projector columns apart.
+//! The ambiguity margin: how well the phases of an encoding distinguish projector columns.
 
 use std::f64::consts::{PI, TAU};
 
-/// Two columns that are hardest to tell apart.
+/// The two columns that are hardest to distinguish.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Closest {
-    /// Their distance in the space of phases, in rad.
+    /// Their distance in phase space, in rad.
     pub margin_rad: f64,
     /// Their distance in projector columns.
     pub distance_px: f64,
 }
 
-/// The pair of columns that share the first phase and are closest in all others. Two columns share the first phase when a
-/// whole number of its periods lies between them; where no two do, the margin is the greatest that phases can have.
+/// Among the pairs of columns with the same first phase, the pair that is closest in all other phases. Two columns have
+/// the same first phase if a whole number of its periods lies between them. If there is no such pair, the margin is the
+/// greatest distance that phases can have.
 pub(super) fn closest_columns(fringe_numbers: &[f64], projector_width: usize) -> Closest {
     let [first, others @ ..] = fringe_numbers else { unreachable!("an encoding has channels") };
     let width = projector_width as f64;
@@ -82,13 +83,14 @@ mod tests {
         let three_colours = [visible(36.0, 0.0), visible(35.0, 0.0), visible(30.0, 0.0)];
         let found = Encoding::new(three_colours, 912).expect("all columns differ");
         assert!((found.ambiguity_margin_rad() - TAU / 6.0).abs() < 1e-9);
-        // Four steps of one fringe number measure one phase, which repeats; with a second number it does not.
+        // Four steps of one fringe number measure one phase, which repeats over the field. A second fringe number
+        // removes the ambiguity.
         let steps = |number| (0..4).map(move |k| visible(number, f64::from(k) * FRAC_PI_2));
         let alone: Vec<_> = steps(36.0).collect();
         assert!(matches!(Encoding::new(alone, 912), Err(Error::JointRange { .. })));
         let both: Vec<_> = steps(16.0).chain(steps(15.0)).collect();
         assert!(Encoding::new(both, 912).is_ok());
-        // One fringe over the projector needs no other.
+        // A single fringe over the whole projector has no ambiguity.
         assert!(Encoding::new([visible(1.0, 0.0)], 912).is_ok());
         assert!(matches!(Encoding::new([], 912), Err(Error::Value { .. })));
         assert!(matches!(Encoding::new([visible(1.0, f64::NAN)], 912), Err(Error::Value { .. })));

@@ -17,10 +17,10 @@ pub enum Projector {
 }
 
 impl Projector {
-    /// Both, in the order of arrays with one entry for each projector.
+    /// Both projectors, in the order of arrays with one entry for each projector.
     pub const ALL: [Self; 2] = [Self::Visible, Self::Infrared];
 
-    /// Place in arrays with one entry for each projector.
+    /// Index in arrays with one entry for each projector.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
@@ -37,9 +37,9 @@ impl Projector {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct ChannelCode {
-    /// Number of fringes over the full projector width; need not be whole.
+    /// Number of fringes over the full projector width. It need not be an integer.
     pub fringe_number: f64,
-    /// Phase that is added to that of the column, in rad.
+    /// Constant that is added to the phase of the column, in rad.
     pub shift_rad: f64,
     /// The projector that shows the channel.
     pub projector: Projector,
@@ -60,7 +60,7 @@ impl ChannelCode {
     }
 }
 
-/// Phase in rad of this number of fringes at a projector column, not wrapped (S1).
+/// Phase in rad at a projector column of fringes with this number, not wrapped (S1).
 pub(super) fn phase_at(fringe_number: f64, column_px: f64, projector_width: usize) -> f64 {
     TAU * fringe_number * column_px / projector_width as f64
 }

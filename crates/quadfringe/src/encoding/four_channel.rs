@@ -27,7 +27,7 @@ impl Channel {
     /// The channels in array order.
     pub const ALL: [Self; 4] = [Self::R, Self::G, Self::B, Self::Ir];
 
-    /// Place in four-channel arrays: R 0, G 1, B 2, IR 3.
+    /// Index in four-channel arrays: R 0, G 1, B 2, IR 3.
     #[must_use]
     pub const fn index(self) -> usize {
         self as usize
@@ -68,7 +68,7 @@ impl Channel {
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct FourChannel {
-    /// Fringe number of R and B, which are in quadrature; their phase is the one that becomes absolute.
+    /// Fringe number of R and B, which are in quadrature. Decoding makes their phase absolute.
     pub quadrature: f64,
     /// Fringe number of G.
     pub green: f64,
@@ -97,13 +97,13 @@ impl FourChannel {
         [self.quadrature, self.green, self.infrared]
     }
 
-    /// Number of fringe orders of R and B that the projector holds.
+    /// Number of fringe orders of R and B over the projector width.
     #[must_use]
     pub fn orders(&self) -> usize {
         self.quadrature.ceil() as usize
     }
 
-    /// Projector columns of one turn of the absolute phase, that of R and B.
+    /// Number of projector columns in one turn of the absolute phase, which is the phase of R and B.
     #[must_use]
     pub fn period_px(&self) -> f64 {
         self.projector_width as f64 / self.quadrature
@@ -117,7 +117,7 @@ impl FourChannel {
 }
 
 impl Encoding {
-    /// The encoding as the four channels of the paper, which are what the decoders of this crate take.
+    /// The encoding as the four channels of the paper. The decoders of this crate take only these.
     ///
     /// ```
     /// use quadfringe::Encoding;
@@ -132,7 +132,7 @@ impl Encoding {
     /// ```
     ///
     /// # Errors
-    /// [`Error::NotFourChannel`] that names the first difference.
+    /// [`Error::NotFourChannel`], which names the first difference.
     pub fn four_channel_view(&self) -> Result<FourChannel> {
         let fault = |fault| Err(Error::NotFourChannel { fault });
         let [red, green, blue, infrared] = self.channels() else {
@@ -163,7 +163,7 @@ impl Encoding {
 
 #[cfg(test)]
 impl FourChannel {
-    /// The view of an encoding that is known to be valid.
+    /// The four-channel view of an encoding that is known to be valid.
     pub(crate) fn of(encoding: Result<Encoding>) -> Self {
         encoding.and_then(|encoding| encoding.four_channel_view()).expect("a valid four-channel encoding")
     }

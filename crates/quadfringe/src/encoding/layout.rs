@@ -1,4 +1,4 @@
-//! Where the mirrors lie, and the ideal images for them.
+//! Positions of the projector's mirrors, and the ideal images sampled at them.
 
 use std::f64::consts::TAU;
 
@@ -7,7 +7,7 @@ use ndarray::Array2;
 use super::channel::ChannelCode;
 use crate::error::{Error, Result};
 
-/// How the mirrors of a projector's micromirror array lie.
+/// Arrangement of the mirrors of a projector.
 ///
 /// ```
 /// use quadfringe::DmdLayout;
@@ -33,7 +33,7 @@ impl DmdLayout {
     }
 }
 
-/// Direction in which fringes count.
+/// Direction in which fringes are counted.
 ///
 /// ```
 /// use quadfringe::encoding::Axis;
@@ -50,7 +50,7 @@ pub enum Axis {
     Rows,
 }
 
-/// Where the mirror stored at (row, column) lies, in columns.
+/// Horizontal position, in columns, of the mirror that is stored at (row, column).
 ///
 /// ```
 /// use quadfringe::encoding::{DmdLayout, mirror_column};
@@ -62,7 +62,7 @@ pub fn mirror_column(layout: DmdLayout, row: usize, column: usize) -> f64 {
     column as f64 + row_shift(layout, row)
 }
 
-/// How far a row of mirrors lies to the right, in columns.
+/// Distance by which a row of mirrors is shifted to the right, in columns.
 pub(crate) fn row_shift(layout: DmdLayout, row: usize) -> f64 {
     match layout {
         DmdLayout::Diamond if row % 2 == 1 => 0.5,
@@ -71,7 +71,7 @@ pub(crate) fn row_shift(layout: DmdLayout, row: usize) -> f64 {
 }
 
 /// Ideal image of one channel for a projector of `[width, height]` mirrors, `(height, width)`, linear light from 0 to 1
-/// (S1). [`Encoding::patterns`](super::Encoding::patterns) gives those of all channels.
+/// (S1). [`Encoding::patterns`](super::Encoding::patterns) returns the images of all channels.
 ///
 /// ```
 /// use quadfringe::encoding::{DmdLayout, Encoding, pattern};
@@ -86,14 +86,14 @@ pub fn pattern(channel: &ChannelCode, [width, height]: [usize; 2], layout: DmdLa
         let phase = channel.phase_rad(mirror_column(layout, row, column), width);
         (0.5 + 0.5 * (phase + channel.shift_rad).cos()) as f32
     };
-    // All even rows are alike, and all odd ones.
+    // All even rows are equal, and all odd rows are equal.
     let kinds: Vec<Vec<f32>> =
         (0..2).map(|row| (0..width).map(|column| level(row, column)).collect()).collect();
     Array2::from_shape_fn((height, width), |(row, column)| kinds[row % 2][column])
 }
 
 /// Ideal image of one step of an N-step capture, `(height, width)`, linear light `0.5 + 0.5 cos(2 pi number u / size + shift)`
-/// with the column or the row for `u`, at the places of the mirrors.
+/// where `u` is the column or the row of each mirror.
 ///
 /// # Errors
 /// [`Error::Value`] when the image has no pixels or a number is not finite.

@@ -1,10 +1,10 @@
-//! The encoding of projector columns: channels of fringes, their ideal images, and the layout of the mirrors that show them.
+//! The encoding of projector columns: channels of fringes, their ideal images, and the layout of the projector's mirrors.
 //!
-//! An [`Encoding`] is a list of channels over the columns `u` of a projector of width `W`. Channel `c` shows
-//! `0.5 + 0.5 cos(2 pi N_c u / W + delta_c)` in linear light (S1), with its fringe number `N_c` and shift `delta_c`.
-//! Channels of one projector and one fringe number measure one phase together: two in quadrature (two-step phase
-//! shifting), or more (phase stepping). A channel that stands alone measures its phase by a Fourier filter. An encoding
-//! is valid when these phases tell all columns apart.
+//! An [`Encoding`] is a list of channels over the columns `u` of a projector of width `W`. Channel `c` shows `0.5 + 0.5
+//! cos(2 pi N_c u / W + delta_c)` in linear light (S1), with its fringe number `N_c` and shift `delta_c`. Channels with
+//! the same projector and the same fringe number measure one phase together: two channels in quadrature by two-step
+//! phase shifting, more channels by N-step phase shifting. A Fourier filter gives the phase of a single channel. An
+//! encoding is valid if no two columns have the same combination of phases.
 
 mod ambiguity;
 mod channel;
@@ -23,9 +23,10 @@ use ndarray::Array2;
 use params::MARGIN_NEEDED_RAD;
 use std::f64::consts::FRAC_PI_2;
 
-/// The channels that are projected, with proof that their phases tell all projector columns apart.
+/// The channels that are projected. Every value of this type is valid: the phases of the channels distinguish all
+/// projector columns.
 ///
-/// The phase of the first channel is the one that decoding makes absolute.
+/// Decoding makes the phase of the first channel absolute.
 ///
 /// ```
 /// use quadfringe::Encoding;
@@ -53,7 +54,7 @@ pub struct Encoding {
 }
 
 impl Encoding {
-    /// An encoding of any channels over `projector_width` columns.
+    /// Makes an encoding from any channels over `projector_width` columns.
     ///
     /// # Errors
     /// [`Error::Value`] for an empty list, a projector of less than two columns, a fringe number that is not above 0 and
@@ -76,8 +77,8 @@ impl Encoding {
         Ok(encoding)
     }
 
-    /// The four channels of the paper from three fringe numbers: of R and B, of G, and of IR. R and B are in quadrature:
-    /// B is shifted by `pi/2`. The visible projector shows R, G and B, the infrared one IR.
+    /// Makes the four channels of the paper from three fringe numbers: for R and B, for G, and for IR. R and B are in
+    /// quadrature: B is shifted by `pi/2`. The visible projector shows R, G and B, the infrared one IR.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -92,12 +93,12 @@ impl Encoding {
         Self::new(channels, projector_width)
     }
 
-    /// The four channels of the paper with the optimum fringe numbers `N`, `N - 1` and `N - sqrt(N)` (S4): the beats of
-    /// the first with the others have 1 and `sqrt(N)` fringes.
+    /// Makes the four channels of the paper with the optimum fringe numbers `N`, `N - 1` and `N - sqrt(N)` (S4): the
+    /// beats of the first with the others have 1 and `sqrt(N)` fringes.
     ///
     /// # Errors
     /// [`Error::Value`] when `n` is not a perfect square of at least 4, or does not fit the width; [`Error::JointRange`]
-    /// when `n` is so large that neighbouring beats cannot be told apart.
+    /// when `n` is so large that neighbouring fringes of the beats cannot be distinguished.
     pub fn optimum(n: u32, projector_width: usize) -> Result<Self> {
         let root = n.isqrt();
         if n < 4 || root * root != n {
@@ -119,13 +120,13 @@ impl Encoding {
         self.projector_width
     }
 
-    /// Projector columns of one turn of the absolute phase, that of the first channel.
+    /// Number of projector columns in one turn of the absolute phase, which is the phase of the first channel.
     #[must_use]
     pub fn period_px(&self) -> f64 {
         self.projector_width as f64 / self.channels[0].fringe_number
     }
 
-    /// Absolute phase in rad at a projector column: that of the first channel.
+    /// Absolute phase in rad at a projector column, which is the phase of the first channel.
     ///
     /// ```
     /// use quadfringe::Encoding;
@@ -152,8 +153,9 @@ impl Encoding {
         self.channels.iter().map(|channel| pattern(channel, size_px, layout)).collect()
     }
 
-    /// Least distance in phase space (rad) between two columns that share the first phase: the error of the other phases
-    /// together at which a fringe order is mistaken. At most `pi sqrt(m)` for `m` other phases.
+    /// Ambiguity margin: least distance in phase space (rad) between two columns with the same first phase. A fringe
+    /// order can be mistaken when the joint error of the other phases reaches half of it. It is at most `pi sqrt(m)` for
+    /// `m` other phases.
     #[must_use]
     pub fn ambiguity_margin_rad(&self) -> f64 {
         self.closest_columns().margin_rad
@@ -180,8 +182,8 @@ impl Encoding {
         Ok(())
     }
 
-    /// Fringe numbers of the phases that are measured, in order: channels that share projector and fringe number measure
-    /// one phase.
+    /// Fringe numbers of the measured phases, in order. Channels with the same projector and fringe number measure one
+    /// phase.
     fn measured_numbers(&self) -> Vec<f64> {
         let mut phases: Vec<(f64, Projector)> = Vec::new();
         for channel in &self.channels {

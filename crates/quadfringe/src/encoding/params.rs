@@ -1,6 +1,6 @@
-//! Tuned numbers of an encoding: unit, trade-off, and the test that holds them.
+//! Tuned numbers of an encoding, each with its unit, its trade-off and the test that checks it.
 
-/// Least distance in phase space (rad) between two columns that counts as different. It leaves 0.15 rad of joint error to
-/// each of the two; smaller values accept encodings in which noise decides, larger ones refuse encodings that decode
-/// (`cargo test -p quadfringe --lib ambiguity`).
+/// Two columns count as different if their distance in phase space is at least this, in rad. It leaves each of the two a
+/// joint error of 0.15 rad. A smaller value accepts encodings whose orders noise decides; a larger one refuses encodings
+/// that can be decoded (`cargo test -p quadfringe --lib ambiguity`).
 pub(super) const MARGIN_NEEDED_RAD: f64 = 0.3;

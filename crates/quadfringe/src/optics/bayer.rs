@@ -1,4 +1,4 @@
-//! Colour filters of a chip that measures one colour at each pixel.
+//! Bayer patterns: the colour filters of a chip that measures one colour at each pixel.
 
 use crate::encoding::Channel;
 use crate::error::{Error, Limit, Result};
@@ -31,7 +31,7 @@ impl BayerPattern {
     /// Parse a name: rggb, grbg, gbrg or bggr.
     ///
     /// # Errors
-    /// [`Error::Value`] that lists the four for any other name.
+    /// [`Error::Value`] for any other name; it lists the four valid names.
     pub fn from_name(name: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|pattern| pattern.name() == name);
         let known = Limit::OneOf(&["rggb", "grbg", "gbrg", "bggr"]);

@@ -15,7 +15,7 @@ pub(super) fn apply(k: &[f64; 5], [x, y]: [f64; 2]) -> [f64; 2] {
     ]
 }
 
-/// Whether the distorted radius increases everywhere between the axis and the point, so that the model is one to one.
+/// Whether the distorted radius increases all the way from the axis to the point. Only there the model is one to one.
 pub(super) fn is_before_fold(k: &[f64; 5], [x, y]: [f64; 2]) -> bool {
     let [k1, k2, _, _, k3] = *k;
     if k1 >= 0.0 && k2 >= 0.0 && k3 >= 0.0 {
@@ -30,7 +30,7 @@ pub(super) fn is_before_fold(k: &[f64; 5], [x, y]: [f64; 2]) -> bool {
             .all(|q| !(q > 0.0 && q < s) || growth(q) > 0.0)
 }
 
-/// Real roots of `a + b s + c s^2`, NaN for those that do not exist.
+/// Real roots of `a + b s + c s^2`; NaN in place of a root that does not exist.
 fn stationary_points(a: f64, b: f64, c: f64) -> [f64; 2] {
     if c == 0.0 {
         return [-a / b, f64::NAN];
@@ -39,8 +39,8 @@ fn stationary_points(a: f64, b: f64, c: f64) -> [f64; 2] {
     [(-b + root) / (2.0 * c), (-b - root) / (2.0 * c)]
 }
 
-/// Ideal normalised coordinates from distorted ones, by Newton's method with step halving; `None` when no point before
-/// the fold is imaged there.
+/// Ideal normalised coordinates from distorted ones, by Newton's method with step halving; `None` if no point before
+/// the fold has these distorted coordinates.
 pub(super) fn remove(k: &[f64; 5], distorted: [f64; 2]) -> Option<[f64; 2]> {
     let mut point = start(k, distorted);
     let mut miss = miss_of(k, point, distorted);
@@ -68,7 +68,7 @@ pub(super) fn remove(k: &[f64; 5], distorted: [f64; 2]) -> Option<[f64; 2]> {
     (norm(miss) < SOLVED).then_some(point)
 }
 
-/// Start value: the distorted point, moved towards the axis until it lies before the fold.
+/// Start of the iteration: the distorted point, moved towards the axis until it lies before the fold.
 fn start(k: &[f64; 5], distorted: [f64; 2]) -> [f64; 2] {
     let mut point = distorted;
     for _ in 0..START_REDUCTIONS {

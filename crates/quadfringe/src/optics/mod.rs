@@ -55,11 +55,11 @@ impl Ray {
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub struct Device {
-    /// Columns.
+    /// Number of columns.
     pub width: usize,
-    /// Rows.
+    /// Number of rows.
     pub height: usize,
-    /// Focal length in columns and in rows.
+    /// Focal length along the columns and along the rows, in pixels.
     pub focal_px: [f64; 2],
     /// Principal point (column, row).
     pub centre_px: [f64; 2],
@@ -72,7 +72,8 @@ pub struct Device {
 }
 
 impl Device {
-    /// Device from all parameters; `rotation` and `translation_mm` map points from the camera frame to the device frame.
+    /// Makes a device from all parameters; `rotation` and `translation_mm` map points from the camera frame to the
+    /// device frame.
     ///
     /// # Errors
     /// [`Error::Value`] when the size is zero, a focal length is not positive, a number is not finite, or the rotation is
@@ -91,7 +92,7 @@ impl Device {
             .with_pose(rotation, translation_mm)
     }
 
-    /// Device without distortion whose frame is the camera frame.
+    /// Makes a device without distortion whose frame is the camera frame.
     ///
     /// # Errors
     /// [`Error::Value`] when the size is zero, a focal length is not positive, or a number is not finite.
@@ -116,7 +117,7 @@ impl Device {
         })
     }
 
-    /// The same device with lens distortion k1, k2, p1, p2, k3 (OpenCV).
+    /// This device with the lens distortion k1, k2, p1, p2, k3 (OpenCV).
     ///
     /// # Errors
     /// [`Error::Value`] when a coefficient is not finite.
@@ -125,7 +126,7 @@ impl Device {
         Ok(Self { distortion, ..self })
     }
 
-    /// The same device with the pose `T_device_camera`.
+    /// This device with the pose `T_device_camera`.
     ///
     /// # Errors
     /// [`Error::Value`] when a number is not finite or the rotation is not a proper rotation within 1e-6.
@@ -135,8 +136,8 @@ impl Device {
         Ok(Self { rotation, translation_mm, ..self })
     }
 
-    /// Project a point of the camera frame (mm) to a pixel (column, row), inside the image or not. `None` if the point is not
-    /// in front of the device, or so far off axis that the distortion model folds back.
+    /// Projects a point of the camera frame (mm) to a pixel (column, row), which may lie outside the image. `None` if the
+    /// point is not in front of the device, or so far off axis that the distortion model folds back.
     #[must_use]
     pub fn project(&self, p_mm: [f64; 3]) -> Option<[f64; 2]> {
         let [x, y, z] = self.device_from_camera(p_mm);
@@ -152,7 +153,7 @@ impl Device {
         Some(pixel)
     }
 
-    /// Ray through a pixel (column, row), in the camera frame; its direction is NaN where no ray meets that pixel.
+    /// Ray through a pixel (column, row), in the camera frame; its direction is NaN if no ray meets this pixel.
     #[must_use]
     pub fn ray(&self, pixel: [f64; 2]) -> Ray {
         let [x, y] = self.undistort(pixel);
@@ -182,7 +183,7 @@ impl Device {
         distortion::remove(&self.distortion, distorted).unwrap_or([f64::NAN; 2])
     }
 
-    /// Normalised coordinates with distortion, from those without.
+    /// Adds the distortion to normalised coordinates.
     #[must_use]
     pub fn distort(&self, ideal: [f64; 2]) -> [f64; 2] {
         distortion::apply(&self.distortion, ideal)
@@ -194,20 +195,20 @@ impl Device {
         self.distortion.iter().any(|k| *k != 0.0)
     }
 
-    /// Whether a position (column, row) lies on the image, that is within half a pixel of a pixel centre.
+    /// Whether a position (column, row) lies in the image; pixels extend half a pixel around their centres.
     #[must_use]
     pub fn contains(&self, pixel: [f64; 2]) -> bool {
         let inside = |p: f64, n: usize| (-0.5..n as f64 - 0.5).contains(&p);
         inside(pixel[0], self.width) && inside(pixel[1], self.height)
     }
 
-    /// Point of the camera frame in the device frame, mm.
+    /// Transforms a point (mm) from the camera frame to the device frame.
     #[must_use]
     pub fn device_from_camera(&self, p_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| dot(self.rotation[i], p_mm) + self.translation_mm[i])
     }
 
-    /// Direction of the device frame in the camera frame.
+    /// Transforms a direction from the device frame to the camera frame.
     pub(crate) fn camera_from_direction(&self, v: [f64; 3]) -> [f64; 3] {
         let r = &self.rotation;
         std::array::from_fn(|i| r[0][i] * v[0] + r[1][i] * v[1] + r[2][i] * v[2])

@@ -1,11 +1,12 @@
-//! A pair of calibrated projectors, coaxial or not, and the infrared fringes that they show.
+//! A pair of calibrated projectors, coaxial or not, and the phase of the infrared fringes in space.
 
 use super::Device;
 use crate::error::{Error, Limit, Result};
 
 impl Device {
-    /// Map a position (column, row) of this device to `other` through the plane z = `z_mm` of the camera frame. `None` if its
-    /// ray does not meet the plane, or if the point is outside the field of `other`.
+    /// Maps a position (column, row) of this device to `other`: the ray of the position meets the plane z = `z_mm` of the
+    /// camera frame in a point, and `other` images this point. `None` if the ray does not meet the plane, or if the point is
+    /// outside the field of `other`.
     ///
     /// ```
     /// use quadfringe::optics::{Device, rotation_from_vector};
@@ -25,8 +26,7 @@ impl Device {
     }
 }
 
-/// A calibrated pair of projectors with their poses, and whether the infrared image is pre-deformed to correct for them
-/// (S10, S11).
+/// A pair of projectors with calibrated poses (S10). The infrared image can be pre-deformed to correct the poses (S11).
 ///
 /// ```
 /// use quadfringe::optics::{ProjectorPair, Device};
@@ -47,13 +47,13 @@ pub struct ProjectorPair {
 }
 
 impl ProjectorPair {
-    /// Two projectors with plain fringes; their poses are relative to the camera.
+    /// Makes a pair that shows plain fringes. The poses of the projectors are relative to the camera.
     #[must_use]
     pub const fn new(visible: Device, infrared: Device) -> Self {
         Self { visible, infrared, predeformed_z_mm: None }
     }
 
-    /// The same pair with an infrared image pre-deformed for the plane z = `z_mm`.
+    /// This pair with an infrared image that is pre-deformed for the plane z = `z_mm`.
     ///
     /// # Errors
     /// [`Error::Value`] when the depth is not finite and positive.
@@ -69,7 +69,7 @@ impl ProjectorPair {
     }
 
     /// Position in the field of infrared fringes that lights a point of the camera frame (mm): 0 at the first column, 1 after
-    /// the last. Times the fringe number it is the phase in turns. `None` if the point is not lit.
+    /// the last one. This position times the fringe number is the phase in turns. `None` if the point is not lit.
     #[must_use]
     pub fn infrared_turns(&self, p_mm: [f64; 3]) -> Option<f64> {
         let mirror = self.infrared.project(p_mm)?;

@@ -20,7 +20,7 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// Pose from a rotation, row by row, and a translation in mm.
+    /// Makes a pose from a rotation, given row by row, and a translation in mm.
     ///
     /// # Errors
     /// [`crate::Error::Value`] when a number is not finite or the rotation is not a proper rotation within 1e-6.
@@ -30,25 +30,25 @@ impl Pose {
         Ok(Self { rotation, translation_mm })
     }
 
-    /// Point of the body in the camera frame, mm.
+    /// Transforms a point (mm) from the body frame to the camera frame.
     #[must_use]
     pub fn camera_from_body(&self, p_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| dot(self.rotation[i], p_mm) + self.translation_mm[i])
     }
 
-    /// Point of the camera frame in the body frame, mm.
+    /// Transforms a point (mm) from the camera frame to the body frame.
     #[must_use]
     pub fn body_from_camera(&self, p_mm: [f64; 3]) -> [f64; 3] {
         self.body_from_direction(std::array::from_fn(|i| p_mm[i] - self.translation_mm[i]))
     }
 
-    /// Direction of the body in the camera frame.
+    /// Transforms a direction from the body frame to the camera frame.
     #[must_use]
     pub fn camera_from_direction(&self, v: [f64; 3]) -> [f64; 3] {
         self.rotation.map(|row| dot(row, v))
     }
 
-    /// Direction of the camera frame in the body frame.
+    /// Transforms a direction from the camera frame to the body frame.
     #[must_use]
     pub fn body_from_direction(&self, v: [f64; 3]) -> [f64; 3] {
         let r = &self.rotation;

@@ -1,14 +1,14 @@
-//! Smooth bodies and their blends. The value of every function here, and of every blend, changes by at most 1 per mm.
+//! Smooth bodies and their blends. The value of each body and of each blend changes by at most 1 per mm.
 
 use crate::optics::dot;
 
-/// Smooth union: the lesser of two values, rounded where they differ by less than `k` mm.
+/// Smooth union: the smaller of two values, rounded off where they differ by less than `k` mm.
 pub(super) fn join(a: f64, b: f64, k: f64) -> f64 {
     let overlap = (k - (a - b).abs()).max(0.0);
     a.min(b) - overlap * overlap / (4.0 * k)
 }
 
-/// Smooth difference: the body `a` without the body `b`, rounded over `k` mm.
+/// Smooth difference: the body `a` without the body `b`, rounded off over `k` mm.
 pub(super) fn carve(a: f64, b: f64, k: f64) -> f64 {
     -join(-a, b, k)
 }
@@ -31,7 +31,7 @@ impl Ellipsoid {
         }
     }
 
-    /// Negative inside, and nowhere greater than the distance.
+    /// A value that is negative inside and nowhere greater than the distance to the surface.
     pub(super) fn value(&self, p: [f64; 3]) -> f64 {
         let q: [f64; 3] = std::array::from_fn(|i| (p[i] - self.centre[i]) * self.one_over_radii[i]);
         (dot(q, q).sqrt() - 1.0) * self.least_radius
@@ -43,7 +43,7 @@ impl Ellipsoid {
 pub(super) struct Capsule {
     start: [f64; 3],
     along: [f64; 3],
-    /// One over the squared length.
+    /// One over the squared length of the segment.
     scale: f64,
     radius: f64,
 }
@@ -62,7 +62,7 @@ impl Capsule {
         dot(away, away).sqrt() - self.radius
     }
 
-    /// Least and greatest coordinate along an axis.
+    /// Least and greatest coordinate of the body along an axis.
     pub(super) fn extent(&self, axis: usize) -> [f64; 2] {
         let (a, b) = (self.start[axis], self.start[axis] + self.along[axis]);
         [a.min(b) - self.radius, a.max(b) + self.radius]

@@ -26,13 +26,13 @@ impl Face {
 }
 
 impl Default for Face {
-    /// On the reference plane of the ready scenes.
+    /// A face on the reference plane of the ready scenes.
     fn default() -> Self {
         Self::new([6.0, 2.0, REFERENCE_Z_MM])
     }
 }
 
-/// How a part is joined to the previous parts, rounded over a length in mm.
+/// How a part is joined to the previous parts; the seam is rounded off over a length in mm.
 #[derive(Clone, Copy)]
 enum Blend {
     Add(f64),
@@ -67,7 +67,7 @@ const PARTS: [(Ellipsoid, Blend); 10] = [
     take([0.0, 48.5, -62.0], [24.0, 2.5, 5.0], 4.0),
 ];
 
-/// Rounding of the crease that mirroring leaves on the centre line, mm.
+/// Length over which the crease that mirroring leaves on the centre line is rounded off, mm.
 const CREASE_MM: f64 = 4.0;
 
 impl Surface for Face {

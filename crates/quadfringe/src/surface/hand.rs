@@ -22,11 +22,11 @@ pub struct Hand {
 }
 
 const WRIST_MM: [f64; 3] = [0.0, 82.0, 752.0];
-/// Rounding where capsules meet, mm.
+/// Length over which the seams between capsules are rounded off, mm.
 const ROUNDING_MM: f64 = 7.0;
 /// A finger of the resting hand.
 struct Finger {
-    /// Knuckle (x, y) from the wrist, mm.
+    /// Position (x, y) of the knuckle relative to the wrist, mm.
     knuckle_mm: [f64; 2],
     /// Length of the first joint, mm.
     length_mm: f64,
@@ -46,7 +46,7 @@ const FINGERS: [Finger; 4] = [
     finger([11.0, -80.0], 37.0, 0.07, 9.5),
     finger([30.0, -70.0], 29.0, 0.20, 8.0),
 ];
-/// Length of each joint of a finger over that of the first.
+/// Length of each joint of a finger divided by the length of the first joint.
 const JOINTS: [f64; 3] = [1.0, 0.68, 0.5];
 
 impl Hand {
@@ -84,7 +84,7 @@ impl Hand {
     }
 
     fn from_capsules(capsules: Vec<Capsule>) -> Self {
-        // Blending enlarges the body by a fraction of the rounding.
+        // Blending makes the body larger than its capsules, by less than the rounding.
         let extreme = |axis: usize, end: usize, pick: fn(f64, f64) -> f64| {
             let ends = capsules.iter().map(|capsule| capsule.extent(axis)[end]);
             ends.reduce(pick).unwrap_or(0.0)
@@ -97,7 +97,8 @@ impl Hand {
     }
 }
 
-/// Point of the resting hand (from the wrist) turned by the wave, brought nearer, and put in the camera frame.
+/// Takes a point of the resting hand, given relative to the wrist, turns it by the wave, moves it nearer, and expresses
+/// it in the camera frame.
 fn placed([x, y, z]: [f64; 3], wave_rad: f64, nearer_mm: f64) -> [f64; 3] {
     let (s, c) = wave_rad.sin_cos();
     let [wx, wy, wz] = WRIST_MM;

@@ -1,10 +1,11 @@
-//! First crossing of a ray and an implicit surface.
+//! First intersection of a ray with an implicit surface.
 
 use super::Surface;
 use super::params::{CLOSED_MM, REFINEMENTS_MAX, STEP_MIN_MM};
 use crate::optics::Ray;
 
-/// Distance at which the value stops being positive, within the range and the bounds of the surface.
+/// Distance along the ray at which the value of the surface first is not positive, within the range and the bounds of
+/// the surface.
 pub(super) fn first_crossing<S: Surface + ?Sized>(surface: &S, ray: &Ray, range_mm: [f64; 2]) -> Option<f64> {
     let [mut t, end] = clip(ray, surface.bounds_mm(), range_mm)?;
     let rate = surface.rate_limit(ray.direction);
@@ -23,7 +24,7 @@ pub(super) fn first_crossing<S: Surface + ?Sized>(surface: &S, ray: &Ray, range_
     None
 }
 
-/// Part of the range within the box; `None` when the ray passes by.
+/// The part of the range that lies in the box; `None` if the ray misses the box.
 pub(super) fn clip(ray: &Ray, [low, high]: [[f64; 3]; 2], range_mm: [f64; 2]) -> Option<[f64; 2]> {
     let [mut from, mut to] = range_mm;
     for axis in 0..3 {
@@ -42,7 +43,7 @@ pub(super) fn clip(ray: &Ray, [low, high]: [[f64; 3]; 2], range_mm: [f64; 2]) ->
     (from <= to && from.is_finite()).then_some([from, to])
 }
 
-/// Root within a bracket by the secant that keeps the bracket (Illinois), helped by bisection.
+/// Root in a bracket by the Illinois method, a secant method that keeps the bracket, with bisection as a safeguard.
 fn close<S: Surface + ?Sized>(surface: &S, ray: &Ray, bracket: [f64; 2], values: [f64; 2]) -> f64 {
     let ([mut a, mut b], [mut fa, mut fb]) = (bracket, values);
     let mut same_side = 0i32;

@@ -1,8 +1,8 @@
 //! The measured object: implicit surfaces in the camera frame, composed without a mesh.
 //!
-//! A [`Surface`] is a function that is positive in free space and negative inside the body (S9). Rays meet
-//! boxes, spheres and planes in closed form. For all others they march in steps that cannot pass the surface, and then
-//! close a bracket around the crossing to far below 1e-6 mm. [`scene`] gives the ready scenes by name, near z = 800 mm.
+//! A [`Surface`] is a function that is positive in free space and negative inside the body (S9). Rays meet boxes,
+//! spheres and planes in closed form. For all others they march in steps that cannot pass the surface, and then close a
+//! bracket around the crossing to far below 1e-6 mm. [`scene`] returns ready scenes near z = 800 mm by name.
 
 mod blend;
 mod face;
@@ -28,7 +28,7 @@ use params::NORMAL_STEP_MM;
 /// Distance of the reference plane of the ready scenes from the camera, mm.
 pub const REFERENCE_Z_MM: f64 = 800.0;
 
-/// Names of the scenes of [`scene`].
+/// Names that [`scene`] accepts.
 pub const SCENES: [&str; 6] = ["plane", "peaks", "steps", "sphere", "face", "hand"];
 
 /// A body bounded by an implicit surface.
@@ -51,10 +51,10 @@ pub const SCENES: [&str; 6] = ["plane", "peaks", "steps", "sphere", "face", "han
 /// assert!((t - 790.0).abs() < 1e-9);
 /// ```
 pub trait Surface: Send + Sync + std::fmt::Debug {
-    /// Positive in free space, zero on the surface, negative inside; for a point of the camera frame in mm.
+    /// Value at a point of the camera frame in mm: positive in free space, zero on the surface, negative inside.
     fn value(&self, p_mm: [f64; 3]) -> f64;
 
-    /// Least and greatest corner of a box that holds the surface, mm; infinite where it has no end.
+    /// Least and greatest corner of a box that contains the surface, mm; infinite where the surface has no end.
     fn bounds_mm(&self) -> [[f64; 3]; 2];
 
     /// Upper bound of the change of [`Surface::value`] per mm along a unit direction; 1 for distance functions.
@@ -81,7 +81,7 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     }
 }
 
-/// Several bodies as one; a ray meets the nearest.
+/// Several bodies as one. A ray hits the nearest of them.
 ///
 /// ```
 /// use quadfringe::surface::{Plane, Sphere, Surface, Union};
@@ -157,7 +157,7 @@ pub fn scene(name: &str, time_s: f64) -> Result<Box<dyn Surface>> {
     })
 }
 
-/// The vector scaled to unit length.
+/// The vector, scaled to unit length.
 fn unit(v: [f64; 3]) -> [f64; 3] {
     let scale = 1.0 / crate::optics::dot(v, v).sqrt();
     v.map(|c| c * scale)

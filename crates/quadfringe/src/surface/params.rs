@@ -1,17 +1,17 @@
-//! Numbers of the ray march: unit, trade-off, and what holds them. `cargo test -p quadfringe --test forward_random` compares
-//! hits of random rays with closed forms.
+//! Numbers of the ray march, each with its unit, its trade-off and the test that checks it. `cargo test -p quadfringe --test
+//! forward_random` compares hits of random rays with closed forms.
 
-/// Shortest step of the march, mm. Objects thinner than this along the ray may be missed; a shorter step takes longer
-/// where a ray passes a surface at a small angle. `cargo test -p quadfringe --test forward_random` compares hits with
-/// closed forms.
+/// Shortest step of the march, mm. The march can miss objects that are thinner than this along the ray; a shorter step
+/// takes longer where a ray passes a surface at a small angle. `cargo test -p quadfringe --test forward_random`
+/// compares hits with closed forms.
 pub(super) const STEP_MIN_MM: f64 = 0.05;
 
-/// Width at which the bracket around a crossing counts as closed, mm. Follows from the rounding of `f64`, which is
-/// 1e-13 mm at 1 m; a smaller width may never be reached.
+/// The search ends when the bracket around a crossing is narrower than this, mm. Follows from the rounding of `f64`,
+/// which is 1e-13 mm at 1 m; the search may never reach a smaller width.
 pub(super) const CLOSED_MM: f64 = 1e-10;
 
-/// Most steps that close a bracket. Follows from bisection, which alone closes 0.05 mm to 1e-10 mm in 29 steps, so this
-/// never ends the search early.
+/// Greatest number of steps that narrow a bracket. Follows from bisection, which narrows 0.05 mm to 1e-10 mm in 29
+/// steps, so this limit never ends the search early.
 pub(super) const REFINEMENTS_MAX: usize = 100;
 
 /// Step of the finite differences of the default normal, mm. A longer step rounds edges; a shorter one loses digits.

@@ -22,7 +22,7 @@ pub struct Peaks {
 const PEAKS_UNIT_MM: [f64; 2] = [53.333_333, 40.0];
 /// Least and greatest value of the peaks function, rounded outwards.
 const PEAKS_RANGE: [f64; 2] = [-6.56, 8.11];
-/// Greatest slope of the function in the units above, per mm of scale: 0.3281 rounded up.
+/// Greatest slope of the function with the units above, for a scale of 1 mm: 0.3281, rounded up.
 const PEAKS_SLOPE_PER_MM: f64 = 0.34;
 
 impl Peaks {

@@ -26,14 +26,14 @@ pub struct Posed {
 const PLATE_MM: f64 = 4.0;
 
 impl Posed {
-    /// A body in a pose; the body is given in the frame of the body.
+    /// Puts a body into a pose. The body is defined in its body frame.
     #[must_use]
     pub fn new(body: Box<dyn Surface>, pose: Pose) -> Self {
         Self { body, pose }
     }
 
-    /// A flat plate such as a calibration board: its face lies in the plane z = 0 of its frame, between two corners
-    /// (x, y) in mm, and looks towards negative z, so that a board that faces the camera has a pose near no rotation.
+    /// A flat plate such as a calibration board: its face lies in the plane z = 0 of its frame, between two corners (x,
+    /// y) in mm, and looks towards negative z, so that the pose of a board that faces the camera has little rotation.
     ///
     /// # Errors
     /// [`crate::Error::Value`] when the corners do not span a rectangle.

@@ -5,7 +5,8 @@ use ndarray::Array2;
 use super::Surface;
 use crate::error::{Error, Result};
 
-/// Upper bound of the change of a relief's value along a direction, from its greatest slope.
+/// Upper bound of the rate at which the value of a relief changes along a direction, given the greatest slope of the
+/// relief.
 pub(super) fn relief_rate(slope: f64, [x, y, z]: [f64; 3]) -> f64 {
     z.abs() + slope * x.hypot(y)
 }
@@ -25,7 +26,8 @@ pub enum Interpolation {
     Bicubic,
 }
 
-/// Relief from a grid of heights over a plane of constant depth, towards the camera; a solid block with side walls.
+/// Solid block with side walls whose face is a relief: a grid of heights over a plane of constant depth, positive
+/// towards the camera.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -47,8 +49,8 @@ pub struct HeightMap {
 }
 
 impl HeightMap {
-    /// Relief from heights in mm (rows along y, columns along x) over the plane z = `z_mm`; `origin_mm` is the (x, y) of
-    /// the first sample and `pitch_mm` the distance of samples along x and y.
+    /// Relief from heights in mm (rows along y, columns along x) over the plane z = `z_mm`; `origin_mm` is the position
+    /// (x, y) of the first sample and `pitch_mm` the distance between samples along x and y.
     ///
     /// # Errors
     /// [`Error::Value`] when the map has fewer than 2 x 2 samples, a height or place is not finite, or a pitch is not
@@ -124,8 +126,9 @@ fn check_grid(heights_mm: &Array2<f64>, origin_mm: [f64; 2], pitch_mm: [f64; 2],
     Ok(())
 }
 
-/// Bound of the slope between samples, from the differences of neighbours. Catmull-Rom turns differences of at most 1
-/// into a slope of at most 1.375 along its axis, and amplifies across it by at most 1.25.
+/// Upper bound of the slope between samples, from the differences of neighbouring samples. Catmull-Rom turns
+/// differences of at most 1 into a slope of at most 1.375 along its axis, and amplifies across this axis by at most
+/// 1.25.
 fn steepest(heights_mm: &Array2<f64>, pitch_mm: [f64; 2], interpolation: Interpolation) -> f64 {
     let (rows, columns) = heights_mm.dim();
     let mut worst = [0f64; 2];
@@ -146,13 +149,14 @@ fn steepest(heights_mm: &Array2<f64>, pitch_mm: [f64; 2], interpolation: Interpo
 
 /// A position along one axis of the grid.
 struct GridPlace {
-    /// Number of the sample before the position.
+    /// Index of the sample before the position.
     cell: usize,
-    /// Distance from that sample as a part of the pitch, in [0, 1].
+    /// Distance from that sample divided by the pitch, in [0, 1].
     part: f64,
 }
 
-/// The cell that holds a position in samples; the border continues beyond the grid.
+/// The grid cell that contains a position, which is given in samples. A position beyond the grid is moved to its
+/// border.
 fn place(position: f64, samples: usize) -> GridPlace {
     let held = position.clamp(0.0, (samples - 1) as f64);
     let index = (held as usize).min(samples - 2);

@@ -1,4 +1,4 @@
-//! Bodies with closed-form intersections: half-space, sphere, cuboid; and the steps composed of them.
+//! Bodies with closed-form intersections (half-space, sphere, cuboid), and the scene of steps composed of them.
 
 use super::{REFERENCE_Z_MM, Surface, Union, march, unit};
 use crate::error::{Error, Result};
@@ -110,7 +110,7 @@ impl Surface for Sphere {
         let nearest = -dot(v, ray.direction);
         let passing: [f64; 3] = std::array::from_fn(|i| v[i] + nearest * ray.direction[i]);
         let half = (self.radius_mm * self.radius_mm - dot(passing, passing)).sqrt();
-        // A ray that passes by has a NaN half chord, for which every comparison is false.
+        // The half chord of a ray that misses the sphere is NaN, and comparisons with NaN are false.
         let t = (nearest - half).max(from);
         (half >= 0.0 && t <= to && t <= nearest + half).then_some(t)
     }
@@ -148,7 +148,7 @@ impl Cuboid {
         Ok(Self { low_mm, high_mm })
     }
 
-    /// Signed distance outside each pair of faces.
+    /// Signed distance beyond each pair of faces, negative between them.
     fn beyond(&self, p_mm: [f64; 3]) -> [f64; 3] {
         std::array::from_fn(|i| (self.low_mm[i] - p_mm[i]).max(p_mm[i] - self.high_mm[i]))
     }
