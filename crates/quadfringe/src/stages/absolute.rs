@@ -1,7 +1,7 @@
 //! Absolute phase from wrapped phase and fringe order.
 //!
-//! A wrapped phase differs from the absolute one by whole turns. Any estimate of the absolute phase that is exact to half
-//! a turn gives their number: `Phi = phi + 2 pi round((estimate - phi) / 2 pi)`.
+//! A wrapped phase differs from the absolute phase by whole turns. An estimate of the absolute phase with an error below
+//! half a turn gives their number: `Phi = phi + 2 pi round((estimate - phi) / 2 pi)`.
 
 use crate::parallel::angle::round;
 use crate::{Error, Result};
@@ -19,7 +19,7 @@ pub struct Absolute {
 }
 
 impl Absolute {
-    /// From two maps of one size.
+    /// Combines two maps of equal size.
     ///
     /// # Errors
     /// [`Error::Shape`] when the maps differ in size.
@@ -31,7 +31,7 @@ impl Absolute {
     }
 }
 
-/// A wrapped phase with the turns that bring it nearest to an estimate of the absolute phase, both in rad and
+/// Adds whole turns to a wrapped phase until it is nearest to an estimate of the absolute phase; both in rad and
 /// `(rows, columns)`. NaN in, NaN out.
 ///
 /// # Errors
@@ -59,7 +59,7 @@ pub fn nearest_turn(
     Ok(pixels.par_map_collect(|&wrapped, &estimate| with_turns_of(estimate, wrapped)))
 }
 
-/// The same for one pixel.
+/// [`nearest_turn`] for one pixel.
 #[inline(always)]
 pub(crate) fn with_turns_of(estimate: f32, wrapped: f32) -> f32 {
     wrapped + TAU * round((estimate - wrapped) * (1.0 / TAU))

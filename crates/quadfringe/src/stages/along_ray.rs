@@ -1,15 +1,15 @@
 //! Fringe orders along the camera ray, for two calibrated projectors.
 //!
 //! Each candidate order of the first phase is a point on the camera ray. Both projectors are calibrated, so the second and
-//! the third phase that they show there are known. The candidate whose phases agree best with the measured ones wins,
-//! whether the projectors are coaxial or not.
+//! the third phase at this point are known. The candidate whose phases agree best with the measured ones wins. The
+//! projectors need not be coaxial.
 
 use super::Phases;
 use crate::encoding::FourChannel;
 use crate::parallel::angle::{round, wrap_positive};
 use std::f32::consts::TAU;
 
-/// Pixels that are searched together, as vectors.
+/// Number of pixels that are searched together, as vectors.
 const BLOCK: usize = 64;
 
 /// The rays of a row of pixels, with one entry per pixel.
@@ -27,7 +27,7 @@ pub struct RayRow<'a> {
     pub infrared: [&'a [f32]; 4],
     /// Least first absolute phase in rad that a surface on the ray can have; NaN if there is none.
     pub low_rad: &'a [f32],
-    /// Greatest such phase in rad. Both differ by no more than the width of the field.
+    /// Greatest such phase in rad. The two differ by no more than the width of the field.
     pub high_rad: &'a [f32],
 }
 
@@ -42,13 +42,13 @@ impl RayRow<'_> {
 
 /// Search along the camera ray, one pixel at a time.
 ///
-/// If the beat of the first two fringe numbers has one fringe over the field, it limits the candidates: those farther away
-/// than half a beat of the third number cannot win.
+/// If the beat of the first two fringe numbers has one fringe over the field, it gives an estimate that limits the
+/// candidates: a candidate that is further from it than half a fringe of the beat with the third number cannot win.
 #[derive(Debug, Clone)]
 pub(crate) struct AlongRay {
-    /// Second fringe number over the first.
+    /// Second fringe number divided by the first.
     ratio: f32,
-    /// Squared distance of the closest candidates, turns^2.
+    /// Squared distance between the phases of the two closest candidates, turns^2.
     apart: f32,
     near: Option<Near>,
 }
@@ -56,11 +56,11 @@ pub(crate) struct AlongRay {
 /// Candidates near the estimate that the beat of the first two phases gives.
 #[derive(Debug, Clone, Copy)]
 struct Near {
-    /// 1, or -1 when the second number is the greater.
+    /// 1, or -1 if the second fringe number is greater than the first.
     sign: f32,
     /// Number of orders after which all phases but the infrared one repeat.
     cycle: f32,
-    /// Number of candidates to each side.
+    /// Number of candidates on each side of the estimate.
     reach: i32,
 }
 
@@ -78,9 +78,9 @@ impl Near {
     }
 }
 
-/// Least and second least cost of the candidates so far, for a block of pixels. Costs are kept as the bits of
-/// non-negative numbers, which have the same order: a choice between integers compiles without masked stores, which a
-/// choice between floating-point numbers does not.
+/// Least and second least cost of the candidates so far, for a block of pixels. Costs are not negative, so their bits,
+/// read as integers, have the same order. A choice between integers compiles without masked stores; a choice between
+/// floating-point numbers needs them.
 struct Best {
     least: [u32; BLOCK],
     next: [u32; BLOCK],
@@ -94,8 +94,8 @@ impl AlongRay {
         Self { ratio, apart: apart * apart, near: Near::of(numbers) }
     }
 
-    /// Absolute phase and margin of a row of pixels. The margin is 1 if the second and the third phase agree exactly and 0
-    /// if another candidate agrees as well. NaN in, NaN out; NaN also where no candidate lies on the ray.
+    /// Absolute phase and margin of a row of pixels. The margin is 1 if the second and the third phase agree exactly, and
+    /// 0 if another candidate agrees equally well. NaN in, NaN out; NaN also where no candidate lies on the ray.
     #[inline(always)]
     pub fn order_row(
         &self,
@@ -144,7 +144,7 @@ impl AlongRay {
         for step in -near.reach..=near.reach {
             let turns = TAU * step as f32;
             let guess = |i: usize| {
-                // The beat is the same at both ends of the field.
+                // The beat has the same phase at both ends of the field, so the estimate may lie a cycle off.
                 let guess = start[i] + turns;
                 let guess = if guess > high[i] { guess - cycle } else { guess };
                 if guess < low[i] { guess + cycle } else { guess }
@@ -194,13 +194,13 @@ impl AlongRay {
 }
 
 impl Best {
-    /// Before the first candidate. A second candidate costs at most `apart`.
+    /// The state before the first candidate. The second least cost starts at `apart` and cannot exceed it.
     #[inline(always)]
     fn beyond(apart: f32) -> Self {
         Self { least: [f32::INFINITY.to_bits(); BLOCK], next: [apart.to_bits(); BLOCK] }
     }
 
-    /// Write the margins, and NaN where there was no candidate.
+    /// Writes the margins. Phase and margin become NaN where there was no candidate.
     #[inline(always)]
     fn finish(&self, phase: &mut [f32], margin: &mut [f32]) {
         for (i, (phase, margin)) in phase.iter_mut().zip(margin).enumerate() {
@@ -234,7 +234,7 @@ mod tests {
         AlongRay::new(&FourChannel::of(Encoding::optimum(36, 912)))
     }
 
-    /// Phase and margin of a pixel with the absolute phase `truth`, whose three phases are off by `noise`.
+    /// Phase and margin found for a pixel with the absolute phase `truth`, after `noise` is added to its three phases.
     fn search(
         way: &AlongRay,
         infrared: [f32; 4],

@@ -1,8 +1,8 @@
 //! Means over blocks of pixels.
 //!
-//! The published decoder finds fringe orders from means over a few rows, and over 1, 2 or 4 columns where fringes are
-//! coarse enough: a mean over `n` pixels has `1 / n` of their noise variance. The phase itself is then taken from single
-//! pixels; the means only select its order.
+//! The published decoder finds fringe orders from means over a few rows, and over 2 or 4 columns if the fringes are
+//! coarse enough, because a mean over `n` pixels has `1 / n` of their noise variance. The means only select the order;
+//! the phase is taken from single pixels.
 
 use super::params::{BLOCK_COLUMNS_MAX, ROWS_PER_COLUMN, SAMPLES_PER_FRINGE_MIN};
 use crate::error::Limit;
@@ -11,7 +11,7 @@ use crate::{Error, Result};
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 
-/// Size of the blocks whose means the published decoder works on.
+/// Size of the blocks over which the published decoder takes means.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub struct Blocks {
@@ -22,8 +22,8 @@ pub struct Blocks {
 }
 
 impl Blocks {
-    /// The widest blocks that leave enough samples per fringe of G and IR, whose periods along a row are given in camera
-    /// pixels. `width` is that of the image, in pixels.
+    /// The widest blocks that leave enough samples in each fringe of G and IR. Their fringe periods along a row and the
+    /// `width` of the image are given in camera pixels.
     ///
     /// ```
     /// use quadfringe::stages::Blocks;
@@ -49,9 +49,9 @@ impl Blocks {
 
 /// Means over blocks of `rows` rows and `columns` columns of an image.
 ///
-/// The result has one row for every block, also for the last one, which may have fewer rows, and
-/// `image columns / columns` columns, rounded down. Its unit is that of the image. NaN in a block makes its mean NaN;
-/// see [`fill_gaps`].
+/// The result has one row for every block, and `image columns / columns` columns, rounded down; the last block may
+/// contain fewer image rows than the others. The unit of the image is kept. NaN in a block makes its mean NaN; see
+/// [`fill_gaps`].
 ///
 /// # Errors
 /// [`Error::Value`] when `rows` is 0, or `columns` is no power of two or wider than the image.
@@ -90,8 +90,8 @@ pub fn block_means(image: ArrayView2<'_, f32>, rows: usize, columns: usize) -> R
 /// Fill each gap of a row (NaN or infinity) with the last value before it, and a gap at the beginning with the first value
 /// after it. A row without any value becomes 0.
 ///
-/// One NaN would spread over the whole row in the Fourier filter. The infrared image has gaps where registration leaves
-/// pixels that its chip does not see; discard the result there.
+/// In the Fourier filter, one NaN would spread over the whole row. A registered infrared image has gaps where the
+/// infrared chip does not see the point; discard the result there.
 ///
 /// ```
 /// use ndarray::array;
@@ -109,10 +109,11 @@ pub fn fill_gaps(image: ArrayView2<'_, f32>) -> Array2<f32> {
     filled
 }
 
-/// Repeat each row of a map of blocks for the `rows` rows of its block, for an image of `height` rows.
+/// Repeats each row of a map of blocks for all image rows of the block. A block has `rows` rows, the image `height`
+/// rows.
 ///
 /// # Errors
-/// [`Error::Shape`] when the map has another number of blocks than such an image.
+/// [`Error::Shape`] when the map does not have one row for each block of such an image.
 ///
 /// ```
 /// use ndarray::array;
@@ -129,13 +130,13 @@ pub fn repeat_rows(map: ArrayView2<'_, f32>, rows: usize, height: usize) -> Resu
     Ok(Array2::from_shape_fn([height, map.ncols()], |(y, x)| map[[y / rows.max(1), x]]))
 }
 
-/// Add a row to a sum of rows.
+/// Adds a row to a sum of rows.
 #[inline(always)]
 pub(crate) fn add(row: &[f32], sum: &mut [f32]) {
     sum.iter_mut().zip(row).for_each(|(sum, light)| *sum += light);
 }
 
-/// Divide a sum of so many rows by their number.
+/// Divides a sum of `rows` rows by their number.
 #[inline(always)]
 pub(crate) fn scale(sum: &mut [f32], rows: usize) {
     sum.iter_mut().for_each(|sum| *sum *= 1.0 / rows as f32);
@@ -157,7 +158,7 @@ pub(crate) fn coarsen(row: &[f32], step: usize, out: &mut Aligned<f32>, spare: &
     }
 }
 
-/// Means of two samples.
+/// Means of two neighbouring samples.
 #[inline(always)]
 fn pair_means(row: &[f32], out: &mut [f32]) {
     let (pairs, _) = row.as_chunks::<2>();
@@ -170,7 +171,7 @@ fn pair_means(row: &[f32], out: &mut [f32]) {
 #[inline(always)]
 pub(crate) fn fill_row_gaps(row: &mut [f32], gaps: &mut Vec<usize>) {
     gaps.clear();
-    // A vector comparison of all pixels: only shots with registration have gaps.
+    // This first pass compiles to vectors, and most rows end here: only shots with registration have gaps.
     if row.iter().fold(true, |whole, v| whole & v.is_finite()) {
         return;
     }

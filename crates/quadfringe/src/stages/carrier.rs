@@ -1,8 +1,9 @@
 //! The fringe period in camera pixels, estimated from the shot.
 //!
-//! Fringes concentrate power at one frequency, the carrier. The mean power spectrum of a few lines, each without its mean
-//! and under a sine-squared window, has a peak there. The centre of gravity of the peak is the number of fringes on the
-//! line, and the length of the line over this number is the period.
+//! Fringes concentrate power at one frequency, the carrier. The mean is subtracted from each of a few lines, and the
+//! lines are multiplied by a sine-squared window; then their mean power spectrum has a peak at the carrier. The centre of
+//! gravity of the peak is the number of fringes on a line, and the length of the line divided by this number is the
+//! period.
 
 use super::params::{
     CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, CARRIER_SHARE_MIN, PERIOD_MIN_PX, SAMPLE_ROWS,
@@ -32,7 +33,7 @@ impl Carrier {
 
 /// The carrier of a fringe image: the strongest peak in the mean power spectrum of its rows and of its columns.
 ///
-/// NaN counts as the mean of its line.
+/// NaN is replaced by the mean of its line.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -60,8 +61,8 @@ fn line_period(image: ArrayView2<'_, f32>) -> f64 {
     spectrum.take_period_px()
 }
 
-/// Fringe period along the rows in camera pixels, as the published decoder estimates it from linear red light: from 3
-/// pixels to the width of the image, which it is when no carrier stands out.
+/// Fringe period along the rows in camera pixels, as the published decoder estimates it from linear red light. The
+/// result lies between 3 pixels and the width of the image; it is the width if no carrier stands out.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -79,12 +80,12 @@ pub fn row_period_px(image: ArrayView2<'_, f32>) -> f64 {
     spectrum.take_row_period_px()
 }
 
-/// Rows that the fringe period is estimated from.
+/// Rows from which the fringe period is estimated.
 pub(crate) fn period_rows(height: usize) -> impl Iterator<Item = usize> {
     (0..height).step_by(height.div_ceil(SAMPLE_ROWS).max(1))
 }
 
-/// Mean power spectrum of lines of one length, planned once.
+/// Mean power spectrum of lines of equal length; the transform is planned once.
 pub(crate) struct LineSpectrum {
     forward: Arc<dyn RealToComplex<f32>>,
     window: Vec<f32>,
@@ -111,7 +112,7 @@ impl LineSpectrum {
         }
     }
 
-    /// Add a line; NaN counts as the mean of the line.
+    /// Adds a line. NaN is replaced by the mean of the line.
     pub fn add(&mut self, line: ArrayView1<'_, f32>) {
         let seen = line.iter().filter(|v| v.is_finite());
         let mean = seen.clone().sum::<f32>() / seen.count().max(1) as f32;
@@ -128,7 +129,7 @@ impl LineSpectrum {
         }
     }
 
-    /// Period of the strongest peak in samples, infinite where none stands out. The lines are forgotten.
+    /// Period of the strongest peak in samples; infinite if no peak stands out. Resets the spectrum for new lines.
     pub fn take_period_px(&mut self) -> f64 {
         let cycles = strongest(&self.power, CARRIER_POWER_MIN * self.level);
         self.power.fill(0.0);
@@ -136,7 +137,7 @@ impl LineSpectrum {
         cycles.map_or(f64::INFINITY, |cycles| self.window.len() as f64 / cycles)
     }
 
-    /// The same within the limits of [`row_period_px`].
+    /// As [`Self::take_period_px`], within the limits of [`row_period_px`].
     pub fn take_row_period_px(&mut self) -> f64 {
         let width = self.window.len() as f64;
         self.take_period_px().clamp(PERIOD_MIN_PX, width)

@@ -1,7 +1,7 @@
 //! Projector columns from absolute phase.
 //!
-//! `Phi = 2 pi N u / W` (S1), so `u = Phi W / (2 pi N)`. No light comes from beside the projector image, so columns more
-//! than one beyond its edges are wrong and become NaN together with their phase.
+//! `Phi = 2 pi N u / W` (S1), so `u = Phi W / (2 pi N)`. No light comes from outside the projector image. Columns that
+//! lie more than one column outside it are therefore wrong; they and their phases become NaN.
 
 use crate::encoding::Encoding;
 use ndarray::{Array2, ArrayView2};
@@ -43,7 +43,7 @@ pub fn columns_from_phase(encoding: &Encoding, phase_rad: ArrayView2<'_, f32>) -
     found
 }
 
-/// Columns between which the projector image lies, with one column of noise on each side.
+/// First and last column of the projector image, with a tolerance of one column for noise on each side.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ProjectorEdges {
     first_px: f32,

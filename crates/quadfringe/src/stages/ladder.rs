@@ -1,8 +1,8 @@
 //! Fringe orders by a ladder of beats, pixel by pixel (S4).
 //!
 //! The beat of the phases of N and N - 1 fringes has one fringe over the field, so it has no ambiguity. It gives the order
-//! of the beat of N and N - sqrt(N), which has sqrt(N) fringes, and this one gives the order of N: a ladder 1 -> sqrt(N)
-//! -> N, on which noise grows by the factor sqrt(N) at each rung.
+//! of the beat of N and N - sqrt(N), which has sqrt(N) fringes, and this second beat gives the order of N. Noise grows by
+//! the factor sqrt(N) at each of the two rungs 1 -> sqrt(N) -> N.
 
 use super::{Absolute, Phases};
 use crate::encoding::{Encoding, FourChannel};
@@ -12,18 +12,18 @@ use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Pixels that are searched together, as vectors.
+/// Number of pixels that are searched together, as vectors.
 const BLOCK: usize = 64;
 
 /// Fringe orders of one pixel at a time (S4).
 ///
-/// Fringe numbers without a beat of at most one fringe have no ladder; every order is tried in turn for them.
+/// If no beat of the fringe numbers has at most one fringe, there is no ladder, and every order is tried in turn.
 #[derive(Debug, Clone)]
 pub struct Ladder {
     numbers: Phases<f32>,
     columns_per_turn: f32,
     width: f32,
-    /// Orders after which all three phases repeat, if the whole field is one such cycle.
+    /// Number of orders after which all three phases repeat, if the whole field is one such cycle.
     cycle: Option<f32>,
     climbs: bool,
     orders: usize,
@@ -39,17 +39,17 @@ pub struct Ordered {
     pub margin: f32,
 }
 
-/// Where the field ends and all phases repeat, in turns of the first phase.
+/// The end of the field, where all phases repeat, in turns of the first phase.
 #[derive(Clone, Copy)]
 struct Repeat {
     /// End of the field.
     end: f32,
-    /// Length of the cycle to go back by from there.
+    /// Length of the cycle, which is subtracted from phases beyond the end.
     cycle: f32,
 }
 
 impl Ladder {
-    /// Plan for the fringe numbers of an encoding.
+    /// Plans the ladder for the fringe numbers of an encoding.
     #[must_use]
     pub fn new(code: &FourChannel) -> Self {
         let numbers = Phases::from_array(code.numbers());
@@ -84,10 +84,11 @@ impl Ladder {
         Ordered { phase_rad: phase_rad[0], margin: margin[0] }
     }
 
-    /// The same for a row of pixels.
+    /// [`Self::order`] for a row of pixels.
     #[inline(always)]
     pub(crate) fn order_row(&self, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
-        // Column 0 and the end of the field look alike if all phases repeat. The field starts half a column before 0.
+        // If all phases repeat, column 0 and the end of the field cannot be distinguished. The field starts half a
+        // column before column 0.
         let end = (self.width - 0.5) / self.columns_per_turn;
         let never = Repeat { end: f32::INFINITY, cycle: 0.0 };
         let repeat = self.cycle.map_or(never, |cycle| Repeat { end, cycle });
@@ -103,7 +104,7 @@ impl Ladder {
         }
     }
 
-    /// Climb the ladder. Phases are in turns, so that orders are whole numbers.
+    /// Climbs the ladder. Phases are in turns, so that orders are integers.
     #[inline(always)]
     fn climb(&self, wrapped: Phases<&[f32]>, repeat: Repeat, phase: &mut [f32], margin: &mut [f32]) {
         let Phases { quadrature: n1, green: n2, infrared: n3 } = self.numbers;
@@ -136,8 +137,8 @@ impl Ladder {
         }
     }
 
-    /// Try every order for a block of pixels. The best one has the least squared error of the other two phasors; the
-    /// margin follows from the next best one.
+    /// Tries every order for a block of pixels. The best order has the least squared error of the other two phasors;
+    /// the margin follows from the second best order.
     fn search_block(&self, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
         let Phases { quadrature: first, green: second, infrared: third } = wrapped;
         let to_second = self.numbers.green / self.numbers.quadrature;
@@ -164,10 +165,10 @@ impl Ladder {
     }
 }
 
-/// The whole number of turns nearest to a number.
+/// The nearest integer number of turns.
 struct Nearest {
     turns: f32,
-    /// Distance of the number from it.
+    /// Distance from it.
     rest: f32,
 }
 

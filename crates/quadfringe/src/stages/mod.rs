@@ -1,4 +1,4 @@
-//! The stages of the published method, each in one file that derives it, states its source and runs by itself.
+//! The stages of the published method. Each has a file that derives it, states its source, and can be used alone.
 //!
 //! | stage | equation |
 //! |---|---|
@@ -14,8 +14,8 @@
 //! | [`columns_from_phase`]: projector columns | (S1) |
 //! | [`n_step()`]: the reference by N-step phase shifting | |
 //!
-//! The published decoder calls the same functions row by row. The test `tests/stages.rs` composes the public ones by hand
-//! and gets the same bits; the recipe stands in the source of `published/mod.rs`.
+//! The published decoder calls the same functions row by row. The test `tests/stages.rs` composes the public functions
+//! and gets bit-identical results; the source of `published/mod.rs` holds the recipe.
 
 mod absolute;
 mod along_ray;

@@ -13,7 +13,7 @@ use ndarray::{Array2, ArrayView2, ArrayView3, ArrayViewMut1, Axis, Zip};
 use std::f32::consts::PI;
 use std::f64::consts::TAU;
 
-/// Fewest images that determine background, modulation and phase.
+/// Least number of images that determine background, modulation and phase.
 const STEPS_MIN: usize = 3;
 
 /// The three unknowns of a fringe image, each `(rows, columns)`.
@@ -28,8 +28,8 @@ pub struct NStep {
     pub modulation: Array2<f32>,
 }
 
-/// Phase, background and modulation from equally spaced steps over one period,
-/// `I_s = a + b cos(Phi + 2 pi s / N)`, `stack` being `(steps, rows, columns)` with N >= 3 steps.
+/// Phase, background and modulation from equally spaced steps over one period, `I_s = a + b cos(Phi + 2 pi s / N)`.
+/// `stack` has the shape `(steps, rows, columns)` with N >= 3 steps.
 ///
 /// Harmonics of the fringes up to the order N - 2 do not change the phase.
 ///
@@ -94,7 +94,7 @@ impl Wave {
     }
 }
 
-/// Sums over the steps at one pixel, of differences to the first step.
+/// Sums over the steps at one pixel, of the differences from the first step.
 #[derive(Clone, Default)]
 struct Sums {
     real: f64,
@@ -109,10 +109,10 @@ struct RowOut<'a> {
     modulation: ArrayViewMut1<'a, f32>,
 }
 
-/// Demodulate one row, `(steps, columns)`.
+/// Demodulates one row, `(steps, columns)`.
 ///
-/// The sums run over differences to the first step. The weights add up to zero, so only the rounding changes, and equal
-/// images give a modulation of exactly 0.
+/// The sums run over the differences from the first step. The weights add up to zero, so this changes only the
+/// rounding, and equal images give a modulation of exactly 0.
 fn demodulate_row(steps: ArrayView2<'_, f32>, waves: &[Wave], mut out: RowOut<'_>) {
     let first = steps.row(0);
     let mut sums = vec![Sums::default(); first.len()];
@@ -133,7 +133,7 @@ fn demodulate_row(steps: ArrayView2<'_, f32>, waves: &[Wave], mut out: RowOut<'_
     }
 }
 
-/// An angle in (-pi, pi]: -pi becomes pi.
+/// Moves an angle from [-pi, pi] to (-pi, pi]: -pi becomes pi.
 fn half_open(angle: f32) -> f32 {
     if angle <= -PI { PI } else { angle }
 }

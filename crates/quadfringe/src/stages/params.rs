@@ -1,27 +1,27 @@
-//! Tuned numbers of the stages: unit, trade-off, and what measures them.
+//! Tuned numbers of the stages, each with its unit, its trade-off and the command that measures it.
 //!
 //! `python evaluation/accuracy.py` (method `published`) measures the effect of a change on noise, texture and edges.
 
-/// Rows of the image that the fringe period and the statistics of a shot are taken from. More rows average out objects
-/// and shadows; fewer rows take less time (`python evaluation/accuracy.py`).
+/// Number of image rows from which the fringe period and the statistics of a shot are estimated. More rows average out
+/// objects and shadows; fewer rows take less time (`python evaluation/accuracy.py`).
 pub(crate) const SAMPLE_ROWS: usize = 16;
 
-/// Lines, in each direction, that [`carrier`](super::carrier()) takes its spectrum from. More lines average out
-/// objects; fewer take less time. Not measured.
+/// Number of lines in each direction of which [`carrier`](super::carrier()) averages the spectrum. More lines average
+/// out objects; fewer lines take less time. Not measured.
 pub(crate) const CARRIER_LINES: usize = 48;
 
-/// Fewest fringes over the image that count as a carrier. A larger number ignores slow shading better; a smaller number
-/// accepts coarser fringes. Fewer than 4 fringes lie in the spectrum of the illumination. Not measured.
+/// Least number of fringes over the image that counts as a carrier. A larger number ignores slow shading better; a
+/// smaller number accepts coarser fringes. Fewer than 4 fringes lie in the spectrum of the illumination. Not measured.
 pub(crate) const CARRIER_CYCLES_MIN: usize = 4;
 
 /// Least share of the power above [`CARRIER_CYCLES_MIN`] that the carrier must have. A larger share rejects fringes on
-/// textured or broken surfaces; a smaller one accepts noise. Coarse texture without fringes can have more, which the
-/// share cannot tell apart. `python evaluation/captures_report.py` and `cargo test -p quadfringe --test sizes` decode
+/// textured or broken surfaces; a smaller one accepts noise. Coarse texture without fringes can have a larger share and
+/// then counts as a carrier. `python evaluation/captures_report.py` and `cargo test -p quadfringe --test sizes` decode
 /// shots whose carriers must be found.
 pub(crate) const CARRIER_SHARE_MIN: f32 = 0.2;
 
-/// Least power of a carrier over the power of the mean level. Follows from the rounding of `f32`, which leaves less
-/// than 1e-12 of a flat line; fringes with an amplitude of 0.1 % of the level have 9e-8.
+/// Least power of a carrier divided by the power of the mean level. Follows from the rounding of `f32`, which leaves
+/// less than 1e-12 of a flat line; fringes with an amplitude of 0.1 % of the level have 9e-8.
 pub(crate) const CARRIER_POWER_MIN: f32 = 1e-8;
 
 /// Least number of samples per fringe of G and IR after averaging over columns. The improved band ends at 2.3 times the
@@ -42,8 +42,8 @@ pub(crate) const ROWS_PER_COLUMN: usize = 2;
 /// evaluation/accuracy.py` shows the effect on edges, `cargo bench -p quadfringe -- shot` the time.
 pub(crate) const BLOCK_COLUMNS_MAX: usize = 4;
 
-/// Least number of samples per fringe in which the envelope looks for extrema. More samples place an extremum more
-/// exactly; fewer average more noise away. An extremum between samples is the top of a parabola. `python
+/// Least number of samples per fringe with which the envelope searches for extrema. More samples place an extremum more
+/// exactly; fewer average more noise away. The place of an extremum between samples comes from a parabola. `python
 /// evaluation/accuracy.py` shows the effect on both.
 pub(crate) const ENVELOPE_SAMPLES_PER_FRINGE: f32 = 8.0;
 
@@ -73,20 +73,21 @@ pub(crate) const TRADITIONAL_BAND: BandEdges =
 pub(crate) const IMPROVED_BAND: BandEdges =
     BandEdges { zero_below: 0.0, full_from: 0.3, full_to: 1.8, zero_above: 2.3 };
 
-/// Length of the passage from the end of a row to its beginning, as one part in so many of the row. A longer passage
-/// makes the ring of the transform smoother; a shorter one takes less time. `cargo test -p quadfringe --lib
-/// fringes_go_on_in_phase_at_both_ends` checks the passage.
+/// The transform joins the end of a row to its beginning by a passage, whose length is the length of the row divided by
+/// this number. A longer passage makes the join smoother; a shorter one takes less time. `cargo test -p quadfringe
+/// --lib fringes_go_on_in_phase_at_both_ends` checks the passage.
 pub(crate) const PASSAGE_PART: usize = 10;
 
-/// Least margin below which an order counts as a stray. A larger value counts noise as strays; a smaller one misses
-/// strays on noisy shots. `cargo test -p quadfringe --test uncertainty` bounds the probabilities that follow.
+/// Lower bound of the margin below which an order counts as a stray. A larger value counts noise as strays; a smaller
+/// one misses strays on noisy shots. `cargo test -p quadfringe --test uncertainty` bounds the probabilities that
+/// follow.
 pub(crate) const STRAY_MARGIN_MIN: f32 = 0.25;
 
 /// Least standard deviation of a beat in rad. It keeps the probabilities of shots without noise away from 0 and 1. A
 /// larger value overestimates the probability on clean shots. Not measured.
 pub(crate) const BEAT_SIGMA_MIN_RAD: f32 = 0.02;
 
-/// One pixel in so many of a sampled row enters the statistics of a shot. Fewer pixels take less time and make the
-/// median less exact. Follows from the standard error of a median: 16 rows of 1024 columns give 5,500 pixels, whose
+/// Step between the pixels of a sampled row that enter the statistics of a shot. Fewer pixels take less time and make
+/// the median less exact. Follows from the standard error of a median: 16 rows of 1024 columns give 5,500 pixels, whose
 /// median is certain to 2 %.
 pub(crate) const SAMPLE_STRIDE: usize = 3;

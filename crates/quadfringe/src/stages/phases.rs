@@ -19,19 +19,19 @@ pub struct Phases<T> {
 }
 
 impl<T> Phases<T> {
-    /// From an array in the order R and B, G, IR, which is that of the fringe numbers.
+    /// From an array in the order of the fringe numbers: R and B, G, IR.
     #[inline(always)]
     pub fn from_array([quadrature, green, infrared]: [T; 3]) -> Self {
         Self { quadrature, green, infrared }
     }
 
-    /// Apply a function to each phase.
+    /// Applies a function to each phase.
     #[inline(always)]
     pub fn map<U>(self, mut f: impl FnMut(T) -> U) -> Phases<U> {
         Phases { quadrature: f(self.quadrature), green: f(self.green), infrared: f(self.infrared) }
     }
 
-    /// Borrow each phase.
+    /// Borrows each phase.
     #[inline(always)]
     pub const fn as_ref(&self) -> Phases<&T> {
         Phases { quadrature: &self.quadrature, green: &self.green, infrared: &self.infrared }

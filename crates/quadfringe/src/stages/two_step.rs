@@ -61,8 +61,8 @@ pub fn modulation(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Result
     pixel_by_pixel(red, blue, |red, blue| (red * red + blue * blue).sqrt())
 }
 
-/// Modulation of R over that of B for each row, from R and B without their backgrounds: the factor for B that makes
-/// both equal. It is the ratio of the root mean squares along the row.
+/// Modulation of R divided by the modulation of B for each row, from R and B without their backgrounds. Multiplied by
+/// this factor, B has the modulation of R. The factor is the ratio of the root mean squares along the row.
 ///
 /// # Errors
 /// [`Error::Shape`] when the two differ in size.
@@ -81,7 +81,7 @@ pub fn modulation_ratio(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> 
     Ok(rows.map(|(red, blue)| row_modulation_ratio(&red.to_vec(), &blue.to_vec())).collect())
 }
 
-/// The same for one row.
+/// [`modulation_ratio`] for one row.
 #[inline(always)]
 pub(crate) fn row_modulation_ratio(red: &[f32], blue: &[f32]) -> f32 {
     (power(red) / power(blue).max(f32::MIN_POSITIVE)).sqrt()

@@ -26,7 +26,8 @@ pub struct Valid {
     pub quality: Array2<f32>,
 }
 
-/// Discard pixels of low modulation, and phases whose order has a low margin. `modulation` is the least of all channels.
+/// Discards pixels of low modulation, and phases whose order has a low margin. `modulation` is the least modulation of
+/// all channels.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size.
@@ -62,7 +63,7 @@ pub fn discard_invalid(
     Ok(Valid { phase_rad, quality })
 }
 
-/// What one pixel has.
+/// The decision about one pixel.
 #[derive(Clone, Copy)]
 pub(crate) struct Judged {
     /// Enough modulation.

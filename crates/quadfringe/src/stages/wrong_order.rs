@@ -1,9 +1,10 @@
 //! The probability that a fringe order is wrong, from the margins of a shot.
 //!
-//! With the margin `m`, a beat is off by `d = pi (1 - m)`, and for the next order it would be off by `2 pi - d`. Two causes
-//! make an order wrong. Noise: beats are off by a normal deviation `sigma`, known from the median of `d`, so the next
-//! order is less likely by `exp(-2 pi (pi - d) / sigma^2)`. Strays: near edges a phase is arbitrary; their share is known
-//! from the margins that lie where noise hardly reaches (four sigma), and a stray order is as good as random.
+//! If the margin is `m`, the beat differs by `d = pi (1 - m)` from the value that its order requires, and by `2 pi - d`
+//! from the value that the next order requires. There are two causes of a wrong order. Noise: the differences have a normal
+//! distribution, whose standard deviation `sigma` follows from the median of `d`, so the next order is less likely by the
+//! factor `exp(-2 pi (pi - d) / sigma^2)`. Strays: near edges a phase is arbitrary, and the order of a stray is random. The
+//! share of strays follows from the number of margins beyond four sigma, where noise hardly reaches.
 
 use super::params::{BEAT_SIGMA_MIN_RAD, SAMPLE_ROWS, SAMPLE_STRIDE, STRAY_MARGIN_MIN};
 use ndarray::{Array2, ArrayView2};
@@ -11,9 +12,10 @@ use std::f32::consts::PI;
 
 /// Entries of the table of probabilities, a power of two. One entry spans 0.003 rad of a beat.
 const STEPS: usize = 1024;
-/// In a number of this size the last bit has the value 1: adding it rounds a number into the last bits.
+/// 2^23, where the last bit of an `f32` has the value 1. Adding it to a number rounds the number and leaves it in the
+/// last bits.
 const WHOLE: f32 = 8_388_608.0;
-/// A normal deviation reaches the median of its size with this many standard deviations.
+/// Median of the absolute value of a normal deviation, in standard deviations.
 const MEDIAN_OF_NORMAL: f32 = 0.6745;
 
 /// Probability in [0, 1] that the order of each pixel is wrong, `(rows, columns)`, from the margins of a whole shot. NaN
@@ -44,26 +46,26 @@ pub fn wrong_order_probability(quality: ArrayView2<'_, f32>) -> Array2<f32> {
     out
 }
 
-/// Whether the statistics of a shot of so many rows take in row `y`. These rows have neighbours above and below.
+/// Whether row `y` enters the statistics of a shot of `height` rows. Such rows have neighbours above and below.
 pub(crate) fn is_sampled(y: usize, height: usize) -> bool {
     let every = height.div_ceil(SAMPLE_ROWS).max(1);
     y % every == 1 % every && y > 0 && y + 1 < height
 }
 
-/// Probability of a wrong order for each margin.
+/// Table of the probability of a wrong order by margin.
 #[derive(Debug, Clone)]
 pub(crate) struct WrongOrderTable {
-    /// NaN from `STEPS` on.
+    /// Entries from `STEPS` on are NaN.
     table: Box<[f32; 2 * STEPS]>,
 }
 
 impl WrongOrderTable {
-    /// Before the statistics of a shot are known.
+    /// A placeholder until the statistics of the shot are known.
     pub fn empty() -> Self {
         Self { table: Box::new([0.0; 2 * STEPS]) }
     }
 
-    /// From margins of many pixels.
+    /// Makes the table from the margins of many pixels.
     pub fn new(margins: &[f32]) -> Self {
         let mut apart: Vec<f32> = margins.iter().map(|margin| PI * (1.0 - margin)).collect();
         let sigma = deviation(&mut apart).max(BEAT_SIGMA_MIN_RAD);
@@ -82,7 +84,7 @@ impl WrongOrderTable {
         Self { table: Box::new(std::array::from_fn(entry)) }
     }
 
-    /// Probabilities for a row of margins; NaN for NaN. Places in the table are computed as vectors, and only the look-up
+    /// Probabilities for a row of margins; NaN for NaN. Indices into the table are computed as vectors; only the look-up
     /// is scalar.
     #[inline(always)]
     pub fn row(&self, margins: &[f32], out: &mut [f32]) {
@@ -100,8 +102,8 @@ impl WrongOrderTable {
     }
 }
 
-/// Standard deviation of normal values around 0 from the median of their size; 0 if there are none. The values are
-/// replaced by their sizes in another order.
+/// Standard deviation of normal values around 0, from the median of their absolute values; 0 if there are none. The
+/// values are replaced by their absolute values and reordered.
 pub(crate) fn deviation(values: &mut [f32]) -> f32 {
     values.iter_mut().for_each(|value| *value = value.abs());
     let middle = values.len() / 2;

@@ -6,9 +6,9 @@ use crate::parallel::Aligned;
 use crate::stages::blocks::coarsen;
 use crate::stages::params::{ENVELOPE_SAMPLES_PER_FRINGE, ENVELOPE_SMOOTHING};
 
-/// Extrema that are refined together, as vectors.
+/// Number of extrema that are refined together, as vectors.
 const LANES: usize = 8;
-/// Pixels that are drawn together: in most cases all from one extremum to the next.
+/// Number of pixels that are drawn together; in most cases enough to reach from one extremum to the next.
 const BLOCK: usize = 24;
 
 /// Working memory of [`mean_envelope`].
@@ -41,8 +41,9 @@ struct Line {
 
 /// Background of `row`. Returns false if the row has no fringes.
 ///
-/// The row is split where it crosses its moving mean. Each half wave between two crossings holds one extremum, which is
-/// located on means of 1, 2, 4, ... pixels, as many as leave [`ENVELOPE_SAMPLES_PER_FRINGE`] samples per fringe.
+/// The row is split where it crosses its moving mean. Each half wave between two crossings contains one extremum. To
+/// find it, the row is averaged over 1, 2, 4, ... pixels, as many as leave [`ENVELOPE_SAMPLES_PER_FRINGE`] samples per
+/// fringe.
 #[inline(always)]
 pub(super) fn mean_envelope(
     row: &[f32],
@@ -81,14 +82,14 @@ fn coarseness(period_px: f32) -> usize {
 }
 
 impl Knots {
-    /// Places and values of the extrema: the tops of the parabolas through each extremum and its two neighbours.
+    /// Places and values of the extrema: the vertices of parabolas through each extremum and its two neighbours.
     #[inline(always)]
     fn find(&mut self, waves: &Waves, smooth: &[f32], shortest: usize, step: f32) {
         let Self { at_px, value, extrema } = self;
         waves.extrema(smooth, shortest, extrema);
         let count = extrema.len();
         let whole = count.next_multiple_of(LANES);
-        // Neither a half wave between two crossings nor this padding touches an end of the row.
+        // An extremum lies between two crossings and therefore has two neighbours; sample 1, the padding, has them too.
         extrema.resize(whole, Extremum { sample: 1, sign: 0.0 });
         at_px.resize(whole, 0.0);
         value.resize(whole, 0.0);
@@ -114,8 +115,8 @@ impl Knots {
     }
 }
 
-/// The background at each knot: half the sum of its envelope and the opposite one, which is a straight line between the
-/// two neighbouring knots.
+/// The background at each knot: half the sum of the value at the knot and the opposite envelope, which is a straight
+/// line between the two neighbouring knots.
 #[inline(always)]
 fn find_levels(Knots { at_px, value, .. }: &Knots, levels: &mut Vec<f32>) {
     let last = value.len() - 1;
@@ -130,7 +131,7 @@ fn find_levels(Knots { at_px, value, .. }: &Knots, levels: &mut Vec<f32>) {
     }
 }
 
-/// Straight lines between the levels at the knots, level before the first and after the last knot.
+/// Straight lines between the background levels at the knots, constant before the first and after the last knot.
 #[inline(always)]
 fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>) {
     lines.resize(levels.len() + 1, Line::default());
@@ -144,7 +145,8 @@ fn find_lines(Knots { at_px, .. }: &Knots, levels: &[f32], lines: &mut Vec<Line>
     lines[levels.len()] = Line { level: levels[levels.len() - 1], slope: 0.0, end: u32::MAX };
 }
 
-/// Draw the lines one after another in whole blocks; each line overwrites the excess of the previous one.
+/// Draws the lines one after another in whole blocks. A block may extend beyond the end of its line; the next line
+/// overwrites the excess.
 #[inline(always)]
 fn draw(lines: &[Line], out: &mut [f32]) {
     let mut start = 0;

@@ -18,8 +18,8 @@ use rayon::prelude::*;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Background {
-    /// The published way: half the sum of the upper and the lower envelope, which are straight lines through the fringe
-    /// maxima and minima of the row.
+    /// The published method: half the sum of the upper and the lower envelope of the row. The envelopes connect the
+    /// fringe maxima and the fringe minima by straight lines.
     MeanEnvelope,
     /// Moving mean over one fringe period. It has half the noise and is exact for a linear background.
     #[default]
@@ -28,8 +28,8 @@ pub enum Background {
 
 /// Background of every row of an image, `(rows, columns)` in the unit of the image.
 ///
-/// `period_px` is the fringe period along the row in camera pixels. A row without fringes gets its moving mean in either
-/// case. NaN spreads along its row.
+/// `period_px` is the fringe period along the row in camera pixels. A row without fringes gets its moving mean with
+/// either method. NaN spreads along its row.
 ///
 /// # Errors
 /// [`crate::Error::Value`] when the period is below 3 pixels or longer than a row.

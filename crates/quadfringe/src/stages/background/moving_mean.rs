@@ -1,4 +1,4 @@
-//! Moving mean over a window of any width, whole or not.
+//! Moving mean over a window whose width need not be an integer.
 
 use crate::parallel::Aligned;
 
@@ -10,17 +10,17 @@ pub(super) struct Sums {
     window: Aligned<f32>,
 }
 
-/// Mean over `width` samples around each sample. A window that would leave the row is shifted inside.
+/// Mean over `width` samples around each sample. A window that would extend beyond the row is shifted inwards.
 ///
-/// Window sums are composed of sums over 1, 2, 4, ... samples: every pass is a vector addition, and rounding errors do not
-/// accumulate along the row as in a running sum.
+/// Window sums are composed of sums over 1, 2, 4, ... samples. Every pass is a vector addition, and unlike in a running
+/// sum, rounding errors do not accumulate along the row.
 #[inline(always)]
 pub(super) fn moving_mean(row: &[f32], width: f32, sums: &mut Sums, out: &mut [f32]) {
     let n = row.len();
     let width = width.clamp(1.0, n as f32);
     let reach = (width - 1.0) / 2.0;
     let side = reach as usize;
-    // The samples at both ends of the window have a partial weight.
+    // The samples at the two ends of the window have a partial weight.
     let part = reach - side as f32;
     let scale = 1.0 / width;
     let (first, last) = (end_mean(row.iter(), width), end_mean(row.iter().rev(), width));
@@ -54,7 +54,7 @@ fn end_mean<'a>(row: impl Iterator<Item = &'a f32>, width: f32) -> f32 {
     sum / width
 }
 
-/// Sums of `count` (odd) samples from each place on.
+/// Sums of `count` (odd) samples, starting at each sample.
 #[inline(always)]
 fn window_sums<'a>(row: &'a [f32], count: usize, sums: &'a mut Sums) -> &'a [f32] {
     if count == 1 {

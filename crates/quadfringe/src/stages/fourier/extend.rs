@@ -1,11 +1,11 @@
 //! Continuation of the fringes beyond the ends of a row. The transform treats a row as a ring, and a jump from its end to
 //! its beginning would leak into all frequencies.
 
-/// Write fringes into `tail` that continue the end of `row` and fade, with the weights `fade` (0 to 1), into fringes that
-/// lead to its beginning.
+/// Writes fringes into `tail` that continue the end of `row` and, with the weights `fade` (0 to 1), fade into fringes
+/// that lead to its beginning.
 ///
-/// Fringes are symmetric about an extremum. The row is mirrored at the extremum nearest to its end, which continues value,
-/// slope and phase; mirroring at the end would make the phase jump.
+/// Fringes are symmetric about an extremum. The row is mirrored at the extremum nearest to its end, so that value, slope
+/// and phase continue. If it were mirrored at its end, the phase would jump.
 #[inline(always)]
 pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], scratch: &mut Scratch, tail: &mut [f32]) {
     let n = row.len();
@@ -16,7 +16,7 @@ pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], scratch: &mut Sc
     let after = mirror(edge, quarter, misses);
     let before = mirror(&row[..6 * quarter + 2], quarter, misses);
     reversed(&row[..n - 1 - after], tail);
-    // From the far end of the tail backwards: the fringes that lead to the beginning of the row.
+    // The fringes that lead to the beginning of the row are written backwards from the far end of the tail.
     let beyond = tail.len().saturating_sub(n - 1 - before);
     for (value, weight) in tail[..beyond].iter_mut().zip(fade) {
         *value += weight * (row[n - 1] - *value);
@@ -34,7 +34,7 @@ pub(super) struct Scratch {
     misses: Vec<f32>,
 }
 
-/// The end of `source` in reverse order. Its first sample fills the rest if it is too short.
+/// Copies the end of `source` in reverse order. If `source` is too short, its first sample fills the rest.
 #[inline(always)]
 fn reversed(source: &[f32], out: &mut [f32]) {
     let (known, beyond) = out.split_at_mut(source.len().min(out.len()));
@@ -44,8 +44,9 @@ fn reversed(source: &[f32], out: &mut [f32]) {
     beyond.fill(source[0]);
 }
 
-/// Twice the distance of an extremum from the end of a row, of which `edge[0]` is the last sample: the place about which
-/// a quarter of a fringe is most symmetric. The search covers half a fringe and evaluates all places together.
+/// Twice the distance of an extremum from the end of a row, whose last sample is `edge[0]`. The extremum is the place
+/// about which a quarter of a fringe is most symmetric. The search covers half a fringe and evaluates all places
+/// together.
 #[inline(always)]
 fn mirror(edge: &[f32], quarter: usize, misses: &mut Vec<f32>) -> usize {
     misses.clear();
@@ -78,7 +79,7 @@ mod tests {
             let mut tail = [0.0; 60];
             extend(&row, 25.3, &fade, &mut Scratch::default(), &mut tail);
             for k in 0..30 {
-                // An extremum is found to a quarter of a pixel, so the mirrored row is off by half a pixel at most.
+                // An extremum is found to a quarter of a pixel, so the mirrored row is shifted by half a pixel at most.
                 assert!((tail[k] - at(400.0 + k as f32)).abs() < 0.13, "{start} {k}");
                 assert!((tail[59 - k] - at(-1.0 - k as f32)).abs() < 0.13, "{start} {k}");
             }

@@ -22,14 +22,15 @@ impl<T> RowPair<T> {
     }
 }
 
-/// Transforms for rows of one length, planned once. Two rows share one complex transform, as its real and its imaginary
-/// part.
+/// Transforms for rows of one length, planned once. Two rows share one complex transform: one is its real part, the
+/// other its imaginary part.
 #[derive(Clone)]
 pub(crate) struct RowFilter {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     columns: usize,
-    /// Weights of the passage from the end of a row to its beginning. Its length makes the row fast to transform.
+    /// Weights of the passage from the end of a row to its beginning. With the length of the passage added, the row has
+    /// a length that is fast to transform.
     fade: Vec<f32>,
 }
 
@@ -46,7 +47,7 @@ pub(crate) struct RowScratch {
     tails: [Aligned<f32>; 2],
     extend: extend::Scratch,
     spectrum: Aligned<Complex32>,
-    /// Weighted positive frequencies; zero from `bins` on.
+    /// Weighted positive frequencies. All entries from `bins` on are zero.
     positive: Aligned<Complex32>,
     bins: usize,
     output: Aligned<Complex32>,
@@ -67,12 +68,12 @@ impl RowFilter {
         }
     }
 
-    /// Weights of the frequencies from zero up to the end of the band, scaled to the amplitude that the fringes had before
-    /// averaging over `pixels` pixels.
+    /// Weights of the frequencies from zero up to the end of the band. They restore the amplitude that the fringes had
+    /// before averaging over `pixels` pixels.
     pub fn weights(&self, band: Band, period: f32, pixels: usize) -> Vec<f32> {
         let length = self.forward.len();
         let carrier = length as f32 / period;
-        // Separating the two rows gives twice the spectrum, which makes up for the negative frequencies left out.
+        // Separating the two rows doubles the spectrum; this compensates for the omitted negative frequencies.
         let scale = 1.0 / length as f32;
         let averaging = |bin: usize| {
             let half_turn = std::f32::consts::PI * bin as f32 / length as f32;
@@ -98,7 +99,7 @@ impl RowFilter {
         }
     }
 
-    /// Adapt working memory that may have served rows of another length.
+    /// Adapts working memory that may have been used for rows of another length.
     #[inline(always)]
     pub fn ready(&self, scratch: &mut RowScratch) {
         if scratch.spectrum.len() != self.forward.len() || scratch.tails[0].len() != self.fade.len() {
@@ -106,7 +107,7 @@ impl RowFilter {
         }
     }
 
-    /// Spectrum of two rows of fringes without background, whose periods are in samples.
+    /// Spectrum of two rows of fringes without background. The fringe periods are in samples.
     #[inline(always)]
     pub fn transform(&self, rows: RowPair<&[f32]>, periods: RowPair<f32>, scratch: &mut RowScratch) {
         let RowScratch { tails, extend: edges, spectrum, work, .. } = scratch;
@@ -123,13 +124,13 @@ impl RowFilter {
         self.forward.process_with_scratch(spectrum, work);
     }
 
-    /// Analytic signal of one of the transformed rows: its weighted positive frequencies. It is a ring: the passage from
-    /// the end of the row to its beginning follows the row.
+    /// Analytic signal of one of the transformed rows: its weighted positive frequencies. The signal is periodic: after
+    /// the row comes the passage from its end to its beginning.
     #[inline(always)]
     pub fn analytic<'a>(&self, half: Half, weights: &[f32], scratch: &'a mut RowScratch) -> &'a [Complex32] {
         let RowScratch { spectrum, positive, bins, output, work, .. } = scratch;
         let mirrored = spectrum.iter().rev();
-        // The zero frequency is background.
+        // The zero frequency is background and is left out.
         let weighted = positive.iter_mut().zip(spectrum.iter()).zip(weights).skip(1).zip(mirrored);
         for (((out, &up), &w), down) in weighted {
             *out = match half {
@@ -147,7 +148,7 @@ impl RowFilter {
     }
 }
 
-/// Shortest length of at least `least` with the prime factors 2 and 3 only, and divisible by 16.
+/// Shortest length that is at least `least`, has only the prime factors 2 and 3 (at most 3^2), and is divisible by 16.
 fn quick_length(least: usize) -> usize {
     let threes = [1, 3, 9];
     let lengths = threes.map(|three| three * least.div_ceil(three).next_power_of_two().max(16));

@@ -1,10 +1,10 @@
-//! Phase at every pixel from an analytic signal that is known for means of pixels.
+//! Interpolation of the phase at every pixel from the analytic signal of block means.
 
 use crate::parallel::Aligned;
 use crate::parallel::angle::{coarse_atan2, wrap};
 use rustfft::num_complex::Complex32;
 
-/// Working rows of [`Interpolation::run`]: from the sample before the first to the one after the last.
+/// Working rows of [`Interpolation::run`]. They extend from the sample before the row to the sample after it.
 #[derive(Debug, Default)]
 pub(crate) struct Interpolation {
     phase: Aligned<f32>,
@@ -17,9 +17,9 @@ pub(crate) struct Interpolation {
 }
 
 impl Interpolation {
-    /// Phase and power at every pixel from an analytic signal whose samples are means of `PIXELS` pixels: straight lines
-    /// between the centres of the samples. The phase is not wrapped. `power` keeps the lesser of its value and the square
-    /// of the modulation. The signal is a ring that continues beyond the row.
+    /// Interpolates phase and power linearly between the centres of samples of an analytic signal, each a mean of
+    /// `PIXELS` pixels. The phase is not wrapped. `power` keeps the smaller of its value and the square of the
+    /// modulation. The signal is periodic and continues beyond the row.
     #[inline(always)]
     pub fn run<const PIXELS: usize>(&mut self, ring: &[Complex32], phase: &mut [f32], power: &mut [f32]) {
         let Self { phase: phases, power: powers, phase_step, power_step } = self;
@@ -43,7 +43,7 @@ impl Interpolation {
         draw::<PIXELS>(powers, power_step, power, lesser);
     }
 
-    /// The same for any width of samples that [`Blocks`](crate::stages::Blocks) can have.
+    /// [`Self::run`] for every width that [`Blocks`](crate::stages::Blocks) can have.
     #[inline(always)]
     pub fn run_for(&mut self, pixels: usize, ring: &[Complex32], phase: &mut [f32], power: &mut [f32]) {
         match pixels {
@@ -54,8 +54,8 @@ impl Interpolation {
     }
 }
 
-/// Straight lines from the centre of each sample to that of the next, joined with the present values of the pixels.
-/// `PIXELS` pixels lie between two centres, and half as many before the first.
+/// Draws straight lines from the centre of each sample to the centre of the next; `join` combines them with the present
+/// values of the pixels. `PIXELS` pixels lie between two centres, and half as many before the first.
 #[inline(always)]
 fn draw<const PIXELS: usize>(
     starts: &[f32],
@@ -96,7 +96,7 @@ impl Polar {
     }
 }
 
-/// The lesser of two numbers without a branch; `b` if either is NaN.
+/// The smaller of two numbers without a branch; `b` if either is NaN.
 #[inline(always)]
 pub(crate) fn lesser(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
@@ -108,7 +108,7 @@ mod tests {
     use std::f32::consts::TAU;
 
     fn check<const PIXELS: usize>(bound: f32) {
-        // An odd length: the last pixels lie beyond the last centre.
+        // With an odd length, the last pixels lie beyond the last centre.
         const WIDTH: usize = 1021;
         let at = |x: f32| TAU * x / 29.0 + 2.0 * (TAU * x / 300.0).sin();
         let middle = |sample: f32| PIXELS as f32 * sample + (PIXELS as f32 - 1.0) / 2.0;

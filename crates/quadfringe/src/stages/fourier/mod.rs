@@ -1,8 +1,8 @@
 //! Fourier transform profilometry along rows (Takeda and Mutoh, Appl. Opt. 22, 3977 (1983); (S3)).
 //!
 //! A row without its background is `b cos(Phi) = b/2 (exp(j Phi) + exp(-j Phi))`. The spectrum of the first term lies at
-//! positive frequencies. Keeping a band of these, and twice their amplitude, gives the analytic signal `b exp(j Phi)`: its
-//! argument is the wrapped phase and its size the modulation.
+//! positive frequencies. If a band of these is kept and doubled, the analytic signal `b exp(j Phi)` remains. Its argument
+//! is the wrapped phase and its magnitude the modulation.
 
 mod extend;
 mod filter;
@@ -21,9 +21,11 @@ use ndarray::{Array2, ArrayView2, ArrayViewMut1, Axis, Zip};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[non_exhaustive]
 pub enum Band {
-    /// Half a carrier to each side of the carrier, which excludes the zero component: |dh/dx| < L0 / (3 d).
+    /// Half a carrier to each side of the carrier, which excludes the zero frequency. Surfaces may have slopes |dh/dx|
+    /// < L0 / (3 d).
     Traditional,
-    /// From zero to about twice the carrier, after removal of the background: |dh/dx| < L0 / d, three times the range.
+    /// From zero to about twice the carrier, after the background is removed. Surfaces may have slopes |dh/dx| < L0 /
+    /// d, three times as much.
     #[default]
     Improved,
 }
@@ -41,7 +43,7 @@ impl Band {
     }
 }
 
-/// From 0 at 0 to 1 at 1.
+/// A smooth rise from 0 at `t` = 0 to 1 at `t` = 1.
 fn raised_cosine(t: f32) -> f32 {
     0.5 - 0.5 * (std::f32::consts::PI * t).cos()
 }
@@ -49,7 +51,7 @@ fn raised_cosine(t: f32) -> f32 {
 /// Wrapped phase in rad, `(rows, columns)`, of an image with fringes along its rows.
 ///
 /// `period_px` is the mean fringe period along the row in camera pixels. The traditional band subtracts only the mean
-/// of each row; the improved band subtracts the background, estimated as `removal` says. NaN spreads along its row.
+/// of each row; the improved band subtracts the background, which is estimated by `removal`. NaN spreads along its row.
 ///
 /// # Errors
 /// [`Error::Value`] when the period is below 3 pixels or longer than a row.
@@ -111,10 +113,10 @@ fn row_means(image: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
         .to_owned())
 }
 
-/// Fringes without background, as [`fourier_pair`] takes them.
+/// Fringes without background, the input of [`fourier_pair`].
 #[derive(Debug, Clone, Copy)]
 pub struct Fringes<'a> {
-    /// Means of blocks of pixels less their background, `(rows, columns)`.
+    /// Means over blocks of pixels, minus their background, `(rows, columns)`.
     pub means: ArrayView2<'a, f32>,
     /// Mean fringe period along the row in samples of `means`.
     pub period: f64,
@@ -132,14 +134,14 @@ pub struct Demodulated {
 
 /// Phase and modulation at every pixel of two images with fringes along their rows, by the improved band (S3).
 ///
-/// Both images share one complex transform, the first as its real and the second as its imaginary part: this halves the
-/// work and is what the published decoder does with G and IR. `columns` is the width of the blocks that the means were
-/// taken over, and `width` that of the image in pixels; between the centres of blocks the phase follows straight lines,
-/// with an arctangent exact to 1.3e-5 rad. NaN spreads along its row, to both images.
+/// Both images share one complex transform, the first as its real and the second as its imaginary part, which halves
+/// the work; the published decoder transforms G and IR in this way. `columns` is the width of the blocks over which the
+/// means were taken, and `width` the width of the image in pixels. The phase is interpolated linearly between the
+/// centres of blocks, and the arctangent is exact to 1.3e-5 rad. NaN spreads along its row, to both images.
 ///
 /// # Errors
-/// [`Error::Shape`] when the two differ in size or have another number of columns than `width / columns`;
-/// [`Error::Value`] when `columns` is not 1, 2 or 4, or a period is below 3 samples or longer than a row.
+/// [`Error::Shape`] when the two images differ in size or do not have `width / columns` columns; [`Error::Value`] when
+/// `columns` is not 1, 2 or 4, or a period is below 3 samples or longer than a row.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -208,7 +210,7 @@ impl Fringes<'_> {
 }
 
 impl Demodulated {
-    /// Maps for [`Interpolation::run_for`], which writes the lesser power.
+    /// Empty maps. The power starts at infinity, because [`Interpolation::run_for`] keeps the smaller value.
     fn empty(rows: usize, columns: usize) -> Self {
         let modulation = Array2::from_elem((rows, columns), f32::INFINITY);
         Self { phase_rad: Array2::zeros((rows, columns)), modulation }

@@ -20,7 +20,7 @@ fn rms(found: &Array2<f32>, phase: &[f32]) -> f32 {
 fn the_improved_band_follows_slopes_where_the_traditional_one_fails() {
     for (swing, bound) in [(0.5, 0.02), (0.75, 0.1)] {
         let (image, phase) = swinging(swing);
-        // A moving mean over a period would take most of the slow fringes for background.
+        // A moving mean over a period would remove most of the slow fringes as background.
         let run = |band| fourier(image.view(), band, Background::MeanEnvelope, 32.0).unwrap();
         let old = rms(&run(Band::Traditional), &phase);
         let new = rms(&run(Band::Improved), &phase);
