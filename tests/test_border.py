@@ -45,7 +45,7 @@ def test_every_dtype_gives_the_column(images: Four, method: str, dtype: str, ful
     assert list(maps) == ["phase_rad", "column_px", "modulation", "quality", *SURENESS]
     error = np.abs(maps["column_px"] - np.arange(912))[8:-8, 30:-30]
     hold("demo.border_returned", np.isfinite(error).mean())
-    hold("demo.border_depth_median_mm", np.nanmedian(error))
+    hold("demo.border_column_median_px", np.nanmedian(error))
     assert all(m.dtype == np.float32 and m.shape == (96, 912) for m in maps.values())
 
 
