@@ -86,6 +86,14 @@ def test_memory_is_used_again_only_when_nobody_looks_at_it(images: Four) -> None
         np.testing.assert_array_equal(values[10:20], expected + np.float32(1.0))
 
 
+@pytest.mark.parametrize("method", ["published", "joint"])
+def test_maps_begin_with_a_cache_line(images: Four, method: str) -> None:
+    camera = _core.Device(912, 96, (2000.0, 2000.0), (455.5, 47.5))
+    calibrated = decoder(method=method, camera=camera, projector=_core.Bench().visible)
+    for decode in (decoder(method=method).decode, calibrated.decode):
+        assert [name for name, values in decode(*eight_bit(images)).items() if values.ctypes.data % 64] == []
+
+
 def test_strided_views_are_as_good_as_copies(images: Four) -> None:
     red, green, blue, ir = eight_bit(images)
     colour = np.stack([red, green, blue], axis=2)
