@@ -1,26 +1,27 @@
-//! Raw intensities to linear light, channel by channel, with look-up tables for integer types.
+//! Conversion of raw intensities to linear light, channel by channel, with look-up tables for integer types.
 
 use super::{Conditioner, Response, Sample};
 use std::borrow::Cow;
 
 use ndarray::ArrayView2;
 
-/// Dark level and responses of the four channels, ready for one type of sample and one full scale.
+/// Dark level and responses of the four channels, prepared for one type of sample and one full scale.
 #[derive(Debug, Clone)]
 pub(super) struct Linear {
     dark: [f32; 4],
     response: [Response; 4],
-    /// Applied here only without crosstalk, which must be removed in between.
+    /// Applied here only if there is no crosstalk. Otherwise crosstalk must be removed first, and [`super::unmix`]
+    /// applies the response.
     projector_response: [Response; 4],
     full_scale: f32,
     tables: [Vec<f32>; 4],
     tables_for: Option<TableKey>,
 }
 
-/// What the look-up tables depend on, apart from the calibration.
+/// The values, other than the calibration, on which the look-up tables depend.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct TableKey {
-    /// Levels of the type of sample; 0 for a type without tables.
+    /// Number of levels of the type of sample; 0 for a type without tables.
     levels: usize,
     full_scale: f32,
 }
@@ -37,7 +38,7 @@ impl Linear {
         }
     }
 
-    /// Fill the look-up tables when the type or the full scale has changed since the last shot.
+    /// Fills the look-up tables if the type or the full scale has changed since the last shot.
     pub fn prepare<T: Sample>(&mut self, full_scale: f32) {
         let key = TableKey { levels: T::LEVELS, full_scale };
         if self.tables_for == Some(key) {
@@ -55,7 +56,7 @@ impl Linear {
         self.projector_response[c].linear(self.response[c].linear(fraction - self.dark[c]))
     }
 
-    /// A row of channel `c`.
+    /// Converts a row of channel `c`.
     #[inline(always)]
     pub fn row<T: Sample>(&self, c: usize, row: &[T], out: &mut [f32]) {
         let (table, scale) = (&self.tables[c][..T::LEVELS], 1.0 / self.full_scale);
@@ -72,7 +73,7 @@ impl Linear {
         }
     }
 
-    /// A row in which two channels alternate: the first in even columns, the second in odd ones.
+    /// Converts a row in which two channels alternate: the first in even columns, the second in odd ones.
     #[inline(always)]
     pub fn row_of_two<T: Sample>(&self, channels: [usize; 2], row: &[T], [even, odd]: [&mut [f32]; 2]) {
         let (pairs, last) = row.as_chunks::<2>();
@@ -95,7 +96,7 @@ impl Linear {
         }
     }
 
-    /// Whether plain arithmetic replaces the table, because it vectorises.
+    /// Whether arithmetic without a table is enough. It vectorises, and a table does not.
     #[inline(always)]
     fn is_plain(&self, c: usize) -> bool {
         [self.response[c], self.projector_response[c]] == [Response::default(); 2]
@@ -120,8 +121,8 @@ pub(super) fn row_of<'r, T: Sample>(plane: &'r ArrayView2<'_, T>, y: usize) -> C
     }
 }
 
-/// Extend the `count` samples after the first `margin` by `margin` samples on both sides. Samples are mirrored at the end
-/// sample in place and in value, which keeps the slope.
+/// Extends the `count` samples that follow the first `margin` entries by `margin` samples on both sides. The samples are
+/// reflected at the end sample in position and in value, which keeps the slope.
 pub(super) fn extend(line: &mut [f32], margin: usize, count: usize) {
     let (first, last) = (margin, margin + count - 1);
     for i in 1..=margin {

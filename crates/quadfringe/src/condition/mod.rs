@@ -1,4 +1,5 @@
-//! A raw shot to linear light: dark level, response, crosstalk, registration (step 1 of both methods, (S1)).
+//! Conditioning: from a raw shot to linear light, by dark level, response, crosstalk and registration (step 1 of both
+//! methods, (S1)).
 //!
 //! A [`Conditioner`] holds the calibration of the four channels. A [`Shot`] borrows the images of one exposure: four
 //! planes, or the raw mosaic of a Bayer chip and an infrared image. Conditioning turns intensities into fractions of full
@@ -41,13 +42,13 @@ use ndarray::Array2;
 pub struct Conditioner {
     /// Dark level per channel, as a fraction of full scale.
     pub dark: [f32; 4],
-    /// Inverse response per captured channel, applied before crosstalk is removed: that of the camera, or that of camera
-    /// and projector together if there is no crosstalk.
+    /// Inverse response of each captured channel, which is applied before crosstalk is removed: of the camera, or of
+    /// camera and projector together if there is no crosstalk.
     pub response: [Response; 4],
-    /// Captured light from projected light; rows: captured R, G, B, IR; columns: projected R, G, B, IR.
+    /// Matrix from projected light to captured light. Rows: captured R, G, B, IR; columns: projected R, G, B, IR.
     pub crosstalk: [[f64; 4]; 4],
-    /// Inverse response per projected channel, applied after crosstalk is removed, because crosstalk mixes the light that
-    /// the projector emits.
+    /// Inverse response of each projected channel, which is applied after crosstalk is removed, because crosstalk mixes
+    /// the light that the projector emits.
     pub projector_response: [Response; 4],
     /// Affine map from a visible pixel (x, y, 1) to the infrared pixel (x, y) that sees the same point.
     pub ir_registration: [[f64; 3]; 2],
@@ -68,35 +69,35 @@ impl Default for Conditioner {
 }
 
 impl Conditioner {
-    /// The same with these dark levels.
+    /// This conditioner with these dark levels.
     #[must_use]
     pub const fn with_dark(mut self, dark: [f32; 4]) -> Self {
         self.dark = dark;
         self
     }
 
-    /// The same with these responses of the captured channels.
+    /// This conditioner with these responses of the captured channels.
     #[must_use]
     pub const fn with_response(mut self, response: [Response; 4]) -> Self {
         self.response = response;
         self
     }
 
-    /// The same with this crosstalk.
+    /// This conditioner with this crosstalk matrix.
     #[must_use]
     pub const fn with_crosstalk(mut self, crosstalk: [[f64; 4]; 4]) -> Self {
         self.crosstalk = crosstalk;
         self
     }
 
-    /// The same with these responses of the projected channels.
+    /// This conditioner with these responses of the projected channels.
     #[must_use]
     pub const fn with_projector_response(mut self, projector_response: [Response; 4]) -> Self {
         self.projector_response = projector_response;
         self
     }
 
-    /// The same with this registration of the infrared image.
+    /// This conditioner with this registration of the infrared image.
     #[must_use]
     pub const fn with_ir_registration(mut self, ir_registration: [[f64; 3]; 2]) -> Self {
         self.ir_registration = ir_registration;
@@ -106,7 +107,7 @@ impl Conditioner {
     /// Check the range of every number.
     ///
     /// # Errors
-    /// [`Error::Value`] that names the first number out of range, or a crosstalk matrix without inverse.
+    /// [`Error::Value`], which names the first number that is out of range, or a crosstalk matrix that has no inverse.
     pub fn check(&self) -> Result<()> {
         for (channel, dark) in Channel::ALL.iter().zip(self.dark) {
             if !(0.0..1.0).contains(&dark) {
@@ -142,8 +143,8 @@ impl Conditioner {
     }
 }
 
-/// R, G, B and IR as linear light at every pixel, `(rows, columns)`, fractions of full scale (S1). IR is NaN where its chip
-/// does not see the point.
+/// R, G, B and IR as linear light at every pixel, `(rows, columns)`, fractions of full scale (S1). IR is NaN where the
+/// infrared chip does not see the point.
 ///
 /// # Errors
 /// As [`Conditioner::check`].

@@ -19,7 +19,7 @@ pub(crate) struct Plan {
 }
 
 impl Plan {
-    /// `conditioner` must have been checked.
+    /// Prepares a conditioner that has been checked.
     pub fn new(conditioner: &Conditioner) -> Result<Self> {
         let identity = Conditioner::default();
         let mixed = conditioner.crosstalk != identity.crosstalk;
@@ -32,7 +32,7 @@ impl Plan {
         })
     }
 
-    /// Prepare a shot before its rows are read: images that will be interpolated are linearised here.
+    /// Prepares a shot before its rows are read. Images that must be interpolated are linearised here.
     pub fn prepare<T: Sample>(&mut self, shot: &Shot<'_, T>) {
         self.linear.prepare::<T>(shot.full_scale());
         if let Some((raw, pattern)) = shot.mosaic() {
@@ -43,7 +43,7 @@ impl Plan {
         }
     }
 
-    /// One row of the shot as four rows of linear light.
+    /// Converts one row of the shot to four rows of linear light.
     #[inline(always)]
     pub fn row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [&mut [f32]; 4]) {
         let [red, green, blue, infrared] = out;
@@ -64,15 +64,16 @@ impl Plan {
         }
     }
 
-    /// Fill gaps in a row of infrared light with the nearest pixel of its chip, for steps that use neighbours.
+    /// Fills gaps in a row of infrared light with the nearest pixel of the infrared chip, for steps that use
+    /// neighbouring pixels.
     pub fn continue_infrared(&self, y: usize, infrared: &mut [f32]) {
         if let Some(registered) = &self.registered {
             registered.continue_row(y, infrared);
         }
     }
 
-    /// Mark the pixels of a row that are saturated in no channel, and those with glare: saturated in R and in B, whose
-    /// fringes are a quarter period apart and never both at their crest.
+    /// Marks the pixels of a row that are not saturated in any channel, and the pixels with glare, which are saturated
+    /// in both R and B. Fringes cannot do this, because R and B are a quarter period apart.
     #[inline(always)]
     pub fn saturation_row<T: Sample>(
         &self,

@@ -1,4 +1,4 @@
-//! Registration: the infrared image at the visible pixels.
+//! Registration: interpolation of the infrared image at the visible pixels.
 
 use super::linear::{Linear, extend, row_of};
 use super::{Sample, Shot};
@@ -8,13 +8,13 @@ use rayon::prelude::*;
 
 /// Channel of the infrared image.
 const INFRARED: usize = 3;
-/// Pixels beyond the image that the interpolation reaches.
+/// Number of pixels by which the interpolation reaches beyond the image.
 const MARGIN: usize = 2;
 
-/// Linear infrared light with margins, and the affine map from a visible pixel (x, y, 1) to its place in it.
+/// Linear infrared light with margins, and the affine map from a visible pixel (x, y, 1) to its position in this image.
 ///
-/// Values are interpolated by Lagrange's polynomial through 4 x 4 pixels. It lowers the amplitude of fringes with a period
-/// of 20 pixels by 0.03 %, bilinear interpolation by 1.2 %.
+/// Values are interpolated by Lagrange's polynomial through 4 x 4 pixels. This lowers the amplitude of fringes with a
+/// period of 20 pixels by 0.03 %; bilinear interpolation lowers it by 1.2 %.
 #[derive(Debug, Clone)]
 pub(super) struct Registered {
     map: [[f64; 3]; 2],
@@ -27,7 +27,7 @@ impl Registered {
         Self { map, light: Vec::new(), size: [0; 2] }
     }
 
-    /// Linearise the infrared image of a shot.
+    /// Converts the infrared image of a shot to linear light.
     pub fn fill<T: Sample>(&mut self, infrared: &ArrayView2<'_, T>, linear: &Linear) {
         let (rows, columns) = infrared.dim();
         self.size = [rows, columns];
@@ -45,7 +45,7 @@ impl Registered {
         self.size[1] + 2 * MARGIN
     }
 
-    /// Extend the columns as [`extend`] extends rows.
+    /// Extends the columns in the same way as [`extend`] extends rows.
     fn extend_rows(&mut self) {
         let (stride, rows) = (self.stride(), self.size[0]);
         let mut line = vec![0.0; rows + 2 * MARGIN];
@@ -60,7 +60,7 @@ impl Registered {
         }
     }
 
-    /// Place (x, y) in the infrared image of a visible pixel.
+    /// Position (x, y) in the infrared image that corresponds to a visible pixel.
     fn place(&self, x: usize, y: usize) -> [f64; 2] {
         self.map.map(|m| m[0] * x as f64 + m[1] * y as f64 + m[2])
     }
@@ -70,7 +70,7 @@ impl Registered {
         x >= 0.0 && y >= 0.0 && x <= (columns - 1) as f64 && y <= (rows - 1) as f64
     }
 
-    /// Visible pixels of row `y` that the infrared chip sees: from the first to the one after the last.
+    /// Range of the visible pixels of row `y` that the infrared chip sees.
     fn seen(&self, y: usize, width: usize) -> std::ops::Range<usize> {
         let seen = |x: &usize| self.sees(self.place(*x, y));
         match (0..width).find(seen) {
@@ -91,7 +91,7 @@ impl Registered {
         }
     }
 
-    /// Fill gaps with the nearest pixel of the infrared chip.
+    /// Fills gaps with the nearest pixel of the infrared chip.
     pub fn continue_row(&self, y: usize, out: &mut [f32]) {
         let [rows, columns] = self.size;
         for (x, value) in out.iter_mut().enumerate().filter(|(_, value)| value.is_nan()) {
@@ -101,8 +101,8 @@ impl Registered {
         }
     }
 
-    /// End of a run from `x` to at most `end`, along which the infrared position moves by whole pixels with the visible
-    /// one, so that samples are read side by side.
+    /// End of a run of pixels that starts at `x` and ends at `end` at the latest. In a run, each visible pixel
+    /// corresponds to the next pixel of one infrared row, so that samples are read from adjacent addresses.
     fn end_of_run(&self, x: usize, mut end: usize, y: usize) -> usize {
         let moved = |x: usize| {
             let [u, v] = self.place(x, y);
@@ -126,7 +126,7 @@ impl Registered {
         interpolate(rows, start, step, out);
     }
 
-    /// Infrared pixels around the place of the first pixel of a run.
+    /// Infrared pixels around the position of the first pixel of a run.
     fn between(&self, x: usize, end: usize, y: usize) -> Neighbours {
         let (first, last) = (self.place(x, y), self.place(end - 1, y));
         let [left, top] = first.map(|at| at.floor() as usize);
@@ -139,7 +139,7 @@ impl Registered {
         }
     }
 
-    /// Clear the mark of pixels next to a saturated infrared pixel.
+    /// Clears the mark of pixels whose position is next to a saturated infrared pixel.
     pub fn saturation_row<T: Sample>(
         &self,
         shot: &Shot<'_, T>,
@@ -165,7 +165,8 @@ impl Registered {
     }
 }
 
-/// Infrared columns and rows around a place; left and right, or top and bottom, are equal if the place lies on a pixel.
+/// Infrared columns and rows around a position. Left and right, or top and bottom, are equal if the position lies on a
+/// pixel.
 struct Neighbours {
     left: usize,
     right: usize,
@@ -185,7 +186,8 @@ fn weights(t: f32) -> [f32; 4] {
     ]
 }
 
-/// Values at fractions (x, y) that begin at `start` and grow by `step` from pixel to pixel.
+/// Interpolated values at the fractional positions (x, y), which are `start` at the first pixel and increase by `step`
+/// from pixel to pixel.
 #[multiversion(targets("x86_64+avx2"))]
 fn interpolate(rows: [&[f32]; 4], start: [f32; 2], step: [f32; 2], out: &mut [f32]) {
     let n = out.len();
@@ -213,7 +215,8 @@ mod tests {
         (0.5 + 0.4 * (TAU / period_px * (x + 0.1 * y)).cos()) as f32
     }
 
-    /// Sub-pixel shift, scale and rotation are undone. Bilinear interpolation would be off by 0.005 at 20 px.
+    /// Registration reverses sub-pixel shift, scale and rotation. Bilinear interpolation would have an error of 0.005
+    /// at 20 px.
     #[test]
     fn shift_scale_and_turn_are_undone() {
         let maps = [

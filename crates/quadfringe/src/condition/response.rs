@@ -6,8 +6,8 @@ use crate::{Error, Result};
 /// Inverse response of one channel: captured intensity `I` (fraction of full scale, dark subtracted) to linear light,
 /// `linear = max(I / (1 - knee I^20) - offset, 0) ^ exponent`.
 ///
-/// Only a power law commutes with the albedo of the object, so that dark and bright patches need the same curve. The knee
-/// is the compression of highlights just below saturation. The default is the identity.
+/// A power law is the only curve that is the same for dark and bright patches, because it commutes with the albedo of the
+/// object. The knee describes the compression of highlights just below saturation. The default is the identity.
 ///
 /// ```
 /// use quadfringe::Response;
@@ -49,7 +49,7 @@ impl Response {
     /// Check the range of every number.
     ///
     /// # Errors
-    /// [`Error::Value`] that names the kind of response (`what`), the channel and the number.
+    /// [`Error::Value`], which names the kind of response (`what`), the channel and the number.
     pub fn check(&self, what: &str, channel: &str) -> Result<()> {
         let numbers = [
             ("offset", self.offset, 0.0..0.5, "[0, 0.5)"),

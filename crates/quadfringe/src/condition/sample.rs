@@ -23,10 +23,10 @@ pub trait Sample: sealed::Sealed + Copy + Send + Sync + 'static {
     /// The intensity as a number.
     fn intensity(self) -> f32;
 
-    /// Refuse NaN and infinity.
+    /// Refuses NaN and infinity.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] with the count and the first place.
+    /// [`Error::NotFinite`] with the number of such values and the position of the first.
     fn check_finite(_plane: &ArrayView2<'_, Self>, _channel: &str) -> Result<()> {
         Ok(())
     }

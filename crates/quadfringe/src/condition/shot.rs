@@ -12,7 +12,7 @@ pub struct Shot<'a, T> {
     full_scale: f32,
 }
 
-/// Images of the chips.
+/// The images that the chips of the camera deliver.
 #[derive(Debug, Clone)]
 pub(super) enum Images<'a, T> {
     /// R, G, B, IR.
@@ -54,8 +54,8 @@ impl<'a, T: Sample> Shot<'a, T> {
     /// A shot of a camera with two chips: the raw mosaic of the visible one and the infrared image. Full scale is the
     /// greatest value of the type.
     ///
-    /// Missing colours are interpolated after dark level and response, from samples of the same colour only, at the place
-    /// of the pixel. The decoded phase therefore belongs to that place.
+    /// The missing colours of each pixel are interpolated at its position, after dark level and response are corrected,
+    /// from samples of the same colour only. The decoded phase therefore belongs to the position of the pixel.
     ///
     /// # Errors
     /// [`Error::Shape`] when the two images differ in size or the mosaic is smaller than 2 x 2; [`Error::NotFinite`] for
@@ -135,7 +135,7 @@ impl<'a, T: Sample> Shot<'a, T> {
     }
 }
 
-/// Four images in the order R, G, B, IR, as of [`Shot::new`].
+/// A shot from four images in the order R, G, B, IR, as [`Shot::new`].
 ///
 /// ```
 /// use ndarray::Array2;

@@ -1,4 +1,5 @@
-//! Removal of crosstalk, then of the projector response, because light mixes after it has left the projector.
+//! Removal of crosstalk and then of the projector response, in this order because light mixes after it has left the
+//! projector.
 
 use super::params::{CURVE_ENTRIES, CURVE_STEEP_ENTRIES};
 use super::{Conditioner, Response};
@@ -13,7 +14,7 @@ pub(super) struct Unmix {
 
 impl Unmix {
     /// # Errors
-    /// As [`Conditioner::check`] for a matrix without inverse.
+    /// As [`Conditioner::check`], for a crosstalk matrix without inverse.
     pub fn new(conditioner: &Conditioner) -> Result<Self> {
         Ok(Self {
             inverse: conditioner.crosstalk_inverse()?,
@@ -21,8 +22,8 @@ impl Unmix {
         })
     }
 
-    /// Remove crosstalk from a row of the four channels. In gaps of the infrared image its light counts as 0 for the other
-    /// channels, because a NaN would spread along their rows in later filters.
+    /// Removes crosstalk from a row of the four channels. In gaps of the infrared image the other channels are computed
+    /// with an infrared light of 0, because a NaN would spread along their rows in later filters.
     pub fn row(&self, rows: &mut [&mut [f32]; 4]) {
         for x in 0..rows[0].len() {
             let mut seen = [rows[0][x], rows[1][x], rows[2][x], rows[3][x]];
@@ -37,17 +38,18 @@ impl Unmix {
     }
 }
 
-/// A response as a table. A power for every pixel and channel would take longer than the published decoding.
+/// A response as a table, because computing a power for every pixel and channel would take longer than the published
+/// method.
 #[derive(Debug, Clone)]
 struct Curve {
     response: Response,
     table: Vec<f32>,
-    /// Entries between which straight lines replace the response.
+    /// Range of entries in which straight lines replace the response.
     range: std::ops::Range<f32>,
 }
 
 impl Curve {
-    /// `None` for the identity.
+    /// Makes the table; `None` for the identity, which needs none.
     fn new(response: Response) -> Option<Self> {
         let entry = |i: usize| response.linear(i as f32 / CURVE_ENTRIES as f32);
         let range = response.offset * CURVE_ENTRIES as f32 + CURVE_STEEP_ENTRIES..CURVE_ENTRIES as f32;

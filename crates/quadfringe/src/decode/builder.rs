@@ -1,4 +1,4 @@
-//! A decoder, planned step by step.
+//! Builder of a decoder.
 
 use super::method::Method;
 use super::options::Options;
@@ -23,7 +23,7 @@ pub struct DecoderBuilder {
 }
 
 impl Decoder {
-    /// Plan a decoder of this encoding for images of `shape` (rows, columns).
+    /// Starts the plan of a decoder for this encoding and for images of `shape` (rows, columns).
     pub fn builder(encoding: &Encoding, shape: [usize; 2]) -> DecoderBuilder {
         DecoderBuilder {
             encoding: encoding.clone(),
@@ -42,25 +42,26 @@ impl DecoderBuilder {
         &self.encoding
     }
 
-    /// Photometric calibration. Default: images are linear, without crosstalk, and registered.
+    /// Sets the photometric calibration. Default: images are linear, without crosstalk, and registered.
     pub fn conditioner(mut self, conditioner: Conditioner) -> Self {
         self.conditioner = conditioner;
         self
     }
 
-    /// The method and its thresholds.
+    /// Sets the method and its thresholds.
     pub fn options(mut self, options: Options) -> Self {
         self.options = options;
         self
     }
 
-    /// Calibrated camera and projector, for points in mm. Default: the decoder stops at the projector column.
+    /// Sets the calibrated camera and projector, for points in mm. Default: the decoder gives projector columns and no
+    /// points.
     pub fn triangulator(mut self, triangulator: Triangulator) -> Self {
         self.triangulator = Some(triangulator);
         self
     }
 
-    /// Check and plan everything once.
+    /// Checks and plans everything once.
     ///
     /// # Errors
     /// [`Error::TooSmall`] for images of less than 16 x 16 pixels; [`Error::NotFourChannel`] for an encoding that the

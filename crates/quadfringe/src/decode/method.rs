@@ -1,4 +1,4 @@
-//! The methods that decode a shot, each with the choices that it alone knows.
+//! The methods that decode a shot, each with the options that only it has.
 
 use crate::encoding::Encoding;
 use crate::error::{Error, Limit, Result};
@@ -9,7 +9,7 @@ use std::sync::Arc;
 /// Names of the methods.
 const NAMES: &[&str] = &["published", "joint"];
 
-/// The method that decodes a shot. A choice that one method alone knows is part of that method.
+/// The method that decodes a shot. Options that only one method has are part of that method.
 ///
 /// ```
 /// use quadfringe::{Decoder, Encoding, Method, Options};
@@ -23,8 +23,9 @@ const NAMES: &[&str] = &["published", "joint"];
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub enum Method {
-    /// All four channels together: local fit in any fringe direction, phase weighted by noise, fringe orders from
-    /// neighbourhoods. The default: the most accurate phase and the fewest wrong orders.
+    /// Fits all four channels together: a local fit in any fringe direction, a phase weighted by noise, and fringe
+    /// orders from neighbourhoods. It is the default, because it has the most accurate phase and the fewest wrong
+    /// orders.
     Joint(JointOptions),
     /// The chain of the paper: mean envelope, two-step phase shifting, improved Fourier filter along the rows, ladder of
     /// beats pixel by pixel. Needs fringes that run across the rows.
@@ -48,7 +49,7 @@ impl Method {
     /// old settings and files.
     ///
     /// # Errors
-    /// [`Error::Value`] that lists the names for any other.
+    /// [`Error::Value`] for any other name; it lists the valid names.
     pub fn from_name(name: &str) -> Result<Self> {
         match name {
             "joint" | "best" => Ok(Self::joint()),
@@ -57,11 +58,11 @@ impl Method {
         }
     }
 
-    /// The same method with fringe orders searched along the camera rays of this table; for callers that have the method by
+    /// This method with a search of fringe orders along the camera rays of `table`; for callers that chose the method by
     /// name.
     ///
     /// # Errors
-    /// [`Error::NotOfMethod`] for another method than the published one.
+    /// [`Error::NotOfMethod`] for any method but the published one.
     pub fn with_along_rays(self, table: PairTable) -> Result<Self> {
         match self {
             Self::Published(published) => Ok(published.with_along_rays(table).into()),
@@ -69,10 +70,11 @@ impl Method {
         }
     }
 
-    /// The same method with channels exposed at these instants (R, G, B, IR); for callers that have the method by name.
+    /// This method with channels that are exposed at these instants (R, G, B, IR); for callers that chose the method by
+    /// name.
     ///
     /// # Errors
-    /// [`Error::NotOfMethod`] for another method than the joint one.
+    /// [`Error::NotOfMethod`] for any method but the joint one.
     pub fn with_channel_instants_us(self, instants: [f32; 4]) -> Result<Self> {
         match self {
             Self::Joint(joint) => Ok(joint.with_channel_instants_us(instants).into()),
@@ -80,7 +82,7 @@ impl Method {
         }
     }
 
-    /// For images of `shape` (rows, columns).
+    /// Checks the options of the method for images of `shape` (rows, columns).
     pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
         match self {
             Self::Joint(joint) => joint.check(),
@@ -92,7 +94,7 @@ impl Method {
         Error::NotOfMethod { option, of, method: self.name() }
     }
 
-    /// The name in settings and files.
+    /// Name of the method in settings and files.
     #[must_use]
     pub const fn name(&self) -> &'static str {
         match self {
@@ -101,8 +103,8 @@ impl Method {
         }
     }
 
-    /// Version of the method, for saved results. It is raised whenever the method gives other maps for the same shot and
-    /// options.
+    /// Version of the method, for saved results. It changes whenever the method gives different maps for the same shot
+    /// and options.
     #[must_use]
     pub const fn version(&self) -> &'static str {
         match self {
@@ -110,10 +112,11 @@ impl Method {
         }
     }
 
-    /// Whether the method decodes this encoding. Both take the four channels of the paper, with any fringe numbers.
+    /// Checks that the method decodes this encoding. Both methods take the four channels of the paper, with any fringe
+    /// numbers.
     ///
     /// # Errors
-    /// [`Error::NotFourChannel`] that names the first difference.
+    /// [`Error::NotFourChannel`], which names the first difference.
     pub fn accepts(&self, encoding: &Encoding) -> Result<()> {
         match self {
             Self::Joint(_) | Self::Published(_) => encoding.four_channel_view().map(|_| ()),
@@ -139,18 +142,18 @@ impl From<PublishedOptions> for Method {
     }
 }
 
-/// Choices of the joint method.
+/// Options of the joint method.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 #[non_exhaustive]
 pub struct JointOptions {
-    /// The middle of the exposure of R, G, B and IR in us, relative to the instant that the result shall show; `None`
-    /// when all channels are exposed together. A projector that shows its colours one after another needs them when the
-    /// surface moves.
+    /// The middle of the exposure of R, G, B and IR in us, relative to the instant for which the shape is computed;
+    /// `None` if all channels are exposed together. Set it if the surface moves and the projector shows its colours one
+    /// after another.
     pub channel_instants_us: Option<[f32; 4]>,
 }
 
 impl JointOptions {
-    /// Channels exposed at these instants: R, G, B, IR.
+    /// Options for channels that are exposed at these instants: R, G, B, IR.
     #[must_use]
     pub const fn with_channel_instants_us(mut self, instants: [f32; 4]) -> Self {
         self.channel_instants_us = Some(instants);
@@ -168,17 +171,18 @@ impl JointOptions {
     }
 }
 
-/// Choices of the published method.
+/// Options of the published method.
 #[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct PublishedOptions {
-    /// Search fringe orders along the camera rays with both projectors calibrated: each candidate order is a depth, at
-    /// which the infrared projector lights the ray with a known phase. `None` takes the two projectors as coaxial.
+    /// Table for the search of fringe orders along the camera rays, if both projectors are calibrated: each candidate
+    /// order is a depth, at which the infrared projector lights the ray with a known phase. With `None` the two
+    /// projectors are assumed to be coaxial.
     pub along_rays: Option<Arc<PairTable>>,
 }
 
 impl PublishedOptions {
-    /// Search fringe orders along the camera rays of this table.
+    /// Options for a search of fringe orders along the camera rays of `table`.
     #[must_use]
     pub fn with_along_rays(mut self, table: PairTable) -> Self {
         self.along_rays = Some(Arc::new(table));
@@ -196,7 +200,7 @@ impl PublishedOptions {
     }
 }
 
-/// Without the numbers of the table.
+/// Leaves out the numbers of the table.
 impl fmt::Debug for PublishedOptions {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let size = self.along_rays.as_ref().map(|table| table.shape());
@@ -216,7 +220,7 @@ mod tests {
         }
     }
 
-    /// Settings and files of earlier releases hold this name.
+    /// Settings and files of earlier versions contain this name.
     #[test]
     fn best_is_read_as_joint() {
         assert_eq!(Method::from_name("best").expect("the earlier name").name(), "joint");

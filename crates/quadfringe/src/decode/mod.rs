@@ -1,4 +1,4 @@
-//! One shot through all of the inverse half: the images of one exposure -> absolute phase -> millimetres.
+//! Decoding of one shot through the whole inverse half: the images of one exposure -> absolute phase -> millimetres.
 //!
 //! ```text
 //! condition   dark level, response, Bayer mosaic, crosstalk, registration               (S1)
@@ -9,8 +9,8 @@
 //! height      camera ray and projector column -> X, Y, Z                                (S7)
 //! ```
 //!
-//! [`Decoder::builder`] plans and checks everything once; [`Decoder::decode`] then runs for every shot. The steps stand in
-//! the modules of the two methods, `joint` and `published`.
+//! [`Decoder::builder`] plans and checks everything once; [`Decoder::decode`] then runs for every shot. The modules of the
+//! two methods, `joint` and `published`, contain the steps.
 
 mod builder;
 pub(crate) mod method;
@@ -31,8 +31,8 @@ use crate::joint::Joint;
 use crate::published::Published;
 use output::Finish;
 
-/// Decodes shots of one size and one encoding: planned once, run many times. Results are the same bits for any number of
-/// threads.
+/// Decodes shots of one size and one encoding. A decoder is planned once and used for many shots. Results are
+/// bit-identical for any number of threads.
 ///
 /// ```
 /// use quadfringe::{Decoder, DmdLayout, Encoding, Shot};
@@ -60,7 +60,7 @@ enum Engine {
 }
 
 impl Decoder {
-    /// The encoding that is decoded.
+    /// The encoding that this decoder decodes.
     #[must_use]
     pub const fn encoding(&self) -> &Encoding {
         &self.encoding
@@ -72,13 +72,13 @@ impl Decoder {
         self.shape
     }
 
-    /// The options in force, defaults included.
+    /// All options, including those that have their default.
     #[must_use]
     pub const fn options(&self) -> &Options {
         &self.options
     }
 
-    /// Decode one shot.
+    /// Decodes one shot.
     ///
     /// # Errors
     /// As [`Self::decode_into`].
@@ -88,8 +88,8 @@ impl Decoder {
         Ok(decoded)
     }
 
-    /// Decode one shot into maps of an earlier one, which allocates nothing. Every pixel is written, NaN for no data. Maps
-    /// of another size, such as those of [`Decoded::default`], are replaced by new ones.
+    /// Decodes one shot into the maps of an earlier shot, without allocating memory. Every pixel is written, with NaN for
+    /// no data. Maps of another size, such as the empty maps of [`Decoded::default`], are replaced by new ones.
     ///
     /// ```
     /// use quadfringe::{Decoded, Decoder, DmdLayout, Encoding, Shot};
@@ -105,7 +105,7 @@ impl Decoder {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Shape`] when the shot has another size than the decoder.
+    /// [`Error::Shape`] when the shot does not have the size that the decoder was planned for.
     pub fn decode_into<T: Sample>(&mut self, shot: &Shot<'_, T>, out: &mut Decoded) -> Result<()> {
         if shot.shape() != self.shape {
             return Err(Error::shape("shot", &self.shape, &shot.shape()));
@@ -114,7 +114,8 @@ impl Decoder {
         self.plan.prepare(shot);
         let finish = Finish { four: &self.four, triangulator: self.triangulator.as_ref() };
         let Self { plan, options, engine, .. } = self;
-        // One way into the pool of threads; from outside every stage would have to wake them.
+        // Enters the thread pool once. Otherwise every parallel stage would enter it from outside and have to wake its
+        // threads.
         rayon::scope(|_| match engine {
             Engine::Joint(engine) => engine.run(plan, shot, options, &finish, out),
             Engine::Published(engine) => engine.run(plan, shot, options, &finish, out),

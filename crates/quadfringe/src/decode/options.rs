@@ -1,9 +1,9 @@
-//! The method of decoding, and the thresholds that every method has.
+//! The decoding method, and the thresholds that both methods have.
 
 use super::method::Method;
 use crate::error::{Error, Limit, Result};
 
-/// The options of decoding. Their defaults stand here and nowhere else.
+/// The options of decoding. This is the only place that defines their defaults.
 ///
 /// ```
 /// use quadfringe::Options;
@@ -13,16 +13,16 @@ use crate::error::{Error, Limit, Result};
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Options {
-    /// The method, with the choices that it alone has. Default: joint.
+    /// The method, with the options that only it has. Default: joint.
     pub method: Method,
-    /// Least modulation of R and B that counts as light, as a fraction of full scale. Lower it for dark surfaces, raise it
-    /// against noise in shadows. Default: 0.02.
+    /// Least modulation of R and B that counts as light, as a fraction of full scale. Lower it for dark surfaces; raise it
+    /// if noise in shadows is returned as data. Default: 0.02.
     pub modulation_min: f32,
-    /// Least quality of a fringe order that is returned, in [0, 1]. Raise it to lose wrong orders and points with them.
-    /// Default: 0.15.
+    /// Least quality of a fringe order that is returned, in [0, 1]. A higher value removes more wrong orders, and
+    /// correct points with them. Default: 0.15.
     pub quality_min: f32,
-    /// Fringe period in camera pixels, at least 3; `None` estimates it from every shot. Give it where one object in a
-    /// dark field makes the estimate fail. Default: `None`.
+    /// Fringe period in camera pixels, at least 3; `None` estimates it from every shot. Set it if the estimate fails,
+    /// for example for a single object in a dark field. Default: `None`.
     pub period_px: Option<f64>,
 }
 
@@ -33,35 +33,35 @@ impl Default for Options {
 }
 
 impl Options {
-    /// The same with this method.
+    /// These options with this method.
     #[must_use]
     pub fn with_method(mut self, method: impl Into<Method>) -> Self {
         self.method = method.into();
         self
     }
 
-    /// The same with this least modulation.
+    /// These options with this least modulation.
     #[must_use]
     pub const fn with_modulation_min(mut self, modulation_min: f32) -> Self {
         self.modulation_min = modulation_min;
         self
     }
 
-    /// The same with this least quality.
+    /// These options with this least quality.
     #[must_use]
     pub const fn with_quality_min(mut self, quality_min: f32) -> Self {
         self.quality_min = quality_min;
         self
     }
 
-    /// The same with this fringe period in camera pixels.
+    /// These options with this fringe period in camera pixels.
     #[must_use]
     pub const fn with_period_px(mut self, period_px: f64) -> Self {
         self.period_px = Some(period_px);
         self
     }
 
-    /// Instants of the channels, when the method has them.
+    /// Instants of the channels; `None` if they are not set or the method does not have them.
     #[must_use]
     pub const fn channel_instants_us(&self) -> Option<[f32; 4]> {
         match &self.method {
@@ -76,7 +76,7 @@ impl Options {
         matches!(&self.method, Method::Published(published) if published.along_rays.is_some())
     }
 
-    /// For images of `shape` (rows, columns).
+    /// Checks the options for images of `shape` (rows, columns).
     pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
         let fractions = [("modulation_min", self.modulation_min), ("quality_min", self.quality_min)];
         for (name, value) in fractions {

@@ -1,4 +1,4 @@
-//! The maps of a decoded shot, and the last step of every method: columns and points from the absolute phase.
+//! The maps of a decoded shot, and the last step of both methods: columns and points from the absolute phase.
 
 use super::params::ROWS_AT_ONCE;
 use crate::encoding::FourChannel;
@@ -9,35 +9,37 @@ use ndarray::{Array, Array1, Array2, Array3, Dimension, Ix2, Ix3, s};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Maps of one decoded shot, pixel by pixel of the visible chip; NaN is no data.
+/// Maps of one decoded shot, with one value for each pixel of the visible chip; NaN is no data.
 ///
 /// [`Decoder::decode`](crate::Decoder::decode) makes them. The default holds empty maps, which
 /// [`Decoder::decode_into`](crate::Decoder::decode_into) replaces.
 #[derive(Debug, Clone, Default)]
 #[non_exhaustive]
 pub struct Decoded {
-    /// Absolute phase of the first fringe number in rad, 0 at projector column 0; `(rows, columns)`, as all maps but the
-    /// last.
+    /// Absolute phase of the first fringe number in rad, 0 at projector column 0; `(rows, columns)`, like all maps but
+    /// the last.
     pub phase_rad: Array2<f32>,
     /// Column of the visible projector.
     pub column_px: Array2<f32>,
-    /// Modulation in linear light, as a fraction of full scale: that of R and B by the joint method, the least of all
-    /// channels by the published one. Known wherever there is light.
+    /// Modulation in linear light, as a fraction of full scale: modulation of R and B with the joint method, the least
+    /// of all channels with the published method. Known wherever there is light.
     pub modulation: Array2<f32>,
     /// Margin of the fringe order over the next best one, in [0, 1]; known wherever there is light.
     pub quality: Array2<f32>,
     /// Upper bound of the probability that the fringe order is wrong, in [0, 1].
     pub wrong_order_probability: Array2<f32>,
-    /// Standard deviation of the absolute phase in rad, given that the fringe order is right; of a decoder without
-    /// triangulator.
+    /// Standard deviation of the absolute phase in rad, provided that the fringe order is right. Only from a decoder
+    /// without triangulator.
     pub uncertainty_rad: Option<Array2<f32>>,
-    /// Standard deviation of the depth Z in mm, given that the fringe order is right; of a decoder with triangulator.
+    /// Standard deviation of the depth Z in mm, provided that the fringe order is right. Only from a decoder with
+    /// triangulator.
     pub uncertainty_mm: Option<Array2<f32>>,
-    /// Points in the camera frame in mm, `(rows, columns, 3)`; of a decoder with triangulator.
+    /// Points in the camera frame in mm, `(rows, columns, 3)`. Only from a decoder with triangulator.
     pub xyz_mm: Option<Array3<f32>>,
 }
 
-/// Zeros of `shape` that begin with a cache line: a vector across two lines takes two stores, which slows a decoder down.
+/// Zeros of `shape` that start at a cache line. A vector that lies across two cache lines takes two stores, which slows
+/// the decoder down.
 fn aligned_zeros<D: Dimension>(shape: D) -> Array<f32, D> {
     let count = shape.size();
     let memory = vec![0.0; count + spare::<f32>()];
@@ -46,14 +48,14 @@ fn aligned_zeros<D: Dimension>(shape: D) -> Array<f32, D> {
     aligned.into_shape_with_order(shape).expect("as many numbers as the shape has")
 }
 
-/// Replace a map of another shape or layout.
+/// Replaces a map if it has another shape or layout.
 fn fit<D: Dimension>(map: &mut Array<f32, D>, shape: D) {
     if map.raw_dim() != shape || !map.is_standard_layout() {
         *map = aligned_zeros(shape);
     }
 }
 
-/// As [`fit`] for a map that may not be wanted.
+/// As [`fit`], for a map that is removed if it is not wanted.
 fn fit_if<D: Dimension>(wanted: bool, map: &mut Option<Array<f32, D>>, shape: D) {
     match map {
         Some(map) if wanted => fit(map, shape),
@@ -75,7 +77,7 @@ impl Decoded {
         self.phase_rad.mapv(|phase| (phase / TAU).floor())
     }
 
-    /// Make every map ready for a decoder of images of `shape`; those that are ready keep their memory.
+    /// Prepares every map for a decoder of images of `shape`. Maps that already fit keep their memory.
     pub(super) fn fit(&mut self, shape: [usize; 2], calibrated: bool) {
         let [rows, columns] = shape;
         let maps = [
@@ -91,12 +93,12 @@ impl Decoded {
         fit_if(calibrated, &mut self.xyz_mm, Ix3(rows, columns, 3));
     }
 
-    /// All maps row by row, for an engine to fill.
+    /// The rows of all maps, for parallel iteration.
     pub(crate) fn rows(&mut self) -> impl IndexedParallelIterator<Item = OutputRow<'_>> {
         self.row_by_row().into_par_iter().with_min_len(ROWS_AT_ONCE)
     }
 
-    /// The same one after the other.
+    /// The rows of all maps, as a list.
     pub(crate) fn row_by_row(&mut self) -> Vec<OutputRow<'_>> {
         let width = self.phase_rad.ncols();
         let maps = [
@@ -135,19 +137,20 @@ pub(crate) struct OutputRow<'a> {
     pub quality: &'a mut [f32],
     /// Wrong-order probability.
     pub wrong: &'a mut [f32],
-    /// Standard deviation: of the phase until the row is finished, then of the depth when calibrated.
+    /// Standard deviation of the phase. When the row is finished and the decoder is calibrated, it becomes the standard
+    /// deviation of the depth.
     pub sigma: &'a mut [f32],
     pub xyz: Option<&'a mut [f32]>,
 }
 
-/// The last step of either method, row by row: columns and points from the absolute phase, with their uncertainty.
+/// The last step of both methods, row by row: columns and points from the absolute phase, with their uncertainty.
 pub(crate) struct Finish<'a> {
     pub four: &'a FourChannel,
     pub triangulator: Option<&'a Triangulator>,
 }
 
 impl Finish<'_> {
-    /// Finish row `y`, of which phase, modulation, quality, uncertainty of the phase and wrong-order probability are
+    /// Finishes row `y`. Its phase, modulation, quality, uncertainty of the phase and wrong-order probability must be
     /// known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
         let columns_per_rad = self.four.period_px() as f32 / TAU;
@@ -160,25 +163,25 @@ impl Finish<'_> {
     }
 }
 
-/// 0, or NaN, to be added to a number that is no data. For a choice between a number in memory and NaN the compiler would make masked
-/// stores, which are slow on some processors.
+/// 0 if `known`, else NaN. Adding it turns a number into no data. If code chose between the number and NaN instead, the compiler
+/// would make masked stores, which are slow on some processors.
 #[inline(always)]
 pub(crate) fn hole_unless(known: bool) -> f32 {
     if known { 0.0 } else { f32::NAN }
 }
 
-/// From the phase to projector columns.
+/// Conversion from phase to projector columns.
 #[derive(Clone, Copy)]
 struct Projection {
     columns_per_rad: f32,
-    /// First column behind the projector's image, with a column of tolerance for noise.
+    /// End of the projector image in columns, with a tolerance of one column for noise.
     end: f32,
-    /// Unit that the standard deviation is brought to, per rad.
+    /// Factor that converts the standard deviation from rad to its new unit.
     sigma_unit: f32,
 }
 
-/// Fills the columns of a row. Outside the projector's image there is no light, so a phase found there is no data, and neither are
-/// its uncertainty and the probability of a wrong order.
+/// Fills the columns of a row. Outside the projector image there is no light. A phase there becomes no data, and so do its
+/// uncertainty and its wrong-order probability.
 #[multiversion(targets("x86_64+avx2"))]
 fn fill_columns(Projection { columns_per_rad, end, sigma_unit }: Projection, row: &mut OutputRow) {
     let found = row.phase.iter_mut().zip(&mut *row.column);

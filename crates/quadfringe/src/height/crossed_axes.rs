@@ -1,30 +1,32 @@
 //! Height from a phase difference in the ideal crossed-axes layout (S5).
 //!
-//! Layout, in the plane through both optical centres: the camera looks straight down on the reference plane from `L0`
-//! above the point `O`; the projector stands at the same height `L0`, a distance `d` to the side of the camera, and its axis
-//! goes through `O`, so that `tan(theta) = d / L0`. `x` is measured on the reference plane from `O`, positive away from
-//! the projector.
+//! Layout, in the plane through both optical centres: the camera looks straight down on the reference plane, from the height
+//! `L0` above the point `O`. The projector stands at the same height `L0`, at a distance `d` to the side of the camera, and
+//! its axis goes through `O`, so that `tan(theta) = d / L0`. `x` is measured on the reference plane from `O`, positive away
+//! from the projector.
 //!
-//! 1. Fringes are even, with period `P0`, on the plane through `O` normal to the projector axis. The projector ray that
-//!    meets the reference plane at `x` meets that plane at `L0 x cos(theta) / (L0 + x sin(theta) cos(theta))`: the
-//!    distance along the axis is `L0 / cos(theta) + x sin(theta)`, the distance from the axis `x cos(theta)`. Hence
-//!    `phi(x) = (2 pi / P0) L0 x cos(theta) / G(x)` with `G(x) = L0 + x sin(theta) cos(theta)`.
+//! 1. On the plane through `O` normal to the projector axis, fringes are even and have the period `P0`. The projector
+//!    ray that meets the reference plane at `x` meets this normal plane at `L0 x cos(theta) / (L0 + x sin(theta)
+//!    cos(theta))`: the distance along the axis is `L0 / cos(theta) + x sin(theta)`, the distance from the axis `x
+//!    cos(theta)`. Hence `phi(x) = (2 pi / P0) L0 x cos(theta) / G(x)` with `G(x) = L0 + x sin(theta) cos(theta)`.
 //! 2. The camera ray that ends at `x` on the reference plane meets the object at height `h`, at `x (L0 - h) / L0` from
-//!    the camera axis. The projector ray through that object point goes on to `x + e` on the reference plane, with
-//!    `e = d h / (L0 - h)` by similar triangles.
+//!    the camera axis. The projector ray through this object point continues to `x + e` on the reference plane, with `e
+//!    = d h / (L0 - h)` by similar triangles.
 //! 3. `dphi = phi(x + e) - phi(x) = (2 pi L0^2 cos(theta) / P0) e / (G (G + e sin(theta) cos(theta)))`. Solved for `e`:
 //!    `d / e = 2 pi L0^2 d cos(theta) / (P0 dphi G^2) - d sin(theta) cos(theta) / G`.
 //! 4. From step 2, `h = L0 / (1 + d / e)`, which is (S5).
 //!
 //! So (S5) is exact under these conditions: both centres are at the same height; `theta` is `atan(d / L0)`; `P0` is measured
 //! on the normal plane through `O`; and `x` is the end of the camera ray on the reference plane, not the coordinate of the
-//! object point. The phase must grow away from the projector; if it grows towards it, change the sign of `dphi`.
+//! object point. The phase must increase away from the projector; if it increases towards the projector, change the sign of
+//! `dphi`.
 
 use std::f64::consts::TAU;
 
 use crate::error::{Error, Result};
 
-/// The ideal crossed-axes layout: camera normal to the reference plane, projector to its side at the same height.
+/// The ideal crossed-axes layout: the camera axis is normal to the reference plane, and the projector stands to the
+/// side of the camera at the same height.
 ///
 /// ```
 /// use quadfringe::height::CrossedAxes;
@@ -43,8 +45,9 @@ pub struct CrossedAxes {
 }
 
 impl CrossedAxes {
-    /// Layout with the camera `distance_mm` (L0) above the reference plane, the projector `baseline_mm` (d) to its side,
-    /// and fringes of `period_mm` (P0) on the plane normal to the projector axis where the two axes cross.
+    /// Makes a layout with the camera `distance_mm` (L0) above the reference plane and the projector `baseline_mm` (d)
+    /// to its side. Fringes have the period `period_mm` (P0) on the plane that is normal to the projector axis where the
+    /// two axes cross.
     ///
     /// # Errors
     /// [`Error::Value`] when a length is not finite and positive.
@@ -66,7 +69,7 @@ impl CrossedAxes {
     }
 
     /// Height in mm (S5) from object phase minus reference phase in rad, for the camera ray that ends at `x_mm` on the
-    /// reference plane; 0 for no phase difference, NaN for NaN.
+    /// reference plane; 0 if there is no phase difference, NaN for NaN.
     #[must_use]
     pub fn height_from_phase(&self, difference_rad: f64, x_mm: f64) -> f64 {
         let (l0, d) = (self.distance_mm, self.baseline_mm);
@@ -78,7 +81,7 @@ impl CrossedAxes {
         l0 / (first - d * self.cos * self.sin / g + 1.0)
     }
 
-    /// Object phase minus reference phase in rad for a height in mm below `L0`: the inverse of
+    /// Object phase minus reference phase in rad for a height in mm, which must be less than `L0`: the inverse of
     /// [`CrossedAxes::height_from_phase`] (steps 1 to 3 of the derivation).
     #[must_use]
     pub fn phase_from_height(&self, height_mm: f64, x_mm: f64) -> f64 {

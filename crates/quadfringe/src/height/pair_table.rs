@@ -1,9 +1,9 @@
 //! The infrared phase along each camera ray, as a function of the first phase.
 //!
 //! Along a camera ray, each depth corresponds to a column of the visible projector and to one of the infrared projector.
-//! The second is a smooth function of the first: without lens distortion a quotient of two linear functions, which a
-//! translation between the projectors leaves linear and a rotation bends slightly. The table stores a cubic for each pixel
-//! through four Chebyshev nodes of the part of the ray that can be lit.
+//! The second column is a smooth function of the first. Without lens distortion it is a quotient of two linear functions;
+//! it is linear if the projectors are only translated against each other, and a rotation bends it slightly. The table
+//! stores a cubic for each pixel, through four Chebyshev nodes on the part of the ray that can be lit.
 
 use ndarray::{Array2, ArrayView2, Axis};
 use rayon::prelude::*;
@@ -16,9 +16,9 @@ use crate::error::{Error, Result};
 use crate::optics::{Device, ProjectorPair};
 use crate::stages::{Absolute, AlongRay, Phases, RayRow};
 
-/// Nodes and coefficients of the cubic.
+/// Number of nodes, and of coefficients, of the cubic.
 const NODES: usize = 4;
-/// Rows of numbers for each row of pixels: the cubic, then the ends of the ray.
+/// Number of stored rows for each row of pixels: the coefficients of the cubic, then the two ends of the ray.
 const LINES: usize = NODES + 2;
 
 /// The infrared phase along every camera ray of a calibrated pair of projectors, planned once.
@@ -47,13 +47,13 @@ pub struct PairTable {
 }
 
 impl PairTable {
-    /// Plan for a camera and two projectors in its frame. Depths along the camera's axis outside `depth_range_mm` are
-    /// not searched; without it the search covers all that the visible projector can light.
+    /// Plans the table for a camera and two projectors in its frame. Depths outside `depth_range_mm` are not searched;
+    /// without a range the search covers all depths that the visible projector can light.
     ///
     /// # Errors
-    /// [`Error::Value`] when [`Triangulator`] cannot use the devices, when the fringes are for another width
-    /// than the visible projector's, or when the range is not two growing depths of at least 0;
-    /// [`Error::NotFourChannel`] for another encoding.
+    /// [`Error::Value`] when [`Triangulator`] cannot use the devices, when the encoding does not have the width of the
+    /// visible projector, or when the range is not two increasing depths of at least 0; [`Error::NotFourChannel`] for
+    /// another encoding.
     pub fn new(
         camera: &Device,
         pair: &ProjectorPair,
@@ -81,7 +81,7 @@ impl PairTable {
         Ok(Self { search: AlongRay::new(&four), shape: (rows, columns), numbers })
     }
 
-    /// Size of the maps (rows, columns): that of the camera.
+    /// Size of the maps, which is the size of the camera image (rows, columns).
     #[must_use]
     pub const fn shape(&self) -> (usize, usize) {
         self.shape
@@ -99,11 +99,11 @@ impl PairTable {
         RayRow { infrared: std::array::from_fn(line), low_rad: line(NODES), high_rad: line(NODES + 1) }
     }
 
-    /// The infrared phase in rad, not wrapped, for a map of first absolute phases in rad. NaN in, NaN out; NaN also where no
-    /// ray can be lit.
+    /// The infrared phase in rad, not wrapped, for a map of the absolute phase of the first fringe number in rad. NaN in,
+    /// NaN out; NaN also where the ray cannot be lit.
     ///
     /// # Errors
-    /// [`Error::Shape`] when the map has another size than the camera image.
+    /// [`Error::Shape`] when the map does not have the size of the camera image.
     pub fn infrared_rad(&self, phase_rad: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
         check("phase map", phase_rad, self.shape)?;
         Ok(Array2::from_shape_fn(self.shape, |(row, column)| {
@@ -111,21 +111,21 @@ impl PairTable {
         }))
     }
 
-    /// Absolute phase and margin, both `(rows, columns)`, from wrapped phases in rad: of all points on a camera ray the one
-    /// whose green and infrared phase agree best with the measured ones. NaN in, NaN out; NaN also where no candidate lies
-    /// on the ray.
+    /// Absolute phase and margin, both `(rows, columns)`, from wrapped phases in rad. Of the points on a camera ray with
+    /// the measured first phase, the one whose green and infrared phases agree best with the measured ones is chosen. NaN
+    /// in, NaN out; NaN also where no candidate lies on the ray.
     ///
     /// # Errors
-    /// [`Error::Shape`] when a map has another size than the camera image.
+    /// [`Error::Shape`] when a map does not have the size of the camera image.
     pub fn unwrap(&self, wrapped_rad: Phases<ArrayView2<'_, f32>>) -> Result<Absolute> {
         self.unwrap_blocks(wrapped_rad, 1)
     }
 
-    /// The same for means over blocks of `rows` rows, of [`block_means`](crate::stages::block_means): one row of the maps
-    /// for each block, whose rays are those of its middle row.
+    /// [`Self::unwrap`] for the phases of [`block_means`](crate::stages::block_means) over `rows` rows. The maps have one
+    /// row for each block; a block uses the rays of its middle row.
     ///
     /// # Errors
-    /// [`Error::Shape`] when a map has another number of blocks or columns than the camera image;
+    /// [`Error::Shape`] when a map does not have one row for each block, and the columns, of the camera image;
     /// [`Error::Value`] when `rows` is 0.
     pub fn unwrap_blocks(&self, wrapped_rad: Phases<ArrayView2<'_, f32>>, rows: usize) -> Result<Absolute> {
         if rows == 0 {
@@ -154,7 +154,7 @@ impl PairTable {
         Absolute::new(phase_rad, margin)
     }
 
-    /// The same for one row of pixels with the rays of row `y`.
+    /// [`Self::unwrap`] for one row of pixels, with the rays of row `y`.
     #[inline(always)]
     pub(crate) fn order_row(&self, y: usize, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
         self.search.order_row(wrapped, &self.row(y), phase, margin);
@@ -173,13 +173,13 @@ struct Plan<'a> {
     pair: &'a ProjectorPair,
     triangulator: Triangulator,
     range_mm: [f64; 2],
-    /// Phase in rad over the whole field, of the first fringe number and of the infrared one.
+    /// Phase in rad over the whole field: of the first fringe number, and (`third`) of the infrared one.
     first: f64,
     third: f64,
 }
 
 impl Plan<'_> {
-    /// Write the lines of one row of pixels.
+    /// Writes the stored rows of one row of pixels.
     fn row(&self, row: usize, out: &mut [f32]) {
         let columns = self.camera.width;
         let rays: Vec<_> = (0..columns).map(|x| self.camera.undistort([x as f64, row as f64])).collect();
@@ -207,19 +207,20 @@ impl Plan<'_> {
         }
     }
 
-    /// Depth at which the rays of a row meet columns of the visible projector; NaN where they do not.
+    /// Depth at which each ray of a row meets its column of the visible projector; NaN where they do not meet.
     fn depths(&self, row: usize, columns_px: &[f32]) -> Vec<f64> {
         let mut xyz = vec![0.0; 3 * columns_px.len()];
         self.triangulator.xyz_row(row, columns_px, &mut xyz);
         xyz.chunks_exact(3).map(|point| f64::from(point[2])).collect()
     }
 
-    /// Least and greatest column that light a ray within the range of depths; NaN where none does. `edges_mm` are the
+    /// Least and greatest column that light a ray within the range of depths; NaN if no column does. `edges_mm` are the
     /// depths at which the ray enters and leaves the field.
     fn ends_px(&self, ray: [f64; 2], edges_mm: [f64; 2], field: [f64; 2]) -> [f64; 2] {
         let column = |z_mm: f64| self.pair.visible().project(at(ray, z_mm)).map(|px| px[0]);
         let inside = |px: f64| px >= field[0] && px <= field[1];
-        // Infinity lies in the field: the ray enters at the only edge that it meets, or has always been inside.
+        // The infinite end of the ray lies in the field, so the ray enters the field at the only edge that it meets, or
+        // starts inside.
         let open = column(FAR_MM).is_some_and(inside);
         let [first, last] = edges_mm;
         let (near, far) = match (first.is_finite(), last.is_finite()) {

@@ -21,7 +21,7 @@ struct Sample {
     height_mm: f64,
 }
 
-/// Per-pixel polynomial `h = sum_n a_n dphi^n`, with `dphi` the phase minus that of the reference plane.
+/// Per-pixel polynomial `h = sum_n a_n dphi^n`, where `dphi` is the phase minus the phase of the reference plane.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -49,9 +49,9 @@ impl PolynomialHeight {
     /// height is NaN.
     ///
     /// # Errors
-    /// [`Error::Value`] when the degree is out of range, a height is not finite, there are fewer different heights than
-    /// `degree + 1`, or the planes differ so little in phase that no pixel has a solution; [`Error::Shape`] when a map
-    /// has another size than the reference.
+    /// [`Error::Value`] when the degree is out of range, a height is not finite, there are fewer than `degree + 1`
+    /// different heights, or the planes differ so little in phase that no pixel has a solution; [`Error::Shape`] when a
+    /// map does not have the size of the reference.
     pub fn fit(
         reference_rad: ArrayView2<'_, f32>,
         planes: &[HeightPlane<'_>],
@@ -84,10 +84,11 @@ impl PolynomialHeight {
         Ok(Self { reference_rad: reference_rad.to_owned(), coefficients })
     }
 
-    /// An earlier fit from the phase of its reference plane and its [`PolynomialHeight::coefficients`].
+    /// Restores an earlier fit from the phase of its reference plane and its [`PolynomialHeight::coefficients`].
     ///
     /// # Errors
-    /// [`Error::Shape`] unless the coefficients are `(rows, columns, degree + 1)` of degree 1 to 6 for the size of the reference.
+    /// [`Error::Shape`] unless the coefficients have the shape `(rows, columns, degree + 1)`, with the rows and columns of the
+    /// reference and a degree from 1 to 6.
     pub fn from_coefficients(reference_rad: Array2<f32>, coefficients: Array3<f64>) -> Result<Self> {
         let (rows, columns) = reference_rad.dim();
         let terms = coefficients.dim().2.clamp(2, DEGREE_MAX + 1);
@@ -112,7 +113,7 @@ impl PolynomialHeight {
     /// Height map in mm, float32, from an absolute phase map in rad; NaN where either has no data.
     ///
     /// # Errors
-    /// [`Error::Shape`] when the map has another size than the calibration.
+    /// [`Error::Shape`] when the map does not have the size of the calibration.
     pub fn height_from_phase(&self, phase_rad: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
         if phase_rad.dim() != self.reference_rad.dim() {
             return Err(Error::shape("phase map", self.reference_rad.shape(), phase_rad.shape()));
@@ -185,7 +186,7 @@ fn fit_pixel(samples: &[Sample], degree: usize) -> Option<[f64; DEGREE_MAX + 1]>
     Some(solve_upper(&upper, weights, terms, scale))
 }
 
-/// Subtract the part of `vector` along the unit vector `unit`, and return the length of that part.
+/// Subtracts from `vector` its component along the unit vector `unit`, and returns the length of the component.
 fn remove_component(unit: &[f64], vector: &mut [f64]) -> f64 {
     let part = inner(unit, vector);
     vector.iter_mut().zip(unit).for_each(|(v, u)| *v -= part * u);
@@ -196,7 +197,7 @@ fn inner(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// Back substitution, and the change from the scaled phase to rad.
+/// Back substitution, and conversion of the coefficients from the scaled phase to rad.
 fn solve_upper(
     upper: &[[f64; DEGREE_MAX + 1]; DEGREE_MAX + 1],
     weights: [f64; DEGREE_MAX + 1],

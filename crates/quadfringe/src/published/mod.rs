@@ -1,4 +1,5 @@
-//! THE RECIPE of the published method: one exposure to absolute phase, in the steps of `docs/method/published.md`.
+//! THE RECIPE of the published method: from one exposure to absolute phase, with the steps of
+//! `docs/method/published.md`.
 //!
 //! | step | stage | equation |
 //! |---|---|---|
@@ -12,9 +13,9 @@
 //! | 7 uncertainty and wrong-order probability | `wrong_order_probability` | |
 //! | 8 projector column and height | `columns_from_phase`, `height::Triangulator` | (S7) |
 //!
-//! Orders are found on means over blocks of a few pixels, whose noise is lower; the phase stays that of single pixels. For
-//! a given `encoding`, `shot` and `conditioner`, the functions of [`stages`](crate::stages) give the same bits as the decoder
-//! (`tests/stages.rs` compares every map):
+//! Orders are found from means over blocks of a few pixels, which have less noise; the phase comes from single pixels. For a
+//! given `encoding`, `shot` and `conditioner`, the functions of [`stages`](crate::stages) give results that are bit-identical
+//! to those of the decoder (`tests/stages.rs` compares every map):
 //!
 //! ```
 //! # use ndarray::{Array2, ArrayView2, Zip};
@@ -106,9 +107,9 @@ use uncertainty::ShotStatistics;
 
 /// How fringe orders are found.
 enum Unwrapping {
-    /// By the ladder of beats, which takes both projectors as coaxial.
+    /// By the ladder of beats, which assumes coaxial projectors.
     Ladder(Ladder),
-    /// Along the camera ray, with both projectors calibrated.
+    /// Along the camera ray, if both projectors are calibrated.
     AlongRay(Arc<PairTable>),
 }
 
@@ -124,7 +125,7 @@ pub(crate) struct Published {
     shape: [usize; 2],
 }
 
-/// The Fourier filter for rows of means over so many columns.
+/// The Fourier filter for rows of means over `columns` columns.
 struct SizedFilter {
     columns: usize,
     filter: RowFilter,
@@ -144,7 +145,7 @@ impl Published {
         }
     }
 
-    /// Search along the camera rays from now on.
+    /// Makes all later shots search fringe orders along the camera rays.
     pub fn unwrap_along_rays(&mut self, table: Arc<PairTable>) {
         self.unwrapping = Unwrapping::AlongRay(table);
     }
@@ -164,7 +165,7 @@ impl Published {
         };
         let mut plan = self.plan(conditioning, options, period_px);
         let mut rows = out.row_by_row();
-        // 7. Uncertainties follow from statistics of the shot, which a few strips give.
+        // 7. Uncertainties follow from statistics of the shot, which come from a few strips.
         plan.statistics = self.sample(&plan, shot, &mut rows);
         let plan = plan;
         rows.par_chunks_mut(plan.blocks.rows)
@@ -186,7 +187,7 @@ impl Published {
             );
     }
 
-    /// What the strips of a shot with this fringe period share, before its statistics are known.
+    /// The data that all strips of a shot share, given its fringe period. The statistics are not known yet.
     fn plan<'a>(&'a self, conditioning: &'a Plan, options: &Options, period_px: f64) -> StripPlan<'a> {
         let numbers = self.numbers;
         let periods_px = numbers.map(|number| (period_px * numbers.quadrature / number) as f32);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::strip::Strip;
 
-/// Second differences down the columns of R and B, for the row in the middle.
+/// Second differences of R and B along the columns, for one row.
 struct SecondDifferences {
     red: Vec<f32>,
     blue: Vec<f32>,
@@ -22,7 +22,7 @@ impl SecondDifferences {
         Self { red: vec![0.0; width], blue: vec![0.0; width] }
     }
 
-    /// Those of row `y`.
+    /// Computes the second differences of row `y`.
     fn measure<T: Sample>(&mut self, y: usize, strip: &mut Strip, plan: &StripPlan<'_>, shot: &Shot<'_, T>) {
         let width = self.red.len();
         for (row, weight) in [(y - 1, 1.0), (y, -2.0), (y + 1, 1.0)] {
@@ -35,7 +35,7 @@ impl SecondDifferences {
     }
 }
 
-/// Numbers that the statistics follow from.
+/// Samples from which the statistics are computed.
 #[derive(Default)]
 struct Sampled {
     second_differences: Vec<f32>,
@@ -43,12 +43,13 @@ struct Sampled {
 }
 
 impl Published {
-    /// Whether a strip of `count` rows from the `first` on has sampled rows.
+    /// Whether a strip of `count` rows that starts at row `first` contains sampled rows.
     pub(super) fn has_sampled_rows(&self, first: usize, count: usize) -> bool {
         (first..first + count).any(|y| is_sampled(y, self.shape[0]))
     }
 
-    /// Decode the strips that have sampled rows, in units of the noise, and return the statistics of these rows.
+    /// Decodes the strips that contain sampled rows, with uncertainties in units of the noise, and returns the
+    /// statistics of these rows.
     pub(super) fn sample<T: Sample>(
         &self,
         plan: &StripPlan<'_>,

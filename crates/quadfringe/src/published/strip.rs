@@ -16,7 +16,7 @@ use multiversion::multiversion;
 /// The published background: half the sum of the envelopes.
 const BACKGROUND: Background = Background::MeanEnvelope;
 
-/// What all strips of a shot share.
+/// The data that all strips of a shot share.
 pub(super) struct StripPlan<'a> {
     pub conditioning: &'a Plan,
     pub unwrapping: &'a Unwrapping,
@@ -32,7 +32,7 @@ pub(super) struct StripPlan<'a> {
     pub statistics: ShotStatistics,
 }
 
-/// A value for R and one for B, which are in quadrature.
+/// A value for each of R and B, which are in quadrature.
 #[derive(Debug, Default)]
 struct Quadrature<T> {
     red: T,
@@ -46,7 +46,7 @@ impl<T> Quadrature<T> {
     }
 }
 
-/// A value for G and one for IR, which the Fourier filter takes together.
+/// A value for each of G and IR, which share a Fourier transform.
 #[derive(Debug, Default)]
 pub(super) struct FourierPair<T> {
     pub green: T,
@@ -67,25 +67,25 @@ type Row = Aligned<f32>;
 pub(super) struct Strip {
     /// Light of R and B for each row.
     quadrature: Vec<Quadrature<Row>>,
-    /// Light of G and IR of the row read last.
+    /// Light of G and IR of the row that was read last.
     others: FourierPair<Row>,
     /// Columns without infrared light for each row.
     gaps: Vec<Vec<usize>>,
-    /// Sums of R and B over the rows, then their means less the background.
+    /// First the sums of R and B over the rows, then the means minus the background.
     quadrature_means: Quadrature<Row>,
-    /// Background of these means.
+    /// Background of the means of R and B.
     levels: Quadrature<Row>,
     /// Sums of G and IR over the rows.
     sums: FourierPair<Row>,
-    /// Block means of G and IR less their background.
+    /// Block means of G and IR minus their background.
     fringes: FourierPair<Row>,
     /// Phases of the block means at every pixel: wrapped for R and B, up to whole turns for G and IR.
     phases: Phases<Row>,
-    /// The lesser squared modulation of G and IR.
+    /// The smaller of the squared modulations of G and IR.
     power: Row,
     /// Absolute phase of the means.
     absolute: Row,
-    /// Margin of its order, and the probability that the order is wrong.
+    /// Margin of its order, and (`wrong`) the probability that the order is wrong.
     margin: Row,
     wrong: Row,
     coarse: Row,
@@ -95,7 +95,7 @@ pub(super) struct Strip {
     interpolation: Interpolation,
 }
 
-/// Decode as many rows as `out` has, from row `y` on, to phase, modulation and quality. Fused multiplication is not
+/// Decodes the rows of `out`, which start at row `y`, to phase, modulation and quality. Fused multiply-add is not
 /// enabled, so the results are the same for vectors of any width.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn decode_strip<T: Sample>(
@@ -125,7 +125,7 @@ pub(super) fn decode_strip<T: Sample>(
 }
 
 impl Strip {
-    /// Adapt rows that may have served another image.
+    /// Adapts rows that may have been used for another image.
     #[inline(always)]
     fn resize(&mut self, plan: &StripPlan<'_>, width: usize) {
         self.quadrature.resize_with(plan.blocks.rows, Default::default);
@@ -148,7 +148,7 @@ impl Strip {
         [red, green, blue, infrared].map(|row| &mut **row)
     }
 
-    /// The same for a single row of `width` pixels, outside a strip.
+    /// Working rows for the linear light of a single row of `width` pixels, outside a strip.
     pub fn light(&mut self, width: usize) -> [&mut [f32]; 4] {
         if self.quadrature.is_empty() {
             self.quadrature.resize_with(1, Default::default);
@@ -168,7 +168,7 @@ impl Strip {
         &self.quadrature[0].blue
     }
 
-    /// Add row `i` of the strip to the sums.
+    /// Adds row `i` of the strip to the sums.
     #[inline(always)]
     fn sum(&mut self, i: usize) {
         for (sum, light) in self.sums.both_mut().into_iter().zip(self.others.both_mut()) {
@@ -188,8 +188,8 @@ impl Strip {
         }
     }
 
-    /// Background of the means of R and B over so many `rows`, and the phase of these means. Returns the modulation of R
-    /// over that of B.
+    /// Computes the background of the means of R and B over `rows` rows, and the phase of these means. Returns the
+    /// modulation of R divided by the modulation of B.
     #[inline(always)]
     fn two_step(&mut self, plan: &StripPlan<'_>, rows: usize) -> f32 {
         let Self { quadrature_means, levels, background, phases, .. } = self;
@@ -206,7 +206,7 @@ impl Strip {
         ratio
     }
 
-    /// Phases and modulations of G and IR from their block means over so many `rows`.
+    /// Computes phases and modulations of G and IR from their means over blocks of `rows` rows.
     #[inline(always)]
     fn fourier(&mut self, plan: &StripPlan<'_>, rows: usize) {
         let pixels = plan.blocks.columns;
@@ -234,7 +234,7 @@ impl Strip {
         }
     }
 
-    /// Absolute phase of the means, with the rays of row `y`.
+    /// Computes the absolute phase of the means; a search along camera rays uses the rays of row `y`.
     #[inline(always)]
     fn order(&mut self, y: usize, plan: &StripPlan<'_>) {
         let Self { phases, absolute, margin, wrong, .. } = self;
@@ -246,8 +246,8 @@ impl Strip {
         plan.statistics.wrong_orders.row(margin, wrong);
     }
 
-    /// Results of row `i`: the two-step phase of each pixel with the turns of the means, its uncertainty, and NaN where
-    /// the modulation or the margin is too low.
+    /// Writes the results of row `i`: the two-step phase of each pixel with the whole turns of the means, and its
+    /// uncertainty. The phase is NaN where the modulation or the margin is too low.
     #[inline(always)]
     fn row(&self, i: usize, ratio: f32, plan: &StripPlan<'_>, out: &mut OutputRow<'_>) {
         let (noise, limits) = (plan.statistics.noise, plan.limits);

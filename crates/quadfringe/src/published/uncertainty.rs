@@ -1,4 +1,4 @@
-//! Statistics of a shot that the uncertainty of its pixels follows from, and the uncertainty of a two-step phase.
+//! The uncertainty of a two-step phase, and the statistics of a shot from which it follows.
 
 use crate::decode::output::OutputRow;
 use crate::stages::{WrongOrderTable, deviation};
@@ -12,27 +12,29 @@ pub(super) struct ShotStatistics {
 }
 
 impl ShotStatistics {
-    /// Before they are known: uncertainties come in units of the noise.
+    /// Placeholder until the statistics are known: uncertainties are in units of the noise.
     pub fn unit_noise() -> Self {
         Self { noise: 1.0, wrong_orders: WrongOrderTable::empty() }
     }
 
-    /// From second differences of intensities down the columns, to which the fringes contribute little, and from margins
-    /// of fringe orders. White noise of variance 1 has second differences of variance 1 + 4 + 1 = 6.
+    /// Computes the statistics from second differences of intensities along the columns, to which the fringes contribute
+    /// little, and from margins of fringe orders. White noise of variance 1 has second differences of variance 1 + 4 + 1
+    /// = 6.
     pub fn new(second_differences: &mut [f32], margins: &[f32]) -> Self {
         let noise = deviation(second_differences) / 6f32.sqrt();
         Self { noise, wrong_orders: WrongOrderTable::new(margins) }
     }
 
-    /// Complete a row that was decoded before the statistics were known.
+    /// Completes a row that was decoded before the statistics were known.
     pub fn complete(&self, row: &mut OutputRow<'_>) {
         row.sigma.iter_mut().for_each(|sigma| *sigma *= self.noise);
         self.wrong_orders.row(row.quality, row.wrong);
     }
 }
 
-/// Standard deviation in rad of a two-step phase from red and from blue times `ratio`, if both have the same noise. A
-/// change of either moves the phase by the part of it that is perpendicular to the phasor.
+/// Standard deviation in rad of a two-step phase. `red` and `blue` are the components of the phasor, where `blue` has
+/// already been multiplied by `ratio`; before that both had the same `noise`. Only the part of the noise that is
+/// perpendicular to the phasor changes the phase.
 #[inline(always)]
 pub(super) fn two_step_sigma(red: f32, blue: f32, ratio: f32, noise: f32) -> f32 {
     let square = red * red + blue * blue;

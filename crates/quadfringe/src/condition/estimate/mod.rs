@@ -1,10 +1,10 @@
-//! The response of projector and camera from an N-step capture, without any ground truth.
+//! Estimate of the response of projector and camera from an N-step capture, without ground truth.
 //!
-//! N steps over one period give a phase that hardly depends on the response; two steps a quarter period apart do not. The
-//! estimate is the response whose inverse makes both phases agree. Their difference is the error of a single-shot
-//! measurement, so noise and nonlinearity have the same weights as in the measurement; on noisy captures the exponent is
-//! therefore slightly above 1 / gamma. On gamma in fringe projection: Guo, He and Chen, "Gamma correction for digital
-//! fringe projection profilometry", Applied Optics 43, 2906 (2004).
+//! The phase of N steps over one period hardly depends on the response; the phase of two steps a quarter period apart
+//! does. The estimate is the response whose inverse makes the two phases agree. Their difference is the error of a
+//! single-shot measurement, so noise and nonlinearity have the same weights as in a measurement. On noisy captures the
+//! exponent is therefore slightly above 1 / gamma. On gamma in fringe projection: Guo, He and Chen, "Gamma correction for
+//! digital fringe projection profilometry", Applied Optics 43, 2906 (2004).
 
 mod order;
 mod samples;
@@ -28,19 +28,19 @@ use simplex::minimise;
 pub struct ResponseEstimate {
     /// Inverse response, ready for a conditioner.
     pub response: Response,
-    /// RMS error of a two-step phase with the intensities as captured, rad.
+    /// RMS error of the two-step phase from the captured intensities, rad.
     pub two_step_rms_before_rad: f64,
-    /// The same after inversion of the response, rad: noise and drift remain.
+    /// RMS error of the two-step phase after the response is inverted, rad. Noise and drift remain.
     pub two_step_rms_after_rad: f64,
     /// Number of pixels (or tiles) that the estimate uses.
     pub pixels: usize,
 }
 
 /// Inverse response from stacks of equally spaced phase steps over one period, each `(steps, rows, columns)`, in
-/// fractions of full scale (255 of 8 bit is 1.0), less the dark level if it is known.
+/// fractions of full scale (255 of 8 bit is 1.0). Subtract the dark level before, if it is known.
 ///
 /// Take at least five steps; a multiple of four (8, 12, 16) separates the harmonics best. Several stacks of the same size
-/// and exposure are pooled; they may show other fringe numbers or objects. Any object works; one with dark and bright areas
+/// and exposure are pooled; their fringe numbers and objects may differ. Any object works; one with dark and bright areas
 /// that fills the image without saturation works best. The knee is 0 unless the captures show one. The result does not
 /// depend on the number of threads.
 ///
@@ -80,7 +80,7 @@ pub fn estimate_response(stacks: &[ArrayView3<'_, f32>]) -> Result<ResponseEstim
     })
 }
 
-/// Offset, exponent and knee of least cost; the knee is 0 unless it lowers the cost enough.
+/// Offset, exponent and knee with the least cost. The knee is 0 unless it lowers the cost enough.
 fn fit(samples: &Samples, offset_max: f64) -> Response {
     let cost = |trial: Trial| {
         if trial.is_inside(offset_max) { samples.cost(&trial.response()) } else { f64::INFINITY }
@@ -97,7 +97,7 @@ fn fit(samples: &Samples, offset_max: f64) -> Response {
     }
 }
 
-/// A response that the search tries, in the double precision of the search.
+/// A response that the search tries, in double precision.
 #[derive(Clone, Copy)]
 struct Trial {
     offset: f64,
@@ -118,7 +118,8 @@ impl Trial {
     }
 }
 
-/// Greatest offset: the first percentile of the darkest steps, so that few pixels become negative.
+/// Greatest offset that is tried: the first percentile over the pixels of their darkest step, so that few pixels become
+/// negative.
 fn offset_bound(traces: &[samples::Trace<'_>]) -> f64 {
     let darkest = |t: &samples::Trace<'_>| t.steps.iter().copied().fold(1.0, f32::min);
     let mut floor: Vec<f32> = traces.iter().map(darkest).collect();

@@ -3,14 +3,15 @@
 use crate::condition::params::{RMS_MAX_RAD, STEP_EXCESS, STEP_EXCESS_RAD};
 use crate::{Error, Result};
 
-/// Requirement on every stack, for messages.
+/// The requirement on every stack, for error messages.
 const ORDERED: &str =
     "images in the order of their phase steps, I_s = a + b cos(Phi + 2 pi s / N), s = 0..N-1";
 
-/// Check that the error is small and that no step stands out, as for any ordered stack after correction of the response.
+/// Checks that the two-step error is small and that no step has a much larger error than the others. Both hold for an
+/// ordered stack after its response is corrected.
 ///
 /// # Errors
-/// [`Error::Value`] that names the step to look at.
+/// [`Error::Value`], which names the suspicious step.
 pub(super) fn check_order(rms_rad: &[f64]) -> Result<()> {
     let total = root_mean_square(rms_rad);
     let mut sorted = rms_rad.to_vec();
@@ -29,7 +30,7 @@ pub(super) fn check_order(rms_rad: &[f64]) -> Result<()> {
     Err(Error::value("stack", ORDERED, found))
 }
 
-/// Error for a stack with too many pixels that do not vary like fringes.
+/// Error for a stack in which too many pixels do not vary as fringes do.
 pub(super) fn disordered(disordered: usize, usable: usize) -> Error {
     let found = format!(
         "{disordered} pixels that do not vary in this order and {usable} that do; sort the images by their phase step, give \
@@ -38,13 +39,14 @@ pub(super) fn disordered(disordered: usize, usable: usize) -> Error {
     Error::value("stack", ORDERED, found)
 }
 
-/// The step most likely to be out of place, and the RMS error of its two-step phase.
+/// The step that is most likely out of order, and the RMS error of its two-step phase.
 struct Suspect {
     step: usize,
     rms_rad: f64,
 }
 
-/// A step out of place has a large error as first step and as partner.
+/// Finds the step that is most likely out of order: such a step causes a large error both as the first of two steps and
+/// as the second.
 fn suspect(rms_rad: &[f64]) -> Suspect {
     let n = rms_rad.len();
     let both = |s: usize| rms_rad[s].hypot(rms_rad[(s + n - n / 4) % n]);

@@ -1,4 +1,4 @@
-//! Pixels of the stacks, packed for fast evaluation, and the two-step phase error that they would have.
+//! Pixels of the stacks, packed for fast evaluation, and their two-step phase error for any response.
 
 use super::Response;
 use crate::condition::params::{HUBER_RAD, LEVEL_MAX};
@@ -7,10 +7,11 @@ use ndarray::{Array2, ArrayView1, Zip};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Pixels that are evaluated together. Sums run over blocks in order, so the result does not depend on the threads.
+/// Number of pixels that are evaluated together. Sums run over the blocks in a fixed order, so the result does not
+/// depend on the number of threads.
 const BLOCK: usize = 256;
 
-/// One pixel over all steps, with its first harmonic.
+/// One pixel over all steps, and its first harmonic.
 #[derive(Clone, Copy)]
 pub(super) struct Trace<'a> {
     /// Intensities, fractions of full scale.
@@ -19,7 +20,7 @@ pub(super) struct Trace<'a> {
     pub harmonic: [f32; 2],
 }
 
-/// Some pixels: levels `(steps, pixels)` and the unit vectors of their phases.
+/// A block of pixels: levels `(steps, pixels)` and the unit vectors of their phases.
 struct Block {
     levels: Array2<u16>,
     cos: Vec<f32>,
@@ -48,7 +49,8 @@ impl Samples {
         self.blocks.iter().map(|block| block.cos.len()).sum()
     }
 
-    /// Mean over pixels and steps of Huber's function of the two-step error, rad^2 for small errors.
+    /// Mean over pixels and steps of the Huber loss of the two-step error; the square of the error in rad^2 where it is
+    /// small.
     pub fn cost(&self, response: &Response) -> f64 {
         let sums = self.per_block(response, |errors| vec![huber_sum(errors)]);
         sums[0] / (self.len() * self.steps()) as f64
@@ -84,7 +86,8 @@ impl Block {
         }
     }
 
-    /// Phase from step s and its partner a quarter period later, minus the phase of the whole stack: `(steps, pixels)`.
+    /// For every step s, the phase from this step and its partner a quarter period later, minus the phase of the whole
+    /// stack: `(steps, pixels)`.
     fn errors_rad(&self, table: &[f32], partner: &Array2<f32>) -> Array2<f32> {
         let steps = self.levels.nrows();
         let mut light = self.levels.mapv(|level| table[usize::from(level)]);
@@ -121,8 +124,8 @@ fn huber_sum(errors_rad: &Array2<f32>) -> f64 {
     sums.into_iter().map(f64::from).sum()
 }
 
-/// Weights `(steps, steps)` of the signal a quarter period after each step, by trigonometric interpolation. For a multiple
-/// of 4 steps it is the step N / 4 later.
+/// Weights `(steps, steps)` that give the signal a quarter period after each step, by trigonometric interpolation. If the
+/// number of steps N is a multiple of 4, this is the step N / 4 later.
 fn quarter_period_later(steps: usize) -> Array2<f32> {
     let n = steps as f64;
     let wave = |k: usize, x: f64| {

@@ -1,4 +1,4 @@
-//! Selection of the pixels that show the response, and the reasons if there are too few.
+//! Selection of the pixels for the estimate, and the reasons if there are too few.
 
 use super::order;
 use super::samples::Trace;
@@ -10,7 +10,7 @@ use ndarray::{Array2, ArrayView1, ArrayView2, ArrayView3, Axis, s};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Kind of a pixel.
+/// Whether a pixel can be used, or why it cannot.
 #[derive(Clone, Copy)]
 pub(super) enum Mark {
     Usable([f32; 2]),
@@ -23,7 +23,8 @@ pub(super) enum Mark {
 /// The usable pixels of all stacks, thinned by a fixed stride.
 ///
 /// # Errors
-/// [`Error::Value`] with the reasons when fewer than 1000 are left, or when too many pixels do not vary like fringes.
+/// [`Error::Value`] with the reasons when fewer than 1000 pixels are left, or when too many pixels do not vary as
+/// fringes do.
 pub(super) fn select<'a>(stacks: &'a [ArrayView3<'a, f32>]) -> Result<Vec<Trace<'a>>> {
     let marks: Vec<Array2<Mark>> = stacks.iter().map(marks_of).collect();
     let usable: Vec<Trace<'a>> = stacks
@@ -57,7 +58,7 @@ fn marks_of(stack: &ArrayView3<'_, f32>) -> Array2<Mark> {
     marks
 }
 
-/// Weights of the steps in cosine and sine of the first harmonic.
+/// Weights of the steps in the cosine and the sine of the first harmonic.
 pub(super) fn waves(steps: usize) -> Vec<[f32; 2]> {
     (0..steps)
         .map(|s| (TAU * s as f64 / steps as f64).sin_cos())
@@ -83,7 +84,8 @@ pub(super) fn mark_of(
         variance += change * change / steps.len() as f32;
     }
     let power = harmonic[0] * harmonic[0] + harmonic[1] * harmonic[1];
-    // Twice the power of the faintest fringes, because noise on faint fringes is no disorder.
+    // The limit is four times the variance of the faintest usable fringes, so that noise on faint fringes does not
+    // count as disorder.
     let strong = variance > 2.0 * modulation_min * modulation_min;
     if strong && variance - power / 2.0 > DISORDER * variance {
         Mark::Disordered

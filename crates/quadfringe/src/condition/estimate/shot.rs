@@ -1,4 +1,5 @@
-//! The response from one shot with a known phase: the pixels of a tile, sorted by phase, are a stack of phase steps.
+//! Estimate of the response from one shot whose phase is known: the pixels of a tile, sorted by phase, act as a stack
+//! of phase steps.
 //!
 //! Albedo and shadows change single tiles at random, but the response changes the fringes of all tiles alike. A wrong
 //! response also makes the phase wrong, so decoding and estimating alternate until both agree.
@@ -17,12 +18,12 @@ use ndarray::{Array2, ArrayView1, ArrayView2, s};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Inverse responses of R, G, B and IR from one shot: `light` as captured, in fractions of full scale, and the decoded
-/// phase of the first fringe number in rad, NaN where there is none; all `(rows, columns)`.
+/// Inverse responses of R, G, B and IR from one shot. `light` is the captured light in fractions of full scale, `phase`
+/// the decoded phase of the first fringe number in rad, NaN for no data; all `(rows, columns)`.
 ///
-/// `None` for a channel without a measurable nonlinearity (a gamma between about 0.9 and 1.1), and where fringes cover too
-/// little of the image; ten by ten fringes are enough. Decode the shot again with the result and repeat the estimate until
-/// it converges, because a wrong response makes the phase wrong. The `pixels` of an estimate are tiles.
+/// A channel without a measurable nonlinearity (a gamma between about 0.9 and 1.1) has `None`. So has every channel if
+/// fringes cover too little of the image; ten by ten fringes are enough. Decode the shot again with the result and repeat
+/// the estimate until it converges, because a wrong response makes the phase wrong. The `pixels` of an estimate are tiles.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size; [`Error::NotFourChannel`] for another encoding.
@@ -74,7 +75,7 @@ pub fn estimate_response_of_shot(
     Ok(traces.each_ref().map(|traces| of_channel(traces, shared)))
 }
 
-/// The response shared by all channels, or that of a single channel if it is much better.
+/// Chooses the response shared by all channels, or a separate response for this channel if it fits much better.
 ///
 /// One projector and one camera usually have the same response in all channels, and four times as many tiles make a more
 /// stable estimate.
@@ -98,7 +99,7 @@ fn of_channel(traces: &[Trace<'_>], shared: Response) -> Option<ResponseEstimate
     })
 }
 
-/// A response and the two-step error that remains with it.
+/// A response and the remaining two-step error.
 struct Fitted {
     response: Response,
     rms_rad: f64,
@@ -124,7 +125,7 @@ fn traces_of(means: &Array2<f32>) -> Vec<Trace<'_>> {
     means.outer_iter().filter_map(|steps| Some(Trace { steps, harmonic: harmonic_of(steps)? })).collect()
 }
 
-/// Mean light by phase step, `(tiles, steps)`, of the tiles that have every step and are not saturated.
+/// Mean light in each phase step, `(tiles, steps)`, for the tiles that have every step and are not saturated.
 fn tiles(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32, side: usize) -> Array2<f32> {
     // The tiles of a small image overlap by half.
     let [rows, columns] = [light.nrows() / side, light.ncols() / side];
@@ -159,7 +160,7 @@ fn steps_of(
     let all = light.len() as f32;
     let even = counts.iter().all(|&count| count >= EVENNESS_MIN * known / PHASE_STEPS as f32);
     let told = known >= KNOWN_MIN * all && saturated <= SATURATED_MAX * known && even;
-    // Noise makes light negative where the dark level was subtracted.
+    // After the dark level is subtracted, noise can make light negative.
     told.then(|| std::array::from_fn(|i| (sums[i] / counts[i]).clamp(0.0, 1.0)))
 }
 

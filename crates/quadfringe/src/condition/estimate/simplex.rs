@@ -9,7 +9,8 @@ pub(super) struct Corner<const D: usize> {
     pub cost: f64,
 }
 
-/// The point of least cost near `start`. The search runs twice, because a simplex may collapse early.
+/// The point of least cost near `start`. The search runs a second time from its result, because a simplex may collapse
+/// early.
 pub(super) fn minimise<const D: usize>(
     start: [f64; D],
     step: [f64; D],
@@ -46,7 +47,7 @@ fn descend<const D: usize>(start: [f64; D], step: [f64; D], cost: &impl Fn([f64;
     simplex[0]
 }
 
-/// A corner that replaces the worst one; `None` if the simplex must shrink.
+/// A new corner in place of the worst one; `None` if the simplex must shrink.
 fn replacement<const D: usize>(
     simplex: &[Corner<D>],
     corner: &impl Fn([f64; D]) -> Corner<D>,

@@ -29,7 +29,7 @@ fn message(stack: &Array3<f32>) -> String {
 fn gamma_is_found_for_any_number_of_steps() {
     for steps in [5, 6, 7, 8, 10, 12, 13, 16] {
         let found = estimate(&capture(steps, 0.0, |v| v.powf(2.2)));
-        // Rounding flattens the dark stripes, whose valleys are half a grey value high.
+        // Rounding flattens the dark stripes, where the fringe minima have half a grey value.
         let Response { offset, exponent, knee } = found.response;
         assert!((exponent - 1.0 / 2.2).abs() < 0.035, "{steps} {found:?}");
         assert!(offset < 0.01 && knee == 0.0, "{steps} {found:?}");

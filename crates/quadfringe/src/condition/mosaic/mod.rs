@@ -1,10 +1,10 @@
 //! Interpolation of a raw Bayer mosaic to linear R, G and B at every pixel.
 //!
-//! Each colour is interpolated from samples of the same colour, because the channels carry different fringes. R and B,
-//! with one sample in two columns and two rows, are interpolated half way between samples by Lagrange's polynomial through
-//! six of them, along rows and along columns. G, whose samples form a chessboard, is interpolated along both diagonals by
-//! the polynomial through four. Both keep the mean and lower the amplitude of fringes with a period of 20 pixels by less
-//! than 0.1 %; bilinear interpolation lowers it by 5 %.
+//! Each colour is interpolated from samples of the same colour, because the channels carry different fringes. R and B have
+//! one sample in every 2 x 2 pixels. Half way between samples they are interpolated by Lagrange's polynomial through six
+//! samples, along rows and along columns. G, whose samples form a chessboard, is interpolated along both diagonals by the
+//! polynomial through four samples. Both keep the mean and lower the amplitude of fringes with a period of 20 pixels by
+//! less than 0.1 %; bilinear interpolation lowers it by 5 %.
 
 use super::linear::{Linear, extend, row_of};
 use super::{Sample, Shot};
@@ -16,24 +16,24 @@ use rayon::prelude::*;
 #[cfg(test)]
 mod tests;
 
-/// Samples that the interpolation uses beyond either end of a row of one colour.
+/// Number of samples that the interpolation uses beyond either end of a row of one colour.
 const MARGIN: usize = 3;
-/// Rows that it uses beyond the first and the last one.
+/// Number of rows that the interpolation uses beyond the first and the last row.
 const ROW_MARGIN: usize = 5;
-/// Samples of one colour that are processed together, in the nearest cache.
+/// Number of samples of one colour that are processed together and fit into the nearest cache.
 const BLOCK: usize = 64;
 
 /// Linear light of a mosaic with margins. A row is stored as its even columns followed by its odd columns.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Mosaic {
     light: Vec<f32>,
-    /// Samples of half a row, including margins.
+    /// Number of samples in half a row, including margins.
     half: usize,
     first_red: [usize; 2],
 }
 
 impl Mosaic {
-    /// Linearise the samples of a shot.
+    /// Converts the samples of a shot to linear light.
     pub fn fill<T: Sample>(&mut self, raw: &ArrayView2<'_, T>, pattern: BayerPattern, linear: &Linear) {
         let (rows, columns) = raw.dim();
         self.first_red = pattern.first_red();
@@ -52,7 +52,8 @@ impl Mosaic {
         self.extend_rows(rows);
     }
 
-    /// Extend the rows above and below, mirrored at the first and the last row of the same colours, as [`extend`] does.
+    /// Adds rows above and below the image. They are reflected at the first and at the last row that has the same
+    /// colours, as in [`extend`].
     fn extend_rows(&mut self, rows: usize) {
         for i in 1..=ROW_MARGIN {
             let first = i % 2;
@@ -64,7 +65,7 @@ impl Mosaic {
         }
     }
 
-    /// Write line `to` of the store by mirroring the row `image` at the row `at`.
+    /// Writes the stored row `to` as the reflection of the image row `image` at the image row `at`.
     fn mirror_row(&mut self, to: usize, at: usize, image: usize) {
         let stride = 2 * self.half;
         let start = |row: usize| (row + ROW_MARGIN) * stride;
@@ -99,13 +100,13 @@ impl Mosaic {
     }
 }
 
-/// Split a row of raw samples by the parity of the columns, as linear light.
+/// Converts a row of raw samples to linear light and splits it by the parity of the columns.
 #[multiversion(targets("x86_64+avx2"))]
 fn split_row<T: Sample>(linear: &Linear, channels: [usize; 2], row: &[T], out: [&mut [f32]; 2]) {
     linear.row_of_two(channels, row, out);
 }
 
-/// R or B in a row with samples of it, in every other column from `column` on.
+/// R or B in a row that has samples of this colour, in every other column from `column` on.
 #[multiversion(targets("x86_64+avx2"))]
 fn own_row(line: &[f32], column: usize, out: &mut [f32]) {
     for (block, out) in out.chunks_mut(2 * BLOCK).enumerate() {
@@ -113,7 +114,7 @@ fn own_row(line: &[f32], column: usize, out: &mut [f32]) {
     }
 }
 
-/// R or B in a row between rows with samples of it.
+/// R or B in a row between two rows that have samples of this colour.
 #[multiversion(targets("x86_64+avx2"))]
 fn row_between(lines: [&[f32]; 6], column: usize, out: &mut [f32]) {
     let mut line = [0.0; BLOCK + 2 * MARGIN];
@@ -124,7 +125,7 @@ fn row_between(lines: [&[f32]; 6], column: usize, out: &mut [f32]) {
     }
 }
 
-/// Interpolate samples of every other column to every column of a block.
+/// Interpolates the samples of every other column to every column of a block.
 #[inline(always)]
 fn spread(line: &[f32], column: usize, out: &mut [f32]) {
     let n = out.len().div_ceil(2);
@@ -145,7 +146,7 @@ fn half_way_each([a, b, c, d, e, f]: [&[f32]; 6], out: &mut [f32]) {
     }
 }
 
-/// Write samples to every other column from `column` on, and interpolated values between them.
+/// Writes samples to every other column from `column` on, and interpolated values between them.
 #[inline(always)]
 fn interleave(samples: &[f32], between: &[f32], column: usize, out: &mut [f32]) {
     let [first, second] = if column == 0 { [samples, between] } else { [between, samples] };
@@ -158,7 +159,7 @@ fn interleave(samples: &[f32], between: &[f32], column: usize, out: &mut [f32]) 
     }
 }
 
-/// Rows around a row of G, one, two and three above and below: the columns that have G.
+/// Samples of G in a row and in the rows one, two and three above and below it.
 struct GreenRows<'a> {
     here: &'a [f32],
     near: [&'a [f32]; 2],
@@ -178,8 +179,8 @@ fn green_row<'a>(rows: &GreenRows<'a>, column: usize, out: &mut [f32]) {
     }
 }
 
-/// G between the samples of a row, from sample `start` on. The samples to the left of these pixels start at
-/// `start - column`, those to the right one later.
+/// G between the samples of a row, from sample `start` on. The left neighbours of these pixels start at sample `start -
+/// column`, the right neighbours one sample later.
 #[inline(always)]
 fn green_between(rows: &GreenRows<'_>, start: usize, column: usize, between: &mut [f32]) {
     let GreenRows { here, near, alike, far } = *rows;
@@ -216,8 +217,9 @@ fn green_between(rows: &GreenRows<'_>, start: usize, column: usize, between: &mu
     }
 }
 
-/// Mark the pixels of row `y` whose nearest samples are not saturated, and those whose nearest samples of both R and B are
-/// saturated. Farther samples of the interpolation have a weight of at most a tenth.
+/// Marks two kinds of pixels of row `y`: pixels whose nearest samples are not saturated, and pixels with glare, whose
+/// nearest samples of both R and B are saturated. Samples further away have a weight of at most a tenth in the
+/// interpolation.
 pub(super) fn saturation_row<T: Sample>(
     shot: &Shot<'_, T>,
     y: usize,
@@ -236,7 +238,8 @@ pub(super) fn saturation_row<T: Sample>(
             let saturated = samples.iter().enumerate().filter(|(_, s)| s.intensity() >= limit);
             for (x, _) in saturated {
                 let channel = pattern.channel(row, x);
-                // G reaches along its row and column: from the rows above and below only the same column.
+                // A sample of G is next to the pixels of its row and of its column, so in the rows above and below only
+                // its column counts.
                 let reach = usize::from(channel != Channel::G || row == y);
                 let end = (x + reach + 1).min(samples.len());
                 touched[x.saturating_sub(reach)..end].iter_mut().for_each(|t| t[channel.index()] = true);

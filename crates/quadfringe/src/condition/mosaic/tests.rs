@@ -1,4 +1,4 @@
-//! Interpolated mosaics against the sampled images.
+//! Compares interpolated mosaics with the images from which they were sampled.
 
 use super::*;
 use crate::Conditioner;
@@ -48,8 +48,8 @@ fn a_ramp_comes_back_up_to_the_borders_in_every_pattern_and_size() {
     }
 }
 
-/// Two-step phase of R and B, amplitude of G, against the truth. Bilinear interpolation has errors of 0.018 rad at 20 px
-/// and 0.075 rad at 10 px.
+/// Compares the two-step phase of R and B and the amplitude of G with the truth. Bilinear interpolation has errors of
+/// 0.018 rad at 20 px and 0.075 rad at 10 px.
 #[test]
 fn fringes_keep_phase_and_modulation() {
     let bounds = [(28.0, 2e-5, 3e-4), (20.0, 1.5e-4, 1e-3), (14.0, 1e-3, 4e-3), (10.0, 6e-3, 0.014)];

@@ -1,6 +1,6 @@
 //! Blocks of pixels that are triangulated together, as vectors.
 
-/// Pixels of a block.
+/// Number of pixels in a block.
 pub(super) const BLOCK: usize = 64;
 
 /// Normalised directions `(x, y, 1)` of the rays of a block.
@@ -9,16 +9,16 @@ pub(super) struct Directions {
     pub y: [f32; BLOCK],
 }
 
-/// Intermediate values of a block. Only as many entries as there are columns are valid.
+/// Intermediate values of a block. If a block has fewer columns than [`BLOCK`], the last entries are not valid.
 pub(super) struct Block {
     pub directions: Directions,
     /// Ideal normalised coordinates of the columns.
     pub ideal: [f32; BLOCK],
-    /// Derivative of the ideal coordinate by the column, 1 / px.
+    /// Derivative of the ideal coordinate with respect to the column, 1 / px.
     pub stretch: [f32; BLOCK],
     /// Depth, mm.
     pub depth: [f32; BLOCK],
-    /// Derivative of the depth by the column, mm / px.
+    /// Derivative of the depth with respect to the column, mm / px.
     pub growth: [f32; BLOCK],
 }
 
@@ -28,7 +28,7 @@ impl Block {
         Self { directions: Directions { x: row, y: row }, ideal: row, stretch: row, depth: row, growth: row }
     }
 
-    /// `t x, t y, t` pixel by pixel.
+    /// Writes the points `t x, t y, t` pixel by pixel.
     #[inline(always)]
     pub fn write_points(&self, xyz: &mut [f32]) {
         let Directions { x, y } = &self.directions;
@@ -38,7 +38,7 @@ impl Block {
         }
     }
 
-    /// Turn standard deviations of columns in px into those of depths in mm.
+    /// Converts standard deviations of columns in px to standard deviations of depths in mm.
     #[inline(always)]
     pub fn scale_uncertainty(&self, uncertainty: &mut [f32]) {
         for (value, growth) in uncertainty.iter_mut().zip(&self.growth) {

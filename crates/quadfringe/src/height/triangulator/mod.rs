@@ -1,14 +1,16 @@
 //! Triangulation: intersection of camera rays with projector columns (S7).
 //!
-//! In projector coordinates the points of a camera ray are `A + t B`, with `A` the camera centre and `B` the rotated
-//! direction `(x, y, 1)` of the pixel. A column with the normalised coordinate `k` requires `A0 + t B0 = k (A2 + t B2)`:
+//! In projector coordinates the points of a camera ray are `A + t B`, where `A` is the camera centre and `B` the rotated
+//! direction `(x, y, 1)` of the pixel. For a column with the normalised coordinate `k`, the condition is `A0 + t B0 = k
+//! (A2 + t B2)`, so
 //!
-//! `t = (k A2 - A0) / (B0 - k B2)`, and `X, Y, Z = t x, t y, t`: a rational function of the column for each pixel.
+//! `t = (k A2 - A0) / (B0 - k B2)` and `X, Y, Z = t x, t y, t`. This is a rational function of the column for each
+//! pixel.
 //!
 //! Camera distortion is removed once, in the table of `x, y`. With projector distortion a column is a curved sheet of light,
 //! but the camera ray is a straight line `m = m0 + s k` in ideal projector coordinates, so the distorted coordinate is a
-//! polynomial in `k` alone. Three Newton steps from the measured value solve it: exact to rounding at every depth, without
-//! a table and without a limited depth range.
+//! polynomial in `k` alone. Three Newton steps from the measured value solve it. The result is exact to rounding at every
+//! depth and needs no table with a limited depth range.
 
 use multiversion::multiversion;
 use ndarray::{Array2, Array3, ArrayView2, Axis};
@@ -44,17 +46,18 @@ use sheets::ColumnSheets;
 #[derive(Debug, Clone)]
 pub struct Triangulator {
     camera: Device,
-    /// Normalised `x, y` of every pixel when the camera has distortion; without it they are linear.
+    /// Normalised `x, y` of every pixel if the camera has distortion; `None` without distortion, because they are then
+    /// linear in the pixel.
     directions: Option<Array2<[f32; 2]>>,
     projector: ColumnSheets,
 }
 
 impl Triangulator {
-    /// Plan for one pair of devices; the frame of the result is that of the camera.
+    /// Plans the triangulation for a camera and a projector. Points are given in the camera frame.
     ///
     /// # Errors
     /// [`Error::Value`] when the camera's pose is not the identity (the projector's pose is relative to the camera), or
-    /// when the baseline is not across the columns of the projector, so that columns do not depend on depth.
+    /// when the baseline does not lie across the columns of the projector, so that columns do not depend on depth.
     pub fn new(camera: &Device, projector: &Device) -> Result<Self> {
         let offset = (0..3).fold(0f64, |worst, i| {
             let turn =
@@ -71,13 +74,13 @@ impl Triangulator {
         Ok(Self { camera: camera.clone(), directions, projector: ColumnSheets::new(projector)? })
     }
 
-    /// Size of the column maps (rows, columns): that of the camera.
+    /// Size of the column maps, which is the size of the camera image (rows, columns).
     #[must_use]
     pub fn shape(&self) -> (usize, usize) {
         (self.camera.height, self.camera.width)
     }
 
-    /// Points of one image row: `out` receives X, Y, Z in mm pixel by pixel, NaN where the column is NaN or where the
+    /// Points of one image row. `out` receives X, Y, Z in mm for each pixel; NaN where the column is NaN, or where the
     /// column and the ray do not meet in front of the camera.
     ///
     /// # Panics
@@ -90,9 +93,9 @@ impl Triangulator {
         points(self, row, columns_px, out);
     }
 
-    /// Uncertainty of the depth for one image row: `uncertainty` holds standard deviations of the columns in px and receives
-    /// those of Z in mm, NaN where [`Self::xyz_row`] has no point. The point moves along its ray, so X and Y change in
-    /// proportion to Z.
+    /// Uncertainty of the depth for one image row. `uncertainty` holds the standard deviations of the columns in px and
+    /// receives the standard deviations of Z in mm; NaN where [`Self::xyz_row`] has no point. The point moves along its ray,
+    /// so X and Y change in proportion to Z.
     ///
     /// # Panics
     /// As [`Self::xyz_row`].
@@ -132,7 +135,7 @@ impl Triangulator {
     /// parallel.
     ///
     /// # Errors
-    /// [`Error::Shape`] when the map has another size than the camera image.
+    /// [`Error::Shape`] when the map does not have the size of the camera image.
     pub fn xyz_mm(&self, columns_px: ArrayView2<'_, f32>) -> Result<Array3<f32>> {
         let (height, width) = self.shape();
         if columns_px.dim() != (height, width) {
@@ -200,7 +203,7 @@ fn deviations(triangulator: &Triangulator, row: usize, columns_px: &[f32], uncer
     }
 }
 
-/// Both, sharing the intersection.
+/// A row of points and standard deviations, from one intersection.
 #[multiversion(targets("x86_64+avx2"))]
 fn points_and_deviations(
     triangulator: &Triangulator,

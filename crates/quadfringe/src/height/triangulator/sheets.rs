@@ -1,11 +1,11 @@
-//! Sheets of light: the columns of a projector in its frame, with lens distortion.
+//! Sheets of light: the surfaces that the columns of a projector light, in the projector frame, with lens distortion.
 
 use super::block::{BLOCK, Block, Directions};
 use crate::error::{Error, Result};
 use crate::height::params::{ACROSS_SHARE_MIN, BASELINE_MIN_MM, NEWTON_STEPS};
 use crate::optics::Device;
 
-/// An ideal coordinate, and the derivative of the distorted coordinate by it.
+/// An ideal coordinate, and the derivative of the distorted coordinate with respect to it.
 struct Ideal {
     coordinate: f32,
     slope: f32,
@@ -42,8 +42,8 @@ impl ColumnSheets {
         })
     }
 
-    /// Depths at which rays `(x, y, 1)` meet the sheets of `columns`, NaN behind the camera, and their derivatives by the
-    /// column: that of `t = (k A2 - A0) / (B0 - k B2)` by `k`, times `dk / du`.
+    /// Depths at which rays `(x, y, 1)` meet the sheets of `columns`, NaN behind the camera, and the derivatives of the
+    /// depths with respect to the columns: `dt / dk` of `t = (k A2 - A0) / (B0 - k B2)`, times `dk / du`.
     #[inline(always)]
     pub fn intersect(&self, columns: &[f32], block: &mut Block) {
         self.ideal(columns, block);
@@ -60,7 +60,7 @@ impl ColumnSheets {
         }
     }
 
-    /// Ideal normalised coordinates of `columns`, and their derivatives by the column.
+    /// Ideal normalised coordinates of `columns`, and their derivatives with respect to the columns.
     #[inline(always)]
     fn ideal(&self, columns: &[f32], block: &mut Block) {
         let Block { directions: Directions { x, y }, ideal: k, stretch, .. } = block;
@@ -77,7 +77,8 @@ impl ColumnSheets {
         }
     }
 
-    /// Ideal normalised column at which the projector's image of the ray `(x, y, 1)` has the distorted column `measured`.
+    /// Ideal normalised coordinate of the point on the ray `(x, y, 1)` that the projector images at the distorted
+    /// coordinate `measured`.
     #[inline(always)]
     fn ideal_coordinate(&self, distortion: &[f32; 5], measured: f32, x: f32, y: f32) -> Ideal {
         let [k1, k2, p1, p2, k3] = *distortion;
