@@ -1,5 +1,5 @@
-//! Steps 2 to 6 on the coarse level: mask, beats, orders and photometry, which all need a neighbourhood. The phase of the full image
-//! starts from their result.
+//! Steps 2 to 6 on the coarse level: mask, beats, orders and photometry, which all need a neighbourhood. The phase at full
+//! resolution starts from their results.
 
 use super::illumination::LitMask;
 use super::local_fit::{LocalFit, PixelMaps};
@@ -16,7 +16,7 @@ use super::smooth::mark_discontinuities;
 use super::window::Window;
 use crate::encoding::FourChannel;
 
-/// Results of the steps on the coarse level, and the steps themselves.
+/// The steps on the coarse level, and their results.
 pub(super) struct CoarseLevel {
     /// Absolute phase of every pixel in rad.
     pub phase: Vec<f32>,
@@ -24,15 +24,16 @@ pub(super) struct CoarseLevel {
     pub modulation: Vec<f32>,
     /// 1 near discontinuities of the surface, shadows and borders.
     pub discontinuities: Vec<f32>,
-    /// Modulation where a pixel and its neighbours lie on one smooth, lit surface, 0 elsewhere.
+    /// Modulation of pixels that lie with their neighbours on one smooth, lit surface; 0 elsewhere.
     smooth_modulation: Vec<f32>,
-    /// Wrapped phase of R and B until orders are known; then squared residuals, and within a refit the phase of the wide window.
+    /// Working plane: first the wrapped phase of R and B; once orders are known, the squared residuals; during a refit, the
+    /// phase of the wide window.
     work: Vec<f32>,
     /// Standard deviation of the intensities in linear light.
     pub noise: f32,
-    /// Noise over the mean modulation of lit pixels.
+    /// Noise divided by the mean modulation of lit pixels.
     relative_noise: f32,
-    /// Whether the surface is textured: enough pixels take offsets and amplitudes from another place.
+    /// Whether the surface counts as textured, because enough pixels take offsets and amplitudes from another place.
     pub textured: bool,
     pub lit_mask: LitMask,
     fit: LocalFit,
@@ -64,7 +65,8 @@ impl CoarseLevel {
         }
     }
 
-    /// Step 2: the mask of lit pixels, which restricts the level. Interpolated light may reach `reach_px` pixels into a shadow.
+    /// Step 2: finds the mask of lit pixels and removes the other pixels from the level. Interpolated light may reach
+    /// `reach_px` pixels into a shadow.
     pub fn find_light(
         &mut self,
         level: &mut Level,
@@ -100,7 +102,8 @@ impl CoarseLevel {
         self.slopes.measure(scene, map);
     }
 
-    /// Step 4: fringe orders (S4), by offsets and amplitudes of the local fit, and once more by those that follow from these orders.
+    /// Step 4: chooses fringe orders (S4) with the offsets and amplitudes of the local fit, then once more with the offsets and
+    /// amplitudes that a fit to these orders gives.
     pub fn choose_orders(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         let wrapped = Wrapped { map, fit: &self.fit, photometry: None, slopes: &self.slopes };
@@ -113,14 +116,16 @@ impl CoarseLevel {
         self.orders.choose(scene, &wrapped, &mut self.phase);
     }
 
-    /// Steps 5 and 6 in turns: offset and amplitude of every channel, and the phase from all four channels with them.
+    /// Steps 5 and 6, alternating: fits offset and amplitude of every channel, and with them the phase from all four
+    /// channels.
     pub fn refine(&mut self, scene: &Scene<'_>, ratios: [f32; 3], moving: bool, mut scratch: Scratch<'_>) {
         self.textured = false;
         self.fit_phase(scene, ratios, scratch.lend());
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
         self.photometry.fit(scene, ratios, map, &self.slopes, &self.free_fit());
         if moving {
-            // Places with other offsets and amplitudes could explain the effect of motion, so no pixel may choose one.
+            // Offsets and amplitudes of another place could seem to explain the effect of motion, so no pixel may
+            // choose another place.
             let fit = PhotometryFit { phase_trust: params::MOVING_PHASE_TRUST, ..self.free_fit() };
             self.refit(scene, ratios, &fit, scratch.lend());
             self.fit_phase(scene, ratios, scratch);
@@ -140,7 +145,7 @@ impl CoarseLevel {
                 self.fit_phase(scene, ratios, scratch.lend());
             }
         }
-        // The phase of a textured surface still follows the texture, and its slopes would too.
+        // The phase of a textured surface still has errors from the texture, and refined slopes would have them too.
         if moving || !self.textured {
             self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
         }
@@ -157,7 +162,8 @@ impl CoarseLevel {
         }
     }
 
-    /// Step 6 on the coarse level: phase by the present photometry, squared residuals and discontinuities.
+    /// Step 6 on the coarse level: fits the phase with the present photometry, and computes squared residuals and
+    /// discontinuities.
     fn fit_phase(&mut self, scene: &Scene<'_>, ratios: [f32; 3], scratch: Scratch<'_>) {
         let mut window = Window::new(scene, &self.slopes, &self.modulation, self.noise).near();
         if self.textured {
@@ -171,7 +177,8 @@ impl CoarseLevel {
         mark_discontinuities(scene.grid, map, &mut self.discontinuities, &mut self.smooth_modulation);
     }
 
-    /// Step 5: photometry by the phase of a wide window, which follows the surface and not the errors of wrong photometry.
+    /// Step 5: fits the photometry to the phase of a wide window. This phase follows the surface, while errors of the
+    /// previous photometry average out.
     fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 3], fit: &PhotometryFit, scratch: Scratch<'_>) {
         self.residuals.measure(scene, &self.work, &self.modulation);
         self.slopes.measure(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
@@ -184,8 +191,8 @@ impl CoarseLevel {
         self.photometry.fit(scene, ratios, map, &self.slopes, fit);
     }
 
-    /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains it best. Enough pixels that
-    /// take them from another place make a textured surface.
+    /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains its intensities best. If
+    /// enough pixels take them from another place, the surface counts as textured.
     fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
         let moved = self.photometry.choose_places(scene, ratios, map, &self.slopes, self.noise);
@@ -193,7 +200,7 @@ impl CoarseLevel {
     }
 }
 
-/// Noise over the mean modulation of lit pixels.
+/// Noise divided by the mean modulation of lit pixels.
 fn relative(noise: f32, modulation: &[f32]) -> f32 {
     let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
     let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));

@@ -1,8 +1,8 @@
 //! Step 2: the mask of pixels that both projectors light, and the noise of the intensities.
 //!
-//! R and B are a quarter period apart, so on a lit surface they are never both at the bottom of their fringes: together they
-//! stand at least 0.15 of their range above it. In a shadow all four channels lie at the bottom. Bottom and range come from
-//! the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
+//! R and B are a quarter period apart, so on a lit surface they are never both at the bottom of their range: at least one
+//! lies 0.146 of its range or more above it. In a shadow all four channels lie at the bottom. Bottom and range are taken
+//! from the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::neighbours::{around, least_of_five, least_of_nine, sum_of_nine};
@@ -15,7 +15,7 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Bottom of each channel and 1 / range^2, one after the other: maps of cells.
+/// Number of maps of cells: bottom and 1 / range^2 for each channel.
 const LEVEL_MAPS: usize = 8;
 
 /// The mask of lit pixels, with its working maps.
@@ -26,7 +26,7 @@ pub(super) struct LitMask {
     levels: CellMaps,
     sums: CellMaps,
     slots: Slots<TaskWork<Rows>>,
-    /// Standard deviation of the intensities of the last image, in linear light.
+    /// Standard deviation of the intensities in the last image, in linear light.
     pub noise: f32,
 }
 
@@ -35,12 +35,12 @@ pub(super) struct LitMask {
 struct Rows {
     maps: RowMaps,
     spare: Vec<f32>,
-    /// Squared heights above the bottom, and their sums over nine pixels, of the rows that a task needs.
+    /// Squared heights above the bottom, and their sums over nine pixels, for the rows that a task needs.
     heights: Vec<f32>,
     sums: Vec<f32>,
 }
 
-/// Levels of the light along one row of pixels.
+/// Bottom and range of the light along one row of pixels.
 struct LevelRows<'a> {
     bottom: [&'a [f32]; 4],
     /// 1 / range^2.
@@ -63,7 +63,8 @@ impl LitMask {
         self.find_again(grid, light, lit);
     }
 
-    /// The same on a finer image of the same scene, whose grid has the cells of the last [`Self::find`].
+    /// As [`Self::find`], on a finer image of the same scene. Bottom and range are taken from the last [`Self::find`];
+    /// `grid` must have the same cells.
     pub fn find_again(&mut self, grid: &Grid, light: [&[f32]; 4], lit: &mut [f32]) {
         self.noise = noise_of_image(light[0], grid);
         let this = &*self;
@@ -73,12 +74,12 @@ impl LitMask {
         );
     }
 
-    /// The mask of the rows from `first` on.
+    /// Computes the mask of the rows from `first` on.
     fn find_rows(&self, grid: &Grid, light: [&[f32]; 4], first: usize, rows: &mut Rows, lit: &mut [f32]) {
         let stride = grid.stride;
         let Rows { maps, spare, heights, sums } = rows;
         let last = first + lit.len() / stride - 1;
-        // Rows that repeat at the border of the image are those at the border.
+        // Beyond the border of the image the rows at the border are used again.
         let [high, mean] =
             [2, 1].map(|reach| first.saturating_sub(reach)..=(last + reach).min(grid.height - 1));
         heights.resize((ROWS + 4) * stride, 0.0);
@@ -94,15 +95,15 @@ impl LitMask {
             sum_of_nine(near, grid.width, spare, out);
         }
         for (y, lit) in (first..=last).zip(lit.chunks_exact_mut(stride)) {
-            // A mean of nine reaches one pixel into a shadow; the least of nine means does not.
+            // A mean over nine pixels carries light one pixel into a shadow; the least of nine such means does not.
             let near = near(y, *mean.start()).map(|at| &sums[at..at + stride]);
             least_of_nine(near, grid.width, 9.0 * HEIGHT_MIN, spare, lit);
         }
     }
 
-    /// Removes lit pixels that lie `reach_px` pixels or less from an unlit one: light interpolated from a mosaic reaches that
-    /// far. The corner of the square around a pixel is a product of two distant samples with a hundredth of the weight, so the
-    /// corners of the last ring do not count. The content of `scratch` is lost.
+    /// Removes lit pixels that are `reach_px` pixels or less away from an unlit pixel, because light interpolated from a
+    /// mosaic reaches that far. The corners of the outermost ring do not count: samples there have a hundredth of the weight
+    /// in the interpolation, since both of their distances are large. The content of `scratch` is lost.
     pub fn erode(&mut self, grid: &Grid, reach_px: usize, scratch: &mut [f32], lit: &mut [f32]) {
         let stride = grid.stride;
         for ring in 1..=reach_px {
@@ -141,7 +142,7 @@ impl LitMask {
                 for (sums, out) in sums.iter().zip(out.chunks_exact_mut(grid.columns)) {
                     let mut last = 0.0;
                     for ((mean, sum), n) in out.iter_mut().zip(*sums).zip(count) {
-                        // Padding repeats the last cell.
+                        // In the padding the last cell is repeated.
                         last = if *n > 0.0 { sum / n } else { last };
                         *mean = last;
                     }
@@ -216,7 +217,8 @@ fn add_light(inside: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
     }
 }
 
-/// Sum of the squared heights of the four channels above the bottom, in units of the range, less the variance of the noise.
+/// Sum over the four channels of the squared height above the bottom, in units of the range, minus the variance of the
+/// noise.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn heights(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mut [f32]) {
     let (bottom, precision, light) =

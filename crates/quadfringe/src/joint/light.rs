@@ -1,4 +1,4 @@
-//! Step 1: planes of linear light (S1), and of step 2 the fringe period.
+//! Step 1, planes of linear light (S1), and the fringe period of step 2.
 
 use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
 use super::pyramid::Level;
@@ -9,8 +9,8 @@ use multiversion::multiversion;
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
-/// Writes the linear light of a shot into the planes of a level. Its mask `lit` is 0 for glare and for pixels that one chip does not
-/// see, `usable` is 0 for saturated pixels too.
+/// Writes the linear light of a shot into the planes of a level. The mask `lit` becomes 0 for glare and for pixels that the
+/// infrared chip does not see; the mask `usable` becomes 0 also for saturated pixels.
 pub(super) fn linear_light<T: Sample>(plan: &Plan, shot: &Shot<'_, T>, shape: [usize; 2], level: &mut Level) {
     let [height, width] = shape;
     let stride = level.lit.len() / height;
@@ -63,7 +63,8 @@ fn linear_row<T: Sample>(
     plan.continue_infrared(y, infrared);
 }
 
-/// Fringe period across the fringes in pixels, from the red plane; a share of the width when no carrier stands out.
+/// Fringe period across the fringes in pixels, from the red plane; a fixed share of the image width if no carrier
+/// stands out.
 pub(super) fn fringe_period_px(red: &[f32], [height, width]: [usize; 2]) -> f64 {
     let stride = red.len() / height;
     let red = ArrayView2::from_shape((height, stride), red).expect("a plane is whole");

@@ -1,22 +1,22 @@
-//! Result maps as working memory until they are written. A decoder and its results then need some ten megabytes less for each
-//! megapixel, and large planes stay in the caches (`quadfringe bench`).
+//! The maps of the result serve as working memory until they are written. This saves some ten megabytes for each megapixel,
+//! and large planes stay in the caches (`quadfringe bench`).
 
 use super::phase::FitRows;
 use super::scene::Scratch;
 use crate::decode::output::Decoded;
 use ndarray::Array2;
 
-/// Maps of a result that have not been written yet.
+/// Maps of the result that have not been written yet.
 pub(super) struct OutputMemory<'a> {
     /// Two working planes in the map of points, which the steps use one after the other.
     pub scratch: Scratch<'a>,
-    /// Output of the phase fit at full resolution: modulation in the map of that name, squared residuals in that of the wrong-order
-    /// probability, information in that of the uncertainty.
+    /// Output of the phase fit at full resolution. Modulation goes into its map, squared residuals go into the map of the
+    /// wrong-order probability, and information goes into the map of the uncertainty.
     pub found: FitRows<'a>,
 }
 
 impl<'a> OutputMemory<'a> {
-    /// The maps of `out`; `spare` holds the working planes when `out` has no map of points.
+    /// Borrows the maps of `out`. If `out` has no map of points, `spare` holds the working planes.
     pub fn new(out: &'a mut Decoded, spare: &'a mut Vec<f32>, pixels: usize) -> Self {
         let width = out.phase_rad.ncols();
         let rows = |map: &'a mut Array2<f32>| {

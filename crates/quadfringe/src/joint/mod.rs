@@ -14,7 +14,7 @@
 //! ```
 //!
 //! The steps share the model of the intensities (`model`), a grid of cells for slowly varying quantities (`cells`), and the tuned
-//! numbers (`params`). `docs/method/joint.md` derives them under the same numbers.
+//! numbers (`params`). `docs/method/joint.md` derives the steps and numbers them in the same way.
 
 mod agreement;
 mod cells;
@@ -62,12 +62,12 @@ use uncertainty::PhaseNoise;
 use validity::{PixelFit, Validity};
 use window::Window;
 
-/// A decoder by the joint method: the results of its steps, and their working memory.
+/// Decoder for the joint method: the results of its steps, and their working memory.
 pub(crate) struct Joint {
     shape: [usize; 2],
-    /// Length of a padded row of pixels.
+    /// Length of a row of pixels including padding.
     stride: usize,
-    /// Fringe numbers over the first.
+    /// Fringe numbers divided by the first.
     ratios: [f32; 3],
     pyramid: Pyramid,
     coarse: CoarseLevel,
@@ -77,13 +77,13 @@ pub(crate) struct Joint {
     /// Modulation of R and B in linear light, 0 where there is no light.
     modulation: Vec<f32>,
     motion: Motion,
-    /// Light as captured, when motion is compensated.
+    /// Light before compensation, if motion is compensated.
     captured: [Vec<f32>; 4],
     validity: Validity,
     agreement: Agreement,
-    /// Probability of a wrong order, node by node.
+    /// Wrong-order probability of every node.
     wrong_order: Vec<f32>,
-    /// Working planes, when the result has no map of points to lend.
+    /// Working planes, for results that have no map of points to serve as such.
     spare: Vec<f32>,
 }
 
@@ -141,7 +141,8 @@ impl Joint {
         let noise = self.uncertainty(&frame);
         // 10. Heights (S7).
         self.write(&frame, &noise, finish, out);
-        // 9. again: components settle doubtful orders, after step 10 has removed pixels outside the projector's image.
+        // 9. again: connected components settle doubtful orders. This follows step 10, which removes pixels outside the
+        //    projector image.
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
         let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
         self.validity.propagate(&grid, &self.phase, wrong_order, quality);
@@ -166,7 +167,7 @@ impl Joint {
         coarse.fit_fringes(&scene, &level.lit, options.modulation_min);
         // 4. Fringe orders (S4).
         coarse.choose_orders(&scene, *ratios);
-        // 5. Photometry, and 6. phase from all four channels, in turns.
+        // 5. and 6. Photometry and phase from all four channels, alternating.
         coarse.refine(&scene, *ratios, moving, memory.scratch.lend());
         pyramid.restore(frame);
         // 6. Phase at full resolution.
@@ -174,7 +175,7 @@ impl Joint {
         self.fit_phase(frame, memory);
     }
 
-    /// Step 6: phase and modulation of every pixel, from those of the coarse level.
+    /// Step 6: upsamples phase and modulation from the coarse level to every pixel.
     fn upsample(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
         let (grid, coarse) = (frame.full.grid, &mut self.coarse);
         if frame.coarse.factor == 1 {
@@ -197,7 +198,7 @@ impl Joint {
         self.upsampler.run(levels, &mut self.phase, &mut self.modulation);
     }
 
-    /// Step 6 at full resolution.
+    /// Step 6: fits the phase at full resolution.
     fn fit_phase(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
         let (scene, ratios) = (self.pyramid.full.scene(frame.full), self.ratios);
         let CoarseLevel { slopes, noise, photometry, phase_fit, residuals, textured, .. } = &mut self.coarse;
@@ -207,7 +208,8 @@ impl Joint {
             let model = PhaseModel { scene: &scene, photometry, ratios, window };
             return phase_fit.step(model, &mut self.phase, scratch.lend(), found);
         }
-        // Residuals for step 8 come from the illumination of windows: with an albedo for every pixel any order would fit.
+        // The residuals for step 8 are taken with the offsets and amplitudes of windows. With an albedo for every channel
+        // and pixel, any order would fit.
         let squared_residual = std::mem::take(&mut found.squared_residual);
         let mut residuals_only = FitRows { squared_residual, ..FitRows::none(frame.full.grid.height) };
         let model = PhaseModel { scene: &scene, photometry, ratios, window: window.wide() };
@@ -215,7 +217,7 @@ impl Joint {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
         photometry.estimate_albedo(&scene, ratios, map, slopes, *noise);
         found.squared_residual = FitRows::none(frame.full.grid.height).squared_residual;
-        // The wide window averaged errors of the texture; the narrow one follows the shape.
+        // The wide window averaged out errors that the texture causes; the narrow window follows the shape.
         let model = PhaseModel { scene: &scene, photometry, ratios, window: window.loosened(residuals) };
         phase_fit.step(model, &mut self.phase, scratch.lend(), found);
     }
@@ -267,7 +269,7 @@ impl Joint {
         }
     }
 
-    /// Step 9, except for what depends on connected components.
+    /// Step 9, without the part that needs connected components.
     fn uncertainty(&mut self, frame: &Frame<'_>) -> PhaseNoise {
         let scene = self.pyramid.full.scene(frame.full);
         let CoarseLevel { noise, photometry, orders, slopes, .. } = &self.coarse;

@@ -1,7 +1,7 @@
 //! The model of the intensities (S1): `I_c = rho (A_c + B_c cos(k_c Phi + delta_c))`.
 //!
-//! Channel c of R, G, B, IR has the offset `A_c`, the amplitude `B_c` and `k_c = N_c / N_1` fringes for each fringe of R and B;
-//! `Phi` is the absolute phase of R and B, `rho` the albedo of the pixel. The shift `delta_c` is pi/2 for B and 0 for the others.
+//! Channel c has the offset `A_c`, the amplitude `B_c` and `k_c = N_c / N_1` fringes for each fringe of R and B. `Phi` is the
+//! absolute phase of R and B, `rho` the albedo of the pixel. The shift `delta_c` is pi/2 for B and 0 for the others.
 
 use crate::parallel::angle::sin_cos;
 
@@ -13,7 +13,7 @@ pub(super) struct FringeRows<'a> {
 }
 
 impl<'a> FringeRows<'a> {
-    /// From maps that hold offset and amplitude of R, of G, of B, of IR one after the other.
+    /// Takes maps in the order offset and amplitude of R, of G, of B, of IR.
     pub fn from_interleaved(maps: [&'a [f32]; 8]) -> Self {
         Self { offset: [0, 2, 4, 6].map(|k| maps[k]), amplitude: [1, 3, 5, 7].map(|k| maps[k]) }
     }
@@ -29,14 +29,14 @@ pub(super) struct CellFringes {
 /// Carriers of the four channels at one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Carriers {
-    /// `cos(k_c Phi + delta_c)`, less the contrast that averaging pixels has cost.
+    /// `cos(k_c Phi + delta_c)`, reduced by the contrast that was lost in averaging pixels.
     pub cosine: [f32; 4],
     /// Its derivative with respect to `Phi`.
     pub derivative: [f32; 4],
 }
 
-/// Carriers at an absolute phase in rad. `ratios` are the numbers of fringes over the first; `loss` is the share of the contrast
-/// of R and B that averaging pixels has cost.
+/// Carriers at an absolute phase in rad. `ratios` are the fringe numbers divided by the first; `loss` is the share of the
+/// contrast of R and B that was lost in averaging pixels.
 #[inline(always)]
 pub(super) fn carriers(phase: f32, [_, second, third]: [f32; 3], loss: f32) -> Carriers {
     let (s, c) = sin_cos(phase);
@@ -47,7 +47,8 @@ pub(super) fn carriers(phase: f32, [_, second, third]: [f32; 3], loss: f32) -> C
     Carriers { cosine: scale([c, c_g, -s, c_ir]), derivative: scale([-s, -second * s_g, -c, -third * s_ir]) }
 }
 
-/// Share of a contrast that averaging pixels leaves: the first order is `loss`, the second that of a mean over a linear phase.
+/// Share of the contrast that remains after averaging pixels (J1): the expansion to second order in `loss` for a mean over a
+/// linear phase.
 #[inline(always)]
 pub(super) fn contrast(loss: f32) -> f32 {
     1.0 - loss + 0.3 * loss * loss

@@ -1,8 +1,8 @@
-//! Sums, means and minima over a pixel and its neighbours; borders repeat.
+//! Sums, means and minima over a pixel and its neighbours. Pixels at the border are repeated beyond it.
 
 use multiversion::multiversion;
 
-/// Rows above, at and below row `y`.
+/// Numbers of the rows above, at and below row `y`.
 pub(super) fn around(y: usize, height: usize) -> [usize; 3] {
     [y.saturating_sub(1), y, (y + 1).min(height - 1)]
 }
@@ -39,7 +39,7 @@ pub(super) fn sum_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>,
     }
 }
 
-/// 1 where the least of a pixel and its eight neighbours is above `limit`, 0 elsewhere and in the padding.
+/// 1 where a pixel and its eight neighbours are all above `limit`, 0 elsewhere and in the padding.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn least_of_nine(
     rows: [&[f32]; 3],
@@ -64,7 +64,7 @@ pub(super) fn least_of_nine(
     }
 }
 
-/// The same for a pixel and its four neighbours in row and column.
+/// 1 where a pixel and its four neighbours in row and column are all above `limit`, 0 elsewhere and in the padding.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn least_of_five(rows: [&[f32]; 3], width: usize, limit: f32, out: &mut [f32]) {
     let least = |a: f32, b: f32| if a < b { a } else { b };

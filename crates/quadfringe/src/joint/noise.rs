@@ -5,14 +5,14 @@ use super::params::illumination::{NOISE_SAMPLES, NOISE_STRIDE};
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
 
-/// Median of the size of normal values over their standard deviation.
+/// Median of the absolute value of a normal deviation, in standard deviations.
 const MEDIAN_OF_NORMAL: f32 = 0.6745;
 
-/// Noise of a plane of light, from a mask that cancels every variation along rows alone or along columns alone
-/// (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)); in the unit of the light.
+/// Noise of a plane of light, from a mask that gives 0 for every variation that is only along rows or only along
+/// columns (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)); in the unit of the light.
 pub(super) fn noise_of_image(red: &[f32], grid: &Grid) -> f32 {
     let stride = grid.stride;
-    // Rows are whole vectors long; an odd step visits all columns.
+    // Rows are padded to whole vectors, so an odd step visits all columns.
     let step = (red.len() / NOISE_SAMPLES) | 1;
     let seen = (stride + 1..red.len().saturating_sub(stride + 1))
         .step_by(step)
@@ -24,8 +24,8 @@ pub(super) fn noise_of_image(red: &[f32], grid: &Grid) -> f32 {
     median(seen.collect()) / (MEDIAN_OF_NORMAL * 6.0)
 }
 
-/// Noise of the intensities in linear light, from the second differences of a wrapped phase along rows: slopes and most curvature
-/// cancel.
+/// Noise of the intensities in linear light, from the second differences of a wrapped phase along rows, in which slopes and most
+/// of the curvature cancel.
 pub(super) fn noise_of_phase(scene: &Scene<'_>, PhaseMap { phase, modulation }: PhaseMap<'_>) -> f32 {
     let grid = scene.grid;
     let seen = (0..phase.len())
@@ -39,7 +39,7 @@ pub(super) fn noise_of_phase(scene: &Scene<'_>, PhaseMap { phase, modulation }: 
     median(seen.collect()) / (MEDIAN_OF_NORMAL * 6f32.sqrt())
 }
 
-/// Upper median; 0 of an empty list.
+/// Upper median; 0 for an empty list.
 fn median(mut values: Vec<f32>) -> f32 {
     if values.is_empty() {
         return 0.0;

@@ -1,7 +1,7 @@
-//! Step 6: the phase from all four channels. Once the order is known every channel measures the same projector column.
+//! Step 6: the phase from all four channels. Once the order is known, every channel measures the same projector column.
 //!
-//! A Gauss-Newton step of the phase of every pixel under the model (S1), with the albedo eliminated, averaged over the window that
-//! follows the surface.
+//! Each pixel takes a Gauss-Newton step of its phase under the model (S1), with the albedo eliminated. The steps are averaged
+//! over a window that follows the surface.
 
 use super::cells::RowMaps;
 use super::model::{FringeRows, carriers};
@@ -22,14 +22,14 @@ pub(super) struct PhaseFit {
     slots: Slots<Rows>,
 }
 
-/// Output of the fit besides the phase: rows of the image; rows of length 0 are not written.
+/// Output of the fit other than the phase, as rows of the image. Rows of length 0 are not written.
 pub(super) struct FitRows<'a> {
     /// Mean of the squared residuals of the four channels, in linear light squared.
     pub squared_residual: Vec<&'a mut [f32]>,
     /// Modulation of R and B in linear light.
     pub modulation: Vec<&'a mut [f32]>,
-    /// Sum of the weighted squared derivatives of the intensities in the window, in linear light squared per rad^2: noise^2 over
-    /// it is the variance of the phase, apart from the share of the window.
+    /// Sum of the weighted squared derivatives of the intensities in the window, in linear light squared per rad^2. The variance
+    /// of the phase is noise^2 divided by it, times the share of the window ([`Window::share`]).
     pub information: Vec<&'a mut [f32]>,
 }
 
@@ -46,7 +46,7 @@ impl FitRows<'_> {
 pub(super) struct PhaseModel<'a> {
     pub scene: &'a Scene<'a>,
     pub photometry: &'a Photometry,
-    /// Fringe numbers over the first.
+    /// Fringe numbers divided by the first.
     pub ratios: [f32; 3],
     pub window: Window<'a>,
 }
@@ -63,7 +63,7 @@ struct ModelRow {
     ss: Vec<f32>,
     /// Mean amplitude of R and B for an albedo of 1.
     amplitude: Vec<f32>,
-    /// Albedo that fits best, times its weight, and that weight.
+    /// The best-fitting albedo times `albedo_weight`.
     weighted_albedo: Vec<f32>,
     albedo_weight: Vec<f32>,
 }
@@ -72,7 +72,7 @@ struct ModelRow {
 #[derive(Clone, Copy)]
 struct PixelRows<'a> {
     phase: &'a [f32],
-    /// Share of the contrast that averaging pixels has cost.
+    /// Share of the contrast that was lost in averaging pixels.
     loss: &'a [f32],
     modulation: &'a [f32],
 }
@@ -82,7 +82,7 @@ struct PixelRows<'a> {
 struct Rows {
     maps: RowMaps,
     losses: RowMaps,
-    /// Models of the rows above, at and below; their places move on by one with every row.
+    /// Ring buffer with the models of the rows above, at and below the present row.
     ring: [ModelRow; 3],
     smooth: SmoothAlbedo,
     spare: Vec<f32>,
@@ -105,7 +105,7 @@ struct FoundRows {
 }
 
 impl PhaseFit {
-    /// One step of an absolute phase in rad, in place.
+    /// Takes one step of an absolute phase in rad, in place.
     pub fn step(
         &mut self,
         model: PhaseModel<'_>,
@@ -123,7 +123,7 @@ impl PhaseFit {
             .zip(squared_residual.par_iter_mut().zip(modulation.par_iter_mut()))
             .chunks(ROWS)
             .enumerate();
-        // Blocks of rows: the model of each row is computed once, except for the two rows next to a block.
+        // Rows are processed in blocks. Only the models of the two rows next to a block are computed twice.
         out.for_each_init(
             || slots.take(),
             |rows, (block, out)| {
@@ -145,7 +145,7 @@ impl PhaseFit {
 }
 
 impl Rows {
-    /// The model of row `y`, into place `at` of the ring.
+    /// Computes the model of row `y` into entry `at` of the ring buffer.
     fn model(&mut self, model: PhaseModel<'_>, phase: &[f32], y: usize, at: usize) {
         let PhaseModel { scene, photometry, ratios, window } = model;
         let fringes = photometry.sample(scene, y, &mut self.maps);
@@ -154,7 +154,7 @@ impl Rows {
         predict(&fringes, pixels, scene.rows(y), ratios, &mut self.ring[at]);
     }
 
-    /// Normal equations of row `y`, number `i` of its block, and their average along the row.
+    /// Computes the normal equations of row `y`, the row `i` of its block, and averages them along the row.
     fn average(&mut self, model: PhaseModel<'_>, before: &[f32], y: usize, i: usize, out: AverageRow<'_>) {
         let (scene, grid) = (model.scene, model.scene.grid);
         let Self { ring, smooth, spare, found, window, .. } = self;
@@ -247,7 +247,7 @@ fn linearise(model: &ModelRow, albedo: &SmoothAlbedo, lit: Lit, normal: NormalRo
             let albedo = weighted[x] / weight[x];
             let numerator = albedo * (ds[x] - albedo * md[x]);
             let square = ss[x] - albedo * (2.0 * ms[x] - albedo * mm[x]);
-            // The part of a derivative that a change of albedo would explain as well carries no information about the phase.
+            // The part of a derivative that a change of the albedo also explains carries no information about the phase.
             let denominator = albedo * albedo * (dd[x] - ALBEDO_SHARE * md[x] * md[x] / mm[x]);
             let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
             found[0][x] = if on { numerator } else { 0.0 };

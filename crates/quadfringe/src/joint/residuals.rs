@@ -1,5 +1,5 @@
-//! Residuals around every cell. Near an edge of the texture, where offsets and amplitudes are not right yet, they exceed the noise,
-//! and neighbouring phases differ accordingly.
+//! Mean residuals around every cell. They exceed the noise near an edge of the texture, where offsets and amplitudes are still
+//! wrong and the phases of neighbouring pixels differ for the same reason.
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::params::phase::{RESIDUAL_SAMPLED_ROWS, RESIDUAL_WIDTH};
@@ -23,7 +23,8 @@ impl Default for Residuals {
 }
 
 impl Residuals {
-    /// Average the mean squared residuals of the pixels, in linear light squared; `modulation` is 0 where there is no light.
+    /// Averages the mean squared residuals of the pixels, in linear light squared. `modulation` is 0 where there is no
+    /// light.
     pub fn measure(&mut self, scene: &Scene<'_>, squared_residual: &[f32], modulation: &[f32]) {
         scene.grid.window_sums::<2, ()>(
             CellWindow { sigma_cells: scene.cells(RESIDUAL_WIDTH), sampled_rows: RESIDUAL_SAMPLED_ROWS },
@@ -39,7 +40,7 @@ impl Residuals {
         );
     }
 
-    /// Mean squared residual along row `y` of the scene that was measured, or of a finer one.
+    /// Mean squared residual along row `y` of the measured scene, or of a finer image of it.
     pub fn row<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
         let [row] = maps.sample(scene.grid, &self.maps, 0, y);
         row

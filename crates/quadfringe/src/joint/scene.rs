@@ -1,4 +1,4 @@
-//! One shot as the steps of the joint method see it: four planes of light, the pixels that count, and a grid of cells.
+//! Input of the steps of the joint method: four planes of light, the mask of usable pixels, and a grid of cells.
 
 use super::cells::Grid;
 use super::params::pyramid::MOSAIC_REACH_PX;
@@ -9,7 +9,7 @@ pub(super) struct ScaledGrid<'a> {
     pub grid: &'a Grid,
     /// Fringe period across the fringes, in pixels of this level.
     pub period_px: f64,
-    /// Camera pixels along a side of a pixel of this level, which is their mean.
+    /// Number of camera pixels along a side of a pixel of this level, which is a mean of camera pixels.
     pub factor: usize,
 }
 
@@ -17,12 +17,12 @@ pub(super) struct ScaledGrid<'a> {
 pub(super) struct Frame<'a> {
     pub full: ScaledGrid<'a>,
     pub coarse: ScaledGrid<'a>,
-    /// Pixels that interpolated light reaches into a shadow.
+    /// Number of pixels by which interpolated light reaches into a shadow.
     pub reach_px: usize,
 }
 
 impl<'a> Frame<'a> {
-    /// `coarse` has the cells of `full` over fewer pixels; the fringe period is in pixels of `full`.
+    /// `coarse` must have the cells of `full`, each with fewer pixels. The fringe period is in pixels of `full`.
     pub fn new(full: &'a Grid, coarse: &'a Grid, period_px: f64, is_mosaic: bool) -> Self {
         let factor = full.step / coarse.step;
         Self {
@@ -32,7 +32,7 @@ impl<'a> Frame<'a> {
         }
     }
 
-    /// The reach in pixels of the coarse level.
+    /// [`Self::reach_px`] in pixels of the coarse level.
     pub fn coarse_reach_px(&self) -> usize {
         self.reach_px.div_ceil(self.coarse.factor)
     }
@@ -48,7 +48,7 @@ pub(super) struct Scene<'a> {
     pub grid: &'a Grid,
     /// Fringe period across the fringes in pixels.
     pub period_px: f64,
-    /// Camera pixels along a side of a pixel, which is their mean.
+    /// Number of camera pixels along a side of a pixel, which is a mean of camera pixels.
     pub factor: usize,
 }
 
@@ -75,7 +75,7 @@ pub(super) struct Scratch<'a> {
 }
 
 impl Scratch<'_> {
-    /// The same planes for one step.
+    /// Lends the planes to one step.
     pub fn lend(&mut self) -> Scratch<'_> {
         Scratch { first: &mut *self.first, second: &mut *self.second }
     }
@@ -101,7 +101,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// A width given in fringe periods, in cells.
+    /// Converts a width from fringe periods to cells.
     pub fn cells(&self, periods: f32) -> f32 {
         periods * self.period_px as f32 / self.grid.step as f32
     }

@@ -9,21 +9,22 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use std::f32::consts::PI;
 
-/// Weights and weighted steps along and down, and lit pixels.
+/// Number of sums: weight and weighted phase difference along the row, the same two down the column, and lit pixels.
 const TERMS: usize = 5;
 
-/// The pixels to the right of those of a row.
+/// A row shifted by one pixel, so that each entry holds the right neighbour.
 #[derive(Debug, Default)]
 struct ShiftedRows {
     phase: Vec<f32>,
     modulation: Vec<f32>,
 }
 
-/// Slopes of the phase in rad per cell, which stays right when the cells are laid over another image.
+/// Slopes of the phase in rad per cell. In this unit they hold for every level of the image pyramid, because the levels
+/// have the same cells.
 #[derive(Debug)]
 pub(super) struct Slopes {
     maps: CellMaps,
-    /// Slopes of the wide window, which join those of the fine one.
+    /// Slopes of the wide window, which are combined with the slopes of the fine window.
     wide: CellMaps,
     sums: CellMaps,
     slots: Slots<TaskWork<ShiftedRows>>,
@@ -37,12 +38,13 @@ impl Default for Slopes {
 }
 
 impl Slopes {
-    /// Slopes of a phase in a wide window.
+    /// Measures the slopes of a phase in a wide window.
     pub fn measure(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>) {
         self.average(scene, map, WIDTH, 0.0);
     }
 
-    /// Slopes of a phase without wrong orders in a smaller window; where that holds few pixels they stay as they were.
+    /// Measures the slopes of a phase without wrong orders in a smaller window. Where the window contains few pixels,
+    /// the slopes hardly change.
     pub fn refine(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>) {
         std::mem::swap(&mut self.maps, &mut self.wide);
         self.average(scene, map, FINE_WIDTH, WIDE_SHARE);
@@ -101,9 +103,9 @@ impl Slopes {
         [0, 1].map(|k| self.maps.line(row, k)[column])
     }
 
-    /// Share of the contrast of the first fringes that averaging camera pixels has cost in row `y`; that of others goes with
-    /// the square of their number. Of a phase with the step `s` per pixel, the mean of `f` parts of it, it is
-    /// `(1 - 1 / f^2) s^2 / 24` in each direction.
+    /// Share of the contrast of R and B that is lost in row `y` because each pixel is a mean of camera pixels. For another
+    /// channel, multiply it by the square of the ratio of the fringe numbers. If the phase changes by `s` per pixel, and a
+    /// pixel is the mean of `f` camera pixels along a side, the loss is `(1 - 1 / f^2) s^2 / 24` in each direction (J1).
     pub fn loss<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
         let [row] = maps.sample_mut(scene.grid, &self.maps, 2, y);
         let scale = loss_scale(scene);
@@ -111,7 +113,7 @@ impl Slopes {
         row
     }
 
-    /// The same at a cell.
+    /// [`Self::loss`] at a cell.
     pub fn loss_at(&self, scene: &Scene<'_>, [row, column]: [usize; 2]) -> f32 {
         self.maps.line(row, 2)[column] * loss_scale(scene)
     }
@@ -128,7 +130,7 @@ impl Slopes {
         row
     }
 
-    /// Slopes down at row `y`.
+    /// Slopes down the columns at row `y`.
     pub fn down<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
         let [row] = maps.sample(scene.grid, &self.maps, 1, y);
         row
@@ -139,7 +141,8 @@ fn loss_scale(scene: &Scene<'_>) -> f32 {
     (1.0 - 1.0 / (scene.factor * scene.factor) as f32) / (scene.grid.step * scene.grid.step) as f32
 }
 
-/// Adds weights and weighted differences between lit pixels; a difference near half a turn belongs to an edge.
+/// Adds the differences between lit pixels, and their weights. A difference near half a turn has a small weight,
+/// because it belongs to an edge.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [[Lanes; TERMS]]) {
     let (here, there) = (here.map(lanes), there.map(lanes));
@@ -185,7 +188,7 @@ mod tests {
                 0.25 * x + (wave * x).sin()
             })
             .collect();
-        // Beyond column 160 the surface is unlit; only the wide window reaches across.
+        // Beyond column 160 the surface is not lit. Only the wide window reaches across this border.
         let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % 256 < 160))).collect();
         let light = vec![0.5; grid.pixels()];
         let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };

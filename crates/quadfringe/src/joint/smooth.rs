@@ -1,4 +1,4 @@
-//! Where the phase of the coarse level is smooth: pixels that lie on one lit surface with their neighbours.
+//! Smooth parts of the phase on the coarse level: pixels that lie with their neighbours on one lit surface.
 
 use super::cells::Grid;
 use super::neighbours::around;
@@ -7,8 +7,8 @@ use super::scene::PhaseMap;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Writes 1 into `discontinuities` for every pixel that is not on one lit surface with its eight neighbours, and into
-/// `smooth_modulation` the modulation of the others, else 0.
+/// Writes 1 into `discontinuities` for every pixel that does not lie on one lit surface with its eight neighbours. For
+/// all other pixels it writes their modulation into `smooth_modulation`. The remaining entries of both maps become 0.
 pub(super) fn mark_discontinuities(
     grid: &Grid,
     map: PhaseMap<'_>,

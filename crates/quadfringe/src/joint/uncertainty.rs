@@ -1,32 +1,33 @@
 //! Step 9: the standard deviation of the phase, and the probability that an order is wrong.
 //!
-//! The phase is a weighted mean of least-squares steps, one from each pixel of a window. A pixel whose intensities have the standard
-//! deviation `noise` determines its phase with the variance `noise^2 / J`, where `J` is the sum of the squared derivatives of its four
-//! intensities with respect to the phase, albedo eliminated. A mean with weights `w J` has the variance
-//! `noise^2 sum(w^2 J) / sum(w J)^2`. The window adds up `sum(w J)` anyway; `sum(w^2 J)` is a fixed share of it wherever `J` varies
-//! little in the window, also where an edge cuts the window in half. The disagreement of the channels beyond noise and the error
-//! of the method itself are added.
+//! The phase is a weighted mean of least-squares steps, one from each pixel of a window. A pixel whose intensities have the
+//! standard deviation `noise` determines its phase with the variance `noise^2 / J`, where `J` is the sum of the squared
+//! derivatives of its four intensities with respect to the phase, after the albedo is eliminated. A mean with weights `w J` has
+//! the variance `noise^2 sum(w^2 J) / sum(w J)^2`. The window computes `sum(w J)` anyway. `sum(w^2 J)` is a fixed share of it
+//! where `J` varies little in the window, even if an edge cuts the window in half. The variance by which the channels disagree
+//! beyond noise and the variance of the method's error are added.
 //!
-//! The probability of a wrong order is `exp(-lead / temperature)` of the second cheapest order against the cheapest. The
-//! temperature is the cost that the evidence of the shot gives the chosen orders: it contains the noise, texture and
-//! discontinuities of this shot.
+//! The second cheapest order is less probable than the cheapest by the factor `exp(-lead / temperature)`, which gives
+//! the wrong-order probability. The temperature is estimated from the costs of the chosen orders, and so depends on the
+//! noise, texture and discontinuities of this shot.
 
 use super::params::uncertainty::{ALBEDO_LOSS, EXPONENT_MAX, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN};
 use multiversion::multiversion;
 
-/// Noise of phases that a window has averaged.
+/// Noise of a phase that a window has averaged.
 pub(super) struct PhaseNoise {
     variance: f32,
 }
 
 impl PhaseNoise {
-    /// For intensities with the standard deviation `noise`, in a window whose squared weights are `share` of its weights.
+    /// Noise of the phase if the intensities have the standard deviation `noise`, and the sum of the squared weights of
+    /// the window is the sum of its weights times `share`.
     pub fn new(noise: f32, share: f32) -> Self {
         Self { variance: ALBEDO_LOSS * noise * noise * share }
     }
 
-    /// Standard deviation of a row in rad, in place of the information that the window has added up; `disagreement` is the variance
-    /// in rad^2 by which the channels disagree beyond noise.
+    /// Replaces the information of a row, which the window has added up, by the standard deviation of the phase in rad.
+    /// `disagreement` is the variance in rad^2 by which the channels disagree beyond noise.
     pub fn deviations(&self, disagreement: &[f32], row: &mut [f32]) {
         deviations(self.variance, disagreement, row);
     }
@@ -43,32 +44,33 @@ fn deviations(variance: f32, disagreement: &[f32], row: &mut [f32]) {
 /// How certain the order of a node is.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct NodeVerdict {
-    /// Cost of the second cheapest order less that of the cheapest, in units of the price of a change of surface, at most 1.
+    /// Cost of the second cheapest order minus cost of the cheapest, in units of the jump price, at most 1.
     pub lead: f32,
-    /// Cost that the evidence of the node gives the chosen order, in [0, 1] of the greatest.
+    /// Cost of the chosen order by the evidence of the node alone, as a share of the greatest cost, in [0, 1].
     pub order_cost: f32,
-    /// Whether there is light to judge by.
+    /// Whether the node is lit and so has evidence.
     pub lit: bool,
 }
 
-/// From lead and cost of a node to the probability that its order is wrong.
+/// Model of the probability that the order of a node is wrong, given its lead and cost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WrongOrderModel {
     /// Temperature of the shot, in units of the greatest cost of a node.
     temperature: f32,
     /// Mean cost of the chosen orders, in the same unit.
     mean: f32,
-    /// Nodes with independent evidence that a lead of 1 is worth.
+    /// Number of nodes with independent evidence that a lead of 1 stands for.
     nodes_per_lead: f32,
 }
 
 impl WrongOrderModel {
-    /// From the lit nodes of a shot. A lead of 1 is worth `jump_nodes` contradicting nodes; `shared` nodes in a row take their
-    /// evidence from one window and count as one.
+    /// Makes the model from the lit nodes of a shot. A lead of 1 stands for `jump_nodes` contradicting nodes. Of these,
+    /// `shared` nodes in a row take their evidence from the same window and count as one.
     ///
-    /// A squared difference of `n` normal terms has the mean `n T / 2` and the variance `n T^2 / 2` at temperature T, whatever `n`
-    /// is: the noise of many pixels raises costs without making them vary. Costs at discontinuities vary as much as they are large.
-    /// Variance over mean therefore separates the two, and the smaller of mean and that ratio is the temperature.
+    /// At the temperature T, a sum of `n` squared normal differences has the mean `n T / 2` and the variance `n T^2 / 2`: noise
+    /// of many pixels raises the costs more than it makes them vary, and variance over mean is T for every `n`. Costs at
+    /// discontinuities vary as much as they are large. The temperature is therefore the smaller of two numbers: the mean, and
+    /// variance over mean.
     pub fn new(verdicts: impl Iterator<Item = NodeVerdict>, jump_nodes: f32, shared: f32) -> Self {
         let (mut count, mut sum, mut squares) = (1e-9, 0.0, 0.0);
         for cost in verdicts.map(|verdict| f64::from(verdict.order_cost)) {
@@ -80,8 +82,8 @@ impl WrongOrderModel {
         Self { temperature: temperature.max(TEMPERATURE_MIN), mean: mean as f32, nodes_per_lead }
     }
 
-    /// Probability that the order of a node is wrong. A node whose evidence contradicts its order by more than twice the mean cost
-    /// has a temperature higher by the excess.
+    /// Probability that the order of a node is wrong. If the cost of the order of a node exceeds twice the mean cost, the excess
+    /// is added to the temperature of this node.
     pub fn probability(&self, NodeVerdict { lead, order_cost, .. }: NodeVerdict) -> f32 {
         let temperature = self.temperature + (order_cost - 2.0 * self.mean).max(0.0);
         1.0 / (1.0 + (self.nodes_per_lead * lead.max(0.0) / temperature).min(EXPONENT_MAX).exp())

@@ -1,8 +1,8 @@
 //! A smoothing window that follows the local slope of the phase and stops at edges.
 //!
-//! The weight of a neighbour falls with the difference between its phase and the slope through the pixel, in units of the noise (a
-//! bilateral window with Tukey's biweight), first along rows and then along columns. The window adds up normal equations of a
-//! Gauss-Newton step, so that every neighbour counts by its information.
+//! This is a bilateral window with Tukey's biweight: the weight of a neighbour decreases with the difference between its phase
+//! and the phase that the slope predicts, in units of the noise. The window runs first along rows and then along columns. It adds
+//! up the normal equations of a Gauss-Newton step, so that every neighbour has the weight of its information.
 
 use super::cells::RowMaps;
 use super::params::phase::{REACH_RAD, REACH_SIGMAS, SIGMA_MAX_PX, SIGMA_MIN_PX, WIDE, WIDTH};
@@ -22,7 +22,7 @@ pub(super) struct Window<'a> {
     scene: &'a Scene<'a>,
     slopes: &'a Slopes,
     modulation: &'a [f32],
-    /// Neighbours to each side, and their distance from one to the next in pixels.
+    /// Number of neighbours on each side; `spacing` is the distance between them in pixels.
     radius: usize,
     spacing: usize,
     sigma: f32,
@@ -30,7 +30,8 @@ pub(super) struct Window<'a> {
     residuals: Option<&'a Residuals>,
 }
 
-/// Normal equations of a step of the phase along a row: the step is numerator over denominator, both 0 for pixels that take no part.
+/// Normal equations of a step of the phase along a row. The step is the numerator divided by the denominator; both are 0 for
+/// pixels that take no part.
 pub(super) struct NormalRows<'a> {
     pub numerator: &'a mut [f32],
     pub denominator: &'a mut [f32],
@@ -74,31 +75,32 @@ impl<'a> Window<'a> {
         self.scene.row(self.modulation, y)
     }
 
-    /// Share of contrast that is lost in row `y`, see [`Slopes::loss`].
+    /// Share of the contrast that is lost in row `y`; see [`Slopes::loss`].
     pub fn loss<'b>(&self, y: usize, maps: &'b mut RowMaps) -> &'b [f32] {
         self.slopes.loss(self.scene, y, maps)
     }
 
-    /// The same with a reach of two pixels, enough on the way to a solution.
+    /// This window with a reach of two pixels, which is enough for intermediate steps.
     pub fn near(self) -> Self {
         Self { radius: self.radius.min(2), ..self }
     }
 
-    /// The same with a reach of a whole fringe: errors that wrong offsets and amplitudes cause change their sign along a fringe.
+    /// This window with a reach of a whole fringe. Errors that wrong offsets and amplitudes cause change their sign along a
+    /// fringe and average out.
     pub fn wide(self) -> Self {
         let sigma = WIDE * self.scene.period_px as f32;
-        // A third of sigma apart neighbours still add up to a smooth window.
+        // The window is still smooth if its neighbours are a third of sigma apart.
         let spacing = (sigma / 3.0).max(1.0) as usize;
         Self { sigma, spacing, radius: (2.0 * sigma / spacing as f32).ceil() as usize, ..self }
     }
 
-    /// The same, wider in phase where the model leaves `residuals` above the noise.
+    /// This window, but tolerating greater phase differences where the `residuals` of the model exceed the noise.
     pub fn loosened(self, residuals: &'a Residuals) -> Self {
         Self { residuals: Some(residuals), ..self }
     }
 
-    /// Average along row `y` of a phase. `measure` writes the normal equations of a step of it, `numerator / denominator` and 0
-    /// for pixels that take no part; `out` receives phase plus mean step, and weight.
+    /// Averages a phase along row `y`. `measure` writes the normal equations of its step: `numerator / denominator`, or 0 for
+    /// pixels that take no part. `out` receives the phase plus the mean step, and the weight.
     pub fn along(
         &self,
         y: usize,
@@ -113,7 +115,7 @@ impl<'a> Window<'a> {
         self.sharpen(y, residuals, sharpness);
         let inner = padded.each_mut().map(|row| {
             row.resize(2 * reach + grid.stride, 0.0);
-            // Another window may have left values before and behind the row.
+            // A wider window may have left values before and after the row.
             let (before, rest) = row.split_at_mut(reach);
             let (inner, behind) = rest.split_at_mut(grid.stride);
             before.fill(0.0);
@@ -129,20 +131,21 @@ impl<'a> Window<'a> {
         average_along((&taps, self.spacing), padded, [phase, slope, sharpness], [out.phase, out.weight]);
     }
 
-    /// Furthest neighbour in pixels.
+    /// Distance of the furthest neighbour in pixels.
     fn reach(&self) -> usize {
         self.spacing * self.radius
     }
 
-    /// Half distances in cells and weights of the neighbours with numbers `numbers`, of which the middle one is the pixel itself.
+    /// Half the distance, in cells, and the weight of the neighbours with these `numbers`. Neighbour number `radius` is the pixel
+    /// itself.
     fn taps(&self, numbers: std::ops::Range<usize>) -> Vec<[f32; 2]> {
         let distance = |k: usize| self.spacing as f32 * (k as f32 - self.radius as f32);
         let half = 0.5 / self.scene.grid.step as f32;
         numbers.map(|k| [half * distance(k), (-0.5 * (distance(k) / self.sigma).powi(2)).exp()]).collect()
     }
 
-    /// Average along columns the output of [`Self::along`]; rows of `information` receive the weights that the window
-    /// has added up, each as many as it holds.
+    /// Averages the output of [`Self::along`] along columns. Rows of `information` receive the sums of the weights of
+    /// the window, as many as they have room for.
     pub fn down<T: Default + Send>(
         &self,
         average: &Average<'_>,
@@ -170,15 +173,15 @@ impl<'a> Window<'a> {
         );
     }
 
-    /// Sum of squared weights over the sum of weights, for a window that lies on one surface, or is cut in half by an edge:
-    /// noise of the mean is this share of noise over information.
+    /// Sum of the squared weights divided by the sum of the weights, for a window that lies on one surface or is cut in
+    /// half by an edge. The variance of the mean is this share times noise^2 divided by the information.
     pub fn share(&self) -> f32 {
         let taps = self.taps(0..2 * self.radius + 1);
         let [squares, sum] = [2, 1].map(|power| taps.iter().map(|[_, near]| near.powi(power)).sum::<f32>());
         (squares / sum).powi(2)
     }
 
-    /// Slopes of the rows that `count` rows from `first` on need.
+    /// Computes the slopes of all rows that the average of `count` rows from `first` on needs.
     fn slopes_down(&self, first: usize, count: usize, rows: &mut WindowRows) {
         let (stride, reach) = (self.scene.grid.stride, self.reach());
         rows.slopes.resize((ROWS + 2 * reach) * stride, 0.0);
@@ -188,7 +191,7 @@ impl<'a> Window<'a> {
         }
     }
 
-    /// Row `y`, number `index` of its block.
+    /// Averages row `y`, which has the number `index` in its block.
     fn row_down(
         &self,
         average: &Average<'_>,
@@ -200,7 +203,7 @@ impl<'a> Window<'a> {
         let grid = self.scene.grid;
         self.sharpen(y, &mut rows.residuals, &mut rows.sharpness);
         let slope = |k: usize| &rows.slopes[(index + self.spacing * k) * grid.stride..][..grid.stride];
-        // Neighbours inside the image.
+        // Only neighbours inside the image count.
         let [above, below] = [y, grid.height - 1 - y].map(|rows| (rows / self.spacing).min(self.radius));
         let inside = self.radius - above..self.radius + below + 1;
         let there: Vec<[&[f32]; 3]> = (inside.clone())
@@ -213,7 +216,7 @@ impl<'a> Window<'a> {
         average_down(&self.taps(inside), &there, here, out);
     }
 
-    /// Sharpness at every pixel of a row: 1 / the square of the greatest difference in phase within a surface.
+    /// Sharpness at every pixel of a row: 1 / the square of the greatest phase difference that counts as one surface.
     fn sharpen(&self, y: usize, maps: &mut RowMaps, sharpness: &mut Vec<f32>) {
         sharpness.clear();
         match self.residuals {
@@ -236,7 +239,7 @@ fn sharpen(modulation: &[f32], noise: f32, squares: &mut [f32]) {
     }
 }
 
-/// Weight of a neighbour `d` off the slope between two pixels.
+/// Weight of a neighbour whose phase differs by `d` from the phase that the slope predicts.
 #[inline(always)]
 fn fit(d: f32, sharpness: f32) -> f32 {
     let miss = 1.0 - d * d * sharpness;
@@ -244,8 +247,8 @@ fn fit(d: f32, sharpness: f32) -> f32 {
     fits * fits
 }
 
-/// Average over neighbours along a row, weighted by how well they fit: the phase between two pixels is the mean of their slopes
-/// times their distance, which is exact for a surface of constant curvature.
+/// Averages over neighbours along a row, weighted by how well they fit. The predicted phase difference of two pixels is the
+/// mean of their slopes times their distance, which is exact for a surface of constant curvature.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn average_along(
     (taps, spacing): (&[[f32; 2]], usize),
@@ -278,7 +281,7 @@ fn average_along(
     }
 }
 
-/// The same along columns, over `there`: phase, weight and slope of every neighbouring row.
+/// Averages over neighbours along columns. `there` holds phase, weight and slope of every neighbouring row.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out: [&mut [f32]; 2]) {
     let here = here.map(lanes);
@@ -310,7 +313,7 @@ mod tests {
     use super::super::scene::PhaseMap;
     use super::*;
 
-    /// A phase averaged by a window that counts every pixel alike.
+    /// A phase averaged by a window in which all pixels have equal information.
     fn averaged(window: &Window<'_>, seen: &[f32]) -> Vec<f32> {
         let grid = window.scene.grid;
         let (mut along, mut weight) = (seen.to_vec(), vec![1.0; grid.pixels()]);
@@ -334,7 +337,7 @@ mod tests {
     #[test]
     fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
         let grid = Grid::new([96, 256], 4.0);
-        // The error that wrong offsets cause in a two-step phase, next to a step of 1.3 rad.
+        // A two-step phase with the error that wrong offsets cause, next to a step of 1.3 rad.
         let truth = |i: usize| 0.25 * (i % 256) as f32 + if i % 256 >= 128 { 1.3 } else { 0.0 };
         let ripple = |i: usize| 0.05 * (2.0 * truth(i)).sin();
         let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + ripple(i)).collect();
@@ -357,7 +360,7 @@ mod tests {
                 .map(|window| averaged(&window, &seen));
         let [narrow, strict, loose] = [&narrow, &strict, &wide].map(|phase| worst(phase, flat.clone()));
         assert!(loose < 0.012 && strict > 0.04 && narrow > 0.015, "{narrow} {strict} {loose}");
-        // The step is none of it.
+        // The step is not averaged away.
         assert!(worst(&wide, 112..144) < 0.15, "{}", worst(&wide, 112..144));
     }
 
@@ -390,9 +393,9 @@ mod tests {
         let phase = averaged(&window, &seen);
         let error = |i: usize| (phase[i] - truth(i)).abs();
         let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
-        // Near the step its rise leaks into the slopes.
+        // Near the step, its height leaks into the slopes.
         assert!(worst < 0.05, "{worst}");
-        // Away from step and borders, where the window is whole, noise of 0.0115 rad is down to a fifth.
+        // Away from the step and the borders, where the window is whole, it reduces noise of 0.0115 rad to a fifth.
         let inside = |i: usize| (16..48).contains(&(i / 128)) && (76..112).contains(&(i % 128));
         let errors: Vec<f32> = (0..grid.pixels()).filter(|&i| inside(i)).map(|i| error(i).powi(2)).collect();
         let rms = (errors.iter().sum::<f32>() / errors.len() as f32).sqrt();

@@ -8,10 +8,10 @@ pub const WIDTH: f32 = 0.43;
 /// (x0.7: peaks and dim steps +2 %, face -3 %).
 pub const FINE_WIDTH: f32 = 0.2;
 
-/// Weight of the wide slopes among the refined ones, as a share of the pixels of a whole window. They decide where the fine
-/// window holds few pixels. Varied: no effect.
+/// Weight of the wide slopes in the mean with the fine ones, as a share of the number of pixels in a whole window. They
+/// dominate where the fine window contains few pixels. Varied: no effect.
 pub const WIDE_SHARE: f32 = 0.1;
 
-/// Rows of pixels that stand for a row of cells. More: time. Fewer: noise (varied, 1 row: peaks without noise +6 %, face +3 %; 3
-/// rows: no effect).
+/// Number of pixel rows that are sampled for each row of cells. More: time. Fewer: noise (varied, 1 row: peaks without noise +6
+/// %, face +3 %; 3 rows: no effect).
 pub const SAMPLED_ROWS: usize = 2;
