@@ -1,4 +1,4 @@
-//! Step 4, near discontinuities: the pixels of a cell choose among the orders that the cell and its neighbours propose.
+//! Step 4 near discontinuities: each pixel of a cell chooses among the orders that the cell and its neighbours propose.
 
 use super::evidence::{albedo, observed_cosine};
 use super::matching::Matching;
@@ -10,7 +10,7 @@ use crate::joint::slopes::Slopes;
 use crate::parallel::angle::{round, sin_cos, wrap};
 use std::f32::consts::TAU;
 
-/// The order of the cell and those of eight neighbours.
+/// Greatest number of candidates: the order of the cell and the orders of its eight neighbours.
 const CANDIDATES: usize = 9;
 
 /// A cell, by row and column.
@@ -26,7 +26,7 @@ pub(super) struct Nodes<'a> {
     /// Wrapped phase of every node.
     pub phase: &'a [f32],
     pub matching: &'a Matching,
-    /// Fringe numbers of G and IR over that of R and B.
+    /// Fringe numbers of G and IR divided by the fringe number of R and B.
     pub ratios: [f32; 2],
 }
 
@@ -64,14 +64,14 @@ impl Candidates {
                 let [along, down] = slopes.at(other_row, other_column);
                 let way =
                     along * (column as f32 - other_column as f32) + down * (row as f32 - other_row as f32);
-                // The phase that the neighbour predicts here, as turns relative to that of this node.
+                // The phase that the neighbour predicts at this node, relative to the phase of this node, in turns.
                 found.add(-round((gap - way) / TAU));
             }
         }
         found
     }
 
-    /// Whether there is more than one.
+    /// Whether there is more than one candidate.
     pub fn is_choice(&self) -> bool {
         self.count > 1
     }
@@ -97,12 +97,13 @@ pub(super) struct Block {
 }
 
 impl Block {
-    /// Turns of pixel `i` of the cell, as decided.
+    /// The turns that pixel `i` of the cell has chosen.
     pub fn turns(&self, i: usize) -> f32 {
         self.turns[i]
     }
 
-    /// Give every pixel the candidate that agrees best with the cosines of G and IR that it and its neighbours observe.
+    /// Chooses for every pixel the candidate that agrees best with the cosines of G and IR that the pixel and its
+    /// neighbours observe.
     pub fn decide(
         &mut self,
         nodes: Nodes<'_>,
@@ -145,14 +146,14 @@ impl Block {
     }
 }
 
-/// One pixel, with the absolute phase that the order of its cell gives it.
+/// One pixel, with its absolute phase by the order of its cell.
 struct Pixel {
     wrapped_phase: f32,
     absolute_phase: f32,
     light: [f32; 4],
 }
 
-/// Adds the squared differences between observed and predicted cosines of G and IR for every candidate.
+/// Adds for every candidate the squared differences between the observed and the predicted cosines of G and IR.
 fn add_costs(pixel: &Pixel, fringes: &CellFringes, ratios: [f32; 2], turns: &[f32], costs: &mut [f32]) {
     let CellFringes { offset, amplitude } = fringes;
     let light = pixel.light;

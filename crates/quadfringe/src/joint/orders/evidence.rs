@@ -1,5 +1,5 @@
-//! Step 4: the evidence of the nodes. Each has a phase, beats from the local fit, and sums over its pixels from which the cost of
-//! every order follows.
+//! Step 4: the evidence of the nodes. A node has a phase, beats from the local fit, and sums over its pixels, from which the cost
+//! of every order follows.
 
 use super::matching::{CosineSums, NodeEvidence};
 use super::wrapped::Wrapped;
@@ -12,7 +12,8 @@ use crate::parallel::angle::{atan2, sin_cos, wrap, wrap_positive};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
 
-/// Sums over the pixels of a node: pixels, then s^2, s cos f, s sin f, cos 2f, sin 2f of G and of IR.
+/// Number of sums over the pixels of a node: the number of pixels, then s^2, s cos f, s sin f, cos 2f, sin 2f for G and
+/// for IR.
 const SUMS: usize = 11;
 
 /// Working rows of one task.
@@ -33,7 +34,7 @@ pub(super) fn observed_cosine(light: f32, albedo: f32, offset: f32, amplitude: f
     if seen > -OBSERVED_COSINE_MAX { seen } else { -OBSERVED_COSINE_MAX }
 }
 
-/// Albedo of a pixel from R and B at a phase: the two are never both dark. The arrays hold R and B.
+/// Albedo of a pixel from R and B at a phase; the two are never both dark. The arrays hold values of R and B.
 #[inline(always)]
 pub(super) fn albedo(phase: f32, light: [f32; 2], offset: [f32; 2], amplitude: [f32; 2]) -> f32 {
     let (s, c) = sin_cos(phase);
@@ -42,7 +43,8 @@ pub(super) fn albedo(phase: f32, light: [f32; 2], offset: [f32; 2], amplitude: [
     (light[0] * r + light[1] * b) / if norm > 1e-6 { norm } else { 1e-6 }
 }
 
-/// Wrapped phase of the nodes of one row: that of the lit pixel nearest to the middle of each cell, in [0, 2 pi).
+/// Wrapped phase of the nodes of one row, in [0, 2 pi): the phase of the lit pixel that is nearest to the middle of the
+/// cell.
 #[inline(never)]
 pub(super) fn node_phases(scene: &Scene<'_>, wrapped: &Wrapped<'_>, row: usize, out: &mut [f32]) {
     let grid = scene.grid;
@@ -82,7 +84,8 @@ pub(super) fn row_evidence(
     out.extend((0..nodes.len()).map(|x| evidence(nodes[x], &beats, &rows.cells, x)));
 }
 
-/// Sums over the pixels of a row of nodes, into `rows.cells`; the first is the number of lit pixels.
+/// Computes the sums over the pixels of each node of a row into `rows.cells`. The first sum is the number of usable lit
+/// pixels, plus the small weight of all lit pixels.
 fn gather(
     scene: &Scene<'_>,
     wrapped: &Wrapped<'_>,
@@ -127,7 +130,8 @@ fn add_cosines(
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
             let weight = if lit { usable[x] } else { 0.0 };
-            // A lit pixel counts a little even if it is saturated, so that a node of such pixels is lit without evidence.
+            // A saturated lit pixel has a small weight, so that a node with only such pixels counts as lit but has no
+            // evidence.
             terms[0][x] = if lit { weight + LIT_WEIGHT } else { 0.0 };
             let unwrapped = node[x] + wrap(phase[x] - node[x]);
             let red_blue = |rows: &[Lanes; 4]| [rows[0][x], rows[2][x]];

@@ -1,4 +1,5 @@
-//! Step 4: the fringe orders of a scene: a node on every cell, and the pixels near discontinuities one by one (S4).
+//! Step 4: the fringe orders of a scene (S4). Every cell is a node with one order; near discontinuities each pixel
+//! chooses its order.
 
 mod candidates;
 mod evidence;
@@ -26,7 +27,7 @@ pub(super) struct Orders {
     matching: Matching,
     /// Wrapped phase of every node.
     phase: Vec<f32>,
-    /// Fringe numbers of G and IR over that of R and B.
+    /// Fringe numbers of G and IR divided by the fringe number of R and B.
     ratios: [f32; 2],
     slots: Slots<EvidenceRows>,
     blocks: Slots<Block>,
@@ -44,7 +45,7 @@ impl Orders {
         }
     }
 
-    /// Choose the orders of a wrapped phase; `absolute` receives the absolute phase.
+    /// Chooses the orders of a wrapped phase. `absolute` receives the absolute phase.
     pub fn choose(&mut self, scene: &Scene<'_>, wrapped: &Wrapped<'_>, absolute: &mut [f32]) {
         let grid = scene.grid;
         self.phase.resize(grid.rows * grid.columns, 0.0);
@@ -78,11 +79,12 @@ impl Orders {
         })
     }
 
-    /// Probability for every node that its order is wrong.
+    /// Wrong-order probability of every node.
     pub fn wrong_order_probability(&self, scene: &Scene<'_>, out: &mut Vec<f32>) {
         let grid = scene.grid;
         let lit = (0..grid.rows).flat_map(|row| self.verdicts(scene, row)).filter(|verdict| verdict.lit);
-        // Evidence comes from the window of the local fit: so many nodes wide as an equal weight for each would make it.
+        // The evidence of this number of nodes in a row comes from the same window of the local fit. It is the width of
+        // a window with equal weights that averages noise as much as the Gaussian window does.
         let shared = scene.cells(2.0 * PI.sqrt() * local_fit::WINDOW);
         let model = WrongOrderModel::new(lit, jump_nodes(scene) as f32, shared);
         out.resize(grid.rows * grid.columns, 0.0);
@@ -96,7 +98,7 @@ impl Orders {
         Nodes { phase: &self.phase, matching: &self.matching, ratios: self.ratios }
     }
 
-    /// Absolute phase of the pixels of one cell.
+    /// Writes the absolute phase of the pixels of one cell.
     #[inline(never)]
     fn write(
         &self,
@@ -126,7 +128,7 @@ impl Orders {
     }
 }
 
-/// Nodes in a row whose contradicting evidence costs as much as a change of surface (J11).
+/// Number of nodes in a row whose contradicting evidence costs as much as a change of surface (J11).
 fn jump_nodes(scene: &Scene<'_>) -> f64 {
     (JUMP_PERIODS * scene.period_px / scene.grid.step as f64).clamp(JUMP_NODES_MIN, JUMP_NODES_MAX)
 }

@@ -7,7 +7,7 @@ use crate::joint::photometry::Photometry;
 use crate::joint::scene::{PhaseMap, Scene};
 use crate::joint::slopes::Slopes;
 
-/// A wrapped phase, and where offsets, amplitudes and beats come from.
+/// A wrapped phase, and the sources of offsets, amplitudes and beats.
 #[derive(Clone, Copy)]
 pub(in crate::joint) struct Wrapped<'a> {
     /// Wrapped phase of R and B.

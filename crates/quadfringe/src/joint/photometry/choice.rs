@@ -1,6 +1,7 @@
-//! Step 5 on textured surfaces: each pixel chooses a place to take offsets and amplitudes from. Near an edge of the texture a window
-//! mixes two albedos; some way off, on the side of the pixel, it does not. Where the light does not fit the offsets and amplitudes of
-//! its place, a pixel takes those of the place around it that explain it and its neighbours best.
+//! Step 5 on textured surfaces: each pixel chooses a place to take offsets and amplitudes from. Near an edge of the texture, a
+//! window mixes two albedos; a window further away, on the same side of the edge as the pixel, does not. Where the light does not
+//! fit the offsets and amplitudes at the pixel, it takes offsets and amplitudes from a place nearby that explain the pixel and
+//! its neighbours best.
 
 use crate::joint::cells::{CellMaps, Grid, RowMaps};
 use crate::joint::model::carriers;
@@ -14,8 +15,8 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Places to take offsets and amplitudes from, in units of `PLACE_DISTANCE`: rows down, columns right. The place of the pixel comes
-/// first, then row by row.
+/// Places to take offsets and amplitudes from, in units of `PLACE_DISTANCE`: rows down, columns right. The first place is the
+/// pixel itself; the others follow row by row.
 const PLACES: [[isize; 2]; 17] = [
     [0, 0],
     [-2, -2],
@@ -35,44 +36,46 @@ const PLACES: [[isize; 2]; 17] = [
     [2, 0],
     [2, 2],
 ];
-/// Squared residual in units of the variance of the noise: four intensities less albedo and phase.
+/// Expectation of the squared residual in units of the variance of the noise: four intensities minus the two unknowns
+/// albedo and phase.
 const RESIDUAL_BY_NOISE: f32 = 2.0;
 
 /// The place that every pixel takes offsets and amplitudes from.
 #[derive(Debug, Default)]
 pub(super) struct Choice {
-    /// Numbers in [`PLACES`], in padded rows of the scene of the fit; none when all pixels take those of their place.
+    /// Index into [`PLACES`] for each pixel, in padded rows of the scene of the fit. Empty if no pixel takes another
+    /// place.
     places: Vec<u8>,
     stride: usize,
     aside: usize,
     slots: Slots<Rows>,
 }
 
-/// Rows of one task, of which one lies above and one below its pixels: misfits are averaged over neighbours.
+/// Rows of one task, including one above and one below its pixels, because residuals are averaged over neighbours.
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
-    /// Offsets and amplitudes of one row, continued to both sides up to the furthest place.
+    /// Offsets and amplitudes of one row, extended on both sides up to the furthest place.
     wide: [Vec<f32>; 8],
     /// Cosines and derivatives of the four channels.
     carriers: Vec<[Vec<f32>; 8]>,
-    /// Squared residuals with the offsets and amplitudes of places in one row, place by place.
+    /// Squared residuals with the offsets and amplitudes of the places of one row, one place after the other.
     squares: Vec<Vec<f32>>,
-    /// Squared residual that another place has to undercut.
+    /// Squared residual below which another place is taken.
     best: Vec<Vec<f32>>,
-    /// Vectors of pixels that look around.
+    /// The vectors of pixels that compare places.
     active: Vec<bool>,
     smooth: Vec<f32>,
     spare: Vec<f32>,
 }
 
 impl Choice {
-    /// Every pixel takes those of its place.
+    /// Every pixel takes the offsets and amplitudes at its position again.
     pub fn forget(&mut self) {
         self.places.clear();
     }
 
-    /// Put 0 where the pixels of row `y` have chosen another place.
+    /// Sets `usable` to 0 for the pixels of row `y` that have chosen another place.
     pub fn leave_out(&self, y: usize, usable: &mut [f32]) {
         if self.places.is_empty() {
             return;
@@ -82,8 +85,8 @@ impl Choice {
         }
     }
 
-    /// Choose among places on a grid of cells over a scene, by how well the four intensities fit with the best albedo and, to first
-    /// order, the best phase. Returns the share of the lit pixels that take another place.
+    /// Chooses a place for every pixel, by how well the four intensities fit with the best albedo and, to first order, the best
+    /// phase. Returns the share of the lit pixels that take another place.
     pub fn make(
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
@@ -132,8 +135,8 @@ impl Choice {
         chosen as f32 / count(modulation, |light| *light > 0.0).max(1) as f32
     }
 
-    /// Put what the pixels of row `y` have chosen into the offsets and amplitudes of that row; the cells lie over the scene of the fit or over
-    /// a finer one.
+    /// Replaces offsets and amplitudes of row `y` where its pixels have chosen another place. The grid lies over the scene of the
+    /// fit or over a finer image of it.
     pub fn apply(&self, grid: &Grid, maps: &CellMaps, y: usize, rows: &mut [&mut [f32]; 8]) {
         if self.places.is_empty() {
             return;
@@ -155,7 +158,7 @@ fn apply(
     let aside = (aside * factor) as isize;
     let last = [grid.height - 1, grid.width - 1].map(|last| last as isize);
     for (group, places) in places.chunks(LANES).enumerate() {
-        // Most vectors hold no other place.
+        // In most vectors no pixel takes another place.
         if places.iter().fold(0, |any, place| any | place) == 0 {
             continue;
         }
@@ -198,7 +201,8 @@ impl Rows {
         active.resize(stride / LANES, true);
     }
 
-    /// Squared residuals of the rows `lines` with offsets and amplitudes of the rows `from`, so many columns to the right.
+    /// Computes the squared residuals of the rows `lines` with offsets and amplitudes of the rows `from`, taken `rights`
+    /// columns to the right.
     fn measure(
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
@@ -228,8 +232,8 @@ impl Rows {
         }
     }
 
-    /// Which vectors look around, if any: those whose squared residuals exceed `least` and a share of the modulation on average, and
-    /// their neighbours. `lights` are the rows of the modulation.
+    /// Finds the vectors that compare places: those whose mean squared residual exceeds `least` plus a share of the squared
+    /// modulation, and their neighbours. Returns whether there are any. `lights` are the rows of the modulation.
     fn find_active<'a>(
         &mut self,
         lights: impl Iterator<Item = &'a [f32]> + Clone,
@@ -258,7 +262,8 @@ impl Rows {
         much.contains(&true)
     }
 
-    /// Take `place`, whose squared residuals begin at number `first`, where it is better than any before.
+    /// Takes `place`, whose squared residuals begin at index `first`, for the pixels where it is better than every
+    /// place before.
     fn compare(&mut self, place: u8, first: usize, grid: &Grid, places: &mut [u8]) {
         let Self { squares, best, spare, smooth, .. } = self;
         for (i, (places, best)) in places.chunks_mut(grid.stride).zip(best).enumerate() {
@@ -282,7 +287,7 @@ fn count<T: Sync>(values: &[T], which: impl Fn(&T) -> bool + Sync) -> usize {
     values.par_chunks(1 << 14).map(|values| values.iter().filter(|value| which(value)).count()).sum()
 }
 
-/// A row with its ends repeated: `reach` times before, and behind until there are `stride + 2 reach` numbers.
+/// Extends a row by its end values: `reach` values before it, and after it until there are `stride + 2 reach` values.
 fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
     out.clear();
     out.resize(reach, row[0]);
@@ -307,8 +312,8 @@ fn carry(pixels: [&[f32]; 2], ratios: [f32; 3], out: [&mut [f32]; 8]) {
     }
 }
 
-/// Squared residual after the best albedo and a small change of the phase; 0 of unlit pixels, the greatest number in vectors that do
-/// not look around.
+/// Squared residual after the best albedo and a small change of the phase. It is 0 for unlit pixels, and the greatest number in
+/// vectors that do not compare places.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn squared_residuals(
     model: [&[f32]; 8],
@@ -365,8 +370,8 @@ mod tests {
         (choice, share)
     }
 
-    /// Greatest difference from the texture of the pixel, in its place and as chosen; the pixels at the edge see both textures in their
-    /// neighbours.
+    /// Greatest difference from the texture of the pixel, with the values at its position and with the chosen ones. Pixels next
+    /// to the edge are left out, because their neighbours belong to both textures.
     fn errors(edge: &Edge, choice: &Choice) -> [f32; 2] {
         let mut rows = RowMaps::default();
         let mut sampled = rows.sample_mut::<8>(&edge.grid, &edge.maps, 0, 30);
@@ -391,7 +396,7 @@ mod tests {
         let [here, chosen] = errors(&edge, &choice);
         assert!(here > 0.1, "{here}");
         assert!(chosen < 0.02, "{chosen}");
-        // Those pixels see a mixture in their place, and they take no part in the next fit.
+        // At their position these pixels have a mixture of both textures, so they take no part in the next fit.
         let mut usable = vec![1.0; 256];
         choice.leave_out(30, &mut usable);
         let left_out: Vec<usize> = (0..256).filter(|&x| usable[x] == 0.0).collect();

@@ -1,4 +1,4 @@
-//! For tests: an edge between two textures, and cells as a window leaves them.
+//! For tests: an edge between two textures, and the cells that a fit in windows would give.
 
 use crate::joint::cells::{CellMaps, Grid};
 use crate::joint::model::carriers;
@@ -17,7 +17,7 @@ pub const ALBEDO: f32 = 0.6;
 /// Fringes on two textures that meet in column [`EDGE`], under noise; the cells mix both over ten pixels to either side.
 pub struct Edge {
     pub grid: Grid,
-    /// a, b of R, of G, of B, of IR on both sides.
+    /// Offset and amplitude of R, of G, of B, of IR on both sides.
     pub textures: [[f32; 8]; 2],
     pub maps: CellMaps,
     pub phase: Vec<f32>,
@@ -54,7 +54,7 @@ impl Edge {
         Scene { light, usable, grid: &self.grid, period_px: f64::from(PERIOD_PX), factor: 1 }
     }
 
-    /// A plane with one value everywhere.
+    /// A plane that has the same value everywhere.
     pub fn plane(&self, value: f32) -> Vec<f32> {
         vec![value; self.grid.pixels()]
     }

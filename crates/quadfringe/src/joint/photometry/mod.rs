@@ -1,9 +1,9 @@
-//! Step 5: photometry. Offset and amplitude of every channel, once the absolute phase is known.
+//! Step 5: photometry, which fits offset and amplitude of every channel once the absolute phase is known.
 //!
-//! In the model (S1) phase and albedo belong to the pixel, offsets `A` and amplitudes `B` to a window of about a fringe. The change
-//! that an error of the phase or albedo of a pixel causes to first order is projected out of its four intensities (variable
-//! projection; Golub and Pereyra, SIAM J. Numer. Anal. 10, 413 (1973)), so that neither noise of the phase nor texture reaches `A`
-//! and `B`, and one round replaces many alternating ones.
+//! In the model (S1) each pixel has a phase and an albedo, and each window of about a fringe has offsets `A` and amplitudes `B`.
+//! To first order, an error of the phase or the albedo changes the four intensities of a pixel in known directions. These
+//! directions are projected out (variable projection; Golub and Pereyra, SIAM J. Numer. Anal. 10, 413 (1973)), so that neither
+//! noise of the phase nor texture reaches `A` and `B`, and one fit replaces many alternating ones.
 
 mod choice;
 #[cfg(test)]
@@ -24,7 +24,7 @@ use multiversion::multiversion;
 use solve::{MATRIX, SUMS, improve};
 use texture::PixelAlbedo;
 
-/// Offsets and amplitudes on cells wider than those of the scene.
+/// Offsets and amplitudes on cells that are wider than the cells of the scene.
 #[derive(Debug)]
 pub(in crate::joint) struct Photometry {
     grid: Grid,
@@ -48,13 +48,13 @@ struct Rows {
 pub(in crate::joint) struct PhotometryFit {
     /// Greatest misfit (root mean square residual over modulation) of a pixel that takes part.
     pub misfit_max: f32,
-    /// Noise over modulation.
+    /// Noise divided by modulation.
     pub relative_noise: f32,
-    /// Rows of pixels that stand for a row of cells.
+    /// Number of pixel rows that are sampled for each row of cells.
     pub sampled_rows: usize,
-    /// Weight of the given phase relative to the information of the light about it.
+    /// Weight of the given phase relative to the information about the phase in the light.
     pub phase_trust: f32,
-    /// Least lit share of the window of the slopes around a pixel that takes part.
+    /// A pixel takes part if at least this share of the window of the slopes around it is lit.
     pub lit_share_min: f32,
 }
 
@@ -71,8 +71,8 @@ impl Photometry {
         }
     }
 
-    /// Start from offsets and amplitudes that the local fit finds without orders, averaged over the neighbourhood. Where the phase
-    /// hardly changes in a window they are all there is.
+    /// Starts from the offsets and amplitudes of the local fit, which needs no orders, averaged over the neighbourhood. Where the
+    /// phase hardly changes in a window, later fits cannot improve them.
     pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit, slopes: &Slopes, ratios: [f32; 3]) {
         let fine = scene.grid;
         let side = (CELL * scene.period_px).max(fine.step as f64);
@@ -95,7 +95,7 @@ impl Photometry {
         self.draw_together(scene, f32::INFINITY);
     }
 
-    /// Offsets and amplitudes that the pixels of row `y` have chosen, in the scene of the fit or a finer one.
+    /// Offsets and amplitudes that the pixels of row `y` have chosen, in the scene of the fit or a finer image of it.
     pub fn sample<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> FringeRows<'a> {
         let grid = self.grid.over(scene.grid);
         if self.albedo.is_known(scene) {
@@ -106,13 +106,13 @@ impl Photometry {
         FringeRows::from_interleaved(rows.map(|row| &*row))
     }
 
-    /// Offsets and amplitudes in the places of the pixels, whatever they have chosen.
+    /// Offsets and amplitudes at the positions of the pixels, whatever place they have chosen.
     pub fn sample_in_place<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> FringeRows<'a> {
         FringeRows::from_interleaved(maps.sample(&self.grid.over(scene.grid), &self.maps, 0, y))
     }
 
-    /// Let every pixel choose among the offsets and amplitudes of the places around it, by the phase of the last fit and intensities
-    /// with the standard deviation `noise`. Returns the share of the lit pixels that take those of another place.
+    /// Lets every pixel choose among the offsets and amplitudes of the places around it, given the phase in `map` and intensities
+    /// with the standard deviation `noise`. Returns the share of the lit pixels that choose another place.
     pub fn choose_places(
         &mut self,
         scene: &Scene<'_>,
@@ -125,7 +125,7 @@ impl Photometry {
         self.choice.make((&grid, &self.maps), scene, (ratios, slopes), [map.phase, map.modulation], noise)
     }
 
-    /// Estimate the albedo of every channel at every pixel.
+    /// Estimates the albedo of every channel at every pixel.
     pub fn estimate_albedo(
         &mut self,
         scene: &Scene<'_>,
@@ -146,7 +146,7 @@ impl Photometry {
         CellFringes { offset: [0, 2, 4, 6].map(value), amplitude: [1, 3, 5, 7].map(value) }
     }
 
-    /// Fit offsets and amplitudes to an absolute phase. Pixels that have chosen another place take no part.
+    /// Fits offsets and amplitudes to an absolute phase. Pixels that have chosen another place take no part.
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
@@ -204,13 +204,13 @@ impl Photometry {
     }
 }
 
-/// The fit of every cell, drawn to that of its neighbourhood unless their textures differ.
+/// Draws the fit of every cell to the mean of its neighbourhood unless their textures differ (J14).
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn blend(threshold: f32, cell: [&[f32]; 8], wide: [&[f32]; 8], out: &mut [f32]) {
     let columns = cell[0].len();
     for i in 0..columns {
         let norm = |maps: &[&[f32]; 8]| (0..8).map(|k| maps[k][i] * maps[k][i]).sum::<f32>().max(1e-12);
-        // Only ratios count: the albedo of the pixels takes a common factor.
+        // Only ratios have a meaning, because the albedo of the pixels compensates a common factor.
         let scale = (norm(&cell) / norm(&wide)).sqrt();
         let size = norm(&cell);
         let square: f32 = (0..8).map(|k| (cell[k][i] - scale * wide[k][i]).powi(2)).sum();
@@ -249,8 +249,8 @@ fn add_projected(
     }
 }
 
-/// Terms of one pixel. `trust` weighs the given phase against the information of the light: the less it is trusted, the more of an
-/// error of the phase is projected out.
+/// Terms of one pixel in the normal equations. `trust` is the weight of the given phase relative to the information about it in
+/// the light: the smaller it is, the more of an error of the phase is projected out (J12).
 #[inline(always)]
 fn project(
     model: [f32; 8],
@@ -271,7 +271,7 @@ fn project(
         ms += m[c] * seen[c];
     }
     dd += trust * mm;
-    // Projector onto what neither m (albedo) nor d (phase) can explain.
+    // Projection onto the part that neither m (albedo) nor d (phase) can explain.
     let determinant = mm * dd - md * md;
     let inverse = 1.0 / if determinant > 1e-12 { determinant } else { 1e-12 };
     let mut projector = [[0.0f32; 4]; 4];
@@ -298,7 +298,7 @@ fn project(
             let q = p * carriers.cosine[c];
             terms[at] = p;
             terms[at + 1] = p * carriers.cosine[k];
-            // Columns a_c and b_c meet a_k and b_k; the triangle below the diagonal is not stored.
+            // Products of a_c and b_c with a_k and b_k. The triangle below the diagonal is not stored.
             if k > c {
                 terms[at + 2] = q;
                 terms[at + 3] = q * carriers.cosine[k];
@@ -378,7 +378,7 @@ mod tests {
         let maps = super::super::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
         fit.run(&scene, &usable, 0.02, maps);
         found.start(&scene, &fit, &slopes, RATIOS);
-        // The phase given is 0.05 rad off, as a two-step phase with wrong offsets is.
+        // The given phase has an error of 0.05 rad, like a two-step phase with wrong offsets.
         let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
         for _ in 0..3 {
             let fit = free_fit(0.3);
@@ -388,7 +388,7 @@ mod tests {
         let mut maps = RowMaps::default();
         let rows = found.sample(&scene, 48, &mut maps);
         for x in 40..216 {
-            // Only ratios are defined.
+            // Only ratios have a meaning.
             let scale = rows.offset[0][x] / fringes[0][0];
             for c in 0..4 {
                 let (a, b) = (rows.offset[c][x] / scale, rows.amplitude[c][x] / scale);

@@ -4,12 +4,12 @@ use crate::joint::params::photometry::RIDGE;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
-/// Upper triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
+/// Number of entries in a triangle of the normal matrix of a_r, b_r, a_g, b_g, a_b, b_b, a_ir, b_ir.
 pub(super) const MATRIX: usize = 36;
-/// The same with the right hand side.
+/// Number of entries including the right-hand side.
 pub(super) const SUMS: usize = MATRIX + 8;
 
-/// Normal equations of a row of cells, solved for the change of the eight unknowns.
+/// Solves the normal equations of a row of cells for the change of the eight unknowns, and adds it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn improve(sums: [&[f32]; SUMS], before: [&[f32]; 8], out: &mut [f32]) {
     let columns = before[0].len();
@@ -31,7 +31,7 @@ pub(super) fn improve(sums: [&[f32]; SUMS], before: [&[f32]; 8], out: &mut [f32]
     }
 }
 
-/// Systems of [`LANES`] cells, side by side; of a matrix only the lower triangle.
+/// Systems of equations of [`LANES`] cells, side by side. Only the lower triangle of each matrix is stored.
 struct System {
     matrix: [[Lanes; 8]; 8],
     right: [Lanes; 8],
@@ -75,7 +75,8 @@ impl System {
                 size[x] += before[r][x] * before[r][x];
             }
         }
-        // For light of another texture a model of 0 has the least residual. Only ratios have a meaning, so the size is held.
+        // In light of another texture, a model of 0 would have the least residual. Only ratios have a meaning, so the
+        // magnitude of the unknowns is held (J13).
         let scale: Lanes = std::array::from_fn(|x| (trace[x] + 8.0 * floor[x]) / size[x]);
         for r in 0..8 {
             for x in 0..LANES {
@@ -100,7 +101,7 @@ impl System {
                 let pivot = matrix[k][k][x];
                 inverse[x] = 1.0 / (if pivot > 1e-12 { pivot } else { 1e-12 }).sqrt();
             }
-            // On the diagonal the inverse is what is needed.
+            // The diagonal stores the inverse, because only the inverse is used.
             matrix[k][k] = inverse;
             for r in k + 1..8 {
                 for x in 0..LANES {

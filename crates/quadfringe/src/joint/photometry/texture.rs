@@ -1,9 +1,9 @@
 //! Step 5 on textured surfaces: the albedo of every channel at every pixel.
 //!
-//! Offset and amplitude share one albedo, `I_c = rho_c (1 + k_c cos)`, and the contrast `k_c` belongs to the light and not to the
-//! texture, so it varies slowly. Once the phase is known each pixel gives the albedo of every channel, with a precision that grows
-//! with the brightness of its fringe. The mean runs over the surrounding pixels whose albedo agrees in all channels within the noise,
-//! so that no window mixes two albedos (a bilateral mean; Tomasi and Manduchi, ICCV 1998).
+//! Offset and amplitude have a common albedo: `I_c = rho_c (1 + k_c cos)`. The contrast `k_c` is a property of the light and not
+//! of the texture, so it varies slowly. Once the phase is known, each pixel determines the albedo of every channel, more
+//! precisely where its fringe is bright. These albedos are averaged over the surrounding pixels that have the same albedo in all
+//! channels within the noise, so that no window mixes two albedos (a bilateral mean; Tomasi and Manduchi, ICCV 1998).
 
 use crate::joint::cells::{CellMaps, Grid, RowMaps, TaskWork};
 use crate::joint::model::carriers;
@@ -19,9 +19,9 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// Share of the variance of noise that a mean of nine by [`binomial`] keeps.
+/// Share of the variance of noise that remains after the mean over nine pixels by [`binomial`].
 const MEAN_OF_NINE: f32 = 9.0 / 64.0;
-/// Steps of an albedo of 1; the greatest albedo is twice that. The noise of a mean is far coarser.
+/// Number of levels up to an albedo of 1; the greatest albedo is 2. The noise of a mean is much larger than a level.
 const LEVELS: f32 = 32768.0;
 
 /// Albedos of every pixel, and working maps.
@@ -29,9 +29,9 @@ const LEVELS: f32 = 32768.0;
 pub(super) struct PixelAlbedo {
     /// Albedos of R, G, B, IR in padded rows, in units of 1/[`LEVELS`].
     planes: [Vec<u16>; 4],
-    /// Length of these rows; 0 when the pixels take those of their cells.
+    /// Length of these rows; 0 if the pixels take offsets and amplitudes of their cells.
     stride: usize,
-    /// 1 and the contrast of every channel.
+    /// For every channel 1 and its contrast.
     contrasts: CellMaps,
     slots: Slots<TaskWork<Rows>>,
 }
@@ -50,17 +50,18 @@ struct Rows {
     /// Light times its model, and the square of the model, of three rows.
     models: [[Vec<f32>; 8]; 3],
     spare: Vec<f32>,
-    /// Albedo and precision of four channels, with room to both sides, of as many rows as the mean reaches over.
+    /// Ring buffer with albedo and precision of four channels, padded on both sides, for all rows within the reach of
+    /// the mean.
     ring: Vec<f32>,
-    /// Where in it the pixels of the mean begin, with their weights.
+    /// Indices in the ring buffer at which the pixels of the mean begin, and their weights.
     places: Vec<(usize, f32)>,
 }
 
-/// Another pixel of the mean: rows down, columns right, both from the first, and weight.
+/// Another pixel of the mean: rows down and columns right from the first pixel, and its weight.
 type Tap = ([usize; 2], f32);
 
 impl PixelAlbedo {
-    /// The pixels take offsets and amplitudes of their cells.
+    /// Discards the albedos; the pixels take offsets and amplitudes of their cells.
     pub fn forget(&mut self) {
         self.stride = 0;
     }
@@ -70,7 +71,8 @@ impl PixelAlbedo {
         self.stride == scene.grid.stride
     }
 
-    /// Offsets and amplitudes of row `y`, with contrasts on `grid`.
+    /// Offsets and amplitudes of row `y`: albedo, and albedo times contrast, where the contrasts are interpolated on
+    /// `grid`.
     pub fn sample<'a>(&self, grid: &Grid, y: usize, maps: &'a mut RowMaps) -> [&'a mut [f32]; 8] {
         let mut rows = maps.sample_mut::<8>(grid, &self.contrasts, 0, y);
         let albedos = self.planes.each_ref().map(|plane| &plane[y * grid.stride..][..grid.stride]);
@@ -78,8 +80,8 @@ impl PixelAlbedo {
         rows
     }
 
-    /// Estimate the albedo by a phase (rad) and a modulation; `fringes` (offset and amplitude of each channel) give the contrasts, and
-    /// the intensities have the standard deviation `noise`.
+    /// Estimates the albedo, given a phase (rad) and a modulation. The contrasts come from `fringes` (offset and amplitude of
+    /// each channel); the intensities have the standard deviation `noise`.
     pub fn measure(
         &mut self,
         (grid, fringes): (&Grid, &CellMaps),
@@ -122,7 +124,7 @@ impl PixelAlbedo {
                     let y = from + i as isize;
                     model(y + 1, &mut models[(i + 2) % 3]);
                     let known = &mut ring[8 * wide * (i % kept)..][..8 * wide];
-                    // Beyond the border there are no pixels.
+                    // Beyond the border there are no pixels, so the weight is 0.
                     let on = if (0..grid.height as isize).contains(&y) { 1.0 } else { 0.0 };
                     for c in 0..4 {
                         let (albedo, precision) = known[2 * c * wide..][..2 * wide].split_at_mut(wide);
@@ -145,7 +147,7 @@ impl PixelAlbedo {
         );
     }
 
-    /// Contrasts of the light: amplitude over offset, from which the albedo cancels.
+    /// Contrasts of the light: amplitude divided by offset, in which the albedo cancels.
     fn contrast(&mut self, grid: &Grid, fringes: &CellMaps, scene: &Scene<'_>, sums: &mut CellMaps) {
         let Self { contrasts, slots, .. } = self;
         grid.smooth::<8, Rows>(
@@ -168,7 +170,7 @@ impl PixelAlbedo {
     }
 }
 
-/// The pixels of the mean around one, and how far they reach.
+/// The pixels of the mean, relative to its middle, and the distance of the furthest.
 fn taps(period_px: f32) -> (Vec<Tap>, usize) {
     let spacing = (ALBEDO_REACH * period_px / ALBEDO_STEPS as f32).round().max(1.0) as usize;
     let sigma = ALBEDO_WIDTH * period_px;
@@ -182,7 +184,7 @@ fn taps(period_px: f32) -> (Vec<Tap>, usize) {
     (near.collect(), spacing * ALBEDO_STEPS)
 }
 
-/// Light times its model for an albedo of 1, channel by channel, and the squares of that model; 0 for unlit pixels.
+/// For each channel, light times its model for an albedo of 1, and the square of the model; 0 for unlit pixels.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn project(
     contrasts: [&[f32]; 4],
@@ -210,7 +212,7 @@ fn project(
     }
 }
 
-/// Albedo in the place of a mean product, and its precision in that of a mean square.
+/// Replaces a mean product by the albedo, and a mean square by the precision of this albedo.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn divide((on, noise): (f32, f32), [product, square]: [&mut [f32]; 2]) {
     let variance = MEAN_OF_NINE * noise * noise;
@@ -222,7 +224,7 @@ fn divide((on, noise): (f32, f32), [product, square]: [&mut [f32]; 2]) {
     }
 }
 
-/// Offsets, and amplitudes in the places of the contrasts.
+/// Writes the offsets, and replaces the contrasts by the amplitudes.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn apply(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
     let albedos = albedos.map(|row| row.as_chunks::<LANES>().0);
@@ -239,11 +241,11 @@ fn apply(albedos: [&[u16]; 4], rows: [&mut [f32]; 8]) {
     }
 }
 
-/// Pixels that are averaged side by side: with more the sums would not stay in registers.
+/// Number of pixels that are averaged side by side. With more pixels the sums would not fit into registers.
 const SIDE: usize = LANES / 2;
 
-/// Mean albedos over the surrounding pixels that have the same albedo in all channels. `taps` give where in the `ring` another pixel
-/// begins, `pixel` the pixel itself.
+/// Averages albedos over the surrounding pixels that have the same albedo in all channels. `taps` are the indices in the `ring`
+/// at which the other pixels begin, `pixel` is the index of the pixel itself.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn average(taps: &[(usize, f32)], pixel: usize, (ring, wide): (&[f32], usize), out: [&mut [u16]; 4]) {
     let out = out.map(|row| row.as_chunks_mut::<SIDE>().0);
@@ -282,7 +284,7 @@ fn join(
             let (mine, theirs) = (pixel[2 * c + 1][x], other[2 * c + 1][x]);
             let precision = if mine < theirs { mine } else { theirs };
             let gap = pixel[2 * c][x] - other[2 * c][x];
-            // Of two variances the greater one stands for about two thirds of their sum.
+            // The greater of two variances is about two thirds of their sum.
             apart += 0.7 * precision * gap * gap;
         }
         let excess = if apart > 0.0 { apart * (1.0 / ALBEDO_EXCESS) } else { 0.0 };
@@ -307,7 +309,7 @@ mod tests {
     const CONTRASTS: [f32; 4] = [0.8, 0.7, 0.9, 0.6];
     const INKS: [[f32; 4]; 2] = [[0.5, 0.2, 0.6, 0.4], [0.3, 0.5, 0.2, 0.4]];
 
-    /// PixelAlbedo found of two inks that meet.
+    /// The albedo found for a print of two inks that meet.
     struct Print {
         edge: Edge,
         albedo: PixelAlbedo,
@@ -329,7 +331,7 @@ mod tests {
             Self { edge, albedo }
         }
 
-        /// Offset and amplitude of a channel in row 30 over their true values.
+        /// Offset and amplitude of a channel in row 30, divided by their true values.
         fn ratios(&self, c: usize, columns: impl Iterator<Item = usize>) -> Vec<[f32; 2]> {
             let mut maps = RowMaps::default();
             let rows = self.albedo.sample(&self.edge.grid, 30, &mut maps);
@@ -342,7 +344,7 @@ mod tests {
     fn near_an_edge_every_pixel_has_the_albedo_of_its_side() {
         let print = Print::new(1e-3, |_| 1.0);
         for c in 0..4 {
-            // A pixel and its neighbours see both inks in the two columns at the edge.
+            // In the two columns at the edge, a pixel and its neighbours see both inks.
             let columns = (20..236).filter(|x| !(EDGE - 1..=EDGE).contains(x));
             for (at, ratios) in print.ratios(c, columns).into_iter().enumerate() {
                 assert!(ratios.iter().all(|ratio| (ratio - 1.0).abs() < 0.03), "{c} {at} {ratios:?}");
@@ -357,7 +359,7 @@ mod tests {
         for c in 0..4 {
             let errors = print.ratios(c, 24..108).into_iter().map(|[a, _]| (a - 1.0).powi(2));
             let rms = (errors.sum::<f32>() / 84.0).sqrt();
-            // The albedo of one pixel has the relative error noise over light; the mean runs over hundreds.
+            // The albedo of one pixel has the relative error noise / light; the mean is over hundreds of pixels.
             assert!(rms < 0.25 * noise / (ALBEDO * INKS[0][c]), "{c} {rms}");
         }
     }

@@ -1,5 +1,4 @@
-//! The image pyramid: one shot at full resolution and on the coarse level. A level is four planes of linear light and the masks of
-//! its pixels.
+//! The image pyramid: one shot at full resolution and on the coarse level. A level has four planes of linear light, and masks.
 
 mod upsample;
 
@@ -20,14 +19,14 @@ pub(in crate::joint) struct Pyramid {
 }
 
 impl Pyramid {
-    /// For so many pixels of the full image, padding included.
+    /// Makes a pyramid for a full image with this number of pixels, including padding.
     pub fn new(pixels: usize) -> Self {
         let mut full = Level::default();
         full.resize(pixels);
         Self { full, coarse: Level::default() }
     }
 
-    /// Make the coarse level. With a factor of 1 it is the full level itself, moved there until [`Self::restore`].
+    /// Makes the coarse level. If the factor is 1, the full level is moved there until [`Self::restore`].
     pub fn shrink(&mut self, frame: &Frame<'_>) {
         match frame.coarse.factor {
             1 => std::mem::swap(&mut self.full, &mut self.coarse),
@@ -35,20 +34,20 @@ impl Pyramid {
         }
     }
 
-    /// Move the full level back after the steps on the coarse level.
+    /// Moves the full level back after the steps on the coarse level.
     pub fn restore(&mut self, frame: &Frame<'_>) {
         if frame.coarse.factor == 1 {
             std::mem::swap(&mut self.full, &mut self.coarse);
         }
     }
 
-    /// The coarse level and the full one with their grids.
+    /// The coarse and the full level as scenes.
     pub fn scenes<'a>(&'a self, frame: &Frame<'a>) -> [Scene<'a>; 2] {
         [self.coarse.scene(frame.coarse), self.full.scene(frame.full)]
     }
 }
 
-/// How many times fewer pixels along a side the coarse level has: as few as still show the fringes.
+/// Factor by which the coarse level has fewer pixels along a side: the greatest that still resolves the fringes.
 pub(in crate::joint) fn factor(period_px: f64, grid: &Grid) -> usize {
     let mut factor = 1;
     while factor < FACTOR_MAX.min(grid.step) && period_px >= 2.0 * COARSE_PERIOD_MIN_PX * factor as f64 {
@@ -73,13 +72,13 @@ impl Level {
         planes.for_each(|plane| plane.resize(pixels, 0.0));
     }
 
-    /// The planes with a grid of cells.
+    /// The level as a scene with a grid of cells.
     pub fn scene<'a>(&'a self, ScaledGrid { grid, period_px, factor }: ScaledGrid<'a>) -> Scene<'a> {
         let light = self.light.each_ref().map(Vec::as_slice);
         Scene { light, usable: &self.usable, grid, period_px, factor }
     }
 
-    /// Takes the pixels out where the mask `illuminated` is 0.
+    /// Removes the pixels where the mask `illuminated` is 0.
     pub fn restrict(&mut self, grid: &Grid, illuminated: &[f32]) {
         let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));
         masks.zip(illuminated.par_chunks(grid.stride)).for_each(|((lit, usable), illuminated)| {
@@ -90,9 +89,9 @@ impl Level {
         });
     }
 
-    /// The image with the mean of every `factor` x `factor` pixels of `fine`, lit where all of them are lit and usable where half of
-    /// them are usable; a mean that lies partly beyond the last row or column is therefore unlit. Light repeats beyond the last
-    /// row; beyond the last column existing pixels count. `grid` is that of the mean image.
+    /// Fills this level with the means of `factor` x `factor` pixels of `fine`. A mean is lit if all of its pixels are lit, and
+    /// usable if at least half of them are usable. A mean that lies partly beyond the last row or column is therefore unlit; its
+    /// light comes from the last row repeated, or from the existing columns. `grid` is the grid of this level.
     pub fn shrink(&mut self, fine: &Self, grid: &Grid, fine_grid: &Grid, factor: usize) {
         self.resize(grid.pixels());
         let planes = self.light.each_mut().map(|plane| plane.par_chunks_mut(grid.stride));
@@ -104,30 +103,30 @@ impl Level {
             for (out, plane) in light {
                 mean(factor, &rows_of(plane, fine_grid, row, factor), out);
                 if !fine_grid.width.is_multiple_of(factor) {
-                    // The padding is dark.
+                    // The padding is dark, so the sum has fewer terms.
                     out[grid.width - 1] *= factor as f32 / (fine_grid.width % factor) as f32;
                 }
             }
             least(factor, &rows_of(&fine.lit, fine_grid, row, factor), lit);
             if (row + 1) * factor > fine_grid.height {
-                // Its mean belongs to another place than its middle.
+                // The mean does not belong to the middle of the pixel.
                 lit.fill(0.0);
             }
-            // Noise takes single pixels of a crest beyond full scale; without the crest the fringe has no fit.
+            // Noise saturates single pixels of a fringe maximum; without its maximum a fringe cannot be fitted.
             mean(factor, &rows_of(&fine.usable, fine_grid, row, factor), usable);
             at_least_half(lit, usable);
         });
     }
 }
 
-/// The rows of `plane` that make up row `row` of an image with `factor` times fewer.
+/// The `factor` rows of `plane` that form row `row` of the coarse image.
 fn rows_of<'a>(plane: &'a [f32], grid: &Grid, row: usize, factor: usize) -> Vec<&'a [f32]> {
     debug_assert_eq!(plane.len(), grid.pixels());
     let place = |i: usize| (row * factor + i).min(grid.height - 1) * grid.stride;
     (0..factor).map(|i| &plane[place(i)..][..grid.stride]).collect()
 }
 
-/// `lit` where a share is half or more, else 0.
+/// Replaces shares of a half or more by `lit`, and smaller ones by 0.
 fn at_least_half(lit: &[f32], shares: &mut [f32]) {
     for (share, lit) in shares.iter_mut().zip(lit) {
         *share = if *share >= 0.5 { *lit } else { 0.0 };
@@ -151,7 +150,7 @@ fn least(factor: usize, rows: &[&[f32]], out: &mut [f32]) {
     }
 }
 
-/// `F` rows and `F` columns into one.
+/// Combines `F` rows and `F` columns into one.
 #[inline(always)]
 fn fold<const F: usize>(rows: &[&[f32]], out: &mut [f32], join: impl Fn(f32, f32) -> f32, scale: f32) {
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
@@ -182,7 +181,7 @@ mod tests {
     #[test]
     fn a_shrunk_image_has_means_of_light_and_the_least_of_masks_at_odd_borders_too() {
         let (height, width) = (5, 7);
-        // One pixel of a square, two of another, three of a third.
+        // One pixel is saturated in one square, two in another, three in a third.
         let saturated = [(0, 0), (2, 0), (3, 1), (2, 2), (2, 3), (3, 2)];
         for factor in [2, 4] {
             let fine_grid = Grid::with_stride([height, width], LANES * factor, 4.0);

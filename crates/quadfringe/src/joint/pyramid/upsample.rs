@@ -1,7 +1,7 @@
 //! Step 6: upsampling from the phase of the coarse level to a first phase of every pixel.
 //!
-//! Where the surface is smooth the phase is interpolated. Near discontinuities and shadows each pixel takes, of the surfaces that meet
-//! there, the one that explains its four intensities and those of its neighbours best.
+//! Where the surface is smooth, the phase is interpolated. Near discontinuities and shadows several surfaces meet, and each pixel
+//! takes the one that best explains its four intensities and the intensities of its neighbours.
 
 use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
@@ -16,7 +16,7 @@ use rayon::prelude::*;
 
 /// A pixel and its eight neighbours.
 const NEAR: usize = 9;
-/// Vectors that hold the pixels of a block and of a rim of one pixel.
+/// Number of vectors for the pixels of a block and of a rim of one pixel around it.
 const VECTORS: usize = ((FACTOR_MAX + 2) * (FACTOR_MAX + 2)).div_ceil(LANES);
 
 /// Working rows of the tasks.
@@ -31,14 +31,15 @@ struct Rows {
     around: Around,
 }
 
-/// The surfaces at the pixels of a block and of its rim: squared residuals, and corrections of the phase.
+/// Squared residuals and corrections of the phase for each surface, at the pixels of a block and of its rim.
 #[derive(Debug, Default)]
 struct Around {
     squared_residuals: [[Lanes; NEAR]; VECTORS],
     corrections: [[Lanes; NEAR]; VECTORS],
 }
 
-/// One of the surfaces that meet at a pixel of the coarse level: phase at the first fine pixel in rad, slopes in rad per fine pixel.
+/// One of the surfaces that meet at a pixel of the coarse level: its phase at the first fine pixel in rad, and its slopes in rad
+/// per fine pixel.
 #[derive(Debug, Clone, Copy, Default)]
 struct Surface {
     phase: f32,
@@ -48,7 +49,7 @@ struct Surface {
 }
 
 impl Surface {
-    /// Its phase at fine pixel (x, y) of the block, whose first is (0, 0).
+    /// Phase of the surface at the fine pixel (x, y) of the block; the first pixel is (0, 0).
     fn at(&self, x: f32, y: f32) -> f32 {
         self.phase + self.along * x + self.down * y
     }
@@ -61,14 +62,14 @@ pub(in crate::joint) struct Levels<'a> {
     pub fine: &'a Scene<'a>,
     /// Phase, discontinuities, slopes and photometry of the coarse level.
     pub found: &'a CoarseLevel,
-    /// Fringe numbers over the first.
+    /// Fringe numbers divided by the first.
     pub ratios: [f32; 3],
     /// 1 for lit pixels of the fine level.
     pub lit: &'a [f32],
 }
 
 impl Upsampler {
-    /// Absolute phase (rad) and modulation of every pixel of the fine level.
+    /// Computes absolute phase (rad) and modulation of every pixel of the fine level.
     pub fn run(&self, levels: Levels<'_>, phase: &mut [f32], modulation: &mut [f32]) {
         let Levels { coarse, fine, found, lit, .. } = levels;
         let (grid, stride) = (coarse.grid, fine.grid.stride);
@@ -94,7 +95,7 @@ impl Upsampler {
     }
 }
 
-/// Fine row `i` of the `factor` rows of a coarse row, bilinear.
+/// Interpolates bilinearly the fine row `i` of the `factor` rows of a coarse row.
 fn interpolate(rows: [&[f32]; 3], i: usize, factor: usize, mix: &mut Vec<f32>, out: &mut [f32]) {
     let columns = rows[0].len();
     mix.resize(columns + 2, 0.0);
@@ -105,7 +106,7 @@ fn interpolate(rows: [&[f32]; 3], i: usize, factor: usize, mix: &mut Vec<f32>, o
     spread(factor, mix, out);
 }
 
-/// One row of coarse pixels, of which those near discontinuities and shadows are decided one by one.
+/// One row of coarse pixels. Pixels near discontinuities and shadows are decided one by one.
 struct CoarseRow<'a> {
     levels: Levels<'a>,
     row: usize,
@@ -124,7 +125,7 @@ impl CoarseRow<'_> {
         }
     }
 
-    /// The fine pixels of one coarse pixel.
+    /// Decides the fine pixels of one coarse pixel.
     fn block(&self, column: usize, around: &mut Around, phase: &mut [f32], modulation: &mut [f32]) {
         let (factor, stride) = (self.factor, self.levels.fine.grid.stride);
         let mut found = [Surface::default(); NEAR];
@@ -159,7 +160,7 @@ impl CoarseRow<'_> {
         self.levels.found.photometry.cell(coarse, row, column)
     }
 
-    /// Surfaces of the pixel and its neighbours, those that differ; their number.
+    /// Collects the different surfaces of the pixel and its neighbours, and returns their number.
     fn surfaces(&self, column: usize, surfaces: &mut [Surface; NEAR]) -> usize {
         let Levels { coarse, found, .. } = self.levels;
         let (grid, factor) = (coarse.grid, self.factor as f32);
@@ -189,7 +190,7 @@ impl CoarseRow<'_> {
         count
     }
 
-    /// Residuals and corrections of every surface at the pixels of a block and of its rim.
+    /// Computes residuals and corrections of every surface at the pixels of a block and of its rim.
     fn compare(&self, column: usize, surfaces: &[Surface], around: &mut Around) {
         let (Levels { fine, lit: mask, ratios, .. }, factor) = (self.levels, self.factor);
         let (grid, side) = (fine.grid, factor + 2);
@@ -221,7 +222,7 @@ impl CoarseRow<'_> {
 }
 
 impl Around {
-    /// The surface with the least squared residual over the pixel (x, y) of a block and its neighbours.
+    /// The surface with the least sum of squared residuals over the pixel (x, y) of a block and its neighbours.
     fn best(&self, x: usize, y: usize, side: usize, count: usize) -> usize {
         let square = |n: usize, k: usize| {
             let at = (y + n / 3) * side + x + n % 3;
@@ -239,7 +240,7 @@ impl Around {
     }
 }
 
-/// A vector of pixels with the phase that one surface gives them, and the modulation of that surface.
+/// A vector of pixels with their phase on one surface, and the modulation of this surface.
 struct Pixels<'a> {
     phase: Lanes,
     lit: Lanes,
@@ -247,7 +248,8 @@ struct Pixels<'a> {
     modulation: f32,
 }
 
-/// Squared residual of lit pixels after the best albedo and a small correction of the phase, and that correction.
+/// Fits the albedo and a small correction of the phase to the intensities of lit pixels; gives the squared residual and
+/// the correction.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn explain(
     pixels: &Pixels,

@@ -6,7 +6,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Connected components by their runs along rows (union-find).
+/// Connected components, found by union-find over runs of pixels along rows.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Components {
     rows: Vec<Vec<Run>>,
@@ -14,7 +14,7 @@ pub(super) struct Components {
     sizes: Vec<u32>,
 }
 
-/// Pixels side by side on one surface.
+/// A run: adjacent pixels of a row on one surface.
 #[derive(Debug, Clone, Copy)]
 struct Run {
     from: u32,
@@ -40,8 +40,8 @@ struct Row<'a> {
 }
 
 impl Components {
-    /// Removes small components from `valid`, and writes 1 into `seeds` for pixels of large ones, 0 elsewhere. Neighbours whose
-    /// `phase` (rad) is half a turn or more apart are not connected.
+    /// Removes small components from `valid`. Writes 1 into `seeds` for pixels of large components, 0 elsewhere. Neighbours
+    /// whose `phase` (rad) differs by half a turn or more are not connected.
     pub fn remove_small(
         &mut self,
         grid: &Grid,
@@ -94,7 +94,7 @@ impl Components {
     }
 }
 
-/// Runs of a row; `ends` is working memory.
+/// Finds the runs of a row; `ends` is working memory.
 fn find_runs(valid: &[u8], phase: &[f32], ends: &mut Vec<u8>, runs: &mut Vec<Run>) {
     runs.clear();
     ends.resize(valid.len(), 0);
@@ -112,7 +112,7 @@ fn find_runs(valid: &[u8], phase: &[f32], ends: &mut Vec<u8>, runs: &mut Vec<Run
     runs.extend(open.map(|from| Run { from, to: valid.len() as u32, number: 0 }));
 }
 
-/// 1 for every pixel but the first where a run begins or has ended.
+/// Marks with 1 every pixel at which a run begins or before which one has ended; the first pixel is never marked.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn mark_ends(valid: &[u8], phase: &[f32], ends: &mut [u8]) {
     ends[0] = 0;
@@ -142,7 +142,7 @@ fn connect(above: Row<'_>, below: Row<'_>, parents: &mut [u32]) {
     }
 }
 
-/// Neighbours on one surface.
+/// Whether two neighbours with these phases lie on one surface.
 fn joined(a: f32, b: f32) -> bool {
     (a - b).abs() < PI
 }
@@ -188,7 +188,7 @@ mod tests {
     fn a_spiral_is_one_component() {
         let grid = Grid::new([16, 16], 4.0);
         let mut valid = vec![0u8; grid.pixels()];
-        // Two columns joined at the bottom only.
+        // Two columns that are connected only at the bottom.
         for y in 0..16 {
             valid[y * 16 + 3] = 1;
             valid[y * 16 + 6] = 1;

@@ -1,4 +1,5 @@
-//! Step 8: pixels that their nearest neighbours make doubtful: order jumps of the absolute phase, and narrow strips.
+//! Step 8: pixels that are doubtful because of their nearest neighbours, at order jumps of the absolute phase and in
+//! narrow strips.
 
 use crate::joint::cells::Grid;
 use crate::joint::params::validity::{AMBIGUOUS_RAD, AMBIGUOUS_REACH};
@@ -12,7 +13,7 @@ use std::f32::consts::PI;
 #[derive(Debug, Default)]
 pub(super) struct Discontinuities {
     at_jump: Vec<u8>,
-    /// Of these, pixels where the wrapped phases of R and B agree, so that they cannot see the jump.
+    /// Pixels at a jump across which the wrapped phase hardly changes, so that R and B do not see it.
     ambiguous: Vec<u8>,
 }
 
@@ -35,9 +36,9 @@ impl Discontinuities {
         &self.at_jump
     }
 
-    /// Marks in `excluded` every lit pixel whose absolute phase (rad) differs by half a turn or more from that of a lit neighbour,
-    /// and the pixels around it: there one of the two has the wrong order, or sees two surfaces at once. Where the wrapped phases
-    /// agree only G and IR show on which side a pixel lies, and those are blurred, so more pixels around are marked.
+    /// Marks in `excluded` every lit pixel whose absolute phase (rad) differs by half a turn or more from a lit neighbour, and
+    /// the pixels around it: one of the two has the wrong order or sees two surfaces at once. If the wrapped phases agree, only G
+    /// and IR show on which side a pixel lies. Their beats are blurred, so more pixels around it are marked.
     pub fn mark(&mut self, grid: &Grid, map: PhaseMap<'_>, excluded: &mut Vec<u8>) {
         let stride = grid.stride;
         self.at_jump.resize(grid.pixels(), 0);
@@ -76,11 +77,11 @@ impl<'a> Row<'a> {
     }
 }
 
-/// A square of pixels around those of row `y`.
+/// Size of the square around each pixel of row `y`.
 #[derive(Clone, Copy)]
 struct Near {
     y: usize,
-    /// Pixels to each side.
+    /// Number of pixels on each side.
     reach: usize,
 }
 
@@ -90,8 +91,9 @@ impl Near {
     }
 }
 
-/// Keeps of `pixels` those with at least `least` like them, themselves included, among the 5 x 5 around; pixels beyond the border of
-/// the image count as present. This removes narrow strips near edges, where two surfaces share a pixel.
+/// Keeps the marked `pixels` that have at least `least` marked pixels in the 5 x 5 pixels around them, themselves included.
+/// Pixels beyond the border of the image count as marked. This removes narrow strips near edges, where two surfaces share a
+/// pixel.
 pub(super) fn remove_narrow(grid: &Grid, least: u8, pixels: &[u8], out: &mut Vec<u8>) {
     out.resize(grid.pixels(), 0);
     out.par_chunks_mut(grid.stride).enumerate().for_each_init(Vec::new, |sums, (y, out)| {
@@ -108,7 +110,7 @@ pub(super) fn remove_narrow(grid: &Grid, least: u8, pixels: &[u8], out: &mut Vec
     });
 }
 
-/// Counts become 1 for pixels that were there and have so many neighbours, 0 for the others.
+/// Replaces the counts by 1 for pixels that are marked and have a count of at least `least`, and by 0 for the others.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn keep(pixels: &[u8], least: u8, counts: &mut [u8]) {
     for (count, pixel) in counts.iter_mut().zip(pixels) {

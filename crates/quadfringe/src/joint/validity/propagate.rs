@@ -1,8 +1,8 @@
-//! Step 9 for connected components: the order of a pixel is as certain as that of the component it belongs to.
+//! Step 9 for connected components: the order of a pixel is as certain as the order of its component.
 //!
-//! Costs of orders are summed over windows, and a window that sees both sides of a discontinuity makes the order doubtful on either.
-//! From one pixel of a component to the next the phase is continuous, and so is the order. A window some cells deeper sees this
-//! component alone, and its verdict holds up to the discontinuity.
+//! Costs of orders are summed over windows. A window that sees both sides of a discontinuity makes the order doubtful on both. In
+//! a component the phase continues from pixel to pixel, and so does the order. A window some cells further inside sees only this
+//! component, and its order holds up to the discontinuity.
 
 use super::regrow::GROWN;
 use crate::joint::cells::Grid;
@@ -19,7 +19,7 @@ use std::ops::Range;
 /// Propagation along components, with working memory.
 #[derive(Debug, Default)]
 pub(super) struct Propagation {
-    /// Settled pixels of each task.
+    /// Pixels that each task has settled.
     settled: Vec<Vec<Settled>>,
     slots: Slots<Reach>,
 }
@@ -27,15 +27,16 @@ pub(super) struct Propagation {
 /// New values for a doubtful pixel.
 #[derive(Debug, Clone, Copy)]
 struct Settled {
-    /// Place without padding.
+    /// Index in maps without padding.
     at: usize,
     wrong_order: f32,
     quality: f32,
 }
 
 impl Propagation {
-    /// Doubtful pixels of the `components` take the probability of a wrong order, and the quality, of the most certain of four pixels
-    /// some cells away along their row and column, or at the end of the component. Both maps are without padding.
+    /// Settles the doubtful pixels of the `components`. Four pixels of the same component are candidates: some cells away along
+    /// the row and the column, or where the component ends. A doubtful pixel takes wrong-order probability and quality from the
+    /// most certain of them. These two maps are without padding.
     pub fn run(
         &mut self,
         grid: &Grid,
@@ -63,7 +64,8 @@ impl Propagation {
     }
 }
 
-/// An image: absolute phase (rad) and components in padded rows; probability of a wrong order and quality without padding.
+/// An image. Absolute phase (rad) and components have padded rows; wrong-order probability and quality are without
+/// padding.
 struct Image<'a> {
     grid: &'a Grid,
     phase: &'a [f32],
@@ -80,11 +82,11 @@ struct Row<'a> {
 }
 
 impl Image<'_> {
-    /// Groups of pixels of row `y` with a doubtful one among them.
+    /// Groups of pixels of row `y` that contain a doubtful pixel.
     fn doubtful(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
         let wrong_order = &self.wrong_order[y * self.grid.width..][..self.grid.width];
         let groups = wrong_order.chunks(GROUP).enumerate();
-        // Without a way out in the middle the loop over a group becomes a few vector instructions.
+        // A loop over the group without early exit compiles to a few vector instructions.
         let doubtful = |group: &[f32]| group.iter().fold(false, |any, &wrong| any | (wrong > DOUBTFUL));
         groups.filter(move |(_, group)| doubtful(group)).map(|(i, group)| i * GROUP..i * GROUP + group.len())
     }
@@ -97,7 +99,7 @@ impl Image<'_> {
     /// New values for a doubtful pixel, from the ends of its component in four directions.
     fn settle(&self, at: usize, ends: [usize; 4], component: u8) -> Option<Settled> {
         let (wrong_order, quality) = (self.wrong_order, self.quality);
-        // NaN outside the projector's image compares as false.
+        // Outside the projector image the probability is NaN, and comparisons with NaN are false.
         let certain = ends.into_iter().filter(|&end| wrong_order[end] < wrong_order[at]);
         let best = certain.min_by(|&a, &b| wrong_order[a].total_cmp(&wrong_order[b]))?;
         let floor = if component == GROWN { GROWN_PROBABILITY_MIN } else { SETTLED_PROBABILITY_MIN };
@@ -109,17 +111,17 @@ impl Image<'_> {
     }
 }
 
-/// How many pixels the component of a pixel continues, up to a limit: to the right, up and down.
+/// Number of pixels, up to a limit, for which the component of each pixel continues to the right, up and down.
 #[derive(Debug, Default)]
 struct Reach {
-    /// 0 where a pixel and the one on its left are of one component.
+    /// 0 where a pixel and its left neighbour belong to one component.
     apart: Vec<u8>,
     right: Vec<u8>,
-    /// Of the last row visited from above.
+    /// Counts upwards, for the row visited last.
     up: Vec<u8>,
-    /// Of the last row visited from below.
+    /// Counts downwards, for the row visited last.
     below: Vec<u8>,
-    /// Downwards, for all rows of the task.
+    /// Counts downwards, for all rows of the task.
     down: Vec<u8>,
 }
 
@@ -149,7 +151,7 @@ impl Reach {
         }
     }
 
-    /// Counts downwards for all rows of a task.
+    /// Computes the counts downwards for all rows of a task.
     fn count_down(&mut self, image: &Image<'_>, rows: Range<usize>, most: u8) {
         let Grid { width, height, .. } = *image.grid;
         self.down.resize(rows.len() * width, 0);
@@ -163,7 +165,7 @@ impl Reach {
         }
     }
 
-    /// Settles the doubtful pixels of a group of row `y`, number `index` of its task.
+    /// Settles the doubtful pixels of a group of row `y`, which has the number `index` in its task.
     fn settle_group(
         &mut self,
         image: &Image<'_>,
@@ -204,7 +206,8 @@ fn joined(here: Row<'_>, there: Row<'_>, x: usize) -> bool {
     (here.components[x] != 0) & (there.components[x] != 0) & near
 }
 
-/// 0 for pixels that are of one component with the one on their left, 1 for others and for the first.
+/// Marks the start of components along a row: 0 for pixels that belong to one component with their left neighbour, 1
+/// for the others and for the first pixel.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn mark_apart(row: Row, apart: &mut [u8]) {
     let n = apart.len() - 1;
@@ -216,7 +219,8 @@ fn mark_apart(row: Row, apart: &mut [u8]) {
     }
 }
 
-/// Counts of the pixels that a component continues, from those of the row that it continues into.
+/// Updates the counts from the row `there` to its neighbour `here`: one more if the component continues from `here` to
+/// `there`, else 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn count_on(here: Row, there: Row, most: u8, counts: &mut [u8]) {
     let n = counts.len();
@@ -234,7 +238,8 @@ mod tests {
 
     #[test]
     fn certainty_reaches_a_discontinuity_and_the_end_of_the_component() {
-        // Two components two turns apart; the orders of eight columns at their border are doubtful, and column 28 ends the second.
+        // Two components whose phases are two turns apart. The orders of eight columns at their border are doubtful, and the
+        // second component ends at column 28.
         let grid = Grid::new([6, 32], 4.0);
         let columns = |value: fn(usize) -> f32| (0..6 * 32).map(|i| value(i % 32)).collect::<Vec<_>>();
         let phase = columns(|x| 0.2 * x as f32 + if x < 16 { 0.0 } else { 4.0 * PI });

@@ -1,16 +1,16 @@
-//! Step 8: components grow back into doubtful pixels next to them (region growing with hysteresis; Canny, IEEE TPAMI 8, 679 (1986)).
+//! Step 8: region growing. Components grow back into doubtful pixels next to them (hysteresis; Canny, IEEE TPAMI 8, 679 (1986)).
 //!
-//! At an order jump one of two sides is wrong, or a pixel sees both surfaces, and the exclusion removes a strip from each side. Orders
-//! are known by cells, and one cell across the rim of a surface makes all of its pixels doubtful. A side that is wrong is mostly a
-//! narrow strip that is removed entirely. The remaining component takes back the pixels into which its phase continues straight and whose
-//! intensities agree with that. Between two surfaces that meet, holes remain.
+//! At an order jump one of the two sides is wrong, or a pixel sees both surfaces, and the exclusion removes a strip from each
+//! side. Orders are chosen for cells, so a cell across the rim of a surface makes all of its pixels doubtful. A wrong side is
+//! mostly a narrow strip, which is removed entirely. The remaining component takes back the pixels into which its phase continues
+//! straight and whose intensities agree with this phase. Between two surfaces that meet, holes remain.
 
 use crate::joint::cells::Grid;
 use crate::joint::params::tasks::GROUP;
 use crate::joint::params::validity::{AMBIGUOUS_REACH, BEND_MAX_RAD, FACING_REACH};
 use std::f32::consts::PI;
 
-/// Mark of a pixel that was added to a component; 1 marks the others.
+/// Mark of a pixel that was added to a component. The other pixels of a component have the mark 1.
 pub(super) const GROWN: u8 = 2;
 
 /// Maps that decide whether a pixel may be added.
@@ -24,19 +24,20 @@ pub(super) struct Candidates<'a> {
     pub at_jump: &'a [u8],
 }
 
-/// Working lists of pixels, by their places.
+/// Working lists of pixels, given by their index.
 #[derive(Debug, Default)]
 pub(super) struct Regrow {
     open: Vec<u32>,
     taken: Vec<u32>,
-    /// Pixels taken at an order jump, or further away than exclusion reaches.
+    /// Added pixels that lie at an order jump, or further away than exclusion reaches.
     far: Vec<u32>,
 }
 
 impl Regrow {
-    /// Adds to `valid` and to the `components`, which are part of it, consistent pixels no more than a cell (or the reach of exclusion)
-    /// away into which the phase of two pixels of a component in a line continues straight. Those at an order jump, or further away
-    /// than exclusion reaches, stay holes where another surface is valid nearby.
+    /// Adds pixels to `valid` and to the `components`, which are a subset of it. A pixel is added if it is consistent, at most a
+    /// cell (or the reach of exclusion) away from a component, and the phase of two pixels of the component that lie in line
+    /// with it continues straight into it. Pixels at an order jump, or further away than exclusion reaches, are not added if
+    /// another surface is valid nearby.
     pub fn run(&mut self, grid: &Grid, candidates: &Candidates<'_>, valid: &mut [u8], components: &mut [u8]) {
         let phase = candidates.phase;
         self.open_pixels(grid, candidates.consistent, valid);
@@ -73,7 +74,7 @@ impl Regrow {
             let [consistent, valid] = [consistent, valid].map(|map| &map[y * grid.stride..][..grid.width]);
             for (i, (consistent, valid)) in consistent.chunks(GROUP).zip(valid.chunks(GROUP)).enumerate() {
                 let is_open = |x: &usize| consistent[*x] > valid[*x];
-                // Most groups have no such pixel; without a way out in the middle the loop over a group becomes vectors.
+                // Most groups have no such pixel. A loop over the group without early exit compiles to vectors.
                 if (0..consistent.len()).fold(false, |any, x| any | is_open(&x)) {
                     let first = y * grid.stride + i * GROUP;
                     self.open.extend((0..consistent.len()).filter(is_open).map(|x| (first + x) as u32));
@@ -83,7 +84,7 @@ impl Regrow {
     }
 }
 
-/// Whether two pixels of a component in a line lead straight to the pixel, in one of four directions.
+/// Whether the phase of two pixels of a component continues straight into the pixel, in one of four directions.
 fn continues(grid: &Grid, phase: &[f32], components: &[u8], at: usize) -> bool {
     directions(grid, at, 2).any(|step| {
         let (near, far) = (at.wrapping_add_signed(step), at.wrapping_add_signed(2 * step));
@@ -102,7 +103,7 @@ fn faces_another(grid: &Grid, phase: &[f32], valid: &[u8], at: usize) -> bool {
     })
 }
 
-/// Steps to those of the four neighbours of a pixel behind which the image has `count` pixels.
+/// Index steps from a pixel to its four neighbours, for the directions in which the image continues for `count` pixels.
 fn directions(grid: &Grid, at: usize, count: usize) -> impl Iterator<Item = isize> {
     let (y, x, down) = (at / grid.stride, at % grid.stride, grid.stride as isize);
     let left_or_up = [(x, -1), (y, -down)].map(|(before, step)| (before >= count, step));
@@ -115,7 +116,8 @@ fn directions(grid: &Grid, at: usize, count: usize) -> impl Iterator<Item = isiz
 mod tests {
     use super::*;
 
-    /// A surface with a step of 20 rad at column 16: its phase, pixels at the jump, valid pixels outside six columns around it.
+    /// A surface with a step of 20 rad at column 16: its phase, the pixels at the jump, and the valid pixels, which exclude six
+    /// columns around it.
     struct Step {
         grid: Grid,
         phase: Vec<f32>,
@@ -140,7 +142,7 @@ mod tests {
             y * self.grid.stride + x
         }
 
-        /// Valid pixels after growing into the consistent ones.
+        /// Valid pixels after growing into the consistent pixels.
         fn grown(&self, consistent: &[u8]) -> Vec<u8> {
             let (mut valid, mut components) = (self.valid.clone(), self.valid.clone());
             let candidates = Candidates { phase: &self.phase, consistent, at_jump: &self.at_jump };
@@ -181,7 +183,8 @@ mod tests {
         let mut step = Step::new();
         let mut consistent = step.all();
         consistent[step.place(14, 7)] = 0;
-        // Next to the step a narrow strip has an order too few, so that no pixel is valid near the other side; below, column 13 bends.
+        // Next to the step, the order of a narrow strip is too low by one, so that no pixel is valid near the other side. In the
+        // lower rows the phase bends at column 13.
         for y in 0..20 {
             for x in 17..19 {
                 let at = step.place(x, y);

@@ -1,4 +1,5 @@
-//! Step 8: support. The share of the neighbourhood whose evidence agrees with the order chosen there.
+//! Step 8: the support of an order, which is the share of the neighbourhood whose evidence agrees with the orders
+//! chosen there.
 
 use crate::joint::cells::{CellMaps, Grid, RowMaps, TaskWork};
 use crate::joint::orders::Orders;
@@ -16,7 +17,7 @@ pub(super) struct Support {
 }
 
 impl Support {
-    /// Measure it from the costs of the chosen orders.
+    /// Measures the support from the costs of the chosen orders.
     pub fn measure(&mut self, scene: &Scene<'_>, orders: &Orders) {
         let grid = scene.grid;
         let Self { support, agreement, sums, slots } = self;

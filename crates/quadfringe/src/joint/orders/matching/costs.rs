@@ -1,4 +1,4 @@
-//! Costs of the orders of a node: the squared difference between the evidence and the prediction of every order.
+//! Costs of the orders of a node: the squared difference between the evidence and the predictions of each order.
 
 use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
@@ -7,14 +7,14 @@ use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
 
-/// Every order as a label, with its predictions; label 1 is order 0, label 0 the order before the field.
+/// Predictions of every order. Orders are numbered as labels: label 1 is order 0, label 0 the order before the field.
 #[derive(Debug, Clone)]
 pub(super) struct CostTable {
-    /// Beats of G and IR in a turn of the first phase.
+    /// Turns of the beats of G and IR in one turn of the first phase.
     ratios: [f64; 2],
-    /// Beats of every label for a wrapped phase of 0: G and IR.
+    /// Beats of G and IR for every label at a wrapped phase of 0.
     beats: [Vec<u16>; 2],
-    /// Phase that every label adds to that of order 0: G and IR.
+    /// Phase difference of G and IR between every label and order 0.
     rotations: [Rotations; 2],
     /// Greatest wrapped phase, in turns, that the last order may have.
     last_turn: f64,
@@ -24,7 +24,7 @@ pub(super) struct CostTable {
     count: usize,
 }
 
-/// Cosine and sine of an angle for every label, and those of twice the angle.
+/// Cosine and sine of an angle and of twice the angle, for every label.
 #[derive(Debug, Clone)]
 struct Rotations {
     cos: Vec<f32>,
@@ -63,12 +63,12 @@ impl CostTable {
         }
     }
 
-    /// Number of labels, padded to whole vectors.
+    /// Number of labels including padding to whole vectors.
     pub fn count(&self) -> usize {
         self.count
     }
 
-    /// Cost of every label of a node: the mean of the costs by its beats and by its cosines.
+    /// Cost of every label of a node: the mean of the cost by beats and the cost by cosines.
     pub fn costs(&self, node: &NodeEvidence, out: &mut [i16]) {
         if !node.lit {
             out.fill(0);
@@ -77,7 +77,7 @@ impl CostTable {
         let phase = f64::from(node.phase);
         let predicted = self.ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
         let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
-        // Without usable pixels all labels have the same cost by cosines, 0.
+        // Without usable pixels, the cost by cosines is 0 for all labels.
         let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
         costs(beats, cosines, self, out);
@@ -92,7 +92,7 @@ impl CostTable {
     }
 }
 
-/// Cosines of a node; `scale` brings a sum of squared differences to the unit of the costs.
+/// Cosines of a node. `scale` converts a sum of squared differences to the unit of the costs.
 #[derive(Clone, Copy)]
 struct Cosines<'a> {
     sums: &'a [CosineSums; 2],
@@ -100,7 +100,7 @@ struct Cosines<'a> {
     scale: f32,
 }
 
-/// `beats` are those observed less those predicted for order 0.
+/// Computes the costs of all labels. `beats` are the observed beats minus the beats predicted for order 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) {
     let blocks = out.len() / LANES;
@@ -130,7 +130,7 @@ fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) 
     }
 }
 
-/// Squared distance of two beats, 127 for 45 degrees or more.
+/// Squared difference of two beats. The difference is limited to 127, which is 45 degrees.
 #[inline(always)]
 fn beat_cost(observed: u16, predicted: u16) -> i16 {
     let error = (observed.wrapping_sub(predicted) as i16 >> 6).unsigned_abs();

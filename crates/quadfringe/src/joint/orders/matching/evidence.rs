@@ -1,19 +1,20 @@
-//! The evidence of one node, before the costs of its neighbours are added.
+//! The evidence of one node, without the costs of its neighbours.
 
 use super::sweep::Node;
 
-/// Evidence of one node; angles in turns, 65536 to a turn.
+/// Evidence of one node. The unit of angles is 1/65536 turn.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::joint) struct NodeEvidence {
     /// Wrapped phase of the first fringe number.
     pub phase: u16,
-    /// Beats of G and IR against it, from the window of the local fit: little noise, blurred at discontinuities.
+    /// Beats of G and IR with the first phase, from the window of the local fit. They have little noise but are blurred
+    /// at discontinuities.
     pub beats: [u16; 2],
-    /// Cosines of G and IR that the pixels of the node observe: noisy, sharp.
+    /// Cosines of G and IR that the pixels of the node observe. They are noisy but sharp.
     pub cosines: [CosineSums; 2],
     /// Number of pixels in these sums.
     pub pixels: f32,
-    /// Whether there is light to judge by.
+    /// Whether the node is lit.
     pub lit: bool,
 }
 
@@ -29,12 +30,12 @@ pub(in crate::joint) struct CosineSums {
 }
 
 impl NodeEvidence {
-    /// An angle in turns, 65536 to a turn.
+    /// Converts an angle from rad to units of 1/65536 turn.
     pub fn turns(angle_rad: f32) -> u16 {
         (angle_rad * (65536.0 / std::f32::consts::TAU)).round() as i32 as u16
     }
 
-    /// The part of it that the sweeps use.
+    /// The part of the evidence that the sweeps use.
     pub(super) fn node(&self) -> Node {
         Node { phase: self.phase, lit: self.lit }
     }

@@ -1,10 +1,10 @@
 //! Step 4: fringe orders by semi-global matching (S4).
 //!
 //! Every order of a node predicts the beats of G and IR against R and B, and the cosines that the pixels of the node observe in G
-//! and IR. Half the disagreement of the beats and half that of the cosines is the cost of the order; both are truncated, so that
-//! one wrong beat near a discontinuity cannot outweigh the neighbourhood. Costs are summed along rows and columns as in semi-global
-//! matching (Hirschmueller, IEEE TPAMI 30, 328 (2008)), with one change: where the wrapped phase jumps by a turn the order changes
-//! for free, and only a change of surface has a price.
+//! and IR. The cost of the order is half the disagreement of the beats plus half the disagreement of the cosines. Both are
+//! truncated, so that one wrong beat near a discontinuity cannot outweigh the neighbourhood. Costs are summed along rows and
+//! columns as in semi-global matching (Hirschmueller, IEEE TPAMI 30, 328 (2008)), with one change: where the wrapped phase jumps
+//! by a turn, the order changes without cost; only a change of surface has a price.
 
 mod costs;
 mod evidence;
@@ -20,7 +20,7 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use sweep::{LANES, Node, Path, across, sweep_back, sweep_on};
 
-/// The matching of a shot: orders of its nodes, and how certain they are.
+/// The matching of a shot: the orders of its nodes, and their certainty.
 #[derive(Debug, Clone)]
 pub(super) struct Matching {
     table: CostTable,
@@ -31,9 +31,9 @@ pub(super) struct Matching {
     sums: Vec<u16>,
     /// Order of every node.
     pub order: Vec<i16>,
-    /// Cost of the second cheapest order less that of the cheapest, in units of the price of a change of surface.
+    /// Cost of the second cheapest order minus cost of the cheapest, in units of the jump price.
     pub lead: Vec<f32>,
-    /// Cost that the evidence of the node gives the chosen order, in [0, 1] of the greatest.
+    /// Cost of the chosen order by the evidence of the node alone, as a share of the greatest cost, in [0, 1].
     pub order_cost: Vec<f32>,
 }
 
@@ -51,13 +51,13 @@ impl Matching {
         }
     }
 
-    /// Whether there is light to judge a node by.
+    /// Whether a node is lit.
     pub fn is_lit(&self, node: usize) -> bool {
         self.nodes[node].lit
     }
 
-    /// Choose the orders of `rows` x `columns` nodes; `evidence` appends the evidence of a row of them. A change of surface costs
-    /// as much as `jump_nodes` contradicting nodes in a row; a change by one order costs half of that.
+    /// Chooses the orders of `rows` x `columns` nodes. `evidence` appends the evidence of a row of nodes. A change of surface
+    /// costs as much as `jump_nodes` contradicting nodes in a row, a change by one order half as much.
     pub fn choose(
         &mut self,
         [rows, columns]: [usize; 2],
@@ -142,7 +142,7 @@ impl Matching {
     }
 }
 
-/// The label with the least sum of costs, and how far the next is behind.
+/// The label with the least sum of costs, and the distance to the second least sum.
 #[derive(Debug, Clone, Copy)]
 struct Cheapest {
     label: usize,
@@ -178,7 +178,7 @@ mod tests {
     const COLUMNS: usize = 96;
     const ROWS: usize = 64;
 
-    /// A node that sees projector column `u`, with the beats of a perfect shot and one pixel in it.
+    /// A node with a single pixel that sees projector column `u`, with the beats of a perfect shot.
     fn node(code: &FourChannel, u: f64) -> NodeEvidence {
         let [n1, n2, n3] = code.numbers();
         let turns = |n: f64| ((n * u / code.projector_width as f64) * 65536.0).round() as i64 as u16;
@@ -244,7 +244,7 @@ mod tests {
     #[test]
     fn dark_nodes_pass_no_costs_on() {
         let code = FourChannel::of(Encoding::optimum(36, 912));
-        // Beyond the dark lies another surface, ten orders on.
+        // Beyond the dark nodes lies another surface, ten orders higher.
         let column = |x: usize| 101.37 + 4.0 * x as f64 + if x >= 44 { 10.0 * code.period_px() } else { 0.0 };
         let found =
             choose(&code, |x, _| NodeEvidence { lit: !(40..44).contains(&x), ..node(&code, column(x)) });

@@ -2,23 +2,24 @@
 
 use multiversion::multiversion;
 
-/// Labels are padded to whole vectors.
+/// Number of labels in a vector. Labels are padded to whole vectors.
 pub(super) const LANES: usize = 16;
-/// Cost of a label outside the field: more than any sum of costs along a path, and no overflow when a price is added.
+/// Cost of a label outside the field. It is more than any sum of costs along a path, and does not overflow when a price
+/// is added.
 pub(super) const IMPOSSIBLE: i16 = 16000;
-/// Room before and after the labels, so that shifted reads stay inside.
+/// Padding before and after the labels, so that shifted reads stay inside the memory.
 const PAD: usize = 8;
 
-/// A node as the sweeps see it.
+/// The data of a node that the sweeps need.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Node {
-    /// Wrapped phase of the first fringe number, 65536 to a turn.
+    /// Wrapped phase of the first fringe number in units of 1/65536 turn.
     pub phase: u16,
-    /// Whether there is light to judge by; an unlit node ends all paths.
+    /// Whether the node is lit. An unlit node ends all paths.
     pub lit: bool,
 }
 
-/// Aggregated costs of the last node of one path.
+/// One path, with the aggregated costs of its last node.
 pub(super) struct Path {
     previous: Vec<i16>,
     current: Vec<i16>,
@@ -27,9 +28,9 @@ pub(super) struct Path {
     /// Whether the path starts here.
     fresh: bool,
     labels: usize,
-    /// Price of a change of surface by any number of orders.
+    /// Price of a change by any number of orders.
     jump: i16,
-    /// Price of one by a single order.
+    /// Price of a change by one order.
     step: i16,
 }
 
@@ -55,7 +56,7 @@ impl Path {
         self.previous[PAD..PAD + self.labels].fill(0);
     }
 
-    /// Goes on to one node; its aggregated costs start the sums, or are added to them.
+    /// Advances to the next node. Its aggregated costs are added to the sums, or written to them if `starts_sums`.
     #[inline(always)]
     fn advance(&mut self, node: Node, costs: &[i16], sums: &mut [u16], starts_sums: bool) {
         if !node.lit {
@@ -67,7 +68,8 @@ impl Path {
             }
             return;
         }
-        // A wrapped phase that jumps up by more than half a turn has come from the order above.
+        // If the wrapped phase jumps up by more than half a turn, the surface continues in the order below; label n
+        // continues the label n + 1 of the last node.
         let shift = match i32::from(node.phase) - i32::from(self.phase) {
             _ if self.fresh => 0,
             32769.. => 1,
@@ -79,7 +81,8 @@ impl Path {
         std::mem::swap(&mut self.previous, &mut self.current);
     }
 
-    /// Costs of the node plus the cheapest way to each label from those of the last node, whose labels lie `shift` further.
+    /// Adds to the costs of the node the cheapest way from the last node to each label. Label n continues the label n +
+    /// `shift` of the last node.
     #[inline(always)]
     fn aggregate(&mut self, shift: isize, costs: &[i16], sums: &mut [u16], starts_sums: bool) {
         let at = (PAD as isize + shift) as usize;
@@ -107,7 +110,7 @@ impl Path {
     }
 }
 
-/// Along a row; the sums start here.
+/// Sweeps a row forwards. This sweep starts the sums.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn sweep_on(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &mut [u16]) {
     let labels = path.labels;
@@ -117,7 +120,7 @@ pub(super) fn sweep_on(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &mu
     }
 }
 
-/// Back along a row.
+/// Sweeps a row backwards.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn sweep_back(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &mut [u16]) {
     let labels = path.labels;
@@ -127,7 +130,7 @@ pub(super) fn sweep_back(path: &mut Path, nodes: &[Node], costs: &[i16], sums: &
     }
 }
 
-/// One row further, for paths down columns next to each other.
+/// Advances the paths of adjacent columns by one row.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn across(paths: &mut [Path], nodes: &[Node], costs: &[i16], sums: &mut [u16]) {
     for (x, (path, &node)) in paths.iter_mut().zip(nodes).enumerate() {
