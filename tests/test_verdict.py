@@ -11,6 +11,7 @@ import pytest
 from support.bars import hold
 
 import quadfringe as qf
+from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.errors import DecodeError
 
 METHODS = ("joint", "published")
@@ -107,3 +108,23 @@ def test_a_patch_of_glare_is_no_data_and_the_rest_stays(sound: qf.Shot) -> None:
     shape = qf.decode(changed(sound, glare), plan("joint"))
     assert not shape.returned[100:200, 100:300].any()
     hold("demo.mixed_returned", shape.returned.mean())
+
+
+def test_rows_of_an_image_have_the_calibration_of_the_whole() -> None:
+    """The verdict decodes bands of rows; the camera and the infrared chip then have another origin."""
+    chips = ((1.001, 0.002, 1.5), (-0.003, 0.998, -2.0))
+    with qf.open(qf.SystemConfig(scene=qf.SceneConfig(surface="face", infrared_from_visible=chips))) as scanner:
+        shot, calibration = scanner.grab(), scanner.calibration
+    assert isinstance(shot, qf.Shot)
+    first, rows = 192, np.s_[192:288]
+    whole = KernelDecoder(shot.ir.shape, 255.0, qf.Plan(912, calibration=calibration, decode={"method": "published"}))
+    part = whole.for_rows(first, 96)
+    band = qf.Shot(*(image[rows] for image in shot.channels.values()))
+    points_mm, expected_mm = part.shape(band).xyz_mm, whole.shape(shot).xyz_mm
+    assert points_mm is not None
+    assert expected_mm is not None
+    assert np.nanmedian(np.abs(points_mm - expected_mm[rows])) < 5e-4
+    assert part.plan.calibration is not None
+    place = np.array((500.0, 250.0, 1.0))
+    seen = np.array(part.plan.calibration.ir_registration) @ (place - (0, first, 0))
+    np.testing.assert_allclose(seen, np.array(chips) @ place - (0, first), atol=1e-9)

@@ -11,7 +11,7 @@ import numpy as np
 
 from quadfringe import _core
 from quadfringe.config import Response, brief
-from quadfringe.data import AnyShot, BayerShot, Shape, Shot, conditioning, core_device
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, Shot, conditioning, core_device
 from quadfringe.decoding.plan import Plan
 from quadfringe.errors import InputError
 
@@ -61,6 +61,12 @@ class KernelDecoder:
         """Give a decoder of the same plan by another method."""
         decode = self.plan.decode.model_copy(update={"method": method})
         return KernelDecoder(self._size, self._full_scale, replace(self.plan, decode=decode))
+
+    def for_rows(self, first: int, count: int) -> KernelDecoder:
+        """Give a decoder of the same plan for some rows of the images."""
+        calibration = self.plan.calibration
+        known = calibration if calibration is None else _of_rows(calibration, first, count)
+        return KernelDecoder((count, self._size[1]), self._full_scale, replace(self.plan, calibration=known))
 
     def shape(self, shot: AnyShot) -> Shape:
         """Give the shape of a shot of this size."""
@@ -143,6 +149,17 @@ def _check_size(size: Size, plan: Plan) -> None:
             f"the calibration's projector has {projector.width_px} columns, "
             f"projector_width_px is {plan.projector_width_px}; the two must agree"
         )
+
+
+def _of_rows(calibration: Calibration, first: int, count: int) -> Calibration:
+    """Give the calibration of a camera that sees some rows only: its rows count from the first of them."""
+    column, row = calibration.camera.centre_px
+    camera = calibration.camera.model_copy(update={"height_px": count, "centre_px": (column, row - first)})
+    registration = calibration.ir_registration
+    if registration is not None:
+        (xx, xy, x), (yx, yy, y) = registration
+        registration = ((xx, xy, x + xy * first), (yx, yy, y + (yy - 1) * first))
+    return calibration.model_copy(update={"camera": camera, "ir_registration": registration})
 
 
 def _geometry(plan: Plan) -> dict[str, Any]:

@@ -59,7 +59,7 @@ class Decoder:
     def decode(self, shot: AnyShot) -> Shape:
         """Give the shape; raises `DecodeError` when its orders cannot be trusted, naming the likely cause.
 
-        A shot whose orders are doubtful is decoded up to six times more, to find out whether channels are exchanged.
+        A shot whose orders are doubtful is decoded with channels exchanged too, in part or as a whole, to name them.
         Raises `InputError` for a shot of another size or full scale.
         """
         self._check(shot)
@@ -94,7 +94,7 @@ class Decoder:
 
 
 def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot) -> Shape:
-    judge(shape, shot, kernel.shape)
+    judge(shape, shot, kernel)
     return shape
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from itertools import combinations
 from typing import get_args
@@ -11,6 +10,7 @@ import numpy as np
 
 from quadfringe.config import BayerPattern
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot
+from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.errors import DecodeError
 
 __all__ = ["judge", "order_margin"]
@@ -27,14 +27,19 @@ COLLAPSED = {"joint": 0.55, "published": 0.35}
 DOUBTFUL = 0.6
 CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged
 
-Decode = Callable[[AnyShot], Shape]
+# A band of rows shows which exchanges can explain a doubtful shot: the share of the rows, and their least number.
+BAND_SHARE, BAND_ROWS_MIN = 1 / 8, 96
+# Margin in the band, as a share of the margin at which channels count as exchanged, from which the whole image is
+# decoded. On scenes of the virtual bench, clean, noisy, textured, with gamma 2.2 and with a raw mosaic, the right
+# channels have at least 0.65 (joint) and 0.92 (published) of their margin in the whole image.
+NEAR = {"joint": 0.6, "published": 0.85}
 
 
-def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
+def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
     """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
 
-    When the median margin is below 0.6, `again` decodes the shot with each pair of channels exchanged, or as each other
-    Bayer pattern, to name them; with None that check is left out.
+    When the median margin is below 0.6, `decoder` decodes the shot with each pair of channels exchanged, or as each
+    other Bayer pattern, to name them; with None that check is left out.
     """
     margin, lit, returned = _margin(shape)
     collapsed = COLLAPSED[shape.config["decode"]["method"]]
@@ -48,8 +53,8 @@ def judge(shape: Shape, shot: AnyShot, again: Decode | None) -> None:
             "no shape: no pixel carries fringes in all channels; check focus and exposure, "
             "and that every channel is given once"
         )
-    if again is not None:
-        _refuse_exchanged(shot, margin, max(collapsed, CLEARLY_BETTER * margin), again)
+    if decoder is not None:
+        _refuse_exchanged(shape, shot, max(collapsed, CLEARLY_BETTER * margin), decoder)
     if not enough or margin < collapsed:
         raise DecodeError(
             f"no shape: the order margin has collapsed: below {margin:.2f} of 1 for half of the lit "
@@ -84,14 +89,38 @@ def _blind_channels(shot: AnyShot) -> list[str]:
     return found
 
 
-def _refuse_exchanged(shot: AnyShot, margin: float, least: float, again: Decode) -> None:
+def _refuse_exchanged(shape: Shape, shot: AnyShot, least: float, decoder: KernelDecoder) -> None:
     """Raise `DecodeError` if exchanging channels raises the median margin above `least`."""
-    found = {words: _margin(again(other))[0] for words, other in _suspects(shot).items()}
-    best = max(found, key=lambda words: found[words])
-    if found[best] > least:
+    suspects = _plausible(_suspects(shot), shape, least, decoder)
+    found = {words: _margin(decoder.shape(other))[0] for words, other in suspects.items()}
+    best = max(found, key=lambda words: found[words], default="")
+    if best and found[best] > least:
         raise DecodeError(
-            f"no shape: {best}: the median order margin is {margin:.2f} as given and {found[best]:.2f} if so"
+            f"no shape: {best}: the median order margin is {_margin(shape)[0]:.2f} as given and {found[best]:.2f} if so"
         )
+
+
+def _plausible(suspects: dict[str, AnyShot], shape: Shape, least: float, decoder: KernelDecoder) -> dict[str, AnyShot]:
+    """Give the suspects whose margin comes near to `least` in a band of rows, which takes a fraction of the time."""
+    lit = np.isfinite(shape.quality).sum(axis=1)
+    count = max(BAND_ROWS_MIN, 2 * round(BAND_SHARE * lit.size / 2))
+    if 2 * count > lit.size:
+        return suspects
+    # The band with most light, from an even row, because a mosaic repeats after two.
+    first = 2 * (int(np.convolve(lit, np.ones(count), "valid").argmax()) // 2)
+    part, near = decoder.for_rows(first, count), NEAR[decoder.settings["method"]] * least
+    return {
+        words: other
+        for words, other in suspects.items()
+        if _margin(part.shape(_rows_of(other, first, count)))[0] >= near
+    }
+
+
+def _rows_of(shot: AnyShot, first: int, count: int) -> AnyShot:
+    images = {name: image[first : first + count] for name, image in shot.images.items()}
+    if isinstance(shot, BayerShot):
+        return BayerShot(images["raw"], shot.bayer, images["ir"], shot.full_scale)
+    return Shot(images["red"], images["green"], images["blue"], images["ir"], shot.full_scale)
 
 
 def _suspects(shot: AnyShot) -> dict[str, AnyShot]:
