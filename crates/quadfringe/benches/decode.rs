@@ -1,6 +1,7 @@
-//! Times of the whole of both methods and of each stage, on one shot of the virtual bench: 1024 x 768, 8 bit, 3 %
-//! noise. With them the floor: the transforms and memory traffic that every Fourier decoder needs. The ratios to it are
-//! taken in turns and printed at the end, so that they hold on a busy machine too.
+//! Times of both methods and of each stage, on one shot of the virtual bench: 1024 x 768, 8 bit, 3 % noise. They are
+//! compared with the floor, which is the time of the transforms and memory traffic that every Fourier decoder needs.
+//! For the ratios, which are printed at the end, methods and floor run alternately, so that the ratios are right also
+//! on a busy machine.
 //!
 //! ```text
 //! cargo bench -p quadfringe                      everything
@@ -50,7 +51,7 @@ impl Scene {
         [self.planes[0].nrows(), self.planes[0].ncols()]
     }
 
-    /// Maps of the size of the scene.
+    /// Makes maps with the size of the scene.
     fn maps(&self) -> Result<Decoded> {
         self.decoder(Method::published())?.decode(&self.shot()?)
     }
@@ -66,8 +67,8 @@ impl Scene {
     }
 }
 
-/// What no Fourier decoder does without: every row of two channels forward and back through the transform, every byte
-/// of a shot read and every byte of its maps written once.
+/// The work that every Fourier decoder must do: transform every row of two channels forward and back, read every byte
+/// of a shot, and write every byte of its maps once.
 struct Floor {
     forward: Arc<dyn RealToComplex<f32>>,
     inverse: Arc<dyn ComplexToReal<f32>>,
@@ -131,7 +132,7 @@ fn floor(c: &mut Criterion) {
     group.finish();
 }
 
-/// Each method against the floor and against itself on one thread: the least of many turns.
+/// Ratios of each method to the floor, and to itself on one thread, from the least times of many runs.
 fn ratios(_: &mut Criterion) {
     const TURNS: usize = 40;
     let scene = Scene::new().expect("the reference bench renders");
@@ -171,7 +172,7 @@ fn milliseconds(work: impl FnOnce()) -> f64 {
     1e3 * start.elapsed().as_secs_f64()
 }
 
-/// From bytes to phase, order, quality and X, Y, Z, into maps made before.
+/// Times of whole shots, from bytes to phase, order, quality and X, Y, Z, written into existing maps.
 fn whole_shots(c: &mut Criterion) {
     let scene = Scene::new().expect("the reference bench renders");
     let mut group = c.benchmark_group("shot");

@@ -1,8 +1,9 @@
-//! The floor under a decoder that filters two channels along rows, with both methods, on one shot: 1024 x 768, 8 bit.
+//! Times of both methods and of the floor, on one shot of 1024 x 768, 8 bit. The floor is a lower bound for the time of
+//! a decoder that filters two channels along rows.
 //!
-//! The floor reads every byte of the four images, takes two channels forward (real) and back (complex: the analytic
-//! signal that a phase needs) by Fourier transforms along rows, and writes as many bytes as a decoded shot has, eight
-//! `f32` for each pixel. It decodes nothing. It and both methods write into maps made before.
+//! The floor reads every byte of the four images, transforms two channels along rows forward (real) and back (complex,
+//! because a phase needs the analytic signal), and writes as many bytes as a decoded shot has: eight `f32` for each
+//! pixel. It decodes nothing. Floor and methods write into existing maps.
 //!
 //! ```text
 //! cargo bench -p quadfringe --bench floor                medians of 30 rounds in ms, as JSON
@@ -27,7 +28,7 @@ use std::time::{Duration, Instant};
 type Outcome<T> = std::result::Result<T, Box<dyn Error>>;
 
 const ROUNDS: usize = 30;
-/// Systems take some time to give threads that slept a core each.
+/// Warm-up before timing: an operating system needs some time to give each woken thread its core.
 const WARM: Duration = Duration::from_millis(100);
 const FLOATS_PER_PIXEL: usize = 8;
 const NAMES: [&str; 3] = ["floor", "published", "joint"];
@@ -40,7 +41,7 @@ struct Floor {
     out: Vec<f32>,
 }
 
-/// What one thread needs for a row.
+/// Working memory of one thread for a row.
 struct Scratch {
     real: Vec<f32>,
     half: Vec<Complex32>,
@@ -132,7 +133,7 @@ impl Contenders {
         Ok(Self { floor: Floor::new(rows, columns), planes, methods })
     }
 
-    /// Time of one run in ms, after some that are not timed.
+    /// Time of one run in ms, after some runs that are not timed.
     fn time_ms(&mut self, name: &str) -> Outcome<f64> {
         let start = Instant::now();
         while start.elapsed() < WARM {
@@ -182,7 +183,7 @@ fn serve(contenders: &mut Contenders) -> Outcome<()> {
 }
 
 fn main() -> Outcome<()> {
-    // Cargo itself adds --bench.
+    // Cargo adds the argument --bench.
     let given: Vec<_> = std::env::args().skip(1).filter(|argument| argument != "--bench").collect();
     let mut contenders = Contenders::new()?;
     match given.iter().map(String::as_str).collect::<Vec<_>>()[..] {

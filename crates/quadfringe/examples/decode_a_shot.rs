@@ -1,4 +1,4 @@
-//! Simulate one shot of the steps, decode it, and compare the depth with the truth.
+//! Simulates one shot of the scene of steps, decodes it, and compares the depth with the truth.
 //!
 //! `cargo run --release --example decode_a_shot [scene]`
 
@@ -12,14 +12,14 @@ use std::time::Instant;
 fn main() -> Result<(), Box<dyn Error>> {
     let name = std::env::args().nth(1).unwrap_or_else(|| "steps".into());
 
-    // The forward half: what a camera would see.
+    // The forward half renders the images that a camera would take.
     let bench = Bench::reference();
     let encoding = Encoding::optimum(36, bench.visible.width)?;
     let cast = bench.cast(scene(&name, 0.0)?.as_ref());
     let render = RenderOptions { noise: 0.03, seed: 1, ..RenderOptions::default() };
     let images = bench.render(&cast, &Light::shot(&encoding)?, &render)?.into_u8()?;
 
-    // The inverse half: planned once, then run for every shot.
+    // The inverse half is planned once and then decodes every shot.
     let (rows, columns) = images[0].dim();
     let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
     let mut decoder = Decoder::builder(&encoding, [rows, columns]).triangulator(triangulator).build()?;

@@ -1,8 +1,8 @@
-//! Decode a stream: a camera that does not wait, one decoder, and maps that every shot uses again.
+//! Decodes a stream: the camera does not wait for the single decoder, and all shots share the same maps.
 //!
-//! The camera of this example is the virtual bench before a moving hand, thirty times a second. It sends every shot
-//! through a channel that holds one, and drops a shot that finds the channel full, as a driver would: the decoder works
-//! on a fresh shot and never falls behind. From the second shot on decoding allocates nothing.
+//! The camera of this example is the virtual bench, which films a moving hand thirty times a second. It sends every
+//! shot through a channel with room for one shot. Like a driver, it drops a shot if the channel is full, so the decoder
+//! works on a recent shot and never falls behind. From the second shot on, decoding allocates no memory.
 //!
 //! `cargo run --release --example decode_a_stream [shots]`
 
@@ -18,7 +18,7 @@ use std::time::{Duration, Instant};
 
 const FRAME: Duration = Duration::from_millis(33);
 
-/// One delivery of the camera: four images and the instant of their exposure.
+/// One exposure of the camera: four images and the instant of the exposure.
 struct Frame {
     images: [Array2<u8>; 4],
     time_s: f64,
@@ -30,7 +30,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     bench.camera = Device::pinhole(512, 384, [1290.3; 2], [255.5, 191.5])?;
     let encoding = Encoding::optimum(36, bench.visible.width)?;
 
-    // Planned and checked once.
+    // The decoder is planned and checked once.
     let shape = [bench.camera.height, bench.camera.width];
     let triangulator = Triangulator::new(&bench.camera, &bench.visible)?;
     let mut decoder = Decoder::builder(&encoding, shape).triangulator(triangulator).build()?;
@@ -44,7 +44,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-/// Decode until the camera stops.
+/// Decodes shots until the camera stops.
 fn follow(decoder: &mut Decoder, frames: &Receiver<Frame>) -> quadfringe::Result<()> {
     let mut maps = Decoded::default();
     for Frame { images, time_s } in frames {
@@ -64,7 +64,7 @@ fn follow(decoder: &mut Decoder, frames: &Receiver<Frame>) -> quadfringe::Result
     Ok(())
 }
 
-/// Send shots at the frame rate; returns the number of shots that the decoder had no time for.
+/// Sends shots at the frame rate. Returns the number of shots that were dropped because the decoder had no time.
 fn film(
     bench: &Bench,
     encoding: &Encoding,

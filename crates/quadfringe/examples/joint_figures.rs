@@ -1,5 +1,5 @@
-//! Figures of the joint method on six shots of the virtual bench, for a change of one of its numbers: change it in
-//! `src/joint/params`, run this before and after, and compare.
+//! Figures of the joint method on six shots of the virtual bench. To see the effect of a tuned number, run this before
+//! and after you change the number in `src/joint/params`, and compare.
 //!
 //! ```text
 //! cargo run --release --example joint_figures
@@ -12,10 +12,10 @@ use quadfringe::surface::scene;
 use quadfringe::{Decoded, Decoder, Encoding, Result, Shot};
 use std::f64::consts::PI;
 
-/// Pixels of a fringe of the reference bench: farther than this from edges a surface is smooth.
+/// Width in pixels of a fringe of the reference bench. A pixel that is further than this from edges counts as smooth.
 const FRINGE_PX: f32 = 28.0;
 
-/// Name, surface, and how the shot is rendered.
+/// Name, surface and render options of each shot.
 fn shots() -> [(&'static str, &'static str, RenderOptions); 6] {
     let noisy = |seed| RenderOptions { noise: 0.03, seed, ..RenderOptions::default() };
     let clean = RenderOptions { bit_depth: BitDepth::Sixteen, ..RenderOptions::default() };
@@ -42,7 +42,7 @@ fn decode(bench: &Bench, encoding: &Encoding, planes: &Planes) -> Result<Decoded
     }
 }
 
-/// A root mean square as it grows.
+/// Accumulator of a root mean square.
 #[derive(Default)]
 struct Rms {
     sum: f64,
@@ -60,7 +60,7 @@ impl Rms {
     }
 }
 
-/// One line of figures.
+/// Prints one line of figures.
 fn report(name: &str, decoded: &Decoded, cast: &Cast, encoding: &Encoding) {
     let (truth, edge, depth): (Array2<f32>, _, _) =
         (cast.phase_rad(encoding), cast.edge_distance_px(), cast.depth_mm());

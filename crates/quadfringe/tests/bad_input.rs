@@ -1,4 +1,4 @@
-//! Bad input is an error that says what was expected, what came and what to do; bad light is no data.
+//! Bad input causes an error that says what was expected, what came and what to do. Bad light causes no data.
 
 mod common;
 

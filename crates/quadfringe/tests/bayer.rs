@@ -1,4 +1,5 @@
-//! Shots of a Bayer chip against shots with all colours at every pixel, and registered infrared against aligned.
+//! Compares shots of a Bayer chip with shots that have all colours at every pixel, and a registered infrared image with
+//! an aligned one.
 
 mod common;
 
@@ -8,19 +9,21 @@ use quadfringe::rig::{Bench, BitDepth, Cast, Demosaic, RenderOptions};
 use quadfringe::{Conditioner, Decoded, Error, Method, Response, Shot};
 use std::f32::consts::PI;
 
-/// One fringe of the reference bench in camera pixels.
+/// Width of a fringe of the reference bench in camera pixels.
 const FRINGE_PX: f32 = 28.0;
-/// Offset of the infrared chip from the visible one: parts of a pixel, a turn by a quarter of a degree, a scale.
+/// Misalignment of the infrared chip: a shift by parts of a pixel, a rotation by a quarter of a degree, and a scale.
 const MISALIGNED: [[f64; 3]; 2] = [[1.002, -0.0044, 0.37], [0.0044, 1.002, -1.62]];
 
 fn mosaic(plain: &RenderOptions) -> RenderOptions {
     RenderOptions { bayer: Some(BAYER), ..plain.clone() }
 }
 
-/// Pixels at the rim of the image that the infrared chip of [`MISALIGNED`] does not see: five and a half at most.
+/// Width of the rim of the image that an infrared chip with the misalignment [`MISALIGNED`] does not see; it is five
+/// and a half pixels at most.
 const UNSEEN_PX: usize = 6;
 
-/// Phase RMS (rad) over right pixels a fringe away from edges and from the rim of what both chips see.
+/// Phase RMS (rad) over the pixels with the right order that are at least a fringe away from edges and from the rim of
+/// the area that both chips see.
 fn inner_phase_rms_rad(decoded: &Decoded, cast: &Cast) -> f64 {
     let (truth, edge) = (cast.phase_rad(&code()), cast.edge_distance_px());
     let (rows, columns) = truth.dim();
@@ -37,15 +40,16 @@ fn found(bench: &Bench, cast: &Cast, render: &RenderOptions, method: &Method) ->
     score(&there_and_back(bench, cast, &code(), render, method), cast, &code(), FRINGE_PX)
 }
 
-/// The same scene with all colours everywhere, from the raw mosaic, and from planes that the camera interpolated.
+/// Scores of a scene from all colours at every pixel, from the raw mosaic, and from planes that the camera
+/// interpolated.
 fn three_ways(bench: &Bench, cast: &Cast, plain: &RenderOptions, method: &Method) -> [Score; 3] {
     let raw = mosaic(plain);
     let bilinear = RenderOptions { demosaic: Some(Demosaic::Bilinear), ..raw.clone() };
     [plain, &raw, &bilinear].map(|render| found(bench, cast, render, method))
 }
 
-/// Without noise a mosaic is as good as full sampling, and the mean of neighbours is not; the best method does not suffer from
-/// it, because all but its last step works on means of pixels.
+/// Without noise a mosaic is as good as full sampling, and bilinear interpolation is not. The joint method hardly suffers from
+/// bilinear interpolation, because all but its last step work on means of pixels.
 #[test]
 fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
     let bench = bench(1);
@@ -60,7 +64,8 @@ fn a_mosaic_keeps_the_phase_that_bilinear_planes_lose() {
     }
 }
 
-/// At edges two colours in three are a mixture of both sides: no order is lost, and a shadow may be a pixel too small.
+/// At edges, two of three colours are interpolated from both sides. No order may be lost by this, and a shadow may be a
+/// pixel too small.
 #[test]
 fn a_mosaic_loses_no_orders_at_edges() {
     let bench = bench(1);
@@ -70,7 +75,7 @@ fn a_mosaic_loses_no_orders_at_edges() {
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
     assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
-    // A pixel next to every shadow is left out, into which light is interpolated: five in a thousand.
+    // Next to every shadow one pixel is left out, because light is interpolated into it: five pixels in a thousand.
     assert!(raw.returned_share() > full.returned_share() - 5e-3, "{raw:?}");
 }
 
@@ -87,8 +92,8 @@ fn a_noisy_mosaic_leaves_a_tenth_of_a_millimetre() {
     }
 }
 
-/// Response and dark level are undone before samples are mixed, crosstalk after: then a mosaic of a camera with all of
-/// them is as good as one without.
+/// Response and dark level are corrected before samples are mixed, crosstalk after. With this order, a mosaic of a
+/// camera that has all of these effects is as good as one without them.
 #[test]
 fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
     let bench = bench(1);
@@ -121,7 +126,7 @@ fn dark_level_response_crosstalk_and_registration_are_undone_in_a_mosaic() {
     }
 }
 
-/// A registered infrared image is worth as much as one that was aligned.
+/// A registered infrared image is as good as an aligned one.
 #[test]
 fn registration_costs_neither_phase_nor_orders() {
     let bench = bench(1);
@@ -142,7 +147,7 @@ fn registration_costs_neither_phase_nor_orders() {
         println!("{name} {method:?} {rms:?}\n{aligned:?}\n{registered:?}");
         // Or so little that noise of a thousandth of full scale would hide it.
         assert!(rms[1] < (1.1 * rms[0]).max(2e-3), "{rms:?}");
-        // The published filter runs along whole rows, and errs near pixels that the infrared chip does not see.
+        // The published filter runs along whole rows, and has errors near pixels that the infrared chip does not see.
         assert!(
             registered.wrong_orders() <= aligned.wrong_orders() + registered.lit / 20_000,
             "{registered:?}"

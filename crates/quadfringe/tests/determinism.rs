@@ -1,4 +1,4 @@
-//! The same bits for any number of threads, and for a decoder that has decoded other shots before.
+//! Results are bit-identical for any number of threads, and for a decoder that has decoded other shots before.
 
 mod common;
 
@@ -22,7 +22,7 @@ fn bits(decoded: &Decoded) -> Vec<u32> {
     values.map(|v| v.to_bits()).collect()
 }
 
-/// Squares of random albedo, on which the joint method estimates an albedo for every pixel.
+/// Options with squares of random albedo, for which the joint method estimates an albedo for every pixel.
 fn printed() -> RenderOptions {
     RenderOptions { albedo: Albedo::Patches { side_mm: 20.0, albedo: [0.9; 4] }, ..noisy(5) }
 }
@@ -67,7 +67,7 @@ fn a_shot_leaves_nothing_behind() {
     }
 }
 
-/// Decoders work in the memory of the maps that they are given, and rows of planes are longer than those of images.
+/// Decoders use the memory of the given maps as working memory, and rows of planes are longer than rows of images.
 #[test]
 fn maps_may_hold_anything() {
     for (width, height, options) in [(333, 250, noisy(5)), (500, 375, printed()), (810, 300, noisy(5))] {

@@ -1,4 +1,4 @@
-//! The virtual bench against what it must be.
+//! Compares the virtual bench with known results.
 
 use ndarray::{Array2, Array3};
 use quadfringe::encoding::{Channel, DmdLayout, Encoding, pattern};
@@ -36,7 +36,7 @@ fn worst(a: &Array2<f32>, b: &Array2<f32>) -> f32 {
     a.iter().zip(b).fold(0.0, |worst, (a, b)| worst.max((a - b).abs()))
 }
 
-/// Section 5 of the method: identical camera and projector capture what was projected.
+/// If camera and projector are identical, the camera captures the projected image.
 #[test]
 fn identical_camera_and_projector_capture_the_projected_image() {
     let focal = 12.0 / 4.65e-3;
@@ -126,7 +126,7 @@ fn options_do_what_they_say() {
     assert!(shaded[0] > 0.9 && shaded[0] < 0.99);
 }
 
-/// Seen through a shift by whole pixels, the infrared image is the same one elsewhere, and the others stay.
+/// If the infrared chip is shifted by whole pixels, the infrared image is shifted, and the other images do not change.
 #[test]
 fn the_infrared_chip_has_rays_of_its_own() {
     let bench = small(Bench::reference(), 16);

@@ -1,4 +1,4 @@
-//! The virtual bench and triangulation over random rigs and surfaces.
+//! Checks the virtual bench and triangulation for random rigs and surfaces.
 
 mod common;
 
@@ -96,7 +96,7 @@ proptest! {
                 continue;
             }
             lit += 1;
-            // Columns are float32: half a unit in the last place is 3e-5 columns, some 1e-4 mm.
+            // Columns are float32. Half a unit in the last place is 3e-5 columns, or some 1e-4 mm.
             let error = (0..3).fold(0f64, |e, axis| e.max((point[axis] - hit.xyz_mm[axis]).abs()));
             prop_assert!(error < 1e-3, "{at:?} {error} {point:?} {:?}", hit.xyz_mm);
         }

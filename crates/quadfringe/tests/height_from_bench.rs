@@ -1,4 +1,4 @@
-//! Phase to millimetres against simulated benches.
+//! Compares heights and depths from phase with simulated benches.
 
 use ndarray::{Array2, Axis};
 use quadfringe::Encoding;
@@ -7,8 +7,8 @@ use quadfringe::optics::{Device, rotation_from_vector};
 use quadfringe::rig::{Bench, Projector};
 use quadfringe::surface::Plane;
 
-/// Camera straight down on the plane z = L0; projector `d` to its left at the same height, its axis through the foot of
-/// the camera axis, so that columns grow away from the projector.
+/// The camera looks straight down on the plane z = L0. The projector stands `d` to its left at the same height, and its
+/// axis meets the camera axis in that plane, so that columns increase away from the projector.
 fn crossed_axes_bench(distance_mm: f64, baseline_mm: f64) -> Bench {
     let camera = Device::pinhole(160, 120, [400.0; 2], [79.5, 59.5]).expect("valid camera");
     let angle = baseline_mm.atan2(distance_mm);
@@ -25,7 +25,7 @@ fn analytic_geometry_agrees_with_a_ray_cast_of_its_layout() {
     let (distance_mm, baseline_mm, fringes) = (800.0, 230.0, 36.0);
     let bench = crossed_axes_bench(distance_mm, baseline_mm);
     let code = Encoding::optimum(36, 912).expect("a valid encoding");
-    // Period on the plane normal to the projector axis, at the distance of the crossing.
+    // Fringe period on the plane that is normal to the projector axis where the axes cross.
     let period_mm = 912.0 / fringes / 1570.0 * distance_mm.hypot(baseline_mm);
     let layout = CrossedAxes::new(distance_mm, baseline_mm, period_mm).expect("valid layout");
     let reference = bench.cast(&Plane::at_z(distance_mm));
@@ -67,7 +67,7 @@ fn polynomial_from_planes_measures_a_plane_between_them() {
     assert!(measured.iter().filter(|h| h.is_finite()).count() > 10_000);
 }
 
-/// With strong distortion of both lenses, from 150 mm before to 150 mm behind the reference plane.
+/// Checks both lenses with strong distortion, from 150 mm in front of the reference plane to 150 mm behind it.
 #[test]
 fn triangulation_is_exact_over_depth_with_both_distortions() {
     let mut bench = crossed_axes_bench(800.0, 230.0);
@@ -87,7 +87,8 @@ fn triangulation_is_exact_over_depth_with_both_distortions() {
     assert!(worst > 0.0 && worst < 1e-3, "{worst} mm");
 }
 
-/// Depth in mm at which the projector sees the ray of a camera pixel in `column`, by secants in double precision.
+/// Depth in mm at which the ray of a camera pixel meets the sheet of light of `column`, by the secant method in double
+/// precision.
 fn depth_mm(bench: &Bench, pixel: [f64; 2], column: f32) -> f64 {
     let ray = bench.camera.ray(pixel);
     let miss = |z_mm: f64| bench.visible.project(ray.at(z_mm)).expect("in front")[0] - f64::from(column);

@@ -1,4 +1,4 @@
-//! Colours shown one after another before a surface that moves: shots of the virtual bench, fixed seeds.
+//! Colours are projected one after another on a moving surface: shots of the virtual bench with fixed seeds.
 
 mod common;
 
@@ -10,10 +10,11 @@ use std::f32::consts::PI;
 
 /// R, G and B share a frame of 60 Hz; infrared is lit throughout.
 const INSTANTS_US: [f32; 4] = [-5556.0, 0.0, 5556.0, 0.0];
-/// Pixels of a fringe of the reference bench.
+/// Width of a fringe of the reference bench in pixels.
 const FRINGE_PX: usize = 28;
 
-/// A shot with 3 % noise of a surface that stands somewhere else at each of the three instants, and what the middle one sees.
+/// Renders a shot with 3 % noise of a surface that has a different position at each of the three instants. Returns the images
+/// and the cast of the middle instant.
 fn film<S: Surface>(bench: &Bench, at: impl Fn(f64) -> S) -> (Planes, Cast) {
     let instants = [0, 1, 2].map(|c| f64::from(INSTANTS_US[c]) * 1e-6);
     let casts = instants.map(|time_s| bench.cast(&at(time_s)));
@@ -31,8 +32,8 @@ fn decode(bench: &Bench, planes: &Planes, channel_instants_us: Option<[f32; 4]>)
     decode_planes(&mut decoder(bench, options), planes).expect("a valid shot")
 }
 
-/// RMS of the phase in rad over right orders a fringe away from edges and border; share of pixels with light that come back,
-/// and of these the share with a wrong order.
+/// Returns the RMS of the phase in rad over pixels with the right order at least a fringe away from edges and border; the
+/// share of lit pixels that are returned; and the share of these that have a wrong order.
 fn errors(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
     let (truth, edge) = (cast.phase_rad(&code()), cast.edge_distance_px());
     let (rows, columns) = truth.dim();
@@ -51,7 +52,7 @@ fn errors(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
     [(sum / f64::max(count, 1.0)).sqrt(), returned / lit, wrong / f64::max(returned, 1.0)]
 }
 
-/// Errors without and with the instants.
+/// Errors without and with the channel instants.
 fn before_and_after<S: Surface>(name: &str, at: impl Fn(f64) -> S) -> [[f64; 3]; 2] {
     let bench = bench(1);
     let (planes, truth) = film(&bench, at);
@@ -71,7 +72,7 @@ fn the_ripple_of_a_moving_plane_goes() {
     for speed_mm_per_s in [50.0, 100.0, 200.0, 300.0] {
         let name = format!("plane, {speed_mm_per_s} mm/s");
         let [before, after] = before_and_after(&name, |t| Plane::at_z(790.0 + speed_mm_per_s * t));
-        // 3 % noise alone has 0.005 rad.
+        // 3 % noise alone causes an error of 0.005 rad.
         assert!(after[0] < 0.008 + 0.2 * before[0], "{name}: {before:?} {after:?}");
         assert!(after[1] > 0.97 && after[2] == 0.0, "{name}: {after:?}");
     }
@@ -79,7 +80,7 @@ fn the_ripple_of_a_moving_plane_goes() {
 
 #[test]
 fn a_moving_hand_is_brought_to_one_instant() {
-    // As fast as the hand of the bench moves, and three times as fast.
+    // The hand of the bench at its speed and at three times its speed.
     for faster in [1.0, 3.0] {
         let name = format!("hand, {faster} times as fast");
         let [before, after] =
@@ -91,7 +92,8 @@ fn a_moving_hand_is_brought_to_one_instant() {
 
 #[test]
 fn what_moves_too_fast_is_no_data() {
-    // B has turned against R by a fifth of a fringe, where they hardly differ: some pixels are not seen to be too fast.
+    // B has shifted against R by a fifth of a fringe, so that the two hardly differ. Some pixels are therefore not
+    // recognised as too fast.
     let [before, after] = before_and_after("plane, 600 mm/s", |t| Plane::at_z(790.0 + 600.0 * t));
     assert!(after[1] < 0.25 && after[2] < 0.03, "{before:?} {after:?}");
 }

@@ -1,4 +1,4 @@
-//! A pair of projectors that is not coaxial, decoded with both calibrated.
+//! Decodes shots of two projectors that are calibrated and not coaxial.
 
 mod common;
 
@@ -13,7 +13,8 @@ use std::sync::Arc;
 
 const DEPTHS_MM: [f64; 5] = [700.0, 750.0, 800.0, 850.0, 900.0];
 
-/// The reference bench with lenses that distort, each in its own way, and 1 degree and 0.5 mm on every axis.
+/// The reference bench with a different lens distortion for each device, and with projectors that deviate by 1 degree
+/// and 0.5 mm on every axis.
 fn apart(shrink: usize, layout: DmdLayout) -> Bench {
     let reference = Bench { ..Bench::reference_with(layout) };
     let lens = |device: quadfringe::Device, k| device.with_distortion(k).expect("finite");
@@ -53,17 +54,19 @@ fn decode(
     decode_planes(&mut builder.build()?, &planes)
 }
 
-/// A fringe of the infrared light in pixels of the largest image here: nearer to a border of light the row filter leaks.
+/// Width of an infrared fringe in pixels of the largest image here. Nearer to a border of light, the row filter has
+/// errors.
 const BORDER_PX: usize = 17;
 
-/// Lit, returned and wrong pixels, of those that both projectors light, away from borders of light.
+/// Number of lit, returned and wrong pixels, among the pixels that both projectors light, away from borders of light.
 fn counts(decoded: &Decoded, cast: &Cast) -> (usize, usize, usize) {
     let (truth, lit) = (cast.phase_rad(&code()), cast.column_px(Projector::Infrared));
     let columns = truth.ncols();
     let whole = |(at, (t, ir)): (usize, (&f32, &f32))| {
         let x = at % columns;
         let inside = x >= BORDER_PX && x + BORDER_PX < columns && t.is_finite() && ir.is_finite();
-        // Lit by both a fringe to the left and to the right, along the row that is filtered.
+        // Both projectors must light the row for a fringe to the left and to the right, because the filter runs along
+        // the row.
         let row = lit.row(at / columns);
         inside && row[x - BORDER_PX].is_finite() && row[x + BORDER_PX].is_finite()
     };
@@ -77,7 +80,7 @@ fn counts(decoded: &Decoded, cast: &Cast) -> (usize, usize, usize) {
     (both().count(), returned.count(), wrong.count())
 }
 
-/// Plain or pre-deformed, in both layouts, the table knows the infrared phase at every depth.
+/// The table gives the infrared phase at every depth, for plain and pre-deformed patterns and for both layouts.
 #[test]
 fn the_table_knows_the_infrared_phase() {
     let four = code().four_channel_view().expect("four channels");
@@ -138,7 +141,7 @@ fn steps_and_noise_are_no_harder_than_for_one_projector() {
     assert!(wrong <= 1.05 * wrong_alone && returned >= 0.97 * returned_alone, "{shares:?}");
 }
 
-/// The published correction and the search together: the table knows what a pre-deformed image shows.
+/// The published correction and the search can be combined, because the table includes the pre-deformation.
 #[test]
 fn a_predeformed_image_is_read_both_ways() {
     let bench = apart(4, DmdLayout::Diamond);

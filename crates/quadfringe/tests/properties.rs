@@ -1,4 +1,4 @@
-//! What must hold for any code, any phase, any exposure, any rig.
+//! Properties that must hold for any encoding, phase, exposure and rig.
 
 mod common;
 
@@ -13,7 +13,7 @@ use quadfringe::stages::{Absolute, Phases};
 use quadfringe::{Channel, Decoder, Device, DmdLayout, Encoding, Method, Shot, stages};
 use std::f64::consts::TAU;
 
-/// Fringe codes for a projector of 912 columns, whole numbers and others.
+/// Encodings for a projector of 912 columns, with fringe numbers that are integers and others that are not.
 fn any_code() -> impl Strategy<Value = Encoding> {
     let triples = vec![
         [36.0, 35.0, 30.0],
@@ -29,7 +29,7 @@ fn wrap(angle: f64) -> f64 {
     angle - TAU * (angle / TAU).round()
 }
 
-/// The images that a camera sees which sees the projector's columns one to one: a + b * pattern, and a shift of a.
+/// Images of a camera that sees the projector columns one to one: `offset + scale * pattern`.
 fn one_to_one(code: &Encoding, rows: usize, offset: f32, scale: f32) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
         let size_px = [code.projector_width(), rows];
@@ -47,8 +47,8 @@ fn joint(code: &Encoding, images: [Array2<f32>; 4]) -> quadfringe::Decoded {
 proptest! {
     #![proptest_config(common::cases(64))]
 
-    /// wrap(unwrap(phi)) = phi for any three wrapped phases, and the truth itself for three that belong together: away
-    /// from the borders of the field, where an error of the beat turns it over.
+    /// For any three wrapped phases, wrap(unwrap(phi)) = phi. For three phases of one column, unwrap(phi) is the true
+    /// phase, except near the borders of the field, where an error of the beat can wrap it around.
     #[test]
     fn unwrapping_adds_whole_turns_only(
         code in any_code(),
@@ -81,7 +81,8 @@ proptest! {
         }
     }
 
-    /// Equal steps give phase, background and modulation back; an offset shifts the background alone.
+    /// N-step phase shifting returns phase, background and modulation of the fringes. An offset changes only the
+    /// background.
     #[test]
     fn an_offset_shifts_the_background_alone(
         steps in 3..17usize,
@@ -105,7 +106,7 @@ proptest! {
 proptest! {
     #![proptest_config(common::cases(12))]
 
-    /// More room light or another exposure leaves the phase as it is.
+    /// More room light or another exposure does not change the phase.
     #[test]
     fn exposure_and_room_light_leave_the_phase(
         offset in 0.0..0.25f32,
@@ -127,7 +128,8 @@ proptest! {
 }
 
 prop_compose! {
-    /// A projector 9 to 17 degrees beside the camera that lights the whole field through some lens.
+    /// A bench with a projector 9 to 17 degrees to the side of the camera, which lights the whole field through a lens
+    /// with random distortion.
     fn any_bench()(
         angle_deg in 9.0..17.0f64,
         side in prop::bool::ANY,
@@ -168,7 +170,7 @@ proptest! {
     ) {
         let cast = cast_scene(&bench, name);
         let render = RenderOptions { noise, seed, bit_depth: BitDepth::Twelve, ..RenderOptions::default() };
-        // Twelve bits come in 16-bit words.
+        // Twelve-bit images are stored in 16-bit words.
         let lights = Light::shot(&code).expect("four channels");
         let planes = bench.render(&cast, &lights, &render).expect("valid scene");
         let Planes::U16(images) = &planes else { panic!("12 bit") };
@@ -188,7 +190,7 @@ proptest! {
     }
 }
 
-/// The published way in one random rig, so that both stay whole.
+/// The published method in one random rig, so that both methods are tested.
 #[test]
 fn the_published_way_holds_on_a_small_bench() {
     let bench = common::bench(2);

@@ -1,4 +1,4 @@
-//! The response that a shot shows by itself: found for any object, and nothing found where there is none.
+//! The response estimated from a shot: it is found for any object, and no response is found in linear light.
 
 mod common;
 
@@ -29,7 +29,8 @@ fn captured(planes: &Planes) -> [Array2<f32>; 4] {
     linearise(&shot, &Conditioner::default()).expect("a valid shot")
 }
 
-/// Decode and estimate in turn, `rounds` times: the decoded shot of the last round, and what it was decoded with.
+/// Decodes and estimates alternately, `rounds` times. Returns the decoded shot of the last round and the response with
+/// which it was decoded.
 fn straightened(bench: &Bench, planes: &Planes, rounds: usize) -> (Decoded, [Response; 4]) {
     let light = captured(planes);
     let mut response = [Response::default(); 4];
@@ -51,7 +52,7 @@ fn render(bench: &Bench, cast: &Cast, options: &RenderOptions) -> Planes {
     bench.render(cast, &Light::shot(&code()).expect("four channels"), options).expect("a valid scene")
 }
 
-/// Nearly all of the phase error goes and no pixels are lost, with steps, curves and 3 % noise.
+/// The estimate removes nearly all of the phase error and loses no pixels, with steps, curves and 3 % noise.
 #[test]
 fn a_gamma_is_found_and_undone() {
     let bench = bench(2);
@@ -61,25 +62,25 @@ fn a_gamma_is_found_and_undone() {
         let bent = score(&decode(&bench, &planes, [Response::default(); 4]), &cast, &code(), FRINGE_PX);
         let (decoded, response) = straightened(&bench, &planes, 7);
         let straight = score(&decoded, &cast, &code(), FRINGE_PX);
-        // Room light on the albedo of the bench is not bent.
+        // Room light, times the albedo of the bench, does not pass the projector, so it is an offset.
         let offset = 0.9 * RenderOptions::default().ambient[0] as f32;
         let truth = Response { offset, exponent: 1.0 / gamma as f32, ..Response::default() };
         let known = score(&decode(&bench, &planes, [truth; 4]), &cast, &code(), FRINGE_PX);
         println!("{name} {gamma}: {response:?}\n{bent:?}\n{straight:?}\n{known:?}");
-        // As good as with the response that the light has in truth, and what is left beyond that is little of what was there.
+        // The result must be as good as with the true response, and only a small part of the additional error may remain.
         assert!(straight.phase_rms_rad < 1.05 * known.phase_rms_rad, "{name}: {straight:?} {known:?}");
         let excess =
             |score: Score| (score.phase_rms_rad.powi(2) - known.phase_rms_rad.powi(2)).max(0.0).sqrt();
         assert!(excess(straight) < 0.25 * excess(bent), "{name}: {bent:?} {straight:?} {known:?}");
         assert!(straight.returned_share() > bent.returned_share() - 1e-3, "{name}: {bent:?} {straight:?}");
         for exponent in response.map(|channel| f64::from(channel.exponent)) {
-            // A lower offset makes up for a lower exponent.
+            // A lower offset compensates a lower exponent.
             assert!((exponent * gamma - 1.0).abs() < 0.2, "{name}: {exponent}");
         }
     }
 }
 
-/// A camera with a gamma bends ambient light too: nothing but an exponent is left to find.
+/// The gamma of a camera acts on ambient light too, so there is only an exponent to find, and no offset.
 #[test]
 fn the_gamma_of_a_camera_is_found_exactly() {
     let bench = bench(2);
@@ -94,7 +95,7 @@ fn the_gamma_of_a_camera_is_found_exactly() {
     }
 }
 
-/// Channels with a response of their own are told apart from those that share one.
+/// A channel with a different response is distinguished from the channels that share one.
 #[test]
 fn channels_may_differ() {
     let bench = bench(2);
@@ -109,7 +110,7 @@ fn channels_may_differ() {
     }
 }
 
-/// Linear light stays as it is: whatever the surface, its print, its shadows, its noise, and light of other channels.
+/// Linear light is left unchanged for any surface, print, shadows, noise, and light from other channels.
 #[test]
 fn nothing_is_found_in_linear_light() {
     let bench = bench(2);

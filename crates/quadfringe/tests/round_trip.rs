@@ -1,14 +1,14 @@
-//! decode(simulate(h)) gives h back: the bars of the first whole chain, through the public API alone.
+//! decode(simulate(h)) must return h: the bars of the whole chain, through the public API alone.
 
 mod common;
 
 use common::{bench, cast_scene, clean, code, noisy, score, there_and_back};
 use quadfringe::Method;
 
-/// One fringe of the reference bench in camera pixels.
+/// Width of a fringe of the reference bench in camera pixels.
 const FRINGE_PX: f32 = 28.0;
-/// Share of returned pixels whose order may be wrong without noise: a few near edges where R and B see the same phase
-/// on both sides, and a few that the lens blurs into a shadow, out of 780 thousand.
+/// Share of returned pixels whose order may be wrong without noise. Of 780 thousand pixels these are a few near edges
+/// where R and B have the same phase on both sides, and a few where lens blur spreads light into a shadow.
 const WRONG_MAX: f64 = 2e-5;
 
 #[test]

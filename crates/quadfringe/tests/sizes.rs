@@ -1,4 +1,4 @@
-//! Images of any size with fringes of any width: the image that guides has one pixel for one, four or sixteen.
+//! Images of any size with fringes of any width. The coarse level has one pixel for one, four or sixteen pixels.
 
 mod common;
 
@@ -9,12 +9,13 @@ use quadfringe::rig::Planes;
 use quadfringe::{Channel, Decoder, DmdLayout, Encoding, Method, Options};
 use std::f64::consts::TAU;
 
-/// What a camera sees that sees the projector's columns one to one, but those from `step` on `shift` columns further.
+/// Images of a camera that sees the projector columns one to one, except that from column `step` on it sees `shift`
+/// columns further.
 fn images(code: &Encoding, shape: [usize; 2], step: usize, shift: usize) -> [Array2<f32>; 4] {
     seen(code, shape, move |_, x| (if x < step { x } else { x + shift }) as f64)
 }
 
-/// What a camera sees whose pixel `(y, x)` looks at column `source(y, x)`.
+/// Images of a camera whose pixel `(y, x)` sees column `source(y, x)`.
 fn seen(code: &Encoding, shape: [usize; 2], source: impl Fn(usize, usize) -> f64) -> [Array2<f32>; 4] {
     Channel::ALL.map(|channel| {
         let image = pattern(&code.channels()[channel.index()], [912, 1], DmdLayout::Regular);
@@ -27,8 +28,8 @@ fn seen(code: &Encoding, shape: [usize; 2], source: impl Fn(usize, usize) -> f64
     })
 }
 
-/// Decode what is `seen` by both methods; every pixel more than `border` from the sides must have its column. Near the border, less than
-/// a fringe determines the background.
+/// Decodes the images of [`seen`] by both methods. Every pixel that is more than `border` from the left and right sides must have
+/// its column. Near the border, less than a fringe determines the background, so larger errors are allowed.
 fn columns_come_back(
     numbers: [f64; 3],
     shape: [usize; 2],
@@ -58,7 +59,7 @@ fn columns_come_back(
 
 #[test]
 fn every_size_and_period_gives_every_pixel_its_column() {
-    // Fringes of 14, 29 and 59 pixels; sizes that no factor divides.
+    // Fringes of 14, 29 and 59 pixels, and sizes that are not multiples of a factor of the pyramid.
     for numbers in [[64.0, 63.0, 56.0], [31.0, 30.0, 26.0], [15.5, 14.5, 12.0]] {
         let code = Encoding::four_channel(numbers, 912).expect("valid");
         for shape in [[97, 601], [130, 643], [163, 702]] {
@@ -70,7 +71,8 @@ fn every_size_and_period_gives_every_pixel_its_column() {
             for ((_, x), phase) in phase.indexed_iter().filter(|(_, phase)| phase.is_finite()) {
                 let column = if x < step { x } else { x + shift };
                 let error = f64::from(*phase) - TAU * numbers[0] * column as f64 / 912.0;
-                // A fringe from the sides; next to the step, pixels of both sides are averaged.
+                // Inside means a fringe away from the sides. Next to the step, pixels of both of its sides are
+                // averaged.
                 let inside = usize::from(x.min(shape[1] - 1 - x) as f64 > 912.0 / numbers[0]);
                 let weight = if x.abs_diff(step) > 8 { 1.0 } else { 0.1 };
                 worst[inside] = worst[inside].max(weight * error.abs());
@@ -86,7 +88,7 @@ fn every_size_and_period_gives_every_pixel_its_column() {
     }
 }
 
-/// Cameras of many pixels see fringes of a hundred and more.
+/// Cameras with many pixels see fringes that are a hundred pixels wide and more.
 #[test]
 fn wide_fringes_give_every_pixel_its_column() {
     // Fringes of 118, 177, 235 and 353 pixels.
@@ -95,8 +97,8 @@ fn wide_fringes_give_every_pixel_its_column() {
     }
 }
 
-/// A camera turned about its axis, or a slope down the rows: the means that the published method takes over rows must not lose the
-/// order where the phase of neighbouring rows differs.
+/// With a camera that is rotated about its axis, or a surface that slopes down the rows, neighbouring rows have different phases.
+/// The means of the published method over rows must not lose the order then.
 #[test]
 fn inclined_fringes_give_every_pixel_its_column() {
     for (slope, first) in [(-1.0, 140.0), (0.5, 10.0), (2.0, 10.0)] {

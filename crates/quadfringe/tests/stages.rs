@@ -1,4 +1,4 @@
-//! The public stages, composed by hand, give the bits of the published decoder.
+//! The public stages, composed by hand, give results that are bit-identical to those of the published decoder.
 
 mod common;
 
@@ -26,7 +26,7 @@ struct Maps {
     blocks: Blocks,
 }
 
-/// Means over blocks less their background, and the background.
+/// Means over blocks minus their background, and the background.
 struct Means {
     fringes: Array2<f32>,
     level: Array2<f32>,
@@ -38,7 +38,7 @@ fn means(image: &Array2<f32>, rows: usize, columns: usize, period_px: f64) -> Re
     Ok(Means { fringes: means - &level, level })
 }
 
-/// The recipe of `published/mod.rs` with the steps in functions of this test.
+/// The recipe of `published/mod.rs`, with its steps in functions of this test.
 fn by_hand(light: [Array2<f32>; 4], code: &Encoding, table: Option<&PairTable>) -> Result<Maps> {
     let [red, green, blue, infrared] = light;
     let (height, width) = red.dim();
@@ -114,12 +114,12 @@ fn light_of(planes: &Planes, conditioner: &Conditioner) -> Result<[Array2<f32>; 
     }
 }
 
-/// NaN equals NaN, whatever its bits.
+/// Bits of a map for comparison, where all NaN are equal.
 fn bits(map: &Array2<f32>) -> Array2<u32> {
     map.mapv(|value| if value.is_nan() { f32::NAN.to_bits() } else { value.to_bits() })
 }
 
-/// Decode both ways and compare every map; returns the blocks and the number of pixels with data.
+/// Decodes in both ways and compares every map. Returns the size of the blocks and the number of pixels with data.
 fn compare(
     name: &str,
     planes: &Planes,
@@ -191,7 +191,7 @@ fn stages_give_the_bits_of_the_decoder_with_a_calibration() {
         .with_response(response(1.1))
         .with_crosstalk(crosstalk)
         .with_projector_response(response(0.8))
-        // Part of the image lies beyond the infrared chip.
+        // The infrared chip does not see part of the image.
         .with_ir_registration([[1.001, 0.002, 3.4], [-0.002, 0.999, -2.3]]);
     for (depth, scene) in [(BitDepth::Eight, "face"), (BitDepth::Twelve, "steps"), (BitDepth::Float, "hand")]
     {

@@ -1,4 +1,5 @@
-//! Is the uncertainty that comes with a shape the error that it has? Shots of the virtual bench at full size, fixed seeds.
+//! Compares the stated uncertainty of a shape with its errors, on shots of the virtual bench at full size with fixed
+//! seeds.
 
 mod common;
 
@@ -7,7 +8,8 @@ use quadfringe::rig::{Albedo, Bench, Cast, Light, RenderOptions};
 use quadfringe::{Decoded, Method, Options};
 use std::f32::consts::PI;
 
-/// A fringe of the reference bench: smooth parts are farther than this from edges and from the border.
+/// Width of a fringe of the reference bench in pixels. Smooth parts are further than this from edges and from the
+/// border.
 const FRINGE_PX: usize = 28;
 
 /// Noise, albedo and room light, as shares of full scale.
@@ -32,7 +34,7 @@ fn decode(
     decode_planes(&mut decoder(bench, options), &planes).expect("a valid shot")
 }
 
-/// Shares of the errors of smooth parts inside one, two and three standard deviations, of the depth.
+/// Shares of the depth errors in smooth parts that lie inside one, two and three standard deviations.
 fn inside(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
     let (truth, depth, edge) = (cast.phase_rad(&code()), cast.depth_mm(), cast.edge_distance_px());
     let xyz = decoded.xyz_mm.as_ref().expect("calibrated");
@@ -51,10 +53,10 @@ fn inside(decoded: &Decoded, cast: &Cast) -> [f64; 3] {
     shares.map(|share| share / count)
 }
 
-/// Shares of normal errors.
+/// These shares for normally distributed errors.
 const NORMAL: [f64; 3] = [0.683, 0.954, 0.997];
 
-/// Whether every share keeps within a tolerance, below and above, of those of normal errors.
+/// Asserts that every share is within tolerances, `below` and `above`, of the share of normal errors.
 fn hold_shares(method: &Method, surfaces: &[&str], below: [f64; 3], above: [f64; 3]) {
     let bench = bench(1);
     let mut off = Vec::new();
@@ -74,12 +76,14 @@ fn hold_shares(method: &Method, surfaces: &[&str], below: [f64; 3], above: [f64;
 
 #[test]
 fn errors_of_the_joint_method_are_as_large_as_it_says() {
-    // With little noise the error of the method dominates: below the uncertainty on a plane, above it near the shadows of steps.
+    // With little noise the error of the method dominates. It is smaller than the uncertainty on a plane, and larger near the
+    // shadows of steps.
     let surfaces = ["plane", "peaks", "steps", "sphere"];
     hold_shares(&Method::joint(), &surfaces, [0.04, 0.04, 0.03], [0.11, 0.035, 0.003]);
 }
 
-/// Features smaller than the window are smoothed away by all four channels alike, which none of them can tell.
+/// Features that are smaller than the window are smoothed in all four channels alike, so no disagreement of channels
+/// shows it.
 #[test]
 fn errors_on_small_features_are_little_larger_than_it_says() {
     hold_shares(&Method::joint(), &["face"], [0.06, 0.1, 0.08], [0.04, 0.02, 0.003]);
@@ -90,13 +94,13 @@ fn errors_of_the_published_method_are_as_large_as_it_says() {
     hold_shares(&Method::published(), &["plane", "peaks"], [0.04, 0.025, 0.01], [0.04, 0.025, 0.003]);
 }
 
-/// What the probabilities of a shot promise, before quality decides.
+/// Observed and promised numbers of wrong orders of a shot, without a limit on quality.
 #[derive(Default)]
 struct Promise {
     returned: f64,
     wrong: f64,
     promised: f64,
-    /// Pixels that are said to be right by 99 in 100, and how many of them are wrong.
+    /// Number of pixels with a wrong-order probability below 1 %, and (`surely_wrong`) how many of them are wrong.
     sure: f64,
     surely_wrong: f64,
 }
@@ -108,7 +112,7 @@ impl Promise {
         let returned = decoded.phase_rad.indexed_iter().filter(|(_, phase)| phase.is_finite());
         for (at, phase) in returned {
             let probability = f64::from(decoded.wrong_order_probability[at]);
-            // In shadow there is no right order.
+            // In shadow the truth is NaN, so a pixel there does not count as wrong.
             let wrong = f64::from(u8::from((phase - truth[at]).abs() >= PI));
             found.returned += 1.0;
             found.wrong += wrong;
@@ -141,7 +145,7 @@ fn wrong_orders_of_the_joint_method_are_not_more_than_promised() {
         for light in [LIGHTS[0], LIGHTS[1], LIGHTS[2]] {
             let found = promise(&Method::joint(), name, light);
             assert!(found.wrong <= found.promised, "{name} {light:?}");
-            // A bound that says something: few pixels are doubtful, and the others are right.
+            // The bound must also be useful: few pixels are doubtful, and the others are right.
             assert!(found.promised < 0.006 * found.returned, "{name} {light:?}");
             assert!(found.sure > 0.94 * found.returned, "{name} {light:?}");
             assert!(found.surely_wrong <= 1e-5 * found.sure, "{name} {light:?}");

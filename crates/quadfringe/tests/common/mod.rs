@@ -1,4 +1,4 @@
-//! A shot on the virtual bench and its decoding, scored against the truth.
+//! Helpers that render a shot on the virtual bench, decode it, and compare it with the truth.
 
 #![allow(dead_code)] // each test uses its part
 
@@ -12,10 +12,10 @@ use quadfringe::{
 };
 use std::f32::consts::PI;
 
-/// The pattern of the mosaics that are tested.
+/// The Bayer pattern of all mosaics in these tests.
 pub const BAYER: BayerPattern = BayerPattern::Grbg;
 
-/// So many random cases, the same in every run.
+/// Settings for `count` random cases, which are the same in every run.
 pub fn cases(count: u32) -> ProptestConfig {
     ProptestConfig {
         cases: count,
@@ -26,7 +26,7 @@ pub fn cases(count: u32) -> ProptestConfig {
     }
 }
 
-/// The reference bench with a camera of fewer pixels over the same field.
+/// The reference bench, whose camera has the same field but fewer pixels by the factor `shrink` along a side.
 pub fn bench(shrink: usize) -> Bench {
     let whole = Bench::reference();
     let (width, height) = (whole.camera.width / shrink, whole.camera.height / shrink);
@@ -36,12 +36,12 @@ pub fn bench(shrink: usize) -> Bench {
     Bench { camera, ..whole }
 }
 
-/// Without noise and nearly without rounding.
+/// Options for images without noise and nearly without rounding.
 pub fn clean() -> RenderOptions {
     RenderOptions { bit_depth: BitDepth::Sixteen, ..RenderOptions::default() }
 }
 
-/// As hard as the published test: Gaussian noise of 3 % of full scale, then 8 bit.
+/// Options as in the published test: Gaussian noise of 3 % of full scale, then rounding to 8 bit.
 pub fn noisy(seed: u64) -> RenderOptions {
     RenderOptions { noise: 0.03, seed, ..RenderOptions::default() }
 }
@@ -50,7 +50,7 @@ pub fn code() -> Encoding {
     Encoding::optimum(36, 912).expect("a valid encoding")
 }
 
-/// A decoder to millimetres for the camera of a bench.
+/// A decoder for the camera of a bench, calibrated to millimetres.
 pub fn decoder(bench: &Bench, options: Options) -> Decoder {
     let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
     let shape = [bench.camera.height, bench.camera.width];
@@ -63,7 +63,7 @@ pub fn bytes(planes: Planes) -> [Array2<u8>; 4] {
     planes.into_u8().expect("the default bit depth")
 }
 
-/// Decode what the bench rendered; a mosaic is taken as `BAYER`.
+/// Decodes images that the bench rendered. A mosaic must have the pattern `BAYER`.
 pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> {
     match planes {
         Planes::BayerU8([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
@@ -75,7 +75,7 @@ pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> 
     }
 }
 
-/// Render a cast scene and decode it to millimetres.
+/// Renders a cast scene and decodes it to millimetres.
 pub fn there_and_back(
     bench: &Bench,
     cast: &Cast,
@@ -86,7 +86,7 @@ pub fn there_and_back(
     there_and_back_by(bench, cast, code, render, method, &Conditioner::default())
 }
 
-/// The same with what a calibration knows of the intensities.
+/// As [`there_and_back`], with a conditioner.
 pub fn there_and_back_by(
     bench: &Bench,
     cast: &Cast,
@@ -112,22 +112,22 @@ pub fn cast_scene(bench: &Bench, name: &str) -> Cast {
     bench.cast(scene(name, 0.0).expect("known scene").as_ref())
 }
 
-/// What a decoded shot is worth.
+/// Score of a decoded shot.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Score {
     /// Lit pixels.
     pub lit: usize,
     /// Pixels returned, lit or not.
     pub returned: usize,
-    /// Of these, pixels with another order than the truth, or without any light.
+    /// Returned pixels whose order differs from the truth, or that have no light.
     pub wrong: usize,
-    /// Of these, pixels in shadow.
+    /// Returned pixels in shadow.
     pub in_shadow: usize,
-    /// Over right pixels away from edges.
+    /// Over the pixels with the right order away from edges.
     pub phase_rms_rad: f64,
-    /// Over right pixels away from edges.
+    /// Over the pixels with the right order away from edges.
     pub depth_rms_mm: f64,
-    /// How many those are.
+    /// Number of these pixels.
     pub smooth: usize,
 }
 
@@ -136,7 +136,7 @@ impl Score {
         self.wrong as f64 / self.returned.max(1) as f64
     }
 
-    /// Returned pixels that are lit, and have another order than the truth.
+    /// Returned lit pixels whose order differs from the truth.
     pub fn wrong_orders(&self) -> usize {
         self.wrong - self.in_shadow
     }
@@ -146,7 +146,7 @@ impl Score {
     }
 }
 
-/// Judge a decoded shot; smooth parts are more than `far_px` away from any edge.
+/// Compares a decoded shot with the truth. Smooth parts are more than `far_px` away from any edge.
 pub fn score(decoded: &Decoded, cast: &Cast, code: &Encoding, far_px: f32) -> Score {
     let (truth, edge) = (cast.phase_rad(code), cast.edge_distance_px());
     let (depth, shadow) = (cast.depth_mm(), cast.shadow());
