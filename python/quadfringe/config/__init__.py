@@ -22,7 +22,7 @@ from quadfringe.config.decode import (
 from quadfringe.config.devices import IDENTITY, Device, Pixels, Triple
 from quadfringe.config.projectors import FlashRoute, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.config.scene import Affine, BayerPattern, HeightMapConfig, Matrix4, SceneConfig, Surface
-from quadfringe.config.system import SystemConfig, load_system
+from quadfringe.config.system import SystemConfig, check_system, load_system
 
 __all__ = [
     "IDENTITY",
@@ -58,6 +58,7 @@ __all__ = [
     "VirtualConfig",
     "brief",
     "capture_config",
+    "check_system",
     "checked",
     "load_system",
     "shortened",

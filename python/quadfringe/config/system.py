@@ -17,6 +17,7 @@ from typing import Literal
 from pydantic import Field
 
 from quadfringe.config._base import Model, checked
+from quadfringe.config._brief import brief
 from quadfringe.config.cameras import AnyCapture, ReplayConfig, VirtualConfig
 from quadfringe.config.decode import DecodeConfig, Fringes
 from quadfringe.config.devices import Device
@@ -25,7 +26,7 @@ from quadfringe.config.scene import SceneConfig
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import read_bytes
 
-__all__ = ["SystemConfig", "load_system"]
+__all__ = ["SystemConfig", "check_system", "load_system"]
 
 FILE = "system.toml"
 
@@ -56,6 +57,13 @@ class SystemConfig(Model):
     fringes: Fringes = Field(default=Fringes(), description="Fringes that the projectors show.")
     scene: SceneConfig = Field(default=SceneConfig(), description="The scene of the virtual bench.")
     decode: DecodeConfig = Field(default=DecodeConfig(), description="How shots are decoded.")
+
+
+def check_system(config: object) -> None:
+    """Raise `InputError` unless these are the settings of a system, and say how to read them from a file."""
+    if not isinstance(config, SystemConfig):
+        advice = "; read a system file with qf.config.load_system" if isinstance(config, (str, Path)) else ""
+        raise InputError(f"config: expected a SystemConfig, such as qf.SystemConfig(), got {brief(config)}{advice}")
 
 
 def load_system(path: Path | str) -> SystemConfig:

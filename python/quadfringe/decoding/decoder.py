@@ -7,7 +7,7 @@ from threading import Lock
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
-from quadfringe.decoding.plan import Plan, stated_response
+from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened
 from quadfringe.decoding.verdict import judge
 from quadfringe.errors import InputError
@@ -39,8 +39,9 @@ class Decoder:
     """
 
     def __init__(self, like: AnyShot | Size, plan: Plan, *, full_scale: float | None = None) -> None:
-        self.plan = plan
         self._size, self._full_scale = size_of(like, full_scale)
+        check_plan(plan)
+        self.plan = plan
         self._kernel = KernelDecoder(self._size, self._full_scale, plan)
         self._known = stated_response(plan.response, plan.calibration) != "auto"
         self._tried = 0

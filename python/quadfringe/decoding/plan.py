@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from quadfringe import _core
-from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, checked, shortened
+from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, brief, checked, shortened
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.errors import InputError
 
-__all__ = ["Plan", "calibration_of", "response_of", "stated_response"]
+__all__ = ["Plan", "calibration_of", "check_plan", "response_of", "stated_response"]
 
 # Column coordinates are float32: up to 2^16 they are exact to 1/256 of a column. No projector has as many.
 COLUMNS_MAX = 65536
@@ -73,6 +73,19 @@ class Plan:
             "projector_width_px": self.projector_width_px,
             "fringes": self.fringes.model_dump(mode="json"),
         }
+
+
+def check_plan(plan: object) -> None:
+    """Raise `InputError` unless this is a plan, and say how to make one of what was given."""
+    if isinstance(plan, Plan):
+        return
+    given = "912"
+    if isinstance(plan, int):
+        given = f"{plan}"
+    for kinds, name in (((str, Path, Calibration), "calibration"), (Fringes, "fringes"), (DecodeConfig, "decode")):
+        if isinstance(plan, kinds):
+            given = f"912, {name}={brief(plan)}"
+    raise InputError(f"plan: expected a Plan, such as qf.Plan({given}), got {brief(plan)}")
 
 
 def _columns(width: Any) -> int:

@@ -7,7 +7,7 @@ from typing import Literal
 from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, check_shot, size_of
-from quadfringe.decoding.plan import Plan, stated_response
+from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.stages import response_of_shot
 from quadfringe.decoding.verdict import order_margin
 from quadfringe.errors import InputError
@@ -48,6 +48,7 @@ def estimate_response(shot: AnyShot, plan: Plan) -> Response | Literal["linear"]
     >>> decoder = qf.Decoder(shot, replace(plan, response=response))
     """
     check_shot(shot)
+    check_plan(plan)
     if stated_response(plan.response, plan.calibration) != "auto":
         raise InputError('this plan has a response, from `response` or its calibration; make one with response="auto"')
     return decode_straightened(KernelDecoder(*size_of(shot, None), plan), shot)[0].response

@@ -21,6 +21,7 @@ True
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -46,8 +47,10 @@ from quadfringe._core import (
     unwrap,
     wrong_order_probability,
 )
-from quadfringe.config import ChannelResponse, Fringes, Response, ResponseChoice
+from quadfringe.config import ChannelResponse, Fringes, Response, ResponseChoice, brief
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
+from quadfringe.data._checks import check_maps
+from quadfringe.decoding._kernel import check_shot
 from quadfringe.decoding.plan import calibration_of, response_of, stated_response
 from quadfringe.errors import DecodeError, InputError
 
@@ -78,6 +81,7 @@ __all__ = [
 
 Map = NDArray[np.float32]
 FringeNumbers = tuple[float, float, float]
+CHANNELS = ("red", "green", "blue", "ir")
 
 
 class Wrapped(NamedTuple):
@@ -124,8 +128,9 @@ def linear_light(
     - "auto", as in a `Plan`: the response that the calibration states. Where a `Plan` would estimate it, `InputError`.
 
     IR is NaN where its chip does not see the point. The colours of a raw mosaic are interpolated at every pixel from
-    linear samples. Raises `InputError` for arguments that are no calibration or response, or cannot be read.
+    linear samples. Raises `InputError` for arguments that are no shot, calibration or response, or cannot be read.
     """
+    check_shot(shot)
     calibration = calibration_of(calibration)
     known = conditioning(calibration, "auto" if response == "calibration" else _known(response, calibration))
     if isinstance(shot, BayerShot):
@@ -169,9 +174,11 @@ def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
 def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     """Give the phases and the modulation of linear light by name, each (H, W) float32 (S2, S3).
 
-    The fringe period comes from the red image. Raises `DecodeError` when no fringes cross the rows.
+    The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes cross
+    the rows.
     """
     first, second, third = _three(fringe_numbers)
+    _check_light(light)
     red, blue = light["red"], light["blue"]
     period_px = row_period(red)
     if not np.isfinite(carrier(red)[0]):
@@ -212,6 +219,8 @@ def order(
 
     With `rays`, a table of two calibrated projectors, orders are searched along the camera rays.
     """
+    if not isinstance(wrapped, Wrapped):
+        raise InputError(f"wrapped: expected a Wrapped, as stages.demodulate gives it, got {brief(wrapped)}")
     phases = (wrapped.red_blue_rad, wrapped.green_rad, wrapped.infrared_rad)
     if rays is None:
         means_rad, margin = unwrap(*phases, fringe_numbers, projector_width_px)
@@ -232,6 +241,13 @@ def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tupl
 
 def _three(fringe_numbers: FringeNumbers) -> FringeNumbers:
     return Fringes.model_validate({"numbers": fringe_numbers}).numbers
+
+
+def _check_light(light: object) -> None:
+    if not isinstance(light, Mapping) or not set(CHANNELS) <= set(light):
+        got = f"only {', '.join(map(str, light))}" if isinstance(light, Mapping) and light else brief(light)
+        raise InputError(f"light: expected {', '.join(CHANNELS)} by name, as stages.linear_light gives them, got {got}")
+    check_maps({name: light[name] for name in CHANNELS})
 
 
 def _wrap(phase_rad: Map) -> Map:

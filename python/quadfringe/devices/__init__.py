@@ -8,7 +8,7 @@ from importlib import import_module
 from types import TracebackType
 from typing import Literal, Protocol, Self
 
-from quadfringe.config import Fringes, SystemConfig
+from quadfringe.config import Fringes, SystemConfig, check_system
 from quadfringe.config.cameras import capture_config
 from quadfringe.data import AnyShot, Calibration
 from quadfringe.devices.light import Light
@@ -163,6 +163,7 @@ def open_devices(config: SystemConfig) -> Devices:
 
     Raises `ConfigError` for devices that cannot be combined, and OSError when one cannot be opened.
     """
+    check_system(config)
     devices: Devices = import_module(CAMERAS[config.capture.kind]).open_devices(config)
     return devices
 
@@ -186,6 +187,7 @@ def open_projector(config: SystemConfig) -> Projector:
     With a real camera and no `projectors`, the fringes are shown by other means (`ExternalLight`). Raises OSError when
     a device cannot be opened, and ValueError when it does not support the settings.
     """
+    check_system(config)
     if config.projectors is not None:
         from quadfringe.devices.lightcrafter import ProjectorPair
 

@@ -17,10 +17,10 @@ from pathlib import Path
 from threading import Lock
 from typing import Any
 
-from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, load_system, shortened
+from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, check_system, load_system, shortened
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.plan import stated_response
+from quadfringe.decoding.plan import calibration_of, stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.scanner.streaming import LiveStream, Tap
@@ -46,7 +46,8 @@ class Scanner:
         camera: Camera,
         calibration: Calibration | Path | str | None = None,
     ) -> None:
-        self.calibration = Calibration.load(calibration) if isinstance(calibration, (str, Path)) else calibration
+        check_system(config)
+        self.calibration = calibration_of(calibration)
         self.projector = projector
         self.camera = camera
         self._planning = Lock()
