@@ -1,8 +1,8 @@
 //! Step 3: the local fit.
 
-/// Width (sigma) of the first window in fringe periods, which has to average whole fringes. Larger: edges blur (varied x1.4:
-/// wrong orders of the face 14 -> 447 ppm, near edges of steps +12 %). Smaller: it no longer holds a fringe (x0.7: phase RMS of
-/// peaks without noise +19 %, near edges of steps -18 %).
+/// Width (sigma) of the first window in fringe periods. It must average whole fringes. Larger: edges blur (varied x1.4: wrong
+/// orders of the face 14 -> 447 ppm, near edges of steps +12 %). Smaller: it no longer holds a fringe (x0.7: phase RMS of peaks
+/// without noise +19 %, near edges of steps -18 %).
 pub const FIRST_WINDOW: f32 = 0.5;
 
 /// Width (sigma) of the fitting window in fringe periods. Larger: less noise of beats, offsets and amplitudes. Smaller: they
@@ -10,18 +10,18 @@ pub const FIRST_WINDOW: f32 = 0.5;
 /// steps +34 %, promised wrong orders of the textured face three times as many.
 pub const WINDOW: f32 = 0.3;
 
-/// Rows of pixels that stand for a row of cells. Neighbouring rows carry nearly the same information, and the window holds
-/// hundreds of pixels. Varied: 1 row has 8 % less RMS near edges of steps, 3 rows no effect.
+/// Number of pixel rows that are sampled for each row of cells. Neighbouring rows have nearly the same information, and
+/// the window contains hundreds of pixels. Varied: 1 row has 8 % less RMS near edges of steps, 3 rows no effect.
 pub const SAMPLED_ROWS: usize = 2;
 
-/// Ridge of the normal equations relative to the weight in the window. Larger: offsets and amplitudes are drawn to 0. Smaller:
-/// windows without a whole fringe become singular. Varied: no effect, but 4 % near edges of dim steps at x0.7.
+/// Ridge of the normal equations relative to the weight in the window. Larger: offsets and amplitudes are pulled towards 0.
+/// Smaller: windows without a whole fringe become singular. Varied: no effect, but 4 % near edges of dim steps at x0.7.
 pub const RIDGE: f32 = 1e-3;
 
 /// Least contrast (amplitude over offset) of light from the projector. Larger: surfaces under room light are lost. Smaller: room
 /// light counts as fringes. Varied: no effect, but 4 % near edges of dim steps at x1.4.
 pub const CONTRAST_MIN: f32 = 0.1;
 
-/// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 when B repeats R. Larger: surfaces along
-/// the fringes are lost. Smaller: the phase is noise there. Varied: no effect.
+/// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 if all phasors lie along one line, as
+/// when B repeats R. Larger: surfaces along the fringes are lost. Smaller: the phase is noise there. Varied: no effect.
 pub const SPREAD_MIN: f32 = 0.02;
