@@ -26,8 +26,8 @@ pub const PIXEL_MISFIT_MAX: f32 = 0.5;
 /// edges of steps 6 % worse). Smaller: x0.7, 0.4 points less.
 pub const GROWN_MISFIT_MAX: f32 = 0.35;
 
-/// Least number of passed pixels in the 5 x 5 pixels around a pixel, including the pixel; at a straight edge there are
-/// 15. More: corners are lost. Fewer: narrow strips stay. Varied (7 and 14): no effect.
+/// Least number of passed pixels in the 5 x 5 pixels around a pixel, including the pixel itself; a straight edge leaves 15 of
+/// them. More: corners are lost. Fewer: narrow strips stay. Varied (7 and 14): no effect.
 pub const NEIGHBOURS_MIN: u8 = 10;
 
 /// Side, in fringe periods, of a square with the area of the smallest component that is kept. Larger: small objects are lost.
