@@ -62,9 +62,13 @@
 //! let mut decoder = Decoder::builder(&encoding, [192, 256]).triangulator(triangulator).build()?;
 //! let decoded = decoder.decode(&Shot::try_from(&images)?)?;
 //!
-//! let xyz_mm = decoded.xyz_mm.as_ref().expect("a decoder with a triangulator gives points");
-//! let (depth_mm, truth_mm) = (xyz_mm[[96, 128, 2]], cast.depth_mm()[[96, 128]]);
-//! assert!((depth_mm - truth_mm).abs() < 0.5);
+//! // A decoder with a triangulator gives points.
+//! if let Some(xyz_mm) = &decoded.xyz_mm {
+//!     let (depth_mm, truth_mm) = (xyz_mm[[96, 128, 2]], cast.depth_mm()[[96, 128]]);
+//!     println!("depth {depth_mm:.2} mm, true {truth_mm:.2} mm");
+//! #     assert!((depth_mm - truth_mm).abs() < 0.5);
+//! }
+//! # assert!(decoded.xyz_mm.is_some());
 //! # Ok::<(), quadfringe::Error>(())
 //! ```
 

@@ -36,6 +36,25 @@ pub(super) const STEPS_MIN: usize = 5;
 /// scale, little room is left for fringes.
 pub(super) const OFFSET_MAX: f64 = 0.2;
 
+/// The bound on the offset is at least this, fraction of full scale, so that the search has an interval even where the darkest
+/// pixels are black. Not measured: it is half a level of an 8-bit camera.
+pub(super) const OFFSET_MAX_LEAST: f64 = 0.002;
+
+/// Start of the search: offset as a fraction of full scale, exponent and knee of the inverse response. A start far from the
+/// response takes more rounds; `cargo test -p quadfringe --lib condition` checks that it does not decide the result.
+pub(super) const START_OFFSET: f64 = 0.01;
+/// See [`START_OFFSET`]; the exponent of a gamma of 2.
+pub(super) const START_EXPONENT: f64 = 0.5;
+/// See [`START_OFFSET`].
+pub(super) const START_KNEE: f64 = 0.5;
+
+/// First steps of the search from its start, in the same units. See [`START_OFFSET`].
+pub(super) const STEP_OFFSET: f64 = 0.03;
+/// See [`STEP_OFFSET`].
+pub(super) const STEP_EXPONENT: f64 = 0.15;
+/// See [`STEP_OFFSET`].
+pub(super) const STEP_KNEE: f64 = 0.3;
+
 /// Exponents of the inverse response that the search tries. Not measured: they include gammas from 0.4 to 10, which
 /// includes the gammas of common encodings, 0.45 and 2.2.
 pub(super) const EXPONENTS: std::ops::Range<f64> = 0.1..2.5;

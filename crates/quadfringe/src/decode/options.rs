@@ -1,6 +1,7 @@
 //! The decoding method, and the thresholds that both methods have.
 
 use super::method::Method;
+use super::params::{MODULATION_MIN, QUALITY_MIN};
 use crate::error::{Error, Limit, Result};
 
 /// The options of decoding. This is the only place that defines their defaults.
@@ -28,7 +29,12 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { method: Method::default(), modulation_min: 0.02, quality_min: 0.15, period_px: None }
+        Self {
+            method: Method::default(),
+            modulation_min: MODULATION_MIN,
+            quality_min: QUALITY_MIN,
+            period_px: None,
+        }
     }
 }
 

@@ -7,3 +7,11 @@ pub(super) const SIDE_MIN_PX: usize = 16;
 /// Least number of rows that a thread takes at once. With more rows there are fewer tasks to share among threads; with
 /// fewer rows the time between tasks grows. It changes no result, only the time: `cargo bench -p quadfringe -- shot`.
 pub(crate) const ROWS_AT_ONCE: usize = 8;
+
+/// Default of the least modulation of R and B, fraction of full scale. A smaller value returns noise in shadows as data; a larger
+/// value loses dark surfaces. `cargo test -p quadfringe --test round_trip` holds the share of lit pixels that come back.
+pub(super) const MODULATION_MIN: f32 = 0.02;
+
+/// Default of the least quality of a returned order. A smaller value returns more wrong orders; a larger value loses correct
+/// points with them. `python evaluation/accuracy.py` measures both shares.
+pub(super) const QUALITY_MIN: f32 = 0.15;

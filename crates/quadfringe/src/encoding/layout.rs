@@ -14,6 +14,7 @@ use crate::error::{Error, Result};
 /// assert_eq!(DmdLayout::Diamond.pitch_um(), [10.8, 5.4]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[non_exhaustive]
 pub enum DmdLayout {
     /// Square grid: mirror (row, column) lies at (row, column).
     #[default]

@@ -63,7 +63,8 @@ impl Agreement {
             |_, [numerator, information, other_numerator, other_information], out| {
                 let pair = Pair { numerator, information };
                 let other = Pair { numerator: other_numerator, information: other_information };
-                excess(pair, other, variance, out);
+                let (weight, found) = out.split_at_mut(numerator.len());
+                excess(pair, other, variance, weight, found);
             },
         );
         self.average(scene);
@@ -142,18 +143,17 @@ fn add_pairs(
 }
 
 /// Weight of every cell, then the squared difference between the pairs above that of noise, as a variance of their mean.
-fn excess(pair: Pair<'_>, other: Pair<'_>, variance: f32, out: &mut [f32]) {
-    let columns = pair.numerator.len();
-    for i in 0..columns {
+fn excess(pair: Pair<'_>, other: Pair<'_>, variance: f32, weight: &mut [f32], excess: &mut [f32]) {
+    for i in 0..weight.len() {
         let (first, second) = (pair.information[i], other.information[i]);
         let whole = first + second;
         let counts = whole > 1e-9 && first.min(second) > PAIR_SHARE_MIN * whole;
-        (out[i], out[columns + i]) = (0.0, 0.0);
+        (weight[i], excess[i]) = (0.0, 0.0);
         if counts {
             let apart = pair.numerator[i] / first - other.numerator[i] / second;
             let by_noise = variance * (1.0 / first + 1.0 / second);
             let shares = (first * first + second * second) / (2.0 * whole * whole);
-            (out[i], out[columns + i]) = (1.0, shares * (apart * apart - by_noise).min(PAIR_EXCESS_MAX_RAD2));
+            (weight[i], excess[i]) = (1.0, shares * (apart * apart - by_noise).min(PAIR_EXCESS_MAX_RAD2));
         }
     }
 }

@@ -9,8 +9,9 @@
 //! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample
 //! 7  motion between the channels (optional)                                    motion
 //! 8  validity: doubtful pixels become no data                                  validity
-//! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement, validity::propagate
+//! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement
 //! 10 heights                                                             (S7)  decode::output, height
+//! 11 doubtful orders become as certain as their surface                        propagation
 //! ```
 //!
 //! The steps share the model of the intensities (`model`), a grid of cells for slowly varying quantities (`cells`), and the tuned
@@ -31,6 +32,7 @@ mod orders;
 mod params;
 mod phase;
 mod photometry;
+mod propagation;
 mod pyramid;
 mod residuals;
 mod scene;
@@ -55,6 +57,7 @@ use motion::{Motion, Timing};
 use params::motion::ROUNDS;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
 use phase::{FitRows, PhaseModel};
+use propagation::Propagation;
 use pyramid::{Level, Levels, Pyramid, Upsampler};
 use rayon::prelude::*;
 use scene::{Frame, PhaseMap, ScaledGrid, Scene};
@@ -81,6 +84,7 @@ pub(crate) struct Joint {
     captured: [Vec<f32>; 4],
     validity: Validity,
     agreement: Agreement,
+    propagation: Propagation,
     /// Wrong-order probability of every node.
     wrong_order: Vec<f32>,
     /// Working planes, for results that have no map of points to serve as such.
@@ -104,6 +108,7 @@ impl Joint {
             captured: Default::default(),
             validity: Validity::default(),
             agreement: Agreement::default(),
+            propagation: Propagation::default(),
             wrong_order: Vec::new(),
             spare: Vec::new(),
         }
@@ -141,11 +146,10 @@ impl Joint {
         let noise = self.uncertainty(&frame);
         // 10. Heights (S7).
         self.write(&frame, &noise, finish, out);
-        // 9. again: connected components settle doubtful orders. This follows step 10, which removes pixels outside the
-        //    projector image.
+        // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image.
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
         let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
-        self.validity.propagate(&grid, &self.phase, wrong_order, quality);
+        self.propagation.run(&grid, &self.phase, &self.validity.components, wrong_order, quality);
     }
 
     /// Steps 2 to 6.
@@ -269,7 +273,7 @@ impl Joint {
         }
     }
 
-    /// Step 9, without the part that needs connected components.
+    /// Step 9: the noise of the phase, the excess of the residuals, and the probability of a wrong order.
     fn uncertainty(&mut self, frame: &Frame<'_>) -> PhaseNoise {
         let scene = self.pyramid.full.scene(frame.full);
         let CoarseLevel { noise, photometry, orders, slopes, .. } = &self.coarse;

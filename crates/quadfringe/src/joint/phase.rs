@@ -6,7 +6,7 @@
 use super::cells::RowMaps;
 use super::model::{FringeRows, carriers};
 use super::neighbours::{around, binomial};
-use super::params::phase::{ALBEDO_SHARE, UNLIT_WEIGHT};
+use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
 use super::photometry::Photometry;
 use super::scene::{Scene, Scratch};
@@ -220,7 +220,7 @@ fn predict(
                 ss += s * s;
             }
             let albedo = ms / mm;
-            let albedo = if albedo > 1e-4 { albedo } else { 1e-4 };
+            let albedo = if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
             let weight = if lit[x] > 0.0 { 1.0 } else { UNLIT_WEIGHT };
             let mean = 0.5 * (amplitude[0][x] + amplitude[2][x]);
             let values = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];

@@ -31,7 +31,7 @@ impl Residuals {
             &self.slots,
             &mut self.sums,
             &mut self.maps,
-            |(), y, sums| add_lit([squared_residual, modulation].map(|plane| scene.row(plane, y)), sums),
+            |(), y, sums| add_lit(scene.row(squared_residual, y), scene.row(modulation, y), sums),
             |_, [count, squares], out| {
                 for (out, (square, n)) in out.iter_mut().zip(squares.iter().zip(count)) {
                     *out = square / n.max(1e-6);
@@ -48,8 +48,8 @@ impl Residuals {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_lit(pixels: [&[f32]; 2], sums: &mut [[Lanes; 2]]) {
-    let pixels = pixels.map(lanes);
+fn add_lit(squared_residual: &[f32], modulation: &[f32], sums: &mut [[Lanes; 2]]) {
+    let pixels = [squared_residual, modulation].map(lanes);
     for (i, sums) in sums.iter_mut().enumerate() {
         let [square, modulation] = take(&pixels, i);
         let mut terms = [[0.0; LANES]; 2];

@@ -19,6 +19,7 @@ use super::Projector;
 /// # Ok::<(), quadfringe::error::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Light<'a> {
     /// The same everywhere: 1 for white, 0 for black.
     Uniform(f64),

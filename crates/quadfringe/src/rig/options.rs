@@ -16,6 +16,7 @@ use super::Projector;
 /// assert_eq!(options.noise, 0.0);
 /// ```
 #[derive(Debug, Clone, PartialEq)]
+#[non_exhaustive]
 pub enum Albedo {
     /// The same everywhere: R, G, B, IR.
     Uniform([f32; 4]),
@@ -88,6 +89,7 @@ impl Albedo {
 /// assert_eq!(quadfringe::rig::BitDepth::Ten.full_scale(), 1023.0);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[non_exhaustive]
 pub enum BitDepth {
     /// u8, full scale 255.
     #[default]
@@ -146,6 +148,7 @@ impl BitDepth {
 /// assert_ne!(plain_camera, RenderOptions { demosaic: None, ..plain_camera.clone() });
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[non_exhaustive]
 pub enum Demosaic {
     /// The mean of the nearest samples of each colour, as in most cameras and libraries.
     Bilinear,

@@ -18,6 +18,7 @@ pub(super) fn relief_rate(slope: f64, [x, y, z]: [f64; 3]) -> f64 {
 /// assert_eq!(Interpolation::default(), Interpolation::Bicubic);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
+#[non_exhaustive]
 pub enum Interpolation {
     /// Bilinear, with creases at the grid lines.
     Bilinear,

@@ -12,7 +12,10 @@ mod select;
 mod shot;
 mod simplex;
 
-use super::params::{EXPONENTS, KNEE_GAIN, KNEE_GAIN_RAD2, KNEE_MAX, OFFSET_MAX, STEPS_MIN};
+use super::params::{
+    EXPONENTS, KNEE_GAIN, KNEE_GAIN_RAD2, KNEE_MAX, OFFSET_MAX, OFFSET_MAX_LEAST, START_EXPONENT, START_KNEE,
+    START_OFFSET, STEP_EXPONENT, STEP_KNEE, STEP_OFFSET, STEPS_MIN,
+};
 use super::{Response, Sample};
 use crate::{Error, Result};
 use ndarray::ArrayView3;
@@ -87,9 +90,10 @@ fn fit(samples: &Samples, offset_max: f64) -> Response {
     };
     let with_knee = |[offset, exponent, knee]: [f64; 3]| Trial { offset, exponent, knee };
     let without = |[offset, exponent]: [f64; 2]| Trial { offset, exponent, knee: 0.0 };
-    let (start, step) = ((offset_max / 2.0).min(0.01), (offset_max / 2.0).min(0.03));
-    let bent = minimise([start, 0.5, 0.5], [step, 0.15, 0.3], |point| cost(with_knee(point)));
-    let plain = minimise([start, 0.5], [step, 0.15], |point| cost(without(point)));
+    let [offset, step] = [START_OFFSET, STEP_OFFSET].map(|offset| offset.min(offset_max / 2.0));
+    let (start, steps) = ([offset, START_EXPONENT, START_KNEE], [step, STEP_EXPONENT, STEP_KNEE]);
+    let bent = minimise(start, steps, |point| cost(with_knee(point)));
+    let plain = minimise([offset, START_EXPONENT], [step, STEP_EXPONENT], |point| cost(without(point)));
     if plain.cost * (1.0 - KNEE_GAIN) <= bent.cost + KNEE_GAIN_RAD2 {
         without(plain.point).response()
     } else {
@@ -124,7 +128,7 @@ fn offset_bound(traces: &[samples::Trace<'_>]) -> f64 {
     let darkest = |t: &samples::Trace<'_>| t.steps.iter().copied().fold(1.0, f32::min);
     let mut floor: Vec<f32> = traces.iter().map(darkest).collect();
     floor.sort_by(f32::total_cmp);
-    f64::from(floor[floor.len() / 100]).clamp(0.002, OFFSET_MAX)
+    f64::from(floor[floor.len() / 100]).clamp(OFFSET_MAX_LEAST, OFFSET_MAX)
 }
 
 fn check(stacks: &[ArrayView3<'_, f32>]) -> Result<()> {

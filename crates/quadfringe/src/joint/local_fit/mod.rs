@@ -14,7 +14,10 @@ use super::params::local_fit::{FIRST_WINDOW, SAMPLED_ROWS, WINDOW};
 use super::scene::Scene;
 use crate::parallel::slots::Slots;
 use rayon::prelude::*;
-use rows::{SUMS, add_products, add_squares, finish_row, map, relative_albedo, solve_row, two_step};
+use rows::{
+    ChannelRows, RedBlueRows, StrengthRows, add_products, add_squares, finish_row, map, relative_albedo,
+    solve_row, sum, two_step,
+};
 
 /// Results of the fit on the cells, and its working maps.
 #[derive(Debug)]
@@ -72,7 +75,7 @@ impl LocalFit {
     /// Offsets and amplitudes at row `y`.
     pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut [RowMaps; 2]) -> FringeRows<'a> {
         let [first, second] = maps;
-        let [a_r, b_r, a_b, b_b] = first.sample(scene.grid, &self.maps, map::TWO_STEP, y);
+        let [a_r, b_r, a_b, b_b] = first.sample(scene.grid, &self.maps, map::A_R, y);
         let [a_g, _, _, a_ir, _, _, b_g, b_ir] = second.sample(scene.grid, &self.maps, map::A_G, y);
         FringeRows { offset: [a_r, a_g, a_b, a_ir], amplitude: [b_r, b_g, b_b, b_ir] }
     }
@@ -81,8 +84,8 @@ impl LocalFit {
     pub fn cell(&self, row: usize, column: usize) -> CellFringes {
         let value = |k: usize| self.maps.line(row, k)[column];
         CellFringes {
-            offset: [0, map::A_G, 2, map::A_IR].map(value),
-            amplitude: [1, map::B_G, 3, map::B_IR].map(value),
+            offset: [map::A_R, map::A_G, map::A_B, map::A_IR].map(value),
+            amplitude: [map::A_R + 1, map::B_G, map::A_B + 1, map::B_IR].map(value),
         }
     }
 
@@ -117,17 +120,17 @@ impl LocalFit {
     /// Normal equations of every cell for `a`, `p`, `q` of the four channels.
     fn solve(&mut self, scene: &Scene<'_>) {
         let start = &self.start;
-        scene.grid.window_sums::<SUMS, Rows>(
+        scene.grid.window_sums::<{ sum::COUNT }, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.maps,
             |rows, y, sums| {
                 let Rows { maps, cos, sin, .. } = rows;
-                let maps = maps.sample::<4>(scene.grid, start, 0, y);
+                let red_blue = RedBlueRows::sample(maps, scene, start, y);
                 cos.resize(scene.grid.stride, 0.0);
                 sin.resize(scene.grid.stride, 0.0);
-                two_step(maps, None, scene.rows(y), cos, sin);
+                two_step(&red_blue, None, scene.rows(y), cos, sin);
                 add_products(scene.row(scene.usable, y), [cos, sin], scene.rows(y), sums);
             },
             |_, sums, out| solve_row(sums, out),
@@ -159,11 +162,12 @@ impl LocalFit {
                     albedo_smooth.resize(grid.stride, 0.0);
                     let near = [0, 1, 2].map(|k| ring[(i + k) % 3].as_slice());
                     binomial(near, grid.width, smooth, albedo_smooth);
-                    let two = maps.sample::<4>(grid, &self.maps, map::TWO_STEP, y);
-                    two_step(two, Some(albedo_smooth), scene.rows(y), cos, sin);
-                    let strengths = maps.sample::<2>(grid, &self.maps, map::WEAKEST, y);
-                    let known = [cos.as_slice(), sin, scene.row(lit, y), albedo_smooth];
-                    finish_row(known, strengths, least, [phase, modulation]);
+                    let red_blue = RedBlueRows::sample(maps, scene, &self.maps, y);
+                    two_step(&red_blue, Some(albedo_smooth), scene.rows(y), cos, sin);
+                    let [weakest, mean] = maps.sample(grid, &self.maps, map::WEAKEST, y);
+                    let strength =
+                        StrengthRows { weakest, mean, lit: scene.row(lit, y), albedo: albedo_smooth };
+                    finish_row([cos, sin], &strength, least, phase, modulation);
                 }
             },
         );
@@ -176,15 +180,26 @@ impl LocalFit {
         let grid = scene.grid;
         cos.resize(grid.stride, 0.0);
         sin.resize(grid.stride, 0.0);
-        let maps = maps.sample::<14>(grid, &self.maps, map::TWO_STEP, y);
-        let [two @ .., _, _, _, _, _, _, _, _, _, _] = maps;
-        two_step(two, None, scene.rows(y), cos, sin);
+        let maps = maps.sample::<14>(grid, &self.maps, map::A_R, y);
+        let [red_offset, red_amplitude, blue_offset, blue_amplitude, ..] = maps;
+        let red_blue = RedBlueRows { red_offset, red_amplitude, blue_offset, blue_amplitude };
+        two_step(&red_blue, None, scene.rows(y), cos, sin);
+        let channel = |a: usize, p: usize| ChannelRows { a: maps[a], p: maps[p], q: maps[p + 1] };
         let model = [
-            [maps[0], maps[map::P_R], maps[map::P_R + 1]],
-            [maps[map::A_G], maps[map::A_G + 1], maps[map::A_G + 2]],
-            [maps[2], maps[map::P_B], maps[map::P_B + 1]],
-            [maps[map::A_IR], maps[map::A_IR + 1], maps[map::A_IR + 2]],
+            channel(map::A_R, map::P_R),
+            channel(map::A_G, map::A_G + 1),
+            channel(map::A_B, map::P_B),
+            channel(map::A_IR, map::A_IR + 1),
         ];
         relative_albedo(model, [cos, sin], scene.rows(y), &mut albedo[at]);
+    }
+}
+
+impl<'a> RedBlueRows<'a> {
+    /// Row `y` of maps of the fit, or of its start.
+    fn sample(rows: &'a mut RowMaps, scene: &Scene<'_>, maps: &CellMaps, y: usize) -> Self {
+        let [red_offset, red_amplitude, blue_offset, blue_amplitude] =
+            rows.sample(scene.grid, maps, map::A_R, y);
+        Self { red_offset, red_amplitude, blue_offset, blue_amplitude }
     }
 }

@@ -1,17 +1,56 @@
 //! Loops of the fit over one row of pixels or of cells.
 
 use crate::joint::params::local_fit::{CONTRAST_MIN, RIDGE, SPREAD_MIN};
+use crate::joint::params::phase::ALBEDO_MIN;
 use crate::parallel::angle::atan2;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use multiversion::multiversion;
 
-/// Sums of one cell: w, wc, ws, wcc, wcs, then w I, w I c, w I s of R, G, B, IR.
-pub(super) const SUMS: usize = 17;
+/// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`.
+pub(super) mod sum {
+    pub const W: usize = 0;
+    pub const C: usize = 1;
+    pub const S: usize = 2;
+    pub const CC: usize = 3;
+    pub const CS: usize = 4;
+    /// `I`, `I c` and `I s` of R, then of G, B and IR.
+    pub const LIGHT: usize = 5;
+    pub const COUNT: usize = LIGHT + 3 * 4;
+}
+
+/// Offset and amplitude of R and B along a row.
+#[derive(Clone, Copy)]
+pub(super) struct RedBlueRows<'a> {
+    pub red_offset: &'a [f32],
+    pub red_amplitude: &'a [f32],
+    pub blue_offset: &'a [f32],
+    pub blue_amplitude: &'a [f32],
+}
+
+/// Coefficients of `a + p cos Phi + q sin Phi` of one channel along a row.
+#[derive(Clone, Copy)]
+pub(super) struct ChannelRows<'a> {
+    pub a: &'a [f32],
+    pub p: &'a [f32],
+    pub q: &'a [f32],
+}
+
+/// What decides the modulation of the pixels of a row, and whether there is enough of it.
+pub(super) struct StrengthRows<'a> {
+    /// Least amplitude of the four channels.
+    pub weakest: &'a [f32],
+    /// Mean amplitude of R and B.
+    pub mean: &'a [f32],
+    /// 1 where light of the projector falls.
+    pub lit: &'a [f32],
+    pub albedo: &'a [f32],
+}
 
 /// Maps of the fit on the cells. Of R and B: offset and amplitude, four maps in a row; then of all channels the coefficients of
 /// `a + p cos + q sin`; then the least amplitude of all channels and the mean amplitude of R and B.
 pub(super) mod map {
-    pub const TWO_STEP: usize = 0;
+    pub const A_R: usize = 0;
+    pub const A_B: usize = 2;
     pub const P_R: usize = 4;
     pub const P_B: usize = 6;
     pub const A_G: usize = 8;
@@ -37,17 +76,17 @@ pub(super) fn add_squares(usable: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes
     }
 }
 
-/// Unit phasor of R and B for offsets and amplitudes `a_r, b_r, a_b, b_b`: (R / rho - a) / b times rho b_r b_b, as
-/// only the direction counts.
+/// Unit phasor of R and B: (R / rho - a) / b times rho b_r b_b, as only the direction counts.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn two_step(
-    maps: [&[f32]; 4],
+    rows: &RedBlueRows,
     albedo: Option<&[f32]>,
     light: [&[f32]; 4],
     cos: &mut [f32],
     sin: &mut [f32],
 ) {
-    let (maps, light) = (maps.map(lanes), [lanes(light[0]), lanes(light[2])]);
+    let maps = [rows.red_offset, rows.red_amplitude, rows.blue_offset, rows.blue_amplitude].map(lanes);
+    let light = [lanes(light[0]), lanes(light[2])];
     let mut out = [lanes_mut(cos), lanes_mut(sin)];
     for i in 0..out[0].len() {
         let albedo = albedo.map_or([1.0; LANES], |albedo| lanes(albedo)[i]);
@@ -69,21 +108,21 @@ pub(super) fn add_products(
     usable: &[f32],
     phasor: [&[f32]; 2],
     light: [&[f32]; 4],
-    sums: &mut [[Lanes; SUMS]],
+    sums: &mut [[Lanes; sum::COUNT]],
 ) {
     let (rows, light) = ([lanes(usable), lanes(phasor[0]), lanes(phasor[1])], light.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
         let ([w, cos, sin], light) = (take(&rows, i), take(&light, i));
-        let mut terms = [w; SUMS];
+        let mut terms = [w; sum::COUNT];
         for x in 0..LANES {
             let (c, s) = (w[x] * cos[x], w[x] * sin[x]);
-            (terms[1][x], terms[2][x]) = (c, s);
-            (terms[3][x], terms[4][x]) = (c * cos[x], c * sin[x]);
+            (terms[sum::C][x], terms[sum::S][x]) = (c, s);
+            (terms[sum::CC][x], terms[sum::CS][x]) = (c * cos[x], c * sin[x]);
             for k in 0..4 {
-                let seen = light[k][x];
-                terms[5 + 3 * k][x] = w[x] * seen;
-                terms[6 + 3 * k][x] = c * seen;
-                terms[7 + 3 * k][x] = s * seen;
+                let (seen, first) = (light[k][x], sum::LIGHT + 3 * k);
+                terms[first][x] = w[x] * seen;
+                terms[first + 1][x] = c * seen;
+                terms[first + 2][x] = s * seen;
             }
         }
         add(sums, &terms);
@@ -92,7 +131,7 @@ pub(super) fn add_products(
 
 /// Everything that follows from the sums of a row of cells, cell by cell.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn solve_row(sums: [&[f32]; SUMS], out: &mut [f32]) {
+pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], out: &mut [f32]) {
     let columns = sums[0].len();
     let mut maps = out.chunks_exact_mut(columns);
     let mut maps: [&mut [f32]; map::COUNT] =
@@ -100,7 +139,7 @@ pub(super) fn solve_row(sums: [&[f32]; SUMS], out: &mut [f32]) {
     for i in 0..columns {
         let CellSolution { channels: [r, g, b, ir], spread } = solve_cell(sums, i);
         let strength = |[a, _, _, b]: [f32; 4]| if b > CONTRAST_MIN * a { b } else { 0.0 };
-        let seen = if spread > SPREAD_MIN * sums[0][i] { 1.0 } else { 0.0 };
+        let seen = if spread > SPREAD_MIN * sums[sum::W][i] { 1.0 } else { 0.0 };
         let weakest = strength(r).min(strength(b)).min(strength(g)).min(strength(ir));
         let pairs = [
             [r[0], r[3]],
@@ -129,8 +168,8 @@ struct CellSolution {
 
 /// Solve the normal equations of cell `i` by the adjugate of their matrix.
 #[inline(always)]
-fn solve_cell(sums: [&[f32]; SUMS], i: usize) -> CellSolution {
-    let [w, wc, ws, wcc, wcs] = [0, 1, 2, 3, 4].map(|k| sums[k][i]);
+fn solve_cell(sums: [&[f32]; sum::COUNT], i: usize) -> CellSolution {
+    let [w, wc, ws, wcc, wcs] = [sum::W, sum::C, sum::S, sum::CC, sum::CS].map(|k| sums[k][i]);
     let half = 0.5 * w;
     let skew = wcc - half;
     let spread = half - (skew * skew + wcs * wcs).sqrt();
@@ -141,7 +180,7 @@ fn solve_cell(sums: [&[f32]; SUMS], i: usize) -> CellSolution {
     let scale = 1.0 / (a * xx + b * xy + c * xz).max(f32::MIN_POSITIVE);
     let mut channels = [[0.0f32; 4]; 4];
     for (k, fit) in channels.iter_mut().enumerate() {
-        let [u, v, t] = [5 + 3 * k, 6 + 3 * k, 7 + 3 * k].map(|m| sums[m][i] * scale);
+        let [u, v, t] = [0, 1, 2].map(|m| sums[sum::LIGHT + 3 * k + m][i] * scale);
         let (p, q) = (xy * u + yy * v + yz * t, xz * u + yz * v + zz * t);
         *fit = [xx * u + xy * v + xz * t, p, q, (p * p + q * q).sqrt()];
     }
@@ -150,12 +189,13 @@ fn solve_cell(sums: [&[f32]; SUMS], i: usize) -> CellSolution {
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn relative_albedo(
-    model: [[&[f32]; 3]; 4],
+    model: [ChannelRows; 4],
     phasor: [&[f32]; 2],
     light: [&[f32]; 4],
     out: &mut [f32],
 ) {
-    let (model, phasor, light) = (model.map(|maps| maps.map(lanes)), phasor.map(lanes), light.map(lanes));
+    let (model, phasor, light) =
+        (model.map(|rows| [rows.a, rows.p, rows.q].map(lanes)), phasor.map(lanes), light.map(lanes));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
         let ([cos, sin], light) = (take(&phasor, i), take(&light, i));
         let (mut sum, mut norm) = ([0.0; LANES], [1e-9; LANES]);
@@ -170,20 +210,22 @@ pub(super) fn relative_albedo(
         }
         for x in 0..LANES {
             let albedo = sum[x] / norm[x];
-            out[x] = if albedo > 1e-4 { albedo } else { 1e-4 };
+            out[x] = if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
         }
     }
 }
 
-/// Phase, and modulation where there is enough of it.
+/// Phase of the phasor, and modulation where it is at least `least`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn finish_row(
-    known: [&[f32]; 4],
-    strengths: [&[f32]; 2],
+    phasor: [&[f32]; 2],
+    strength: &StrengthRows,
     least: f32,
-    [phase, modulation]: [&mut [f32]; 2],
+    phase: &mut [f32],
+    modulation: &mut [f32],
 ) {
-    let rows = [known[0], known[1], strengths[0], strengths[1], known[2], known[3]].map(lanes);
+    let StrengthRows { weakest, mean, lit, albedo } = strength;
+    let rows = [phasor[0], phasor[1], weakest, mean, lit, albedo].map(lanes);
     let mut out = [lanes_mut(phase), lanes_mut(modulation)];
     for i in 0..out[0].len() {
         let [cos, sin, weakest, mean, lit, albedo] = take(&rows, i);

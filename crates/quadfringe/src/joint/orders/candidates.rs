@@ -27,7 +27,7 @@ pub(super) struct Nodes<'a> {
     pub phase: &'a [f32],
     pub matching: &'a Matching,
     /// Fringe numbers of G and IR divided by the fringe number of R and B.
-    pub ratios: [f32; 2],
+    pub ratios_g_ir: [f32; 2],
 }
 
 impl Nodes<'_> {
@@ -130,7 +130,7 @@ impl Block {
                     absolute_phase: whole + wrap(wrapped_phase - phase),
                     light: scene.light.map(|plane| plane[at]),
                 };
-                add_costs(&pixel, &fringes, nodes.ratios, candidates.turns(), &mut costs);
+                add_costs(&pixel, &fringes, nodes.ratios_g_ir, candidates.turns(), &mut costs);
             }
             self.costs.push(costs);
         }
@@ -154,12 +154,12 @@ struct Pixel {
 }
 
 /// Adds for every candidate the squared differences between the observed and the predicted cosines of G and IR.
-fn add_costs(pixel: &Pixel, fringes: &CellFringes, ratios: [f32; 2], turns: &[f32], costs: &mut [f32]) {
+fn add_costs(pixel: &Pixel, fringes: &CellFringes, ratios_g_ir: [f32; 2], turns: &[f32], costs: &mut [f32]) {
     let CellFringes { offset, amplitude } = fringes;
     let light = pixel.light;
     let red_blue = |values: &[f32; 4]| [values[0], values[2]];
     let albedo = albedo(pixel.wrapped_phase, red_blue(&light), red_blue(offset), red_blue(amplitude));
-    for (c, ratio) in [1, 3].into_iter().zip(ratios) {
+    for (c, ratio) in [1, 3].into_iter().zip(ratios_g_ir) {
         let seen = observed_cosine(light[c], albedo, offset[c], amplitude[c]);
         for (cost, turns) in costs.iter_mut().zip(turns) {
             let (_, predicted) = sin_cos(ratio * (pixel.absolute_phase + TAU * turns));

@@ -73,13 +73,13 @@ pub(super) fn node_phases(scene: &Scene<'_>, wrapped: &Wrapped<'_>, row: usize, 
 pub(super) fn row_evidence(
     scene: &Scene<'_>,
     wrapped: &Wrapped<'_>,
-    ratios: [f32; 2],
+    ratios_g_ir: [f32; 2],
     row: usize,
     nodes: &[f32],
     rows: &mut EvidenceRows,
     out: &mut Vec<NodeEvidence>,
 ) {
-    gather(scene, wrapped, ratios, row, nodes, rows);
+    gather(scene, wrapped, ratios_g_ir, row, nodes, rows);
     let beats = wrapped.fit.beats(row);
     out.extend((0..nodes.len()).map(|x| evidence(nodes[x], &beats, &rows.cells, x)));
 }
@@ -89,7 +89,7 @@ pub(super) fn row_evidence(
 fn gather(
     scene: &Scene<'_>,
     wrapped: &Wrapped<'_>,
-    ratios: [f32; 2],
+    ratios_g_ir: [f32; 2],
     row: usize,
     nodes: &[f32],
     rows: &mut EvidenceRows,
@@ -103,7 +103,7 @@ fn gather(
     for y in grid.samples(row, SAMPLED_ROWS) {
         let fringes = wrapped.fringes(scene, y, maps);
         let pixels = scene.pixel_row(wrapped.map, y);
-        add_cosines(node_phase, &pixels, scene.rows(y), &fringes, ratios, sums);
+        add_cosines(node_phase, &pixels, scene.rows(y), &fringes, ratios_g_ir, sums);
     }
     for (k, line) in cells.iter_mut().enumerate() {
         line.resize(grid.columns, 0.0);
@@ -117,7 +117,7 @@ fn add_cosines(
     pixels: &PixelRow,
     light: [&[f32]; 4],
     fringes: &FringeRows,
-    ratios: [f32; 2],
+    ratios_g_ir: [f32; 2],
     sums: &mut [[Lanes; SUMS]],
 ) {
     let pixels = [node_phase, pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -139,7 +139,7 @@ fn add_cosines(
             for beat in 0..2 {
                 let c = 2 * beat + 1;
                 let s = observed_cosine(light[c][x], albedo, offset[c][x], amplitude[c][x]);
-                let (sine, cos) = sin_cos(ratios[beat] * unwrapped);
+                let (sine, cos) = sin_cos(ratios_g_ir[beat] * unwrapped);
                 let values = [s * s, s * cos, s * sine, cos * cos - sine * sine, 2.0 * sine * cos];
                 for k in 0..5 {
                     terms[1 + 5 * beat + k][x] = weight * values[k];

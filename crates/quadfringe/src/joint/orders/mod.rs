@@ -28,18 +28,18 @@ pub(super) struct Orders {
     /// Wrapped phase of every node.
     phase: Vec<f32>,
     /// Fringe numbers of G and IR divided by the fringe number of R and B.
-    ratios: [f32; 2],
+    ratios_g_ir: [f32; 2],
     slots: Slots<EvidenceRows>,
     blocks: Slots<Block>,
 }
 
 impl Orders {
     pub fn new(code: &FourChannel) -> Self {
-        let ratios = [Channel::G, Channel::Ir].map(|c| (code.fringe_number(c) / code.quadrature) as f32);
+        let ratios_g_ir = [Channel::G, Channel::Ir].map(|c| (code.fringe_number(c) / code.quadrature) as f32);
         Self {
             matching: Matching::new(code),
             phase: Vec::new(),
-            ratios,
+            ratios_g_ir,
             slots: Slots::default(),
             blocks: Slots::default(),
         }
@@ -53,10 +53,10 @@ impl Orders {
             .par_chunks_mut(grid.columns)
             .enumerate()
             .for_each(|(row, phase)| node_phases(scene, wrapped, row, phase));
-        let (phase, ratios, slots) = (&self.phase, self.ratios, &self.slots);
+        let (phase, ratios_g_ir, slots) = (&self.phase, self.ratios_g_ir, &self.slots);
         self.matching.choose([grid.rows, grid.columns], jump_nodes(scene), |row, out| {
             let nodes = &phase[row * grid.columns..][..grid.columns];
-            row_evidence(scene, wrapped, ratios, row, nodes, &mut slots.take(), out);
+            row_evidence(scene, wrapped, ratios_g_ir, row, nodes, &mut slots.take(), out);
         });
         let this = &*self;
         absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
@@ -95,7 +95,7 @@ impl Orders {
     }
 
     fn nodes(&self) -> Nodes<'_> {
-        Nodes { phase: &self.phase, matching: &self.matching, ratios: self.ratios }
+        Nodes { phase: &self.phase, matching: &self.matching, ratios_g_ir: self.ratios_g_ir }
     }
 
     /// Writes the absolute phase of the pixels of one cell.

@@ -31,6 +31,10 @@ pub const RESIDUAL_WIDTH: f32 = 0.125;
 /// of pixels.
 pub const RESIDUAL_SAMPLED_ROWS: usize = 2;
 
+/// Least albedo by which a step of the phase is divided; it only keeps the division finite. Follows from the range of the images:
+/// full scale over the least albedo of a lit pixel is far below its inverse. A larger floor changes dark pixels.
+pub const ALBEDO_MIN: f32 = 1e-4;
+
 /// Share of the pixel itself in its albedo, which is a mean of nine pixels with the weights 1 2 1 in both directions. Follows
 /// from these weights: 4 / 16. With 1 a step would be up to four times longer and overshoot the solution where the errors of
 /// neighbours have different signs. Varied x0.7: peaks without noise +8 %, near edges of steps -7 %; x1.4: -9 % and +24 %.

@@ -7,6 +7,7 @@ use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
 use crate::joint::model::{CellFringes, carriers};
 use crate::joint::neighbours::around;
+use crate::joint::params::phase::ALBEDO_MIN;
 use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
 use crate::joint::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, lanes};
@@ -279,7 +280,7 @@ fn explain(
         let rest = ss - albedo * ms - change * ds;
         let rest = if rest > 0.0 { rest } else { 0.0 };
         let rest = if rest < most { rest } else { most };
-        let step = change / if albedo > 1e-4 { albedo } else { 1e-4 };
+        let step = change / if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
         let step = if step < CORRECTION_MAX_RAD { step } else { CORRECTION_MAX_RAD };
         let on = pixels.lit[x] > 0.0;
         squared_residuals[x] = if on { rest } else { 0.0 };

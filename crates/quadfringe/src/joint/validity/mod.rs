@@ -2,11 +2,10 @@
 
 mod components;
 mod discontinuities;
-mod propagate;
 mod regrow;
 mod support;
 
-use super::cells::{Grid, RowMaps, TaskWork};
+use super::cells::{RowMaps, TaskWork};
 use super::neighbours::around;
 use super::orders::Orders;
 use super::params::validity::{
@@ -19,8 +18,8 @@ use crate::parallel::slots::Slots;
 use components::{Components, SizeLimits};
 use discontinuities::{Discontinuities, remove_narrow};
 use multiversion::multiversion;
-use propagate::Propagation;
 use rayon::prelude::*;
+pub(super) use regrow::GROWN;
 use regrow::Regrow;
 use support::Support;
 
@@ -59,14 +58,13 @@ pub(super) struct Validity {
     discontinuities: Discontinuities,
     /// 1 for pixels at or next to an order jump.
     excluded: Vec<u8>,
-    /// First 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`regrow::GROWN`] for those added.
-    components: Vec<u8>,
+    /// First 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`GROWN`] for those added.
+    pub components: Vec<u8>,
     /// 1 for pixels whose intensities agree with their order.
     consistent: Vec<u8>,
     support: Support,
     labelling: Components,
     regrow: Regrow,
-    propagation: Propagation,
     slots: Slots<TaskWork<Rows>>,
 }
 
@@ -96,12 +94,6 @@ impl Validity {
             at_jump: self.discontinuities.at_jump(),
         };
         self.regrow.run(grid, &candidates, &mut self.valid, &mut self.components);
-    }
-
-    /// Step 9 for components: doubtful orders take the probability of a wrong order, and the quality, from certain pixels of their
-    /// component. Both maps are without padding.
-    pub fn propagate(&mut self, grid: &Grid, phase: &[f32], wrong_order: &mut [f32], quality: &mut [f32]) {
-        self.propagation.run(grid, phase, &self.components, wrong_order, quality);
     }
 
     /// Limits of every pixel by itself and with its eight neighbours.

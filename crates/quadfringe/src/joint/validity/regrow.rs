@@ -11,7 +11,7 @@ use crate::joint::params::validity::{AMBIGUOUS_REACH, BEND_MAX_RAD, FACING_REACH
 use std::f32::consts::PI;
 
 /// Mark of a pixel that was added to a component. The other pixels of a component have the mark 1.
-pub(super) const GROWN: u8 = 2;
+pub(in crate::joint) const GROWN: u8 = 2;
 
 /// Maps that decide whether a pixel may be added.
 #[derive(Clone, Copy)]

@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 #[derive(Debug, Clone)]
 pub(super) struct CostTable {
     /// Turns of the beats of G and IR in one turn of the first phase.
-    ratios: [f64; 2],
+    beat_ratios: [f64; 2],
     /// Beats of G and IR for every label at a wrapped phase of 0.
     beats: [Vec<u16>; 2],
     /// Phase difference of G and IR between every label and order 0.
@@ -36,14 +36,14 @@ struct Rotations {
 impl CostTable {
     pub fn new(code: &FourChannel) -> Self {
         let n = code.numbers();
-        let ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
+        let beat_ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
         let count = (code.orders() + 2).div_ceil(LANES) * LANES;
         let per_column = n[0] / code.projector_width as f64;
         let end = n[0] + 0.5 * per_column;
         let labels = || (0..count).map(|label| label as f64 - 1.0);
         let beats =
-            ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
-        let rotations = ratios.map(|ratio| {
+            beat_ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
+        let rotations = beat_ratios.map(|ratio| {
             let angle = |k: f64| TAU * (ratio * k).rem_euclid(1.0);
             Rotations {
                 cos: labels().map(|k| angle(k).cos() as f32).collect(),
@@ -53,7 +53,7 @@ impl CostTable {
             }
         });
         Self {
-            ratios,
+            beat_ratios,
             beats,
             rotations,
             last_turn: end - end.floor(),
@@ -75,7 +75,7 @@ impl CostTable {
             return;
         }
         let phase = f64::from(node.phase);
-        let predicted = self.ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
+        let predicted = self.beat_ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
         let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
         // Without usable pixels, the cost by cosines is 0 for all labels.
         let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };

@@ -1,15 +1,15 @@
-//! Step 9 for connected components: the order of a pixel is as certain as the order of its component.
+//! Step 11: the order of a pixel is as certain as the order of its component.
 //!
 //! Costs of orders are summed over windows. A window that sees both sides of a discontinuity makes the order doubtful on both. In
 //! a component the phase continues from pixel to pixel, and so does the order. A window some cells further inside sees only this
 //! component, and its order holds up to the discontinuity.
 
-use super::regrow::GROWN;
-use crate::joint::cells::Grid;
-use crate::joint::params::tasks::{GROUP, PROPAGATION_ROWS};
-use crate::joint::params::uncertainty::{
+use super::cells::Grid;
+use super::params::tasks::{GROUP, PROPAGATION_ROWS};
+use super::params::uncertainty::{
     DOUBTFUL, GROWN_PROBABILITY_MIN, PROPAGATION_CELLS, SETTLED_PROBABILITY_MIN,
 };
+use super::validity::GROWN;
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
