@@ -140,8 +140,7 @@ def test_a_wrong_argument_says_the_same_as_a_wrong_key(tmp_path: Path) -> None:
     lines = str(from_file.value).splitlines()[1:]
     assert str(from_python.value).splitlines()[1:] == lines
     assert (
-        lines[0].strip()
-        == "scene.surface: Input should be 'plane', 'peaks', 'steps', 'sphere', 'face' or 'hand', got 'cow'"
+        lines[0].strip() == "scene.surface: expected 'plane', 'peaks', 'steps', 'sphere', 'face' or 'hand', got 'cow'"
     )
     assert "  decode.methd: this key is not known; did you mean method?" in lines
     assert len(lines) == 3

@@ -56,7 +56,7 @@ def test_files_of_schema_1_are_read_and_of_3_refused(calibration: Calibration, t
     (tmp_path / "old.json").write_text(json.dumps(old))
     assert Calibration.load(tmp_path / "old.json").infrared is None
     (tmp_path / "new.json").write_text(json.dumps(old | {"schema_version": 3}))
-    with pytest.raises(ConfigError, match=r"schema_version: Input should be 1 or 2, got 3"):
+    with pytest.raises(ConfigError, match=r"schema_version: expected 1 or 2, got 3"):
         Calibration.load(tmp_path / "new.json")
 
 

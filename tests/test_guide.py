@@ -169,7 +169,7 @@ def test_folders_at_fault_are_explained(folder: Path, tmp_path: Path) -> None:
     mixed = tmp_path / "mixed"
     shutil.copytree(folder, mixed)
     for name in ("red", "green", "blue", "ir"):
-        write_image(mixed / "dark" / "02" / f"{name}.png", np.zeros((10, 12), np.uint8))
+        write_image(mixed / "dark" / "02" / f"{name}.png", np.zeros((10, 12), np.uint16))
     refused = run("run", "--captures", mixed, *out)
     assert (refused.exit_code, "12 x 10 pixels, the captures before it have 512 x 384" in refused.stderr) == (2, True)
     (mixed / "levels" / "r000_g000_b000_ir000_e100" / "ir.png").unlink()

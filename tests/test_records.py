@@ -149,7 +149,7 @@ def test_response_gives_everything_back(tmp_path: Path) -> None:
         ("{", "not valid JSON"),
         ("[]", "expected a JSON object, got list"),
         ('{"red": {"exponet": 2}}', "red.exponet: this key is not known"),
-        ('{"red": {"exponent": -2}}', "red.exponent: Input should be greater than 0, got -2"),
+        ('{"red": {"exponent": -2}}', "red.exponent: expected a number above 0, got -2"),
         ('{"schema_version": 9}', "schema_version"),
     ],
 )

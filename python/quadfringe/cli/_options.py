@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from quadfringe.config import DecodeConfig
 
 __all__ = [
     "METHODS",
@@ -22,6 +28,8 @@ __all__ = [
     "ShotsOption",
     "SystemFile",
     "VirtualSystemOption",
+    "decode_settings",
+    "in_words",
     "method_named",
 ]
 
@@ -90,5 +98,32 @@ METHODS = "joint|published"
 def method_named(name: str) -> str:
     """Return the method with this name; "best" is the name of joint in older scripts."""
     if name not in (*METHODS.split("|"), "best"):
-        raise typer.BadParameter(f"{name!r} is not one of {METHODS.replace('|', ', ')}")
+        raise typer.BadParameter(f"expected {METHODS.replace('|', ' or ')}, got {name!r}")
     return "joint" if name == "best" else name
+
+
+def in_words(error: typer.BadParameter) -> str:
+    """Say of a value of an option what was expected and what was given; typer lets pydantic say it."""
+    problems = getattr(error.__cause__, "errors", None)
+    if problems is None:
+        return error.message
+    from quadfringe.config import reason
+
+    problem = problems(include_url=False)[0]
+    chosen = re.fullmatch(r"(?:Value error, )?('.*') is not one of (.*?)\.?", problem["msg"])
+    return f"expected one of {chosen[2]}, got {chosen[1]}" if chosen else reason(problem)
+
+
+def decode_settings(options: Mapping[str, Any]) -> DecodeConfig:
+    """Make settings of the options that were given; an error names the options as they are typed."""
+    from quadfringe.config import DecodeConfig, checked
+    from quadfringe.errors import ConfigError
+
+    given = {name: value for name, value in options.items() if value is not None}
+    try:
+        return checked(DecodeConfig, given, "options")
+    except ConfigError as error:
+        words = re.sub(r'\b(\w+) = "(\w+)"', r"--\1 \2", str(error))
+        for name in options.keys() - {"method"}:  # the messages also use this one as a word
+            words = re.sub(rf"(?<!-)\b{name}\b", f"--{name.replace('_', '-')}", words)
+        raise ConfigError(words) from None

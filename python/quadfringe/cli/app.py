@@ -26,6 +26,7 @@ from quadfringe.cli import (
     simulate,
     target,
 )
+from quadfringe.cli._options import in_words
 from quadfringe.cli._output import complain
 from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
@@ -41,6 +42,9 @@ class Commands(TyperGroup):
         """Run the command and turn its errors into exit statuses."""
         try:
             return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = in_words(error)
+            raise
         except (BatchError, DecodeError, CameraError, RecordingError) as error:
             complain(str(error))
             raise typer.Exit(FAILED) from error

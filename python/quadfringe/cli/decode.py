@@ -17,6 +17,7 @@ from quadfringe.cli._options import (
     Fringes3,
     JsonOption,
     PredeformedOption,
+    decode_settings,
     method_named,
 )
 from quadfringe.cli._output import say, write_figures
@@ -135,17 +136,17 @@ def decode(
 ) -> None:
     """Decode the images of one shot to absolute phase, and with --calibration to millimetres."""
     from quadfringe import decoding
-    from quadfringe.config import DecodeConfig, Fringes, checked
+    from quadfringe.config import Fringes, checked
 
     _check_result(out, calibration)
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
     plan = decoding.Plan(
         projector_width,
-        Fringes(numbers=fringes, predeformed_z_mm=predeformed_z_mm),
+        checked(Fringes, {"numbers": fringes, "predeformed_z_mm": predeformed_z_mm}, "--fringes"),
         calibration,
         _response(response, linear),
-        checked(DecodeConfig, settings, "options"),
+        decode_settings(settings),
     )
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
     shape = decoding.decode(_shot(folder, files, bayer, bits), plan)

@@ -47,7 +47,7 @@ def doctor(
 
     The exit status is 1 when a fault is found.
     """
-    from quadfringe.config import Fringes
+    from quadfringe.config import Fringes, checked
     from quadfringe.data import Calibration
     from quadfringe.decoding import Plan
     from quadfringe.doctor import examine_calibration, examine_installation, examine_shot
@@ -58,7 +58,7 @@ def doctor(
     if calibration is not None:
         found += examine_calibration(calibration)
     if given.shot is not None:
-        plan = Plan(projector_width, Fringes(numbers=fringes), calibration)
+        plan = Plan(projector_width, checked(Fringes, {"numbers": fringes}, "--fringes"), calibration)
         found += examine_shot(_shot_in(given.shot, bayer), plan)
     _report(found, json)
 

@@ -40,7 +40,7 @@ def pattern(
     With --calibration and --predeformed-z-mm, the infrared image is pre-deformed for an infrared projector that is not
     aligned with the visible one. The correction is exact on the plane at that depth.
     """
-    from quadfringe.config import Fringes
+    from quadfringe.config import Fringes, checked
     from quadfringe.data import Calibration
     from quadfringe.devices.light import predeformation
     from quadfringe.devices.pattern_files import write_patterns
@@ -51,6 +51,7 @@ def pattern(
             "--calibration has no effect without --predeformed-z-mm, the depth of the reference plane; add it"
         )
     known = None if calibration is None else Calibration.load(calibration)
-    wanted = Fringes(numbers=fringes, layout=layout.value, predeformed_z_mm=predeformed_z_mm)
+    values = {"numbers": fringes, "layout": layout.value, "predeformed_z_mm": predeformed_z_mm}
+    wanted = checked(Fringes, values, "--fringes")
     for path in write_patterns(out, wanted.numbers, (width, height), layout.value, predeformation(wanted, known)):
         say(str(path))

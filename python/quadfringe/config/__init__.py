@@ -1,7 +1,8 @@
 """Settings: frozen data with units in names. A key that is not known is an error."""
 
-from quadfringe.config._base import Finite, Model, NotNegative, Positive, checked
+from quadfringe.config._base import SIZE_MAX, Finite, Model, NotNegative, Positive, checked
 from quadfringe.config._brief import brief, shortened
+from quadfringe.config._report import reason
 from quadfringe.config.cameras import (
     AnyCapture,
     AravisConfig,
@@ -26,6 +27,7 @@ from quadfringe.config.system import SystemConfig, check_system, load_system
 
 __all__ = [
     "IDENTITY",
+    "SIZE_MAX",
     "Affine",
     "AnyCapture",
     "AravisConfig",
@@ -61,5 +63,6 @@ __all__ = [
     "check_system",
     "checked",
     "load_system",
+    "reason",
     "shortened",
 ]

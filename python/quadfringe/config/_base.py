@@ -3,22 +3,25 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
-from difflib import get_close_matches
+from collections.abc import Callable, Mapping
 from inspect import Parameter, Signature
-from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from quadfringe.config._brief import brief, shortened
+from quadfringe.config._report import report
 from quadfringe.errors import ConfigError
 
-__all__ = ["Finite", "Model", "NotNegative", "Positive", "checked"]
+__all__ = ["SIZE_MAX", "Finite", "Model", "NotNegative", "Positive", "checked", "kernel_takes"]
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 DOC_WIDTH = 100
+# Pixels along one side of an image, columns of a projector: no device has as many, larger images would not fit into
+# memory, and up to 2^16 a float32 column is exact to 1/256.
+SIZE_MAX = 65536
 
 if TYPE_CHECKING:
     from pydantic._internal._model_construction import ModelMetaclass
@@ -42,7 +45,7 @@ class _ReportingMeta(ModelMetaclass):
             try:
                 return super().__call__(**values)
             except ValidationError as error:
-                raise ConfigError(_report(cls, error, cls.__name__)) from error
+                raise ConfigError(report(cls, error, cls.__name__)) from error
 
 
 class Model(BaseModel, metaclass=_ReportingMeta):
@@ -68,7 +71,7 @@ class Model(BaseModel, metaclass=_ReportingMeta):
         try:
             return super().model_validate(obj, **kwargs)
         except ValidationError as error:
-            raise ConfigError(_report(cls, error, cls.__name__)) from error
+            raise ConfigError(report(cls, error, cls.__name__)) from error
 
     def __repr__(self) -> str:
         fields = type(self).model_fields.items()
@@ -86,8 +89,16 @@ def checked(model: type[AnyModel], values: Mapping[str, Any], source: str) -> An
     try:
         made: AnyModel = model.__pydantic_validator__.validate_python(values)
     except ValidationError as error:
-        raise ConfigError(_report(model, error, source)) from error
+        raise ConfigError(report(model, error, source)) from error
     return made
+
+
+def kernel_takes(name: str, call: Callable[[], object]) -> None:
+    """Make something in the kernel of a setting; raise ValueError with what it expected if it refuses the setting."""
+    try:
+        call()
+    except ValueError as error:
+        raise ValueError(str(error).removeprefix(f"{name}: ").partition(", got ")[0]) from None
 
 
 def _with_fields(model: type[BaseModel]) -> str:
@@ -100,43 +111,3 @@ def _with_fields(model: type[BaseModel]) -> str:
         text = f"{name}: {field.description or ''}{default}"
         lines += textwrap.wrap(text, DOC_WIDTH, initial_indent="    ", subsequent_indent="        ")
     return "\n".join([head, "", "Fields", *lines, ""])
-
-
-def _report(model: type[BaseModel], error: ValidationError, source: str) -> str:
-    problems = [f"  {_path(p['loc'])}: {_reason(model, p)}" for p in error.errors(include_url=False)]
-    count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
-    return "\n".join([f"{source}: {count}", *problems])
-
-
-def _path(location: tuple[int | str, ...]) -> str:
-    """Join a path; words in parentheses are pydantic's names of alternatives."""
-    return ".".join(str(part) for part in location if not str(part).startswith("(")) or "(top level)"
-
-
-def _reason(model: type[BaseModel], problem: Any) -> str:
-    if problem["type"] == "extra_forbidden":
-        *parents, key = problem["loc"]
-        return f"this key is not known{_suggestion(model, parents, str(key))}"
-    if problem["type"] == "missing":
-        return "this key is required and missing"
-    return f"{problem['msg'].removeprefix('Value error, ')}, got {shortened(repr(problem['input']))}"
-
-
-def _suggestion(model: type[BaseModel], parents: list[int | str], key: str) -> str:
-    """Name the key that was probably meant: the most similar one of this table, or the same one of an inner table."""
-    models = [model]
-    for part in parents:
-        fields = [m.model_fields[part] for m in models if part in m.model_fields]
-        models = [found for field in fields for found in _models_in(field.annotation)] or models
-    known = {name: field for m in models for name, field in m.model_fields.items()}
-    if nearest := get_close_matches(key, known, 1):
-        return f"; did you mean {nearest[0]}?"
-    tables = [name for name, field in known.items() for m in _models_in(field.annotation) if key in m.model_fields]
-    return f"; it belongs to {' or '.join(dict.fromkeys(tables))}" if tables else ""
-
-
-def _models_in(annotation: Any) -> list[type[BaseModel]]:
-    """Find the models that a type is made of: itself, or the alternatives of a union."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    return [model for part in get_args(annotation) for model in _models_in(part)]

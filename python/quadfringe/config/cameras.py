@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -121,9 +122,9 @@ WORDS: dict[str, str | None] = {"virtual": None, "aravis": "device", "replay": "
 
 def _from_word(value: Any) -> Any:
     """Turn "kind:rest" into the table it stands for."""
-    if not isinstance(value, str):
+    if isinstance(value, (Mapping, Model)):
         return value
-    kind, colon, rest = value.partition(":")
+    kind, colon, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
     if kind not in WORDS or not colon:
         raise ValueError('expected "virtual:", "aravis:NAME" or "replay:FILE"')
     key = WORDS[kind]

@@ -11,13 +11,25 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
-from quadfringe.config._base import Finite, Model, NotNegative, Positive
+from quadfringe import _core
+from quadfringe.config._base import SIZE_MAX, Finite, Model, NotNegative, Positive, checked, kernel_takes
 
-__all__ = ["ChannelResponse", "DecodeConfig", "Fringes", "Response", "ResponseChoice", "ResponseSetting", "Row4"]
+__all__ = [
+    "ChannelResponse",
+    "DecodeConfig",
+    "Fringes",
+    "Response",
+    "ResponseChoice",
+    "ResponseSetting",
+    "Row4",
+    "three_numbers",
+]
 
+FringeNumbers = tuple[float, float, float]
 Row4 = tuple[Finite, Finite, Finite, Finite]
+SMALLEST = 16, 16  # rows and columns of the smallest image that the kernel decodes
 # Older settings and files call the joint method "best".
 Method = Annotated[Literal["published", "joint"], BeforeValidator(lambda v: "joint" if v == "best" else v)]
 
@@ -87,10 +99,13 @@ def _three(numbers: Any) -> Any:
     return found
 
 
-class Fringes(Model):
-    """The fringes that the projectors show. The kernel checks that the fringe numbers distinguish all columns."""
+Numbers = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_three)]
 
-    numbers: Annotated[tuple[float, float, float], BeforeValidator(_three)] = Field(
+
+class Fringes(Model):
+    """The fringes that the projectors show; the fringe numbers must distinguish all columns of a projector."""
+
+    numbers: Numbers = Field(
         default=(36.0, 35.0, 30.0),
         description="Fringes over the full projector width: of red and blue, of green, of infrared.",
     )
@@ -103,6 +118,27 @@ class Fringes(Model):
         description="Depth in mm of the plane for which the infrared image is pre-deformed (S11), from the calibration "
         "of both projectors. Absent: the image is plain. For projectors that are not quite coaxial.",
     )
+
+    @field_validator("numbers")
+    @classmethod
+    def _distinguish_columns(cls, numbers: FringeNumbers) -> FringeNumbers:
+        # A wider projector forbids no further numbers, so that numbers that fail here fail for every projector.
+        try:
+            _core.check_code(numbers, SIZE_MAX)
+        except ValueError:
+            raise ValueError(
+                "expected fringe numbers whose joint range covers the projector, such as (36, 35, 30)"
+            ) from None
+        return numbers
+
+
+class _ThreeNumbers(Model):
+    numbers: Numbers = Field(description="Fringe numbers, which need not distinguish all columns.")
+
+
+def three_numbers(given: Any) -> FringeNumbers:
+    """Give three fringe numbers for one stage alone; raises `ConfigError` for anything else."""
+    return checked(_ThreeNumbers, {"numbers": given}, "fringe numbers").numbers
 
 
 class DecodeConfig(Model):
@@ -124,15 +160,15 @@ class DecodeConfig(Model):
         description='"coaxial" (default) takes the infrared projector as coaxial with the visible one; "pair" searches '
         "the fringe order along the camera ray with the calibration of both projectors (method published).",
     )
-    depth_range_mm: tuple[NotNegative, Positive] | None = Field(
+    depth_range_mm: tuple[Finite, Finite] | None = Field(
         default=None,
         description='Nearest and farthest depth in mm that unwrapping = "pair" searches. Absent: all depths.',
     )
-    modulation_min: NotNegative | None = Field(
+    modulation_min: Finite | None = Field(
         default=None,
         description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels.",
     )
-    quality_min: Annotated[float, Field(ge=0, lt=1)] | None = Field(
+    quality_min: Finite | None = Field(
         default=None,
         description="Least quality of a valid pixel, from 0 to below 1. Raise it for fewer wrong orders and fewer "
         "pixels.",
@@ -145,6 +181,23 @@ class DecodeConfig(Model):
     threads: Annotated[int, Field(gt=0)] | None = Field(
         default=None, description="Threads of one decoder. Absent: as many as the machine has cores."
     )
+
+    @field_validator("modulation_min", "quality_min", "channel_instants_us")
+    @classmethod
+    def _decoder_takes(cls, value: Any, info: ValidationInfo) -> Any:
+        if value is not None and info.field_name is not None:
+            settings = {info.field_name: value}
+            kernel_takes(info.field_name, lambda: _core.Decoder(SMALLEST, (36, 35, 30), 912, **settings))
+        return value
+
+    @field_validator("depth_range_mm")
+    @classmethod
+    def _depths_grow(cls, depths: tuple[float, float] | None) -> tuple[float, float] | None:
+        if depths is not None:
+            bench, camera = _core.Bench(), _core.Device(1, 1, (1.0, 1.0), (0.0, 0.0))
+            devices = camera, bench.visible, bench.infrared
+            kernel_takes("depth_range_mm", lambda: _core.PairTable(*devices, (36, 35, 30), depth_range_mm=depths))
+        return depths
 
     @model_validator(mode="after")
     def _method_has_the_options(self) -> DecodeConfig:

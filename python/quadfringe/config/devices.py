@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
-from quadfringe.config._base import Finite, Model, Positive
+from quadfringe import _core
+from quadfringe.config._base import SIZE_MAX, Finite, Model, Positive, kernel_takes
 
 __all__ = ["IDENTITY", "Device", "Pixels", "Triple"]
 
-Pixels = Annotated[int, Field(gt=0, le=65536)]
+Pixels = Annotated[int, Field(gt=0, le=SIZE_MAX)]
 Triple = tuple[Finite, Finite, Finite]
 Matrix3 = tuple[Triple, Triple, Triple]
 IDENTITY: Matrix3 = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -36,3 +37,9 @@ class Device(Model):
     )
     rotation: Matrix3 = Field(default=IDENTITY, description="Rotation from the camera frame, row by row.")
     translation_mm: Triple = Field(default=(0.0, 0.0, 0.0), description="Translation from the camera frame, in mm.")
+
+    @field_validator("rotation")
+    @classmethod
+    def _is_a_rotation(cls, rotation: Matrix3) -> Matrix3:
+        kernel_takes("rotation", lambda: _core.Device(1, 1, (1.0, 1.0), (0.0, 0.0), rotation=rotation))
+        return rotation

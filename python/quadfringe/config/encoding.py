@@ -16,13 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.config.decode import Fringes
+from quadfringe.config._base import SIZE_MAX
+from quadfringe.config.decode import three_numbers
 from quadfringe.errors import InputError
 
 __all__ = ["check_code", "optimum", "pattern"]
 
 CHANNELS = {"red": "R", "green": "G", "blue": "B", "ir": "IR"}
-SIZE_MAX = 65536  # pixels along one side of an image; beyond it an image would not fit into memory
 
 
 def optimum(n: int, projector_width: int) -> list[float]:
@@ -35,7 +35,7 @@ def optimum(n: int, projector_width: int) -> list[float]:
 
 def check_code(fringe_numbers: Sequence[float], projector_width: int) -> float:
     """Give the ambiguity margin in rad; ValueError when the joint range does not cover the projector."""
-    return _core.check_code(_numbers(fringe_numbers), _whole("projector_width", projector_width))
+    return _core.check_code(three_numbers(fringe_numbers), _whole("projector_width", projector_width))
 
 
 def pattern(
@@ -54,11 +54,7 @@ def pattern(
     if letters not in CHANNELS.values():
         raise InputError(f"channel: expected one of {', '.join(CHANNELS)}, or R, G, B, IR, got {channel!r}")
     size = _whole("width", width), _whole("height", height)
-    return _core.pattern(letters, _numbers(fringe_numbers), *size, layout=layout)
-
-
-def _numbers(given: Any) -> tuple[float, float, float]:
-    return Fringes.model_validate({"numbers": given}).numbers
+    return _core.pattern(letters, three_numbers(fringe_numbers), *size, layout=layout)
 
 
 def _whole(name: str, value: Any) -> int:

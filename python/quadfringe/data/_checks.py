@@ -23,6 +23,8 @@ def check_images(images: Mapping[str, Any]) -> None:
         if image.ndim != 2:
             colour = "; give each plane of a colour image as a channel" if image.ndim == 3 else ""
             raise InputError(f"{wanted}, got an array of shape {image.shape}{colour}")
+        if not image.size:
+            raise InputError(f"{wanted}, got one without pixels, of shape {image.shape}")
         if image.dtype.name not in DTYPES:
             raise InputError(f"{wanted}, got {image.dtype.name}; convert it, fractions of full scale to float32")
     _check_equal("size", {name: f"{image.shape[1]} x {image.shape[0]}" for name, image in images.items()})
@@ -40,7 +42,7 @@ def check_maps(maps: Mapping[str, Any]) -> None:
     for name, values in maps.items():
         last = (3,) if name.startswith("xyz") else ()
         shape = values.shape if isinstance(values, np.ndarray) else None
-        if shape is None or shape[2:] != last or len(shape) < 2:
+        if shape is None or shape[2:] != last or len(shape) < 2 or 0 in shape:
             got = type(values).__name__ if shape is None else f"an array of shape {shape}"
             raise InputError(f"{name}: expected an array {'(H, W, 3)' if last else '(H, W)'}, got {got}")
     _check_equal("size", {name: f"{values.shape[1]} x {values.shape[0]}" for name, values in maps.items()})

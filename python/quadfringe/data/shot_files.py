@@ -34,8 +34,8 @@ def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | 
 
     The names are `ir`, and `rgb` or all of `red`, `green`, `blue`; with `bayer` (rggb, grbg, gbrg or bggr) they are
     `raw`, the mosaic of a Bayer chip, and `ir`. In a folder they are followed by .png, .tif, .tiff or .bmp. `bits` is
-    the number of bits in use in 16-bit files, 10 or 12 for example. Files of different depth become float32 fractions
-    of full scale. Raises `InputError` that names the file at fault.
+    the number of bits in use in 16-bit files, 10 or 12 for example; other files have none to choose. Files of different
+    depth become float32 fractions of full scale. Raises `InputError` that names the file or argument at fault.
 
     >>> import tempfile
     >>> import numpy as np
@@ -51,6 +51,7 @@ def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | 
     except InputError as error:
         raise error if isinstance(source, Mapping) else InputError(f"{source}: {error}") from None
     images = _read(given)
+    _check_bits(bits, images, given["ir"])
     full_scales = {name: _full_scale(image, bits, given.get(name)) for name, image in images.items()}
     if len({image.dtype for image in images.values()}) > 1:
         images = {name: (image / full_scales[name]).astype(np.float32) for name, image in images.items()}
@@ -115,6 +116,15 @@ def _read(given: Mapping[str, Path]) -> dict[str, NDArray[Any]]:
         colour = read_rgb(given["rgb"])
         images |= {name: colour[:, :, i] for i, name in enumerate(COLOURS)}
     return images
+
+
+def _check_bits(bits: int | None, images: Mapping[str, NDArray[Any]], path: Path) -> None:
+    if bits is None:
+        return
+    if not isinstance(bits, (int, np.integer)) or not 1 <= bits <= 16:
+        raise InputError(f"bits: expected the number of bits in use, from 1 to 16, such as 12, got {bits!r}")
+    if all(image.dtype != np.uint16 for image in images.values()):
+        raise InputError(f"{path}: expected uint16 pixels for bits = {bits}, got {images['ir'].dtype}; leave bits out")
 
 
 def _full_scale(image: NDArray[Any], bits: int | None, path: Path | None) -> float:

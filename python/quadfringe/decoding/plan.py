@@ -9,14 +9,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from quadfringe import _core
-from quadfringe.config import DecodeConfig, Fringes, Response, ResponseChoice, brief, checked, shortened
+from quadfringe.config import SIZE_MAX, DecodeConfig, Fringes, Response, ResponseChoice, brief, checked, shortened
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.errors import InputError
 
 __all__ = ["Plan", "calibration_of", "check_plan", "response_of", "stated_response"]
-
-# Column coordinates are float32: up to 2^16 they are exact to 1/256 of a column. No projector has as many.
-COLUMNS_MAX = 65536
 
 
 @dataclass(frozen=True, init=False, repr=False)
@@ -51,9 +48,10 @@ class Plan:
         decode: DecodeConfig | Mapping[str, Any] = DecodeConfig(),
     ) -> None:
         settings = decode if isinstance(decode, DecodeConfig) else checked(DecodeConfig, decode, "decode")
+        columns = _columns(projector_width_px)
         fields = {
-            "projector_width_px": _columns(projector_width_px),
-            "fringes": _fringes(fringes),
+            "projector_width_px": columns,
+            "fringes": _fringes(fringes, columns),
             "calibration": calibration_of(calibration),
             "response": response_of(response, settings.response),
             "decode": settings.model_copy(update={"response": "auto"}),
@@ -94,13 +92,18 @@ def _columns(width: Any) -> int:
         columns = index(width)
     except TypeError:
         raise InputError(f"{wanted}, got {width!r}") from None
-    if not 2 <= columns <= COLUMNS_MAX:
-        raise InputError(f"{wanted}, from 2 to {COLUMNS_MAX}, got {columns}")
+    if not 2 <= columns <= SIZE_MAX:
+        raise InputError(f"{wanted}, from 2 to {SIZE_MAX}, got {columns}")
     return columns
 
 
-def _fringes(fringes: Fringes | Sequence[float]) -> Fringes:
-    return fringes if isinstance(fringes, Fringes) else checked(Fringes, {"numbers": fringes}, "fringes")
+def _fringes(fringes: Fringes | Sequence[float], columns: int) -> Fringes:
+    found = fringes if isinstance(fringes, Fringes) else checked(Fringes, {"numbers": fringes}, "fringes")
+    try:
+        _core.check_code(found.numbers, columns)
+    except ValueError as error:
+        raise InputError(str(error)) from None
+    return found
 
 
 def calibration_of(calibration: Any) -> Calibration | None:

@@ -47,7 +47,8 @@ from quadfringe._core import (
     unwrap,
     wrong_order_probability,
 )
-from quadfringe.config import ChannelResponse, Fringes, Response, ResponseChoice, brief
+from quadfringe.config import ChannelResponse, Response, ResponseChoice, brief
+from quadfringe.config.decode import three_numbers
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
@@ -177,7 +178,7 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes cross
     the rows.
     """
-    first, second, third = _three(fringe_numbers)
+    first, second, third = three_numbers(fringe_numbers)
     _check_light(light)
     red, blue = light["red"], light["blue"]
     period_px = row_period(red)
@@ -237,10 +238,6 @@ def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tupl
     wrapped = demodulate(light, fringe_numbers)
     green_rad, infrared_rad = (_wrap(wrapped.repeated(phase)) for phase in (wrapped.green_rad, wrapped.infrared_rad))
     return wrapped.phase_rad, green_rad, infrared_rad
-
-
-def _three(fringe_numbers: FringeNumbers) -> FringeNumbers:
-    return Fringes.model_validate({"numbers": fringe_numbers}).numbers
 
 
 def _check_light(light: object) -> None:
