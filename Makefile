@@ -93,7 +93,7 @@ figures: $(STAMPS)/built
 	$(BIN)/python evaluation/figures.py
 
 # Accuracy into evaluation/RESULTS.md.
-evaluation: $(STAMPS)/built
+evaluation: $(STAMPS)/photographs
 	$(BIN)/python evaluation/results.py
 
 # Times, memory and other packages into benches/RESULTS.md; run it on an idle machine.
@@ -106,6 +106,11 @@ peers: $(STAMPS)/peers
 $(STAMPS)/peers: $(STAMPS)/built benches/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps "Fringes>=2.1,<3"
+	touch $@
+
+# The photographs that evaluation/world.py paints on surfaces.
+$(STAMPS)/photographs: $(STAMPS)/built
+	$(BIN)/pip install --quiet --disable-pip-version-check "scikit-image>=0.24"
 	touch $@
 
 format: $(STAMPS)/tools

@@ -89,6 +89,14 @@ def test_tables_are_written_from_records() -> None:
     assert "no test data" in text
 
 
+def test_scenes_are_rows_and_the_rest_is_listed() -> None:
+    figures = {f"face_{key}": float(n) for n, key in enumerate(report.WORLD)}
+    text = report.world_section({"figures": figures | {"edge_px": 1.5, "face_stated_wrong_percent": 3.0}}, "tune")
+    assert "| face | 0 | 1 | 2 | 3 | 4 | 5 | 6 | 7 | 8 | 9 |" in text
+    assert "| edge_px | 1.5 |" in text
+    assert "stated" not in text
+
+
 def test_a_script_without_figures_stops_the_report() -> None:
     with pytest.raises(SystemExit, match="no figures, exit status 2"):
         report.measured(str(ROOT / "benches" / "peers.py"), "--skip", "nobody")

@@ -13,6 +13,19 @@ from typing import Any
 
 Record = dict[str, Any]
 METHODS = ("published", "joint")
+# Columns of the table of scenes that resemble real objects: figure and title.
+WORLD = {
+    "rms_mm": "RMS, mm",
+    "median_mm": "median",
+    "p95_mm": "95 %",
+    "p99_mm": "99 %",
+    "rim_rms_mm": "rims, RMS",
+    "returned_percent": "returned, %",
+    "wrong_percent": "wrong, %",
+    "inside_1_percent": "inside 1, %",
+    "inside_2_percent": "2",
+    "inside_3_percent": "3",
+}
 
 
 def measured(*command: str) -> Record:
@@ -66,5 +79,23 @@ def accuracy_section(found: Record) -> str:
             "`python evaluation/accuracy.py`. The head of the script explains each figure; the module "
             "quadfringe.evaluation.efficiency defines the efficiency.\n",
             table(("figure", *METHODS), lines) + missing,
+        ]
+    )
+
+
+def world_section(found: Record, half: str) -> str:
+    """Give the figures of evaluation/world.py: a row for each scene, and the rest as a list."""
+    figures: dict[str, float] = found["figures"]
+    scenes = [key.removesuffix("_median_mm") for key in figures if key.endswith("_median_mm")]
+    lines = [(scene, *(figures[f"{scene}_{key}"] for key in WORLD)) for scene in scenes]
+    listed = {f"{scene}_{key}" for scene in scenes for key in WORLD}
+    rest = [(key, value) for key, value in figures.items() if key not in listed and "stated_wrong" not in key]
+    return "\n".join(
+        [
+            "## Scenes that resemble real objects, and resolution\n",
+            f"`python evaluation/world.py --half {half}`: depth errors of the joint method at 3 % noise. The module "
+            "quadfringe.evaluation.world draws the scenes and defines the figures.\n",
+            table(("scene", *WORLD.values()), lines),
+            table(("figure", "value"), rest),
         ]
     )
