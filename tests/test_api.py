@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import quadfringe as qf
-from quadfringe import errors
+from quadfringe import data, errors
 from quadfringe.files import atomic
 
 ROOT = Path(__file__).parents[1]
@@ -129,6 +129,12 @@ def test_read_shot_says_what_is_wrong(source: Any, reason: str) -> None:
 
 
 def test_read_shot_names_an_empty_folder(tmp_path: Path) -> None:
+    with pytest.raises(
+        qf.InputError, match=rf"{tmp_path}: no image of a shot in it; expected red.png, .* and ir.png, or rgb.png"
+    ):
+        qf.read_shot(tmp_path)
+    data.write_shot(tmp_path, qf.Shot(*np.zeros((4, 6, 8), np.uint8)))
+    (tmp_path / "ir.png").unlink()
     with pytest.raises(qf.InputError, match=rf"{tmp_path}: no image for ir, the infrared channel: add ir.png"):
         qf.read_shot(tmp_path)
     (tmp_path / "file.png").write_bytes(b"")

@@ -51,12 +51,21 @@ def test_options_go_with_their_method() -> None:
     assert qf.DecodeConfig(channel_instants_us=(0, 1, 2, 3)).channel_instants_us == (0, 1, 2, 3)
 
 
-def test_an_object_without_a_record_has_a_repr_of_one_line(small_bench: Path) -> None:
+def test_an_object_without_a_record_has_a_repr_of_one_line(small_bench: Path, tmp_path: Path) -> None:
     with qf.open(small_bench) as scanner:
         shot = scanner.grab()
         wrapped = qf.stages.demodulate(qf.stages.linear_light(shot), scanner.config.fringes.numbers)
         decoder = qf.Decoder(shot, scanner.plan)
-        for made in (scanner, scanner.camera, scanner.projector, decoder, wrapped):
+        take = tmp_path / "take.h5"
+        with qf.recording.Recorder(take) as recorder:
+            recorder.write(shot)
+        with qf.recording.Recording(take) as recording, qf.open_camera(f"replay:{take}") as replay:
+            stream = scanner.stream(1)
+            assert [measured.shape is not None for measured in stream] == [True]
+            others = (recording, replay, stream, qf.devices.ExternalLight())
+        assert repr(recording) == "Recording(take.h5, 1 shots of 512 x 384 uint8)"
+        assert "response='" in repr(stream.statistics()) or "response=Response" in repr(stream.statistics())
+        for made in (scanner, scanner.camera, scanner.projector, decoder, wrapped, *others):
             assert type(made).__name__ in repr(made)
             assert " at 0x" not in repr(made)
             assert len(repr(made)) <= 120

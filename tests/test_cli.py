@@ -121,6 +121,10 @@ def test_a_folder_is_given_alone(small_bench: Path, tmp_path: Path) -> None:
     out = ["--out", tmp_path / "x.npz"]
     result = run("decode", small_bench, "--ir", small_bench / "ir.png", *FRINGES, *out)
     refused(result, 2, "leave out --ir, or the folder")
+    refused(
+        run("decode", tmp_path, *FRINGES, *out), 2, "no image of a shot in it; expected red.png, green.png, blue.png"
+    )
+    write_image(tmp_path / "red.png", read_image(small_bench / "red.png"))
     refused(run("decode", tmp_path, *FRINGES, *out), 2, "no image for ir, the infrared channel: add ir.png")
 
 
@@ -260,5 +264,12 @@ def test_info_tells_what_a_file_holds(small_bench: Path, tmp_path: Path) -> None
         assert result.exit_code == 0, result.output
         assert text in result.stdout
     refused(run("info", tmp_path / "no.npz"), 2, "no.npz")
+    (tmp_path / "figures.json").write_text('{"figures": {"face_depth_rms_mm": 0.05}}')
+    assert run("info", tmp_path / "figures.json").stdout.split("\n")[:2] == [
+        "Figures of a command",
+        "face_depth_rms_mm: 0.05",
+    ]
+    (tmp_path / "other.json").write_text('{"findings": []}')
+    refused(run("info", tmp_path / "other.json"), 2, "expected a calibration,", "got JSON with the keys findings")
     (tmp_path / "a.txt").touch()
     refused(run("info", tmp_path / "a.txt"), 2, "a.txt")

@@ -90,7 +90,7 @@ def test_one_number_stands_for_all_channels(tmp_path: Path) -> None:
 
 def test_channels_that_are_left_out_are_linear() -> None:
     response = Response.model_validate({"red": {"exponent": 0.5}})
-    assert response.rows() == [(0.0, 0.5, 0.0), *[(0.0, 1.0, 0.0)] * 3]
+    assert response.rows == [(0.0, 0.5, 0.0), *[(0.0, 1.0, 0.0)] * 3]
 
 
 VISIBLE = {"port": "1-1", "hdmi": {"output": "HDMI-1"}}

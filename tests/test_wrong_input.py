@@ -230,3 +230,22 @@ def test_a_command_says_what_an_option_expects(arguments: tuple[object, ...], re
     assert reason in said
     assert "None" not in said
     assert "top level" not in said
+
+
+# Files of another kind
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".tif"])
+def test_a_shape_is_loaded_from_npz(tmp_path: Path, suffix: str) -> None:
+    with pytest.raises(qf.InputError, match=rf"shape{suffix}: expected a shape saved as .npz; .ply and .tif hold only"):
+        qf.Shape.load(tmp_path / f"shape{suffix}")
+    (tmp_path / "x.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    with pytest.raises(
+        qf.InputError, match=r"x.png: expected an archive of arrays \(\.npz\), got another kind of file$"
+    ):
+        qf.Shape.load(tmp_path / "x.png")
+
+
+def test_a_size_of_one_entry_is_written_as_a_tuple() -> None:
+    with pytest.raises(qf.InputError, match=r"expected a shot or a size \(rows, columns\), got \(768,\)"):
+        qf.Decoder((768,), qf.Plan(912))

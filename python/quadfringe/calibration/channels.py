@@ -225,9 +225,7 @@ def _errors(plan: LevelPlan, lit: Array, captured: Array, known: dict[str, Any])
 def _conditioned(captured: Array, known: dict[str, Any]) -> Array:
     """Condition mean intensities (K, 4) as the decoder conditions pixels; returns linear light (K, 4)."""
     images = [np.ascontiguousarray(column[None], np.float32) for column in np.nan_to_num(captured).T]
-    rows: dict[str, Any] = {
-        name: value.rows() if isinstance(value, Response) else value for name, value in known.items()
-    }
+    rows: dict[str, Any] = {name: value.rows if isinstance(value, Response) else value for name, value in known.items()}
     light = _core.linear_light(images[0], images[1], images[2], images[3], **rows)
     return np.stack([light[name][0] for name in CHANNELS], axis=1).astype(float)
 

@@ -14,7 +14,8 @@ __all__ = ["info"]
 
 def info(
     file: Annotated[
-        Path, typer.Argument(help="A shape, calibration, camera response, system file, recording or image.")
+        Path,
+        typer.Argument(help="A shape, calibration, camera response, file of figures, system file, recording or image."),
     ],
 ) -> None:
     """Describe a file: its maps and their ranges, its settings, its calibration."""

@@ -16,7 +16,9 @@ def brief(value: Any) -> str:
         return f"{value:.6g}"
     if isinstance(value, (tuple, list)):
         words = [brief(item) for item in value[:SHOWN]] + ["..."] * (len(value) > SHOWN)
-        return f"({', '.join(words)})" if isinstance(value, tuple) else f"[{', '.join(words)}]"
+        if isinstance(value, list):
+            return f"[{', '.join(words)}]"
+        return f"({', '.join(words)}{',' * (len(words) == 1)})"
     return shortened(repr(value))
 
 

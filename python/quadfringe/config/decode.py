@@ -53,6 +53,7 @@ class Response(Model):
     blue: ChannelResponse = Field(default=ChannelResponse(), description="Response of the blue channel.")
     ir: ChannelResponse = Field(default=ChannelResponse(), description="Response of the infrared channel.")
 
+    @property
     def rows(self) -> list[tuple[float, float, float]]:
         """Offset, exponent and knee of R, G, B, IR."""
         return [(c.offset, c.exponent, c.knee) for c in (self.red, self.green, self.blue, self.ir)]

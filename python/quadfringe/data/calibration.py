@@ -133,10 +133,10 @@ def conditioning(calibration: Calibration | None, response: ResponseChoice | Non
     elif response == "linear":
         response = None
     known = {
-        "response": response.rows() if response else None,
+        "response": response.rows if response else None,
         "dark": calibration.dark if calibration else None,
         "crosstalk": calibration.crosstalk if calibration else None,
-        "projector_response": projector.rows() if projector else None,
+        "projector_response": projector.rows if projector else None,
         "ir_registration": calibration.ir_registration if calibration else None,
     }
     return {name: value for name, value in known.items() if value is not None}

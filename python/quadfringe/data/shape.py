@@ -144,7 +144,10 @@ class Shape:
         """Read what `save` wrote as NPZ; raises `InputError` for any other file."""
         from quadfringe.io.export import read_npz
 
-        stored = read_npz(Path(path))
+        path = Path(path)
+        if path.suffix.lower() in SUFFIXES[1:]:
+            raise InputError(f"{path}: expected a shape saved as .npz; .ply and .tif hold only a part of one")
+        stored = read_npz(path)
         missing = [name for name in MAPS if name not in stored]
         if missing:
             raise InputError(f"{path}: not a saved shape: no {', '.join(missing)}")

@@ -20,6 +20,7 @@ __all__ = ["SUFFIXES", "read_shot", "write_shot"]
 COLOURS = ("red", "green", "blue")
 NAMES = ("rgb", *COLOURS, "raw", "ir")
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp")
+IN_FOLDER = "red.png, green.png, blue.png and ir.png, or rgb.png and ir.png, or raw.png and ir.png"
 Source = Mapping[str, Path | str | None] | Path | str
 
 
@@ -71,8 +72,10 @@ def _files_of(source: Any, bayer: BayerPattern | None) -> dict[str, Path]:
     folder = Path(source)
     if not folder.is_dir():
         reason = "a file, not a folder" if folder.exists() else "no such folder"
-        raise InputError(f"{folder}: {reason}; expected a folder with red.png, green.png, blue.png and ir.png")
+        raise InputError(f"{folder}: {reason}; expected a folder with {IN_FOLDER}")
     found = {name: path for name in NAMES if (path := _image_of(folder, name)) is not None}
+    if not found:
+        raise InputError(f"{folder}: no image of a shot in it; expected {IN_FOLDER}")
     # A folder may hold the mosaic and the planes that a camera made of it; `bayer` says which of them is meant.
     others = (*COLOURS, "rgb") if bayer is not None else ("raw",) * bool(found.keys() - {"raw", "ir"})
     return {name: path for name, path in found.items() if name not in others}

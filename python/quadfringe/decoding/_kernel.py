@@ -35,7 +35,7 @@ class KernelDecoder:
         self._size, self._full_scale, self.plan = size, full_scale, plan
         self._idle = idle or [self._planned()]
         self._described = (
-            plan.described() | self._response_described(source) | {"decode": _rounded(self._idle[0].settings())}
+            plan.described | self._response_described(source) | {"decode": _rounded(self._idle[0].settings())}
         )
 
     @property

@@ -64,8 +64,9 @@ class Plan:
         words += [f"response={self.response!r}", f"decode={self.decode}"]
         return shortened(f"Plan({', '.join(words)})")
 
+    @property
     def described(self) -> dict[str, Any]:
-        """Describe what is decoded, as plain data for a saved file; the decoder adds response and settings in force."""
+        """What is decoded, as plain data for a saved file; the decoder adds response and settings in force."""
         return {
             "quadfringe_version": _core.__version__,
             "projector_width_px": self.projector_width_px,

@@ -84,5 +84,5 @@ def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | Literal["li
 
 
 def _settled(one: Response, other: Response) -> bool:
-    pairs = zip(one.rows(), other.rows(), strict=True)
+    pairs = zip(one.rows, other.rows, strict=True)
     return all(abs(a[1] - b[1]) <= SETTLED * b[1] for a, b in pairs)

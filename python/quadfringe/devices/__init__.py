@@ -138,6 +138,9 @@ class Camera(Protocol):
 class ExternalLight:
     """A projector outside the system: its fringes are shown by other means, or were shown during a recording."""
 
+    def __repr__(self) -> str:
+        return "ExternalLight()"
+
     def show(self, light: Light) -> None:
         """Do nothing for fringes; raise `ConfigError` for the light of a calibration, which nothing would show."""
         if not isinstance(light, Fringes):

@@ -159,6 +159,9 @@ class ProjectorPair:
             self.infrared = opened.enter_context(PatternProjector(config.infrared, colour=False))
             self._opened = opened.pop_all()
 
+    def __repr__(self) -> str:
+        return f"ProjectorPair({self.visible.config.port}, {self.infrared.config.port})"
+
     def show(self, light: Light) -> None:
         """Show this light until the next call.
 

@@ -27,6 +27,9 @@ DAMAGED = (
 )
 
 
+NUMPY_FILES = {"NPZ": "an archive of arrays (.npz)", "NPY": "a single array (.npy)"}
+
+
 def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Convert modulation (H, W) to a grey picture (H, W, 3) uint8; it follows the albedo and shows no fringes."""
     top = np.nanquantile(modulation, 0.99) if np.isfinite(modulation).any() else 1.0
@@ -82,9 +85,11 @@ def read_npy(path: Path) -> NDArray[Any]:
 
 
 def _load(path: Path, kind: str) -> NDArray[Any] | dict[str, NDArray[Any]]:
-    stream = BytesIO(read_bytes(path))
+    data = read_bytes(path)
+    if data and not data.startswith((b"PK", np.lib.format.MAGIC_PREFIX)):
+        raise InputError(f"{path}: expected {NUMPY_FILES[kind]}, got another kind of file")
     try:
-        stored = np.load(stream, allow_pickle=False)
+        stored = np.load(BytesIO(data), allow_pickle=False)
         return stored if isinstance(stored, np.ndarray) else {name: stored[name] for name in stored.files}
     except DAMAGED as error:
         raise InputError(f"{path}: not a readable {kind} file: {error}") from error

@@ -87,12 +87,12 @@ class Header:
         other = Header.of(shot, self.config, self.calibration)
         if other != self:
             raise InputError(
-                f"recording: expected {self.described()}, got a shot with {other.described()}; start another file for "
-                "it"
+                f"recording: expected {self.described}, got a shot with {other.described}; start another file for it"
             )
 
+    @property
     def described(self) -> str:
-        """Describe the images with size, type and full scale."""
+        """The images with size, type and full scale, in words."""
         kind = ", ".join(self.images) + (f" ({self.bayer})" if self.bayer else "")
         device = f" from {self.device}" if self.device else ""
         return f"{kind} of {self.width_px} x {self.height_px} {self.dtype}, full scale {self.full_scale:g}{device}"

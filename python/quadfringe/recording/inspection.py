@@ -31,7 +31,7 @@ def lines_about(path: Path) -> list[str]:
     if suffix == ".npy":
         return _arrays({"array": read_npy(path)})
     if suffix == ".json":
-        return _calibration(path)
+        return _json(path)
     if suffix == ".toml":
         return load_system(path).model_dump_json(indent=2, exclude_none=True).splitlines()
     if suffix in IMAGES:
@@ -60,12 +60,19 @@ def _array(name: str, array: NDArray[Any]) -> str:
     return f"{size}, {values.min():.6g} to {values.max():.6g}, {100 * finite.mean():.1f} % valid"
 
 
-def _calibration(path: Path) -> list[str]:
+def _json(path: Path) -> list[str]:
     try:
-        keys = set(json.loads(read_bytes(path)))
-    except (ValueError, TypeError) as error:
+        values = json.loads(read_bytes(path))
+    except ValueError as error:
         raise ConfigError(f"{path}: not valid JSON: {error}") from error
+    keys = set(values) if isinstance(values, dict) else set()
+    if "figures" in keys and isinstance(values["figures"], dict):
+        return ["Figures of a command", *(f"{name}: {value}" for name, value in values["figures"].items())]
     known_by = Calibration if {"camera", "projector"} & keys else ResponseCalibration
+    if keys and not keys & set(known_by.model_fields):
+        raise InputError(
+            f"{path}: expected a calibration, a camera response or figures, got JSON with the keys {', '.join(values)}"
+        )
     loaded = known_by.load(path)
     return [
         type(loaded).__name__,
@@ -76,7 +83,7 @@ def _calibration(path: Path) -> list[str]:
 def _recording(path: Path) -> list[str]:
     with Recording(path) as recording:
         times_us = recording.times_us
-        lines = [f"Recording: {len(recording)} shots of {recording.header.described()}"]
+        lines = [f"Recording: {len(recording)} shots of {recording.header.described}"]
         if len(recording):
             lost = int(recording.ids[-1] - recording.ids[0]) + 1 - len(recording)
             begin = datetime.fromtimestamp(times_us[0] / 1e6, UTC).isoformat(timespec="milliseconds")

@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.config import SystemConfig
+from quadfringe.config import SystemConfig, shortened
 from quadfringe.data import AnyShot, Calibration, Stamp
 from quadfringe.errors import InputError
 from quadfringe.recording._layout import Header, crcs_of, stamp_at
@@ -52,6 +52,10 @@ class Recording:
             if isinstance(error, InputError):
                 raise
             raise InputError(f"{path}: damaged recording: {error}; copy it again from where it was recorded") from error
+
+    def __repr__(self) -> str:
+        size = f"{self.header.width_px} x {self.header.height_px} {self.header.dtype}"
+        return shortened(f"Recording({self.path.name}, {len(self)} shots of {size})")
 
     @property
     def config(self) -> SystemConfig | None:

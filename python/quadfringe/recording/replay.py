@@ -35,6 +35,9 @@ class ReplayCamera:
         self._closed = Event()
         self.paced = speed == "original"
 
+    def __repr__(self) -> str:
+        return f"ReplayCamera({self._recording!r}, {self._next} played)"
+
     @property
     def name(self) -> str:
         """Name of the file."""

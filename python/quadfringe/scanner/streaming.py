@@ -68,7 +68,8 @@ class StreamStatistics:
     def __repr__(self) -> str:
         dropped = {name: queue.dropped for name, queue in self.queues.items()}
         rates = f"captured_per_s={self.captured_per_s:.1f}, decoded_per_s={self.decoded_per_s:.1f}"
-        return shortened(f"StreamStatistics({rates}, refused={self.refused}, dropped={dropped}, fault={self.fault!r})")
+        state = f"refused={self.refused}, dropped={dropped}, fault={self.fault!r}, response={self.response!r}"
+        return shortened(f"StreamStatistics({rates}, {state})")
 
 
 class _Rate:
@@ -142,6 +143,10 @@ class LiveStream:
         ]
         for thread in self._threads:
             thread.start()
+
+    def __repr__(self) -> str:
+        ended = ", ended" if self._stop.is_set() else ""
+        return shortened(f"LiveStream({self._camera!r}, {self._given} shots decoded{ended})")
 
     def _capture(self) -> None:
         with _ErrorsTo(self._end):

@@ -59,6 +59,9 @@ class _Running(Generic[Item]):
             for _ in numbers() if count is None else range(count):
                 yield self._next(link, queue, None)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self.name})"
+
     @contextmanager
     def _run(self, keep: Keep, borrow: bool) -> Iterator[tuple[Link, DroppingQueue[Item]]]:
         if not self._in_use.acquire(blocking=False):
