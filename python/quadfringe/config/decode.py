@@ -147,7 +147,7 @@ class DecodeConfig(Model):
 
     method: Method | None = Field(
         default=None,
-        description='"joint" fits all channels together (default); "published" is the chain of the paper, some ten '
+        description='"joint" fits all channels together (default); "published" is the chain of the paper, about ten '
         'times as fast, and less accurate at edges and on textured surfaces. "best" is an older name of "joint".',
     )
     response: ResponseSetting = Field(
