@@ -152,4 +152,4 @@ def test_the_command_line_says_it(tmp_path: Path) -> None:
     empty = tmp_path / "empty"
     empty.mkdir()
     missing = CliRunner().invoke(app, ["doctor", str(empty)])
-    assert (missing.exit_code, "no image for ir" in missing.stderr) == (2, True)
+    assert (missing.exit_code, "no image of a shot in it; expected red.png" in missing.stderr) == (2, True)

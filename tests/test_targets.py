@@ -211,12 +211,12 @@ def test_charuco_boards_are_those_of_opencv() -> None:
 
 def test_boards_that_cannot_be_drawn_are_refused() -> None:
     for make, words in (
-        (lambda: ring_board(pitch_mm=-1), "greater than 0"),
+        (lambda: ring_board(pitch_mm=-1), "pitch_mm: expected a number above 0, got -1"),
         (lambda: ring_board(diameter_mm=19), "less than 14 mm"),
         (lambda: ring_board(hole_mm=11.9), "at most 0.8"),
         (lambda: charuco_board(marker_mm=25), "less than 20 mm"),
         (lambda: Target(kind="circles", rows=9, columns=12, pitch_mm=20), "expected diameter_mm"),
-        (lambda: circle_grid(rows=1), "greater than or equal to 3"),
+        (lambda: circle_grid(rows=1), "rows: expected a number of at least 3, got 1"),
     ):
         with pytest.raises((ConfigError, ValueError), match=words):
             make()
