@@ -17,7 +17,10 @@ KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
 
-test: rust python test-usb test-camera test-live
+# The kernel's tests and the wheel are compiled at the same time: each leaves a core idle now and then.
+test:
+	$(MAKE) --jobs 2 --output-sync=target rust $(STAMPS)/built
+	$(MAKE) python test-usb test-camera test-live
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
 # only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
@@ -40,7 +43,7 @@ python: $(STAMPS)/built stubs
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest
+	$(BIN)/pytest --numprocesses 2 --dist loadfile
 
 stubs: $(STAMPS)/built
 	$(BIN)/python -m mypy.stubtest quadfringe._core
