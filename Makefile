@@ -19,7 +19,7 @@ demo: $(STAMPS)/built
 
 # The kernel's tests and the wheel are compiled at the same time: each leaves a core idle now and then.
 test:
-	$(MAKE) --jobs 2 --output-sync=target rust $(STAMPS)/built
+	$(MAKE) --jobs 2 rust $(STAMPS)/built
 	$(MAKE) python test-usb test-camera test-live
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
