@@ -28,18 +28,15 @@ FILES = (
 )
 
 # `path`, or `path::function`, and why it is better long.
+JOINT = "crates/quadfringe/src/joint"
+REPLACED = "the joint energy replaces this step; to polish it before that would be work for nothing"
 EXCEPTIONS = {
     "python/quadfringe/_core.pyi": "one compiled module has one stub file; type checkers do not read several",
-}
-
-# Parts of the joint method that the joint energy replaces: they are moved and named, and not rewritten before that.
-JOINT = "crates/quadfringe/src/joint"
-REPLACED_BY_THE_JOINT_ENERGY = {
-    f"{JOINT}/photometry/choice.rs",
-    f"{JOINT}/photometry/mod.rs",
-    f"{JOINT}/photometry/solve.rs",
-    f"{JOINT}/photometry/texture.rs",
-    f"{JOINT}/window.rs",
+    f"{JOINT}/photometry/choice/mod.rs::make": REPLACED,
+    f"{JOINT}/photometry/project.rs::project": REPLACED,
+    f"{JOINT}/photometry/solve.rs::new": REPLACED,
+    f"{JOINT}/photometry/solve.rs::solve": REPLACED,
+    f"{JOINT}/photometry/texture/mod.rs::measure": REPLACED,
 }
 
 
@@ -58,26 +55,18 @@ def too_long() -> dict[str, int]:
 
 
 def test_files_and_functions_are_short() -> None:
-    allowed = EXCEPTIONS.keys()
-    over = {
-        name: lines
-        for name, lines in too_long().items()
-        if name not in allowed and name.partition("::")[0] not in REPLACED_BY_THE_JOINT_ENERGY
-    }
+    over = {name: lines for name, lines in too_long().items() if name not in EXCEPTIONS}
     assert not over, f"split by idea, or add to EXCEPTIONS with a reason (lines, limits 300 and 40): {over}"
 
 
-def test_no_list_names_what_is_short_by_now() -> None:
-    found = too_long()
-    files = {name.partition("::")[0] for name in found}
-    short = EXCEPTIONS.keys() - found.keys() | (REPLACED_BY_THE_JOINT_ENERGY - files)
-    assert not short, f"remove from the lists of this test: {sorted(short)}"
+def test_no_exception_is_short_by_now() -> None:
+    short = EXCEPTIONS.keys() - too_long().keys()
+    assert not short, f"remove from EXCEPTIONS: {sorted(short)}"
 
 
 def test_exceptions_are_few_and_reasoned() -> None:
     assert len(EXCEPTIONS) <= MOST_EXCEPTIONS
     assert all(len(reason.split()) >= 5 for reason in EXCEPTIONS.values())
-    assert not EXCEPTIONS.keys() & REPLACED_BY_THE_JOINT_ENERGY
 
 
 # The measure itself, on planted sources

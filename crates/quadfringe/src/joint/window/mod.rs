@@ -4,17 +4,19 @@
 //! and the phase that the slope predicts, in units of the noise. The window runs first along rows and then along columns. It adds
 //! up the normal equations of a Gauss-Newton step, so that every neighbour has the weight of its information.
 
+mod rows;
+#[cfg(test)]
+mod tests;
+
 use super::cells::RowMaps;
-use super::params::phase::{REACH_RAD, REACH_SIGMAS, SIGMA_MAX_PX, SIGMA_MIN_PX, WIDE, WIDTH};
+use super::params::phase::{SIGMA_MAX_PX, SIGMA_MIN_PX, WIDE, WIDTH};
 use super::params::tasks::ROWS;
 use super::residuals::Residuals;
 use super::scene::Scene;
 use super::slopes::Slopes;
-use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
-use multiversion::multiversion;
 use rayon::prelude::*;
-use std::f32::consts::TAU;
+use rows::{average_along, average_down, sharpen};
 
 /// The window of one shot.
 #[derive(Clone, Copy)]
@@ -224,181 +226,5 @@ impl<'a> Window<'a> {
             Some(residuals) => sharpness.extend_from_slice(residuals.row(self.scene, y, maps)),
         }
         sharpen(self.modulation(y), self.noise, sharpness);
-    }
-}
-
-/// Turns mean squared residuals into the sharpness of [`Window::sharpen`].
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn sharpen(modulation: &[f32], noise: f32, squares: &mut [f32]) {
-    for (square, &modulation) in squares.iter_mut().zip(modulation) {
-        let light = if modulation > 1e-6 { modulation } else { 1e-6 };
-        let missed = if *square > noise * noise { *square } else { noise * noise };
-        let reach = REACH_SIGMAS * REACH_SIGMAS * missed / (light * light);
-        let reach = if reach > REACH_RAD * REACH_RAD { reach } else { REACH_RAD * REACH_RAD };
-        *square = 1.0 / if reach < TAU * TAU { reach } else { TAU * TAU };
-    }
-}
-
-/// Weight of a neighbour whose phase differs by `d` from the phase that the slope predicts.
-#[inline(always)]
-fn fit(d: f32, sharpness: f32) -> f32 {
-    let miss = 1.0 - d * d * sharpness;
-    let fits = if miss > 0.0 { miss } else { 0.0 };
-    fits * fits
-}
-
-/// Averages over neighbours along a row, weighted by how well they fit. The predicted phase difference of two pixels is the
-/// mean of their slopes times their distance, which is exact for a surface of constant curvature.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average_along(
-    (taps, spacing): (&[[f32; 2]], usize),
-    there: [&[f32]; 4],
-    here: [&[f32]; 3],
-    out: [&mut [f32]; 2],
-) {
-    let here = here.map(lanes);
-    let mut out = out.map(lanes_mut);
-    for i in 0..here[0].len() {
-        let [phase, slope, sharpness] = take(&here, i);
-        let mut sums = [[0.0; LANES]; 2];
-        for (k, &[half, near]) in taps.iter().enumerate() {
-            let from = i * LANES + k * spacing;
-            let [other, other_slope, numerator, denominator]: [&Lanes; 4] =
-                there.map(|row| row[from..].first_chunk().expect("rows are padded"));
-            for x in 0..LANES {
-                let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
-                let weight = near * fit(d, sharpness[x]);
-                let known = weight * denominator[x];
-                sums[0][x] += weight * numerator[x] + known * d;
-                sums[1][x] += known;
-            }
-        }
-        let mut found = [phase, sums[1]];
-        for x in 0..LANES {
-            found[0][x] += sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
-        }
-        put(&mut out, i, &found);
-    }
-}
-
-/// Averages over neighbours along columns. `there` holds phase, weight and slope of every neighbouring row.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn average_down(taps: &[[f32; 2]], there: &[[&[f32]; 3]], here: [&[f32]; 3], out: [&mut [f32]; 2]) {
-    let here = here.map(lanes);
-    let mut out = out.map(lanes_mut);
-    for i in 0..here[0].len() {
-        let [phase, slope, sharpness] = take(&here, i);
-        let mut sums = [[0.0; LANES]; 2];
-        for (&[half, near], there) in taps.iter().zip(there) {
-            let [other, weight, other_slope]: [&Lanes; 3] = there.map(|row| &lanes(row)[i]);
-            for x in 0..LANES {
-                let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
-                let known = near * fit(d, sharpness[x]) * weight[x];
-                sums[0][x] += known * d;
-                sums[1][x] += known;
-            }
-        }
-        let mut found = [phase, sums[1]];
-        for x in 0..LANES {
-            found[0][x] += sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
-        }
-        put(&mut out, i, &found);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::cells::Grid;
-    use super::super::noise::noise_of_phase;
-    use super::super::scene::PhaseMap;
-    use super::*;
-
-    /// A phase averaged by a window in which all pixels have equal information.
-    fn averaged(window: &Window<'_>, seen: &[f32]) -> Vec<f32> {
-        let grid = window.scene.grid;
-        let (mut along, mut weight) = (seen.to_vec(), vec![1.0; grid.pixels()]);
-        let mut rows = WindowRows::default();
-        let lines = along.chunks_mut(grid.stride).zip(weight.chunks_mut(grid.stride));
-        for (y, (phase, weight)) in lines.enumerate() {
-            let level = |NormalRows { numerator, denominator }: NormalRows<'_>| {
-                numerator.fill(0.0);
-                denominator[..grid.width].fill(1.0);
-            };
-            let out = AverageRow { phase, weight };
-            window.along(y, &mut rows, &seen[y * grid.stride..][..grid.stride], level, out);
-        }
-        let average = Average { phase: &along, weight: &weight };
-        let (mut phase, mut information) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
-        let mut lines: Vec<_> = information.chunks_mut(grid.stride).collect();
-        window.down(&average, &Slots::<WindowRows>::default(), |rows| rows, &mut phase, &mut lines);
-        phase
-    }
-
-    #[test]
-    fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
-        let grid = Grid::new([96, 256], 4.0);
-        // A two-step phase with the error that wrong offsets cause, next to a step of 1.3 rad.
-        let truth = |i: usize| 0.25 * (i % 256) as f32 + if i % 256 >= 128 { 1.3 } else { 0.0 };
-        let ripple = |i: usize| 0.05 * (2.0 * truth(i)).sin();
-        let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + ripple(i)).collect();
-        let light = vec![0.5; grid.pixels()];
-        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
-        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
-        let mut slopes = Slopes::default();
-        slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
-        let mut residuals = Residuals::default();
-        residuals.measure(&scene, &vec![(0.04f32 * 0.4).powi(2); grid.pixels()], &modulation);
-        let window = || Window::new(&scene, &slopes, &modulation, 1e-4);
-        let worst = |phase: &[f32], columns: std::ops::Range<usize>| {
-            let inside = |i: &usize| (32..64).contains(&(i / 256)) && columns.contains(&(i % 256));
-            let errors = (0..grid.pixels()).filter(inside).map(|i| (phase[i] - truth(i)).abs());
-            errors.fold(0.0, f32::max)
-        };
-        let flat = 40..88;
-        let [narrow, strict, wide] =
-            [window().loosened(&residuals), window().wide(), window().wide().loosened(&residuals)]
-                .map(|window| averaged(&window, &seen));
-        let [narrow, strict, loose] = [&narrow, &strict, &wide].map(|phase| worst(phase, flat.clone()));
-        assert!(loose < 0.012 && strict > 0.04 && narrow > 0.015, "{narrow} {strict} {loose}");
-        // The step is not averaged away.
-        assert!(worst(&wide, 112..144) < 0.15, "{}", worst(&wide, 112..144));
-    }
-
-    #[test]
-    fn noise_goes_edges_and_curvature_stay() {
-        let grid = Grid::new([64, 128], 4.0);
-        // A curved surface with a step of 1.3 rad.
-        let truth = |i: usize| {
-            let (x, y) = ((i % 128) as f32, (i / 128) as f32);
-            0.25 * x + 1e-3 * (x - 64.0).powi(2) - 8e-4 * (y - 32.0).powi(2)
-                + if x >= 60.0 { 1.3 } else { 0.0 }
-        };
-        let mut state = 1u32;
-        let mut uniform = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 8_388_608.0 - 1.0
-        };
-        let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + 0.02 * uniform()).collect();
-        let light = vec![0.5; grid.pixels()];
-        let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
-        let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
-        let mut slopes = Slopes::default();
-        slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
-        let window = Window::new(
-            &scene,
-            &slopes,
-            &modulation,
-            noise_of_phase(&scene, PhaseMap { phase: &seen, modulation: &modulation }),
-        );
-        let phase = averaged(&window, &seen);
-        let error = |i: usize| (phase[i] - truth(i)).abs();
-        let worst = (0..grid.pixels()).map(error).fold(0.0, f32::max);
-        // Near the step, its height leaks into the slopes.
-        assert!(worst < 0.05, "{worst}");
-        // Away from the step and the borders, where the window is whole, it reduces noise of 0.0115 rad to a fifth.
-        let inside = |i: usize| (16..48).contains(&(i / 128)) && (76..112).contains(&(i % 128));
-        let errors: Vec<f32> = (0..grid.pixels()).filter(|&i| inside(i)).map(|i| error(i).powi(2)).collect();
-        let rms = (errors.iter().sum::<f32>() / errors.len() as f32).sqrt();
-        assert!(rms < 0.0022, "{rms}");
     }
 }
