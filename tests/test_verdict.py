@@ -12,6 +12,7 @@ from support.bars import hold
 
 import quadfringe as qf
 from quadfringe.decoding._kernel import KernelDecoder
+from quadfringe.decoding.verdict import NEAR, band_of, order_margin, rows_of
 from quadfringe.errors import DecodeError
 
 METHODS = ("joint", "published")
@@ -128,3 +129,31 @@ def test_rows_of_an_image_have_the_calibration_of_the_whole() -> None:
     place = np.array((500.0, 250.0, 1.0))
     seen = np.array(part.plan.calibration.ir_registration) @ (place - (0, first, 0))
     np.testing.assert_allclose(seen, np.array(chips) @ place - (0, first), atol=1e-9)
+
+
+BAND_SCENES: dict[str, dict[str, Any]] = {
+    "face": {},
+    "steps": {"surface": "steps"},
+    "sphere": {"surface": "sphere"},
+    "peaks without noise": {"surface": "peaks", "noise": 0.0},
+    "coloured squares": {"patch_mm": 20.0},
+    "small squares on steps": {"surface": "steps", "patch_mm": 12.0},
+    "gamma 2.2": {"projector_exponent": 2.2},
+    "room light": {"ambient": 0.3, "albedo": 0.5},
+    "mosaic": {"bayer": "rggb"},
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("scene", BAND_SCENES)
+def test_a_band_of_rows_keeps_enough_of_the_margin(scene: str, method: str) -> None:
+    config = qf.SceneConfig.model_validate({"noise": 0.03} | BAND_SCENES[scene])
+    with qf.open(qf.SystemConfig(scene=config)) as scanner:
+        shot = scanner.grab()
+    decoder = KernelDecoder(shot.ir.shape, None, plan(method))
+    shape = decoder.shape(shot)
+    first, count = band_of(shape)
+    band = decoder.for_rows(first, count).shape(rows_of(shot, first, count))
+    share = order_margin(band) / order_margin(shape)
+    print(f"{scene}, {method}: the band has {share:.2f} of the margin")
+    assert share >= NEAR[method]
