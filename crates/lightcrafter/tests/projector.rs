@@ -142,7 +142,8 @@ fn an_exposure_for_each_pattern_and_many_images() {
 #[test]
 fn a_table_of_66_images_ends_in_more_than_two() {
     let mut bench = Bench::new();
-    bench.projector.load(&one_image_each(66)).unwrap();
+    let exposures = Exposures::Each(vec![Timing { exposure_us: 250_000, period_us: 250_000 }; 66]);
+    bench.projector.load(&Sequence { exposures, repeat: true, ..one_image_each(66) }).unwrap();
     let sent: Vec<u8> =
         bench.device().log().filter(|request| request.word == 0x1A34).flat_map(|r| r.data.clone()).collect();
     assert_eq!(sent, (0..66).map(|i| i % 3).collect::<Vec<u8>>());
