@@ -8,6 +8,7 @@ Shot(640 x 480 uint16 up to 4095)
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, get_args
@@ -93,7 +94,7 @@ class Stamped:
         return None if self.stamp is None else self.stamp.time_us
 
 
-class _Exposure(Stamped):
+class _Exposure(Stamped, ABC):
     """The checks and the full scale that both kinds of shots share."""
 
     ir: NDArray[Any]
@@ -104,9 +105,9 @@ class _Exposure(Stamped):
         check_full_scale(self.full_scale)
 
     @property
+    @abstractmethod
     def images(self) -> dict[str, NDArray[Any]]:
         """The captured images by name."""
-        raise NotImplementedError
 
     @property
     def full_scale_value(self) -> float:
