@@ -90,12 +90,12 @@ def main() -> None:
     skip = [part for name in options.skip for part in ("--skip", name)]
     repeats = ("--repeats", str(options.repeats))
     # The script that a wrong option or a missing package can stop runs first.
-    beside = peers(measured(str(HERE / "peers.py"), *skip, *repeats))
+    others = peers(measured(str(HERE / "peers.py"), *skip, *repeats))
     bench = ("-m", "quadfringe", "bench", *repeats)
     on_print = measured(*bench, "--patch-mm", "20")
     own = times(measured(*bench, "--scaling"), on_print, measured(str(HERE / "first_frame.py")))
     with atomic(options.out) as temporary:
-        temporary.write_text("\n".join([head, own, beside]))
+        temporary.write_text("\n".join([head, own, others]))
 
 
 if __name__ == "__main__":

@@ -1,11 +1,11 @@
-"""Errors on scenes that resemble real objects, with the resolution beside them.
+"""Measure depth errors and resolution on scenes that resemble real objects.
 
     python evaluation/world.py [--half tune|report] [--method joint] [--only WORD ...] [--json FILE]
 
-Scenes of quadfringe.evaluation.world, 1024 x 768, 3 % noise, 8 bit, response linear. Numbers of a method are chosen on
-the half `tune` and reported on the half `report`; every figure is the mean over the two seeds of the half. Depth errors
-are those of returned pixels with the right order, not nearer than 2 px to an edge. Photographs need scikit-image
-(`make evaluation` installs it).
+The scenes of quadfringe.evaluation.world are rendered at 1024 x 768 with 3 % noise and 8 bit; their response is linear.
+Tune a method on the half `tune`, and report its figures on the half `report`. Every figure is the mean over the two
+seeds of a half. Depth errors count returned pixels with the right order that are at least 2 px from an edge. The
+photographs need scikit-image, which `make evaluation` installs.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Decode = Callable[[world.Take], qf.Shape]
 
 
 def decoded(taken: world.Take, *, method: str, calibration: qf.Calibration) -> qf.Shape:
-    """Decode without a verdict: a shot that is hard is what is measured here."""
+    """Decode without a verdict, because a refused shot would have no figures."""
     plan = qf.Plan(
         calibration.projector.width_px,
         fringes=qf.Fringes(numbers=taken.fringe_numbers),

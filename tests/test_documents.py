@@ -227,6 +227,14 @@ def test_a_document_avoids_words_that_puzzle(document: Path) -> None:
     assert AVOIDED.findall(" ".join(document.read_text().split())) == []
 
 
+def test_sources_avoid_words_that_puzzle() -> None:
+    folders = ("python", "crates", "evaluation", "benches", "tests")
+    paths = [path for folder in folders for end in ("py", "pyi", "rs") for path in (ROOT / folder).rglob(f"*.{end}")]
+    found = {name(path): AVOIDED.findall(path.read_text()) for path in paths if path.name != Path(__file__).name}
+    assert len(found) > 400
+    assert {path: words for path, words in found.items() if words} == {}
+
+
 def test_names_in_the_glossary_exist() -> None:
     sources = [*(ROOT / "python").rglob("*.py"), *ROOT.glob("crates/*/src/**/*.rs"), ROOT / "pyproject.toml"]
     known = set(re.findall(r"\w+", "\n".join(path.read_text() for path in sources)))

@@ -30,7 +30,7 @@ __all__ = [
 
 
 class InputError(ValueError):
-    """A file or a value cannot be used; the message says what was expected and what was given."""
+    """A file or a value that cannot be used. The message names the expected and the given value."""
 
 
 class ConfigError(InputError):

@@ -103,7 +103,7 @@ def method_named(name: str) -> str:
 
 
 def in_words(error: typer.BadParameter) -> str:
-    """Say of a value of an option what was expected and what was given; typer lets pydantic say it."""
+    """Give the message for a refused value of an option: what was expected, and what was given."""
     problems = getattr(error.__cause__, "errors", None)
     if problems is None:
         return error.message

@@ -1,4 +1,4 @@
-"""Problems that pydantic finds, in words: where, what was expected, and what was given."""
+"""Turn problems that pydantic finds into messages: place, expected value, given value."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def report(model: type[BaseModel], error: ValidationError, source: str) -> str:
 
 
 def reason(problem: Any) -> str:
-    """Say what was expected and what was given. A message of this program may say both itself."""
+    """Give what was expected and what was given. Messages of this package may contain both already."""
     given = problem["input"]
     if problem["type"] == "missing":
         return f"this {'key' if isinstance(problem['loc'][-1], str) else 'entry'} is required and missing"

@@ -113,7 +113,7 @@ fn folders_hold_their_module() {
         files.iter().any(|other| other.path.starts_with(&folder))
     };
     let found: Vec<_> = files.iter().filter(doubled).map(|file| &file.path).collect();
-    assert!(found.is_empty(), "beside a folder of the same name, in place of its mod.rs: {found:?}");
+    assert!(found.is_empty(), "next to a folder of the same name, in place of its mod.rs: {found:?}");
 }
 
 /// A crate of a few files, whose root re-exports as the true one does.

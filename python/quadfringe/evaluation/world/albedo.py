@@ -44,7 +44,7 @@ def painted_face(points_mm: Points, random: np.random.Generator) -> Map:
 
 
 class Canvas:
-    """A painting on the plane of x and y: what is drawn later covers what was drawn before."""
+    """An image in the plane of x and y. Later drawings cover earlier ones."""
 
     def __init__(self, low_mm: Sequence[float], high_mm: Sequence[float], albedo: Any) -> None:
         self._low = np.array(low_mm)
@@ -77,7 +77,7 @@ class Canvas:
         return int(x), int(y)
 
     def seen(self, points_mm: Points) -> Map:
-        """Give the albedo at points; the painting is averaged over the area of a camera pixel, 0.3 mm."""
+        """Give the albedo at points, averaged over the area of a camera pixel, 0.3 mm."""
         image = cv2.GaussianBlur(self._image, (0, 0), 0.1 * PIXELS_PER_MM)
         place = np.nan_to_num(((points_mm[..., :2] - self._low) * PIXELS_PER_MM).astype(np.float32))
         x, y = place[..., 0], place[..., 1]
@@ -85,7 +85,7 @@ class Canvas:
 
 
 def photographs(shape: tuple[int, int], random: np.random.Generator) -> Map:
-    """Give another photograph as the albedo of each channel, 0.08 to 0.95."""
+    """Give a different photograph as the albedo of each channel, 0.08 to 0.95."""
     from skimage import data
 
     rows, columns = shape
@@ -100,7 +100,7 @@ def photographs(shape: tuple[int, int], random: np.random.Generator) -> Map:
 
 
 def glossy(points_mm: Points, random: np.random.Generator) -> Map:
-    """Give a coloured surface with a highlight: a narrow lobe around the mirror direction, some way into saturation."""
+    """Give a coloured surface with a highlight, a narrow lobe around the mirror direction that saturates the camera."""
     along_x, along_y = np.gradient(points_mm, axis=1), np.gradient(points_mm, axis=0)
     normal = np.cross(along_y, along_x)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)

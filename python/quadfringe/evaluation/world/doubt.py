@@ -1,4 +1,4 @@
-"""Whether stated probabilities of a wrong order come true, over many shapes together."""
+"""Compare stated probabilities of a wrong order with the true share of wrong orders, over many shapes."""
 
 from __future__ import annotations
 

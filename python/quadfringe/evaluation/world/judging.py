@@ -1,4 +1,4 @@
-"""Compare a shape with the truth of a take: errors, holes, wrong orders, and whether stated doubts are right."""
+"""Compare a shape with the truth: depth errors, missing pixels, wrong orders, and stated uncertainties."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ def pixel_mm(bench: _core.Bench) -> float:
 
 
 def height_ratios(decode: Decode, along: str, seed: int, noise: float = NOISE) -> dict[int, float]:
-    """Give the share of the height of waves over "x" or "y" that is left, by their period in camera pixels."""
+    """Give the share of the height that waves along "x" or "y" keep, by their period in camera pixels."""
     bench = _core.Bench()
     random = np.random.default_rng([seed, 78])
     found = {}
@@ -45,7 +45,7 @@ def height_ratios(decode: Decode, along: str, seed: int, noise: float = NOISE) -
 
 
 def _left(shape: Shape, taken: Take, turn_rad: Values) -> float:
-    """Fit the wave to the depths; the sine of the truth is towards the camera, so that depth falls with it."""
+    """Fit the wave to the negative depths, because heights point to the camera."""
     assert shape.xyz_mm is not None
     used = shape.returned & taken.counted & (np.abs(shape.phase_rad - taken.phase_rad) < np.pi)
     used[:, :64] = used[:, -64:] = used[:64] = used[-64:] = False

@@ -1,4 +1,4 @@
-"""The scenes by name: each draws a shot of the virtual bench, with the truth, from a seed."""
+"""The scenes by name. Each draws a shot of the virtual bench and its truth from a seed."""
 
 from __future__ import annotations
 
