@@ -3,8 +3,8 @@
     python docs/draw_imports.py
 
 The installed package is drawn; `PYTHONPATH=FOLDER` draws the package in another folder. Rooms are the modules and
-packages at the top level, without the compiled one. An arrow is an import between two of them, unless only type checkers
-need it. Floors are the rooms on the longest path of arrows.
+packages at the top level, without the compiled one. An arrow is an import between two of them that happens at run time.
+Floors are the rooms on the longest path of arrows.
 """
 
 from __future__ import annotations

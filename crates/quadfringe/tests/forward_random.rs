@@ -86,7 +86,7 @@ proptest! {
     fn triangulation_gives_the_surface_back(bench in any_bench(), surface in any_surface()) {
         let cast = bench.cast(surface.as_ref());
         let columns = cast.column_px(Projector::Visible);
-        let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("the projector is away from the camera");
+        let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
         let xyz = triangulator.xyz_mm(columns.view()).expect("same size");
         let mut lit = 0;
         for ((at, hit), column) in cast.hits().indexed_iter().zip(&columns) {

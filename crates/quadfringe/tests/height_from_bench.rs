@@ -73,7 +73,7 @@ fn triangulation_is_exact_over_depth_with_both_distortions() {
     let mut bench = crossed_axes_bench(800.0, 230.0);
     bench.camera = bench.camera.with_distortion([-0.25, 0.1, 1e-3, -2e-3, 0.02]).expect("valid");
     bench.visible = bench.visible.with_distortion([-0.2, 0.1, 2e-3, 1e-3, -0.03]).expect("valid");
-    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("the projector is away from the camera");
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
     let mut worst = 0f64;
     for z_mm in [650.0, 725.0, 800.0, 875.0, 950.0] {
         let cast = bench.cast(&Plane::at_z(z_mm));
@@ -110,7 +110,7 @@ fn single_precision_stays_within_a_micrometre_of_double() {
     bent.camera = bent.camera.with_distortion([-0.25, 0.1, 1e-3, -2e-3, 0.02]).expect("valid");
     bent.visible = bent.visible.with_distortion([-0.2, 0.1, 2e-3, 1e-3, -0.03]).expect("valid");
     for bench in [plain, bent] {
-        let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("the projector is away from the camera");
+        let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
         let (height, width) = triangulator.shape();
         let mut xyz = vec![0.0; 3 * width];
         let mut worst_mm = 0f64;
@@ -138,6 +138,6 @@ fn triangulation_refuses_pairs_without_depth() {
     let identity = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
     let above = above.with_pose(identity, [0.0, 200.0, 0.0]).expect("valid pose");
     assert!(Triangulator::new(&bench.camera, &above).is_err());
-    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("the projector is away from the camera");
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
     assert!(triangulator.xyz_mm(Array2::zeros((3, 3)).view()).is_err());
 }
