@@ -36,7 +36,6 @@ EXCEPTIONS = {
     f"{JOINT}/photometry/project.rs::project": REPLACED,
     f"{JOINT}/photometry/solve.rs::new": REPLACED,
     f"{JOINT}/photometry/solve.rs::solve": REPLACED,
-    f"{JOINT}/photometry/texture/mod.rs::measure": REPLACED,
 }
 
 

@@ -46,9 +46,11 @@ ALLOWED: dict[tuple[str, str], str] = {
             ("height", "NODES"),
             ("joint", "CANDIDATES"),
             ("joint", "COUNT"),
+            ("joint", "FREQUENCIES"),
             ("joint", "LEVEL_MAPS"),
             ("joint", "MATRIX"),
             ("joint", "NEAR"),
+            ("joint", "RIM"),
             ("joint", "SUMS"),
             ("joint", "TERMS"),
         ],
@@ -68,7 +70,7 @@ ALLOWED: dict[tuple[str, str], str] = {
         "reach of an interpolation, given by its number of samples",
     ),
     **dict.fromkeys(
-        [("condition", "LEVELS"), ("condition", "FULL_SCALE"), ("joint", "LEVELS")],
+        [("condition", "LEVELS"), ("condition", "FULL_SCALE")],
         "range of a number format",
     ),
     **dict.fromkeys(
@@ -88,7 +90,6 @@ ALLOWED: dict[tuple[str, str], str] = {
             ("joint", "MEDIAN_OF_NORMAL"),
             ("stages", "MEDIAN_OF_NORMAL"),
             ("joint", "RESIDUAL_BY_NOISE"),
-            ("joint", "MEAN_OF_NINE"),
             ("stages", "STEPS_MIN"),
         ],
         "follows from statistics or algebra, as its comment derives",

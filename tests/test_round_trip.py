@@ -85,12 +85,12 @@ def test_simulated_shapes_come_back(
     hold("random_rigs.depth_median_mm", np.nanmedian(np.abs(found.depth_error_mm)))
 
 
-def test_steps_about_as_wide_as_a_fringe_lose_more() -> None:
-    """The weakest rig that was ever drawn: wide fringes, a small angle, and steps."""
+def test_steps_about_as_wide_as_a_fringe_are_returned() -> None:
+    """A rig with wide fringes, a small angle, and steps."""
     numbers, projector = (25.0, 24.0, 20.0), projector_at(math.radians(10), 942.0, 912)
     shape, truth = measured("steps", numbers, projector, 0.0)
     found = compare(shape, truth, projector.width_px / numbers[0])
-    hold("random_rigs.weakest_returned_percent", found.returned_percent)
+    hold("random_rigs.returned_percent", found.returned_percent)
 
 
 @seed(0)

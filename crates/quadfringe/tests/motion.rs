@@ -81,11 +81,12 @@ fn the_ripple_of_a_moving_plane_goes() {
 #[test]
 fn a_moving_hand_is_brought_to_one_instant() {
     // The hand of the bench at its speed and at three times its speed.
-    for faster in [1.0, 3.0] {
+    for (faster, most_rad) in [(1.0, 0.0085), (3.0, 0.0110)] {
         let name = format!("hand, {faster} times as fast");
         let [before, after] =
             before_and_after(&name, |t| Hand::at(0.37 + faster * t).expect("a finite time"));
-        assert!(after[0] < 0.6 * before[0], "{name}: {before:?} {after:?}");
+        // The energy alone takes away half of the error, so compensation has less left to do than without it.
+        assert!(after[0] < 0.7 * before[0] && after[0] < most_rad, "{name}: {before:?} {after:?}");
         assert!(after[1] >= before[1] - 0.02, "{name}: {before:?} {after:?}");
     }
 }

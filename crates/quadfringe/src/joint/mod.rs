@@ -7,6 +7,7 @@
 //! 4  fringe orders by semi-global matching                               (S4)  orders
 //! 5  photometry: offset and amplitude of every channel                         photometry
 //! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample
+//!    minimum of the energy (J16)                                                energy
 //! 7  motion between the channels (optional)                                    motion
 //! 8  validity: doubtful pixels become no data                                  validity
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement
@@ -20,6 +21,7 @@
 mod agreement;
 mod cells;
 mod coarse;
+mod energy;
 mod illumination;
 mod light;
 mod local_fit;
@@ -51,12 +53,13 @@ use crate::parallel::lanes::LANES;
 use agreement::Agreement;
 use cells::{Grid, RowMaps};
 use coarse::CoarseLevel;
+use energy::{Energy, Prior};
 use light::{fringe_period_px, linear_light};
 use memory::OutputMemory;
 use motion::{Motion, Timing};
 use params::motion::ROUNDS;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
-use phase::{FitRows, PhaseModel};
+use phase::PhaseModel;
 use propagation::Propagation;
 use pyramid::{Level, Levels, Pyramid, Upsampler};
 use rayon::prelude::*;
@@ -72,6 +75,7 @@ pub(crate) struct Joint {
     stride: usize,
     /// Fringe numbers divided by the first.
     ratios: [f32; 3],
+    energy: Energy,
     pyramid: Pyramid,
     coarse: CoarseLevel,
     upsampler: Upsampler,
@@ -99,6 +103,7 @@ impl Joint {
             shape,
             stride,
             ratios: numbers.map(|n| (n / numbers[0]) as f32),
+            energy: Energy::default(),
             pyramid: Pyramid::new(stride * shape[0]),
             coarse: CoarseLevel::new(code),
             upsampler: Upsampler::default(),
@@ -125,26 +130,29 @@ impl Joint {
         // 1. Linear light of the four channels (S1).
         linear_light(plan, shot, self.shape, &mut self.pyramid.full);
         // 2. The fringe period scales all windows, cells and the coarse level.
-        let red = &self.pyramid.full.light[0];
-        let period_px = options.period_px.unwrap_or_else(|| fringe_period_px(red, self.shape));
+        let found = || fringe_period_px(&self.pyramid.full.light[0], self.shape);
+        let period_px = options.period_px.unwrap_or_else(found);
         let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS_PER_PERIOD);
         let coarse_grid = grid.shrunk(pyramid::factor(period_px, &grid));
         let frame = Frame::new(&grid, &coarse_grid, period_px, shot.mosaic().is_some());
         // 2. to 6. Absolute phase.
         let mut spare = std::mem::take(&mut self.spare);
         let mut memory = OutputMemory::new(out, &mut spare, grid.pixels());
-        let instants = options.channel_instants_us().map(|instants| instants.map(|t| 1e-6 * t));
         self.absolute_phase(&frame, options, &mut memory);
         // 7. Motion between the channels.
+        let instants = options.channel_instants_us().map(|instants| instants.map(|t| 1e-6 * t));
         if let Some(instants) = instants {
             self.compensate_motion(&frame, Timing { instants, ratios: self.ratios }, options, &mut memory);
         }
         self.spare = spare;
+        // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
+        let (ratios, noise) = (self.ratios, self.coarse.noise);
+        let scene = self.pyramid.full.scene(frame.full);
+        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.phase, &self.modulation);
         // 8. Validity.
         self.validate(&frame, instants, options.quality_min, out);
-        // 9. Uncertainty of the phase, and the probability of a wrong order.
+        // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
         let noise = self.uncertainty(&frame);
-        // 10. Heights (S7).
         self.write(&frame, &noise, finish, out);
         // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image.
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
@@ -205,24 +213,10 @@ impl Joint {
     /// Step 6: fits the phase at full resolution.
     fn fit_phase(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
         let (scene, ratios) = (self.pyramid.full.scene(frame.full), self.ratios);
-        let CoarseLevel { slopes, noise, photometry, phase_fit, residuals, textured, .. } = &mut self.coarse;
+        let CoarseLevel { slopes, noise, photometry, phase_fit, .. } = &mut self.coarse;
         let window = Window::new(&scene, slopes, &self.modulation, *noise);
         let OutputMemory { scratch, found } = memory;
-        if !*textured {
-            let model = PhaseModel { scene: &scene, photometry, ratios, window };
-            return phase_fit.step(model, &mut self.phase, scratch.lend(), found);
-        }
-        // The residuals for step 8 are taken with the offsets and amplitudes of windows. With an albedo for every channel
-        // and pixel, any order would fit.
-        let squared_residual = std::mem::take(&mut found.squared_residual);
-        let mut residuals_only = FitRows { squared_residual, ..FitRows::none(frame.full.grid.height) };
-        let model = PhaseModel { scene: &scene, photometry, ratios, window: window.wide() };
-        phase_fit.step(model, &mut self.phase, scratch.lend(), &mut residuals_only);
-        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
-        photometry.estimate_albedo(&scene, ratios, map, slopes, *noise);
-        found.squared_residual = FitRows::none(frame.full.grid.height).squared_residual;
-        // The wide window averaged out errors that the texture causes; the narrow window follows the shape.
-        let model = PhaseModel { scene: &scene, photometry, ratios, window: window.loosened(residuals) };
+        let model = PhaseModel { scene: &scene, photometry, ratios, window };
         phase_fit.step(model, &mut self.phase, scratch.lend(), found);
     }
 
@@ -287,13 +281,17 @@ impl Joint {
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
         let scene = self.pyramid.full.scene(frame.full);
         let grid = scene.grid;
-        out.rows().enumerate().for_each_init(RowMaps::default, |maps, (y, mut row)| {
-            let at = y * grid.stride..y * grid.stride + grid.width;
-            validity::copy_valid(&self.validity.valid[at.clone()], &self.phase[at], row.phase);
-            noise.deviations(self.agreement.row(&scene, y, maps), row.sigma);
-            let nodes = &self.wrong_order[y / grid.step * grid.columns..];
-            row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
-            finish.row(y, &mut row);
-        });
+        out.rows().enumerate().for_each_init(
+            Default::default,
+            |(maps, rows): &mut (RowMaps, energy::Rows), (y, mut row)| {
+                let at = y * grid.stride..y * grid.stride + grid.width;
+                validity::copy_valid(&self.validity.valid[at.clone()], &self.phase[at], row.phase);
+                let variance = self.energy.variance(&scene, y, rows);
+                noise.deviations(variance, self.agreement.row(&scene, y, maps), row.sigma);
+                let nodes = &self.wrong_order[y / grid.step * grid.columns..];
+                row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
+                finish.row(y, &mut row);
+            },
+        );
     }
 }

@@ -11,7 +11,9 @@
 //! the wrong-order probability. The temperature is estimated from the costs of the chosen orders, and so depends on the
 //! noise, texture and discontinuities of this shot.
 
-use super::params::uncertainty::{ALBEDO_LOSS, EXPONENT_MAX, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN};
+use super::params::uncertainty::{
+    ALBEDO_LOSS, DISAGREEMENT_LEFT, EXPONENT_MAX, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN,
+};
 use multiversion::multiversion;
 
 /// Noise of a phase that a window has averaged.
@@ -27,17 +29,20 @@ impl PhaseNoise {
     }
 
     /// Replaces the information of a row, which the window has added up, by the standard deviation of the phase in rad.
-    /// `disagreement` is the variance in rad^2 by which the channels disagree beyond noise.
-    pub fn deviations(&self, disagreement: &[f32], row: &mut [f32]) {
-        deviations(self.variance, disagreement, row);
+    /// `variance` is that of the energy by noise, in rad^2; where it is 0 the window decides. `disagreement` is the variance by
+    /// which the channels disagree beyond noise.
+    pub fn deviations(&self, variance: &[f32], disagreement: &[f32], row: &mut [f32]) {
+        deviations(self.variance, variance, disagreement, row);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn deviations(variance: f32, disagreement: &[f32], row: &mut [f32]) {
-    for (value, disagreement) in row.iter_mut().zip(disagreement) {
-        let by_noise = variance / if *value > INFORMATION_MIN { *value } else { INFORMATION_MIN };
-        *value = (by_noise + disagreement + METHOD_RAD * METHOD_RAD).sqrt();
+fn deviations(window: f32, variance: &[f32], disagreement: &[f32], row: &mut [f32]) {
+    for (value, (variance, disagreement)) in row.iter_mut().zip(variance.iter().zip(disagreement)) {
+        let by_window = window / if *value > INFORMATION_MIN { *value } else { INFORMATION_MIN };
+        let by_noise = if *variance > 0.0 { *variance } else { by_window };
+        let left = if *variance > 0.0 { DISAGREEMENT_LEFT * disagreement } else { *disagreement };
+        *value = (by_noise + left + METHOD_RAD * METHOD_RAD).sqrt();
     }
 }
 

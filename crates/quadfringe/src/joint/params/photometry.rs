@@ -85,28 +85,3 @@ pub const PLACE_GAIN_MIN: f32 = 0.02;
 /// Another place is taken if its squared residual is less than this share of the squared residual at the place of the pixel.
 /// Varied x0.7: dim steps +6 %, near edges -19 %; x1.4 (worse places are taken): face +161 %.
 pub const PLACE_BETTER: f32 = 0.9;
-
-/// Width (sigma) in fringe periods over which the contrast of the light is averaged. Larger: variation of the light over the
-/// image is smoothed. Smaller: noise. Varied: no effect.
-pub const CONTRAST_WIDTH: f32 = 1.5;
-
-/// Reach of the mean of the albedo in fringe periods. More: time. Varied: textured face +2 % at x1.4, whose steps are
-/// wider.
-pub const ALBEDO_REACH: f32 = 0.6;
-/// Width (sigma) of the mean of the albedo in fringe periods. Larger: fine texture is smoothed. Smaller: noise (varied: textured
-/// face +6 % at x0.7, -4 % at x1.4).
-pub const ALBEDO_WIDTH: f32 = 0.3;
-/// Greatest number of steps to the furthest pixel of the mean. More: time. Varied: textured face +6 % with 2 steps, -2
-/// % with 4.
-pub const ALBEDO_STEPS: usize = 3;
-
-/// Relative error of an albedo that errors of phase and contrast cause. Larger: different albedos are averaged. Smaller:
-/// bright pixels find no other pixels with the same albedo. Varied: no effect.
-pub const ALBEDO_ERROR: f32 = 0.015;
-
-/// A pixel has full weight in the mean if the sum of its squared albedo differences over the four channels, in units of their
-/// variance, is at most this; the expectation of the sum is 4. Varied: textured face +2 % at x0.7, -3 % at x1.4.
-pub const ALBEDO_EXPECTED: f32 = 4.0;
-/// A pixel has no weight if this sum exceeds [`ALBEDO_EXPECTED`] by this much or more. Varied: textured face +5 % at
-/// x0.7, -5 % at x1.4.
-pub const ALBEDO_EXCESS: f32 = 16.0;

@@ -12,7 +12,6 @@ mod project;
 mod solve;
 #[cfg(test)]
 mod tests;
-mod texture;
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::local_fit::LocalFit;
@@ -25,7 +24,6 @@ use choice::Choice;
 use multiversion::multiversion;
 use project::add_projected;
 use solve::{SUMS, improve};
-use texture::PixelAlbedo;
 
 /// Offsets and amplitudes on cells that are wider than the cells of the scene.
 #[derive(Debug)]
@@ -35,7 +33,6 @@ pub(in crate::joint) struct Photometry {
     next: CellMaps,
     sums: CellMaps,
     choice: Choice,
-    albedo: PixelAlbedo,
     slots: Slots<TaskWork<Rows>>,
 }
 
@@ -69,7 +66,6 @@ impl Photometry {
             next: CellMaps::new(8),
             sums: CellMaps::default(),
             choice: Choice::default(),
-            albedo: PixelAlbedo::default(),
             slots: Slots::default(),
         }
     }
@@ -82,7 +78,6 @@ impl Photometry {
         self.grid = Grid::with_stride([fine.height, fine.width], fine.stride, side);
         let times = self.grid.step / fine.step;
         self.choice.forget();
-        self.albedo.forget();
         self.next.fill::<8>(&self.grid, |row, lines| {
             for column in 0..lines[0].len() {
                 let inside = |at: usize, count: usize| (at * times + times / 2).min(count - 1);
@@ -101,9 +96,6 @@ impl Photometry {
     /// Offsets and amplitudes that the pixels of row `y` have chosen, in the scene of the fit or a finer image of it.
     pub fn sample<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> FringeRows<'a> {
         let grid = self.grid.over(scene.grid);
-        if self.albedo.is_known(scene) {
-            return FringeRows::from_interleaved(self.albedo.sample(&grid, y, maps).map(|row| &*row));
-        }
         let mut rows = maps.sample_mut(&grid, &self.maps, 0, y);
         self.choice.apply(&grid, &self.maps, y, &mut rows);
         FringeRows::from_interleaved(rows.map(|row| &*row))
@@ -126,20 +118,6 @@ impl Photometry {
     ) -> f32 {
         let grid = self.grid.over(scene.grid);
         self.choice.make((&grid, &self.maps), scene, (ratios, slopes), [map.phase, map.modulation], noise)
-    }
-
-    /// Estimates the albedo of every channel at every pixel.
-    pub fn estimate_albedo(
-        &mut self,
-        scene: &Scene<'_>,
-        ratios: [f32; 3],
-        map: PhaseMap<'_>,
-        slopes: &Slopes,
-        noise: f32,
-    ) {
-        let grid = self.grid.over(scene.grid);
-        let Self { maps, albedo, sums, .. } = self;
-        albedo.measure((&grid, maps), scene, (ratios, slopes), [map.phase, map.modulation], noise, sums);
     }
 
     /// Offsets and amplitudes near the middle of a cell of the scene's grid.

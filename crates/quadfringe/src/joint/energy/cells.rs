@@ -1,0 +1,174 @@
+//! The cells of a shot: means of a few pixels, which the tiles read, and the way back to the pixels.
+
+use super::tile::{MARGIN, STEP, Tile};
+use crate::joint::cells::{blend, spread};
+use crate::joint::params::energy::{SIDE, SPREAD_MAX_RAD, USABLE_MIN};
+use crate::joint::scene::{PhaseMap, Scene};
+use crate::parallel::lanes::LANES;
+use rayon::prelude::*;
+
+/// Maps of cells in padded rows.
+#[derive(Debug, Default)]
+pub(super) struct Cells {
+    pub height: usize,
+    pub width: usize,
+    /// Pixels along a side of a cell.
+    factor: usize,
+    stride: usize,
+    /// Means of linear light.
+    light: [Vec<f32>; 4],
+    /// Mean phase in rad; after the fit the correction times `inside`.
+    phase: Vec<f32>,
+    /// 1 for cells that can be used in the fit; after it the variance times `inside`.
+    usable: Vec<f32>,
+    /// 1 for cells whose pixels are all lit and lie on one surface.
+    inside: Vec<f32>,
+}
+
+/// Working rows.
+#[derive(Debug, Default)]
+pub(in crate::joint) struct Rows {
+    mix: Vec<f32>,
+    sum: Vec<f32>,
+    weight: Vec<f32>,
+}
+
+impl Cells {
+    /// Averages the pixels of a scene.
+    pub fn average(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, factor: usize) {
+        let grid = scene.grid;
+        (self.height, self.width, self.factor) = (grid.height / factor, grid.width / factor, factor);
+        self.stride = (grid.stride / factor).next_multiple_of(LANES);
+        let size = self.stride * self.height;
+        let Self { light: [red, green, blue, infrared], phase, usable, inside, stride, width, .. } = self;
+        let planes = [red, green, blue, infrared, phase, usable, inside].map(|plane| {
+            plane.resize(size, 0.0);
+            plane.par_chunks_mut(*stride)
+        });
+        let [red, green, blue, infrared, phase, usable, inside] = planes;
+        let rows = red.zip(green).zip(blue.zip(infrared)).zip(phase.zip(usable).zip(inside)).enumerate();
+        rows.for_each(|(y, (((red, green), (blue, infrared)), ((phase, usable), inside)))| {
+            let light = [red, green, blue, infrared].into_iter().zip(scene.light);
+            for (out, plane) in light.chain([(&mut *usable, scene.usable), (phase, map.phase)]) {
+                mean((0..factor).map(|i| scene.row(plane, y * factor + i)), factor, out);
+            }
+            inside.fill(0.0);
+            let (inside, usable) = (&mut inside[..*width], &mut usable[..*width]);
+            for (x, (inside, usable)) in inside.iter_mut().zip(usable).enumerate() {
+                *inside = if is_one_surface(scene, map, factor, [y, x]) { 1.0 } else { 0.0 };
+                *usable = if *usable >= USABLE_MIN { *inside } else { 0.0 };
+            }
+        });
+    }
+
+    /// Fills a tile; gives whether it has any cell that can be used.
+    pub fn load(&self, [row, column]: [usize; 2], tile: &mut Tile) -> bool {
+        let Self { height, width, stride, light, phase, usable, inside, .. } = self;
+        let first = MARGIN.saturating_sub(column * STEP);
+        let left = column * STEP + first - MARGIN;
+        let count = (SIDE - first).min(width.saturating_sub(left));
+        let mut any = false;
+        for y in 0..SIDE {
+            tile.clear(y);
+            let from = (row * STEP + y).wrapping_sub(MARGIN);
+            if from >= *height {
+                continue;
+            }
+            let range = from * stride + left..from * stride + left + count;
+            let [red, green, blue, infrared] = &mut tile.light;
+            let planes = [red, green, blue, infrared].into_iter().zip(light);
+            let planes = planes.chain([
+                (&mut tile.start, phase),
+                (&mut tile.usable, usable),
+                (&mut tile.inside, inside),
+            ]);
+            planes.for_each(|(to, from)| {
+                to.row_mut(y)[first..first + count].copy_from_slice(&from[range.clone()])
+            });
+            any |= usable[range].iter().any(|&usable| usable > 0.0);
+        }
+        any
+    }
+
+    /// Replaces phase and usability by correction and variance, each times `inside`.
+    pub fn replace(&mut self, found: impl Fn(usize, usize) -> Option<[f32; 2]> + Sync) {
+        let Self { phase, usable, inside, stride, width, .. } = self;
+        let rows = phase
+            .par_chunks_mut(*stride)
+            .zip(usable.par_chunks_mut(*stride))
+            .zip(inside.par_chunks_mut(*stride));
+        rows.enumerate().for_each(|(y, ((phase, variance), inside))| {
+            phase.fill(0.0);
+            variance.fill(0.0);
+            for x in 0..*width {
+                match found(y, x) {
+                    Some(values) if inside[x] > 0.0 => [phase[x], variance[x]] = values,
+                    _ => inside[x] = 0.0,
+                }
+            }
+        });
+    }
+
+    /// Adds the interpolated correction to the phase of the pixels.
+    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32]) {
+        phase.par_chunks_mut(scene.grid.stride).enumerate().for_each_init(
+            Rows::default,
+            |rows, (y, phase)| {
+                self.interpolate(&self.phase, scene, y, rows);
+                for (phase, (sum, weight)) in phase.iter_mut().zip(rows.sum.iter().zip(&rows.weight)) {
+                    *phase += if *weight > 0.0 { sum / weight } else { 0.0 };
+                }
+            },
+        );
+    }
+
+    /// Variance along row `y` of the scene, 0 where there is no lit cell.
+    pub fn variance<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut Rows) -> &'a [f32] {
+        self.interpolate(&self.usable, scene, y, rows);
+        for (sum, weight) in rows.sum.iter_mut().zip(&rows.weight) {
+            *sum = if *weight > 0.0 { *sum / weight } else { 0.0 };
+        }
+        &rows.sum
+    }
+
+    /// Interpolates a map and the weight of its cells bilinearly along row `y` of the scene.
+    fn interpolate(&self, map: &[f32], scene: &Scene<'_>, y: usize, rows: &mut Rows) {
+        let Self { height, stride, factor, inside, .. } = self;
+        let place = (y as f32 + 0.5) / *factor as f32 - 0.5;
+        let above = place.floor();
+        let row = |at: f32| at.clamp(0.0, (height - 1) as f32) as usize * stride;
+        let Rows { mix, sum, weight } = rows;
+        mix.resize(stride + 2, 0.0);
+        for (plane, out) in [(map, sum), (inside, weight)] {
+            out.resize(scene.grid.stride.max(stride * factor), 0.0);
+            let (a, b) = (&plane[row(above)..][..*stride], &plane[row(above + 1.0)..][..*stride]);
+            blend(a, b, place - above, &mut mix[1..=*stride]);
+            (mix[0], mix[stride + 1]) = (mix[1], mix[*stride]);
+            spread(*factor, mix, out);
+        }
+    }
+}
+
+/// Whether all pixels of a cell are lit and their phases lie close together.
+fn is_one_surface(scene: &Scene<'_>, map: PhaseMap<'_>, factor: usize, [y, x]: [usize; 2]) -> bool {
+    let (mut low, mut high, mut lit) = (f32::MAX, f32::MIN, true);
+    for row in y * factor..(y + 1) * factor {
+        let (phase, modulation) = (scene.row(map.phase, row), scene.row(map.modulation, row));
+        for at in x * factor..(x + 1) * factor {
+            (low, high) = (low.min(phase[at]), high.max(phase[at]));
+            lit &= modulation[at] > 0.0;
+        }
+    }
+    lit && high - low < SPREAD_MAX_RAD * factor as f32
+}
+
+/// Means of the pixels of `factor` rows and `factor` columns.
+fn mean<'a>(rows: impl Iterator<Item = &'a [f32]>, factor: usize, out: &mut [f32]) {
+    out.fill(0.0);
+    let share = 1.0 / (factor * factor) as f32;
+    for row in rows {
+        for (out, pixels) in out.iter_mut().zip(row.chunks_exact(factor)) {
+            *out += share * pixels.iter().sum::<f32>();
+        }
+    }
+}

@@ -1,0 +1,120 @@
+//! The data term: residuals of the intensities and their derivatives with respect to the unknowns.
+
+use super::exp::exp;
+use super::plane::{total, vectors};
+use super::scales::DataSums;
+use super::tile::Tile;
+use crate::parallel::angle::sin_cos;
+use crate::parallel::lanes::{LANES, Lanes};
+use multiversion::multiversion;
+
+/// Linearises the intensities at the unknowns of a tile. Writes the derivatives, and the negative gradient of the data term into
+/// the residual fields. Returns the sums from which noise and contrasts are estimated.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub(super) fn linearise(tile: &mut Tile) -> DataSums {
+    let Tile { light, usable, unknown, derivatives, residual, scales, ratios, .. } = tile;
+    let cut = 1.0 / (16.0 * scales.misfit);
+    let mut sums = DataSums::default();
+    for at in vectors() {
+        let (phase, contrast, usable) = (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
+        let mut modulation = [0.0; LANES];
+        for x in 0..LANES {
+            modulation[x] = exp(contrast[x]);
+        }
+        let mut shared = Shared::default();
+        for c in 0..4 {
+            let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
+            let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
+            let cells = Cells { phase, modulation, usable, albedo, light };
+            let model = if c == 2 {
+                predict::<true>(&cells, ratio, scales.channel_contrast[c])
+            } else {
+                predict::<false>(&cells, ratio, scales.channel_contrast[c])
+            };
+            let Gradient { whole, by_albedo, cross, power } = shared.add(&model, cut);
+            derivatives.phase[c].set(at, model.slope);
+            derivatives.albedo[c].set(at, whole);
+            derivatives.contrast[c].set(at, model.fringe);
+            residual.albedo[c].set(at, by_albedo);
+            sums.cross[c] += total(cross);
+            sums.power[c] += total(power);
+        }
+        residual.phase.set(at, shared.by_phase);
+        residual.contrast.set(at, shared.by_contrast);
+        sums.squares += total(shared.squares);
+        sums.brightness += total(shared.brightness);
+        sums.cells += total(usable);
+    }
+    sums
+}
+
+/// Sums over the channels of a vector of cells: gradients, squared residuals and squared offsets.
+#[derive(Default)]
+struct Shared {
+    by_phase: Lanes,
+    by_contrast: Lanes,
+    squares: Lanes,
+    brightness: Lanes,
+}
+
+/// What one channel contributes by itself: its intensity, its gradient, and the terms of its contrast.
+struct Gradient {
+    whole: Lanes,
+    by_albedo: Lanes,
+    cross: Lanes,
+    power: Lanes,
+}
+
+impl Shared {
+    /// Adds one channel.
+    #[inline(always)]
+    fn add(&mut self, model: &Model, cut: f32) -> Gradient {
+        let Model { offset, fringe, slope, rest } = model;
+        let [mut whole, mut by_albedo, mut cross, mut power] = [[0.0; LANES]; 4];
+        for x in 0..LANES {
+            whole[x] = offset[x] + fringe[x];
+            by_albedo[x] = whole[x] * rest[x];
+            cross[x] = fringe[x] * rest[x];
+            power[x] = fringe[x] * fringe[x];
+            self.by_phase[x] += slope[x] * rest[x];
+            self.by_contrast[x] += cross[x];
+            self.squares[x] += rest[x] * rest[x] / (1.0 + rest[x] * rest[x] * cut);
+            self.brightness[x] += offset[x] * offset[x];
+        }
+        Gradient { whole, by_albedo, cross, power }
+    }
+}
+
+/// One channel of a vector of cells.
+struct Cells {
+    phase: Lanes,
+    modulation: Lanes,
+    usable: Lanes,
+    albedo: Lanes,
+    light: Lanes,
+}
+
+/// Offset and fringe of the light, the derivative of the fringe with respect to the phase, and the residual.
+struct Model {
+    offset: Lanes,
+    fringe: Lanes,
+    slope: Lanes,
+    rest: Lanes,
+}
+
+/// Predicts the light of one channel; in `QUADRATURE` the fringes are a quarter period ahead.
+#[inline(always)]
+fn predict<const QUADRATURE: bool>(cells: &Cells, ratio: f32, kept: f32) -> Model {
+    let Cells { phase, modulation, usable, albedo, light } = cells;
+    let [mut offset, mut fringe, mut slope, mut rest] = [[0.0; LANES]; 4];
+    for x in 0..LANES {
+        let (sine, cosine) = sin_cos(ratio * phase[x]);
+        let (sine, cosine) = if QUADRATURE { (cosine, -sine) } else { (sine, cosine) };
+        offset[x] = usable[x] * exp(albedo[x]);
+        let amplitude = offset[x] * modulation[x] * kept;
+        fringe[x] = amplitude * cosine;
+        slope[x] = -ratio * amplitude * sine;
+        rest[x] = usable[x] * light[x] - offset[x] - fringe[x];
+    }
+    Model { offset, fringe, slope, rest }
+}

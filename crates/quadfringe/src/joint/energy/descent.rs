@@ -1,0 +1,83 @@
+//! The steps that lower the energy of a tile, and what they have found.
+
+use super::data::linearise;
+use super::plane::{Fields, vectors};
+use super::preconditioner::{information, phase_information};
+use super::priors::weigh;
+use super::scales::{Determined, Scales, variance_share};
+use super::solve::solve;
+use super::start::{self, smooth};
+use super::tile::{Found, Tile};
+use crate::joint::params::energy::{
+    ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
+};
+use crate::parallel::lanes::LANES;
+
+impl Tile {
+    /// Minimises the energy. The phase and the light must be set; `noise` is the variance of the intensity of a cell.
+    pub fn minimise(&mut self, noise: f32) {
+        self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
+        self.unknown.phase.clone_from(&self.start);
+        start::contrast_and_albedo(self);
+        let mut determined = Determined::default();
+        for outer in 0..OUTER_STEPS {
+            let sums = linearise(self);
+            self.scales.estimate_noise(&sums, determined, noise);
+            let sums = weigh(self);
+            if outer > 0 {
+                let information = information(&self.derivatives, &self.weights);
+                determined = self.scales.estimate_priors(&sums, information);
+                weigh(self);
+            }
+            solve(self, INNER_STEPS);
+            let moved = self.advance();
+            if outer > 1 && moved < RESTING_RAD {
+                break;
+            }
+        }
+    }
+
+    /// Writes the correction of the phase and its variance.
+    pub fn write(&mut self, found: &mut Found) {
+        let Self { start, inside, unknown, scales, derivatives, weights, product, .. } = self;
+        let Fields { phase: information, contrast: spare, .. } = product;
+        for at in vectors() {
+            information.set(at, phase_information(derivatives, weights, at));
+        }
+        // A saturated cell has no information by itself; its neighbours determine it.
+        smooth(information, spare);
+        for at in vectors() {
+            let (phase, start, known) = (unknown.phase.get(at), start.get(at), information.get(at));
+            let bend = weights.bend[0].get(at);
+            let (mut correction, mut variance) = ([0.0; LANES], [0.0; LANES]);
+            for x in 0..LANES {
+                correction[x] = phase[x] - start[x];
+                variance[x] = scales.misfit * variance_share(known[x], bend[x]);
+            }
+            found.correction.set(at, correction);
+            found.variance.set(at, variance);
+            found.inside.set(at, inside.get(at));
+        }
+    }
+
+    /// Adds the step to the unknowns; returns the root mean square of the change of the phase.
+    fn advance(&mut self) -> f32 {
+        let [a, c] = [ALBEDO_STEP_MAX, CONTRAST_STEP_MAX];
+        let limits = [PHASE_STEP_MAX_RAD, a, a, a, a, c];
+        let (mut squares, mut cells) = (0.0, 1e-9);
+        let planes = self.unknown.planes_mut().into_iter().zip(self.step.planes()).zip(limits);
+        for (n, ((unknown, step), limit)) in planes.enumerate() {
+            for y in 0..SIDE {
+                for (unknown, step) in unknown.row_mut(y).iter_mut().zip(step.row(y)) {
+                    let step = step.clamp(-limit, limit);
+                    *unknown += step;
+                    squares += if n == 0 { step * step } else { 0.0 };
+                }
+            }
+        }
+        for y in 0..SIDE {
+            cells += self.inside.row(y).iter().sum::<f32>();
+        }
+        (squares / cells).sqrt()
+    }
+}

@@ -1,0 +1,123 @@
+//! Planes of a tile: a square of cells with a rim of zeros, so that no stencil needs to know the border.
+
+use crate::joint::params::energy::SIDE;
+use crate::parallel::lanes::{LANES, Lanes};
+
+/// Zeros around the cells of a tile: the reach of the stencils.
+const RIM: usize = 2;
+/// Length of a row of a plane.
+pub(super) const STRIDE: usize = SIDE + 2 * RIM;
+
+/// One value for every cell of a tile.
+#[derive(Debug, Clone)]
+pub(super) struct Plane(Vec<f32>);
+
+impl Default for Plane {
+    fn default() -> Self {
+        Self(vec![0.0; STRIDE * STRIDE])
+    }
+}
+
+/// Position of the cell (x, y) in a plane.
+#[inline(always)]
+pub(super) fn place(x: usize, y: usize) -> usize {
+    (y + RIM) * STRIDE + x + RIM
+}
+
+/// Positions of all vectors of cells, row by row.
+#[inline(always)]
+pub(super) fn vectors() -> impl Iterator<Item = usize> {
+    (0..SIDE).flat_map(|y| (0..SIDE / LANES).map(move |i| place(i * LANES, y)))
+}
+
+impl Plane {
+    /// The vector from a position on, by value.
+    #[inline(always)]
+    pub fn get(&self, at: usize) -> Lanes {
+        *self.0[at..].first_chunk().expect("a vector lies inside its plane")
+    }
+
+    #[inline(always)]
+    pub fn set(&mut self, at: usize, values: Lanes) {
+        *self.0[at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
+    }
+
+    pub fn clear(&mut self) {
+        self.0.fill(0.0);
+    }
+
+    /// The cells of row `y`.
+    pub fn row(&self, y: usize) -> &[f32] {
+        &self.0[place(0, y)..][..SIDE]
+    }
+
+    /// The cells of row `y`, to be changed.
+    pub fn row_mut(&mut self, y: usize) -> &mut [f32] {
+        &mut self.0[place(0, y)..][..SIDE]
+    }
+}
+
+/// The vector from a position on, in four planes.
+#[inline(always)]
+pub(super) fn four(planes: &[Plane; 4], at: usize) -> [Lanes; 4] {
+    [planes[0].get(at), planes[1].get(at), planes[2].get(at), planes[3].get(at)]
+}
+
+/// Sum of the values of a vector in double precision.
+#[inline(always)]
+pub(super) fn total(values: Lanes) -> f64 {
+    let mut halves = values;
+    let mut half = LANES / 2;
+    while half > 0 {
+        for x in 0..half {
+            halves[x] += halves[x + half];
+        }
+        half /= 2;
+    }
+    f64::from(halves[0])
+}
+
+/// One value for each unknown of a cell.
+#[derive(Debug, Default)]
+pub(super) struct Fields {
+    pub phase: Plane,
+    /// Logarithm of the albedo of R, G, B, IR.
+    pub albedo: [Plane; 4],
+    /// Logarithm of the contrast of the light.
+    pub contrast: Plane,
+}
+
+impl Fields {
+    /// The six planes.
+    pub fn planes_mut(&mut self) -> [&mut Plane; 6] {
+        let [red, green, blue, infrared] = &mut self.albedo;
+        [&mut self.phase, red, green, blue, infrared, &mut self.contrast]
+    }
+
+    /// The six planes.
+    pub fn planes(&self) -> [&Plane; 6] {
+        let [red, green, blue, infrared] = &self.albedo;
+        [&self.phase, red, green, blue, infrared, &self.contrast]
+    }
+}
+
+/// Derivatives of the intensities of R, G, B, IR with respect to the unknowns of their cell, in linear light.
+#[derive(Debug, Default)]
+pub(super) struct Derivatives {
+    pub phase: [Plane; 4],
+    pub albedo: [Plane; 4],
+    pub contrast: [Plane; 4],
+}
+
+/// Weights of the squared differences between neighbours; 0 where a stencil leaves the lit cells.
+#[derive(Debug, Default)]
+pub(super) struct Weights {
+    /// Second differences of the phase along x, along y, and mixed.
+    pub bend: [Plane; 3],
+    /// First differences along x and y of the mean logarithm of the four albedos.
+    pub brightness: [Plane; 2],
+    /// First differences along x and y of the four logarithms less their mean.
+    pub colour: [Plane; 2],
+    /// First differences along x and y of the contrast.
+    pub contrast: [Plane; 2],
+}

@@ -1,0 +1,166 @@
+//! The scales of noise and priors, estimated from the tile itself (empirical Bayes).
+//!
+//! Each prior says that neighbours differ by a random amount of unknown variance. The variance that makes the data most probable
+//! satisfies `variance = sum of weighted squared differences / number of differences that the data determine` (MacKay, Neural
+//! Computation 4, 415 (1992)). For a field with the information `g` in each cell and a prior of the weight `w`, the share that the
+//! data determine at the spatial frequency k is `g / (g + w |D(k)|^2)`; its mean over all frequencies is the share of the tile.
+
+use crate::joint::params::energy::{
+    BEND_LIMITS, BRIGHTNESS_LIMITS, COLOUR_LIMITS, CONTRAST_LIMITS, DETERMINED_MIN, MODEL_SHARE, PRIOR_CELLS,
+    START,
+};
+
+/// Variances of noise and priors in one tile.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Scales {
+    /// Variance of the intensity of a cell, in linear light squared.
+    pub noise: f32,
+    /// The part of it that the residuals show.
+    pub misfit: f32,
+    /// Variance of the second difference of the phase, rad^2.
+    pub bend: f32,
+    /// Variances of first differences of logarithms.
+    pub brightness: f32,
+    pub colour: f32,
+    pub contrast: f32,
+    /// Contrast of each channel relative to their mean.
+    pub channel_contrast: [f32; 4],
+}
+
+impl Default for Scales {
+    fn default() -> Self {
+        let [bend, brightness, colour, contrast] = START.map(|deviation| deviation * deviation);
+        Self { noise: 1.0, misfit: 1.0, bend, brightness, colour, contrast, channel_contrast: [1.0; 4] }
+    }
+}
+
+/// Sums over the data of a tile.
+#[derive(Debug, Default)]
+pub(super) struct DataSums {
+    /// Usable cells.
+    pub cells: f64,
+    /// Squared residuals; large ones count less.
+    pub squares: f64,
+    /// Squared offsets of four channels.
+    pub brightness: f64,
+    /// Fringes times residuals, and squared fringes, of each channel.
+    pub cross: [f64; 4],
+    pub power: [f64; 4],
+}
+
+/// Sums over the differences of one prior.
+#[derive(Debug, Default)]
+pub(super) struct Sums {
+    /// Weighted squared differences.
+    pub energy: f64,
+    /// Number of differences.
+    pub count: f64,
+    /// Sum of the weights.
+    pub weight: f64,
+}
+
+/// Sums over the differences of all priors.
+#[derive(Debug, Default)]
+pub(super) struct PriorSums {
+    pub bend: Sums,
+    pub brightness: Sums,
+    pub colour: Sums,
+    pub contrast: Sums,
+}
+
+/// Mean information of a cell about its unknowns, in linear light squared.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Information {
+    pub phase: f32,
+    pub albedo: f32,
+    pub contrast: f32,
+}
+
+/// Numbers of unknowns that the data determine, for each cell.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Determined {
+    phase: f32,
+    brightness: f32,
+    colour: f32,
+    contrast: f32,
+}
+
+impl Scales {
+    /// Estimates the variance of the noise from the residuals, and the contrasts of the channels.
+    pub fn estimate_noise(&mut self, sums: &DataSums, determined: Determined, least: f32) {
+        let used = determined.phase + determined.brightness + 3.0 * determined.colour + determined.contrast;
+        let free = sums.cells * f64::from((4.0 - used).max(0.5));
+        self.misfit = ((sums.squares / free.max(1e-9)) as f32).max(least);
+        let mean = sums.brightness / (4.0 * sums.cells).max(1e-9);
+        self.noise = self.misfit + MODEL_SHARE * MODEL_SHARE * mean as f32;
+        let mut change = [1.0; 4];
+        for c in 0..4 {
+            let ridge = 1e-3 * sums.power[c] + 1e-9;
+            change[c] = (1.0 + sums.cross[c] / (sums.power[c] + ridge)) as f32 * self.channel_contrast[c];
+        }
+        let mean = 0.25 * change.iter().sum::<f32>();
+        self.channel_contrast = change.map(|value| (value / mean.max(1e-6)).clamp(0.5, 1.5));
+    }
+
+    /// Estimates the variances of the priors, and gives the numbers of unknowns that the data determine.
+    pub fn estimate_priors(&mut self, sums: &PriorSums, information: Information) -> Determined {
+        let Information { phase, albedo, contrast } = information;
+        let noise = self.noise;
+        let weight =
+            |sums: &Sums, variance: f32| (sums.weight / sums.count.max(1e-9)) as f32 * noise / variance;
+        let determined = Determined {
+            phase: bend_share(weight(&sums.bend, self.bend) / phase.max(1e-12)),
+            brightness: difference_share(weight(&sums.brightness, self.brightness) / albedo.max(1e-12)),
+            colour: difference_share(weight(&sums.colour, self.colour) / albedo.max(1e-12)),
+            contrast: difference_share(weight(&sums.contrast, self.contrast) / contrast.max(1e-12)),
+        };
+        let update = |sums: &Sums, each: f64, share: f32, start: f32, limits: [f32; 2]| {
+            let count = each * sums.count * f64::from(share.max(DETERMINED_MIN));
+            let prior = f64::from(PRIOR_CELLS);
+            let variance = (sums.energy + prior * f64::from(start * start)) / (count + prior);
+            (variance as f32).clamp(limits[0] * limits[0], limits[1] * limits[1])
+        };
+        self.bend = update(&sums.bend, 1.0, determined.phase, START[0], BEND_LIMITS);
+        self.brightness = update(&sums.brightness, 0.5, determined.brightness, START[1], BRIGHTNESS_LIMITS);
+        self.colour = update(&sums.colour, 1.5, determined.colour, START[2], COLOUR_LIMITS);
+        self.contrast = update(&sums.contrast, 0.5, determined.contrast, START[3], CONTRAST_LIMITS);
+        determined
+    }
+}
+
+/// Number of frequencies in each direction for the means below.
+const FREQUENCIES: usize = 8;
+
+/// Squared response of a first difference at frequency number `n`.
+fn response(n: usize) -> f32 {
+    2.0 - 2.0 * (std::f32::consts::PI * (n as f32 + 0.5) / FREQUENCIES as f32).cos()
+}
+
+fn mean_share(square: impl Fn(f32) -> f32) -> f32 {
+    let sum: f32 = (0..FREQUENCIES * FREQUENCIES)
+        .map(|i| square(response(i / FREQUENCIES) + response(i % FREQUENCIES)))
+        .map(|weighted| 1.0 / (1.0 + weighted))
+        .sum();
+    sum / (FREQUENCIES * FREQUENCIES) as f32
+}
+
+/// Share of a field that the data determine, by the weight of its bending relative to the information.
+fn bend_share(relative: f32) -> f32 {
+    mean_share(|laplacian| relative * laplacian * laplacian)
+}
+
+/// The same for first differences.
+fn difference_share(relative: f32) -> f32 {
+    mean_share(|gradient| relative * gradient)
+}
+
+/// Variance of the phase of a cell for unit variance of the noise, by its information and the weight of its bending. Noise passes
+/// the smoothing at the frequency k with the gain `1 / (1 + r |D(k)|^2)`, where r is the weight relative to the information. The
+/// mean of its square over all frequencies is close to the function below (U13).
+#[inline(always)]
+pub(super) fn variance_share(information: f32, bend: f32) -> f32 {
+    let information = if information > 1e-9 { information } else { 1e-9 };
+    let relative = bend / information;
+    let smoothing = 1.0 + 50.0 * relative;
+    (1.0 + 22.0 * relative) / (information * smoothing * smoothing.sqrt())
+}

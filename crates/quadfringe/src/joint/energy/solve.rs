@@ -1,0 +1,245 @@
+//! The linear system of one Gauss-Newton step, solved by preconditioned conjugate gradients.
+
+use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, four, total, vectors};
+use super::preconditioner::{precondition, prepare};
+use super::tile::Tile;
+use crate::joint::params::energy::{CONTRAST_RIDGE, RESIDUAL_LEFT, RIDGE};
+use crate::parallel::lanes::{LANES, Lanes};
+use multiversion::multiversion;
+
+/// Solves the normal equations for the step, starting from the negative gradient in `residual`.
+pub(super) fn solve(tile: &mut Tile, steps: usize) {
+    let Tile {
+        unknown,
+        derivatives,
+        weights,
+        preconditioner,
+        residual,
+        preconditioned,
+        direction,
+        product,
+        step,
+        inside,
+        ..
+    } = tile;
+    // The gradient of the priors.
+    multiply::<false>(derivatives, weights, inside, unknown, product);
+    subtract(product, residual);
+    prepare(preconditioner, derivatives, weights);
+    for plane in step.planes_mut().into_iter().chain(direction.planes_mut()) {
+        plane.clear();
+    }
+    let mut before = 0.0;
+    let mut first = 0.0;
+    for n in 0..steps {
+        let size = precondition(preconditioner, derivatives, residual, preconditioned);
+        if n == 0 {
+            first = size;
+        }
+        if size <= RESIDUAL_LEFT * first {
+            break;
+        }
+        turn(preconditioned, if n == 0 { 0.0 } else { (size / before) as f32 }, direction);
+        let curvature = multiply::<true>(derivatives, weights, inside, direction, product);
+        if curvature <= 0.0 {
+            break;
+        }
+        advance((size / curvature) as f32, direction, product, step, residual);
+        before = size;
+    }
+}
+
+/// Subtracts the product from the residual.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn subtract(product: &Fields, residual: &mut Fields) {
+    for (product, residual) in product.planes().into_iter().zip(residual.planes_mut()) {
+        for at in vectors() {
+            let (product, mut out) = (product.get(at), residual.get(at));
+            for x in 0..LANES {
+                out[x] -= product[x];
+            }
+            residual.set(at, out);
+        }
+    }
+}
+
+/// New search direction: the preconditioned residual plus `share` of the old direction.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn turn(preconditioned: &Fields, share: f32, direction: &mut Fields) {
+    for (new, direction) in preconditioned.planes().into_iter().zip(direction.planes_mut()) {
+        for at in vectors() {
+            let (new, mut out) = (new.get(at), direction.get(at));
+            for x in 0..LANES {
+                out[x] = new[x] + share * out[x];
+            }
+            direction.set(at, out);
+        }
+    }
+}
+
+/// Goes `length` along the direction.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn advance(length: f32, direction: &Fields, product: &Fields, step: &mut Fields, residual: &mut Fields) {
+    let from = direction.planes().into_iter().zip(product.planes());
+    for ((direction, product), (step, residual)) in
+        from.zip(step.planes_mut().into_iter().zip(residual.planes_mut()))
+    {
+        for at in vectors() {
+            let (direction, product) = (direction.get(at), product.get(at));
+            let (mut moved, mut left) = (step.get(at), residual.get(at));
+            for x in 0..LANES {
+                moved[x] += length * direction[x];
+                left[x] -= length * product[x];
+            }
+            step.set(at, moved);
+            residual.set(at, left);
+        }
+    }
+}
+
+/// Multiplies fields by the matrix of the priors, and with `DATA` by that of the data too. Returns the scalar product of the fields
+/// with the result.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub(super) fn multiply<const DATA: bool>(
+    derivatives: &Derivatives,
+    weights: &Weights,
+    inside: &Plane,
+    from: &Fields,
+    to: &mut Fields,
+) -> f64 {
+    let mut product = 0.0;
+    for at in vectors() {
+        let mut vector = Vector {
+            phase: bend(weights, &from.phase, at),
+            albedo: [[0.0; LANES]; 4],
+            contrast: difference(&weights.contrast, &from.contrast, at),
+        };
+        let given = Vector {
+            phase: from.phase.get(at),
+            albedo: four(&from.albedo, at),
+            contrast: from.contrast.get(at),
+        };
+        for (k, edge, there) in
+            [(0, at, at + 1), (0, at - 1, at - 1), (1, at, at + STRIDE), (1, at - STRIDE, at - STRIDE)]
+        {
+            let (bright, colour) = (weights.brightness[k].get(edge), weights.colour[k].get(edge));
+            colours(bright, colour, &given.albedo, &four(&from.albedo, there), &mut vector.albedo);
+        }
+        if DATA {
+            add_data(derivatives, inside.get(at), at, &given, &mut vector);
+        }
+        product += total(vector.times(&given));
+        to.phase.set(at, vector.phase);
+        to.contrast.set(at, vector.contrast);
+        for c in 0..4 {
+            to.albedo[c].set(at, vector.albedo[c]);
+        }
+    }
+    product
+}
+
+/// The unknowns of a vector of cells.
+struct Vector {
+    phase: Lanes,
+    albedo: [Lanes; 4],
+    contrast: Lanes,
+}
+
+impl Vector {
+    /// Scalar product in every cell.
+    #[inline(always)]
+    fn times(&self, other: &Self) -> Lanes {
+        let mut out = [0.0; LANES];
+        for x in 0..LANES {
+            out[x] = self.phase[x] * other.phase[x] + self.contrast[x] * other.contrast[x];
+        }
+        for c in 0..4 {
+            for x in 0..LANES {
+                out[x] += self.albedo[c][x] * other.albedo[c][x];
+            }
+        }
+        out
+    }
+}
+
+/// Adds the product with the matrix of the data and the ridges.
+#[inline(always)]
+fn add_data(derivatives: &Derivatives, inside: Lanes, at: usize, given: &Vector, out: &mut Vector) {
+    let (phase, contrast) = (&given.phase, &given.contrast);
+    for x in 0..LANES {
+        out.phase[x] += RIDGE * inside[x] * phase[x];
+        out.contrast[x] += CONTRAST_RIDGE * inside[x] * contrast[x];
+    }
+    for c in 0..4 {
+        let (by_phase, by_albedo) = (derivatives.phase[c].get(at), derivatives.albedo[c].get(at));
+        let (by_contrast, albedo) = (derivatives.contrast[c].get(at), &given.albedo[c]);
+        for x in 0..LANES {
+            let change = by_phase[x] * phase[x] + by_albedo[x] * albedo[x] + by_contrast[x] * contrast[x];
+            out.phase[x] += by_phase[x] * change;
+            out.contrast[x] += by_contrast[x] * change;
+            out.albedo[c][x] += by_albedo[x] * change + RIDGE * inside[x] * albedo[x];
+        }
+    }
+}
+
+/// Gradient of the bending of a phase.
+#[inline(always)]
+fn bend(weights: &Weights, phase: &Plane, at: usize) -> Lanes {
+    const S: usize = STRIDE;
+    let [along, down, mixed] = &weights.bend;
+    let (w_left, w_right, w_along) = (along.get(at - 1), along.get(at + 1), along.get(at));
+    let (w_above, w_below, w_down) = (down.get(at - S), down.get(at + S), down.get(at));
+    let (m_here, m_left, m_above, m_corner) =
+        (mixed.get(at), mixed.get(at - 1), mixed.get(at - S), mixed.get(at - S - 1));
+    let (p, left, right) = (phase.get(at), phase.get(at - 1), phase.get(at + 1));
+    let (far_left, far_right) = (phase.get(at - 2), phase.get(at + 2));
+    let (above, below) = (phase.get(at - S), phase.get(at + S));
+    let (far_above, far_below) = (phase.get(at - 2 * S), phase.get(at + 2 * S));
+    let (above_left, above_right) = (phase.get(at - S - 1), phase.get(at - S + 1));
+    let (below_left, below_right) = (phase.get(at + S - 1), phase.get(at + S + 1));
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        let straight = w_left[x] * (far_left[x] - 2.0 * left[x] + p[x])
+            + w_right[x] * (p[x] - 2.0 * right[x] + far_right[x])
+            + w_above[x] * (far_above[x] - 2.0 * above[x] + p[x])
+            + w_below[x] * (p[x] - 2.0 * below[x] + far_below[x])
+            - 2.0 * w_along[x] * (left[x] - 2.0 * p[x] + right[x])
+            - 2.0 * w_down[x] * (above[x] - 2.0 * p[x] + below[x]);
+        out[x] = straight + m_here[x] * (p[x] - right[x] - below[x] + below_right[x])
+            - m_left[x] * (left[x] - p[x] - below_left[x] + below[x])
+            - m_above[x] * (above[x] - above_right[x] - p[x] + right[x])
+            + m_corner[x] * (above_left[x] - above[x] - left[x] + p[x]);
+    }
+    out
+}
+
+/// Gradient of the squared first differences of a field.
+#[inline(always)]
+fn difference(weights: &[Plane; 2], field: &Plane, at: usize) -> Lanes {
+    let (along, left, down, above) =
+        (weights[0].get(at), weights[0].get(at - 1), weights[1].get(at), weights[1].get(at - STRIDE));
+    let (here, f_right, f_left) = (field.get(at), field.get(at + 1), field.get(at - 1));
+    let (f_below, f_above) = (field.get(at + STRIDE), field.get(at - STRIDE));
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = along[x] * (here[x] - f_right[x])
+            + left[x] * (here[x] - f_left[x])
+            + down[x] * (here[x] - f_below[x])
+            + above[x] * (here[x] - f_above[x]);
+    }
+    out
+}
+
+/// Adds the gradients of the differences in brightness and colour over one edge of the cells.
+#[inline(always)]
+fn colours(bright: Lanes, colour: Lanes, here: &[Lanes; 4], there: &[Lanes; 4], out: &mut [Lanes; 4]) {
+    for x in 0..LANES {
+        let (a, b) = (here[0][x] - there[0][x], here[1][x] - there[1][x]);
+        let (c, d) = (here[2][x] - there[2][x], here[3][x] - there[3][x]);
+        let shared = 0.25 * (bright[x] - colour[x]) * (a + b + c + d);
+        out[0][x] += colour[x] * a + shared;
+        out[1][x] += colour[x] * b + shared;
+        out[2][x] += colour[x] * c + shared;
+        out[3][x] += colour[x] * d + shared;
+    }
+}

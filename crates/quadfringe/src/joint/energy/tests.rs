@@ -1,0 +1,144 @@
+//! The matrix of a step, the minimum of one tile, and the seams between tiles.
+
+use super::plane::{Fields, Plane, place, total, vectors};
+use super::priors::weigh;
+use super::scales::variance_share;
+use super::solve::multiply;
+use super::tile::{MARGIN, STEP, Tile};
+use super::{around, cell_px, ramp};
+use crate::joint::params::energy::{BLENDED, SIDE};
+use crate::parallel::lanes::LANES;
+
+const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
+
+/// A number in [-1, 1] for each place and seed.
+fn random(seed: usize, at: usize) -> f32 {
+    let mut state = (seed * 7919 + at).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    state ^= state >> 29;
+    state = state.wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    (state >> 40) as f32 / (1u32 << 23) as f32 - 1.0
+}
+
+/// A tile of a curved, two-coloured surface whose light has noise; the right half is twice as bright in R as in G.
+fn tile(noise: f32) -> (Tile, Plane) {
+    let (mut tile, mut truth) = (Tile { ratios: RATIOS, ..Tile::default() }, Plane::default());
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let (u, v) = (x as f32 - 24.0, y as f32 - 24.0);
+            let phase = 60.0 + 0.75 * u + 0.1 * v + 6e-4 * (u * u + v * v);
+            let albedo = if x < SIDE / 2 { [0.5, 0.5, 0.5, 0.5] } else { [0.6, 0.3, 0.4, 0.5] };
+            let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[2] * phase];
+            truth.row_mut(y)[x] = phase;
+            tile.start.row_mut(y)[x] = phase + 0.2 * phase.sin();
+            for c in 0..4 {
+                let light = albedo[c] * (1.0 + 0.6 * turns[c].cos());
+                tile.light[c].row_mut(y)[x] = light + noise * random(c, y * SIDE + x);
+            }
+            (tile.usable.row_mut(y)[x], tile.inside.row_mut(y)[x]) = (1.0, 1.0);
+        }
+    }
+    (tile, truth)
+}
+
+fn errors(tile: &Tile, truth: &Plane) -> (f32, f32) {
+    let (mut squares, mut largest) = (0.0f32, 0.0f32);
+    for y in 0..SIDE {
+        for (found, truth) in tile.unknown.phase.row(y).iter().zip(truth.row(y)) {
+            squares += (found - truth).powi(2);
+            largest = largest.max((found - truth).abs());
+        }
+    }
+    ((squares / (SIDE * SIDE) as f32).sqrt(), largest)
+}
+
+#[test]
+fn the_minimum_finds_phase_and_contrast_through_an_edge_of_colour() {
+    let (mut tile, truth) = tile(0.0);
+    tile.minimise(1e-8);
+    let (rms, largest) = errors(&tile, &truth);
+    assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
+    let contrast = tile.unknown.contrast.row(20)[12].exp();
+    assert!((contrast - 0.6).abs() < 0.01, "{contrast}");
+}
+
+#[test]
+fn noise_is_estimated_and_averaged() {
+    // Uniform noise in [-a, a] has the variance a^2 / 3.
+    let (amplitude, least) = (0.03, 1e-8);
+    let (mut tile, truth) = tile(amplitude);
+    tile.minimise(least);
+    let (rms, _) = errors(&tile, &truth);
+    // A single cell would have 0.05 rad.
+    assert!(rms < 0.02, "{rms}");
+    let expected = amplitude * amplitude / 3.0;
+    assert!((0.6..1.5).contains(&(tile.scales.misfit / expected)), "{} {expected}", tile.scales.misfit);
+}
+
+#[test]
+fn the_matrix_is_symmetric_and_positive() {
+    let (mut tile, _) = tile(0.0);
+    tile.minimise(1e-6);
+    weigh(&mut tile);
+    let fields = |seed: usize| {
+        let mut fields = Fields::default();
+        for (n, plane) in fields.planes_mut().into_iter().enumerate() {
+            for y in 0..SIDE {
+                (0..SIDE).for_each(|x| plane.row_mut(y)[x] = random(10 * seed + n, place(x, y)));
+            }
+        }
+        fields
+    };
+    let (first, second) = (fields(1), fields(2));
+    let [mut one, mut two] = [Fields::default(), Fields::default()];
+    let Tile { derivatives, weights, inside, .. } = &tile;
+    let own = multiply::<true>(derivatives, weights, inside, &first, &mut one);
+    assert!(own > 0.0);
+    multiply::<true>(derivatives, weights, inside, &second, &mut two);
+    let scalar = |a: &Fields, b: &Fields| -> f64 {
+        let product = |(a, b): (&Plane, &Plane)| -> f64 {
+            vectors()
+                .map(|at| {
+                    let (a, mut b) = (a.get(at), b.get(at));
+                    (0..LANES).for_each(|x| b[x] *= a[x]);
+                    total(b)
+                })
+                .sum()
+        };
+        a.planes().into_iter().zip(b.planes()).map(product).sum()
+    };
+    let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
+    assert!((forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
+}
+
+#[test]
+fn tiles_cover_every_cell_with_weights_that_add_up_to_one() {
+    for size in [1, STEP - 1, STEP, STEP + 1, 5 * STEP + 3] {
+        let tiles = size.div_ceil(STEP);
+        for place in 0..size {
+            let inner = |tile: usize| place + MARGIN - tile * STEP;
+            assert!(around(place, tiles).all(|tile| inner(tile) < SIDE));
+            let weight: f32 = around(place, tiles).map(|tile| ramp(inner(tile))).sum();
+            let inside = place >= BLENDED / 2 && place + BLENDED / 2 < (tiles - 1) * STEP + STEP / 2;
+            assert!(weight > 0.0 && (!inside || (weight - 1.0).abs() < 1e-6), "{size} {place} {weight}");
+        }
+    }
+}
+
+#[test]
+fn cells_are_as_wide_as_the_fringes_allow() {
+    let sides = [4.0, 7.9, 8.0, 20.3, 20.5, 33.0, 80.0].map(cell_px);
+    assert_eq!(sides, [1, 1, 2, 2, 4, 4, 4]);
+}
+
+#[test]
+fn the_variance_is_that_of_the_mean_squared_gain() {
+    let exact = |relative: f64| -> f64 {
+        let response = |n: usize| 2.0 - 2.0 * (std::f64::consts::PI * (n as f64 + 0.5) / 64.0).cos();
+        let gain = |i: usize| 1.0 / (1.0 + relative * (response(i / 64) + response(i % 64)).powi(2));
+        (0..4096).map(|i| gain(i).powi(2)).sum::<f64>() / 4096.0
+    };
+    for relative in [1e-3, 1e-2, 0.1, 1.0, 10.0, 100.0] {
+        let share = f64::from(variance_share(2.0, 2.0 * relative as f32)) * 2.0;
+        assert!((0.75..1.35).contains(&(share / exact(relative))), "{relative} {share} {}", exact(relative));
+    }
+}

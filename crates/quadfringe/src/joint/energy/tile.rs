@@ -1,0 +1,55 @@
+//! One tile: its light, unknowns and working memory.
+
+use super::plane::{Derivatives, Fields, Plane, Weights};
+use super::preconditioner::Preconditioner;
+use super::scales::Scales;
+use crate::joint::params::energy::{BLENDED, DISCARDED, SIDE};
+
+/// Cells from one tile to the next.
+pub(super) const STEP: usize = SIDE - 2 * DISCARDED - BLENDED;
+/// Cells of a tile before the first that belongs to it more than to its neighbour.
+pub(super) const MARGIN: usize = DISCARDED + BLENDED / 2;
+
+/// Results of one tile; 0 outside the lit cells.
+#[derive(Debug, Default)]
+pub(super) struct Found {
+    pub inside: Plane,
+    /// Change of the phase, rad.
+    pub correction: Plane,
+    /// Variance of the phase by noise, rad^2.
+    pub variance: Plane,
+}
+
+/// A square of cells and everything that is known about it.
+#[derive(Debug, Default)]
+pub(super) struct Tile {
+    /// Phase at the start.
+    pub start: Plane,
+    /// Linear light of R, G, B, IR.
+    pub light: [Plane; 4],
+    /// 1 for cells whose light takes part.
+    pub usable: Plane,
+    /// 1 for lit cells with a phase.
+    pub inside: Plane,
+    /// Fringe numbers divided by the first.
+    pub ratios: [f32; 3],
+    pub scales: Scales,
+    pub unknown: Fields,
+    pub derivatives: Derivatives,
+    pub weights: Weights,
+    pub preconditioner: Preconditioner,
+    /// Negative gradient, then what of it a step leaves.
+    pub residual: Fields,
+    pub preconditioned: Fields,
+    pub direction: Fields,
+    pub product: Fields,
+    pub step: Fields,
+}
+
+impl Tile {
+    /// Empties a row.
+    pub fn clear(&mut self, row: usize) {
+        let planes = self.light.iter_mut().chain([&mut self.start, &mut self.usable, &mut self.inside]);
+        planes.for_each(|plane| plane.row_mut(row).fill(0.0));
+    }
+}

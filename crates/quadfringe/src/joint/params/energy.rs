@@ -1,0 +1,114 @@
+//! Step 6: the energy of phase, albedo and contrast.
+//!
+//! Chosen on one seed of the half `tune` of `python evaluation/world.py` and on the captures (`python evaluation/captures_report.py`).
+//! Most numbers were not varied one by one.
+
+/// Side of a tile in cells, whole vectors. Larger: scales average over more of the surface, and the 70 planes of a tile no longer
+/// fit into the caches of a core. Smaller: more cells are computed twice (with 48 a decode takes a tenth longer).
+/// `quadfringe bench`.
+pub const SIDE: usize = 64;
+/// Number of cells at each side of a tile that are discarded, because their neighbours are missing. Fewer: seams. More: time.
+/// Not measured: it was set with the others (see the head of this file).
+pub const DISCARDED: usize = 4;
+/// Number of cells at each side over which tiles are blended. Fewer: seams where the scales of two tiles differ. More: time.
+/// Not measured: it was set with the others (see the head of this file).
+pub const BLENDED: usize = 8;
+
+/// Least number of cells in a fringe period, for cells of more than 2 px. Larger: time. Smaller: detail is lost (with 4.5 the
+/// bottle has cells of 4 px and a phase RMS 4 % larger, `python evaluation/captures_report.py`).
+pub const CELLS_PER_PERIOD_MIN: f64 = 5.1;
+/// Least number of cells in a fringe period, for cells of 2 px. Follows from the mean of a cosine over a cell, which keeps 90 % of
+/// its contrast with 4; cells of 1 px take four times as long.
+pub const SMALL_CELLS_PER_PERIOD_MIN: f64 = 4.0;
+/// Greatest side of a cell in pixels. Larger: detail is lost. Smaller: time, which grows with the number of cells.
+/// Not measured: it was set with the others (see the head of this file).
+pub const CELL_MAX_PX: usize = 4;
+/// Greatest difference of the phase between the pixels of a cell, in rad for each pixel of its side. Larger: cells on two surfaces
+/// take part. Smaller: steep slopes are left out.
+/// Not measured: it was set with the others (see the head of this file).
+pub const SPREAD_MAX_RAD: f32 = 0.5;
+/// Least share of usable pixels of a cell that takes part. Larger: noise that saturates single pixels removes cells. Smaller: cells
+/// are biased by the pixels that are left out.
+/// Not measured: it was set with the others (see the head of this file).
+pub const USABLE_MIN: f32 = 0.7;
+
+/// Degrees of freedom of Student's t for second differences of the phase. Larger: steps are smoothed. Smaller: noise stays.
+/// Not measured: it was set with the others (see the head of this file).
+pub const BEND_FREEDOM: f32 = 2.0;
+/// The same for first differences of the brightness. Larger: edges of the texture are smoothed.
+/// Not measured: it was set with the others (see the head of this file).
+pub const BRIGHTNESS_FREEDOM: f32 = 1.0;
+/// The same for the colour.
+/// Not measured: it was set with the others (see the head of this file).
+pub const COLOUR_FREEDOM: f32 = 1.0;
+/// The same for the contrast.
+/// Not measured: it was set with the others (see the head of this file).
+pub const CONTRAST_FREEDOM: f32 = 2.0;
+
+/// Standard deviations with which the estimate of the priors starts: second differences of the phase in rad, and first differences
+/// of the logarithms of brightness, colour and contrast. The estimate forgets them after a few steps.
+/// `python evaluation/world.py --half tune`: with all four three times as large, two more steps are needed.
+pub const START: [f32; 4] = [0.01, 0.04, 0.015, 0.01];
+/// Weight of these in the estimate, as a number of cells. It keeps the estimate of a tile with few lit cells finite.
+/// Not measured: it was set with the others (see the head of this file).
+pub const PRIOR_CELLS: f32 = 0.1;
+/// Bounds of the standard deviations, in the same units. They keep the weights within the range of `f32`.
+/// Not measured: it was set with the others (see the head of this file).
+pub const BEND_LIMITS: [f32; 2] = [0.0005, 0.5];
+/// See [`BEND_LIMITS`].
+pub const BRIGHTNESS_LIMITS: [f32; 2] = [0.002, 1.0];
+/// See [`BEND_LIMITS`].
+pub const COLOUR_LIMITS: [f32; 2] = [0.001, 0.5];
+/// See [`BEND_LIMITS`].
+pub const CONTRAST_LIMITS: [f32; 2] = [0.0005, 0.3];
+/// Least share of the unknowns that counts as determined by the data. Without it, the scale of a tile without structure is the
+/// quotient of two small numbers.
+/// Not measured: it was set with the others (see the head of this file).
+pub const DETERMINED_MIN: f32 = 0.02;
+
+/// Error of the model as a share of the albedo: response, crosstalk and registration are never known exactly. Larger: less noise,
+/// and ripples of an error of the model are smoothed, but fine relief too. Smaller: finer relief. With 0.01 and 0.02 waves of
+/// 16 px keep 0.60 and 0.32 of their height, and the plate has a median of 0.0125 and 0.0109 rad.
+/// `python evaluation/world.py --half tune`, `python evaluation/captures_report.py`.
+pub const MODEL_SHARE: f32 = 0.0125;
+
+/// Number of rounds of contrast and albedo before the first step. More: time.
+/// Not measured: it was set with the others (see the head of this file).
+pub const START_ROUNDS: usize = 2;
+/// Bounds of the contrast of the light in these rounds. Light has no more than full contrast, with a margin for noise.
+/// Follows from the model.
+pub const CONTRAST_START_LIMITS: [f32; 2] = [0.1, 1.05];
+/// Bounds of the albedo in these rounds, in linear light. They keep the logarithm finite; 1 is full scale.
+/// Not measured: it was set with the others (see the head of this file).
+pub const ALBEDO_LIMITS: [f32; 2] = [0.004, 4.0];
+
+/// Greatest number of Gauss-Newton steps. More: time, and scales that are closer to their limit: with 7 the plane has a sixth
+/// less of noise.
+/// `python evaluation/world.py --half tune`.
+pub const OUTER_STEPS: usize = 5;
+/// Greatest number of steps of conjugate gradients in each of them. More: time. Fewer: painted surfaces are not solved.
+/// Not measured: it was set with the others (see the head of this file).
+pub const INNER_STEPS: usize = 20;
+/// Share of the squared residual, in the norm of the preconditioner, at which conjugate gradients end. Smaller: time.
+/// Not measured: it was set with the others (see the head of this file).
+pub const RESIDUAL_LEFT: f64 = 1e-2;
+/// Root mean square change of the phase in rad below which a tile rests. Larger: scales stop too early. Smaller: time.
+/// Not measured: it was set with the others (see the head of this file).
+pub const RESTING_RAD: f32 = 0.001;
+
+/// Greatest change of a phase in one Gauss-Newton step, in rad. The linearisation holds for about a tenth of a turn.
+/// Not measured: it was set with the others (see the head of this file).
+pub const PHASE_STEP_MAX_RAD: f32 = 0.5;
+/// Greatest change of the logarithm of an albedo in one step.
+/// Not measured: it was set with the others (see the head of this file).
+pub const ALBEDO_STEP_MAX: f32 = 0.7;
+/// Greatest change of the logarithm of the contrast in one step.
+/// Not measured: it was set with the others (see the head of this file).
+pub const CONTRAST_STEP_MAX: f32 = 0.3;
+
+/// Ridge of the matrix in linear light squared. It only keeps cells without light finite.
+/// Not measured: any small number will do.
+pub const RIDGE: f32 = 1e-6;
+/// Ridge of the contrast, which a cell at the zero of all fringes does not determine.
+/// Not measured: any small number will do.
+pub const CONTRAST_RIDGE: f32 = 1e-4;
