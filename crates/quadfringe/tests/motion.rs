@@ -85,7 +85,7 @@ fn a_moving_hand_is_brought_to_one_instant() {
         let name = format!("hand, {faster} times as fast");
         let [before, after] =
             before_and_after(&name, |t| Hand::at(0.37 + faster * t).expect("a finite time"));
-        // The energy alone takes away half of the error, so compensation has less left to do than without it.
+        // The energy alone takes away half of the error.
         assert!(after[0] < 0.7 * before[0] && after[0] < most_rad, "{name}: {before:?} {after:?}");
         assert!(after[1] >= before[1] - 0.02, "{name}: {before:?} {after:?}");
     }

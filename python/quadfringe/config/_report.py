@@ -52,7 +52,7 @@ def report(model: type[BaseModel], error: ValidationError, source: str) -> str:
 
 
 def reason(problem: Any) -> str:
-    """Give what was expected and what was given. Messages of this package may contain both already."""
+    """Say what was expected and what was given."""
     given = problem["input"]
     if problem["type"] == "missing":
         return f"this {'key' if isinstance(problem['loc'][-1], str) else 'entry'} is required and missing"

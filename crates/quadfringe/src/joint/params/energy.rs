@@ -4,7 +4,7 @@
 //! Most numbers were not varied one by one.
 
 /// Side of a tile in cells, whole vectors. Larger: scales average over more of the surface, and the 70 planes of a tile no longer
-/// fit into the caches of a core. Smaller: more cells are computed twice (with 48 a decode takes a tenth longer).
+/// fit into the caches of a core. Smaller: more cells are computed twice.
 /// `quadfringe bench`.
 pub const SIDE: usize = 64;
 /// Number of cells at each side of a tile that are discarded, because their neighbours are missing. Fewer: seams. More: time.
@@ -47,7 +47,7 @@ pub const CONTRAST_FREEDOM: f32 = 2.0;
 
 /// Standard deviations with which the estimate of the priors starts: second differences of the phase in rad, and first differences
 /// of the logarithms of brightness, colour and contrast. The estimate forgets them after a few steps.
-/// `python evaluation/world.py --half tune`: with all four three times as large, two more steps are needed.
+/// Not measured: it was set with the others (see the head of this file).
 pub const START: [f32; 4] = [0.01, 0.04, 0.015, 0.01];
 /// Weight of these in the estimate, as a number of cells. It keeps the estimate of a tile with few lit cells finite.
 /// Not measured: it was set with the others (see the head of this file).
@@ -67,8 +67,7 @@ pub const CONTRAST_LIMITS: [f32; 2] = [0.0005, 0.3];
 pub const DETERMINED_MIN: f32 = 0.02;
 
 /// Error of the model as a share of the albedo: response, crosstalk and registration are never known exactly. Larger: less noise,
-/// and ripples of an error of the model are smoothed, but fine relief too. Smaller: finer relief. With 0.01 and 0.02 waves of
-/// 16 px keep 0.60 and 0.32 of their height, and the plate has a median of 0.0125 and 0.0109 rad.
+/// and ripples of an error of the model are smoothed, but fine relief too. Smaller: finer relief.
 /// `python evaluation/world.py --half tune`, `python evaluation/captures_report.py`.
 pub const MODEL_SHARE: f32 = 0.0125;
 
@@ -82,8 +81,7 @@ pub const CONTRAST_START_LIMITS: [f32; 2] = [0.1, 1.05];
 /// Not measured: it was set with the others (see the head of this file).
 pub const ALBEDO_LIMITS: [f32; 2] = [0.004, 4.0];
 
-/// Greatest number of Gauss-Newton steps. More: time, and scales that are closer to their limit: with 7 the plane has a sixth
-/// less of noise.
+/// Greatest number of Gauss-Newton steps. More: time, and scales that are closer to their limit.
 /// `python evaluation/world.py --half tune`.
 pub const OUTER_STEPS: usize = 5;
 /// Greatest number of steps of conjugate gradients in each of them. More: time. Fewer: painted surfaces are not solved.
