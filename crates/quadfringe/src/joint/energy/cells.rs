@@ -1,6 +1,6 @@
 //! The cells of a shot: means of a few pixels, which the tiles read, and the way back to the pixels.
 
-use super::tile::{MARGIN, STEP, Tile};
+use super::tile::Tile;
 use crate::joint::cells::{blend, spread};
 use crate::joint::params::energy::{SIDE, SPREAD_MAX_RAD, USABLE_MIN};
 use crate::joint::scene::{PhaseMap, Scene};
@@ -61,20 +61,18 @@ impl Cells {
         });
     }
 
-    /// Fills a tile; gives whether it has any cell that can be used.
-    pub fn load(&self, [row, column]: [usize; 2], tile: &mut Tile) -> bool {
+    /// Fills a tile whose first cell is `[top, left]`; gives whether it has any cell that can be used.
+    pub fn load(&self, [top, left]: [usize; 2], tile: &mut Tile) -> bool {
         let Self { height, width, stride, light, phase, usable, inside, .. } = self;
-        let first = MARGIN.saturating_sub(column * STEP);
-        let left = column * STEP + first - MARGIN;
-        let count = (SIDE - first).min(width.saturating_sub(left));
+        let count = SIDE.min(width - left);
         let mut any = false;
         for y in 0..SIDE {
             tile.clear(y);
-            let from = (row * STEP + y).wrapping_sub(MARGIN);
-            if from >= *height {
+            if top + y >= *height {
                 continue;
             }
-            let range = from * stride + left..from * stride + left + count;
+            let from = (top + y) * stride + left;
+            let range = from..from + count;
             let [red, green, blue, infrared] = &mut tile.light;
             let planes = [red, green, blue, infrared].into_iter().zip(light);
             let planes = planes.chain([
@@ -82,9 +80,7 @@ impl Cells {
                 (&mut tile.usable, usable),
                 (&mut tile.inside, inside),
             ]);
-            planes.for_each(|(to, from)| {
-                to.row_mut(y)[first..first + count].copy_from_slice(&from[range.clone()])
-            });
+            planes.for_each(|(to, from)| to.row_mut(y)[..count].copy_from_slice(&from[range.clone()]));
             any |= usable[range].iter().any(|&usable| usable > 0.0);
         }
         any

@@ -1,8 +1,8 @@
 //! The steps that lower the energy of a tile, and what they have found.
 
+use super::blocks::{information, phase_information};
 use super::data::linearise;
 use super::plane::{Fields, vectors};
-use super::preconditioner::{information, phase_information};
 use super::priors::weigh;
 use super::scales::{Determined, Scales, variance_share};
 use super::solve::solve;

@@ -4,10 +4,12 @@
 //! differ in surface, brightness, colour and contrast. How much that is, and how large the noise is, is estimated from the shot
 //! itself, tile by tile. Tiles overlap and are independent of each other, so the result does not depend on the threads.
 
+mod blocks;
 mod cells;
 mod data;
 mod descent;
 mod exp;
+mod layout;
 mod plane;
 mod preconditioner;
 mod priors;
@@ -16,15 +18,14 @@ mod solve;
 mod start;
 mod tile;
 
-use super::params::energy::{
-    BLENDED, CELL_MAX_PX, CELLS_PER_PERIOD_MIN, DISCARDED, SIDE, SMALL_CELLS_PER_PERIOD_MIN,
-};
+use super::params::energy::{CELL_MAX_PX, CELLS_PER_PERIOD_MIN, SMALL_CELLS_PER_PERIOD_MIN};
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::slots::Slots;
 use cells::Cells;
+use layout::Axis;
 use plane::Plane;
 use rayon::prelude::*;
-use tile::{Found, MARGIN, STEP, Tile};
+use tile::{Found, Tile};
 
 /// The minimiser, with its working memory.
 #[derive(Debug, Default)]
@@ -49,14 +50,15 @@ impl Energy {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, PhaseMap { phase, modulation }, factor);
         let Self { cells, tiles, slots } = self;
-        let [rows, across] = [cells.height, cells.width].map(|side| side.div_ceil(STEP));
-        tiles.resize_with(rows * across, Found::default);
+        let [rows, columns] = [cells.height, cells.width].map(Axis::new);
+        let across = columns.origins.len();
+        tiles.resize_with(rows.origins.len() * across, Found::default);
         let variance = (prior.noise / factor as f32).powi(2);
         tiles.par_iter_mut().enumerate().for_each_init(
             || slots.take(),
             |tile, (n, found)| {
                 found.inside.clear();
-                if cells.load([n / across, n % across], tile) {
+                if cells.load([rows.origins[n / across], columns.origins[n % across]], tile) {
                     tile.ratios = prior.ratios;
                     tile.minimise(variance);
                     tile.write(found);
@@ -64,7 +66,7 @@ impl Energy {
             },
         );
         let tiles = &*tiles;
-        cells.replace(|y, x| blend(tiles, across, y, x));
+        cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
         cells.correct(scene, phase);
     }
 
@@ -86,14 +88,13 @@ fn cell_px(period_px: f64) -> usize {
 }
 
 /// Blends the tiles at one cell: correction and variance, none outside the lit cells.
-fn blend(tiles: &[Found], columns: usize, y: usize, x: usize) -> Option<[f32; 2]> {
+fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Option<[f32; 2]> {
     let mut sums = [0.0; 3];
-    for row in around(y, tiles.len() / columns) {
-        for column in around(x, columns) {
-            let (inner_y, inner_x) = (y + MARGIN - row * STEP, x + MARGIN - column * STEP);
-            let found = &tiles[row * columns + column];
-            let value = |plane: &Plane| plane.row(inner_y)[inner_x];
-            let weight = ramp(inner_y) * ramp(inner_x) * value(&found.inside);
+    for row in rows.around(y) {
+        for column in columns.around(x) {
+            let found = &tiles[row.tile * columns.origins.len() + column.tile];
+            let value = |plane: &Plane| plane.row(row.inner)[column.inner];
+            let weight = row.weight * column.weight * value(&found.inside);
             sums[0] += weight;
             sums[1] += weight * value(&found.correction);
             sums[2] += weight * value(&found.variance);
@@ -101,19 +102,6 @@ fn blend(tiles: &[Found], columns: usize, y: usize, x: usize) -> Option<[f32; 2]
     }
     let [weight, correction, variance] = sums;
     (weight > 0.0).then(|| [correction / weight, variance / weight])
-}
-
-/// The tiles along one direction that contain a cell.
-fn around(place: usize, tiles: usize) -> std::ops::RangeInclusive<usize> {
-    let first = (place + MARGIN).saturating_sub(SIDE - 1).div_ceil(STEP);
-    first..=((place + MARGIN) / STEP).min(tiles - 1)
-}
-
-/// Weight of a tile at a place in it: 0 in the discarded cells, rising to 1 over the blended ones. The weights of two tiles that
-/// overlap add up to 1.
-fn ramp(place: usize) -> f32 {
-    let inner = place.min(SIDE - 1 - place);
-    ((inner as f32 + 0.5 - DISCARDED as f32) / BLENDED as f32).clamp(0.0, 1.0)
 }
 
 #[cfg(test)]

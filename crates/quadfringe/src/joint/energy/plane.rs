@@ -101,6 +101,46 @@ impl Fields {
     }
 }
 
+/// The unknowns of a vector of cells.
+#[derive(Debug, Default, Clone, Copy)]
+pub(super) struct Column {
+    pub phase: Lanes,
+    pub albedo: [Lanes; 4],
+    pub contrast: Lanes,
+}
+
+impl Column {
+    #[inline(always)]
+    pub fn of(fields: &Fields, at: usize) -> Self {
+        let Fields { phase, albedo, contrast } = fields;
+        Self { phase: phase.get(at), albedo: four(albedo, at), contrast: contrast.get(at) }
+    }
+
+    #[inline(always)]
+    pub fn write(&self, fields: &mut Fields, at: usize) {
+        fields.phase.set(at, self.phase);
+        fields.contrast.set(at, self.contrast);
+        for (plane, values) in fields.albedo.iter_mut().zip(self.albedo) {
+            plane.set(at, values);
+        }
+    }
+
+    /// Scalar product in every cell.
+    #[inline(always)]
+    pub fn times(&self, other: &Self) -> Lanes {
+        let mut out = [0.0; LANES];
+        for x in 0..LANES {
+            out[x] = self.phase[x] * other.phase[x] + self.contrast[x] * other.contrast[x];
+        }
+        for c in 0..4 {
+            for x in 0..LANES {
+                out[x] += self.albedo[c][x] * other.albedo[c][x];
+            }
+        }
+        out
+    }
+}
+
 /// Derivatives of the intensities of R, G, B, IR with respect to the unknowns of their cell, in linear light.
 #[derive(Debug, Default)]
 pub(super) struct Derivatives {

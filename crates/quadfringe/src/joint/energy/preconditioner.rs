@@ -1,194 +1,220 @@
-//! The preconditioner: the six unknowns of a cell with its neighbours held fixed.
+//! The preconditioner: exact solutions along the columns of cells.
 
-use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, four, total, vectors};
-use super::scales::Information;
-use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE};
+use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
+use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, place, total};
+use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
-/// The blocks of the cells: the six unknowns of a cell with its neighbours held fixed.
+/// Solves for each unknown along the columns of cells, which follow the fringes, as if the albedos of a cell and its contrast
+/// answered to its own phase alone: what converges slowly without it is a streak along a fringe, of phase and colour against
+/// each other.
 #[derive(Debug, Default)]
 pub(super) struct Preconditioner {
-    /// Inverse diagonal of each albedo.
-    albedo: [Plane; 4],
-    /// Inverse of the block of phase and contrast once the albedos are eliminated.
+    /// Change of each logarithm of an albedo that balances a unit change of the phase or the contrast of its cell, negative.
+    by_phase: [Plane; 4],
+    by_contrast: [Plane; 4],
+    /// The same of the contrast for the phase.
+    contrast_by_phase: Plane,
+    /// Factors of the phase: inverse pivots, and the shares of the first and the second row above.
     phase: Plane,
-    mixed: Plane,
+    phase_first: Plane,
+    phase_second: Plane,
+    /// Factors of the contrast.
     contrast: Plane,
+    contrast_first: Plane,
+    /// Inverse pivots of the albedos.
+    albedo: [Plane; 4],
+    /// Coupling of an albedo with that of the row below, negative.
+    coupling: Plane,
 }
 
-/// Diagonal of the matrix of bending.
-#[inline(always)]
-fn bend_diagonal(weights: &Weights, at: usize) -> Lanes {
-    let [along, down, mixed] = &weights.bend;
-    let (left, here, right) = (along.get(at - 1), along.get(at), along.get(at + 1));
-    let (above, level, below) = (down.get(at - STRIDE), down.get(at), down.get(at + STRIDE));
-    let corners = [mixed.get(at), mixed.get(at - 1), mixed.get(at - STRIDE), mixed.get(at - STRIDE - 1)];
-    let mut out = [0.0; LANES];
-    for x in 0..LANES {
-        out[x] = left[x] + right[x] + 4.0 * (here[x] + level[x]) + above[x] + below[x];
-        for corner in corners {
-            out[x] += corner[x];
-        }
-    }
-    out
-}
-
-/// Sum of the four weights of first differences at a cell.
-#[inline(always)]
-fn difference_diagonal(weights: &[Plane; 2], at: usize) -> Lanes {
-    let around =
-        [weights[0].get(at), weights[0].get(at - 1), weights[1].get(at), weights[1].get(at - STRIDE)];
-    let mut out = [0.0; LANES];
-    for weight in around {
-        for x in 0..LANES {
-            out[x] += weight[x];
-        }
-    }
-    out
-}
-
-/// Inverse diagonals of the albedos, and the block of phase and contrast without the bending.
-struct Block {
-    albedo: [Lanes; 4],
-    phase: Lanes,
-    mixed: Lanes,
-    contrast: Lanes,
-}
-
-#[inline(always)]
-fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> Block {
-    let bright = difference_diagonal(&weights.brightness, at);
-    let colour = difference_diagonal(&weights.colour, at);
-    let [mut phase, mut mixed, mut contrast] = [[0.0; LANES]; 3];
-    let mut albedo = [[0.0; LANES]; 4];
-    for c in 0..4 {
-        let (by_phase, by_albedo) = (derivatives.phase[c].get(at), derivatives.albedo[c].get(at));
-        let by_contrast = derivatives.contrast[c].get(at);
-        for x in 0..LANES {
-            let prior = 0.75 * colour[x] + 0.25 * bright[x] + RIDGE;
-            albedo[c][x] = 1.0 / (by_albedo[x] * by_albedo[x] + prior);
-            // What remains once the albedo follows.
-            let kept = prior * albedo[c][x];
-            phase[x] += by_phase[x] * by_phase[x] * kept;
-            mixed[x] += by_phase[x] * by_contrast[x] * kept;
-            contrast[x] += by_contrast[x] * by_contrast[x] * kept;
-        }
-    }
-    Block { albedo, phase, mixed, contrast }
-}
-
-/// Mean information of the usable cells.
+/// Factors the matrices of the columns of a tile.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn information(derivatives: &Derivatives, weights: &Weights) -> Information {
-    let [mut phase, mut albedo, mut contrast, mut cells] = [0.0f64; 4];
-    for at in vectors() {
-        let block = block(derivatives, weights, at);
-        let (mut squares, mut fringes, mut count) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+pub(super) fn prepare(lines: &mut Preconditioner, derivatives: &Derivatives, weights: &Weights) {
+    for x in (0..SIDE).step_by(LANES) {
+        let mut above = Pivots::default();
+        for y in 0..SIDE {
+            let at = place(x, y);
+            let local = block(derivatives, weights, at);
+            lines.follow(derivatives, &local, at);
+            lines.albedos(weights, &local.albedo, at);
+            let coupled = lines.contrast(weights, &local, at);
+            lines.bend(weights, &local.phase, coupled, at, &mut above);
+        }
+    }
+}
+
+/// What the factors of a row need of the two rows above.
+#[derive(Default)]
+struct Pivots {
+    /// The pivots themselves are the inverse of these.
+    inverse: [Lanes; 2],
+    /// Share of the row before the last in the last one.
+    first: Lanes,
+}
+
+impl Preconditioner {
+    /// How albedos follow phase and contrast of their cell.
+    #[inline(always)]
+    fn follow(&mut self, derivatives: &Derivatives, local: &Block, at: usize) {
         for c in 0..4 {
-            let (by_albedo, by_contrast) = (derivatives.albedo[c].get(at), derivatives.contrast[c].get(at));
+            let (by_phase, by_albedo) = (derivatives.phase[c].get(at), derivatives.albedo[c].get(at));
+            let by_contrast = derivatives.contrast[c].get(at);
+            let [mut phase, mut contrast] = [[0.0; LANES]; 2];
             for x in 0..LANES {
-                squares[x] += 0.25 * by_albedo[x] * by_albedo[x];
-                fringes[x] += by_contrast[x] * by_contrast[x];
-                count[x] = if squares[x] > 0.0 { 1.0 } else { 0.0 };
+                let share = by_albedo[x] * local.albedo[c][x];
+                (phase[x], contrast[x]) = (share * by_phase[x], share * by_contrast[x]);
             }
+            self.by_phase[c].set(at, phase);
+            self.by_contrast[c].set(at, contrast);
         }
-        phase += total(block.phase);
-        albedo += total(squares);
-        contrast += total(fringes);
-        cells += total(count);
     }
-    let mean = |sum: f64| (sum / cells.max(1.0)) as f32;
-    Information { phase: mean(phase), albedo: mean(albedo), contrast: mean(contrast) }
-}
 
-/// Information of a cell about its phase once albedo and contrast follow.
-#[inline(always)]
-pub(super) fn phase_information(derivatives: &Derivatives, weights: &Weights, at: usize) -> Lanes {
-    let Block { phase, mixed, contrast, .. } = block(derivatives, weights, at);
-    let prior = difference_diagonal(&weights.contrast, at);
-    let mut out = [0.0; LANES];
-    for x in 0..LANES {
-        out[x] = phase[x] - mixed[x] * mixed[x] / (contrast[x] + prior[x] + CONTRAST_RIDGE);
-    }
-    out
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn prepare(blocks: &mut Preconditioner, derivatives: &Derivatives, weights: &Weights) {
-    for at in vectors() {
-        let Block { albedo, phase, mixed, contrast } = block(derivatives, weights, at);
-        let (bend, slow) = (bend_diagonal(weights, at), difference_diagonal(&weights.contrast, at));
-        let mut inverse = [[0.0; LANES]; 3];
+    /// Pivots of the albedos.
+    #[inline(always)]
+    fn albedos(&mut self, weights: &Weights, local: &[Lanes; 4], at: usize) {
+        let (bright, colour) = (weights.brightness[1].get(at), weights.colour[1].get(at));
+        let above = self.coupling.get(at - STRIDE);
+        let mut coupling = [0.0; LANES];
         for x in 0..LANES {
-            let (first, last) = (phase[x] + bend[x] + RIDGE, contrast[x] + slow[x] + CONTRAST_RIDGE);
-            let determinant = first * last - mixed[x] * mixed[x];
-            let inverted = 1.0 / if determinant > 1e-30 { determinant } else { 1e-30 };
-            (inverse[0][x], inverse[1][x], inverse[2][x]) =
-                (last * inverted, -mixed[x] * inverted, first * inverted);
+            coupling[x] = -(0.75 * colour[x] + 0.25 * bright[x]);
         }
+        self.coupling.set(at, coupling);
         for c in 0..4 {
-            blocks.albedo[c].set(at, albedo[c]);
+            let before = self.albedo[c].get(at - STRIDE);
+            let mut inverse = [0.0; LANES];
+            for x in 0..LANES {
+                inverse[x] = 1.0 / (1.0 / local[c][x] - above[x] * above[x] * before[x]);
+            }
+            self.albedo[c].set(at, inverse);
         }
-        blocks.phase.set(at, inverse[0]);
-        blocks.mixed.set(at, inverse[1]);
-        blocks.contrast.set(at, inverse[2]);
+    }
+
+    /// Pivots of the contrast; returns the information about the phase that goes to it.
+    #[inline(always)]
+    fn contrast(&mut self, weights: &Weights, local: &Block, at: usize) -> Lanes {
+        let slow = difference_diagonal(&weights.contrast, at);
+        let (above, before) = (weights.contrast[1].get(at - STRIDE), self.contrast.get(at - STRIDE));
+        let [mut follow, mut coupled, mut inverse, mut first] = [[0.0; LANES]; 4];
+        for x in 0..LANES {
+            let diagonal = local.contrast[x] + slow[x] + CONTRAST_RIDGE;
+            follow[x] = local.mixed[x] / diagonal;
+            coupled[x] = follow[x] * local.mixed[x];
+            first[x] = -above[x] * before[x];
+            inverse[x] = 1.0 / (diagonal + first[x] * above[x]);
+        }
+        self.contrast_by_phase.set(at, follow);
+        self.contrast_first.set(at, first);
+        self.contrast.set(at, inverse);
+        coupled
+    }
+
+    /// Factors of the phase.
+    #[inline(always)]
+    fn bend(&mut self, weights: &Weights, known: &Lanes, coupled: Lanes, at: usize, above: &mut Pivots) {
+        let [_, down, mixed] = &weights.bend;
+        let diagonal = bend_diagonal(weights, at);
+        let (here, last) = (down.get(at), down.get(at - STRIDE));
+        let (corner, corner_left) = (mixed.get(at - STRIDE), mixed.get(at - STRIDE - 1));
+        let [mut inverse, mut first, mut second] = [[0.0; LANES]; 3];
+        for x in 0..LANES {
+            second[x] = last[x] * above.inverse[0][x];
+            let next = -2.0 * (here[x] + last[x]) - corner[x] - corner_left[x] - last[x] * above.first[x];
+            first[x] = next * above.inverse[1][x];
+            let pivot = known[x] - coupled[x] + diagonal[x] + RIDGE - last[x] * second[x] - next * first[x];
+            inverse[x] = 1.0 / if pivot > RIDGE { pivot } else { RIDGE };
+        }
+        self.phase_second.set(at, second);
+        self.phase_first.set(at, first);
+        self.phase.set(at, inverse);
+        *above = Pivots { inverse: [above.inverse[1], inverse], first };
     }
 }
 
-/// Solves the blocks; returns the scalar product of residual and result.
+/// Solves the columns; returns the scalar product of residual and result.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn precondition(
-    blocks: &Preconditioner,
-    data: &Derivatives,
-    residual: &Fields,
-    out: &mut Fields,
-) -> f64 {
+pub(super) fn precondition(lines: &Preconditioner, residual: &Fields, out: &mut Fields) -> f64 {
     let mut product = 0.0;
-    for at in vectors() {
-        let [first, last] = [&residual.phase, &residual.contrast].map(|plane| plane.get(at));
-        let (mut phase, mut contrast) = (first, last);
-        let (inverse, logs) = (four(&blocks.albedo, at), four(&residual.albedo, at));
-        let (by_phase, by_albedo) = (four(&data.phase, at), four(&data.albedo, at));
-        let by_contrast = four(&data.contrast, at);
-        for c in 0..4 {
-            for x in 0..LANES {
-                let follow = by_albedo[c][x] * inverse[c][x] * logs[c][x];
-                phase[x] -= by_phase[c][x] * follow;
-                contrast[x] -= by_contrast[c][x] * follow;
-            }
+    for x in (0..SIDE).step_by(LANES) {
+        let mut rows = [Column::default(), Column::default()];
+        for y in 0..SIDE {
+            let at = place(x, y);
+            let row = lines.eliminate(at, &Column::of(residual, at), &rows);
+            row.write(out, at);
+            rows = [rows[1], row];
         }
-        let [p, m] = blocks.solve(at, [phase, contrast]);
-        let mut sum = [0.0; LANES];
-        for x in 0..LANES {
-            sum[x] = p[x] * first[x] + m[x] * last[x];
+        let mut rows = [Column::default(), Column::default()];
+        for y in (0..SIDE).rev() {
+            let at = place(x, y);
+            let row = lines.substitute(at, &Column::of(out, at), &rows);
+            let solution = lines.answer(at, &row);
+            product += total(solution.times(&Column::of(residual, at)));
+            solution.write(out, at);
+            rows = [rows[1], row];
         }
-        for c in 0..4 {
-            let mut log = logs[c];
-            for x in 0..LANES {
-                let change = by_phase[c][x] * p[x] + by_contrast[c][x] * m[x];
-                log[x] = inverse[c][x] * (log[x] - by_albedo[c][x] * change);
-                sum[x] += log[x] * logs[c][x];
-            }
-            out.albedo[c].set(at, log);
-        }
-        out.phase.set(at, p);
-        out.contrast.set(at, m);
-        product += total(sum);
     }
     product
 }
 
 impl Preconditioner {
-    /// Phase and contrast of a vector of cells, by the inverse of their block.
+    /// Forward elimination of one row, from the results of the two rows above, the nearer one last.
     #[inline(always)]
-    fn solve(&self, at: usize, [phase, contrast]: [Lanes; 2]) -> [Lanes; 2] {
-        let (first, mixed, last) = (self.phase.get(at), self.mixed.get(at), self.contrast.get(at));
-        let [mut p, mut m] = [[0.0; LANES]; 2];
-        for x in 0..LANES {
-            p[x] = first[x] * phase[x] + mixed[x] * contrast[x];
-            m[x] = mixed[x] * phase[x] + last[x] * contrast[x];
+    fn eliminate(&self, at: usize, residual: &Column, [second, first]: &[Column; 2]) -> Column {
+        let mut out = *residual;
+        let (by_phase, by_contrast) = (four(&self.by_phase, at), four(&self.by_contrast, at));
+        let (above, coupling) = (four(&self.albedo, at - STRIDE), self.coupling.get(at - STRIDE));
+        for c in 0..4 {
+            for x in 0..LANES {
+                let log = residual.albedo[c][x];
+                out.phase[x] -= by_phase[c][x] * log;
+                out.contrast[x] -= by_contrast[c][x] * log;
+                out.albedo[c][x] = log - coupling[x] * above[c][x] * first.albedo[c][x];
+            }
         }
-        [p, m]
+        let (follow, share) = (self.contrast_by_phase.get(at), self.contrast_first.get(at));
+        let (one, two) = (self.phase_first.get(at), self.phase_second.get(at));
+        for x in 0..LANES {
+            out.phase[x] -= follow[x] * out.contrast[x] + one[x] * first.phase[x] + two[x] * second.phase[x];
+            out.contrast[x] -= share[x] * first.contrast[x];
+        }
+        out
+    }
+
+    /// Back substitution of one row, from the results of the two rows below, the nearer one last.
+    #[inline(always)]
+    fn substitute(&self, at: usize, row: &Column, [second, first]: &[Column; 2]) -> Column {
+        let mut out = *row;
+        let (pivot, slow) = (self.phase.get(at), self.contrast.get(at));
+        let (one, two) = (self.phase_first.get(at + STRIDE), self.phase_second.get(at + 2 * STRIDE));
+        let share = self.contrast_first.get(at + STRIDE);
+        let (inverse, coupling) = (four(&self.albedo, at), self.coupling.get(at));
+        for x in 0..LANES {
+            out.phase[x] = pivot[x] * row.phase[x] - one[x] * first.phase[x] - two[x] * second.phase[x];
+            out.contrast[x] = slow[x] * row.contrast[x] - share[x] * first.contrast[x];
+        }
+        for c in 0..4 {
+            for x in 0..LANES {
+                out.albedo[c][x] = inverse[c][x] * (row.albedo[c][x] - coupling[x] * first.albedo[c][x]);
+            }
+        }
+        out
+    }
+
+    /// The unknowns of a row: contrast and albedos follow the phase of their cell.
+    #[inline(always)]
+    fn answer(&self, at: usize, row: &Column) -> Column {
+        let mut out = *row;
+        let (by_phase, by_contrast) = (four(&self.by_phase, at), four(&self.by_contrast, at));
+        let follow = self.contrast_by_phase.get(at);
+        for x in 0..LANES {
+            out.contrast[x] -= follow[x] * row.phase[x];
+        }
+        for c in 0..4 {
+            for x in 0..LANES {
+                out.albedo[c][x] -= by_phase[c][x] * row.phase[x] + by_contrast[c][x] * out.contrast[x];
+            }
+        }
+        out
     }
 }

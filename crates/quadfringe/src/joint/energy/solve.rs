@@ -1,9 +1,9 @@
 //! The linear system of one Gauss-Newton step, solved by preconditioned conjugate gradients.
 
-use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, four, total, vectors};
+use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, total, vectors};
 use super::preconditioner::{precondition, prepare};
 use super::tile::Tile;
-use crate::joint::params::energy::{CONTRAST_RIDGE, RESIDUAL_LEFT, RIDGE};
+use crate::joint::params::energy::{CONTRAST_RIDGE, NEGLIGIBLE, RESIDUAL_LEFT, RIDGE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -20,23 +20,23 @@ pub(super) fn solve(tile: &mut Tile, steps: usize) {
         product,
         step,
         inside,
+        scales,
         ..
     } = tile;
     // The gradient of the priors.
     multiply::<false>(derivatives, weights, inside, unknown, product);
     subtract(product, residual);
     prepare(preconditioner, derivatives, weights);
-    for plane in step.planes_mut().into_iter().chain(direction.planes_mut()) {
-        plane.clear();
-    }
-    let mut before = 0.0;
-    let mut first = 0.0;
+    step.planes_mut().into_iter().chain(direction.planes_mut()).for_each(Plane::clear);
+    let cells: f64 = vectors().map(|at| total(inside.get(at))).sum();
+    let negligible = NEGLIGIBLE * f64::from(scales.noise) * cells;
+    let (mut before, mut enough) = (0.0, 0.0);
     for n in 0..steps {
-        let size = precondition(preconditioner, derivatives, residual, preconditioned);
+        let size = precondition(preconditioner, residual, preconditioned);
         if n == 0 {
-            first = size;
+            enough = negligible.max(RESIDUAL_LEFT * size);
         }
-        if size <= RESIDUAL_LEFT * first {
+        if size <= enough {
             break;
         }
         turn(preconditioned, if n == 0 { 0.0 } else { (size / before) as f32 }, direction);
@@ -109,62 +109,30 @@ pub(super) fn multiply<const DATA: bool>(
 ) -> f64 {
     let mut product = 0.0;
     for at in vectors() {
-        let mut vector = Vector {
+        let given = Column::of(from, at);
+        let mut found = Column {
             phase: bend(weights, &from.phase, at),
             albedo: [[0.0; LANES]; 4],
             contrast: difference(&weights.contrast, &from.contrast, at),
-        };
-        let given = Vector {
-            phase: from.phase.get(at),
-            albedo: four(&from.albedo, at),
-            contrast: from.contrast.get(at),
         };
         for (k, edge, there) in
             [(0, at, at + 1), (0, at - 1, at - 1), (1, at, at + STRIDE), (1, at - STRIDE, at - STRIDE)]
         {
             let (bright, colour) = (weights.brightness[k].get(edge), weights.colour[k].get(edge));
-            colours(bright, colour, &given.albedo, &four(&from.albedo, there), &mut vector.albedo);
+            colours(bright, colour, &given.albedo, &four(&from.albedo, there), &mut found.albedo);
         }
         if DATA {
-            add_data(derivatives, inside.get(at), at, &given, &mut vector);
+            add_data(derivatives, inside.get(at), at, &given, &mut found);
         }
-        product += total(vector.times(&given));
-        to.phase.set(at, vector.phase);
-        to.contrast.set(at, vector.contrast);
-        for c in 0..4 {
-            to.albedo[c].set(at, vector.albedo[c]);
-        }
+        product += total(found.times(&given));
+        found.write(to, at);
     }
     product
 }
 
-/// The unknowns of a vector of cells.
-struct Vector {
-    phase: Lanes,
-    albedo: [Lanes; 4],
-    contrast: Lanes,
-}
-
-impl Vector {
-    /// Scalar product in every cell.
-    #[inline(always)]
-    fn times(&self, other: &Self) -> Lanes {
-        let mut out = [0.0; LANES];
-        for x in 0..LANES {
-            out[x] = self.phase[x] * other.phase[x] + self.contrast[x] * other.contrast[x];
-        }
-        for c in 0..4 {
-            for x in 0..LANES {
-                out[x] += self.albedo[c][x] * other.albedo[c][x];
-            }
-        }
-        out
-    }
-}
-
 /// Adds the product with the matrix of the data and the ridges.
 #[inline(always)]
-fn add_data(derivatives: &Derivatives, inside: Lanes, at: usize, given: &Vector, out: &mut Vector) {
+fn add_data(derivatives: &Derivatives, inside: Lanes, at: usize, given: &Column, out: &mut Column) {
     let (phase, contrast) = (&given.phase, &given.contrast);
     for x in 0..LANES {
         out.phase[x] += RIDGE * inside[x] * phase[x];

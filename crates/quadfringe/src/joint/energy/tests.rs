@@ -1,13 +1,13 @@
 //! The matrix of a step, the minimum of one tile, and the seams between tiles.
 
-use super::plane::{Fields, Plane, place, total, vectors};
+use super::cell_px;
+use super::plane::{Column, Derivatives, Fields, Plane, Weights, place, total, vectors};
+use super::preconditioner::{precondition, prepare};
 use super::priors::weigh;
 use super::scales::variance_share;
 use super::solve::multiply;
-use super::tile::{MARGIN, STEP, Tile};
-use super::{around, cell_px, ramp};
-use crate::joint::params::energy::{BLENDED, SIDE};
-use crate::parallel::lanes::LANES;
+use super::tile::Tile;
+use crate::joint::params::energy::SIDE;
 
 const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
 
@@ -74,54 +74,77 @@ fn noise_is_estimated_and_averaged() {
     assert!((0.6..1.5).contains(&(tile.scales.misfit / expected)), "{} {expected}", tile.scales.misfit);
 }
 
+fn random_fields(seed: usize) -> Fields {
+    let mut fields = Fields::default();
+    for (n, plane) in fields.planes_mut().into_iter().enumerate() {
+        for y in 0..SIDE {
+            (0..SIDE).for_each(|x| plane.row_mut(y)[x] = random(10 * seed + n, place(x, y)));
+        }
+    }
+    fields
+}
+
+fn scalar(a: &Fields, b: &Fields) -> f64 {
+    vectors().map(|at| total(Column::of(a, at).times(&Column::of(b, at)))).sum()
+}
+
+#[test]
+fn the_preconditioner_is_symmetric_and_positive() {
+    let (mut tile, _) = tile(0.03);
+    tile.minimise(1e-6);
+    let Tile { derivatives, weights, preconditioner, .. } = &mut tile;
+    prepare(preconditioner, derivatives, weights);
+    let (first, second) = (random_fields(1), random_fields(2));
+    let [mut one, mut two] = [Fields::default(), Fields::default()];
+    let own = precondition(preconditioner, &first, &mut one);
+    precondition(preconditioner, &second, &mut two);
+    let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
+    assert!(own > 0.0 && (forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
+}
+
+#[test]
+fn the_preconditioner_inverts_columns_that_stand_alone() {
+    let (mut tile, _) = tile(0.03);
+    tile.minimise(1e-6);
+    let Tile { derivatives, weights, preconditioner, inside, .. } = &mut tile;
+    // Neither columns nor the unknowns of a cell are coupled: R knows the phase, G and B their albedo, IR the contrast.
+    let Weights { bend: [along, _, mixed], brightness, colour, contrast } = weights;
+    for plane in [along, mixed, &mut brightness[0], &mut colour[0], &mut contrast[0]] {
+        plane.clear();
+    }
+    brightness[1].clone_from(&colour[1]);
+    let Derivatives { phase, albedo, contrast } = derivatives;
+    let [red, _, _, infrared] = albedo;
+    let unknown = phase[1..].iter_mut().chain(&mut contrast[..3]).chain([red, infrared]);
+    unknown.for_each(Plane::clear);
+    prepare(preconditioner, derivatives, weights);
+    let expected = random_fields(3);
+    let [mut product, mut found] = [Fields::default(), Fields::default()];
+    multiply::<true>(derivatives, weights, inside, &expected, &mut product);
+    precondition(preconditioner, &product, &mut found);
+    for n in [0, 2, 3, 5] {
+        let (found, expected) = (found.planes()[n], expected.planes()[n]);
+        for y in 0..SIDE {
+            for (found, expected) in found.row(y).iter().zip(expected.row(y)) {
+                assert!((found - expected).abs() < 0.01, "{n}: {found} {expected}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_matrix_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.0);
     tile.minimise(1e-6);
     weigh(&mut tile);
-    let fields = |seed: usize| {
-        let mut fields = Fields::default();
-        for (n, plane) in fields.planes_mut().into_iter().enumerate() {
-            for y in 0..SIDE {
-                (0..SIDE).for_each(|x| plane.row_mut(y)[x] = random(10 * seed + n, place(x, y)));
-            }
-        }
-        fields
-    };
-    let (first, second) = (fields(1), fields(2));
+    let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
     let Tile { derivatives, weights, inside, .. } = &tile;
     let own = multiply::<true>(derivatives, weights, inside, &first, &mut one);
     assert!(own > 0.0);
     multiply::<true>(derivatives, weights, inside, &second, &mut two);
-    let scalar = |a: &Fields, b: &Fields| -> f64 {
-        let product = |(a, b): (&Plane, &Plane)| -> f64 {
-            vectors()
-                .map(|at| {
-                    let (a, mut b) = (a.get(at), b.get(at));
-                    (0..LANES).for_each(|x| b[x] *= a[x]);
-                    total(b)
-                })
-                .sum()
-        };
-        a.planes().into_iter().zip(b.planes()).map(product).sum()
-    };
     let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
     assert!((forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
-}
-
-#[test]
-fn tiles_cover_every_cell_with_weights_that_add_up_to_one() {
-    for size in [1, STEP - 1, STEP, STEP + 1, 5 * STEP + 3] {
-        let tiles = size.div_ceil(STEP);
-        for place in 0..size {
-            let inner = |tile: usize| place + MARGIN - tile * STEP;
-            assert!(around(place, tiles).all(|tile| inner(tile) < SIDE));
-            let weight: f32 = around(place, tiles).map(|tile| ramp(inner(tile))).sum();
-            let inside = place >= BLENDED / 2 && place + BLENDED / 2 < (tiles - 1) * STEP + STEP / 2;
-            assert!(weight > 0.0 && (!inside || (weight - 1.0).abs() < 1e-6), "{size} {place} {weight}");
-        }
-    }
 }
 
 #[test]

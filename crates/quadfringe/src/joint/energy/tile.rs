@@ -3,12 +3,6 @@
 use super::plane::{Derivatives, Fields, Plane, Weights};
 use super::preconditioner::Preconditioner;
 use super::scales::Scales;
-use crate::joint::params::energy::{BLENDED, DISCARDED, SIDE};
-
-/// Cells from one tile to the next.
-pub(super) const STEP: usize = SIDE - 2 * DISCARDED - BLENDED;
-/// Cells of a tile before the first that belongs to it more than to its neighbour.
-pub(super) const MARGIN: usize = DISCARDED + BLENDED / 2;
 
 /// Results of one tile; 0 outside the lit cells.
 #[derive(Debug, Default)]

@@ -3,10 +3,10 @@
 //! Chosen on one seed of the half `tune` of `python evaluation/world.py` and on the captures (`python evaluation/captures_report.py`).
 //! Most numbers were not varied one by one.
 
-/// Side of a tile in cells, whole vectors. Larger: scales average over more of the surface, and the 70 planes of a tile no longer
-/// fit into the caches of a core. Smaller: more cells are computed twice.
-/// `quadfringe bench`.
-pub const SIDE: usize = 64;
+/// Side of a tile in cells, whole vectors. Larger: scales average over more of the surface. Smaller: more cells are computed twice.
+/// `python benches/bench_decode.py` (an image of 1024 x 768 with cells of 4 px has twelve tiles, 1.6 times its cells; tiles of 64
+/// have 1.7 times).
+pub const SIDE: usize = 80;
 /// Number of cells at each side of a tile that are discarded, because their neighbours are missing. Fewer: seams. More: time.
 /// Not measured: it was set with the others (see the head of this file).
 pub const DISCARDED: usize = 4;
@@ -81,18 +81,25 @@ pub const CONTRAST_START_LIMITS: [f32; 2] = [0.1, 1.05];
 /// Not measured: it was set with the others (see the head of this file).
 pub const ALBEDO_LIMITS: [f32; 2] = [0.004, 4.0];
 
-/// Greatest number of Gauss-Newton steps. More: time, and scales that are closer to their limit.
-/// `python evaluation/world.py --half tune`.
-pub const OUTER_STEPS: usize = 5;
+/// Greatest number of Gauss-Newton steps; a tile that rests takes fewer. More: time on painted surfaces. Fewer: scales stop before
+/// their limit, and fine relief is lost (with five, 0.29 instead of 0.5 of the height of waves of 16 px is left).
+/// `python evaluation/world.py --half tune --only resolution`.
+pub const OUTER_STEPS: usize = 8;
 /// Greatest number of steps of conjugate gradients in each of them. More: time. Fewer: painted surfaces are not solved.
 /// Not measured: it was set with the others (see the head of this file).
 pub const INNER_STEPS: usize = 20;
 /// Share of the squared residual, in the norm of the preconditioner, at which conjugate gradients end. Smaller: time.
 /// Not measured: it was set with the others (see the head of this file).
 pub const RESIDUAL_LEFT: f64 = 1e-2;
+/// Mean squared length of the step that is left in a cell, in the same norm and in units of the variance of the noise, at which
+/// they end as well. Larger: white surfaces are less exact (3e-3: faces 8 %, waves of 39 px keep 0.75 instead of 0.83 of their
+/// height). Smaller: time on tiles that are nearly solved.
+/// `python evaluation/world.py --half tune`.
+pub const NEGLIGIBLE: f64 = 1e-3;
 /// Root mean square change of the phase in rad below which a tile rests. Larger: scales stop too early. Smaller: time.
-/// Not measured: it was set with the others (see the head of this file).
-pub const RESTING_RAD: f32 = 0.001;
+/// 0.001 leaves 0.46 instead of 0.52 of the height of waves of 16 px.
+/// `python evaluation/world.py --half tune --only resolution`.
+pub const RESTING_RAD: f32 = 0.0003;
 
 /// Greatest change of a phase in one Gauss-Newton step, in rad. The linearisation holds for about a tenth of a turn.
 /// Not measured: it was set with the others (see the head of this file).
