@@ -18,7 +18,7 @@ TILE_SHARE = 0.3  # least share of the pixels of a tile that are returned
 TILES_MIN = 4
 # Three quarters of the tiles are off by at most this. On coloured patches and photographs it is 0.1 rad in sound shots,
 # and 0.2 rad or more with other fringe numbers. `pytest tests/test_real_objects.py` decodes both.
-OFFSET_MAX_RAD = 0.13
+OFFSET_MAX_RAD = 0.12
 QUANTILE = 0.75
 
 

@@ -64,7 +64,8 @@ def outline(shape: tuple[int, ...], fill: float, seed: int) -> NDArray[np.bool_]
     rows, columns = shape
     random = np.random.default_rng([seed, 5])
     y, x = np.mgrid[:rows, :columns]
-    across, down = np.sqrt(fill * rows * columns / np.pi) * np.array([1.0, 1.0]) * random.uniform(0.9, 1.1) ** [1, -1]
+    radius, longer = np.sqrt(fill * rows * columns / np.pi), random.uniform(0.9, 1.1)
+    across, down = radius * longer, radius / longer
     y, x = (y - random.uniform(0.4, 0.6) * rows) / down, (x - random.uniform(0.35, 0.65) * columns) / across
     angle, phases = np.arctan2(y, x), random.uniform(0, 6, 2)
     waves = 0.12 * np.sin(3 * angle + phases[0]) + 0.06 * np.sin(7 * angle + phases[1])
