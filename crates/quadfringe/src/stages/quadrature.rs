@@ -76,7 +76,7 @@ fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
 
 /// The band of a carrier in a quadrature spectrum.
 struct Band {
-    /// Centre of gravity in cycles per line.
+    /// Centre of gravity of the squares in cycles per line.
     cycles: f64,
     sum: f64,
 }
@@ -92,7 +92,8 @@ fn strongest_band(quadrature: &[f32], least: f32) -> Option<Band> {
     let sums = bins.map(|bin| (bin, band(bin).iter().sum::<f32>()));
     let (best, sum) = sums.max_by(|(_, one), (_, other)| one.abs().total_cmp(&other.abs()))?;
     let first = (best as f64 / CARRIER_BAND).ceil();
-    let weights = band(best).iter().map(|q| f64::from((sum.signum() * q).max(0.0)));
+    // Squares keep what is left of noise in a wide band from moving the centre.
+    let weights = band(best).iter().map(|q| f64::from((sum.signum() * q).max(0.0)).powi(2));
     let weight: f64 = weights.clone().sum();
     let moment: f64 = weights.enumerate().map(|(i, weight)| (first + i as f64) * weight).sum();
     (sum.abs() > least && sum.abs() > QUADRATURE_SHARE_MIN * total)
