@@ -101,6 +101,14 @@ DepthRangeOption = Annotated[
 BitsOption = Annotated[
     Bits | None, typer.Option(help="Significant bits of 16-bit files; default: 16. Use it for 10 to 14-bit cameras.")
 ]
+PeriodOption = Annotated[
+    float | None,
+    typer.Option(
+        metavar="PX",
+        help="Fringe period across the fringes, camera pixels; default: estimated from the shot. Give it if the estimate "
+        "fails, as on an object narrower than two fringes.",
+    ),
+]
 InstantsOption = Annotated[
     tuple[float, float, float, float] | None,
     typer.Option(
@@ -131,6 +139,7 @@ def decode(
     depth_range_mm: DepthRangeOption = None,
     predeformed_z_mm: PredeformedOption = None,
     bits: BitsOption = None,
+    period_px: PeriodOption = None,
     channel_instants_us: InstantsOption = None,
     json: JsonOption = None,
 ) -> None:
@@ -140,7 +149,7 @@ def decode(
 
     _check_result(out, calibration)
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
-    settings |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
+    settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
     plan = decoding.Plan(
         projector_width,
         checked(Fringes, {"numbers": fringes, "predeformed_z_mm": predeformed_z_mm}, "--fringes"),
@@ -149,8 +158,7 @@ def decode(
         decode_settings(settings),
     )
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    shape = decoding.decode(_shot(folder, files, bayer, bits), plan)
-    _save(shape, out, json)
+    _save(decoding.decode(_shot(folder, files, bayer, bits), plan), out, json)
 
 
 def _check_result(out: Path, calibration: Path | None) -> None:

@@ -174,6 +174,11 @@ class DecodeConfig(Model):
         description="Least quality of a valid pixel, from 0 to below 1. Raise it for fewer wrong orders and fewer "
         "pixels.",
     )
+    period_px: Finite | None = Field(
+        default=None,
+        description="Fringe period across the fringes in camera pixels, at least 3, good to a third. Absent: estimated "
+        "from every shot. Give it if the estimate fails, as on an object narrower than two fringes.",
+    )
     channel_instants_us: Row4 | None = Field(
         default=None,
         description="Times in us at which R, G, B and IR are exposed, relative to the instant of the shape. For "
@@ -183,7 +188,7 @@ class DecodeConfig(Model):
         default=None, description="Threads of one decoder. Absent: as many as the machine has cores."
     )
 
-    @field_validator("modulation_min", "quality_min", "channel_instants_us")
+    @field_validator("modulation_min", "quality_min", "period_px", "channel_instants_us")
     @classmethod
     def _decoder_takes(cls, value: Any, info: ValidationInfo) -> Any:
         if value is not None and info.field_name is not None:

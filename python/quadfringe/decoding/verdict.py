@@ -11,6 +11,7 @@ import numpy as np
 from quadfringe.config import BayerPattern
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot
 from quadfringe.decoding._kernel import KernelDecoder
+from quadfringe.decoding._offsets import channels_agree
 from quadfringe.errors import DecodeError
 
 __all__ = ["band_of", "judge", "order_margin", "rows_of"]
@@ -25,6 +26,9 @@ RETURNED_MIN = 0.05  # least share of the lit pixels that must be returned
 # (joint) and 0.3 (published). `pytest tests/test_verdict.py` tests both limits.
 COLLAPSED = {"joint": 0.55, "published": 0.35}
 DOUBTFUL = 0.6
+# From this margin up to the collapsed one, shots are kept whose channels agree. Below, other fringe numbers on coloured
+# patches agree by chance. `pytest tests/test_real_objects.py` decodes shots of both kinds.
+AGREEING_MIN = 0.3
 CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged
 
 # A band of rows shows which exchanges can explain a doubtful shot: the share of the rows, and their least number.
@@ -40,7 +44,8 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
     """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
 
     When the median margin is below 0.6, `decoder` decodes the shot with each pair of channels exchanged, or as each
-    other Bayer pattern, to name them; with None that check is left out.
+    other Bayer pattern, to name them; with None that check is left out. A shot with a margin from 0.3, as of a
+    photograph, is kept if its channels agree on the phase and no exchange comes near to its margin.
     """
     margin, lit, returned = _margin(shape)
     collapsed = COLLAPSED[shape.config["decode"]["method"]]
@@ -56,7 +61,7 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
         )
     if decoder is not None:
         _refuse_exchanged(shape, shot, max(collapsed, CLEARLY_BETTER * margin), decoder)
-    if not enough or margin < collapsed:
+    if not enough or (margin < collapsed and not _agrees(shape, shot, margin, decoder)):
         raise DecodeError(
             f"no shape: the order margin has collapsed: below {margin:.2f} of 1 for half of the lit "
             "pixels; the channels may be swapped (red, green, blue, ir), or the fringe numbers, the projector "
@@ -99,6 +104,18 @@ def _refuse_exchanged(shape: Shape, shot: AnyShot, least: float, decoder: Kernel
         raise DecodeError(
             f"no shape: {best}: the median order margin is {_margin(shape)[0]:.2f} as given and {found[best]:.2f} if so"
         )
+
+
+def _agrees(shape: Shape, shot: AnyShot, margin: float, decoder: KernelDecoder | None) -> bool:
+    """Tell whether the channels agree on the phase, and in a band of rows no exchange comes near to the margin."""
+    if decoder is None or margin < AGREEING_MIN or not channels_agree(shape, shot, decoder.plan):
+        return False
+    first, count = band_of(shape)
+    part = decoder.for_rows(first, count)
+    given, *others = (
+        order_margin(part.shape(rows_of(one, first, count))) for one in (shot, *_suspects(shot).values())
+    )
+    return given > CLEARLY_BETTER * max(others)
 
 
 def _plausible(suspects: dict[str, AnyShot], shape: Shape, least: float, decoder: KernelDecoder) -> dict[str, AnyShot]:

@@ -22,8 +22,8 @@ pub struct Options {
     /// Least quality of a fringe order that is returned, in [0, 1]. A higher value removes more wrong orders, and
     /// correct points with them. Default: 0.15.
     pub quality_min: f32,
-    /// Fringe period in camera pixels, at least 3; `None` estimates it from every shot. Set it if the estimate fails,
-    /// for example for a single object in a dark field. Default: `None`.
+    /// Fringe period across the fringes in camera pixels, at least 3, good to a third; `None` estimates it from every
+    /// shot. Set it if the estimate fails, for example for an object narrower than two fringes. Default: `None`.
     pub period_px: Option<f64>,
 }
 

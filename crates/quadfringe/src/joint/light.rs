@@ -4,7 +4,7 @@ use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
 use super::pyramid::Level;
 use crate::Shot;
 use crate::condition::{Plan, Sample};
-use crate::stages::carrier;
+use crate::stages::quadrature_carrier;
 use multiversion::multiversion;
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
@@ -63,12 +63,14 @@ fn linear_row<T: Sample>(
     plan.continue_infrared(y, infrared);
 }
 
-/// Fringe period across the fringes in pixels, from the red plane; a fixed share of the image width if no carrier
-/// stands out.
-pub(super) fn fringe_period_px(red: &[f32], [height, width]: [usize; 2]) -> f64 {
-    let stride = red.len() / height;
-    let red = ArrayView2::from_shape((height, stride), red).expect("a plane is whole");
-    let found = carrier(red.slice(s![.., ..width])).period_px();
+/// Fringe period across the fringes in pixels, from the planes of red and blue; a fixed share of the image width if no
+/// carrier stands out.
+pub(super) fn fringe_period_px(light: &[Vec<f32>; 4], [height, width]: [usize; 2]) -> f64 {
+    let [red, _, blue, _] = light.each_ref().map(|plane| {
+        let stride = plane.len() / height;
+        ArrayView2::from_shape((height, stride), plane).expect("a plane is whole").slice_move(s![.., ..width])
+    });
+    let found = quadrature_carrier(red, blue).period_px();
     let shorter = width.min(height) as f64;
     if found.is_finite() {
         found.clamp(PERIOD_MIN_PX, shorter.max(2.0 * PERIOD_MIN_PX))

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! 1  linear light                                                        (S1)  condition
-//! 2  fringe period; mask of lit pixels; noise                                  stages::carrier, illumination, noise
+//! 2  fringe period; mask of lit pixels; noise                                  stages::quadrature_carrier, illumination, noise
 //! 3  coarse level: wrapped phase, beats of G and IR by a local fit   (S2, S3)  pyramid, local_fit, slopes
 //! 4  fringe orders by semi-global matching                               (S4)  orders
 //! 5  photometry: offset and amplitude of every channel                         photometry
@@ -130,7 +130,7 @@ impl Joint {
         // 1. Linear light of the four channels (S1).
         linear_light(plan, shot, self.shape, &mut self.pyramid.full);
         // 2. The fringe period scales all windows, cells and the coarse level.
-        let found = || fringe_period_px(&self.pyramid.full.light[0], self.shape);
+        let found = || fringe_period_px(&self.pyramid.full.light, self.shape);
         let period_px = options.period_px.unwrap_or_else(found);
         let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS_PER_PERIOD);
         let coarse_grid = grid.shrunk(pyramid::factor(period_px, &grid));

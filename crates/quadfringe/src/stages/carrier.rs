@@ -85,19 +85,16 @@ pub(crate) fn period_rows(height: usize) -> impl Iterator<Item = usize> {
     (0..height).step_by(height.div_ceil(SAMPLE_ROWS).max(1))
 }
 
-/// Mean power spectrum of lines of equal length; the transform is planned once.
-pub(crate) struct LineSpectrum {
+/// Spectrum of a line without its mean, under the sine-squared window; the transform is planned once.
+pub(super) struct LineTransform {
     forward: Arc<dyn RealToComplex<f32>>,
     window: Vec<f32>,
     input: Vec<f32>,
-    spectrum: Vec<Complex32>,
+    pub spectrum: Vec<Complex32>,
     work: Vec<Complex32>,
-    power: Vec<f32>,
-    /// Power of the mean levels of the lines.
-    level: f32,
 }
 
-impl LineSpectrum {
+impl LineTransform {
     pub fn new(length: usize) -> Self {
         let forward = RealFftPlanner::new().plan_fft_forward(length);
         let bell = |x: usize| (std::f32::consts::PI * (x as f32 + 0.5) / length as f32).sin();
@@ -106,25 +103,42 @@ impl LineSpectrum {
             input: forward.make_input_vec(),
             spectrum: forward.make_output_vec(),
             work: forward.make_scratch_vec(),
-            power: vec![0.0; length / 2 + 1],
-            level: 0.0,
             forward,
         }
     }
 
-    /// Adds a line. NaN is replaced by the mean of the line.
-    pub fn add(&mut self, line: ArrayView1<'_, f32>) {
+    /// Finds the spectrum of a line, and gives the mean of the line, which replaces NaN.
+    pub fn run(&mut self, line: ArrayView1<'_, f32>) -> f32 {
         let seen = line.iter().filter(|v| v.is_finite());
         let mean = seen.clone().sum::<f32>() / seen.count().max(1) as f32;
         for ((value, &sample), weight) in self.input.iter_mut().zip(line).zip(&self.window) {
             let inside = sample.is_finite();
             *value = if inside { (sample - mean) * weight } else { 0.0 };
         }
-        self.level += (mean * line.len() as f32).powi(2);
         self.forward
             .process_with_scratch(&mut self.input, &mut self.spectrum, &mut self.work)
             .expect("buffers were made by this plan");
-        for (p, s) in self.power.iter_mut().zip(&self.spectrum) {
+        mean
+    }
+}
+
+/// Mean power spectrum of lines of equal length.
+pub(crate) struct LineSpectrum {
+    transform: LineTransform,
+    power: Vec<f32>,
+    /// Power of the mean levels of the lines.
+    level: f32,
+}
+
+impl LineSpectrum {
+    pub fn new(length: usize) -> Self {
+        Self { transform: LineTransform::new(length), power: vec![0.0; length / 2 + 1], level: 0.0 }
+    }
+
+    /// Adds a line. NaN is replaced by the mean of the line.
+    pub fn add(&mut self, line: ArrayView1<'_, f32>) {
+        self.level += (self.transform.run(line) * line.len() as f32).powi(2);
+        for (p, s) in self.power.iter_mut().zip(&self.transform.spectrum) {
             *p += s.norm_sqr();
         }
     }
@@ -134,13 +148,17 @@ impl LineSpectrum {
         let cycles = strongest(&self.power, CARRIER_POWER_MIN * self.level);
         self.power.fill(0.0);
         self.level = 0.0;
-        cycles.map_or(f64::INFINITY, |cycles| self.window.len() as f64 / cycles)
+        cycles.map_or(f64::INFINITY, |cycles| self.length() as f64 / cycles)
     }
 
     /// As [`Self::take_period_px`], within the limits of [`row_period_px`].
     pub fn take_row_period_px(&mut self) -> f64 {
-        let width = self.window.len() as f64;
+        let width = self.length() as f64;
         self.take_period_px().clamp(PERIOD_MIN_PX, width)
+    }
+
+    fn length(&self) -> usize {
+        self.transform.window.len()
     }
 }
 

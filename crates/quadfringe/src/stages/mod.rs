@@ -2,7 +2,7 @@
 //!
 //! | stage | equation |
 //! |---|---|
-//! | [`carrier()`], [`row_period_px`]: the fringe period in camera pixels | |
+//! | [`carrier()`], [`quadrature_carrier`], [`row_period_px`]: the fringe period in camera pixels | |
 //! | [`block_means`], [`fill_gaps`]: means over blocks of pixels | |
 //! | [`background()`]: the illumination without the fringes | |
 //! | [`two_step()`], [`modulation_ratio`]: wrapped phase of R and B | (S2) |
@@ -28,6 +28,7 @@ mod ladder;
 mod n_step;
 mod params;
 mod phases;
+mod quadrature;
 mod two_step;
 mod validity;
 mod wrong_order;
@@ -49,6 +50,7 @@ pub use ladder::{Ladder, Ordered, unwrap};
 pub use n_step::{NStep, n_step};
 pub(crate) use params::SAMPLE_STRIDE;
 pub use phases::Phases;
+pub use quadrature::quadrature_carrier;
 pub(crate) use two_step::row_modulation_ratio;
 pub use two_step::{modulation, modulation_ratio, two_step, two_step_coarse};
 pub(crate) use validity::Judged;

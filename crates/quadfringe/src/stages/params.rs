@@ -6,8 +6,9 @@
 /// objects and shadows; fewer rows take less time (`python evaluation/accuracy.py`).
 pub(crate) const SAMPLE_ROWS: usize = 16;
 
-/// Number of lines in each direction of which [`carrier`](super::carrier()) averages the spectrum. More lines average
-/// out objects; fewer lines take less time. Not measured.
+/// Number of lines in each direction of which [`carrier`](super::carrier()) and
+/// [`quadrature_carrier`](super::quadrature_carrier) average the spectrum. More lines average out objects; fewer lines
+/// take less time. Not measured.
 pub(crate) const CARRIER_LINES: usize = 48;
 
 /// Least number of fringes over the image that counts as a carrier. A larger number ignores slow shading better; a
@@ -19,6 +20,21 @@ pub(crate) const CARRIER_CYCLES_MIN: usize = 4;
 /// then counts as a carrier. `python evaluation/captures_report.py` and `cargo test -p quadfringe --test sizes` decode
 /// shots whose carriers must be found.
 pub(crate) const CARRIER_SHARE_MIN: f32 = 0.2;
+
+/// Ratio of the ends of a carrier's band to its middle. A wider band holds more of the fringes on tilted and curved
+/// surfaces; a narrower one lets fewer other waves in. `cargo test -p quadfringe --lib quadrature` bounds the error; from
+/// 1.2 to 1.5 the periods of its scenes hardly change.
+pub(crate) const CARRIER_BAND: f64 = 1.3;
+
+/// Least share of the quadrature spectrum above [`CARRIER_CYCLES_MIN`] that the band of a carrier must have. A larger
+/// share misses small objects; a smaller one takes texture and noise along the fringes for fringes. `cargo test -p
+/// quadfringe --lib quadrature` bounds the error.
+pub(crate) const QUADRATURE_SHARE_MIN: f32 = 0.3;
+
+/// Least sum of the band of a carrier along rows or columns, divided by that along the other. A larger share misses
+/// inclined fringes at the rim of the frame; a smaller one takes noise along the fringes for fringes. `cargo test -p
+/// quadfringe --lib quadrature` bounds the error; from 0.1 to 0.3 the periods of its scenes hardly change.
+pub(crate) const DIRECTION_SHARE_MIN: f64 = 0.3;
 
 /// Least power of a carrier divided by the power of the mean level. Follows from the rounding of `f32`, which leaves
 /// less than 1e-12 of a flat line; fringes with an amplitude of 0.1 % of the level have 9e-8.

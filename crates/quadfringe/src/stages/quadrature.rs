@@ -1,0 +1,194 @@
+//! The fringe period in camera pixels, estimated from the quarter period between R and B.
+//!
+//! With R = a + b cos(phi) and B = a - b sin(phi), the cross-spectrum of R and B at the carrier is -i b^2 / 4. Its
+//! imaginary part, the quadrature spectrum (Bendat and Piersol, Random Data), holds the fringes alone
+//! (J28). What R and B share, as the outline of an object, its albedo and room light, makes the real part. What each has by
+//! itself, as noise, has no fixed phase and averages out over lines.
+//!
+//! The carrier of a direction is the band with the greatest sum of the quadrature spectrum. The width of the band is a
+//! ratio, because the period changes by a ratio over tilted and curved surfaces. The sum keeps its sign, so that parts
+//! without a fixed phase cancel; its sign tells only in which direction the phase grows. Rows and columns cross the same
+//! fringes, so a direction whose sum is far below that of the other crosses none.
+
+use super::carrier::{Carrier, LineTransform};
+use super::params::{
+    CARRIER_BAND, CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, DIRECTION_SHARE_MIN,
+    QUADRATURE_SHARE_MIN,
+};
+use ndarray::ArrayView2;
+
+/// The carrier of the fringes that R and B show a quarter period apart, in linear light of equal shapes.
+///
+/// The images may have different gains, and fringes only in a part. NaN is replaced by the mean of its line.
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::stages::quadrature_carrier;
+/// use std::f32::consts::TAU;
+/// let object = |y: usize, x: usize| if y.abs_diff(60) < 30 && x.abs_diff(300) < 80 { 1.0 } else { 0.0 };
+/// let image = |shift: f32| {
+///     Array2::from_shape_fn((128, 512), |(y, x)| object(y, x) * (2.0 + (x as f32 * TAU / 20.0 + shift).cos()))
+/// };
+/// let found = quadrature_carrier(image(0.0).view(), image(TAU / 4.0).view());
+/// assert!((found.period_px() - 20.0).abs() < 0.5);
+/// ```
+#[must_use]
+pub fn quadrature_carrier(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Carrier {
+    let along_columns = || line_waves(red.reversed_axes(), blue.reversed_axes());
+    let (row, column) = rayon::join(|| line_waves(red, blue), along_columns);
+    let least = DIRECTION_SHARE_MIN * row.strength.max(column.strength);
+    let [row_px, column_px] = [row, column].map(|found| match found.strength {
+        strength if strength > 0.0 && strength >= least => found.period_px,
+        _ => f64::INFINITY,
+    });
+    Carrier { row_px, column_px }
+}
+
+/// The strongest waves along the lines of one direction.
+#[derive(Default)]
+struct Waves {
+    period_px: f64,
+    /// Sum of the band for a line and for a squared pixel; 0 if no waves stand out.
+    strength: f64,
+}
+
+fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
+    let (lines, length) = red.dim();
+    if length < 4 * CARRIER_CYCLES_MIN {
+        return Waves::default();
+    }
+    let [mut r, mut b] = [(); 2].map(|()| LineTransform::new(length));
+    let (mut quadrature, mut level) = (vec![0.0; length / 2 + 1], 0.0);
+    let sampled = (0..lines).step_by(lines.div_ceil(CARRIER_LINES));
+    let count = sampled.len() as f64;
+    for line in sampled {
+        let means = r.run(red.row(line)) * b.run(blue.row(line));
+        level += means * (length as f32).powi(2);
+        for (sum, (r, b)) in quadrature.iter_mut().zip(r.spectrum.iter().zip(&b.spectrum)) {
+            *sum += (r * b.conj()).im;
+        }
+    }
+    strongest_band(&quadrature, CARRIER_POWER_MIN * level).map_or_else(Waves::default, |band| Waves {
+        period_px: length as f64 / band.cycles,
+        strength: band.sum / (count * (length as f64).powi(2)),
+    })
+}
+
+/// The band of a carrier in a quadrature spectrum.
+struct Band {
+    /// Centre of gravity of the squares in cycles per line.
+    cycles: f64,
+    sum: f64,
+}
+
+/// The band with the greatest sum, if it holds enough of the spectrum.
+fn strongest_band(quadrature: &[f32], least: f32) -> Option<Band> {
+    let bins = CARRIER_CYCLES_MIN..quadrature.len();
+    let total: f32 = quadrature[bins.clone()].iter().map(|q| q.abs()).sum();
+    let band = |bin: usize| {
+        let [low, high] = [bin as f64 / CARRIER_BAND, bin as f64 * CARRIER_BAND];
+        &quadrature[low.ceil() as usize..quadrature.len().min(high as usize + 1)]
+    };
+    let sums = bins.map(|bin| (bin, band(bin).iter().sum::<f32>()));
+    let (best, sum) = sums.max_by(|(_, one), (_, other)| one.abs().total_cmp(&other.abs()))?;
+    let first = (best as f64 / CARRIER_BAND).ceil();
+    // Squares keep what is left of noise in a wide band from moving the centre.
+    let weights = band(best).iter().map(|q| f64::from((sum.signum() * q).max(0.0)).powi(2));
+    let weight: f64 = weights.clone().sum();
+    let moment: f64 = weights.enumerate().map(|(i, weight)| (first + i as f64) * weight).sum();
+    (sum.abs() > least && sum.abs() > QUADRATURE_SHARE_MIN * total)
+        .then(|| Band { cycles: moment / weight, sum: f64::from(sum.abs()) })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::Array2;
+    use std::f32::consts::TAU;
+
+    const SHAPE: (usize, usize) = (384, 512);
+
+    /// Even noise of variance 1, the same for the same pixel and seed.
+    fn noise(y: usize, x: usize, seed: u64) -> f32 {
+        let mut bits = (y as u64) << 40 ^ (x as u64) << 20 ^ seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        for _ in 0..3 {
+            bits = (bits ^ bits >> 29).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        }
+        ((bits >> 40) as f32 / (1u64 << 24) as f32 - 0.5) * 12f32.sqrt()
+    }
+
+    /// R and B of an albedo under fringes with contrast 0.3, and 1 % noise.
+    fn shot(phase: impl Fn(f32, f32) -> f32, albedo: impl Fn(usize, f32, f32) -> f32) -> [Array2<f32>; 2] {
+        [0, 1].map(|channel| {
+            Array2::from_shape_fn(SHAPE, |(y, x)| {
+                let (along, down) = (x as f32, y as f32);
+                let fringes = 1.0 + 0.3 * (phase(along, down) + channel as f32 * TAU / 4.0).cos();
+                0.7 * albedo(channel, along, down) * fringes + 0.01 * noise(y, x, channel as u64)
+            })
+        })
+    }
+
+    fn inclined(period: f32, degrees: f32) -> impl Fn(f32, f32) -> f32 {
+        let (sine, cosine) = degrees.to_radians().sin_cos();
+        move |x, y| TAU * (x * cosine + y * sine) / period
+    }
+
+    /// An ellipse that fills this share of the frame, on black.
+    fn object(share: f32) -> impl Fn(usize, f32, f32) -> f32 {
+        let radius = (share * (SHAPE.0 * SHAPE.1) as f32 / (TAU / 2.0)).sqrt();
+        move |_, x, y| f32::from(u8::from(((x - 220.0) / 1.1).hypot((y - 190.0) * 1.1) < radius))
+    }
+
+    fn ratio([red, blue]: &[Array2<f32>; 2], period: f32) -> f64 {
+        quadrature_carrier(red.view(), blue.view()).period_px() / f64::from(period)
+    }
+
+    #[test]
+    fn fringes_on_a_small_object_are_found_within_a_third() {
+        for degrees in [0.0, 20.0, 45.0] {
+            for (share, longest) in [(0.02, 33.0), (0.05, 50.0), (0.2, 78.0), (1.0, 78.0)] {
+                for period in [8.0, 20.0, 33.0, 50.0, 78.0].into_iter().filter(|&p| p <= longest) {
+                    let found = ratio(&shot(inclined(period, degrees), object(share)), period);
+                    let of = format!("{found} of {period} px, {degrees} degrees, {share} of the frame");
+                    assert!((0.75..1.34).contains(&found), "{of}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn prints_of_other_colours_hide_no_fringes() {
+        let colour = |channel: usize, x: f32, y: f32| {
+            let patch = (x as usize / 48) * 31 + (y as usize / 48) * 17;
+            0.3 + 0.2 * noise(patch, channel, 7)
+        };
+        for period in [8.0, 20.0, 33.0] {
+            let found = ratio(&shot(inclined(period, 5.0), colour), period);
+            assert!((0.75..1.34).contains(&found), "{found} of {period} px");
+        }
+    }
+
+    #[test]
+    fn a_period_that_doubles_over_the_frame_has_a_central_value() {
+        // The frequency falls from 1 / 16 to 1 / 32 over the row.
+        let phase = |x: f32, _: f32| TAU * (x / 16.0 - x * x / (64.0 * SHAPE.1 as f32));
+        let found = ratio(&shot(phase, |_, _, _| 1.0), 1.0);
+        assert!((16.0..32.0).contains(&found), "{found}");
+    }
+
+    #[test]
+    fn the_period_of_a_white_frame_is_exact() {
+        for degrees in [0.0, 10.0, 20.0, 30.0] {
+            let found = ratio(&shot(inclined(25.0, degrees), |_, _, _| 1.0), 25.0);
+            assert!((found - 1.0).abs() < 0.03, "{found} at {degrees} degrees");
+        }
+    }
+
+    #[test]
+    fn images_without_fringes_have_no_carrier() {
+        let plain = shot(|_, _| 0.0, object(0.2));
+        assert!(ratio(&plain, 1.0).is_infinite());
+        let same = [plain[0].clone(), plain[0].clone()];
+        assert!(ratio(&same, 1.0).is_infinite());
+    }
+}

@@ -1,0 +1,49 @@
+"""Offsets of the G and IR fringes from the phase of a shape: other fringe numbers leave them, texture does not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.stages import linear_light
+
+__all__ = ["channels_agree"]
+
+TILE_PX = 96  # side of a tile: a fringe or more, so that texture averages out
+TILE_SHARE = 0.3  # least share of the pixels of a tile that are returned
+TILES_MIN = 4
+# Three quarters of the tiles are off by at most this. On coloured patches and photographs it is 0.1 rad in sound shots,
+# and 0.2 rad or more with other fringe numbers. `pytest tests/test_real_objects.py` decodes both.
+OFFSET_MAX_RAD = 0.12
+QUANTILE = 0.75
+
+
+def channels_agree(shape: Shape, shot: AnyShot, plan: Plan) -> bool:
+    """Tell whether G and IR show their fringes where the phase of the shape puts them; False with too few tiles."""
+    light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
+    first, second, third = plan.fringes.numbers
+    channels = ((light["green"], second / first), (light["ir"], third / first))
+    return all(_offset_rad(image, ratio * shape.phase_rad) <= OFFSET_MAX_RAD for image, ratio in channels)
+
+
+def _offset_rad(image: NDArray[Any], phase_rad: NDArray[Any]) -> float:
+    """Give the quantile of the absolute offsets of the tiles; infinite with too few of them."""
+    known = np.isfinite(phase_rad) & np.isfinite(image)
+    rows, columns = (range(0, size - TILE_PX + 1, TILE_PX) for size in image.shape)
+    tiles = [np.s_[y : y + TILE_PX, x : x + TILE_PX] for y in rows for x in columns]
+    offsets = [
+        _tile_offset_rad(image[tile][known[tile]], phase_rad[tile][known[tile]])
+        for tile in tiles
+        if known[tile].mean() >= TILE_SHARE
+    ]
+    return float(np.quantile(np.abs(offsets), QUANTILE)) if len(offsets) >= TILES_MIN else np.inf
+
+
+def _tile_offset_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> float:
+    waves = np.stack([np.ones_like(phase_rad), np.cos(phase_rad), -np.sin(phase_rad)], axis=1)
+    _, cosine, sine = np.linalg.lstsq(waves.astype(np.float64), light, rcond=None)[0]
+    return float(np.arctan2(sine, cosine))

@@ -1,0 +1,83 @@
+"""Objects on black ground, and captures as other benches could have made them, are decoded and not refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from support.bars import hold
+
+import quadfringe as qf
+from quadfringe.calibration.response import estimate_from_files
+from quadfringe.errors import DecodeError
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import scoring
+from quadfringe.evaluation._isolated import isolated, patches
+from quadfringe.evaluation._variants import VARIANTS, stepped
+
+# Fringe period in px, share of the frame, seed.
+OBJECTS = [(74, 0.15, 2), (9, 0.05, 2), (33, 0.2, 4), (110, 0.2, 4)]
+SMALL_OBJECTS = [(20, 0.02, 2), (74, 0.02, 4)]
+WORST = [("plate", "cut out", 4), ("bottle", "inclined, cut out", 4), ("bottle", "binned, cut out", 4)]
+
+
+@pytest.mark.parametrize(("period_px", "fill", "seed"), OBJECTS)
+def test_an_object_on_black_is_decoded(period_px: int, fill: float, seed: int) -> None:
+    scene = isolated(period_px, fill, seed)
+    score = scoring.score(scene, scenes.shape_of(scene, response="linear").phase_rad)
+    hold("isolated.right_percent", score.right_percent)
+    hold("isolated.right_of_returned_percent", score.right_of_returned_percent)
+
+
+@pytest.mark.parametrize(("period_px", "fill", "seed"), SMALL_OBJECTS)
+def test_an_object_of_few_fringes_is_decoded(period_px: int, fill: float, seed: int) -> None:
+    scene = isolated(period_px, fill, seed)
+    score = scoring.score(scene, scenes.shape_of(scene, response="linear").phase_rad)
+    hold("isolated.small_right_percent", score.right_percent)
+    hold("isolated.right_of_returned_percent", score.right_of_returned_percent)
+
+
+@pytest.fixture(scope="module")
+def coloured() -> scoring.Scene:
+    """An object of coloured patches, whose median order margin is below that of shots with other fringe numbers."""
+    return isolated(20, 0.15, 2, contrast=0.5, noise=0.02, albedo=patches(60, 2))
+
+
+def test_a_coloured_object_is_not_refused(coloured: scoring.Scene) -> None:
+    score = scoring.score(coloured, scenes.shape_of(coloured, response="linear").phase_rad)
+    hold("isolated.coloured_right_of_returned_percent", score.right_of_returned_percent)
+
+
+def test_a_coloured_object_with_other_fringe_numbers_is_refused(coloured: scoring.Scene) -> None:
+    for numbers in ((36.0, 35.0, 30.0), (49.0, 48.0, 42.0)):
+        with pytest.raises(DecodeError):
+            scenes.shape_of(replace(coloured, fringe_numbers=numbers), response="linear")
+
+
+@pytest.mark.parametrize("pair", [("red", "blue"), ("green", "ir"), ("red", "green")])
+def test_a_coloured_object_with_exchanged_channels_is_refused(coloured: scoring.Scene, pair: tuple[str, str]) -> None:
+    first, second = (coloured.channels[name] for name in pair)
+    with pytest.raises(DecodeError):
+        scenes.shape_of(replace(coloured, **{pair[0]: second, pair[1]: first}), response="linear")
+
+
+@pytest.mark.parametrize(("name", "variant", "offset"), WORST)
+def test_variants_of_captures_are_decoded(data_dir: Path, name: str, variant: str, offset: int) -> None:
+    response = estimate_from_files(scenes.step_files(data_dir, name), scenes.STEPS).calibration
+    scene = VARIANTS[variant](stepped(data_dir, name, offset), offset)
+    score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
+    hold("variants.right_percent", score.right_percent)
+    hold("variants.right_of_returned_percent", score.right_of_returned_percent)
+
+
+def test_the_fringe_period_can_be_told() -> None:
+    scene = isolated(20, 0.05, 2)
+    shot, plan = scenes.plan_of(scene, response="linear", period_px=18.0)
+    shape = qf.decode(shot, plan)
+    assert shape.config["decode"]["period_px"] == 18.0
+    hold("isolated.right_percent", scoring.score(scene, shape.phase_rad).right_percent)
+    for period_px in (2.0, -5.0, np.nan):
+        with pytest.raises(qf.ConfigError, match="period_px"):
+            qf.DecodeConfig(period_px=period_px)
