@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
@@ -12,6 +13,8 @@ import typer
 from quadfringe.cli._options import (
     METHODS,
     Bayer,
+    Bits,
+    BitsOption,
     CalibrationOption,
     ColumnsOption,
     Fringes3,
@@ -20,13 +23,13 @@ from quadfringe.cli._options import (
     decode_settings,
     method_named,
 )
-from quadfringe.cli._output import say, write_figures
+from quadfringe.cli._output import caution, say, write_record
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
     from quadfringe.data import AnyShot, Shape
 
-__all__ = ["Bits", "Unwrapping", "decode"]
+__all__ = ["Unwrapping", "decode"]
 
 
 class Unwrapping(StrEnum):
@@ -34,15 +37,6 @@ class Unwrapping(StrEnum):
 
     coaxial = "coaxial"
     pair = "pair"
-
-
-class Bits(StrEnum):
-    """Significant bits of 16-bit files."""
-
-    ten = "10"
-    twelve = "12"
-    fourteen = "14"
-    sixteen = "16"
 
 
 ResultOption = Annotated[
@@ -96,10 +90,9 @@ UnwrappingOption = Annotated[
 ]
 DepthRangeOption = Annotated[
     tuple[float, float] | None,
-    typer.Option(metavar="MM MM", help="Nearest and farthest depth that --unwrapping pair searches, mm."),
-]
-BitsOption = Annotated[
-    Bits | None, typer.Option(help="Significant bits of 16-bit files; default: 16. Use it for 10 to 14-bit cameras.")
+    typer.Option(
+        metavar="MM MM", help="Nearest and farthest depth, mm; points outside are no data. Needs --calibration."
+    ),
 ]
 InstantsOption = Annotated[
     tuple[float, float, float, float] | None,
@@ -137,6 +130,7 @@ def decode(
     """Decode the images of one shot to absolute phase, and with --calibration to millimetres."""
     from quadfringe import decoding
     from quadfringe.config import Fringes, checked
+    from quadfringe.errors import DecodeWarning
 
     _check_result(out, calibration)
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
@@ -149,7 +143,10 @@ def decode(
         decode_settings(settings),
     )
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    shape = decoding.decode(_shot(folder, files, bayer, bits), plan)
+    shot = _shot(folder, files, bayer, bits)
+    with warnings.catch_warnings():  # printed below, in the words of the shape
+        warnings.simplefilter("ignore", DecodeWarning)
+        shape = decoding.decode(shot, plan)
     _save(shape, out, json)
 
 
@@ -185,8 +182,14 @@ def _shot(folder: Path | None, files: Mapping[str, Path | None], bayer: Bayer | 
 
 
 def _save(shape: Shape, out: Path, json: Path | None) -> None:
-    """Save the shape, print a summary and write its figures."""
+    """Save the shape, print a summary and its warnings, and write its figures."""
+    from json import loads
+
+    from quadfringe.files import figures_text
+
     shape.save(out)
+    for text in shape.warnings:
+        caution(text)
     figures = shape.figures()
     pixels = f"{figures['returned_percent']:.1f} % of {shape.phase_rad.size} pixels returned"
     say(f"{out}: {pixels}{_uncertainty(figures)}", json)
@@ -195,7 +198,7 @@ def _save(shape: Shape, out: Path, json: Path | None) -> None:
         listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
         say(f"response estimated from the shot, exponents: {listed} (--response linear skips this)", json)
         figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
-    write_figures(figures, json)
+    write_record(loads(figures_text(figures)) | {"warnings": list(shape.warnings)}, json)
 
 
 def _uncertainty(figures: Mapping[str, float]) -> str:

@@ -2,18 +2,33 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterable
+
 import numpy as np
 
 from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
+from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.causes import blur, registration, wrong_bits
+from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
 from quadfringe.decoding.plan import stated_response
-from quadfringe.doctor._fringes import Fit, fit_fringes, infrared_drift
+from quadfringe.decoding.plausibility import geometry_of, implausible
+from quadfringe.decoding.symptoms import brightness, closure_of, saturation
 from quadfringe.doctor.finding import Finding, graded
-from quadfringe.errors import DecodeError
+from quadfringe.errors import DecodeError, DecodeWarning
 
 __all__ = ["examine_shot"]
 
+# From cause to effect: what is named earlier brings about what follows. Wrong bits make an image dark, clipped crests
+# have harmonics, and blur lets one channel seem to see another.
+ROOTS = (
+    *("bits", "blind channel", "saturation", "brightness", "calibration units", "mirrored or rotated", "fringe orders"),
+    *("fringe numbers", "infrared registration", "infrared projector", "blur", "calibration", "depth range"),
+    *("response", "crosstalk", "coaxial pair", "modulation", "order margin", "returned"),
+)
+GRADES = ("fault", "warning", "good")
 # Limits for a warning and for a fault; pytest tests/test_doctor.py checks them on shots with known defects.
 SATURATED = (0.01, 0.2)  # share of pixels
 BRIGHTNESS = (0.3, 0.05)  # brightest pixels, share of full scale
@@ -27,29 +42,67 @@ DRIFT_PX = (1.0, 2.5)  # offset of the infrared fringes from their expected posi
 
 
 def examine_shot(shot: AnyShot, plan: Plan) -> list[Finding]:
-    """Check a shot as `plan` decodes it; a shot that cannot be decoded gives a fault with the cause.
+    """Check a shot as `plan` decodes it; a shot that cannot be decoded gives a fault with the likeliest cause.
 
+    Faults come first, then warnings; among either the likeliest cause comes first, because it explains what follows.
     Raises `InputError` or ValueError when the plan does not suit the shot.
     """
-    found = [*_saturation(shot), *_black(shot)]
+    found = [*_bits(shot), *_saturation(shot), *_black(shot)]
     try:
-        shape = Decoder(shot, plan).decode(shot)
+        with warnings.catch_warnings():  # told as findings
+            warnings.simplefilter("ignore", DecodeWarning)
+            shape = Decoder(shot, plan).decode(shot)
     except DecodeError as error:
-        fix = "fix this first; the remaining checks need a shot that decodes"
-        return [*found, Finding("fringe orders", "fault", str(error), fix)]
-    found += _orders(shape)
+        refused = Finding(error.reason or "fringe orders", "fault", str(error), error.fix)
+        return [refused, *sorted((one for one in found if one.name != refused.name), key=_rank)]
+    found += [*_geometry(shape), *_orders(shape), *_waves(shot, shape, plan)]
+    return sorted(found, key=_rank)
+
+
+def _rank(one: Finding) -> tuple[int, int]:
+    """Place a finding by its grade, and then by its place in the chain of causes."""
+    root = next((i for i, name in enumerate(ROOTS) if one.name.startswith(name)), len(ROOTS))
+    return GRADES.index(one.grade), root
+
+
+def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
+    """Check the fringes of a decoded shot, channel by channel and against one another."""
+    closure = closure_of(shot, plan)
+    named = [registration(shot, plan, closure)]
     fit = fit_fringes(shot, shape, plan)
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"
-        return [*found, Finding("fringes", "warning", words, "fill more of the field with the object")]
-    return [*found, *_amplitudes(fit), _linearity(fit, plan), _crosstalk(fit, plan), _drift(shot, shape, plan)]
+        few = Finding("fringes", "warning", words, "fill more of the field with the object")
+        return [few, *_told(named)]
+    named.append(blur(shot, fit, plan, closure))
+    return [*_told(named), *_amplitudes(fit), _linearity(fit, plan), _crosstalk(fit, plan), _drift(shot, shape, plan)]
+
+
+def _told(causes: Iterable[Cause | None]) -> list[Finding]:
+    return [
+        Finding(cause.name, "fault" if cause.fatal else "warning", cause.found, cause.fix) for cause in causes if cause
+    ]
+
+
+def _bits(shot: AnyShot) -> list[Finding]:
+    return _told([wrong_bits(shot)])
+
+
+def _geometry(shape: Shape) -> list[Finding]:
+    """Check a shape against its calibration; say what a calibration cannot show."""
+    measured = geometry_of(shape)
+    if measured is None:
+        return []
+    words = (
+        "columns run as the calibration demands, and points lie inside the image of the projector. Fringes along the "
+    )
+    words += "rows do not show images that are flipped up and down or moved along y: check a mark at the upper edge"
+    return _told(implausible(shape)) or [Finding("geometry", "good", words, value=measured.backwards)]
 
 
 def _saturation(shot: AnyShot) -> list[Finding]:
-    top = 0.998 * shot.full_scale_value
     found = []
-    for name, image in shot.channels.items():
-        share = float(np.mean(image >= top))
+    for name, share in saturation(shot).items():
         fix = f"shorten the exposure or lower the {name} light until no crest is saturated; powder shiny parts"
         found.append(graded(f"saturation {name}", share, SATURATED, f"{share:.1%} of the pixels are saturated", fix))
     return found
@@ -57,8 +110,7 @@ def _saturation(shot: AnyShot) -> list[Finding]:
 
 def _black(shot: AnyShot) -> list[Finding]:
     found = []
-    for name, image in shot.channels.items():
-        top = float(np.quantile(image[::4, ::4], 0.99)) / shot.full_scale_value
+    for name, top in brightness(shot).items():
         words = f"the brightest pixels reach {top:.0%} of full scale"
         fix = f"lengthen the exposure, open the aperture, or check that the {name} light is on and its cable connected"
         found.append(graded(f"brightness {name}", top, BRIGHTNESS, words, fix))
@@ -109,10 +161,8 @@ def _linearity(fit: Fit, plan: Plan) -> Finding:
 
 
 def _crosstalk(fit: Fit, plan: Plan) -> Finding:
-    stray = np.abs(fit.crosstalk - np.diag(np.diag(fit.crosstalk)))
-    to, of = np.unravel_index(int(np.argmax(stray)), stray.shape)
-    value = float(stray[to, of])
-    words = f"{fit.names[int(to)]} sees {value:.1%} of the fringes of {fit.names[int(of)]}"
+    to, of, value = fit.worst_stray
+    words = f"{to} sees {value:.1%} of the fringes of {of}"
     known = plan.calibration is not None and plan.calibration.crosstalk is not None
     fix = "add band-pass filters, or " + ("calibrate it again" if known else "calibrate it") + ": quadfringe calibrate"
     return graded("crosstalk", value, CROSSTALK, words, fix)
