@@ -111,10 +111,10 @@ def blur(shot: AnyShot, fit: Fit, plan: Plan, closure: Closure | None) -> Cause 
     sigma_px = float(np.sqrt(max(lost, 0.0)))
     if sigma_px < params.BLUR_PX:
         return None
-    words = (
-        f"the images are blurred by about {sigma_px:.1f} px: the contrast is {visible:.0%} for the finest fringes and "
-    )
-    words += f"{ir:.0%} for the coarsest, and no detail is sharp"
+    # Full fringes cannot have lost more than this; the ratio is off where wrong orders weaken the infrared waves.
+    sigma_px = min(sigma_px, float(np.sqrt(-np.log(max(visible, 1e-3)) / 2)) / np.pi * fine_px)
+    words = f"the images are blurred by about {sigma_px:.1f} px: the contrast is {visible:.0%} for the finest fringes "
+    words += f"and {ir:.0%} for the coarsest, and no detail is sharp"
     fix = "focus the camera and the projectors on the object, close the aperture, and hold the object still"
     return Cause("blur", words, fix)
 

@@ -19,6 +19,16 @@ from quadfringe.decoding.fringe_fit import pixels_of
 
 __all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "within_depths"]
 
+# Maps of a shape that depths outside the range leave; the quality is known wherever there is light.
+BOUNDED = (
+    "phase_rad",
+    "column_px",
+    "modulation",
+    "xyz_mm",
+    "wrong_order_probability",
+    "uncertainty_rad",
+    "uncertainty_mm",
+)
 CALIBRATE = "decode with the calibration of this bench, or calibrate again: quadfringe calibrate"
 FLIP = (
     "switch off mirroring and rotation in the camera's settings, or flip the images back; if they are as the camera "
@@ -98,16 +108,16 @@ def within_depths(shape: Shape, range_mm: tuple[float, float] | None) -> list[Ca
     depth_mm = shape.depth_mm
     if range_mm is None or depth_mm is None:
         return []
+    seen_mm = float(np.nanmedian(depth_mm[::4, ::4])) if np.isfinite(depth_mm[::4, ::4]).any() else float("nan")
     out = shape.returned & ~((depth_mm >= range_mm[0]) & (depth_mm <= range_mm[1]))
     share = _share(out, shape.returned)
-    median_mm = float(np.nanmedian(depth_mm[out])) if np.isfinite(depth_mm[out]).any() else float("nan")
-    for name, values in shape.maps.items():
-        if name not in ("quality", "order"):
+    for values in (getattr(shape, name) for name in BOUNDED):
+        if values is not None:
             values[out] = np.nan
     if share <= params.REFUSED_SHARE:
         return []
     words = f"{share:.0%} of the points lie outside the stated depths of {range_mm[0]:g} to {range_mm[1]:g} mm, at a "
-    words += f"median of {median_mm:.0f} mm, and are no data"
+    words += f"median of {seen_mm:.0f} mm, and are no data"
     return [Cause("depth range", words, f"correct depth_range_mm; or {CALIBRATE}", fatal=False)]
 
 

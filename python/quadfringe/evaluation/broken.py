@@ -163,4 +163,7 @@ def _exposed(scene: str, seed: int, fault: Fault) -> Shot:
     options = (drawn.options or {}) | (fault.options or {})
     drawn = replace(drawn, options=options, fringe_numbers=fault.numbers or drawn.fringe_numbers)
     shot = world.expose(bench, drawn, seed, NOISE).shot
-    return shot if fault.change is None else Shot(*fault.change(shot.channels).values())
+    if fault.change is None:
+        return shot
+    images = fault.change(shot.channels)
+    return Shot(images["red"], images["green"], images["blue"], images["ir"])
