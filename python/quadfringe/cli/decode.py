@@ -28,6 +28,7 @@ from quadfringe.cli._output import caution, say, write_record
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
     from quadfringe.data import AnyShot, Shape
+    from quadfringe.decoding import Plan
 
 __all__ = ["Unwrapping", "decode"]
 
@@ -130,7 +131,6 @@ def decode(
     """Decode the images of one shot to absolute phase, and with --calibration to millimetres."""
     from quadfringe import decoding
     from quadfringe.config import Fringes, checked
-    from quadfringe.errors import DecodeWarning
 
     _check_result(out, calibration)
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
@@ -143,11 +143,17 @@ def decode(
         decode_settings(settings),
     )
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    shot = _shot(folder, files, bayer, bits)
-    with warnings.catch_warnings():  # printed below, in the words of the shape
+    _save(_decoded(_shot(folder, files, bayer, bits), plan), out, json)
+
+
+def _decoded(shot: AnyShot, plan: Plan) -> Shape:
+    """Decode quietly; the warnings are printed in the words of the shape."""
+    from quadfringe import decoding
+    from quadfringe.errors import DecodeWarning
+
+    with warnings.catch_warnings():
         warnings.simplefilter("ignore", DecodeWarning)
-        shape = decoding.decode(shot, plan)
-    _save(shape, out, json)
+        return decoding.decode(shot, plan)
 
 
 def _check_result(out: Path, calibration: Path | None) -> None:

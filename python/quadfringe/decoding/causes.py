@@ -74,7 +74,7 @@ def _shifted(columns: float, rows: float | None) -> Cause:
 
 
 def _pair_moved(columns: float) -> Cause:
-    words = f"infrared fringes lie {columns:+.1f} px beside the visible ones, and the edges of the images agree: "
+    words = f"infrared fringes lie {columns:+.1f} px away from the visible ones, and the edges of the images agree: "
     words += "the infrared projector has moved"
     fix = "calibrate the pair again, and project the pre-deformed infrared pattern (--predeformed-z-mm)"
     return Cause("infrared projector", words, fix)

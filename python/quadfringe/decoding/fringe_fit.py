@@ -31,7 +31,7 @@ QUANTILE = 0.95  # of the tiles: the worst offset that is not an outlier
 
 
 class Stray(NamedTuple):
-    """A channel, the channel whose fringes it sees too, and their amplitude relative to its own."""
+    """A channel, the channel whose fringes it sees too, and their amplitude relative to the right ones."""
 
     to: str
     of: str
