@@ -131,7 +131,7 @@ _NAMES_IN = {
     "scanner": ("Scanner", "open_system"),
 }
 _MODULE_OF = {name: module for module, names in _NAMES_IN.items() for name in names}
-_MODULE_OF |= {name: "errors" for name in __all__ if name.endswith("Error")}
+_MODULE_OF |= {name: "errors" for name in __all__ if name.endswith(("Error", "Warning"))}
 _PACKAGES = (
     "calibration",
     "config",

@@ -19,16 +19,8 @@ from quadfringe.decoding.fringe_fit import pixels_of
 
 __all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "within_depths"]
 
-# Maps of a shape that depths outside the range leave; the quality is known wherever there is light.
-BOUNDED = (
-    "phase_rad",
-    "column_px",
-    "modulation",
-    "xyz_mm",
-    "wrong_order_probability",
-    "uncertainty_rad",
-    "uncertainty_mm",
-)
+# Maps without data outside the range; quality and modulation are known wherever there is light.
+BOUNDED = ("phase_rad", "column_px", "xyz_mm", "wrong_order_probability", "uncertainty_mm")
 CALIBRATE = "decode with the calibration of this bench, or calibrate again: quadfringe calibrate"
 FLIP = (
     "switch off mirroring and rotation in the camera's settings, or flip the images back; if they are as the camera "
@@ -103,7 +95,7 @@ def implausible(shape: Shape) -> list[Cause]:
 def within_depths(shape: Shape, range_mm: tuple[float, float] | None) -> list[Cause]:
     """Make no data of the points of a shape outside a range of depths, in place; name it when most of them are.
 
-    The quality is kept, as at every pixel that is not returned.
+    Quality and modulation are kept, as at every pixel that is not returned.
     """
     depth_mm = shape.depth_mm
     if range_mm is None or depth_mm is None:
