@@ -85,7 +85,7 @@ BLUR_PX = 2.2
 
 # Brightest pixels, share of full scale, below which the light counts as too dark. Sound shots have 0.6 or more. A
 # larger number names dark paint, a smaller one misses shots whose noise hides the fringes.
-DIM = 0.3
+DIM = 0.25
 # The same, below which darkness is named before any other cause of a refusal: the fringes of the sound scenes then
 # have about the amplitude of 2 % noise. A larger number hides other causes of dim shots.
 DARK = 0.1

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -30,9 +30,11 @@ ROOTS = (
 )
 GRADES = ("fault", "warning", "good")
 # Limits for a warning and for a fault; pytest tests/test_doctor.py checks them on shots with known defects.
-SATURATED = (0.01, 0.2)  # share of pixels
-BRIGHTNESS = (0.3, 0.05)  # brightest pixels, share of full scale
+# Share of pixels. A smaller share warns of glints, which cost a pixel where they are and nothing else.
+SATURATED = (0.05, 0.2)
+BRIGHTNESS = (0.25, 0.05)  # brightest pixels, share of full scale; a larger share warns of dark paint
 CONTRAST = (0.10, 0.04)  # amplitude of the fringes, share of full scale
+FULL_CONTRAST = 0.5  # amplitude over mean light, from which a weak amplitude comes from a dark object
 NOT_LINEAR = (0.04, 0.08)  # ratio of the second harmonic to the first
 CROSSTALK = (0.04, 0.15)  # relative amplitude of the fringes of another channel
 MARGIN = (0.7, 0.5)  # median order margin, in [0, 1]
@@ -75,7 +77,13 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
         few = Finding("fringes", "warning", words, "fill more of the field with the object")
         return [few, *_told(named)]
     named.append(blur(shot, fit, plan, closure))
-    return [*_told(named), *_amplitudes(fit), _linearity(fit, plan), _crosstalk(fit, plan), _drift(shot, shape, plan)]
+    return [
+        *_told(named),
+        *_amplitudes(fit, brightness(shot)),
+        _linearity(fit, plan),
+        _crosstalk(fit, plan),
+        _drift(shot, shape, plan),
+    ]
 
 
 def _told(causes: Iterable[Cause | None]) -> list[Finding]:
@@ -141,12 +149,15 @@ def _orders(shape: Shape) -> list[Finding]:
     ]
 
 
-def _amplitudes(fit: Fit) -> list[Finding]:
+def _amplitudes(fit: Fit, tops: Mapping[str, float]) -> list[Finding]:
+    """Grade the fringes; a dark object under good light has weak fringes of full contrast, and no light is missing."""
     found = []
-    for name, amplitude in zip(fit.names, fit.amplitude, strict=True):
+    for name, amplitude, contrast in zip(fit.names, fit.amplitude, fit.contrast, strict=True):
         words = f"the fringes have an amplitude of {amplitude:.1%} of full scale"
         fix = f"focus the {name} projector and the camera, darken the room, or increase the {name} light"
-        found.append(graded(f"modulation {name}", amplitude, CONTRAST, words, fix))
+        dark_object = contrast >= FULL_CONTRAST and tops[name] >= BRIGHTNESS[0] and amplitude >= CONTRAST[1]
+        told = graded(f"modulation {name}", float(amplitude), CONTRAST, words, fix)
+        found.append(Finding(told.name, "good", words, value=told.value) if dark_object else told)
     return found
 
 
@@ -174,7 +185,10 @@ def _drift(shot: AnyShot, shape: Shape, plan: Plan) -> Finding:
         words = "too few pixels carry fringes to check the coaxial pair"
         return Finding("coaxial pair", "warning", words, "fill more of the field with the object")
     fix = "one projector has moved: calibrate the pair again, and project the pre-deformed infrared pattern"
-    words = f"infrared fringes are off by {drift.median_px:+.2f} projector px (median), at most by {drift.worst_px:.2f}"
+    words = (
+        f"infrared fringes are off by {drift.median_px:+.2f} projector px (median), by at most {drift.worst_px:.2f} "
+    )
+    words += "in three quarters of the image"
     if drift.off > OFF_MAX:
         words += f"; the fringe orders are wrong by whole fringes in {drift.off:.0%} of the image"
         return Finding("coaxial pair", "fault", words, fix, drift.worst_px)
