@@ -132,7 +132,7 @@ def decode(
     from quadfringe import decoding
     from quadfringe.config import Fringes, checked
 
-    _check_result(out, calibration)
+    _check_given(out, calibration, depth_range_mm)
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
     plan = decoding.Plan(
@@ -156,14 +156,16 @@ def _decoded(shot: AnyShot, plan: Plan) -> Shape:
         return decoding.decode(shot, plan)
 
 
-def _check_result(out: Path, calibration: Path | None) -> None:
-    """Refuse a result file that this command could not write, before anything is decoded."""
+def _check_given(out: Path, calibration: Path | None, depths: tuple[float, float] | None) -> None:
+    """Refuse a result file that could not be written, and depths without a calibration, before anything is decoded."""
     from quadfringe.data.shape import SUFFIXES
     from quadfringe.errors import InputError
     from quadfringe.files import require_suffix
 
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without a calibration, write .npz")
+    if depths is not None and calibration is None:
+        raise InputError("--depth-range-mm needs --calibration FILE: without a calibration there are no depths")
 
 
 def _response(response: str | None, linear: bool) -> str:
