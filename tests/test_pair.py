@@ -227,8 +227,6 @@ def test_the_search_needs_both_projectors_and_says_so() -> None:
             Decoder(shot, Plan(912, calibration=known, decode=searched))
     with pytest.raises(ValueError, match=r'needs method = "published", and the method is joint'):
         DecodeConfig(method="joint", unwrapping="pair")
-    with pytest.raises(ValueError, match="depth_range_mm"):
-        DecodeConfig(depth_range_mm=(600.0, 900.0))
 
 
 def test_calibrations_keep_the_infrared_projector(tmp_path: Path) -> None:

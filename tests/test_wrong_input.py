@@ -200,7 +200,7 @@ DECODE = ("decode", "shot", "--out", "x.npz", "--projector-width", 912, "--fring
     [
         (
             (*DECODE, 30, "--depth-range-mm", 600, 1000),
-            "error: options: 1 problem --depth-range-mm needs --unwrapping pair, which searches depths",
+            "error: --depth-range-mm needs --calibration FILE: without a calibration there are no depths",
         ),
         (
             (*DECODE, 30, "--unwrapping", "pair"),
@@ -219,7 +219,7 @@ DECODE = ("decode", "shot", "--out", "x.npz", "--projector-width", 912, "--fring
         ((*DECODE, "--linear"), "Invalid value for '--fringes': expected a number, got '--linear'"),
         ((*DECODE, 35), "error: --fringes: 1 problem numbers: expected fringe numbers whose joint range"),
         ((*DECODE, 30, "--method", "cow"), "expected joint or published, got 'cow'"),
-        ((*DECODE, 30, "--bits", 9), "'--bits': expected one of '10', '12', '14', '16', got '9'"),
+        ((*DECODE, 30, "--bits", 9), "'--bits': expected one of '8', '10', '12', '14', '16', got '9'"),
         (("target", "cow"), "expected one of 'rings', 'circles', 'asymmetric', 'charuco', got 'cow'"),
         (("live", "--port", "x"), "'--port': expected a whole number, got 'x'"),
         (("simulate", "--surface", "cow", "--out", "x"), "scene.surface: expected 'plane', 'peaks',"),

@@ -56,6 +56,7 @@ if TYPE_CHECKING:
         CameraNotFoundError,
         ConfigError,
         DecodeError,
+        DecodeWarning,
         InputError,
         MissingExtraError,
         RecordingError,
@@ -78,6 +79,7 @@ __all__ = [
     "ConfigError",
     "DecodeConfig",
     "DecodeError",
+    "DecodeWarning",
     "Decoder",
     "Device",
     "Fringes",
@@ -129,7 +131,7 @@ _NAMES_IN = {
     "scanner": ("Scanner", "open_system"),
 }
 _MODULE_OF = {name: module for module, names in _NAMES_IN.items() for name in names}
-_MODULE_OF |= {name: "errors" for name in __all__ if name.endswith("Error")}
+_MODULE_OF |= {name: "errors" for name in __all__ if name.endswith(("Error", "Warning"))}
 _PACKAGES = (
     "calibration",
     "config",

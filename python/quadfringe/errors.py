@@ -19,6 +19,7 @@ __all__ = [
     "CameraNotFoundError",
     "ConfigError",
     "DecodeError",
+    "DecodeWarning",
     "InputError",
     "MissingExtraError",
     "RecordingError",
@@ -38,7 +39,18 @@ class ConfigError(InputError):
 
 
 class DecodeError(RuntimeError):
-    """The shape of a shot cannot be trusted; the message says why and what to check."""
+    """The shape of a shot cannot be trusted; the message says why and what to do.
+
+    `reason` names the likeliest cause in a few words, and `fix` what to do about it; both may be empty.
+    """
+
+    def __init__(self, message: str = "", *, reason: str = "", fix: str = "") -> None:
+        super().__init__(message)
+        self.reason, self.fix = reason, fix
+
+
+class DecodeWarning(UserWarning):
+    """A shape was returned, and something about it is doubtful; `Shape.warnings` holds the same words."""
 
 
 class CameraError(OSError):

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 __all__ = [
     "METHODS",
     "Bayer",
+    "Bits",
+    "BitsOption",
     "BoardPosesOption",
     "CalibrationOption",
     "ColumnsOption",
@@ -43,9 +45,22 @@ class Bayer(StrEnum):
     bggr = "bggr"
 
 
+class Bits(StrEnum):
+    """Significant bits of 16-bit files."""
+
+    eight = "8"
+    ten = "10"
+    twelve = "12"
+    fourteen = "14"
+    sixteen = "16"
+
+
 JsonOption = Annotated[
     Path | None,
     typer.Option("--json", metavar="FILE", help="Write the figures as JSON to this file; - writes to standard output."),
+]
+BitsOption = Annotated[
+    Bits | None, typer.Option(help="Significant bits of 16-bit files; default: 16. Use it for cameras of 8 to 14 bits.")
 ]
 OutFolder = Annotated[Path, typer.Option(metavar="DIR", help="Folder for the files; created when it is missing.")]
 SystemFile = Annotated[

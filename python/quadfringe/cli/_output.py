@@ -14,6 +14,7 @@ import typer
 from quadfringe.files import atomic, figures_text
 
 __all__ = [
+    "caution",
     "complain",
     "progress",
     "rows",
@@ -31,6 +32,11 @@ Item = TypeVar("Item")
 def complain(message: str) -> None:
     """Print an error on standard error."""
     typer.echo(f"error: {message}", err=True)
+
+
+def caution(message: str) -> None:
+    """Print a warning on standard error."""
+    typer.echo(f"warning: {message}", err=True)
 
 
 def say(message: str, json: Path | None = None) -> None:

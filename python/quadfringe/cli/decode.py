@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
@@ -12,6 +13,8 @@ import typer
 from quadfringe.cli._options import (
     METHODS,
     Bayer,
+    Bits,
+    BitsOption,
     CalibrationOption,
     ColumnsOption,
     Fringes3,
@@ -20,13 +23,14 @@ from quadfringe.cli._options import (
     decode_settings,
     method_named,
 )
-from quadfringe.cli._output import say, write_figures
+from quadfringe.cli._output import caution, say, write_record
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
     from quadfringe.data import AnyShot, Shape
+    from quadfringe.decoding import Plan
 
-__all__ = ["Bits", "Unwrapping", "decode"]
+__all__ = ["Unwrapping", "decode"]
 
 
 class Unwrapping(StrEnum):
@@ -34,15 +38,6 @@ class Unwrapping(StrEnum):
 
     coaxial = "coaxial"
     pair = "pair"
-
-
-class Bits(StrEnum):
-    """Significant bits of 16-bit files."""
-
-    ten = "10"
-    twelve = "12"
-    fourteen = "14"
-    sixteen = "16"
 
 
 ResultOption = Annotated[
@@ -96,17 +91,16 @@ UnwrappingOption = Annotated[
 ]
 DepthRangeOption = Annotated[
     tuple[float, float] | None,
-    typer.Option(metavar="MM MM", help="Nearest and farthest depth that --unwrapping pair searches, mm."),
-]
-BitsOption = Annotated[
-    Bits | None, typer.Option(help="Significant bits of 16-bit files; default: 16. Use it for 10 to 14-bit cameras.")
+    typer.Option(
+        metavar="MM MM", help="Nearest and farthest depth, mm; points outside are no data. Needs --calibration."
+    ),
 ]
 PeriodOption = Annotated[
     float | None,
     typer.Option(
         metavar="PX",
-        help="Fringe period across the fringes, camera pixels; default: estimated from the shot. Give it if the estimate "
-        "fails, as on an object narrower than two fringes.",
+        help="Fringe period across the fringes, camera pixels; default: estimated from the shot. Give it if the "
+        "estimate fails, as on an object narrower than two fringes.",
     ),
 ]
 InstantsOption = Annotated[
@@ -147,7 +141,7 @@ def decode(
     from quadfringe import decoding
     from quadfringe.config import Fringes, checked
 
-    _check_result(out, calibration)
+    _check_given(out, calibration, depth_range_mm)
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
     plan = decoding.Plan(
@@ -158,17 +152,29 @@ def decode(
         decode_settings(settings),
     )
     files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    _save(decoding.decode(_shot(folder, files, bayer, bits), plan), out, json)
+    _save(_decoded(_shot(folder, files, bayer, bits), plan), out, json)
 
 
-def _check_result(out: Path, calibration: Path | None) -> None:
-    """Refuse a result file that this command could not write, before anything is decoded."""
+def _decoded(shot: AnyShot, plan: Plan) -> Shape:
+    """Decode quietly; the warnings are printed in the words of the shape."""
+    from quadfringe import decoding
+    from quadfringe.errors import DecodeWarning
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DecodeWarning)
+        return decoding.decode(shot, plan)
+
+
+def _check_given(out: Path, calibration: Path | None, depths: tuple[float, float] | None) -> None:
+    """Refuse a result file that could not be written, and depths without a calibration, before anything is decoded."""
     from quadfringe.data.shape import SUFFIXES
     from quadfringe.errors import InputError
     from quadfringe.files import require_suffix
 
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without a calibration, write .npz")
+    if depths is not None and calibration is None:
+        raise InputError("--depth-range-mm needs --calibration FILE: without a calibration there are no depths")
 
 
 def _response(response: str | None, linear: bool) -> str:
@@ -193,8 +199,14 @@ def _shot(folder: Path | None, files: Mapping[str, Path | None], bayer: Bayer | 
 
 
 def _save(shape: Shape, out: Path, json: Path | None) -> None:
-    """Save the shape, print a summary and write its figures."""
+    """Save the shape, print a summary and its warnings, and write its figures."""
+    from json import loads
+
+    from quadfringe.files import figures_text
+
     shape.save(out)
+    for text in shape.warnings:
+        caution(text)
     figures = shape.figures()
     pixels = f"{figures['returned_percent']:.1f} % of {shape.phase_rad.size} pixels returned"
     say(f"{out}: {pixels}{_uncertainty(figures)}", json)
@@ -203,7 +215,7 @@ def _save(shape: Shape, out: Path, json: Path | None) -> None:
         listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
         say(f"response estimated from the shot, exponents: {listed} (--response linear skips this)", json)
         figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
-    write_figures(figures, json)
+    write_record(loads(figures_text(figures)) | {"warnings": list(shape.warnings)}, json)
 
 
 def _uncertainty(figures: Mapping[str, float]) -> str:

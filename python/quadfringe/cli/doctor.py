@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from quadfringe.cli._options import Bayer, ColumnsOption, JsonOption
+from quadfringe.cli._options import Bayer, Bits, BitsOption, ColumnsOption, JsonOption
 from quadfringe.cli._output import say, write_record
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ def doctor(
     fringes: FringesOption = (36.0, 35.0, 30.0),
     projector_width: ColumnsOption = 912,
     bayer: BayerOption = None,
+    bits: BitsOption = None,
     json: JsonOption = None,
 ) -> None:
     """Examine the installation, or a shot or a calibration; say what is wrong and how to fix it.
@@ -59,7 +60,7 @@ def doctor(
         found += examine_calibration(calibration)
     if given.shot is not None:
         plan = Plan(projector_width, checked(Fringes, {"numbers": fringes}, "--fringes"), calibration)
-        found += examine_shot(_shot_in(given.shot, bayer), plan)
+        found += examine_shot(_shot_in(given.shot, bayer, bits), plan)
     _report(found, json)
 
 
@@ -82,13 +83,13 @@ def _sorted_paths(paths: Sequence[Path]) -> _Paths:
     return _Paths(folders[0] if folders else None, calibrations[0] if calibrations else None)
 
 
-def _shot_in(folder: Path, bayer: Bayer | None) -> AnyShot:
+def _shot_in(folder: Path, bayer: Bayer | None, bits: Bits | None) -> AnyShot:
     from quadfringe.data import read_shot
     from quadfringe.errors import InputError
 
     if bayer is None and (folder / "raw.png").exists():
         raise InputError(f"{folder}: holds a raw mosaic; name its filter pattern with --bayer")
-    return read_shot(folder, bayer=None if bayer is None else bayer.value)
+    return read_shot(folder, None if bits is None else int(bits), bayer=None if bayer is None else bayer.value)
 
 
 def _report(found: Sequence[Finding], json: Path | None) -> None:

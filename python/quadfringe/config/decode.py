@@ -163,7 +163,8 @@ class DecodeConfig(Model):
     )
     depth_range_mm: tuple[Finite, Finite] | None = Field(
         default=None,
-        description='Nearest and farthest depth in mm that unwrapping = "pair" searches. Absent: all depths.',
+        description="Nearest and farthest depth in mm, for every method; points outside are no data, and "
+        'unwrapping = "pair" does not search there. Needs a calibration. Absent: all depths.',
     )
     modulation_min: Finite | None = Field(
         default=None,
@@ -218,10 +219,4 @@ class DecodeConfig(Model):
                 'channel_instants_us needs method = "joint", and the method is published: '
                 "change the method, or leave channel_instants_us out"
             )
-        return self
-
-    @model_validator(mode="after")
-    def _range_is_searched(self) -> DecodeConfig:
-        if self.depth_range_mm is not None and self.unwrapping != "pair":
-            raise ValueError('depth_range_mm needs unwrapping = "pair", which searches depths')
         return self

@@ -91,6 +91,11 @@ class Shape:
         """Depth along the axis of the camera, (H, W), mm; None without a calibration."""
         return None if self.xyz_mm is None else self.xyz_mm[:, :, 2]
 
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is doubtful about the shape, and what to do about it, in words; empty when nothing is."""
+        return tuple(self.config.get("warnings", ()))
+
     def figures(self) -> dict[str, float]:
         """Compute figures of the shape, by name with unit.
 

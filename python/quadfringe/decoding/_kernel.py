@@ -35,7 +35,9 @@ class KernelDecoder:
         self._size, self._full_scale, self.plan = size, full_scale, plan
         self._idle = idle or [self._planned()]
         self._described = (
-            plan.described | self._response_described(source) | {"decode": _rounded(self._idle[0].settings())}
+            plan.described
+            | self._response_described(source)
+            | {"decode": _rounded(self._idle[0].settings()) | _stated_depths(plan)}
         )
 
     @property
@@ -85,7 +87,9 @@ class KernelDecoder:
 
     def _planned(self) -> _core.Decoder:
         plan = self.plan
-        settings = plan.decode.model_dump(exclude_none=True, exclude={"unwrapping", "response"})
+        # Only the search along rays takes the range; else depths outside become no data after decoding.
+        after = set() if plan.decode.unwrapping == "pair" else {"depth_range_mm"}
+        settings = plan.decode.model_dump(exclude_none=True, exclude={"unwrapping", "response", *after})
         return _core.Decoder(
             self._size,
             plan.fringes.numbers,
@@ -162,6 +166,11 @@ def _of_rows(calibration: Calibration, first: int, count: int) -> Calibration:
     return calibration.model_copy(update={"camera": camera, "ir_registration": registration})
 
 
+def _stated_depths(plan: Plan) -> dict[str, Any]:
+    depths = plan.decode.depth_range_mm
+    return {} if depths is None else {"depth_range_mm": list(depths)}
+
+
 def _geometry(plan: Plan) -> dict[str, Any]:
     calibration = plan.calibration
     searched = plan.decode.unwrapping == "pair"
@@ -170,6 +179,8 @@ def _geometry(plan: Plan) -> dict[str, Any]:
             'unwrapping = "pair" needs a calibration with both projectors: one that has an `infrared` device'
         )
     if calibration is None:
+        if plan.decode.depth_range_mm is not None:
+            raise InputError("depth_range_mm needs a calibration: without one, a shape has no depths")
         return {}
     known = {"camera": core_device(calibration.camera), "projector": core_device(calibration.projector)}
     if not searched or calibration.infrared is None:

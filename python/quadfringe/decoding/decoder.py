@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import warnings
+from dataclasses import replace
 from threading import Lock
 
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
+from quadfringe.decoding.causes import wrong_bits
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
+from quadfringe.decoding.plausibility import implausible, within_depths
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened
 from quadfringe.decoding.verdict import judge
-from quadfringe.errors import InputError
+from quadfringe.errors import DecodeWarning, InputError
 from quadfringe.io.images import full_scale
 
 __all__ = ["Decoder", "decode"]
@@ -60,6 +64,8 @@ class Decoder:
     def decode(self, shot: AnyShot) -> Shape:
         """Give the shape; raises `DecodeError` when its orders cannot be trusted, naming the likely cause.
 
+        With a calibration, a shape that it contradicts is refused too, and depths outside `depth_range_mm` are no data.
+        What is doubtful and returned stands in `Shape.warnings`, and is warned of as `DecodeWarning`.
         A shot whose orders are doubtful is decoded with channels exchanged too, in part or as a whole, to name them.
         Raises `InputError` for a shot of another size or full scale.
         """
@@ -77,7 +83,7 @@ class Decoder:
 
     def _decode_and_hold(self, shot: AnyShot) -> Shape:
         kernel, shape = decode_straightened(self._kernel, shot)
-        _judged(kernel, shape, shot)
+        shape = _judged(kernel, shape, shot)
         self._tried += 1
         if kernel.response != "linear" or self._tried == SHOTS_TRIED:
             self._kernel, self._known = kernel, True
@@ -95,8 +101,19 @@ class Decoder:
 
 
 def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot) -> Shape:
+    """Refuse what cannot be trusted, take depths outside the stated range out, and note what is doubtful."""
     judge(shape, shot, kernel)
-    return shape
+    doubts = implausible(shape)
+    if fatal := next((doubt for doubt in doubts if doubt.fatal), None):
+        raise fatal.error
+    bits = wrong_bits(shot)
+    doubts = [*doubts, *([bits] if bits else []), *within_depths(shape, kernel.plan.decode.depth_range_mm)]
+    if not doubts:
+        return shape
+    words = [f"{doubt.found}; {doubt.fix}" for doubt in doubts]
+    for text in words:
+        warnings.warn(text, DecodeWarning, stacklevel=4)
+    return replace(shape, config={**shape.config, "warnings": words})
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:

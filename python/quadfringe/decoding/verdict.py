@@ -1,4 +1,4 @@
-"""Verdict on a decoded shot: it is refused when channels are black, saturated or exchanged, or its orders collapse."""
+"""Verdict on a decoded shot: it is refused when its orders collapse, with the likeliest cause by a test of each."""
 
 from __future__ import annotations
 
@@ -12,10 +12,14 @@ from quadfringe.config import BayerPattern
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot
 from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding._offsets import channels_agree
-from quadfringe.errors import DecodeError
+from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.causes import after_order, before_order, channels_fit, wrong_bits
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.symptoms import Closure, closure_of
 
 __all__ = ["band_of", "judge", "order_margin", "rows_of"]
 
+ORDERS = "fringe orders"  # the reason of a refusal for exchanged channels, or without a named cause
 STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
 MARGIN_ROWS = 48  # least number of rows and columns that the median margin is taken from
 DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
@@ -44,29 +48,46 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
     """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
 
     When the median margin is below 0.6, `decoder` decodes the shot with each pair of channels exchanged, or as each
-    other Bayer pattern, to name them; with None that check is left out. A shot with a margin from 0.3, as of a
-    photograph, is kept if its channels agree on the phase and no exchange comes near to its margin.
+    other Bayer pattern, to name them; with None these and all further tests are left out. A shot with a margin from
+    0.3, as of a photograph, is kept if its channels agree on the phase and no exchange comes near to its margin.
     """
     margin, lit, returned = _margin(shape)
     collapsed = COLLAPSED[shape.config["decode"]["method"]]
     enough = lit > 0 and returned >= RETURNED_MIN * lit
     if enough and margin >= DOUBTFUL:
         return
-    if blind := _blind_channels(shot):
-        raise DecodeError(f"no shape: {'; '.join(blind)}; check exposure, lens cap and light source")
-    if not lit:
-        raise DecodeError(
-            "no shape: no pixel carries fringes in all channels; check focus and exposure, "
-            "and that every channel is given once"
-        )
-    if decoder is not None:
+    blind = bool(_blind_channels(shot))
+    closure = None if decoder is None or blind else closure_of(shot, decoder.plan)
+    collapse = not enough or (margin < collapsed and (blind or not _agrees(shape, shot, margin, decoder)))
+    if collapse:
+        _refuse_shown(shot, lit, None if decoder is None else decoder.plan, closure)
+    if decoder is not None and not channels_fit(closure):
         _refuse_exchanged(shape, shot, max(collapsed, CLEARLY_BETTER * margin), decoder)
-    if not enough or (margin < collapsed and not _agrees(shape, shot, margin, decoder)):
-        raise DecodeError(
-            f"no shape: the order margin has collapsed: below {margin:.2f} of 1 for half of the lit "
-            "pixels; the channels may be swapped (red, green, blue, ir), or the fringe numbers, the projector "
-            "width or the response are not those of this shot"
-        )
+    if collapse:
+        cause = None if decoder is None else after_order(shot, shape, decoder.plan, closure)
+        raise (cause or _collapsed(margin)).error
+
+
+def _refuse_shown(shot: AnyShot, lit: int, plan: Plan | None, closure: Closure | None) -> None:
+    """Raise `DecodeError` for a cause that shows without fringe orders."""
+    if bits := wrong_bits(shot):
+        raise bits.error
+    if blind := _blind_channels(shot):
+        raise Cause("blind channel", "; ".join(blind), "check exposure, lens cap and light source").error
+    if plan is not None and (cause := before_order(shot, plan, closure)):
+        raise cause.error
+    if not lit:
+        words, fix = "no pixel carries fringes in all channels", "check focus and exposure, and that every channel is "
+        raise Cause("no fringes", words, fix + "given once").error
+
+
+def _collapsed(margin: float) -> Cause:
+    return Cause(
+        ORDERS,
+        f"the order margin has collapsed: below {margin:.2f} of 1 for half of the lit pixels; no test names the cause",
+        "check that the channels are red, green, blue and ir in this order, and that the fringe numbers, the projector "
+        "width and the response are those of this shot",
+    )
 
 
 def order_margin(shape: Shape) -> float:
@@ -101,9 +122,8 @@ def _refuse_exchanged(shape: Shape, shot: AnyShot, least: float, decoder: Kernel
     found = {words: _margin(decoder.shape(other))[0] for words, other in suspects.items()}
     best = max(found, key=lambda words: found[words], default="")
     if best and found[best] > least:
-        raise DecodeError(
-            f"no shape: {best}: the median order margin is {_margin(shape)[0]:.2f} as given and {found[best]:.2f} if so"
-        )
+        words = f"{best}: the median order margin is {_margin(shape)[0]:.2f} as given and {found[best]:.2f} if so"
+        raise Cause(ORDERS, words, "give the images of these channels the other way round").error
 
 
 def _agrees(shape: Shape, shot: AnyShot, margin: float, decoder: KernelDecoder | None) -> bool:
@@ -112,9 +132,7 @@ def _agrees(shape: Shape, shot: AnyShot, margin: float, decoder: KernelDecoder |
         return False
     first, count = band_of(shape)
     part = decoder.for_rows(first, count)
-    given, *others = (
-        order_margin(part.shape(rows_of(one, first, count))) for one in (shot, *_suspects(shot).values())
-    )
+    given, *others = (order_margin(part.shape(rows_of(one, first, count))) for one in (shot, *_suspects(shot).values()))
     return given > CLEARLY_BETTER * max(others)
 
 

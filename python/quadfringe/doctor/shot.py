@@ -2,22 +2,39 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Iterable, Mapping
+
 import numpy as np
 
 from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
+from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.causes import blur, registration, wrong_bits
+from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
 from quadfringe.decoding.plan import stated_response
-from quadfringe.doctor._fringes import Fit, fit_fringes, infrared_drift
+from quadfringe.decoding.plausibility import geometry_of, implausible
+from quadfringe.decoding.symptoms import brightness, closure_of, saturation
 from quadfringe.doctor.finding import Finding, graded
-from quadfringe.errors import DecodeError
+from quadfringe.errors import DecodeError, DecodeWarning
 
 __all__ = ["examine_shot"]
 
+# From cause to effect: what is named earlier brings about what follows. Wrong bits make an image dark, clipped crests
+# have harmonics, and blur lets one channel seem to see another.
+ROOTS = (
+    *("bits", "blind channel", "saturation", "brightness", "calibration units", "mirrored or rotated", "fringe orders"),
+    *("fringe numbers", "infrared registration", "infrared projector", "blur", "calibration", "depth range"),
+    *("response", "crosstalk", "coaxial pair", "modulation", "order margin", "returned"),
+)
+GRADES = ("fault", "warning", "good")
 # Limits for a warning and for a fault; pytest tests/test_doctor.py checks them on shots with known defects.
-SATURATED = (0.01, 0.2)  # share of pixels
-BRIGHTNESS = (0.3, 0.05)  # brightest pixels, share of full scale
+# Share of pixels. A smaller share warns of glints, which cost a pixel where they are and nothing else.
+SATURATED = (0.05, 0.2)
+BRIGHTNESS = (0.25, 0.05)  # brightest pixels, share of full scale; a larger share warns of dark paint
 CONTRAST = (0.10, 0.04)  # amplitude of the fringes, share of full scale
+FULL_CONTRAST = 0.5  # amplitude over mean light, from which a weak amplitude comes from a dark object
 NOT_LINEAR = (0.04, 0.08)  # ratio of the second harmonic to the first
 CROSSTALK = (0.04, 0.15)  # relative amplitude of the fringes of another channel
 MARGIN = (0.7, 0.5)  # median order margin, in [0, 1]
@@ -27,29 +44,73 @@ DRIFT_PX = (1.0, 2.5)  # offset of the infrared fringes from their expected posi
 
 
 def examine_shot(shot: AnyShot, plan: Plan) -> list[Finding]:
-    """Check a shot as `plan` decodes it; a shot that cannot be decoded gives a fault with the cause.
+    """Check a shot as `plan` decodes it; a shot that cannot be decoded gives a fault with the likeliest cause.
 
+    Faults come first, then warnings; among either the likeliest cause comes first, because it explains what follows.
     Raises `InputError` or ValueError when the plan does not suit the shot.
     """
-    found = [*_saturation(shot), *_black(shot)]
+    found = [*_bits(shot), *_saturation(shot), *_black(shot)]
     try:
-        shape = Decoder(shot, plan).decode(shot)
+        with warnings.catch_warnings():  # told as findings
+            warnings.simplefilter("ignore", DecodeWarning)
+            shape = Decoder(shot, plan).decode(shot)
     except DecodeError as error:
-        fix = "fix this first; the remaining checks need a shot that decodes"
-        return [*found, Finding("fringe orders", "fault", str(error), fix)]
-    found += _orders(shape)
+        refused = Finding(error.reason or "fringe orders", "fault", str(error), error.fix)
+        return [refused, *sorted((one for one in found if one.name != refused.name), key=_rank)]
+    found += [*_geometry(shape), *_orders(shape), *_waves(shot, shape, plan)]
+    return sorted(found, key=_rank)
+
+
+def _rank(one: Finding) -> tuple[int, int]:
+    """Place a finding by its grade, and then by its place in the chain of causes."""
+    root = next((i for i, name in enumerate(ROOTS) if one.name.startswith(name)), len(ROOTS))
+    return GRADES.index(one.grade), root
+
+
+def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
+    """Check the fringes of a decoded shot, channel by channel and against one another."""
+    closure = closure_of(shot, plan)
+    named = [registration(shot, plan, closure)]
     fit = fit_fringes(shot, shape, plan)
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"
-        return [*found, Finding("fringes", "warning", words, "fill more of the field with the object")]
-    return [*found, *_amplitudes(fit), _linearity(fit, plan), _crosstalk(fit, plan), _drift(shot, shape, plan)]
+        few = Finding("fringes", "warning", words, "fill more of the field with the object")
+        return [few, *_told(named)]
+    named.append(blur(shot, fit, plan, closure))
+    return [
+        *_told(named),
+        *_amplitudes(fit, brightness(shot)),
+        _linearity(fit, plan),
+        _crosstalk(fit, plan),
+        _drift(shot, shape, plan),
+    ]
+
+
+def _told(causes: Iterable[Cause | None]) -> list[Finding]:
+    return [
+        Finding(cause.name, "fault" if cause.fatal else "warning", cause.found, cause.fix) for cause in causes if cause
+    ]
+
+
+def _bits(shot: AnyShot) -> list[Finding]:
+    return _told([wrong_bits(shot)])
+
+
+def _geometry(shape: Shape) -> list[Finding]:
+    """Check a shape against its calibration; say what a calibration cannot show."""
+    measured = geometry_of(shape)
+    if measured is None:
+        return []
+    words = (
+        "columns run as the calibration demands, and points lie inside the image of the projector. Fringes along the "
+    )
+    words += "rows do not show images that are flipped up and down or moved along y: check a mark at the upper edge"
+    return _told(implausible(shape)) or [Finding("geometry", "good", words, value=measured.backwards)]
 
 
 def _saturation(shot: AnyShot) -> list[Finding]:
-    top = 0.998 * shot.full_scale_value
     found = []
-    for name, image in shot.channels.items():
-        share = float(np.mean(image >= top))
+    for name, share in saturation(shot).items():
         fix = f"shorten the exposure or lower the {name} light until no crest is saturated; powder shiny parts"
         found.append(graded(f"saturation {name}", share, SATURATED, f"{share:.1%} of the pixels are saturated", fix))
     return found
@@ -57,8 +118,7 @@ def _saturation(shot: AnyShot) -> list[Finding]:
 
 def _black(shot: AnyShot) -> list[Finding]:
     found = []
-    for name, image in shot.channels.items():
-        top = float(np.quantile(image[::4, ::4], 0.99)) / shot.full_scale_value
+    for name, top in brightness(shot).items():
         words = f"the brightest pixels reach {top:.0%} of full scale"
         fix = f"lengthen the exposure, open the aperture, or check that the {name} light is on and its cable connected"
         found.append(graded(f"brightness {name}", top, BRIGHTNESS, words, fix))
@@ -89,12 +149,15 @@ def _orders(shape: Shape) -> list[Finding]:
     ]
 
 
-def _amplitudes(fit: Fit) -> list[Finding]:
+def _amplitudes(fit: Fit, tops: Mapping[str, float]) -> list[Finding]:
+    """Grade the fringes; a dark object under good light has weak fringes of full contrast, and no light is missing."""
     found = []
-    for name, amplitude in zip(fit.names, fit.amplitude, strict=True):
+    for name, amplitude, contrast in zip(fit.names, fit.amplitude, fit.contrast, strict=True):
         words = f"the fringes have an amplitude of {amplitude:.1%} of full scale"
         fix = f"focus the {name} projector and the camera, darken the room, or increase the {name} light"
-        found.append(graded(f"modulation {name}", amplitude, CONTRAST, words, fix))
+        dark_object = contrast >= FULL_CONTRAST and tops[name] >= BRIGHTNESS[0] and amplitude >= CONTRAST[1]
+        told = graded(f"modulation {name}", float(amplitude), CONTRAST, words, fix)
+        found.append(Finding(told.name, "good", words, value=told.value) if dark_object else told)
     return found
 
 
@@ -109,10 +172,8 @@ def _linearity(fit: Fit, plan: Plan) -> Finding:
 
 
 def _crosstalk(fit: Fit, plan: Plan) -> Finding:
-    stray = np.abs(fit.crosstalk - np.diag(np.diag(fit.crosstalk)))
-    to, of = np.unravel_index(int(np.argmax(stray)), stray.shape)
-    value = float(stray[to, of])
-    words = f"{fit.names[int(to)]} sees {value:.1%} of the fringes of {fit.names[int(of)]}"
+    to, of, value = fit.worst_stray
+    words = f"{to} sees {value:.1%} of the fringes of {of}"
     known = plan.calibration is not None and plan.calibration.crosstalk is not None
     fix = "add band-pass filters, or " + ("calibrate it again" if known else "calibrate it") + ": quadfringe calibrate"
     return graded("crosstalk", value, CROSSTALK, words, fix)
@@ -124,7 +185,10 @@ def _drift(shot: AnyShot, shape: Shape, plan: Plan) -> Finding:
         words = "too few pixels carry fringes to check the coaxial pair"
         return Finding("coaxial pair", "warning", words, "fill more of the field with the object")
     fix = "one projector has moved: calibrate the pair again, and project the pre-deformed infrared pattern"
-    words = f"infrared fringes are off by {drift.median_px:+.2f} projector px (median), at most by {drift.worst_px:.2f}"
+    words = (
+        f"infrared fringes are off by {drift.median_px:+.2f} projector px (median), by at most {drift.worst_px:.2f} "
+    )
+    words += "in three quarters of the image"
     if drift.off > OFF_MAX:
         words += f"; the fringe orders are wrong by whole fringes in {drift.off:.0%} of the image"
         return Finding("coaxial pair", "fault", words, fix, drift.worst_px)

@@ -38,8 +38,9 @@ def isolated(
     bench, numbers = _core.Bench(), FRINGES[period_px]
     cast = bench.cast(surface)
     ambient = (1 / contrast - 1) / 2
-    light = {"ambient": (ambient,) * 4, "gain": (0.9 / (1 + ambient),) * 4, "noise": 0.0, "bit_depth": 16}
-    images = bench.render(cast, numbers, **light, **({} if albedo is None else {"albedo": albedo}))
+    light: dict[str, Any] = {"ambient": (ambient,) * 4, "gain": (0.9 / (1 + ambient),) * 4}
+    surface_light: dict[str, Any] = {} if albedo is None else {"albedo": albedo}
+    images = bench.render(cast, numbers, noise=0.0, bit_depth=16, **light, **surface_light)
     column_px = cast.column_px().astype(np.float64)
     inside = outline(column_px.shape, fill, seed)
     red, green, blue, ir = (

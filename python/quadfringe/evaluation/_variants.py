@@ -1,4 +1,4 @@
-"""Shots that other benches could have made of the stored captures: other steps, crops, backgrounds, resolution, light."""
+"""Shots that other benches could have made of the captures: other steps, crops, backgrounds, resolution, light."""
 
 from __future__ import annotations
 
@@ -37,7 +37,8 @@ def stepped(data: Path, name: str, offset: int) -> Scene:
     steps = {"red": (0, offset), "blue": (0, offset + quarter)}
     steps |= {key: (f, round(step)) for key, f, step in zip(("green", "ir"), (1, 2), _steps(shift), strict=True)}
     images = {key: _image(data, name, *step) for key, step in steps.items()}
-    return replace(scene, **images, phase_rad=scene.phase_rad + 2 * np.pi * shift / scenes.STEPS)
+    changed: dict[str, Any] = images
+    return replace(scene, **changed, phase_rad=scene.phase_rad + 2 * np.pi * shift / scenes.STEPS)
 
 
 def _steps(shift: int) -> tuple[float, float]:
@@ -57,9 +58,10 @@ def _image(data: Path, name: str, frequency: int, step: int) -> NDArray[np.uint8
 
 def _changed(scene: Scene, image: Callable[[Any], Any], truth: Callable[[Any], Any] | None = None) -> Scene:
     truth = truth or image
+    changed: dict[str, Any] = {name: np.ascontiguousarray(image(channel)) for name, channel in scene.channels.items()}
     return replace(
         scene,
-        **{name: np.ascontiguousarray(image(channel)) for name, channel in scene.channels.items()},
+        **changed,
         phase_rad=truth(scene.phase_rad),
         scored=truth(scene.scored.astype(np.uint8)).astype(bool),
     )

@@ -1,4 +1,4 @@
-"""Amplitude, non-linearity and crosstalk of the fringes of a decoded shot, and the drift of the infrared fringes.
+"""Amplitude, contrast, harmonics and crosstalk of the fringes of a decoded shot, and drift of the infrared fringes.
 
 With the absolute phase known at every pixel, each channel is a sum of known waves: its fringes, their second harmonic
 (a non-linear response) and the fringes of the other channels (crosstalk). Least squares over the whole image gives
@@ -13,13 +13,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration.levels import CHANNELS
 from quadfringe.config import Device
 from quadfringe.data import AnyShot, Shape
-from quadfringe.decoding import Plan
-from quadfringe.decoding.stages import carrier, linear_light
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.stages import CHANNELS, carrier, linear_light
 
-__all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift"]
+__all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift", "pixels_of"]
 
 Map = NDArray[np.float32]
 # Checked by pytest tests/test_doctor.py on shots with known defects.
@@ -28,13 +27,25 @@ TILE_PX = 96  # side of a tile: several fringes, so that the offset of a tile av
 TILE_SHARE = 0.3  # share of a tile that must carry fringes
 TILES_MIN = 2
 SHIFT_MAX = 6  # largest order error that is considered, fringes
-QUANTILE = 0.95  # of the tiles: the worst offset that is not an outlier
+# Of the tiles: a projector that has moved moves the fringes in all of them, while printed edges move single tiles. A
+# larger quantile takes coloured squares for drift: 2.7 px in one tile of twenty, 0.2 px in three quarters of the tiles
+# (`python evaluation/diagnosis.py`).
+QUANTILE = 0.75
+
+
+class Stray(NamedTuple):
+    """A channel, the channel whose fringes it sees too, and their amplitude relative to the right ones."""
+
+    to: str
+    of: str
+    share: float
 
 
 @dataclass(frozen=True)
 class Fit:
     """Fringe amplitude of each channel, share of full scale, and the ratio of its second harmonic to the first.
 
+    `contrast` is the amplitude over the mean light: 1 for full fringes, 0 without any.
     `crosstalk` (4, 4) is the amplitude of the fringes of each channel (columns) in each captured channel (rows),
     relative to the fringes of the captured channel itself.
     """
@@ -43,6 +54,14 @@ class Fit:
     amplitude: NDArray[np.float64]
     harmonic: NDArray[np.float64]
     crosstalk: NDArray[np.float64]
+    contrast: NDArray[np.float64]
+
+    @property
+    def worst_stray(self) -> Stray:
+        """The strongest crosstalk."""
+        stray = np.abs(self.crosstalk - np.diag(np.diag(self.crosstalk)))
+        to, of = np.unravel_index(int(np.argmax(stray)), stray.shape)
+        return Stray(self.names[int(to)], self.names[int(of)], float(stray[to, of]))
 
 
 @dataclass(frozen=True)
@@ -66,16 +85,17 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
     first, second, third = phases
     quadrature = -np.sin(first)  # blue, a quarter period before red
     shown = np.stack([np.cos(first), np.cos(second), quadrature, np.cos(third)], axis=1)
-    amplitude, harmonic, crosstalk = np.zeros(4), np.zeros(4), np.zeros((4, 4))
+    amplitude, harmonic, crosstalk, contrast = np.zeros(4), np.zeros(4), np.zeros((4, 4)), np.zeros(4)
     for i, name in enumerate(CHANNELS):
         phase = (first, second, first, third)[i]
         twice = np.stack([np.cos(2 * phase), np.sin(2 * phase), np.ones_like(phase)], axis=1)
-        wave = (light[name] / backgrounds[name] - 1)[inside]
+        wave = light[name][inside] / backgrounds[name][inside] - 1
         found = np.linalg.lstsq(np.hstack([shown, twice]), wave, rcond=None)[0]
         crosstalk[i] = found[:4] / found[i]
         harmonic[i] = float(np.hypot(found[4], found[5]) / abs(found[i]))
-        amplitude[i] = abs(found[i]) * float(np.median(backgrounds[name][inside]))
-    return Fit(CHANNELS, amplitude, harmonic, crosstalk)
+        contrast[i] = abs(found[i])
+        amplitude[i] = contrast[i] * float(np.median(backgrounds[name][inside]))
+    return Fit(CHANNELS, amplitude, harmonic, crosstalk, contrast)
 
 
 def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
@@ -91,7 +111,7 @@ def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
     column = shape.column_px.astype(float)
     places = (column, column, _expected_ir_column(shape, plan))
     inside = inside & np.isfinite(places[2])
-    waves = [light[name] / backgrounds[name] - 1 for name in ("red", "green", "ir")]
+    waves = [light[name] / np.maximum(backgrounds[name], 1e-6) - 1 for name in ("red", "green", "ir")]
     away, shifts = [], []
     for tile in _tiles(inside):
         lit = inside[tile]
@@ -177,12 +197,17 @@ def _expected_ir_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
 
 
 def _columns_px(xyz_mm: Map, device: Device) -> NDArray[np.float64]:
+    points = np.nan_to_num(xyz_mm.reshape(-1, 3).astype(float), nan=1.0)
+    columns = pixels_of(points, device)[:, 0].reshape(xyz_mm.shape[:2])
+    return np.where(np.isfinite(xyz_mm[:, :, 2]), columns, np.nan)
+
+
+def pixels_of(points_mm: NDArray[np.float64], device: Device) -> NDArray[np.float64]:
+    """Give columns and rows, (N, 2) px, at which a device sees points of the camera frame, (N, 3) mm."""
     import cv2
 
     turn, _ = cv2.Rodrigues(np.array(device.rotation))
     (fx, fy), (cx, cy) = device.focal_px, device.centre_px
     matrix = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], float)
-    points = np.nan_to_num(xyz_mm.reshape(-1, 3).astype(float), nan=1.0)
-    pixels, _ = cv2.projectPoints(points, turn, np.array(device.translation_mm), matrix, np.array(device.distortion))
-    columns = pixels[:, 0, 0].reshape(xyz_mm.shape[:2])
-    return np.where(np.isfinite(xyz_mm[:, :, 2]), columns, np.nan)
+    pixels, _ = cv2.projectPoints(points_mm, turn, np.array(device.translation_mm), matrix, np.array(device.distortion))
+    return np.asarray(pixels[:, 0], np.float64)

@@ -1,0 +1,62 @@
+"""Measure how often the doctor names the cause of a planted fault first, and how often it finds fault with sound shots.
+
+    python evaluation/diagnosis.py [--seed 2] [--only CAUSE ...] [--without-calibration] [--figures] [--json FILE]
+
+Thirty shots of the virtual bench, 1024 x 768, have one fault each: ten causes of three strengths. Thirty shots have
+none. The first finding that is not good counts. The numbers of the tests were chosen on seeds 1 and 3; report 2 or 4.
+"""
+
+from __future__ import annotations
+
+import argparse
+from itertools import chain
+from pathlib import Path
+
+import quadfringe as qf
+from quadfringe.decoding import symptoms
+from quadfringe.doctor import Finding, examine_shot
+from quadfringe.evaluation import broken
+from quadfringe.files import figures_text
+
+
+def first(found: list[Finding]) -> Finding | None:
+    """Give the first finding that is not good."""
+    return next((one for one in found if one.grade != "good"), None)
+
+
+def named(case: broken.Case, plan: qf.Plan) -> tuple[bool, str]:
+    """Tell whether the diagnosis of a case is right, and give it in words."""
+    told = first(examine_shot(case.shot, plan))
+    if told is None:
+        return not case.cause, "nothing"
+    return bool(case.cause) and case.names(told.name, told.found), f"{told.name}: {told.found}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--seed", type=int, default=2)
+    parser.add_argument("--only", nargs="*", metavar="CAUSE", help="causes to plant; without a name, none")
+    parser.add_argument("--without-calibration", action="store_true")
+    parser.add_argument("--figures", action="store_true", help="print the figures that the tests limit")
+    parser.add_argument("--json", type=Path, help="write the figures here")
+    options = parser.parse_args()
+    with qf.open() as scanner:
+        calibration = scanner.calibration
+        assert calibration is not None
+    causes = tuple(broken.CAUSES) if options.only is None else tuple(options.only)
+    right, alarms = 0, 0
+    for case in chain(broken.broken(causes, options.seed), broken.sound()):
+        plan = qf.Plan(912, calibration=None if options.without_calibration else broken.calibrated(case, calibration))
+        good, words = named(case, plan)
+        right += bool(case.cause) and good
+        alarms += not case.cause and not good
+        print(f"{'ok   ' if good else 'WRONG'} {case.cause or 'sound'}, {case.strength}, {case.scene}: {words[:160]}")
+        if options.figures:
+            print(f"      {symptoms.closure_of(case.shot, plan)}, sharpness {symptoms.sharpness(case.shot):.2f}")
+    print(f"{right} of {3 * len(causes)} causes are named first, {alarms} false alarms on sound shots")
+    if options.json:
+        options.json.write_text(figures_text({"causes_named_first": right, "false_alarms": alarms}))
+
+
+if __name__ == "__main__":
+    main()

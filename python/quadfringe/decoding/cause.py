@@ -1,0 +1,24 @@
+"""`Cause`: what is wrong with a shot, as one test found it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from quadfringe.errors import DecodeError
+
+__all__ = ["Cause"]
+
+
+@dataclass(frozen=True)
+class Cause:
+    """The name of a cause, what was found, and what to do about it; `fatal` when the shape cannot be trusted."""
+
+    name: str
+    found: str
+    fix: str
+    fatal: bool = True
+
+    @property
+    def error(self) -> DecodeError:
+        """The refusal of the shot for this cause."""
+        return DecodeError(f"no shape: {self.found}; {self.fix}", reason=self.name, fix=self.fix)

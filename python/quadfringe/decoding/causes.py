@@ -1,0 +1,152 @@
+"""The likeliest cause of a fault of a shot, by a test of each cause.
+
+`before_order` tests what needs no fringe orders, from the data format to the registration of infrared. `after_order`
+tests the waves of a decoded shot, for which the phase of red and blue suffices even where orders are wrong.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding import params, symptoms
+from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.fringe_fit import Fit, fit_fringes
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.symptoms import Closure
+
+__all__ = ["after_order", "before_order", "blur", "channels_fit", "registration", "wrong_bits", "wrong_numbers"]
+
+
+def before_order(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
+    """Name the likeliest cause that shows without fringe orders; None when no test finds one."""
+    tests = (wrong_bits(shot), _too_dark(shot, params.DARK), _saturated(shot), registration(shot, plan, closure))
+    return next((cause for cause in tests if cause is not None), None)
+
+
+def after_order(shot: AnyShot, shape: Shape, plan: Plan, closure: Closure | None) -> Cause | None:
+    """Name the likeliest cause that shows in the waves of a decoded shot; None when no test finds one."""
+    if numbers := wrong_numbers(plan, closure):
+        return numbers
+    fit = fit_fringes(shot, shape, plan)
+    waves = () if fit is None else (blur(shot, fit, plan, closure), _not_linear(fit), _crosstalk(fit))
+    return next((cause for cause in (*waves, _too_dark(shot, params.DIM)) if cause is not None), None)
+
+
+def channels_fit(closure: Closure | None) -> bool:
+    """Say whether every channel has the frequency of its fringe number, and red and blue are in order."""
+    return closure is not None and closure.agreement > params.AGREEMENT_MIN and _off(closure) < params.RATIO_OFF
+
+
+def wrong_bits(shot: AnyShot) -> Cause | None:
+    """Find 16-bit data that hold fewer bits of a camera."""
+    bits = symptoms.bits_in_use(shot)
+    if bits is None:
+        return None
+    top = max(int(image.max()) for image in shot.images.values())
+    words = f"no pixel of the 16-bit images is above {top}: they hold {bits} bits and were read as 16"
+    return Cause("bits", words, f"read them with bits={bits}, on the command line --bits {bits}")
+
+
+def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
+    """Find an infrared image that is shifted from the visible one, and the shift that mends it."""
+    if closure is None or not channels_fit(closure):
+        return None
+    turned = abs(closure.angle_rad) > params.CLOSURE_RAD and closure.steady > params.STEADY_MIN
+    columns = closure.shift_px if turned else 0.0
+    rows = symptoms.rows_match(shot, plan, columns)
+    if turned and rows is not None and rows.still > rows.moved + params.CORRELATION_MORE:
+        return _pair_moved(columns)
+    if turned or (rows is not None and abs(rows.shift_px) > params.SHIFT_MIN_PX):
+        return _shifted(columns, None if rows is None or rows.moved < params.CORRELATION_MIN else rows.shift_px)
+    return None
+
+
+def _shifted(columns: float, rows: float | None) -> Cause:
+    mend = f"{-columns:+.1f} px along x" + ("" if rows is None else f" and {-rows:+.1f} px along y")
+    words = f"the infrared image does not lie on the visible one: a shift of {mend} would mend it"
+    words += "" if rows is not None else " (up to whole fringes; the scene has no edges that show a shift along y)"
+    return Cause(
+        "infrared registration",
+        words,
+        "register the chips: quadfringe calibrate run with its step registration, and decode with that calibration",
+    )
+
+
+def _pair_moved(columns: float) -> Cause:
+    words = f"infrared fringes lie {columns:+.1f} px away from the visible ones, and the edges of the images agree: "
+    words += "the infrared projector has moved"
+    fix = "calibrate the pair again, and project the pre-deformed infrared pattern (--predeformed-z-mm)"
+    return Cause("infrared projector", words, fix)
+
+
+def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
+    """Find fringes whose ratios are not those of the fringe numbers, and the numbers that fit."""
+    if closure is None or closure.agreement < params.AGREEMENT_MIN:
+        return None
+    if not params.RATIO_OFF < _off(closure) < params.RATIO_STRANGE:
+        return None
+    first, second, third = plan.fringes.numbers
+    words = f"the fringe numbers {first:g}, {second:g}, {third:g} are not those of this shot: for {first:g} fringes of "
+    words += f"red and blue it has {closure.green * second:.2f} of green and {closure.infrared * third:.2f} of infrared"
+    root = 1 / max(1 - closure.infrared * third / first, 1e-3)
+    n = round(root) ** 2
+    fits = f", which fits {n}, {n - 1}, {n - round(root)}" if abs(root - round(root)) < 0.25 else ""
+    return Cause("fringe numbers", words + fits, "give the numbers that were projected (--fringes), or project these")
+
+
+def _off(closure: Closure) -> float:
+    return max(abs(closure.green - 1), abs(closure.infrared - 1))
+
+
+def blur(shot: AnyShot, fit: Fit, plan: Plan, closure: Closure | None) -> Cause | None:
+    """Find blur: weak fringes, weaker the finer they are, in images without sharp detail."""
+    red, _, blue, ir = (float(value) for value in fit.contrast)
+    visible = float(np.sqrt(red * blue))
+    if closure is None or visible > params.BLURRED_CONTRAST or symptoms.sharpness(shot) > params.SHARP_MIN:
+        return None
+    coarse_px = closure.infrared_px
+    fine_px = coarse_px * plan.fringes.numbers[2] / plan.fringes.numbers[0]
+    lost = np.log(max(ir, 1e-3) / max(visible, 1e-3)) / (2 * np.pi**2 * (fine_px**-2 - coarse_px**-2))
+    sigma_px = float(np.sqrt(max(lost, 0.0)))
+    if sigma_px < params.BLUR_PX:
+        return None
+    # Full fringes cannot have lost more than this; the ratio is off where wrong orders weaken the infrared waves.
+    sigma_px = min(sigma_px, float(np.sqrt(-np.log(max(visible, 1e-3)) / 2)) / np.pi * fine_px)
+    words = f"the images are blurred by about {sigma_px:.1f} px: the contrast is {visible:.0%} for the finest fringes "
+    words += f"and {ir:.0%} for the coarsest, and no detail is sharp"
+    fix = "focus the camera and the projectors on the object, close the aperture, and hold the object still"
+    return Cause("blur", words, fix)
+
+
+def _too_dark(shot: AnyShot, least: float) -> Cause | None:
+    top = max(symptoms.brightness(shot).values())
+    if top >= least:
+        return None
+    words = f"the images are too dark: their brightest pixels reach {top:.0%} of full scale"
+    return Cause("brightness", words, "lengthen the exposure, open the aperture, or raise the light")
+
+
+def _saturated(shot: AnyShot) -> Cause | None:
+    shares = {n: share for n, share in symptoms.saturation(shot).items() if share > params.SATURATED}
+    if not shares:
+        return None
+    words = "too much light: " + ", ".join(f"{share:.0%} of {name}" for name, share in shares.items()) + " is saturated"
+    return Cause("saturation", words, "shorten the exposure or lower the light until no crest is saturated")
+
+
+def _not_linear(fit: Fit) -> Cause | None:
+    value = float(max(fit.harmonic[0], fit.harmonic[2]))
+    if value < params.HARMONIC:
+        return None
+    words = f"the light is not linear: the second harmonic of red or blue is {value:.0%} of the first"
+    fix = "switch off the gamma table of the projector, or calibrate it: quadfringe calibrate response"
+    return Cause("response", words, fix)
+
+
+def _crosstalk(fit: Fit) -> Cause | None:
+    to, of, value = fit.worst_stray
+    if value < params.STRAY:
+        return None
+    words = f"channels see one another: {to} sees {value:.0%} of the fringes of {of}"
+    return Cause("crosstalk", words, "add band-pass filters, or calibrate crosstalk: quadfringe calibrate, step levels")

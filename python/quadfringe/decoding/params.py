@@ -1,0 +1,99 @@
+"""The tuned numbers of diagnosis and plausibility: value, unit, trade-off, and the command that measured each.
+
+`python evaluation/diagnosis.py` prints every named cause for thirty shots with a planted fault and for sound shots;
+`--figures` adds the figures that the numbers below limit. Seeds 1 and 3 tune, seeds 2 and 4 report.
+"""
+
+from __future__ import annotations
+
+__all__: list[str] = []
+
+# --- Geometry: sound shots have shares of 0.00 and a median tilt of at most 13 degrees, mirrored ones a share of 1.00.
+
+# Samples along the shorter side of the image. More samples cost time in every decode, fewer miss small objects.
+SAMPLES = 48
+# Distance in px over which columns must rise. A longer one crosses more edges, a shorter one is lost in noise.
+REACH_PX = 4
+# Share of the samples whose columns run backwards, or whose points are impossible, from which the shot is refused:
+# most of it contradicts the calibration. A larger share returns more wrong shapes.
+REFUSED_SHARE = 0.5
+# Share from which the shape carries a warning. A smaller share warns of stray pixels, a larger one misses the border
+# of a light field that has moved by a few percent of the image.
+WARNED_SHARE = 0.05
+# Fewest samples from which a share is taken. A larger number leaves small objects unchecked; below about a hundred, a
+# share of WARNED_SHARE is a handful of stray pixels.
+SAMPLES_MIN = 100
+# Rows beyond the image of the projector that are still possible, px. Follows from lens distortion, which calibrations
+# know to a few px at the border. A larger number misses small shifts of the rows.
+ROWS_PX = 8.0
+# Median angle in degrees between the surface and the line of sight from which a calibration is doubted. A projector
+# from another side has 61 or more. A smaller angle warns of objects that are seen at a slant.
+TILT_DEG = 55.0
+# Smallest distance of camera and projector, mm. Follows from the lenses, which are wider than that; a bench of 250 mm
+# has 0.25 when its calibration is in m.
+BASELINE_MM = 2.0
+# Factor by which the median depth may leave the depths of the board in the calibration. Not measured: between them
+# the calibration is tested, and up to half as far again its lens model still holds.
+CALIBRATED_FACTOR = 1.5
+
+# --- Fringe numbers and registration: closure of the three phases
+
+# Relative deviation of a channel's local frequency from its fringe number. Sound shots reach 0.002, and 0.007 when
+# their response is not linear; neighbouring families of numbers differ from 36, 35, 30 by 0.008 (green) and 0.029
+# (infrared) or more. A smaller number calls noise another fringe number, a larger one misses 49, 48, 42.
+RATIO_OFF = 0.015
+# Deviation from which channels count as exchanged rather than as fringes of other numbers: green in place of infrared
+# has 0.14 or more, and families from 16 to 144 fringes at most 0.1. A larger number explains exchanges as numbers.
+RATIO_STRANGE = 0.12
+# Mean length of the closure over a window of CLOSURE_PX, in [0, 1], from which its angle is read. Sound shots with 2
+# % noise have 0.35 (clutter) to 0.97 (plane), exchanged channels at most 0.22. A smaller number trusts noise, a
+# larger one misses shifts on dark objects.
+AGREEMENT_MIN = 0.3
+CLOSURE_PX = 31
+# Lag of the local frequency, px, and its window. Longer ones cross more edges, shorter ones are noisier.
+LAG_PX, FREQUENCY_PX = 8, 25
+# Angle of the closure in rad from which infrared counts as shifted: 0.3 is 2 px at a period of 41 px. Sound shots
+# reach 0.03. A smaller angle names misalignments that cost no order, a larger one misses shifts that cost margin.
+CLOSURE_RAD = 0.3
+# Mean of the closure over its local length, from which the angle counts as one for the whole image. Shifted and sound
+# shots have 0.8 or more, a strong response or crosstalk 0.55 or less. A smaller number calls those shifts.
+STEADY_MIN = 0.7
+# Largest shift along y that is searched, px, and the correlation from which it is believed: scenes with detail along
+# y have 0.66 or more, a plane 0.04. A wider search finds chance maxima, a narrower one misses coarse misalignment.
+SHIFT_MAX_PX = 24
+CORRELATION_MIN = 0.5
+# Shift along y, px, from which it is named without one along x. Sound shots have 0, blurred ones up to 1.
+SHIFT_MIN_PX = 1.5
+# By how much the correlation must fall when infrared is moved along x, for the projector to be blamed and not the
+# chip. Not measured: above the scatter of equal correlations, 0.02. A larger number blames the chip for a moved
+# projector.
+CORRELATION_MORE = 0.05
+
+# --- Blur
+
+# Contrast of the fringes below which blur is considered. Sound shots have 0.88 to 0.9, a blur of 4 px leaves 0.68. A
+# larger number names room light, a smaller one misses light blur.
+BLURRED_CONTRAST = 0.78
+# Largest detail finer than the fringes, over the noise. Sound scenes with edges have 2.3 or more, blurred ones at
+# most 1.96. A larger number calls sharp scenes in room light blurred.
+SHARP_MIN = 2.15
+# Standard deviation of the blur, px, that the contrasts of 36 and 30 fringes must show together. Scatter of the
+# contrasts reaches 1.7 px. A larger number misses light blur.
+BLUR_PX = 2.2
+
+# --- Light
+
+# Brightest pixels, share of full scale, below which the light counts as too dark. Sound shots have 0.6 or more. A
+# larger number names dark paint, a smaller one misses shots whose noise hides the fringes.
+DIM = 0.25
+# The same, below which darkness is named before any other cause of a refusal: the fringes of the sound scenes then
+# have about the amplitude of 2 % noise. A larger number hides other causes of dim shots.
+DARK = 0.1
+# Share of saturated pixels from which saturation is the cause of a refusal. A larger number names the harmonics of
+# the clipped crests instead, a smaller one blames a few glints.
+SATURATED = 0.1
+# Ratio of the second harmonic to the first, from which a refused shot is said to be not linear. Sound shots have
+# 0.007.
+HARMONIC = 0.08
+# Relative amplitude of the fringes of another channel from which a refused shot is said to have crosstalk.
+STRAY = 0.15

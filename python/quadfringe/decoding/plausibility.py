@@ -1,0 +1,181 @@
+"""Plausibility of a shape: whether its calibration allows what was decoded.
+
+An opaque surface that camera and projector both see shows its front to both. From that follows the direction in which
+projector columns grow in the image, whatever the surface. Points must lie before the camera, and inside the image of
+the projector. A few thousand samples decide, so that the time of a decode hardly changes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import Calibration, Shape
+from quadfringe.decoding import params
+from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.fringe_fit import pixels_of
+
+__all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "within_depths"]
+
+# Maps without data outside the range; quality and modulation are known wherever there is light.
+BOUNDED = ("phase_rad", "column_px", "xyz_mm", "wrong_order_probability", "uncertainty_mm")
+CALIBRATE = "decode with the calibration of this bench, or calibrate again: quadfringe calibrate"
+FLIP = (
+    "switch off mirroring and rotation in the camera's settings, or flip the images back; if they are as the camera "
+    "sees them, " + CALIBRATE
+)
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Shares of the samples of a shape that contradict its calibration, and where its points lie.
+
+    `backwards`: columns run against the direction that the calibration demands. `nowhere`: rays do not meet before the
+    camera. `outside`: points above or below the image of the projector. `tilt_deg`: median angle between surface and
+    line of sight. `depth_mm`: median.
+    """
+
+    backwards: float
+    nowhere: float
+    outside: float
+    tilt_deg: float
+    depth_mm: float
+
+
+def geometry_of(shape: Shape) -> Geometry | None:
+    """Measure a shape against its calibration; None without one, or with too few samples."""
+    if shape.calibration is None or shape.xyz_mm is None:
+        return None
+    stride = max(1, min(shape.phase_rad.shape) // params.SAMPLES)
+    reach = params.REACH_PX
+    here, right, below = (
+        np.s_[:-reach:stride, :-reach:stride],
+        np.s_[:-reach:stride, reach::stride],
+        np.s_[reach::stride, :-reach:stride],
+    )
+    columns = shape.column_px[here]
+    returned = np.isfinite(columns)
+    if returned.sum() < params.SAMPLES_MIN:
+        return None
+    points = shape.xyz_mm[here].astype(np.float64)
+    met = returned & np.isfinite(points[..., 2])
+    if met.sum() < params.SAMPLES_MIN:
+        return Geometry(0.0, 1.0, 0.0, float("nan"), float("nan"))
+    growth = (shape.column_px[right] - columns)[met] * _direction(points[met], shape.calibration)
+    rows = pixels_of(points[met], shape.calibration.projector)[:, 1]
+    off = np.maximum(-0.5 - rows, rows - (shape.calibration.projector.height_px - 0.5))
+    tilt = _tilt_deg(points, shape.xyz_mm[right] - points, shape.xyz_mm[below] - points)
+    return Geometry(
+        backwards=_share(growth < 0, np.isfinite(growth)),
+        nowhere=1 - float(met.sum()) / float(returned.sum()),
+        outside=float(np.mean(off > params.ROWS_PX)),
+        tilt_deg=tilt,
+        depth_mm=float(np.median(points[..., 2][met])),
+    )
+
+
+def implausible(shape: Shape) -> list[Cause]:
+    """Name what the calibration contradicts in a shape, the likeliest first; empty when nothing does."""
+    if shape.calibration is None or shape.xyz_mm is None:
+        return []
+    if units := _units(shape.calibration):
+        return [units]
+    found = geometry_of(shape)
+    if found is None:
+        return []
+    if found.backwards > params.REFUSED_SHARE:
+        words = f"fringes run backwards in {found.backwards:.0%} of the image: the calibration says that the projector "
+        words += "columns grow the other way, so the images are mirrored left to right or turned by 180 degrees"
+        return [Cause("mirrored or rotated", words, FLIP)]
+    return [*_impossible(found), *_doubtful(found, shape.calibration)]
+
+
+def within_depths(shape: Shape, range_mm: tuple[float, float] | None) -> list[Cause]:
+    """Make no data of the points of a shape outside a range of depths, in place; name it when most of them are.
+
+    Quality and modulation are kept, as at every pixel that is not returned.
+    """
+    depth_mm = shape.depth_mm
+    if range_mm is None or depth_mm is None:
+        return []
+    seen_mm = float(np.nanmedian(depth_mm[::4, ::4])) if np.isfinite(depth_mm[::4, ::4]).any() else float("nan")
+    out = shape.returned & ~((depth_mm >= range_mm[0]) & (depth_mm <= range_mm[1]))
+    share = _share(out, shape.returned)
+    for values in (getattr(shape, name) for name in BOUNDED):
+        if values is not None:
+            values[out] = np.nan
+    if share <= params.REFUSED_SHARE:
+        return []
+    words = f"{share:.0%} of the points lie outside the stated depths of {range_mm[0]:g} to {range_mm[1]:g} mm, at a "
+    words += f"median of {seen_mm:.0f} mm, and are no data"
+    return [Cause("depth range", words, f"correct depth_range_mm; or {CALIBRATE}", fatal=False)]
+
+
+def calibrated_depths_mm(calibration: Calibration) -> tuple[float, float] | None:
+    """Give the least and largest depth of the boards that a calibration was made from, if its record holds them."""
+    steps = () if calibration.record is None else calibration.record.steps
+    poses = [pose for step in steps if step.name == "poses" for pose in step.settings.values()]
+    placed = [pose["T_camera_board"] for pose in poses if isinstance(pose, dict) and "T_camera_board" in pose]
+    depths = [float(np.asarray(pose, np.float64)[2, 3]) for pose in placed]
+    return (min(depths), max(depths)) if depths else None
+
+
+def _units(calibration: Calibration) -> Cause | None:
+    devices = calibration.projector
+    apart = float(np.linalg.norm(devices.translation_mm))
+    if not 0 < apart < params.BASELINE_MM:
+        return None
+    words = f"the calibration puts the projector {apart:.3g} mm from the camera, nearer than their lenses allow"
+    return Cause("calibration units", words, "give translation_mm in mm: multiply it by 1000 if it is in m")
+
+
+def _impossible(found: Geometry) -> list[Cause]:
+    shares = {
+        "rays of camera and projector do not meet before the camera": found.nowhere,
+        "points lie above or below the image of the projector": found.outside,
+    }
+    words = [f"{what} in {share:.0%} of the image" for what, share in shares.items() if share > params.WARNED_SHARE]
+    if not words:
+        return []
+    fix = f"check that the images are not flipped and that no rows are cut off or moved; {CALIBRATE}"
+    fatal = max(shares.values()) > params.REFUSED_SHARE
+    return [Cause("calibration or image rows", " and ".join(words), fix, fatal)]
+
+
+def _doubtful(found: Geometry, calibration: Calibration) -> list[Cause]:
+    if found.tilt_deg > params.TILT_DEG:
+        words = f"half of the surface is seen at more than {found.tilt_deg:.0f} degrees from its normal, which no "
+        words += "camera sees well: the calibration seems to be of another bench"
+        return [Cause("calibration", words, CALIBRATE, fatal=False)]
+    depths = calibrated_depths_mm(calibration)
+    if depths is None:
+        return []
+    low, high = depths[0] / params.CALIBRATED_FACTOR, depths[1] * params.CALIBRATED_FACTOR
+    if low <= found.depth_mm <= high:
+        return []
+    words = f"the median depth is {found.depth_mm:.0f} mm, and the calibration was made at {depths[0]:.0f} to "
+    words += f"{depths[1]:.0f} mm"
+    return [Cause("calibration", words, f"move the object there; or {CALIBRATE}", fatal=False)]
+
+
+def _direction(points: NDArray[np.float64], calibration: Calibration) -> float:
+    """Give 1 where columns must grow along the rows of the image, else -1: those of a plane that faces the camera."""
+    middle = np.median(points, axis=0)
+    along = middle[2] * np.array([[0.0, 0.0, 1.0], [1e-3, 0.0, 1.0]])
+    first, second = pixels_of(along, calibration.projector)[:, 0]
+    return 1.0 if second >= first else -1.0
+
+
+def _tilt_deg(points: NDArray[np.float64], right: NDArray[np.float64], down: NDArray[np.float64]) -> float:
+    normals = np.cross(right, down)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        lengths = np.linalg.norm(normals, axis=-1) * np.linalg.norm(points, axis=-1)
+        cos = np.abs(np.sum(normals * points, axis=-1)) / lengths
+    known = np.isfinite(cos)
+    return float(np.degrees(np.arccos(np.clip(np.median(cos[known]), 0, 1)))) if known.any() else float("nan")
+
+
+def _share(hits: NDArray[np.bool_], known: NDArray[np.bool_]) -> float:
+    return float(hits[known].mean()) if known.any() else 0.0

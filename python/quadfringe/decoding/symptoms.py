@@ -1,0 +1,182 @@
+"""Figures of a shot that need no decoding: bits in use, light, sharpness, and the closure of its three phases.
+
+For fringe numbers N, N - 1 and N - k the phases close: phi_IR + (k - 1) phi_R - k phi_G = 0 up to whole turns, for any
+surface. A shift of the infrared image turns that sum by a constant angle, and other fringe numbers let it drift.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import AnyShot
+from quadfringe.decoding import params
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.stages import carrier, linear_light, wrapped_phases
+from quadfringe.errors import DecodeError
+
+__all__ = ["Closure", "bits_in_use", "brightness", "closure_of", "rows_match", "saturation", "sharpness"]
+
+Complex = NDArray[np.complex128]
+Map = NDArray[np.float32]
+DEPTHS = (8, 10, 12)  # bits that cameras deliver in 16-bit files; 14 cannot be told from a dim image of 16
+
+
+@dataclass(frozen=True)
+class Closure:
+    """How the phases of red and blue, green and infrared fit together.
+
+    `green` and `infrared` are local frequencies over what the fringe numbers say, 1 if they agree, negative where red
+    and blue run backwards. `angle_rad` is the mean of the closure, `agreement` its local length, 0 to 1, and `steady`
+    the length of its mean over that, 1 for a constant angle; NaN for fringe numbers that do not close. `infrared_px` is
+    the period of the infrared fringes.
+    """
+
+    green: float
+    infrared: float
+    angle_rad: float
+    agreement: float
+    steady: float
+    infrared_px: float
+
+    @property
+    def shift_px(self) -> float:
+        """The shift of the infrared image along x, px, that explains the angle, up to whole periods."""
+        return -self.angle_rad / (2 * np.pi) * self.infrared_px
+
+
+@dataclass(frozen=True)
+class RowsMatch:
+    """Shift of the infrared image along y, px, and its correlation with the visible one, moved along x and not."""
+
+    shift_px: float
+    moved: float
+    still: float
+
+
+def bits_in_use(shot: AnyShot) -> int | None:
+    """Give the bits of the camera when 16-bit data have fewer and count as 16; None when nothing is wrong."""
+    if shot.ir.dtype != np.uint16 or shot.full_scale_value < np.iinfo(np.uint16).max:
+        return None
+    top = max(int(image.max()) for image in shot.images.values())
+    return next((bits for bits in DEPTHS if 0 < top < 2**bits), None)
+
+
+def brightness(shot: AnyShot) -> dict[str, float]:
+    """Give the brightest hundredth of each channel, share of full scale."""
+    return {n: float(np.quantile(i[::4, ::4], 0.99)) / shot.full_scale_value for n, i in shot.channels.items()}
+
+
+def saturation(shot: AnyShot) -> dict[str, float]:
+    """Give the share of saturated pixels of each channel."""
+    return {n: float(np.mean(i >= 0.998 * shot.full_scale_value)) for n, i in shot.channels.items()}
+
+
+def sharpness(shot: AnyShot) -> float:
+    """Give the strongest detail of a few px over the noise of the same scale; about 1.4 when there is only noise."""
+    import cv2
+
+    found = []
+    for image in shot.channels.values():
+        light = image.astype(np.float32)
+        detail = cv2.GaussianBlur(light, (0, 0), 1.5) - cv2.GaussianBlur(light, (0, 0), 3.0)
+        noise = 1.4826 * float(np.median(np.abs(detail - np.median(detail))))
+        found.append(float(np.quantile(np.abs(detail), 0.995)) / max(noise, 1e-9))
+    return float(np.median(found))
+
+
+def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
+    """Measure how the three phases close; None when no fringes cross the rows."""
+    light = _light(shot, plan)
+    first, second, third = plan.fringes.numbers
+    try:
+        phases = wrapped_phases(light, (first, second, third))
+    except DecodeError:
+        return None
+    waves = [np.where(np.isfinite(p), np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]
+    rates = [_rate(wave) for wave in waves]
+    known = np.abs(rates[0]) > 0.1 / params.LAG_PX
+    if not known.any():
+        return None
+    green, infrared = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])
+    closed = _closed(waves, (first, second, third))
+    period = 2 * np.pi / max(float(np.median(np.abs(rates[2][known]))), 1e-6)
+    return Closure(green * first / second, infrared * first / third, *closed, period)
+
+
+def rows_match(shot: AnyShot, plan: Plan, columns_px: float) -> RowsMatch | None:
+    """Compare infrared with visible rows, once infrared is moved back by `columns_px`, from detail along y.
+
+    A mean over a fringe along x takes the fringes out and keeps detail along y. None when there is none in common.
+    """
+    import cv2
+
+    light = _light(shot, plan)
+    period_px, _ = carrier(np.nan_to_num(light["red"]))
+    reach = params.SHIFT_MAX_PX
+    if not np.isfinite(period_px) or min(light["ir"].shape) <= 4 * reach:
+        return None
+    visible, infrared = (
+        _detail_along_y(np.nan_to_num(image), float(period_px))
+        for image in (light["red"] + light["green"] + light["blue"], light["ir"])
+    )
+    inner = visible[reach:-reach, reach:-reach]
+    moved, still = (
+        cv2.matchTemplate(np.roll(infrared, -columns, axis=1)[:, reach:-reach], inner, cv2.TM_CCOEFF_NORMED)[:, 0]
+        for columns in (round(columns_px), 0)
+    )
+    best = int(moved.argmax())
+    if max(moved.max(), still.max()) < params.CORRELATION_MIN or not 0 < best < 2 * reach:
+        return None
+    return RowsMatch(best - reach + _peak(moved[best - 1 : best + 2]), float(moved.max()), float(still.max()))
+
+
+def _light(shot: AnyShot, plan: Plan) -> dict[str, Map]:
+    return linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
+
+
+def _rate(wave: Complex) -> NDArray[np.float64]:
+    """Give the local frequency along the rows, rad / px."""
+    lag = params.LAG_PX
+    turned = _mean(wave[:, lag:] * np.conj(wave[:, :-lag]), params.FREQUENCY_PX)
+    return np.angle(turned) / lag
+
+
+def _closed(waves: list[Complex], numbers: tuple[float, float, float]) -> tuple[float, float, float]:
+    """Give the mean angle of the closure, its local length, and how far the angle is the same everywhere."""
+    first, second, third = numbers
+    turns = (first - third) / (first - second)
+    if abs(turns - round(turns)) > 1e-6:
+        return (float("nan"),) * 3
+    whole = round(turns)
+    closed = waves[2] * waves[0] ** (whole - 1) * np.conj(waves[1]) ** whole
+    local = float(np.abs(_mean(closed, params.CLOSURE_PX)).mean())
+    whole_image = complex(closed.mean())
+    return float(np.angle(whole_image)), local, abs(whole_image) / max(local, 1e-9)
+
+
+def _mean(wave: Complex, side_px: int) -> Complex:
+    import cv2
+
+    size = (side_px, side_px)
+    mean: Complex = cv2.boxFilter(wave.real.copy(), -1, size) + 1j * cv2.boxFilter(wave.imag.copy(), -1, size)
+    return mean
+
+
+def _detail_along_y(image: Map, period_px: float) -> Map:
+    """Give the relative brightness of detail of a few px along y, in means over about a fringe along x."""
+    import cv2
+
+    fine = cv2.GaussianBlur(image, (0, 0), sigmaX=0.6 * period_px, sigmaY=1.0)
+    coarse = cv2.GaussianBlur(image, (0, 0), sigmaX=0.6 * period_px, sigmaY=5.0)
+    relative: Map = (fine / np.maximum(coarse, 1e-3)).astype(np.float32)
+    return relative
+
+
+def _peak(three: NDArray[np.float32]) -> float:
+    """Give the place of the maximum of a parabola through three values, from the middle one."""
+    before, middle, after = (float(value) for value in three)
+    bend = before - 2 * middle + after
+    return 0.0 if bend >= 0 else 0.5 * (before - after) / bend
