@@ -148,7 +148,7 @@ impl Joint {
         // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
         let (ratios, noise) = (self.ratios, self.coarse.noise);
         let scene = self.pyramid.full.scene(frame.full);
-        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.phase, &self.modulation);
+        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.phase, &mut self.modulation);
         // 8. Validity.
         self.validate(&frame, instants, options.quality_min, out);
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).

@@ -2,7 +2,7 @@
 
 use super::tile::Tile;
 use crate::joint::cells::{blend, spread};
-use crate::joint::params::energy::{SIDE, SPREAD_MAX_RAD, USABLE_MIN};
+use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, SPREAD_MAX_RAD, USABLE_MIN};
 use crate::joint::scene::{PhaseMap, Scene};
 use crate::parallel::lanes::LANES;
 use rayon::prelude::*;
@@ -105,17 +105,21 @@ impl Cells {
         });
     }
 
-    /// Adds the interpolated correction to the phase of the pixels.
-    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32]) {
-        phase.par_chunks_mut(scene.grid.stride).enumerate().for_each_init(
-            Rows::default,
-            |rows, (y, phase)| {
-                self.interpolate(&self.phase, scene, y, rows);
-                for (phase, (sum, weight)) in phase.iter_mut().zip(rows.sum.iter().zip(&rows.weight)) {
-                    *phase += if *weight > 0.0 { sum / weight } else { 0.0 };
+    /// Adds the interpolated correction to the phase of the pixels. Pixels that it moves too far lose their light.
+    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], modulation: &mut [f32]) {
+        let stride = scene.grid.stride;
+        let pixels = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride)).enumerate();
+        pixels.for_each_init(Rows::default, |rows, (y, (phase, modulation))| {
+            self.interpolate(&self.phase, scene, y, rows);
+            let found = rows.sum.iter().zip(&rows.weight);
+            for ((phase, modulation), (sum, weight)) in phase.iter_mut().zip(modulation).zip(found) {
+                let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
+                *phase += correction;
+                if correction.abs() > MOVED_MAX_RAD {
+                    *modulation = 0.0;
                 }
-            },
-        );
+            }
+        });
     }
 
     /// Variance along row `y` of the scene, 0 where there is no lit cell.

@@ -45,8 +45,9 @@ pub(super) struct Prior {
 }
 
 impl Energy {
-    /// Corrects the absolute phase of the lit pixels of a scene, in place.
-    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &[f32]) {
+    /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
+    /// one of the two is wrong, and the modulation becomes 0.
+    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &mut [f32]) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, PhaseMap { phase, modulation }, factor);
         let Self { cells, tiles, slots } = self;
@@ -67,7 +68,7 @@ impl Energy {
         );
         let tiles = &*tiles;
         cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
-        cells.correct(scene, phase);
+        cells.correct(scene, phase, modulation);
     }
 
     /// Variance of the phase by noise along row `y` of the scene, rad^2; 0 where there is no lit cell.

@@ -6,9 +6,8 @@ use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
-/// Solves for each unknown along the columns of cells, which follow the fringes, as if the albedos of a cell and its contrast
-/// answered to its own phase alone: what converges slowly without it is a streak along a fringe, of phase and colour against
-/// each other.
+/// The factors of the matrix, column by column. Columns follow the fringes. Without them, streaks of phase and colour along a
+/// fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
 #[derive(Debug, Default)]
 pub(super) struct Preconditioner {
     /// Change of each logarithm of an albedo that balances a unit change of the phase or the contrast of its cell, negative.
