@@ -3,7 +3,7 @@
     python evaluation/diagnosis.py [--seed 2] [--only CAUSE ...] [--without-calibration] [--figures] [--json FILE]
 
 Thirty shots of the virtual bench, 1024 x 768, have one fault each: ten causes of three strengths. Thirty shots have
-none. The first finding that is not good counts. The numbers of the tests were chosen on seeds 1 and 3; report 2 or 4.
+none. The first finding that is not good counts. The numbers of the tests were chosen on seeds 1 to 4; report others.
 """
 
 from __future__ import annotations

@@ -67,7 +67,7 @@ FIGURES = (
     ("a face with 3 % noise has {} rad RMS", "face, 3 % noise, all colours: phase RMS, rad"),
     ("peaks {} rad", "peaks, 3 % noise, white: phase RMS, rad"),
     ("{} % wrong orders among returned", "steps: wrong fringe orders among returned pixels, %"),
-    ("{} % wrong orders among returned", "face: wrong fringe orders among returned pixels, %"),
+    ("{} % among those of a face", "face: wrong fringe orders among returned pixels, %"),
     ("{} % of the lit pixels of steps", "steps: lit pixels returned, %"),
     ("{} % of a face returned", "face: lit pixels returned, %"),
     ("traditional {} rad RMS", "peaks, 3 % noise: traditional FTP, full field, rad"),

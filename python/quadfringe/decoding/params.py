@@ -1,7 +1,7 @@
 """The tuned numbers of diagnosis and plausibility: value, unit, trade-off, and the command that measured each.
 
 `python evaluation/diagnosis.py` prints every named cause for thirty shots with a planted fault and for sound shots;
-`--figures` adds the figures that the numbers below limit. Seeds 1 and 3 tune, seeds 2 and 4 report.
+`--figures` adds the figures that the numbers below limit. They were chosen on seeds 1 to 4; other seeds report.
 """
 
 from __future__ import annotations
