@@ -88,7 +88,7 @@ def require_suffix(path: Path, allowed: tuple[str, ...]) -> str:
     return suffix
 
 
-def figures_text(figures: Mapping[str, float]) -> str:
-    """Render `{"figures": {name_with_unit: number}}` as JSON; a number that is not finite becomes null."""
+def figures_text(figures: Mapping[str, float], **more: list[str]) -> str:
+    """Render `{"figures": {name_with_unit: number}, ...}` as JSON; a number that is not finite becomes null."""
     finite = {k: (v if abs(v) != float("inf") and v == v else None) for k, v in figures.items()}
-    return json.dumps({"figures": finite}, indent=2) + "\n"
+    return json.dumps({"figures": finite, **more}, indent=2) + "\n"

@@ -75,9 +75,8 @@ fn a_mosaic_loses_no_orders_at_edges() {
     assert!(raw.wrong_orders() <= full.wrong_orders() + 1, "{raw:?}");
     assert!(raw.in_shadow < raw.returned / 1000, "{raw:?}");
     assert!(raw.phase_rms_rad < 1.2 * full.phase_rms_rad, "{raw:?}");
-    // Next to every shadow one pixel is left out, because light is interpolated into it: five pixels in a thousand. Its neighbours
-    // may be moved so far by the energy that they are left out as well.
-    assert!(raw.returned_share() > full.returned_share() - 6e-3, "{raw:?}");
+    // Next to every shadow one pixel is left out, because light is interpolated into it: five pixels in a thousand.
+    assert!(raw.returned_share() > full.returned_share() - 5e-3, "{raw:?}");
 }
 
 #[test]

@@ -70,9 +70,9 @@ def rows(
     console.print(drawn)
 
 
-def write_figures(figures: Mapping[str, float], json: Path | None) -> None:
-    """Write {"figures": {...}} to a file, or to standard output for "-"; do nothing without `json`."""
-    _write(figures_text(figures), json)
+def write_figures(figures: Mapping[str, float], json: Path | None, **more: list[str]) -> None:
+    """Write {"figures": {...}, ...} to a file, or to standard output for "-"; do nothing without `json`."""
+    _write(figures_text(figures, **more), json)
 
 
 def write_record(record: Mapping[str, Any], json: Path | None) -> None:

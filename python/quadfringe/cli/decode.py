@@ -23,7 +23,7 @@ from quadfringe.cli._options import (
     decode_settings,
     method_named,
 )
-from quadfringe.cli._output import caution, say, write_record
+from quadfringe.cli._output import caution, say, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
@@ -200,10 +200,6 @@ def _shot(folder: Path | None, files: Mapping[str, Path | None], bayer: Bayer | 
 
 def _save(shape: Shape, out: Path, json: Path | None) -> None:
     """Save the shape, print a summary and its warnings, and write its figures."""
-    from json import loads
-
-    from quadfringe.files import figures_text
-
     shape.save(out)
     for text in shape.warnings:
         caution(text)
@@ -215,7 +211,7 @@ def _save(shape: Shape, out: Path, json: Path | None) -> None:
         listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
         say(f"response estimated from the shot, exponents: {listed} (--response linear skips this)", json)
         figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
-    write_record(loads(figures_text(figures)) | {"warnings": list(shape.warnings)}, json)
+    write_figures(figures, json, warnings=list(shape.warnings))
 
 
 def _uncertainty(figures: Mapping[str, float]) -> str:

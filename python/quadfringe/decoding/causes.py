@@ -35,7 +35,7 @@ def after_order(shot: AnyShot, shape: Shape, plan: Plan, closure: Closure | None
 
 def channels_fit(closure: Closure | None) -> bool:
     """Say whether every channel has the frequency of its fringe number, and red and blue are in order."""
-    return closure is not None and closure.agreement > params.AGREEMENT_MIN and _off(closure) < params.RATIO_OFF
+    return closure is not None and closure.angle.agreement > params.AGREEMENT_MIN and _off(closure) < params.RATIO_OFF
 
 
 def wrong_bits(shot: AnyShot) -> Cause | None:
@@ -52,7 +52,7 @@ def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | 
     """Find an infrared image that is shifted from the visible one, and the shift that mends it."""
     if closure is None or not channels_fit(closure):
         return None
-    turned = abs(closure.angle_rad) > params.CLOSURE_RAD and closure.steady > params.STEADY_MIN
+    turned = abs(closure.angle.rad) > params.CLOSURE_RAD and closure.angle.steady > params.STEADY_MIN
     columns = closure.shift_px if turned else 0.0
     rows = symptoms.rows_match(shot, plan, columns)
     if turned and rows is not None and rows.still > rows.moved + params.CORRELATION_MORE:
@@ -82,7 +82,7 @@ def _pair_moved(columns: float) -> Cause:
 
 def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
     """Find fringes whose ratios are not those of the fringe numbers, and the numbers that fit."""
-    if closure is None or closure.agreement < params.AGREEMENT_MIN:
+    if closure is None or closure.angle.agreement < params.AGREEMENT_MIN:
         return None
     if not params.RATIO_OFF < _off(closure) < params.RATIO_STRANGE:
         return None

@@ -25,26 +25,35 @@ DEPTHS = (8, 10, 12)  # bits that cameras deliver in 16-bit files; 14 cannot be 
 
 
 @dataclass(frozen=True)
+class Angle:
+    """The closure of the three phases; NaN for fringe numbers that do not close.
+
+    `rad` is its mean, `agreement` its local length, 0 to 1, and `steady` the length of its mean over that, 1 for the
+    same angle everywhere.
+    """
+
+    rad: float
+    agreement: float
+    steady: float
+
+
+@dataclass(frozen=True)
 class Closure:
     """How the phases of red and blue, green and infrared fit together.
 
     `green` and `infrared` are local frequencies over what the fringe numbers say, 1 if they agree, negative where red
-    and blue run backwards. `angle_rad` is the mean of the closure, `agreement` its local length, 0 to 1, and `steady`
-    the length of its mean over that, 1 for a constant angle; NaN for fringe numbers that do not close. `infrared_px` is
-    the period of the infrared fringes.
+    and blue run backwards. `infrared_px` is the period of the infrared fringes.
     """
 
     green: float
     infrared: float
-    angle_rad: float
-    agreement: float
-    steady: float
+    angle: Angle
     infrared_px: float
 
     @property
     def shift_px(self) -> float:
         """The shift of the infrared image along x, px, that explains the angle, up to whole periods."""
-        return -self.angle_rad / (2 * np.pi) * self.infrared_px
+        return -self.angle.rad / (2 * np.pi) * self.infrared_px
 
 
 @dataclass(frozen=True)
@@ -101,9 +110,9 @@ def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
     if not known.any():
         return None
     green, infrared = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])
-    closed = _closed(waves, (first, second, third))
+    angle = _closed(waves, (first, second, third))
     period = 2 * np.pi / max(float(np.median(np.abs(rates[2][known]))), 1e-6)
-    return Closure(green * first / second, infrared * first / third, *closed, period)
+    return Closure(green * first / second, infrared * first / third, angle, period)
 
 
 def rows_match(shot: AnyShot, plan: Plan, columns_px: float) -> RowsMatch | None:
@@ -144,17 +153,17 @@ def _rate(wave: Complex) -> NDArray[np.float64]:
     return np.angle(turned) / lag
 
 
-def _closed(waves: list[Complex], numbers: tuple[float, float, float]) -> tuple[float, float, float]:
-    """Give the mean angle of the closure, its local length, and how far the angle is the same everywhere."""
+def _closed(waves: list[Complex], numbers: tuple[float, float, float]) -> Angle:
+    """Measure the sum of the three phases that is the same for every surface."""
     first, second, third = numbers
     turns = (first - third) / (first - second)
     if abs(turns - round(turns)) > 1e-6:
-        return (float("nan"),) * 3
+        return Angle(float("nan"), float("nan"), float("nan"))
     whole = round(turns)
     closed = waves[2] * waves[0] ** (whole - 1) * np.conj(waves[1]) ** whole
     local = float(np.abs(_mean(closed, params.CLOSURE_PX)).mean())
-    whole_image = complex(closed.mean())
-    return float(np.angle(whole_image)), local, abs(whole_image) / max(local, 1e-9)
+    mean = complex(closed.mean())
+    return Angle(float(np.angle(mean)), local, abs(mean) / max(local, 1e-9))
 
 
 def _mean(wave: Complex, side_px: int) -> Complex:

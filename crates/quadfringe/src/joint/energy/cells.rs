@@ -105,19 +105,18 @@ impl Cells {
         });
     }
 
-    /// Adds the interpolated correction to the phase of the pixels. Pixels that it moves too far lose their light.
-    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], modulation: &mut [f32]) {
+    /// Adds the interpolated correction to the phase of the pixels, and marks the pixels that it moves too far with 1.
+    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], moved: &mut Vec<u8>) {
         let stride = scene.grid.stride;
-        let pixels = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride)).enumerate();
-        pixels.for_each_init(Rows::default, |rows, (y, (phase, modulation))| {
+        moved.resize(phase.len(), 0);
+        let pixels = phase.par_chunks_mut(stride).zip(moved.par_chunks_mut(stride)).enumerate();
+        pixels.for_each_init(Rows::default, |rows, (y, (phase, moved))| {
             self.interpolate(&self.phase, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);
-            for ((phase, modulation), (sum, weight)) in phase.iter_mut().zip(modulation).zip(found) {
+            for ((phase, moved), (sum, weight)) in phase.iter_mut().zip(moved).zip(found) {
                 let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
                 *phase += correction;
-                if correction.abs() > MOVED_MAX_RAD {
-                    *modulation = 0.0;
-                }
+                *moved = u8::from(correction.abs() > MOVED_MAX_RAD);
             }
         });
     }

@@ -33,6 +33,7 @@ pub(super) struct Energy {
     cells: Cells,
     tiles: Vec<Found>,
     slots: Slots<Tile>,
+    moved: Vec<u8>,
 }
 
 /// What the shot is known to be.
@@ -45,12 +46,11 @@ pub(super) struct Prior {
 }
 
 impl Energy {
-    /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
-    /// one of the two is wrong, and the modulation becomes 0.
-    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &mut [f32]) {
+    /// Corrects the absolute phase of the lit pixels of a scene, in place.
+    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &[f32]) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, PhaseMap { phase, modulation }, factor);
-        let Self { cells, tiles, slots } = self;
+        let Self { cells, tiles, slots, moved } = self;
         let [rows, columns] = [cells.height, cells.width].map(Axis::new);
         let across = columns.origins.len();
         tiles.resize_with(rows.origins.len() * across, Found::default);
@@ -68,7 +68,12 @@ impl Energy {
         );
         let tiles = &*tiles;
         cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
-        cells.correct(scene, phase, modulation);
+        cells.correct(scene, phase, moved);
+    }
+
+    /// 1 for pixels where the minimum lies far from the phase at the start, so that one of the two is wrong.
+    pub fn moved(&self) -> &[u8] {
+        &self.moved
     }
 
     /// Variance of the phase by noise along row `y` of the scene, rad^2; 0 where there is no lit cell.
