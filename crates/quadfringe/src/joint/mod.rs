@@ -148,7 +148,7 @@ impl Joint {
         // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
         let (ratios, noise) = (self.ratios, self.coarse.noise);
         let scene = self.pyramid.full.scene(frame.full);
-        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.phase, &self.modulation);
+        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.phase, &mut self.modulation);
         // 8. Validity.
         self.validate(&frame, instants, options.quality_min, out);
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
@@ -260,8 +260,7 @@ impl Joint {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
-        let (orders, moved) = (&self.coarse.orders, self.energy.moved());
-        let evidence = validity::Evidence { map, pixel, orders, moved, limits };
+        let evidence = validity::Evidence { map, pixel, orders: &self.coarse.orders, limits };
         self.validity.run(&scene, evidence, quality);
         if let Some(instants) = instants {
             self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid);

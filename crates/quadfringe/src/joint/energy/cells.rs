@@ -105,18 +105,19 @@ impl Cells {
         });
     }
 
-    /// Adds the interpolated correction to the phase of the pixels, and marks the pixels that it moves too far with 1.
-    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], moved: &mut Vec<u8>) {
+    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
+    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], modulation: &mut [f32]) {
         let stride = scene.grid.stride;
-        moved.resize(phase.len(), 0);
-        let pixels = phase.par_chunks_mut(stride).zip(moved.par_chunks_mut(stride)).enumerate();
-        pixels.for_each_init(Rows::default, |rows, (y, (phase, moved))| {
+        let pixels = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride)).enumerate();
+        pixels.for_each_init(Rows::default, |rows, (y, (phase, modulation))| {
             self.interpolate(&self.phase, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);
-            for ((phase, moved), (sum, weight)) in phase.iter_mut().zip(moved).zip(found) {
+            for ((phase, modulation), (sum, weight)) in phase.iter_mut().zip(modulation).zip(found) {
                 let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
                 *phase += correction;
-                *moved = u8::from(correction.abs() > MOVED_MAX_RAD);
+                if correction.abs() > MOVED_MAX_RAD {
+                    *modulation = 0.0;
+                }
             }
         });
     }

@@ -33,7 +33,6 @@ pub(super) struct Energy {
     cells: Cells,
     tiles: Vec<Found>,
     slots: Slots<Tile>,
-    moved: Vec<u8>,
 }
 
 /// What the shot is known to be.
@@ -46,11 +45,13 @@ pub(super) struct Prior {
 }
 
 impl Energy {
-    /// Corrects the absolute phase of the lit pixels of a scene, in place.
-    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &[f32]) {
+    /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
+    /// one of the two is wrong. The modulation becomes 0 there, so that step 8 treats such pixels and their neighbours as it treats
+    /// the border of a shadow.
+    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &mut [f32]) {
         let factor = cell_px(scene.period_px);
         self.cells.average(scene, PhaseMap { phase, modulation }, factor);
-        let Self { cells, tiles, slots, moved } = self;
+        let Self { cells, tiles, slots } = self;
         let [rows, columns] = [cells.height, cells.width].map(Axis::new);
         let across = columns.origins.len();
         tiles.resize_with(rows.origins.len() * across, Found::default);
@@ -68,12 +69,7 @@ impl Energy {
         );
         let tiles = &*tiles;
         cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
-        cells.correct(scene, phase, moved);
-    }
-
-    /// 1 for pixels where the minimum lies far from the phase at the start, so that one of the two is wrong.
-    pub fn moved(&self) -> &[u8] {
-        &self.moved
+        cells.correct(scene, phase, modulation);
     }
 
     /// Variance of the phase by noise along row `y` of the scene, rad^2; 0 where there is no lit cell.

@@ -38,8 +38,6 @@ pub(super) struct Evidence<'a> {
     pub map: PhaseMap<'a>,
     pub pixel: PixelFit<'a>,
     pub orders: &'a Orders,
-    /// 1 for pixels that the energy has moved too far.
-    pub moved: &'a [u8],
     pub limits: Limits,
 }
 
@@ -100,7 +98,7 @@ impl Validity {
 
     /// Limits of every pixel by itself and with its eight neighbours.
     fn check_pixels(&mut self, scene: &Scene<'_>, evidence: Evidence<'_>, quality: &mut [f32]) {
-        let Evidence { map, pixel, orders, moved, limits } = evidence;
+        let Evidence { map, pixel, orders, limits } = evidence;
         let grid = scene.grid;
         self.components.resize(grid.pixels(), 0);
         self.consistent.resize(grid.pixels(), 0);
@@ -123,7 +121,6 @@ impl Validity {
                     lead: &lead[..grid.width],
                     support: &support.row(grid, y, maps)[..grid.width],
                     excluded: &scene.row(excluded, y)[..grid.width],
-                    moved: &scene.row(moved, y)[..grid.width],
                 };
                 let out = VerdictRow { quality, passed, consistent };
                 check_row(&known, limits, sums, out);
@@ -143,7 +140,6 @@ struct CheckRow<'a> {
     lead: &'a [f32],
     support: &'a [f32],
     excluded: &'a [u8],
-    moved: &'a [u8],
 }
 
 /// Verdicts on the pixels of a row.
@@ -154,7 +150,7 @@ struct VerdictRow<'a> {
 }
 
 /// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
-/// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small. The energy may have moved neither far.
+/// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: VerdictRow) {
     let width = known.modulation.len();
@@ -167,15 +163,13 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
     let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
-    let (lead, support) = (&known.lead[..width], &known.support[..width]);
-    let (excluded, moved) = (&known.excluded[..width], &known.moved[..width]);
+    let (lead, support, excluded) = (&known.lead[..width], &known.support[..width], &known.excluded[..width]);
     let (quality, passed, consistent) =
         (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
     let floors = [RESIDUAL_NOISES_MAX, PIXEL_RESIDUAL_NOISES_MAX]
         .map(|most| (most * limits.noise) * (most * limits.noise));
     for x in 0..width {
         let lit = modulation[x] > 0.0;
-        let stays = moved[x] == 0;
         let order_quality = lead[x] * support[x];
         let share = MISFIT_MAX * modulation[x];
         let [pixel_share, grown_share] =
@@ -184,8 +178,8 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
             && here[x] <= floors[1] + pixel_share * pixel_share;
         quality[x] = order_quality + hole_unless(lit);
         let certain = lit & (order_quality >= limits.quality_min);
-        passed[x] = u8::from(certain & agrees & stays & (excluded[x] == 0));
-        consistent[x] = u8::from(lit & stays & (here[x] <= floors[0] + grown_share * grown_share));
+        passed[x] = u8::from(certain & agrees & (excluded[x] == 0));
+        consistent[x] = u8::from(lit & (here[x] <= floors[0] + grown_share * grown_share));
     }
 }
 
@@ -202,7 +196,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_dim_pixel_is_judged_by_its_light_and_a_moved_one_does_not_pass() {
+    fn the_residual_of_a_dim_pixel_is_relative_to_its_light() {
         // The same residual, a quarter of the modulation, of a pixel as bright as its neighbours and of one in a narrow shadow.
         let (mut squared_residual, mut pixel_modulation) = ([0.0; 16], [0.4; 16]);
         (squared_residual[4], squared_residual[12], pixel_modulation[12]) = (0.01, 0.01, 0.1);
@@ -214,12 +208,11 @@ mod tests {
             lead: &[1.0; 16],
             support: &[1.0; 16],
             excluded: &[0; 16],
-            moved: &[0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0, 0],
         };
         let out = VerdictRow { quality: &mut quality, passed: &mut passed, consistent: &mut consistent };
         check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, &mut Vec::new(), out);
         for marks in [passed, consistent] {
-            assert!((0..16).all(|x| marks[x] == u8::from(x != 6 && x != 12)), "{marks:?}");
+            assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
         }
     }
 }
