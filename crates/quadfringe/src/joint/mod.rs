@@ -21,6 +21,7 @@
 mod agreement;
 mod cells;
 mod coarse;
+mod disjoint;
 mod energy;
 mod illumination;
 mod light;

@@ -1,6 +1,7 @@
 //! Step 8: connected components of the valid pixels, and their sizes.
 
 use crate::joint::cells::Grid;
+use crate::joint::disjoint::{root, unite};
 use crate::joint::params::tasks::GROUP;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -145,20 +146,6 @@ fn connect(above: Row<'_>, below: Row<'_>, parents: &mut [u32]) {
 /// Whether two neighbours with these phases lie on one surface.
 fn joined(a: f32, b: f32) -> bool {
     (a - b).abs() < PI
-}
-
-fn root(parents: &mut [u32], mut i: u32) -> u32 {
-    while parents[i as usize] != i {
-        let next = parents[i as usize];
-        parents[i as usize] = parents[next as usize];
-        i = next;
-    }
-    i
-}
-
-fn unite(parents: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parents, a), root(parents, b));
-    parents[a.max(b) as usize] = a.min(b);
 }
 
 #[cfg(test)]
