@@ -1,34 +1,55 @@
 """Decode the real captures in forms that other benches could have made of them, and count refusals and right orders.
 
-    python evaluation/captures.py [--data FOLDER] [--response known|auto|linear] [--json FILE]
+    python evaluation/captures.py [--data FOLDER] [--response known|auto|linear] [--offsets even|odd] [--only WORD ...]
+                                  [--draw FILE] [--json FILE]
 
 Every capture gives shots at 12 offsets of the fringes, and at every fourth offset the variants of
 quadfringe.evaluation._variants. The response is estimated from the 12 images of the first frequency (known), or from
-the shot. A refused shot has no right pixel. Right order: |phase - truth| < pi.
+the shot. A refused shot has no right pixel. Right order: |phase - truth| < pi. Tune on even offsets, report odd ones.
+The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
+those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
 """
 
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 import quadfringe as qf
 from quadfringe.calibration.response import estimate_from_files
-from quadfringe.errors import DecodeError
+from quadfringe.errors import DecodeError, DecodeWarning
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation._variants import OFFSETS, VARIANTS, stepped
 from quadfringe.files import figures_text
 
 EVERY = 4  # offsets between the shots of which variants are made
+CHOSEN = {"all": OFFSETS, "even": OFFSETS[::2], "odd": OFFSETS[1::2]}
+WORST = 10
+TILE = (480, 360)
+COLUMNS = 5
 
 
-def shots(data: Path, name: str) -> Iterator[tuple[str, scoring.Scene]]:
-    for offset in OFFSETS:
+@dataclass(frozen=True)
+class Judged:
+    """A decoded shot: its name, the reason of a refusal, the score, and its picture."""
+
+    label: str
+    reason: str
+    score: scoring.Score
+    picture: NDArray[np.uint8]
+
+
+def shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
+    for offset in offsets:
         scene = stepped(data, name, offset)
         for label, variant in VARIANTS.items():
             if label == "as captured" or offset % EVERY == 0:
@@ -41,44 +62,81 @@ def response_of(data: Path, name: str, choice: str) -> Any:
     return estimate_from_files(scenes.step_files(data, name), scenes.STEPS).calibration
 
 
-def judged(scene: scoring.Scene, response: Any) -> tuple[str, scoring.Score]:
-    """Give the reason of a refusal, which is empty for a shape, and the score."""
+def judged(label: str, scene: scoring.Scene, response: Any) -> Judged:
+    reason = ""
     try:
-        return "", scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
+        phase_rad = scenes.shape_of(scene, response=response).phase_rad
     except DecodeError as error:
-        return str(error), scoring.score(scene, np.full(scene.red.shape, np.nan, np.float32))
+        reason, phase_rad = str(error), np.full(scene.red.shape, np.nan, np.float32)
+    return Judged(label, reason, scoring.score(scene, phase_rad), drawn(label, scene, phase_rad))
 
 
-def summary(name: str, scores: list[scoring.Score], refused: int) -> dict[str, float]:
-    right = [score.right_percent for score in scores]
-    returned = [score.right_of_returned_percent for score in scores if score.returned_percent > 0]
-    found = {
-        "refused_percent": 100 * refused / len(scores),
+def drawn(label: str, scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.uint8]:
+    """Draw what is right, wrong and missing over the red image, in blue, green, red order."""
+    picture = np.repeat((scene.red * (120 / max(scene.red.max(), 1)))[:, :, None].astype(np.uint8), 3, axis=2)
+    right = np.abs(phase_rad - scene.phase_rad) < np.pi
+    returned = np.isfinite(phase_rad)
+    picture[scene.scored & right, 1] += 110
+    picture[scene.scored & ~returned] = (255, 80, 0)
+    picture[scene.scored & returned & ~right] = (0, 0, 255)
+    tile = cv2.resize(picture, TILE, interpolation=cv2.INTER_AREA)
+    cv2.putText(tile, label, (6, 18), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+    return np.asarray(tile, np.uint8)
+
+
+def sheet(found: list[Judged]) -> NDArray[np.uint8]:
+    """Arrange the worst shots by right pixels of the object, then by right pixels of those returned."""
+    by_object = sorted(found, key=lambda one: one.score.right_percent)[:WORST]
+    by_returned = sorted(found, key=lambda one: one.score.right_of_returned_percent)[:WORST]
+    tiles = [one.picture for one in by_object + by_returned]
+    tiles += [np.zeros_like(tiles[0])] * (-len(tiles) % COLUMNS)
+    return np.vstack([np.hstack(tiles[i : i + COLUMNS]) for i in range(0, len(tiles), COLUMNS)])
+
+
+def summary(name: str, found: list[Judged]) -> dict[str, float]:
+    right = [one.score.right_percent for one in found]
+    returned = [one.score.right_of_returned_percent for one in found if one.score.returned_percent > 0]
+    figures = {
+        "refused_percent": 100 * sum(bool(one.reason) for one in found) / len(found),
         "right_mean_percent": float(np.mean(right)),
         "right_worst_percent": min(right),
         "right_of_returned_mean_percent": float(np.mean(returned)),
         "right_of_returned_worst_percent": min(returned),
     }
-    print(f"{name}: {len(scores)} shots, " + ", ".join(f"{key} {value:.2f}" for key, value in found.items()))
-    return {f"{name}_{key}": value for key, value in found.items()}
+    print(f"{name}: {len(found)} shots, " + ", ".join(f"{key} {value:.2f}" for key, value in figures.items()))
+    return {f"{name}_{key}": value for key, value in figures.items()}
 
 
-def main() -> None:
+def options_of() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--data", type=Path, default=scenes.data_folder())
     parser.add_argument("--response", choices=["known", "auto", "linear"], default="known")
+    parser.add_argument("--offsets", choices=CHOSEN, default="all", help="offsets of the fringes")
+    parser.add_argument("--only", nargs="+", metavar="WORD", help="shots whose name contains one of these words")
+    parser.add_argument("--draw", type=Path, metavar="FILE", help="draw the worst shots here")
     parser.add_argument("--json", type=Path, help="write the figures here")
-    options = parser.parse_args()
+    return parser.parse_args()
+
+
+def main() -> None:
+    options = options_of()
+    warnings.simplefilter("ignore", DecodeWarning)
     figures: dict[str, float] = {}
+    every: list[Judged] = []
     print(f"quadfringe {qf.__version__}\n{'':42}{'right %':>9}{'of returned %':>15}")
     for name in scenes.CAPTURES:
-        response, scores, refused = response_of(options.data, name, options.response), [], 0
-        for label, scene in shots(options.data, name):
-            reason, score = judged(scene, response)
-            scores.append(score)
-            refused += bool(reason)
-            print(f"{label:42}{score.right_percent:9.2f}{score.right_of_returned_percent:15.3f}  {reason}", flush=True)
-        figures |= summary(name, scores, refused)
+        response, found = response_of(options.data, name, options.response), []
+        for label, scene in shots(options.data, name, CHOSEN[options.offsets]):
+            if options.only and not any(word in label for word in options.only):
+                continue
+            one = judged(label, scene, response)
+            found.append(one)
+            score = f"{one.score.right_percent:9.2f}{one.score.right_of_returned_percent:15.3f}"
+            print(f"{label:42}{score}  {one.reason}", flush=True)
+        figures |= summary(name, found) if found else {}
+        every += found
+    if options.draw and every:
+        cv2.imwrite(str(options.draw), sheet(every))
     if options.json:
         options.json.write_text(figures_text(figures))
 

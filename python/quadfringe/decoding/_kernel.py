@@ -59,10 +59,14 @@ class KernelDecoder:
         same = conditioning(plan.calibration, response) == conditioning(plan.calibration, self.plan.response)
         return KernelDecoder(self._size, self._full_scale, plan, "shots", self._idle if same else None)
 
+    def with_plan(self, plan: Plan) -> KernelDecoder:
+        """Give a decoder of images of the same size and full scale."""
+        return KernelDecoder(self._size, self._full_scale, plan)
+
     def with_method(self, method: str) -> KernelDecoder:
         """Give a decoder of the same plan by another method."""
         decode = self.plan.decode.model_copy(update={"method": method})
-        return KernelDecoder(self._size, self._full_scale, replace(self.plan, decode=decode))
+        return self.with_plan(replace(self.plan, decode=decode))
 
     def for_rows(self, first: int, count: int) -> KernelDecoder:
         """Give a decoder of the same plan for some rows of the images."""

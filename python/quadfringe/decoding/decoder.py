@@ -9,10 +9,12 @@ from threading import Lock
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
+from quadfringe.decoding.black import below_black, too_black
+from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import wrong_bits
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
-from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened
+from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, response_in_place_of
 from quadfringe.decoding.verdict import judge
 from quadfringe.errors import DecodeWarning, InputError
 from quadfringe.io.images import full_scale
@@ -48,6 +50,7 @@ class Decoder:
         self.plan = plan
         self._kernel = KernelDecoder(self._size, self._full_scale, plan)
         self._known = stated_response(plan.response, plan.calibration) != "auto"
+        self._other: KernelDecoder | None = None  # for shots that contradict the stated response
         self._tried = 0
         self._estimating = Lock()
 
@@ -64,6 +67,7 @@ class Decoder:
     def decode(self, shot: AnyShot) -> Shape:
         """Give the shape; raises `DecodeError` when its orders cannot be trusted, naming the likely cause.
 
+        A shot that is darker than the black of the stated response is decoded with the response that it shows itself.
         With a calibration, a shape that it contradicts is refused too, and depths outside `depth_range_mm` are no data.
         What is doubtful and returned stands in `Shape.warnings`, and is warned of as `DecodeWarning`.
         A shot whose orders are doubtful is decoded with channels exchanged too, in part or as a whole, to name them.
@@ -74,12 +78,23 @@ class Decoder:
             with self._estimating:
                 if not self._known:
                     return self._decode_and_hold(shot)
-        return _judged(self._kernel, self._kernel.shape(shot), shot)
+        kernel, doubt = self._fitting(shot)
+        return _judged(kernel, kernel.shape(shot), shot, doubt)
 
     def decode_without_verdict(self, shot: AnyShot) -> Shape:
         """Give the shape, wrong orders and all; a response that is still unknown is estimated and not held."""
         self._check(shot)
-        return self._kernel.shape(shot) if self._known else decode_straightened(self._kernel, shot)[1]
+        return self._fitting(shot)[0].shape(shot) if self._known else decode_straightened(self._kernel, shot)[1]
+
+    def _fitting(self, shot: AnyShot) -> tuple[KernelDecoder, Cause | None]:
+        """Give the decoder with the stated response, or with an estimate and a doubt if the shot contradicts it."""
+        doubt = _doubt(self._kernel, shot)
+        if doubt is None:
+            return self._kernel, None
+        with self._estimating:
+            if self._other is None or _doubt(self._other, shot):
+                self._other = response_in_place_of(self._kernel, shot)
+            return self._other, doubt
 
     def _decode_and_hold(self, shot: AnyShot) -> Shape:
         kernel, shape = decode_straightened(self._kernel, shot)
@@ -100,17 +115,21 @@ class Decoder:
             )
 
 
-def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot) -> Shape:
+def _doubt(kernel: KernelDecoder, shot: AnyShot) -> Cause | None:
+    return too_black(below_black(shot, kernel.response, kernel.plan.calibration))
+
+
+def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot, doubt: Cause | None = None) -> Shape:
     """Refuse what cannot be trusted, take depths outside the stated range out, and note what is doubtful."""
     judge(shape, shot, kernel)
     doubts = implausible(shape)
-    if fatal := next((doubt for doubt in doubts if doubt.fatal), None):
+    if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
-    bits = wrong_bits(shot)
-    doubts = [*doubts, *([bits] if bits else []), *within_depths(shape, kernel.plan.decode.depth_range_mm)]
+    found = [cause for cause in (doubt, wrong_bits(shot)) if cause]
+    doubts = [*doubts, *found, *within_depths(shape, kernel.plan.decode.depth_range_mm)]
     if not doubts:
         return shape
-    words = [f"{doubt.found}; {doubt.fix}" for doubt in doubts]
+    words = [f"{cause.found}; {cause.fix}" for cause in doubts]
     for text in words:
         warnings.warn(text, DecodeWarning, stacklevel=4)
     return replace(shape, config={**shape.config, "warnings": words})

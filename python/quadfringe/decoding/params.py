@@ -97,3 +97,20 @@ SATURATED = 0.1
 HARMONIC = 0.08
 # Relative amplitude of the fringes of another channel from which a refused shot is said to have crosstalk.
 STRAY = 0.15
+
+# --- Black of a stated response: `python evaluation/captures.py` holds captures with a tenth of the light against the
+# --- response of their full light. They have a channel below black in 0.5 or more of the places, the others in 0.001.
+
+# Side of the squares over which pixels are averaged, px. A larger one blurs fine fringes, a smaller one leaves noise.
+SQUARE_PX = 4
+# A place is bright from this share of the bright light, which is this quantile of the brightest channels. A larger
+# share leaves dark objects out; a smaller one counts shadows, which may be darker than any fringe.
+BRIGHT_SHARE, BRIGHT_QUANTILE = 0.25, 0.99
+# Share of black, and number of standard deviations of the noise, by which a channel must lie below black. Smaller
+# numbers call noise a contradiction, larger ones keep a black that hides a part of the dark fringes.
+BELOW_BLACK, BELOW_NOISES = 0.25, 3.0
+# Share of the bright places from which the response is contradicted. A smaller share lets a few shadows decide, a
+# larger one needs more dark fringes.
+BELOW_SHARE = 0.05
+# Median of the absolute value of a normal deviation, in standard deviations. Follows from the distribution.
+MEDIAN_OF_NORMAL = 0.6745

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 from quadfringe.config import Response
@@ -12,7 +13,7 @@ from quadfringe.decoding.stages import response_of_shot
 from quadfringe.decoding.verdict import order_margin
 from quadfringe.errors import InputError
 
-__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response"]
+__all__ = ["SHOTS_TRIED", "decode_straightened", "estimate_response", "response_in_place_of"]
 
 # Rounds of decoding and estimating. Each takes a part of the distortion out of the phase: on faces and steps of the
 # virtual bench, gammas of 1.2 to 2.6 settle in one to three rounds. The limit bounds the time of a shot whose estimates
@@ -77,6 +78,15 @@ def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[Kern
     straight = as_captured.with_response(found)
     shape = straight.shape(shot)
     return (straight, shape) if order_margin(shape) > order_margin(first) else (linear, first)
+
+
+def response_in_place_of(stated: KernelDecoder, shot: AnyShot) -> KernelDecoder:
+    """Give a decoder with the response that a shot shows, in place of the one that plan or calibration state."""
+    plan, calibration = stated.plan, stated.plan.calibration
+    if calibration is not None:
+        plan = replace(plan, calibration=calibration.model_copy(update={"response": None}))
+    found = decode_straightened(stated.with_plan(replace(plan, response="linear")), shot)[0].response
+    return stated.with_response(found)
 
 
 def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | Literal["linear"]:

@@ -87,7 +87,7 @@ impl Orders {
             let lit = nodes.matching.is_lit(one) && nodes.matching.is_lit(other);
             lit.then(|| nodes.absolute(other) - nodes.absolute(one) - way())
         });
-        surfaces.settle(&mut self.matching.order);
+        surfaces.settle(shared_nodes(scene), &mut self.matching.order);
         self.surfaces = surfaces;
     }
 
@@ -105,10 +105,7 @@ impl Orders {
     pub fn wrong_order_probability(&self, scene: &Scene<'_>, out: &mut Vec<f32>) {
         let grid = scene.grid;
         let lit = (0..grid.rows).flat_map(|row| self.verdicts(scene, row)).filter(|verdict| verdict.lit);
-        // The evidence of this number of nodes in a row comes from the same window of the local fit. It is the width of
-        // a window with equal weights that averages noise as much as the Gaussian window does.
-        let shared = scene.cells(2.0 * PI.sqrt() * local_fit::WINDOW);
-        let model = WrongOrderModel::new(lit, jump_nodes(scene) as f32, shared);
+        let model = WrongOrderModel::new(lit, jump_nodes(scene) as f32, shared_nodes(scene));
         out.resize(grid.rows * grid.columns, 0.0);
         out.par_chunks_mut(grid.columns).enumerate().for_each(|(row, out)| {
             let nodes = out.iter_mut().zip(self.verdicts(scene, row));
@@ -153,6 +150,12 @@ impl Orders {
 /// Number of nodes in a row whose contradicting evidence costs as much as a change of surface (J11).
 fn jump_nodes(scene: &Scene<'_>) -> f64 {
     (JUMP_PERIODS * scene.period_px / scene.grid.step as f64).clamp(JUMP_NODES_MIN, JUMP_NODES_MAX)
+}
+
+/// Number of nodes in a row whose evidence comes from the same window of the local fit. It is the width of a window with equal weights
+/// that averages noise as much as the Gaussian window does.
+fn shared_nodes(scene: &Scene<'_>) -> f32 {
+    scene.cells(2.0 * PI.sqrt() * local_fit::WINDOW).max(1.0)
 }
 
 #[cfg(test)]

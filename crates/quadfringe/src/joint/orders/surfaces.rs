@@ -51,9 +51,10 @@ struct Border {
 }
 
 impl Surfaces {
-    /// Gives the nodes of doubtful surfaces the order with which they continue a surface that is not doubtful.
-    pub fn settle(&mut self, order: &mut [i16]) {
-        let shifts = self.shifts();
+    /// Gives the nodes of doubtful surfaces the order with which they continue a surface that is not doubtful. `shared` nodes in a row
+    /// take their evidence from the same window.
+    pub fn settle(&mut self, shared: f32, order: &mut [i16]) {
+        let shifts = self.shifts(shared);
         if shifts.is_empty() {
             return;
         }
@@ -98,22 +99,24 @@ impl Surfaces {
         }
     }
 
-    /// Whether a step of whole turns at the border of a surface is more likely a wrong order of it.
+    /// Whether a step of whole turns at the border of a surface means that its order is wrong, rather than another surface.
     fn is_doubtful(&self, surface: u32) -> bool {
         let wrong = self.sums[surface as usize] / self.sizes[surface as usize] as f32;
         BORDER_ODDS * wrong > 1.0 - wrong
     }
 
     /// Doubtful surfaces with the turns that they lack, by their number. At least half of the border with the other surface must lack
-    /// this number of turns; of several other surfaces the one with the longest border decides.
-    fn shifts(&mut self) -> Vec<Shift> {
+    /// this number of turns, and this part must be longer than a window; of several other surfaces the longest border decides.
+    fn shifts(&mut self, shared: f32) -> Vec<Shift> {
+        let is_clear =
+            |found: &Lack, border: &[Border]| 2 * found.count >= border.len() && found.count as f32 >= shared;
         let mut borders = self.borders();
         borders.sort_unstable();
         let mut shifts = Vec::new();
         for surface in borders.chunk_by(|a, b| a.surface == b.surface) {
             let longest = surface
                 .chunk_by(|a, b| a.other == b.other)
-                .filter_map(|border| most_frequent(border).filter(|found| 2 * found.count >= border.len()))
+                .filter_map(|border| most_frequent(border).filter(|found| is_clear(found, border)))
                 .max_by_key(|found| found.count);
             shifts.extend(longest.map(|found| Shift { surface: surface[0].surface, turns: found.lacks }));
         }
@@ -157,4 +160,46 @@ fn most_frequent(border: &[Border]) -> Option<Lack> {
     let equal = border.chunk_by(|a, b| a.lacks == b.lacks);
     let found = equal.filter_map(|part| part[0].lacks.map(|lacks| Lack { lacks, count: part.len() }));
     found.max_by_key(|found| found.count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A plane of 12 x 20 nodes with a strip along its left side, whose phase is off by `step` rad and whose orders are wrong with
+    /// the probability `wrong`; `shared` nodes share a window. Gives the turns that the strip and the plane gain.
+    fn gained(step: f32, wrong: f32, shared: f32) -> [i16; 2] {
+        let grid = Grid::new([12 * 4, 20 * 4], 4.0);
+        let in_strip = |[_, column]: [usize; 2]| column < 4;
+        let mut surfaces = Surfaces::default();
+        let node = |i: usize| [i / grid.columns, i % grid.columns];
+        let nodes = grid.rows * grid.columns;
+        surfaces.wrong = (0..nodes).map(|i| if in_strip(node(i)) { wrong } else { 1e-4 }).collect();
+        let off = |place: [usize; 2]| if in_strip(place) { step } else { 0.0 };
+        surfaces.find(&grid, |from, to| Some(off(to) - off(from)));
+        let mut order = vec![7; nodes];
+        surfaces.settle(shared, &mut order);
+        let strip = (0..nodes).filter(|&i| in_strip(node(i)));
+        assert!(strip.clone().all(|i| order[i] == order[0]));
+        assert!((0..nodes).filter(|&i| !in_strip(node(i))).all(|i| order[i] == order[nodes - 1]));
+        [order[0] - 7, order[nodes - 1] - 7]
+    }
+
+    #[test]
+    fn a_doubtful_strip_continues_its_neighbour() {
+        assert_eq!(gained(-TAU + 0.1, 0.2, 5.0), [1, 0]);
+        assert_eq!(gained(3.0 * TAU - 0.1, 0.2, 5.0), [-3, 0]);
+    }
+
+    #[test]
+    fn a_certain_strip_and_one_with_another_step_keep_their_order() {
+        assert_eq!(gained(-TAU + 0.1, 0.01, 5.0), [0, 0]);
+        assert_eq!(gained(-TAU + 1.0, 0.2, 5.0), [0, 0]);
+        assert_eq!(gained(0.1, 0.2, 5.0), [0, 0]);
+    }
+
+    #[test]
+    fn a_border_within_one_window_is_no_evidence() {
+        assert_eq!(gained(-TAU + 0.1, 0.2, 13.0), [0, 0]);
+    }
 }
