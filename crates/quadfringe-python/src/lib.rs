@@ -14,6 +14,7 @@ mod projector;
 mod published_stages;
 mod render;
 mod stages;
+mod workers;
 
 use pyo3::prelude::*;
 

@@ -64,7 +64,7 @@ def pixels_declared(data: bytes) -> int | None:
             return None
     except (struct.error, IndexError):
         return None
-    return abs(width * height)
+    return int(abs(width * height))
 
 
 def _tiff_pages(data: bytes) -> Iterator[int]:
