@@ -3,7 +3,7 @@
 //! A fork copies memory but no threads: work that a child gave to the threads of its parent would never end. Each process
 //! therefore has workers of its own.
 
-use pyo3::exceptions::PyRuntimeError;
+use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::panic::resume_unwind;
@@ -17,6 +17,9 @@ static SHARED: Workers = Workers { threads: None, pool: Mutex::new(None) };
 
 /// The process whose shared workers are rayon's own: the first that worked.
 static FIRST: OnceLock<u32> = OnceLock::new();
+
+/// Most threads of a decoder. Twice those of the largest machines of today; many more exhaust the process.
+pub const THREADS_MAX: usize = 1024;
 
 /// How often a caller that waits looks for signals.
 const SIGNALS_EVERY: Duration = Duration::from_millis(100);
@@ -36,6 +39,10 @@ struct Pool {
 impl Workers {
     /// Starts `threads` threads, or takes those that everything shares.
     pub fn start(threads: Option<usize>) -> PyResult<Self> {
+        if let Some(count) = threads.filter(|count| !(1..=THREADS_MAX).contains(count)) {
+            let message = format!("threads: expected 1 to {THREADS_MAX}, got {count}");
+            return Err(PyValueError::new_err(message));
+        }
         let workers = Self { threads, pool: Mutex::default() };
         if threads.is_some() {
             workers.pool()?;
