@@ -1,4 +1,4 @@
-"""Who may open the live page: its own pages, under its own names, and from other machines only with the token."""
+"""Who may open the live page: itself, under its names, and other machines only with the token."""
 
 from __future__ import annotations
 
@@ -155,7 +155,7 @@ def test_other_machines_need_the_token(guarded: Viewer) -> None:
     assert answer(guarded, "/", Host="evil.example", Cookie=cookie).status == 403
 
 
-def test_every_viewer_has_its_own_token(guarded: Viewer) -> None:
+def test_every_viewer_has_another_token(guarded: Viewer) -> None:
     with Viewer("0.0.0.0", port=8330) as other:
         assert other.url.partition("token=")[2] != guarded.url.partition("token=")[2]
 

@@ -102,13 +102,14 @@ def test_a_period_beyond_the_image_is_refused() -> None:
 
 
 PEAK = """
-import resource, sys
+import re, sys
+from pathlib import Path
 import numpy as np
 import quadfringe as qf
 from quadfringe import _core
 
-def used():
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
+def used():  # getrusage would also count what the parent used
+    return int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1]) * 1024
 
 work, rows, columns = sys.argv[1], 2000, 1824
 before = used()
@@ -132,4 +133,4 @@ print((used() - before) / (rows * columns))
 def test_the_estimates_of_memory_hold(work: str) -> None:
     done = subprocess.run([sys.executable, "-c", PEAK, work], capture_output=True, text=True, check=True)
     estimate = (BYTES_PER_PX | {"render": BENCH_BYTES_PER_PX["camera"]})[work]
-    assert 0.35 * estimate < float(done.stdout) < 1.2 * estimate
+    assert 0.5 * estimate < float(done.stdout) < 1.2 * estimate

@@ -1,7 +1,7 @@
 //! The threads that the kernel works on, and how Python's Ctrl-C reaches a caller that waits for them.
 //!
 //! A fork copies memory but no threads: work that a child gave to the threads of its parent would never end. Each process
-//! therefore has workers of its own.
+//! therefore starts workers.
 
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;

@@ -2,7 +2,7 @@
 
 viser (1.1) offers no hook for requests. It serves page and WebSocket by one call of `websockets.asyncio.server.serve`,
 whose public arguments are all that a guard needs, so this module stands in for that function while viser starts. The
-alternative, a proxy, would copy every cloud once more and leave viser's own port open beside it. A viser that starts
+alternative, a proxy, would copy every cloud once more and leave viser's own port open. A viser that starts
 in another way is stopped, and an error says so.
 """
 
