@@ -71,45 +71,48 @@ def live(
     Only this machine can open the page, unless --host says otherwise; then its address contains a token.
     """
     from contextlib import ExitStack
-    from functools import partial
 
     from quadfringe.recording import Recorder
     from quadfringe.scanner import open_system
     from quadfringe.view.viewer import Viewer
 
     with ExitStack() as stack:
+        # Before the scanner, so that a wrong address is reported before a camera is taken.
+        viewer = Viewer(
+            host,
+            port,
+            stride=view_stride,
+            colouring=colour.value,
+            clouds_per_s=clouds_per_s,
+            allow_hosts=allow_host or (),
+        )
+        stack.enter_context(viewer)
         scanner = stack.enter_context(open_system(system))
-        first = partial(Viewer, stride=view_stride, clouds_per_s=clouds_per_s, colouring=colour.value)
-        viewer = stack.enter_context(first(host, port, allow_hosts=allow_host or ()))
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))
-        say(f"live at {viewer.url}; stop with Ctrl-C")
         with stoppable():
             _follow(scanner, viewer, recorder, shots)
-            if shots is None:
-                say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
-                _sleep()
+    _report(viewer, recorder)
+
+
+def _report(viewer: Viewer, recorder: Recorder | None) -> None:
     if viewer.fault is not None:
         caution(viewer.fault)
     if recorder is not None:
-        _report(recorder)
-
-
-def _report(recorder: Recorder) -> None:
-    done = recorder.statistics()
-    files = ", ".join(str(path) for path in done.files) or "nothing"
-    say(f"{files}: {done.written} shots recorded, {done.refused} refused by the disk")
+        done = recorder.statistics()
+        files = ", ".join(str(path) for path in done.files) or "nothing"
+        say(f"{files}: {done.written} shots recorded, {done.refused} refused by the disk")
 
 
 def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: int | None) -> None:
+    from threading import Event
+
+    say(f"live at {viewer.url}; stop with Ctrl-C")
     columns = scanner.projector_width_px
     taps = {} if recorder is None else {"record": recorder.write}
     with scanner.stream(shots, taps=taps, resume=True) as stream:
         viewer.follow(stream, recorder.statistics if recorder else None, columns)
-
-
-def _sleep() -> None:
-    from threading import Event
-
-    Event().wait()
+    if shots is None:
+        say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
+        Event().wait()

@@ -59,8 +59,7 @@ def serve_page(host: str, port: int, allow_hosts: Iterable[str]) -> ServedPage:
     Raises `InputError` for a host or port that cannot be served, and `MissingExtraError` without the extra `view` or
     when the installed viser cannot be guarded.
     """
-    require("viser", "view")
-    address = listen(host, port)
+    address = listen(host, port)  # before viser is imported, which takes a second
     token = None if address.is_loopback else secrets.token_hex(TOKEN_BYTES)
     guard = Guard(address.names(allow_hosts), token, cookie=f"quadfringe-live-{address.port}")
     try:
