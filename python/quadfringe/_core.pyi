@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "THREADS_MAX",
     "Bench",
     "Cast",
     "Decoder",
@@ -59,6 +60,7 @@ __all__ = [
 ]
 
 __profile__: Final[str]
+THREADS_MAX: Final[int]
 __version__: Final[str]
 
 _Vector2 = tuple[float, float]

@@ -3,6 +3,7 @@
 use crate::arrays::{BAYER_IMAGES, CHANNELS, expected, value_error};
 use crate::device::{Device, axis_named, layout_named, unknown};
 use crate::render::render_options;
+use crate::workers::detached;
 use ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -58,21 +59,21 @@ impl Bench {
     #[pyo3(signature = (surface, *, time_s = 0.0))]
     fn cast(&self, py: Python<'_>, surface: &str, time_s: f64) -> PyResult<Cast> {
         let surface = scene(surface, time_s).map_err(value_error)?;
-        Ok(self.cast_surface(py, surface.as_ref()))
+        self.cast_surface(py, surface.as_ref())
     }
 
     /// Cast one ray through each pixel onto the peaks function over the plane z.
     #[pyo3(signature = (*, z_mm, scale_mm))]
     fn cast_peaks(&self, py: Python<'_>, z_mm: f64, scale_mm: f64) -> PyResult<Cast> {
         let surface = Peaks::new(z_mm, scale_mm).map_err(value_error)?;
-        Ok(self.cast_surface(py, &surface))
+        self.cast_surface(py, &surface)
     }
 
     /// Cast one ray through each pixel onto a plane through a point. The normal of the plane points to the camera.
     #[pyo3(signature = (*, point_mm, normal))]
     fn cast_plane(&self, py: Python<'_>, point_mm: [f64; 3], normal: [f64; 3]) -> PyResult<Cast> {
         let surface = Plane::new(point_mm, normal).map_err(value_error)?;
-        Ok(self.cast_surface(py, &surface))
+        self.cast_surface(py, &surface)
     }
 
     /// Cast one ray through each pixel onto a height map.
@@ -87,7 +88,7 @@ impl Bench {
     ) -> PyResult<Cast> {
         let heights = expected::<f64, 2>("heights_mm", heights_mm)?.to_owned_array();
         let surface = HeightMap::new(heights, origin_mm, pitch_mm, z_mm, Interpolation::default());
-        Ok(self.cast_surface(py, &surface.map_err(value_error)?))
+        self.cast_surface(py, &surface.map_err(value_error)?)
     }
 
     /// Cast one ray through each pixel onto a plate between two corners (x, y) on the plane z = 0 of a posed board.
@@ -101,7 +102,7 @@ impl Bench {
     ) -> PyResult<Cast> {
         let pose = Pose::new(rotation, translation_mm).map_err(value_error)?;
         let plate = Posed::plate(low_mm, high_mm, pose).map_err(value_error)?;
-        Ok(self.cast_surface(py, &plate))
+        self.cast_surface(py, &plate)
     }
 
     /// Albedo that the camera sees of a print on the plane z = 0 of a posed board, (H, W, 4 or 8) float32.
@@ -121,7 +122,7 @@ impl Bench {
         let coverage = expected::<f32, 2>("coverage", coverage)?.to_owned_array();
         let pose = Pose::new(rotation, translation_mm).map_err(value_error)?;
         let print = Print { coverage, pitch_mm, origin_mm, paper, ink, pose };
-        let albedo = py.detach(|| self.0.printed(&print)).map_err(value_error)?;
+        let albedo = detached(py, || self.0.printed(&print))?.map_err(value_error)?;
         Ok(albedo.into_pyarray(py))
     }
 
@@ -176,8 +177,8 @@ impl Bench {
 }
 
 impl Bench {
-    fn cast_surface(&self, py: Python<'_>, surface: &dyn Surface) -> Cast {
-        Cast(py.detach(|| self.0.cast(surface)))
+    fn cast_surface(&self, py: Python<'_>, surface: &dyn Surface) -> PyResult<Cast> {
+        detached(py, || self.0.cast(surface)).map(Cast)
     }
 
     fn render_lights<'py>(
@@ -188,7 +189,7 @@ impl Bench {
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let options = render_options(options)?;
-        let planes = py.detach(|| self.0.render(&cast.0, lights, &options)).map_err(value_error)?;
+        let planes = detached(py, || self.0.render(&cast.0, lights, &options))?.map_err(value_error)?;
         match planes {
             Planes::U8(planes) => named(py, CHANNELS, planes),
             Planes::U16(planes) => named(py, CHANNELS, planes),
@@ -219,25 +220,25 @@ pub struct Cast(rig::Cast);
 #[pymethods]
 impl Cast {
     /// Points in the camera frame, (H, W, 3) float32 mm.
-    fn xyz_mm<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f32>> {
-        py.detach(|| self.0.xyz_mm()).into_pyarray(py)
+    fn xyz_mm<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f32>>> {
+        Ok(detached(py, || self.0.xyz_mm())?.into_pyarray(py))
     }
 
     /// Projector column that lights each pixel, (H, W) float32.
     #[pyo3(signature = (*, infrared = false))]
-    fn column_px<'py>(&self, py: Python<'py>, infrared: bool) -> Bound<'py, PyArray2<f32>> {
+    fn column_px<'py>(&self, py: Python<'py>, infrared: bool) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let projector = if infrared { Projector::Infrared } else { Projector::Visible };
-        py.detach(|| self.0.column_px(projector)).into_pyarray(py)
+        Ok(detached(py, || self.0.column_px(projector))?.into_pyarray(py))
     }
 
     /// Pixels that see a surface which at least one projector does not light, (H, W) bool.
-    fn shadow<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<bool>> {
-        py.detach(|| self.0.shadow()).into_pyarray(py)
+    fn shadow<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        Ok(detached(py, || self.0.shadow())?.into_pyarray(py))
     }
 
     /// Distance to the nearest edge of depth, light or surface, (H, W) float32 pixels.
-    fn edge_distance_px<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f32>> {
-        py.detach(|| self.0.edge_distance_px()).into_pyarray(py)
+    fn edge_distance_px<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
+        Ok(detached(py, || self.0.edge_distance_px())?.into_pyarray(py))
     }
 }
 

@@ -5,22 +5,42 @@ use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
 use crate::device::Device;
 use crate::memory::Memory;
 use crate::plan::{Choices, Geometry, planned};
-use pyo3::exceptions::PyValueError;
+use crate::workers::{Workers, detached, interruptible};
+use numpy::ndarray::{ArrayView2, Ix2};
+use numpy::{Element, PyReadonlyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::Sample;
-use quadfringe::{BayerPattern, Decoded, Encoding, Shot};
-use rayon::{ThreadPool, ThreadPoolBuilder};
+use quadfringe::{BayerPattern, Decoded, Encoding, Method, Shot};
+use rayon::ThreadPool;
 use std::sync::{Arc, Mutex, PoisonError};
+
+/// Shots of so many pixels take a tenth of a second and more on two cores, so that their decoding answers to signals. This
+/// costs a copy of the images, about 1 ms.
+const LONG_PX: LongPx = LongPx { joint: 1 << 18, published: 1 << 23 };
+
+struct LongPx {
+    joint: usize,
+    published: usize,
+}
+
+fn is_long(method: &Method, [rows, columns]: [usize; 2]) -> bool {
+    let long = if matches!(method, Method::Published(_)) { LONG_PX.published } else { LONG_PX.joint };
+    rows * columns >= long
+}
 
 /// Decodes shots of one size. All settings are checked when it is made.
 #[pyclass(frozen, module = "quadfringe._core")]
-pub struct Decoder {
+pub struct Decoder(Arc<Inner>);
+
+/// What a decoder shares with work that goes on after a signal.
+struct Inner {
     kernel: Mutex<quadfringe::Decoder>,
-    pool: Option<ThreadPool>,
+    workers: Workers,
     full_scale: Option<f32>,
     shape: [usize; 2],
     calibrated: bool,
+    long: bool,
     memory: Arc<Memory>,
 }
 
@@ -66,14 +86,16 @@ impl Decoder {
                 &geometry,
             )
         };
-        let kernel = Mutex::new(py.detach(plan).map_err(value_error)?);
-        let (pool, calibrated) = (threads.map(pool_of).transpose()?, geometry.devices().is_some());
-        Ok(Self { kernel, pool, full_scale, shape, calibrated, memory: Arc::default() })
+        let kernel = detached(py, plan)?.map_err(value_error)?;
+        let long = is_long(&kernel.options().method, shape);
+        let (workers, calibrated) = (Workers::start(threads)?, geometry.devices().is_some());
+        let (kernel, memory) = (Mutex::new(kernel), Arc::default());
+        Ok(Self(Arc::new(Inner { kernel, workers, full_scale, shape, calibrated, long, memory })))
     }
 
     /// The settings in use, including the kernel's defaults.
     fn settings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let kernel = self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
+        let kernel = self.0.kernel.lock().unwrap_or_else(PoisonError::into_inner);
         let options = kernel.options();
         let named = PyDict::new(py);
         named.set_item("method", options.method.name())?;
@@ -96,9 +118,9 @@ impl Decoder {
         ir: &Bound<'py, PyAny>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let decoded = match &Images::borrow(CHANNELS, [red, green, blue, ir])? {
-            Images::U8(four) => self.run(py, views(four), Shot::new),
-            Images::U16(four) => self.run(py, views(four), Shot::new),
-            Images::F32(four) => self.run(py, views(four), Shot::new),
+            Images::U8(four) => self.run(py, four, |four| Shot::new(four)),
+            Images::U16(four) => self.run(py, four, |four| Shot::new(four)),
+            Images::F32(four) => self.run(py, four, |four| Shot::new(four)),
         }?;
         self.maps_by_name(py, decoded)
     }
@@ -113,60 +135,74 @@ impl Decoder {
     ) -> PyResult<Bound<'py, PyDict>> {
         let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
         let decoded = match &Images::borrow(BAYER_IMAGES, [raw, ir])? {
-            Images::U8(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
-            Images::U16(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
-            Images::F32(two) => self.run(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir)),
+            Images::U8(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
+            Images::U16(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
+            Images::F32(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
         }?;
         self.maps_by_name(py, decoded)
     }
 }
 
 impl Decoder {
-    fn run<'a, T: Sample, I: Send>(
+    fn run<T: Sample + Element, const COUNT: usize>(
         &self,
         py: Python<'_>,
-        images: I,
-        shot: impl FnOnce(I) -> quadfringe::Result<Shot<'a, T>> + Send,
+        images: &[PyReadonlyArray<'_, T, Ix2>; COUNT],
+        shot: impl for<'a> FnOnce([ArrayView2<'a, T>; COUNT]) -> quadfringe::Result<Shot<'a, T>> + Send + 'static,
     ) -> PyResult<Decoded> {
-        let decoded = py.detach(|| {
-            // A poisoned lock does no harm, because every shot writes all that it reads. The lock is taken outside the pool,
-            // because a thread of the pool that waited for it could not work on the shot that has the lock.
-            let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
-            let work = || {
-                let shot = scaled(shot(images)?, self.full_scale)?;
-                let mut maps = self.memory.maps(self.shape, self.calibrated);
-                kernel.decode_into(&shot, &mut maps).map(|()| maps)
-            };
-            match &self.pool {
-                Some(pool) => pool.install(work),
-                None => work(),
-            }
-        });
+        let pool = self.0.workers.in_use()?;
+        let decoded = if self.0.long {
+            let copies = images.each_ref().map(|image| image.as_array().to_owned());
+            let inner = Arc::clone(&self.0);
+            interruptible(py, move || {
+                inner.decode(pool.as_deref(), || shot(copies.each_ref().map(|copy| copy.view())))
+            })?
+        } else {
+            let views = views(images);
+            py.detach(|| self.0.decode(pool.as_deref(), || shot(views)))
+        };
         decoded.map_err(value_error)
     }
 
     fn maps_by_name<'py>(&self, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
         let named = PyDict::new(py);
-        named.set_item("phase_rad", self.memory.lend(py, decoded.phase_rad)?)?;
-        named.set_item("column_px", self.memory.lend(py, decoded.column_px)?)?;
-        named.set_item("modulation", self.memory.lend(py, decoded.modulation)?)?;
-        named.set_item("quality", self.memory.lend(py, decoded.quality)?)?;
-        named.set_item("wrong_order_probability", self.memory.lend(py, decoded.wrong_order_probability)?)?;
+        named.set_item("phase_rad", self.0.memory.lend(py, decoded.phase_rad)?)?;
+        named.set_item("column_px", self.0.memory.lend(py, decoded.column_px)?)?;
+        named.set_item("modulation", self.0.memory.lend(py, decoded.modulation)?)?;
+        named.set_item("quality", self.0.memory.lend(py, decoded.quality)?)?;
+        named
+            .set_item("wrong_order_probability", self.0.memory.lend(py, decoded.wrong_order_probability)?)?;
         let uncertain =
             [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
         for (name, map) in uncertain {
             if let Some(map) = map {
-                named.set_item(name, self.memory.lend(py, map)?)?;
+                named.set_item(name, self.0.memory.lend(py, map)?)?;
             }
         }
         if let Some(xyz_mm) = decoded.xyz_mm {
-            named.set_item("xyz_mm", self.memory.lend(py, xyz_mm)?)?;
+            named.set_item("xyz_mm", self.0.memory.lend(py, xyz_mm)?)?;
         }
         Ok(named)
     }
 }
 
-fn pool_of(threads: usize) -> PyResult<ThreadPool> {
-    let built = ThreadPoolBuilder::new().num_threads(threads).build();
-    built.map_err(|error| PyValueError::new_err(format!("threads: {threads} cannot be started: {error}")))
+impl Inner {
+    fn decode<'a, T: Sample>(
+        &self,
+        pool: Option<&ThreadPool>,
+        shot: impl FnOnce() -> quadfringe::Result<Shot<'a, T>> + Send,
+    ) -> quadfringe::Result<Decoded> {
+        // A poisoned lock does no harm, because every shot writes all that it reads. The lock is taken outside the pool,
+        // because a thread of the pool that waited for it could not work on the shot that has the lock.
+        let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
+        let work = || {
+            let shot = scaled(shot()?, self.full_scale)?;
+            let mut maps = self.memory.maps(self.shape, self.calibrated);
+            kernel.decode_into(&shot, &mut maps).map(|()| maps)
+        };
+        match pool {
+            Some(pool) => pool.install(work),
+            None => work(),
+        }
+    }
 }

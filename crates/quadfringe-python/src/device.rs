@@ -1,6 +1,7 @@
 //! The encoding that is projected, and the optics: `optimum`, `check_code`, `pattern`, `Device`.
 
 use crate::arrays::value_error;
+use crate::workers::detached;
 use numpy::{IntoPyArray, PyArray2};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -116,7 +117,7 @@ pub fn pattern<'py>(
     let encoding = Encoding::four_channel(fringe_numbers, width).map_err(value_error)?;
     let (channel, layout) = (channel_named(channel)?, layout_named(layout)?);
     let channel = encoding.channels()[channel.index()];
-    let image = py.detach(|| encoding::pattern(&channel, [width, height], layout));
+    let image = detached(py, || encoding::pattern(&channel, [width, height], layout))?;
     Ok(image.into_pyarray(py))
 }
 
@@ -134,7 +135,7 @@ pub fn step_pattern<'py>(
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
     let (axis, layout) = (axis_named(axis)?, layout_named(layout)?);
     let size = [width, height];
-    let image = py.detach(|| encoding::step_pattern(fringe_number, shift_rad, axis, size, layout));
+    let image = detached(py, || encoding::step_pattern(fringe_number, shift_rad, axis, size, layout))?;
     Ok(image.map_err(value_error)?.into_pyarray(py))
 }
 

@@ -2,6 +2,7 @@
 
 use crate::arrays::{expected, value_error};
 use crate::device::Device;
+use crate::workers::detached;
 use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, ToPyArray};
 use pyo3::prelude::*;
 use quadfringe::height::{self, Triangulator};
@@ -40,7 +41,9 @@ impl PolynomialHeight {
         let planes: Vec<_> =
             planes.map(|(height_mm, phase_rad)| height::HeightPlane { height_mm, phase_rad }).collect();
         let reference = reference.as_array();
-        py.detach(|| height::PolynomialHeight::fit(reference, &planes, degree)).map(Self).map_err(value_error)
+        detached(py, || height::PolynomialHeight::fit(reference, &planes, degree))?
+            .map(Self)
+            .map_err(value_error)
     }
 
     /// (H, W) float32 rad.
@@ -61,7 +64,7 @@ impl PolynomialHeight {
     ) -> PyResult<Bound<'py, PyArray2<f32>>> {
         let phase_rad = expected::<f32, 2>("phase_rad", phase_rad)?;
         let view = phase_rad.as_array();
-        let found = py.detach(|| self.0.height_from_phase(view)).map_err(value_error)?;
+        let found = detached(py, || self.0.height_from_phase(view))?.map_err(value_error)?;
         Ok(found.into_pyarray(py))
     }
 }
@@ -77,6 +80,6 @@ pub fn xyz_from_column<'py>(
     let column_px = expected::<f32, 2>("column_px", column_px)?;
     let view = column_px.as_array();
     let found =
-        py.detach(|| Triangulator::new(&camera.0, &projector.0)?.xyz_mm(view)).map_err(value_error)?;
+        detached(py, || Triangulator::new(&camera.0, &projector.0)?.xyz_mm(view))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }

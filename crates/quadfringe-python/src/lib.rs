@@ -14,6 +14,7 @@ mod projector;
 mod published_stages;
 mod render;
 mod stages;
+mod workers;
 
 use pyo3::prelude::*;
 
@@ -21,6 +22,7 @@ use pyo3::prelude::*;
 fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("__profile__", if cfg!(debug_assertions) { "debug" } else { "release" })?;
+    module.add("THREADS_MAX", workers::THREADS_MAX)?;
     module.add_class::<device::Device>()?;
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;

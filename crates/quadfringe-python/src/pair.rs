@@ -2,6 +2,7 @@
 
 use crate::arrays::{expected, value_error};
 use crate::device::{Device, layout_named};
+use crate::workers::detached;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use quadfringe::Encoding;
@@ -36,7 +37,7 @@ pub fn predeform<'py>(
     let reference = Bench::reference_with(layout_named(layout)?);
     let bench = Bench { visible: visible.0, infrared: infrared.0, ..reference };
     let light = Light::fringes(fringe_number, 0.0);
-    let image = py.detach(|| bench.predeform(&light, z_mm)).map_err(value_error)?;
+    let image = detached(py, || bench.predeform(&light, z_mm))?.map_err(value_error)?;
     Ok(image.into_pyarray(py))
 }
 
@@ -63,14 +64,14 @@ impl PairTable {
             let pair = pair_of(&visible, &infrared, predeformed_z_mm)?;
             height::PairTable::new(&camera.0, &pair, &encoding, depth_range_mm)
         };
-        py.detach(plan).map(Self).map_err(value_error)
+        detached(py, plan)?.map(Self).map_err(value_error)
     }
 
     /// The infrared phase in rad, not wrapped, at the points with this first absolute phase.
     fn infrared_rad<'py>(&self, py: Python<'py>, phase_rad: &Bound<'py, PyAny>) -> PyResult<Map<'py>> {
         let phase = expected::<f32, 2>("phase_rad", phase_rad)?;
         let view = phase.as_array();
-        let found = py.detach(|| self.0.infrared_rad(view)).map_err(value_error)?;
+        let found = detached(py, || self.0.infrared_rad(view))?.map_err(value_error)?;
         Ok(found.into_pyarray(py))
     }
 
@@ -87,7 +88,7 @@ impl PairTable {
         let map = |name: &str, object| expected::<f32, 2>(name, object);
         let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
         let views = Phases::from_array(maps.each_ref().map(PyReadonlyArray2::as_array));
-        let found = py.detach(|| self.0.unwrap_blocks(views, rows)).map_err(value_error)?;
+        let found = detached(py, || self.0.unwrap_blocks(views, rows))?.map_err(value_error)?;
         Ok((found.phase_rad.into_pyarray(py), found.margin.into_pyarray(py)))
     }
 }

@@ -1,6 +1,7 @@
 //! Further stages of the published decoder. The basic ones are in `stages`.
 
 use crate::arrays::{expected, value_error};
+use crate::workers::detached;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
 use quadfringe::Encoding;
@@ -17,7 +18,7 @@ fn map<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2
 fn row_period(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<f64> {
     let image = map("image", image)?;
     let view = image.as_array();
-    Ok(py.detach(|| stages::row_period_px(view)))
+    detached(py, || stages::row_period_px(view))
 }
 
 /// Rows and columns of the blocks whose means the published decoder works on.
@@ -37,7 +38,7 @@ fn block_means<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let view = image.as_array();
-    let found = py.detach(|| stages::block_means(view, rows, columns)).map_err(value_error)?;
+    let found = detached(py, || stages::block_means(view, rows, columns))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -46,7 +47,7 @@ fn block_means<'py>(
 fn fill_gaps<'py>(py: Python<'py>, image: &Bound<'py, PyAny>) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let view = image.as_array();
-    Ok(py.detach(|| stages::fill_gaps(view)).into_pyarray(py))
+    Ok(detached(py, || stages::fill_gaps(view))?.into_pyarray(py))
 }
 
 /// Modulation of red over that of blue for each row.
@@ -58,7 +59,7 @@ fn modulation_ratio<'py>(
 ) -> PyResult<Bound<'py, PyArray1<f32>>> {
     let (red, blue) = (map("red", red)?, map("blue", blue)?);
     let (red, blue) = (red.as_array(), blue.as_array());
-    let found = py.detach(|| stages::modulation_ratio(red, blue)).map_err(value_error)?;
+    let found = detached(py, || stages::modulation_ratio(red, blue))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -75,7 +76,7 @@ fn fourier_pair<'py>(
     let (first, second) = (map("first", first)?, map("second", second)?);
     let first = Fringes { means: first.as_array(), period: periods[0] };
     let second = Fringes { means: second.as_array(), period: periods[1] };
-    let found = py.detach(|| stages::fourier_pair(first, second, columns, width)).map_err(value_error)?;
+    let found = detached(py, || stages::fourier_pair(first, second, columns, width))?.map_err(value_error)?;
     Ok(found.map(|found| (found.phase_rad.into_pyarray(py), found.modulation.into_pyarray(py))))
 }
 
@@ -88,7 +89,7 @@ fn nearest_turn<'py>(
 ) -> PyResult<Map<'py>> {
     let (wrapped, estimate) = (map("wrapped_rad", wrapped_rad)?, map("estimate_rad", estimate_rad)?);
     let (wrapped, estimate) = (wrapped.as_array(), estimate.as_array());
-    let found = py.detach(|| stages::nearest_turn(wrapped, estimate)).map_err(value_error)?;
+    let found = detached(py, || stages::nearest_turn(wrapped, estimate))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -109,7 +110,7 @@ fn discard_invalid<'py>(
     let modulation = modulation.as_array();
     let limits = Limits { modulation_min, quality_min };
     let work = || stages::discard_invalid(&Absolute::new(phase, margin)?, modulation, limits);
-    let found = py.detach(work).map_err(value_error)?;
+    let found = detached(py, work)?.map_err(value_error)?;
     Ok((found.phase_rad.into_pyarray(py), found.quality.into_pyarray(py)))
 }
 
@@ -124,7 +125,7 @@ fn columns_from_phase<'py>(
     let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
     let phase = map("phase_rad", phase_rad)?;
     let view = phase.as_array();
-    let found = py.detach(|| stages::columns_from_phase(&encoding, view));
+    let found = detached(py, || stages::columns_from_phase(&encoding, view))?;
     Ok((found.phase_rad.into_pyarray(py), found.column_px.into_pyarray(py)))
 }
 
@@ -133,7 +134,7 @@ fn columns_from_phase<'py>(
 fn wrong_order_probability<'py>(py: Python<'py>, quality: &Bound<'py, PyAny>) -> PyResult<Map<'py>> {
     let quality = map("quality", quality)?;
     let view = quality.as_array();
-    Ok(py.detach(|| stages::wrong_order_probability(view)).into_pyarray(py))
+    Ok(detached(py, || stages::wrong_order_probability(view))?.into_pyarray(py))
 }
 
 /// Add all functions of this file to the module.

@@ -3,6 +3,7 @@
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, expected, value_error, views};
 use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
 use crate::device::unknown;
+use crate::workers::detached;
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
@@ -78,7 +79,7 @@ fn linearise<'a, T: Sample, I: Send>(
     (full_scale, conditioner): &(Option<f32>, Conditioner),
 ) -> PyResult<[Array2<f32>; 4]> {
     let work = || condition::linearise(&scaled(shot(images)?, *full_scale)?, conditioner);
-    py.detach(work).map_err(value_error)
+    detached(py, work)?.map_err(value_error)
 }
 
 fn light_by_name(py: Python<'_>, planes: [Array2<f32>; 4]) -> PyResult<Bound<'_, PyDict>> {
@@ -100,7 +101,7 @@ pub fn background<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let (view, kind) = (image.as_array(), background_named(kind)?);
-    let found = py.detach(|| stages::background(view, kind, period_px)).map_err(value_error)?;
+    let found = detached(py, || stages::background(view, kind, period_px))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -109,7 +110,7 @@ pub fn background<'py>(
 pub fn carrier(py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<(f64, f64)> {
     let image = map("image", image)?;
     let view = image.as_array();
-    let found = py.detach(|| stages::carrier(view));
+    let found = detached(py, || stages::carrier(view))?;
     Ok((found.row_px, found.column_px))
 }
 
@@ -125,7 +126,7 @@ pub fn two_step<'py>(
     let (red, blue) = (map("red", red)?, map("blue", blue)?);
     let (red, blue) = (red.as_array(), blue.as_array());
     let phase = if coarse { stages::two_step_coarse } else { stages::two_step };
-    let found = py.detach(|| phase(red, blue)).map_err(value_error)?;
+    let found = detached(py, || phase(red, blue))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -141,7 +142,7 @@ pub fn fourier<'py>(
 ) -> PyResult<Map<'py>> {
     let image = map("image", image)?;
     let (view, band, kind) = (image.as_array(), band_named(band)?, background_named(kind)?);
-    let found = py.detach(|| stages::fourier(view, band, kind, period_px)).map_err(value_error)?;
+    let found = detached(py, || stages::fourier(view, band, kind, period_px))?.map_err(value_error)?;
     Ok(found.into_pyarray(py))
 }
 
@@ -158,7 +159,7 @@ pub fn unwrap<'py>(
     let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
     let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
     let views = Phases::from_array(maps.each_ref().map(PyReadonlyArray2::as_array));
-    let found = py.detach(|| stages::unwrap(&encoding, views)).map_err(value_error)?;
+    let found = detached(py, || stages::unwrap(&encoding, views))?.map_err(value_error)?;
     Ok((found.phase_rad.into_pyarray(py), found.margin.into_pyarray(py)))
 }
 
@@ -167,7 +168,7 @@ pub fn unwrap<'py>(
 pub fn n_step<'py>(py: Python<'py>, stack: &Bound<'py, PyAny>) -> PyResult<(Map<'py>, Map<'py>, Map<'py>)> {
     let stack = expected::<f32, 3>("stack", stack)?;
     let view = stack.as_array();
-    let found = py.detach(|| stages::n_step(view)).map_err(value_error)?;
+    let found = detached(py, || stages::n_step(view))?.map_err(value_error)?;
     let maps = [found.phase_rad, found.background, found.modulation];
     let [phase, background, modulation] = maps.map(|map| map.into_pyarray(py));
     Ok((phase, background, modulation))
@@ -182,7 +183,7 @@ pub fn estimate_response<'py>(
     let stacks: PyResult<Vec<_>> = stacks.iter().map(|stack| expected::<f32, 3>("stack", stack)).collect();
     let stacks = stacks?;
     let views: Vec<_> = stacks.iter().map(PyReadonlyArray3::as_array).collect();
-    let found = py.detach(|| condition::estimate_response(&views)).map_err(value_error)?;
+    let found = detached(py, || condition::estimate_response(&views))?.map_err(value_error)?;
     figures_of(py, &found)
 }
 
@@ -204,7 +205,7 @@ pub fn estimate_response_of_shot<'py>(
     let phase = map("phase_rad", phase_rad)?;
     let (views, phase) = (light.each_ref().map(PyReadonlyArray2::as_array), phase.as_array());
     let work = || condition::estimate_response_of_shot(views, phase, &encoding);
-    let found = py.detach(work).map_err(value_error)?;
+    let found = detached(py, work)?.map_err(value_error)?;
     let named = PyDict::new(py);
     for (name, estimate) in CHANNELS.into_iter().zip(found) {
         if let Some(estimate) = estimate {

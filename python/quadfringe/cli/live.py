@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from quadfringe.cli._options import FileSizeOption, ShotsOption, SystemFile
-from quadfringe.cli._output import say, stoppable
+from quadfringe.cli._output import caution, say, stoppable
 
 if TYPE_CHECKING:
     from quadfringe.recording import Recorder
@@ -31,7 +31,15 @@ RecordOption = Annotated[
     Path | None, typer.Option(metavar="FILE.h5", help="Also record every raw shot into this new file.")
 ]
 HostOption = Annotated[
-    str, typer.Option(help="Address that the page is served on; 0.0.0.0 shows it to the whole network.")
+    str,
+    typer.Option(
+        help="Address of this machine that the page is served on; 0.0.0.0 shows it to everybody in the network who has "
+        "the token."
+    ),
+]
+AllowHostOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="A further host name under which the page may be opened; may be repeated."),
 ]
 PortOption = Annotated[
     int, typer.Option(min=1, max=65535, help="Port of the page; when it is taken, the next free port is used.")
@@ -56,10 +64,11 @@ def live(
     colour: ColourOption = Colour.texture,
     shots: ShotsOption = None,
     file_gb: FileSizeOption = None,
+    allow_host: AllowHostOption = None,
 ) -> None:
     """Measure continuously and show the shape, the channels and the figures in a browser, until Ctrl-C or --shots.
 
-    Only this machine can open the page, unless --host says otherwise; the page has no password.
+    Only this machine can open the page, unless --host says otherwise; then its address contains a token.
     """
     from contextlib import ExitStack
 
@@ -68,32 +77,42 @@ def live(
     from quadfringe.view.viewer import Viewer
 
     with ExitStack() as stack:
+        # Before the scanner, so that a wrong address is reported before a camera is taken.
+        viewer = Viewer(
+            host,
+            port,
+            stride=view_stride,
+            colouring=colour.value,
+            clouds_per_s=clouds_per_s,
+            allow_hosts=allow_host or (),
+        )
+        stack.enter_context(viewer)
         scanner = stack.enter_context(open_system(system))
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))
-        viewer = stack.enter_context(
-            Viewer(host, port, stride=view_stride, clouds_per_s=clouds_per_s, colouring=colour.value)
-        )
-        say(f"live at {viewer.url}; stop with Ctrl-C")
         with stoppable():
             _follow(scanner, viewer, recorder, shots)
-            if shots is None:
-                say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
-                _sleep()
+    _report(viewer, recorder)
+
+
+def _report(viewer: Viewer, recorder: Recorder | None) -> None:
+    if viewer.fault is not None:
+        caution(viewer.fault)
     if recorder is not None:
         done = recorder.statistics()
-        say(f"{record}: {done.written} shots recorded, {done.refused} refused by the disk")
+        files = ", ".join(str(path) for path in done.files) or "nothing"
+        say(f"{files}: {done.written} shots recorded, {done.refused} refused by the disk")
 
 
 def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: int | None) -> None:
+    from threading import Event
+
+    say(f"live at {viewer.url}; stop with Ctrl-C")
     columns = scanner.projector_width_px
     taps = {} if recorder is None else {"record": recorder.write}
     with scanner.stream(shots, taps=taps, resume=True) as stream:
         viewer.follow(stream, recorder.statistics if recorder else None, columns)
-
-
-def _sleep() -> None:
-    from threading import Event
-
-    Event().wait()
+    if shots is None:
+        say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
+        Event().wait()

@@ -175,18 +175,19 @@ class DecodeConfig(Model):
         description="Least quality of a valid pixel, from 0 to below 1. Raise it for fewer wrong orders and fewer "
         "pixels.",
     )
-    period_px: Finite | None = Field(
+    period_px: Annotated[Finite, Field(le=SIZE_MAX)] | None = Field(
         default=None,
-        description="Fringe period across the fringes in camera pixels, at least 3, good to a third. Absent: estimated "
-        "from every shot. Give it if the estimate fails, as on an object narrower than two fringes.",
+        description="Fringe period across the fringes in camera pixels, from 3 to the longer side of the image, good "
+        "to a third. Absent: estimated from every shot. Give it if the estimate fails, as on an object narrower than "
+        "two fringes.",
     )
     channel_instants_us: Row4 | None = Field(
         default=None,
         description="Times in us at which R, G, B and IR are exposed, relative to the instant of the shape. For "
         "moving surfaces and a projector that shows its colours one after another (method joint).",
     )
-    threads: Annotated[int, Field(gt=0)] | None = Field(
-        default=None, description="Threads of one decoder. Absent: as many as the machine has cores."
+    threads: Annotated[int, Field(gt=0, le=_core.THREADS_MAX)] | None = Field(
+        default=None, description="Threads of one decoder, at most 1024. Absent: as many as the machine has cores."
     )
 
     @field_validator("modulation_min", "quality_min", "period_px", "channel_instants_us")

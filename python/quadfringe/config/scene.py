@@ -22,6 +22,8 @@ Matrix4 = tuple[Row4, Row4, Row4, Row4]
 PerChannel = Annotated[Row4, BeforeValidator(lambda v: (v,) * 4 if isinstance(v, (int, float)) else v)]
 Affine = tuple[Triple, Triple]
 BayerPattern = Literal["rggb", "grbg", "gbrg", "bggr"]
+BLUR_MAX_PX = 100.0  # a wider one takes minutes, and no fringe is left of it
+SEED_MAX = 2**63 - 1  # the largest whole number of a TOML file; the kernel's is twice as large, so that shots can count
 Surface = Literal["plane", "peaks", "steps", "sphere", "face", "hand"]  # as the kernel names them, tested
 
 
@@ -61,8 +63,8 @@ class SceneConfig(Model):
         default=None, description="Rows: captured R, G, B, IR; columns: projected R, G, B, IR."
     )
     gain: PerChannel | None = Field(default=None, description="Captured intensity for light 1 from albedo 1.")
-    blur_px: NotNegative | None = Field(
-        default=None, description="Blur of the lens: standard deviation of a Gaussian, in px."
+    blur_px: Annotated[NotNegative, Field(le=BLUR_MAX_PX)] | None = Field(
+        default=None, description="Blur of the lens: standard deviation of a Gaussian, in px, at most 100."
     )
     infrared_from_visible: Affine | None = Field(
         default=None,
@@ -82,6 +84,6 @@ class SceneConfig(Model):
         default=None, description="The camera interpolates three colour planes from the mosaic, as most cameras do."
     )
     bit_depth: Literal[8, 10, 12, 16] = Field(default=8, description="Bits of the images.")
-    seed: Annotated[int, Field(ge=0)] | None = Field(
+    seed: Annotated[int, Field(ge=0, le=SEED_MAX)] | None = Field(
         default=None, description="Seed of the noise of the first shot; later shots count up from it."
     )

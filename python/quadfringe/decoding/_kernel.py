@@ -10,7 +10,8 @@ from typing import Any, Literal
 import numpy as np
 
 from quadfringe import _core
-from quadfringe.config import Response, brief
+from quadfringe.config import SIZE_MAX, Response, brief
+from quadfringe.config.memory import require_memory
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, Shot, conditioning, core_device
 from quadfringe.decoding.plan import Plan
 from quadfringe.errors import InputError
@@ -18,6 +19,9 @@ from quadfringe.errors import InputError
 __all__ = ["KernelDecoder", "Size", "check_shot", "size_of"]
 
 Size = tuple[int, int]
+# Peak memory of a decoder with two shapes, bytes per pixel, at fringes of 24 px (`pytest tests/test_size_limits.py`
+# holds it). Finer fringes need more: the estimate is to refuse what cannot fit by far, not to promise what does.
+BYTES_PER_PX = {"joint": 150, "published": 75}
 
 
 class KernelDecoder:
@@ -140,10 +144,19 @@ def size_of(like: AnyShot | Size, full_scale: float | None) -> tuple[Size, float
     except (TypeError, ValueError):
         advice = "; read it with qf.read_shot" if isinstance(like, (str, Path)) else ""
         raise InputError(f"expected a shot or a size (rows, columns), got {brief(like)}{advice}") from None
+    if not all(1 <= length <= SIZE_MAX for length in (rows, columns)):
+        raise InputError(f"expected a size (rows, columns) from 1 to {SIZE_MAX} px, got {brief(like)}")
     return (rows, columns), full_scale
 
 
 def _check_size(size: Size, plan: Plan) -> None:
+    require_memory("decoding", size, BYTES_PER_PX[plan.decode.method or "joint"])
+    period_px = plan.decode.period_px
+    if period_px is not None and period_px > max(size):
+        raise InputError(
+            f"period_px: expected at most {max(size)} px, the longer side of the images, got {period_px:g}; the period "
+            "is that of the fringes in the image of the camera"
+        )
     if plan.calibration is None:
         return
     camera, projector = plan.calibration.camera, plan.calibration.projector

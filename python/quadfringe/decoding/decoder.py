@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
-from threading import Lock
 
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
+from quadfringe.decoding._locks import ForkedLock
 from quadfringe.decoding.black import below_black, too_black
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import wrong_bits
@@ -26,7 +26,8 @@ class Decoder:
     """Decodes shots of one size; planned and checked when made. Every shot is judged by the same rule.
 
     `like` is a shot, or a size (rows, columns); `full_scale` defaults to the full scale of the shot, or for a size to
-    the largest value of the dtype. Threads may decode at the same time: each then uses separate buffers.
+    the largest value of the dtype. Threads may decode at the same time: each then uses separate buffers. A forked child
+    may go on with the decoder of its parent. Ctrl-C ends a long call at once; its work ends in the background.
 
     With `plan.response` "auto" and no response in the calibration, the response is estimated from the first sound
     shots: each of up to three shots is decoded with the estimate from itself, the first estimate that shows a response
@@ -52,7 +53,7 @@ class Decoder:
         self._known = stated_response(plan.response, plan.calibration) != "auto"
         self._other: KernelDecoder | None = None  # for shots that contradict the stated response
         self._tried = 0
-        self._estimating = Lock()
+        self._estimating = ForkedLock()
 
     def __repr__(self) -> str:
         method = self._kernel.settings["method"]

@@ -14,12 +14,12 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, check_system, load_system, shortened
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
+from quadfringe.decoding._locks import ForkedLock
 from quadfringe.decoding.plan import calibration_of, stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
 from quadfringe.errors import DecodeError, InputError
@@ -50,7 +50,7 @@ class Scanner:
         self.calibration = calibration_of(calibration)
         self.projector = projector
         self.camera = camera
-        self._planning = Lock()
+        self._planning = ForkedLock()
         self._live: LiveStream | None = None
         self._use(config)
 

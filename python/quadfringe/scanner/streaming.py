@@ -6,6 +6,7 @@ therefore loses shots and does not delay them.
 
 from __future__ import annotations
 
+import os
 import threading
 import time
 from collections import deque
@@ -27,6 +28,10 @@ LENGTH = {"latest": 1, "all": 64}
 TAP_LENGTH = 64
 RATE_WINDOW_S = 2.0
 RETRY_S = 0.5
+FORKED = (
+    "the stream measures in the process that opened it, not in this forked one; open the scanner here, in processes "
+    'that multiprocessing starts with "spawn"'
+)
 
 
 @dataclass(frozen=True)
@@ -123,7 +128,7 @@ class LiveStream:
         at_once: int = 1,
         response: Callable[[], ResponseChoice] = lambda: "linear",
     ) -> None:
-        self._response = response
+        self._response, self._process = response, os.getpid()
         self._camera, self._decode, self._count, self._resume = camera, decode, count, resume
         self._wait = not camera.paced
         self._stop = threading.Event()
@@ -244,6 +249,8 @@ class LiveStream:
         return self
 
     def __next__(self) -> Measured:
+        if os.getpid() != self._process:
+            raise RuntimeError(FORKED)
         try:
             return self._results.get()
         except EndOfQueue:

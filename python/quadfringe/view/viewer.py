@@ -9,86 +9,83 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from contextlib import redirect_stdout
 from io import StringIO
-from socket import gethostname
-from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
-from quadfringe.errors import require
 from quadfringe.recording import RecorderStatistics
 from quadfringe.scanner.streaming import LiveStream, Measured, StreamStatistics
+from quadfringe.view._address import LOOPBACK
+from quadfringe.view._controls import CLOUDS_PER_S, Colouring, Controls, check_controls
+from quadfringe.view._server import serve_page
 from quadfringe.view.colours import Picture, channels_picture, coloured, limits_of, phase_picture, texture
-
-if TYPE_CHECKING:
-    import viser
 
 __all__ = ["CLOUDS_PER_S", "Colouring", "Viewer"]
 
-Colouring = Literal["texture", "height", "quality"]
 Map = NDArray[np.float32]
-COLOURINGS: tuple[Colouring, ...] = ("texture", "height", "quality")
-CLOUDS_PER_S = 4.0  # the default: a browser without a graphics card keeps up with it
-STRIDES = ("1", "2", "4", "8", "16")
 M_PER_MM = 1e-3  # the page uses metres, which suit the near and far planes of its camera
 FIGURES_PERIOD_S = 0.1  # ten updates a second look continuous and cost little
 PICTURES_PERIOD_S = 0.1
-LOCAL = "127.0.0.1"
-EVERYBODY = ("0.0.0.0", "::")
 REPLAYED_MS = 60e3  # older shots come from a recording, which keeps its original time stamps
 
 
 class Viewer:
     """Serves the page at `url` from background threads; close it, or use it in a `with` block.
 
-    Only this machine can open the page, unless `host` says otherwise ("0.0.0.0": the whole network, without a
-    password). At most `clouds_per_s` point clouds are sent per second, with every `stride`-th pixel of every
-    `stride`-th row; a slower browser skips clouds and delays nothing else. A browser with a graphics card shows 10 and
-    more per second; without one, use a `stride` of 4 and few clouds. The page has controls for both. When `port` is
-    taken, the next free one is used; `url` contains it. Raises `MissingExtraError` without the extra `view`.
+    Only this machine can open the page, unless `host` says otherwise ("0.0.0.0": the whole network). Then the page
+    opens only with a token, new for every viewer, which `url` contains; nothing is encrypted. Requests of other web
+    pages are refused, and requests under a name other than localhost, `host`, the name of this machine, or one of
+    `allow_hosts`.
+
+    At most `clouds_per_s` point clouds are sent per second (0.1 to 100), with every `stride`-th pixel of every
+    `stride`-th row (1 to 64); a slower browser skips clouds and delays nothing else. A browser with a graphics card
+    shows 10 and more per second; without one, use a `stride` of 4 and few clouds. The page has controls for both. When
+    `port` is taken, one of the next 99 is used; `url` contains it.
+
+    Raises `InputError` for a host that is not of this machine and for values out of range, and `MissingExtraError`
+    without the extra `view`.
     """
 
     def __init__(
         self,
-        host: str = LOCAL,
+        host: str = LOOPBACK,
         port: int = 8080,
         *,
         stride: int = 2,
         clouds_per_s: float = CLOUDS_PER_S,
         colouring: Colouring = "texture",
+        allow_hosts: Iterable[str] = (),
     ) -> None:
-        self._server = _serve(host, port)
-        self.url = f"http://{gethostname() if host in EVERYBODY else host}:{self._server.get_port()}"
+        check_controls(stride, clouds_per_s, colouring)
+        page = serve_page(host, port, allow_hosts)
+        self._server, self.url = page.server, page.url
+        self._faults = _Faults()
+        # Pages that connect draw from other threads, and viser fails when two of them replace a cloud at once.
+        self._drawing = threading.RLock()
         self._cloud_at = self._pictures_at = 0.0
         self._clouds = 0
         self._depth_mm: tuple[float, float] | None = None
         self._placed = False
         self._last: tuple[Measured, int] | None = None
         self._message = "waiting for the first shot"
-        self._build(str(stride), clouds_per_s, colouring)
+        self._build(stride, clouds_per_s, colouring)
         self._server.on_client_connect(self._show_again)
 
-    def _build(self, stride: str, clouds_per_s: float, colouring: Colouring) -> None:
+    @property
+    def fault(self) -> str | None:
+        """The latest error of the page while it followed a stream; None if there was none."""
+        return self._faults.latest
+
+    def _build(self, stride: int, clouds_per_s: float, colouring: Colouring) -> None:
         gui = self._server.gui
         gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
         gui.main_panel.dock_right()
         gui.set_panel_label("quadfringe live")
-        strides = sorted({stride, *STRIDES}, key=int)
-        self._colour = gui.add_dropdown("Colour", COLOURINGS, initial_value=colouring)
-        self._stride = gui.add_dropdown("Every n-th point", strides, initial_value=stride)
-        self._clouds_per_s = gui.add_slider(
-            "Clouds a second",
-            min=min(1.0, clouds_per_s),
-            max=max(20.0, clouds_per_s),
-            step=0.5,
-            initial_value=clouds_per_s,
-        )
-        self._quality = gui.add_slider("Least quality", min=0.0, max=1.0, step=0.05, initial_value=0.0)
-        self._frozen = gui.add_checkbox("Hold still", initial_value=False)
+        self._controls = Controls(gui, stride, clouds_per_s, colouring)
         self._figures = gui.add_markdown(self._message)
         blank = np.full((48, 64, 3), 40, np.uint8)
         with gui.add_folder("Channels: red, green, blue, infrared"):
@@ -108,12 +105,19 @@ class Viewer:
         recorder: Callable[[], RecorderStatistics] | None = None,
         columns: int = 912,
     ) -> int:
-        """Show what a stream measures until it ends; return the number of shots. Figures update between shots too."""
+        """Show what a stream measures until it ends; return the number of shots. Figures update between shots too.
+
+        An error of the page does not end the stream: the shot is not shown, and `fault` tells why.
+        """
         ended = threading.Event()
+
+        def show_figures() -> None:
+            with self._faults:
+                self.show_figures(stream.statistics(), recorder() if recorder else None)
 
         def figures() -> None:
             while not ended.wait(FIGURES_PERIOD_S):
-                self.show_figures(stream.statistics(), recorder() if recorder else None)
+                show_figures()
 
         watcher = threading.Thread(target=figures, name="figures", daemon=True)
         watcher.start()
@@ -121,11 +125,12 @@ class Viewer:
         try:
             for measured in stream:
                 shots += 1
-                self.show(measured, columns)
+                with self._faults:
+                    self.show(measured, columns)
         finally:
             ended.set()
             watcher.join()
-            self.show_figures(stream.statistics(), recorder() if recorder else None)
+            show_figures()
         return shots
 
     def show(self, measured: Measured, columns: int = 912) -> None:
@@ -135,33 +140,38 @@ class Viewer:
         latency = "replayed" if replayed else f"latency {measured.latency_ms:.0f} ms"
         self._message = latency if measured.error is None else f"{latency} · **no shape:** {measured.error}"
         self._last = (measured, columns)
-        if self._frozen.value or not self._server.get_clients():
+        if self._controls.still or not self._server.get_clients():
             return
+        with self._drawing:
+            self._draw(measured, columns, now)
+
+    def _draw(self, measured: Measured, columns: int, now: float) -> None:
         shape = measured.shape
         if now - self._pictures_at >= PICTURES_PERIOD_S:
             self._pictures_at = now
             self._channels.image = channels_picture(measured.shot)
             if shape is not None:
                 self._phase.image = phase_picture(shape, columns)
-        period_s = 1.0 / self._clouds_per_s.value
+        period_s = 1.0 / self._controls.clouds_per_s
         if shape is not None and shape.xyz_mm is not None and now - self._cloud_at >= period_s:
             self._cloud_at = max(self._cloud_at + period_s, now - period_s)
             self.show_shape(measured.shot, shape)
 
     def _show_again(self, _: object) -> None:
-        """Show the last shot to a page that has just connected."""
+        """Show the last shot to a page that has just connected; viser keeps what was drawn before."""
         if self._last is not None:
-            self._cloud_at = self._pictures_at = 0.0
-            self.show(*self._last)
+            with self._faults:
+                self.show(*self._last)
 
     def show_shape(self, shot: AnyShot, shape: Shape) -> None:
         """Show the points of a calibrated shape immediately."""
-        stride = int(self._stride.value)
+        stride = self._controls.stride
         points_mm, colours = self._points(shot, shape, stride)
-        if not self._placed and len(points_mm):
-            self._place_camera(points_mm)
-        self._add_cloud("/shape", points_mm, colours, M_PER_MM * stride * _pixel_mm(points_mm, shape))
-        self._clouds += 1
+        with self._drawing:
+            if not self._placed and len(points_mm):
+                self._place_camera(points_mm)
+            self._add_cloud("/shape", points_mm, colours, M_PER_MM * stride * _pixel_mm(points_mm, shape))
+            self._clouds += 1
 
     def _add_cloud(self, name: str, points_mm: Map, colours: Picture, point_size: float) -> None:
         self._server.scene.add_point_cloud(
@@ -179,12 +189,12 @@ class Viewer:
         """Return the valid points, (N, 3) mm, and their colours, (N, 3)."""
         xyz_mm = np.ascontiguousarray(np.asarray(shape.xyz_mm)[::stride, ::stride])
         quality = shape.quality[::stride, ::stride]
-        valid = np.flatnonzero(np.isfinite(xyz_mm[:, :, 2]) & (quality >= self._quality.value))
+        valid = np.flatnonzero(np.isfinite(xyz_mm[:, :, 2]) & (quality >= self._controls.quality))
         picture = self._painted(shot, shape, xyz_mm[:, :, 2], quality, stride)
         return xyz_mm.reshape(-1, 3).take(valid, axis=0), picture.reshape(-1, 3).take(valid, axis=0)
 
     def _painted(self, shot: AnyShot, shape: Shape, depth_mm: Map, quality: Map, stride: int) -> Picture:
-        colouring = self._colour.value
+        colouring = self._controls.colouring
         if colouring == "height":
             return coloured(-depth_mm, self._depth_limits(depth_mm))
         if colouring == "quality":
@@ -213,7 +223,7 @@ class Viewer:
     def show_figures(self, stream: StreamStatistics, recording: RecorderStatistics | None = None) -> None:
         """Show rates, queues and losses."""
         self._figures.content = "\n".join(
-            [f"{self._message} · clouds sent {self._clouds}", "", *_table(stream, recording)]
+            [f"{self._message} · clouds sent {self._clouds}", "", *_table(stream, recording, self.fault)]
         )
 
     def close(self) -> None:
@@ -228,11 +238,19 @@ class Viewer:
         self.close()
 
 
-def _serve(host: str, port: int) -> viser.ViserServer:
-    module: Any = require("viser", "view")
-    with redirect_stdout(StringIO()):  # viser prints a banner even with verbose=False
-        server: viser.ViserServer = module.ViserServer(host=host, port=port, label="quadfringe", verbose=False)
-    return server
+class _Faults:
+    """Keeps errors of the page from the measurement that it shows, and remembers the latest."""
+
+    latest: str | None = None
+
+    def __enter__(self) -> None:
+        pass
+
+    def __exit__(self, _kind: object, error: BaseException | None, _traceback: object) -> bool:
+        if not isinstance(error, Exception):
+            return False
+        self.latest = f"the page failed: {type(error).__name__}: {error}"
+        return True
 
 
 def _pixel_mm(points_mm: Map, shape: Shape) -> float:
@@ -243,7 +261,7 @@ def _pixel_mm(points_mm: Map, shape: Shape) -> float:
     return 1.5 * depth_mm / shape.calibration.camera.focal_px[0]
 
 
-def _table(stream: StreamStatistics, recording: RecorderStatistics | None) -> list[str]:
+def _table(stream: StreamStatistics, recording: RecorderStatistics | None, page_fault: str | None) -> list[str]:
     camera = stream.camera
     rows = [
         ("captured", f"{stream.captured_per_s:.1f} /s"),
@@ -257,6 +275,6 @@ def _table(stream: StreamStatistics, recording: RecorderStatistics | None) -> li
     if recording is not None:
         rows.append(("recorded", f"{recording.written} shots, {recording.image_bytes / 1e6:.0f} MB"))
         rows.append(("not recorded", str(recording.refused)))
-    faults = [fault for fault in (stream.fault, recording.fault if recording else None) if fault]
+    faults = [fault for fault in (stream.fault, recording.fault if recording else None, page_fault) if fault]
     lines = [f"| {name} | {value} |" for name, value in rows]
     return ["| figure | value |", "| --- | --- |", *lines, *(f"\n**fault:** {fault}" for fault in faults)]

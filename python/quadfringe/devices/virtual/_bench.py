@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config import Fringes, Response, Row4, SystemConfig, Triple
+from quadfringe.config.memory import require_memory
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth, core_device, device_from_core
 from quadfringe.devices.light import Levels, Light, Step, eight_bit, predeformation
 from quadfringe.errors import DecodeError, InputError
@@ -47,6 +48,10 @@ class _Placed(NamedTuple):
     albedo: NDArray[np.float32] | None
 
 
+# Peak memory of a rendered shot, and of a projected pattern, bytes per pixel (`pytest tests/test_size_limits.py`).
+BYTES_PER_PX = {"camera": 110, "visible": 16, "infrared": 16}
+
+
 class VirtualBench:
     """A simulated bench: one scene, one camera and two projectors, as `config` describes them.
 
@@ -55,6 +60,9 @@ class VirtualBench:
 
     def __init__(self, config: SystemConfig) -> None:
         given = {"camera": config.camera, "visible": config.projector, "infrared": config.infrared}
+        for name, model in given.items():
+            if model is not None:
+                require_memory(f"{name} of the virtual bench", (model.height_px, model.width_px), BYTES_PER_PX[name])
         devices = {name: core_device(model) for name, model in given.items() if model is not None}
         self._bench = _core.Bench(
             **devices, layout=config.fringes.layout, infrared_from_visible=config.scene.infrared_from_visible
