@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
-.PHONY: demo test test-usb test-camera test-live fuzz coverage figures evaluation bench rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live fuzz hostile coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
@@ -84,6 +84,13 @@ fuzz:
 	mkdir -p $(FUZZ)/corpus $(FUZZ)/artifacts
 	RUSTFLAGS="$(COUNTERS)" cargo run --release --quiet --manifest-path $(FUZZ)/Cargo.toml --target $(FUZZ_HOST) -- \
 		$(FUZZ)/corpus -artifact_prefix=$(FUZZ)/artifacts/ -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -print_final_stats=1
+
+# Damaged files to every reader and spoilt shots to both methods, by seeds; `make test` runs a sample.
+HOSTILE_FILES ?= 1000
+HOSTILE_SHOTS ?= 100
+hostile: $(STAMPS)/built
+	cd tests && ../$(BIN)/python -m hostile --count $(HOSTILE_FILES)
+	cd tests && ../$(BIN)/python -m hostile --shots $(HOSTILE_SHOTS)
 
 # Share of the lines of the crate lightcrafter that its tests run; fails below 90 %.
 coverage:

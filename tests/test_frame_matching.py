@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from quadfringe.data import FrameStamp
-from quadfringe.devices.aravis._frame_matching import SHORT_IDS, FrameMatcher, FrameNumbers
+from quadfringe.devices.aravis._frame_matching import CALM, SHORT_IDS, WINDOW, FrameMatcher, FrameNumbers, SingleChip
 
 PERIOD_NS = 33_333_333
 TOLERANCE_NS = 2e6
@@ -159,3 +159,72 @@ def test_extended_ids_do_not_wrap() -> None:
     assert numbers.missed == 1
     assert numbers(1) == 5, "a device that begins anew skipped nothing"
     assert numbers.missed == 1
+
+
+# Clocks that wrap around or are set anew
+
+
+def wrapped(frames: Iterator[Frame], bits: int) -> Iterator[Frame]:
+    """Let the device clocks count with so many bits, ns; 32 bits wrap around every 4.3 s, at another instant each."""
+    for chip, exposure, stamp in frames:
+        yield chip, exposure, FrameStamp(stamp.id, stamp.device_ns % (1 << bits), stamp.arrival_ns)
+
+
+def host_times(matcher: FrameMatcher[int], frames: Iterator[Frame]) -> list[tuple[int, int, float]]:
+    """Give both exposures of every pair, and by how much its time lags behind its arrival, s."""
+    found = []
+    for chip, exposure, stamp in frames:
+        for first, second in matcher.push(chip, stamp, exposure):
+            late_ns = first.stamp.arrival_ns - first.stamp.device_ns - matcher.host_offset_ns
+            found.append((first.item, second.item, late_ns / 1e9))
+    return found
+
+
+@pytest.mark.parametrize("offset_s", [0.0, 5000.0, 2.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_device_clock_that_wraps_around_makes_no_wrong_pair(seed: int, offset_s: float) -> None:
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
+    found = host_times(matcher, wrapped(exposures(seed, 1000, offset_s=offset_s), 32))
+    assert [one for one in found if one[0] != one[1]] == []
+    assert len(found) > 700
+    assert max(abs(late_s) for *_, late_s in found) < 0.1, "the time of a shot is off by a turn of the clock"
+
+
+def test_a_single_chip_whose_clock_wraps_around_keeps_the_time() -> None:
+    chip: SingleChip[int] = SingleChip()
+    for number, exposure, stamp in wrapped(exposures(1, 600), 32):
+        if number == 0:
+            chip.push(0, stamp, exposure)
+            assert abs(stamp.arrival_ns - stamp.device_ns - chip.host_offset_ns) < 1e8
+
+
+@pytest.mark.parametrize("jump_s", [3600.0, 0.5, -0.5, -3600.0])
+def test_a_host_clock_that_is_set_makes_no_wrong_pair(jump_s: float) -> None:
+    """Stamps follow a clock that is set back at once, and one that is set forward when no older frame is compared."""
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
+    frames = [
+        (
+            chip,
+            exposure,
+            FrameStamp(stamp.id, stamp.device_ns, stamp.arrival_ns + (exposure >= 500) * int(jump_s * 1e9)),
+        )
+        for chip, exposure, stamp in exposures(3, 1500)
+    ]
+    found = host_times(matcher, iter(frames))
+    assert [one for one in found if one[0] != one[1]] == []
+    assert len(found) > 1350
+    after = [late_s for exposure, _, late_s in found if exposure >= (500 + WINDOW + CALM)]
+    assert len(after) > 500
+    assert max(abs(late_s) for late_s in after) < 0.1
+
+
+def test_ids_of_sixteen_bits_wrap_around_without_a_gap() -> None:
+    matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
+    shift = SHORT_IDS - 300
+    frames = [
+        (chip, exposure, FrameStamp((exposure + shift - 1) % SHORT_IDS + 1, stamp.device_ns, stamp.arrival_ns))
+        for chip, exposure, stamp in exposures(4, 600, lost=0.0, skipped=0.0, late_start=0)
+    ]
+    numbers = [first.number for frame in frames for first, _ in matcher.push(frame[0], frame[2], frame[1])]
+    assert numbers == list(range(600))
+    assert (matcher.missed, matcher.unpaired) == ([0, 0], [0, 0])

@@ -17,7 +17,7 @@ import quadfringe as qf
 from quadfringe.config import ChannelResponse, Device, Response
 from quadfringe.data import Calibration, ResponseCalibration, Shape
 from quadfringe.errors import ConfigError, InputError
-from quadfringe.io.export import read_npz
+from quadfringe.io.arrays import read_npz
 
 CALIBRATION = Calibration(
     camera=Device(width_px=8, height_px=6, focal_px=(20.0, 20.0), centre_px=(3.5, 2.5)),

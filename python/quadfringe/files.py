@@ -13,6 +13,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -20,18 +21,28 @@ from pathlib import Path
 
 from quadfringe.errors import InputError
 
-__all__ = ["atomic", "atomic_folder", "figures_text", "folder_for", "read_bytes", "require_suffix"]
+__all__ = ["TEXT_BYTES", "atomic", "atomic_folder", "figures_text", "folder_for", "read_bytes", "require_suffix"]
+
+FILE_BYTES = 4 << 30  # no image, shape or recording that is read as a whole is larger
+TEXT_BYTES = 64 << 20  # the same for settings and calibrations, which have up to some 100 kB
+KINDS = {stat.S_IFDIR: "folder", stat.S_IFCHR: "device", stat.S_IFBLK: "device", stat.S_IFIFO: "pipe"}
 
 
 @contextmanager
 def atomic(path: Path | str) -> Iterator[Path]:
     """Give a temporary path in the folder of `path`; rename it to `path` when the block succeeds, else remove it.
 
-    Raises `InputError` when the folder does not exist.
+    A symbolic link is followed: the file that it names is written, and the link stays. Raises `InputError` when the
+    folder does not exist, or when `path` is anything but a regular file, such as a folder or /dev/null.
     """
     path = Path(path)
+    path = Path(os.path.realpath(path)) if path.is_symlink() else path
+    if path.is_symlink():
+        raise InputError(f"{path}: is a symbolic link that leads to itself; remove it")
     if not path.parent.is_dir():
         raise InputError(f"{path}: the folder {path.parent} does not exist; create it first")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path}: is a {_kind(path.stat().st_mode)}; expected the name of a file to write")
     handle, name = tempfile.mkstemp(prefix=f".{path.stem}-", suffix=path.suffix, dir=path.parent)
     os.close(handle)
     temporary = Path(name)
@@ -70,14 +81,28 @@ def folder_for(path: Path) -> Path:
     return path
 
 
-def read_bytes(path: Path) -> bytes:
-    """Read a whole file; raise `InputError` naming the file and the reason."""
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file in it")
+def read_bytes(path: Path, most: int = FILE_BYTES) -> bytes:
+    """Read a whole file of at most `most` bytes; raise `InputError` naming the file and the reason.
+
+    Devices and pipes are refused, because they need not end.
+    """
     try:
+        found = path.stat()
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name a file in it")
+        if not path.is_file():
+            raise InputError(f"{path}: is a {_kind(found.st_mode)}; name a file")
+        if found.st_size > most:
+            raise InputError(f"{path}: has {found.st_size / 1e6:.0f} MB; expected at most {most / 1e6:.0f} MB")
         return path.read_bytes()
+    except MemoryError as error:
+        raise InputError(f"{path}: does not fit into memory") from error
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
+
+
+def _kind(mode: int) -> str:
+    return KINDS.get(stat.S_IFMT(mode), "socket")
 
 
 def require_suffix(path: Path, allowed: tuple[str, ...]) -> str:

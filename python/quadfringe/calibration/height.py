@@ -14,7 +14,8 @@ from quadfringe.calibration._params import HEIGHT_BEYOND
 from quadfringe.calibration.surfaces import fit_plane
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
-from quadfringe.io.export import read_npz, write_npz
+from quadfringe.io.arrays import read_npz
+from quadfringe.io.export import write_npz
 
 __all__ = ["Agreement", "HeightCalibration", "compare_heights", "fit_heights", "heights_over"]
 
@@ -65,8 +66,13 @@ class HeightCalibration:
             raise InputError(
                 f"{path}: not a height calibration: {', '.join(missing)} missing; make one with calibrate run --heights"
             )
-        heights, residuals = (tuple(stored[key].tolist()) for key in KEYS[2:])
-        return cls(stored["reference_rad"], stored["coefficients"], heights, residuals)
+        arrays = reference, coefficients, heights, residuals = [stored[key] for key in KEYS]
+        if [array.ndim for array in arrays] != [2, 3, 1, 1] or any(array.dtype.kind not in "fiu" for array in arrays):
+            got = ", ".join(f"{key} {array.dtype} {array.shape}" for key, array in zip(KEYS, arrays, strict=True))
+            raise InputError(f"{path}: expected arrays (H, W), (H, W, degree + 1) and two lists of numbers, got {got}")
+        if coefficients.shape[:2] != reference.shape or heights.shape != residuals.shape or not heights.size:
+            raise InputError(f"{path}: expected coefficients for every pixel, and a residual for every height")
+        return cls(reference, coefficients, tuple(heights.tolist()), tuple(residuals.tolist()))
 
 
 def fit_heights(

@@ -7,21 +7,28 @@ P_device = R P_camera + T, as `cv2.stereoCalibrate` returns them.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.config import Device
+from quadfringe.config import Device, checked
 from quadfringe.data import Calibration
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.files import atomic, read_bytes, require_suffix
+from quadfringe.io.bounded import BoundedError, Helper, Limits
 
-__all__ = ["SUFFIXES", "devices_from_opencv", "read_opencv", "write_opencv"]
+__all__ = ["SUFFIXES", "devices_from_opencv", "read_opencv", "read_opencv_by", "write_opencv"]
 
 SUFFIXES = (".yml", ".yaml", ".xml", ".json")
 DEVICES = ("camera", "projector", "infrared")
+FILE_BYTES = 16 << 20  # a calibration has some 10 kB, and with the points of all its views some MB
+DEPTH = 32  # lists and tables inside one another; OpenCV follows them until its stack is full
+BRACKETS = re.compile(rb"[\[{\]}]|</|/>|<[A-Za-z_]")
+CLOSING = (b"]", b"}", b"</", b"/>")
+LIMITS = Limits(time_s=5.0, memory_bytes=2 << 30)  # of which OpenCV itself takes half a second and 0.4 GB
 ROUNDING = 1e-6  # of matrix entries that a text file holds with fewer digits
 
 
@@ -57,21 +64,48 @@ def _matrices(name: str, device: Device) -> dict[str, NDArray[np.float64]]:
 def read_opencv(path: Path) -> Calibration:
     """Read the devices from a file of `write_opencv` or of another program; `infrared` may be absent.
 
-    Raises `InputError` naming the file and the matrix when one is missing, has another size or skew, or when the
-    distortion has more coefficients than k3, which the kernel does not model.
+    OpenCV reads the file in a helper process, because some damaged files crash it. Raises `InputError` naming the file
+    and the matrix when one is missing, has another size or skew, or when the distortion has more coefficients than k3,
+    which the kernel does not model; and for a file that OpenCV cannot read.
     """
+    with Helper(LIMITS) as helper:
+        return read_opencv_by(helper, path)
+
+
+def read_opencv_by(helper: Helper, path: Path) -> Calibration:
+    """Read as `read_opencv` does, with a helper process that reads several files."""
+    require_suffix(path, SUFFIXES)
+    if _depth(read_bytes(path, FILE_BYTES)) > DEPTH:
+        raise InputError(f"{path}: expected at most {DEPTH} lists and tables inside one another, got more")
+    try:
+        matrices = helper.run(_matrices_in, path)
+    except BoundedError as error:
+        words = f"{path}: expected an OpenCV FileStorage file; OpenCV {error} when it reads this one"
+        raise InputError(words) from error
+    return devices_from_opencv(matrices, str(path))
+
+
+def _matrices_in(path: Path) -> dict[str, NDArray[np.float64]]:
+    """Read every matrix of numbers in a file; runs in the helper process."""
     import cv2
 
-    require_suffix(path, SUFFIXES)
-    read_bytes(path)  # raises an error that names a missing file, unlike OpenCV
     try:
         storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
         nodes = {key: storage.getNode(key).mat() for key in storage.root().keys()}  # noqa: SIM118 - no mapping
         storage.release()
-    except (cv2.error, SystemError) as error:
-        raise InputError(f"{path}: expected an OpenCV FileStorage file: {error}") from error
-    matrices = {key: np.asarray(matrix, float) for key, matrix in nodes.items() if matrix is not None}
-    return devices_from_opencv(matrices, str(path))
+    except (cv2.error, SystemError, UnicodeDecodeError) as error:
+        words = str(error).strip().splitlines()[-1:]
+        raise InputError(f"{path}: expected an OpenCV FileStorage file: {''.join(words)}") from None
+    return {key: np.asarray(matrix, float) for key, matrix in nodes.items() if matrix is not None}
+
+
+def _depth(text: bytes) -> int:
+    """Give how many lists, tables and elements stand inside one another, of JSON, YAML in brackets, or XML."""
+    depth = deepest = 0
+    for found in BRACKETS.finditer(text):
+        depth += -1 if found[0] in CLOSING else 1
+        deepest = max(deepest, depth)
+    return deepest
 
 
 def devices_from_opencv(matrices: dict[str, NDArray[np.float64]], source: str = "matrices") -> Calibration:
@@ -100,7 +134,8 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
             raise ConfigError(f"{source}: R_{name}_camera: expected a rotation matrix, got {rotation.tolist()}")
         translation = _matrix(f"T_{name}_camera", (3, 1), matrices, source)[:, 0]
         pose = {"rotation": rotation.tolist(), "translation_mm": translation.tolist()}
-    return Device.model_validate(
+    return checked(
+        Device,
         {
             "width_px": round(size[0]),
             "height_px": round(size[1]),
@@ -108,7 +143,8 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
             "centre_px": (matrix[0, 2], matrix[1, 2]),
             "distortion": np.pad(distortion, (0, 5 - distortion.size)).tolist(),
             **pose,
-        }
+        },
+        f"{source}, {name}",
     )
 
 
@@ -119,4 +155,6 @@ def _matrix(
         raise ConfigError(f"{source}: {key} is missing; the file has {', '.join(sorted(matrices)) or 'no matrices'}")
     if matrices[key].size != shape[0] * shape[1]:
         raise ConfigError(f"{source}: {key}: expected {shape[0]} x {shape[1]}, got {matrices[key].shape}")
+    if not np.isfinite(matrices[key]).all():
+        raise ConfigError(f"{source}: {key}: expected finite numbers, got {matrices[key].tolist()}")
     return matrices[key].reshape(shape)

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
 from typing import Any, TypeVar
+from unicodedata import bidirectional, category
 
 import typer
 
@@ -16,6 +17,7 @@ from quadfringe.files import atomic, figures_text
 __all__ = [
     "caution",
     "complain",
+    "printable",
     "progress",
     "rows",
     "say",
@@ -27,21 +29,36 @@ __all__ = [
 ]
 
 Item = TypeVar("Item")
+DIRECTIONS = ("LRE", "RLE", "LRO", "RLO", "PDF", "LRI", "RLI", "FSI", "PDI")  # texts that read otherwise than they are
 
 
 def complain(message: str) -> None:
     """Print an error on standard error."""
-    typer.echo(f"error: {message}", err=True)
+    typer.echo(printable(f"error: {message}"), err=True)
 
 
 def caution(message: str) -> None:
     """Print a warning on standard error."""
-    typer.echo(f"warning: {message}", err=True)
+    typer.echo(printable(f"warning: {message}"), err=True)
 
 
 def say(message: str, json: Path | None = None) -> None:
     """Print a message for a person; on standard error when `json` occupies standard output."""
-    typer.echo(message, err=_is_stdout(json))
+    typer.echo(printable(message), err=_is_stdout(json))
+
+
+def printable(text: str) -> str:
+    """Escape what a terminal would obey instead of showing it: texts of files, and names of files, reach messages."""
+    return "".join(letter if letter in "\n\t" or _shown(letter) else _escaped(letter) for letter in text)
+
+
+def _shown(letter: str) -> bool:
+    """Say whether a letter is shown: no control, no change of the direction of writing, no half of a letter."""
+    return category(letter) not in ("Cc", "Cs") and bidirectional(letter) not in DIRECTIONS
+
+
+def _escaped(letter: str) -> str:
+    return letter.encode("unicode_escape").decode()
 
 
 def _is_stdout(json: Path | None) -> bool:
@@ -59,14 +76,16 @@ def rows(
     """Print a table with a title and column heads, first column left-aligned; on standard error as in `say`."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     drawn = Table()
     for column, name in enumerate(head):
         drawn.add_column(name, justify="right" if column else "left")
     for line in lines:
-        drawn.add_row(*(f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in line))
+        words = (f"{cell:.4g}" if isinstance(cell, float) else str(cell) for cell in line)
+        drawn.add_row(*(Text(printable(one)) for one in words))  # a Text is not markup, whatever is in brackets
     console = Console(stderr=_is_stdout(json))
-    console.print(title, highlight=False, soft_wrap=True)
+    console.print(Text(printable(title)), highlight=False, soft_wrap=True)
     console.print(drawn)
 
 

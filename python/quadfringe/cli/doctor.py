@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -51,13 +52,13 @@ def doctor(
     from quadfringe.config import Fringes, checked
     from quadfringe.data import Calibration
     from quadfringe.decoding import Plan
-    from quadfringe.doctor import examine_calibration, examine_installation, examine_shot
+    from quadfringe.doctor import examine_calibration, examine_digest, examine_installation, examine_shot
 
     given = _sorted_paths(files or [])
     calibration = None if given.calibration is None else Calibration.load(given.calibration)
     found: list[Finding] = [] if files else examine_installation()
-    if calibration is not None:
-        found += examine_calibration(calibration)
+    if calibration is not None and given.calibration is not None:
+        found += [examine_digest(given.calibration), *examine_calibration(calibration)]
     if given.shot is not None:
         plan = Plan(projector_width, checked(Fringes, {"numbers": fringes}, "--fringes"), calibration)
         found += examine_shot(_shot_in(given.shot, bayer, bits), plan)
@@ -100,6 +101,11 @@ def _report(found: Sequence[Finding], json: Path | None) -> None:
             say(f"        fix: {one.fix}", json)
     faults, warnings = (sum(one.grade == grade for one in found) for grade in ("fault", "warning"))
     say(f"{faults} faults, {warnings} warnings", json)
-    write_record({"findings": [vars(one) for one in found]}, json)
+    write_record({"findings": [vars(one) | {"value": _finite(one.value)} for one in found]}, json)
     if faults:
         raise typer.Exit(FAULT)
+
+
+def _finite(value: float | None) -> float | None:
+    """Give a number that JSON can hold: a calibration may be infinitely wrong."""
+    return value if value is not None and isfinite(value) else None

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from quadfringe.cli._output import say
+
 if TYPE_CHECKING:
     from quadfringe.calibration.targets import Target
 
@@ -92,9 +94,9 @@ def target(
         temporary.write_text(board.model_dump_json(indent=2, exclude_none=True) + "\n")
     across, down = board.size_mm
     paper = f"{size.width_mm:g} x {size.height_mm:g} mm"
-    typer.echo(f"{out}: board {across:g} x {down:g} mm on {paper}; {described} describes it")
+    say(f"{out}: board {across:g} x {down:g} mm on {paper}; {described} describes it")
     if suffix != ".png":
-        typer.echo("print at 100 %, not fitted to the page; then measure the bar and the distance of the outer points")
+        say("print at 100 %, not fitted to the page; then measure the bar and the distance of the outer points")
 
 
 @dataclass(frozen=True)

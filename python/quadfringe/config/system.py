@@ -24,7 +24,7 @@ from quadfringe.config.devices import Device
 from quadfringe.config.projectors import ProjectorsConfig
 from quadfringe.config.scene import SceneConfig
 from quadfringe.errors import ConfigError, InputError
-from quadfringe.files import read_bytes
+from quadfringe.files import TEXT_BYTES, read_bytes
 
 __all__ = ["SystemConfig", "check_system", "load_system"]
 
@@ -76,9 +76,12 @@ def load_system(path: Path | str) -> SystemConfig:
         if not (path / FILE).is_file():
             raise InputError(f"{path}: a folder without {FILE}; name the system file")
         path /= FILE
+    text = read_bytes(path, TEXT_BYTES)
     try:
-        values = tomllib.loads(read_bytes(path).decode())
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        values = tomllib.loads(text.decode())
+    except RecursionError:
+        raise ConfigError(f"{path}: lists and tables are nested too deep; expected at most four levels") from None
+    except ValueError as error:  # TOML, UTF-8, and integers of thousands of digits
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
     config = checked(SystemConfig, values, str(path))
     return _with_absolute_paths(config, path.resolve().parent)

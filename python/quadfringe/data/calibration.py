@@ -4,18 +4,31 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal, Self
 
 from pydantic import Field
 
-from quadfringe.config import Affine, Device, Matrix4, Model, Response, ResponseChoice, Row4, checked, shortened
+from quadfringe.config import Affine, Device, Matrix4, Model, Response, ResponseChoice, Row4, brief, checked, shortened
 from quadfringe.errors import ConfigError
-from quadfringe.files import atomic, read_bytes, require_suffix
+from quadfringe.files import TEXT_BYTES, atomic, read_bytes, require_suffix
+from quadfringe.io.texts import json_of
 
-__all__ = ["Calibration", "CalibrationRecord", "CalibrationStep", "ResponseCalibration", "conditioning"]
+__all__ = [
+    "DIGEST",
+    "Calibration",
+    "CalibrationRecord",
+    "CalibrationStep",
+    "ResponseCalibration",
+    "conditioning",
+    "stored_values",
+]
 
 FILE = "calibration.json"  # in a folder that holds a calibration
+DIGEST = "digest"  # key of a file, not of the model: a changed copy of a model has no digest that could be wrong
+EXACT = 1 << 53  # integers below have a float of the same value
 
 
 def _short_lists(text: str) -> str:
@@ -30,22 +43,66 @@ class Stored(Model):
         """Write the model as JSON, whole or not at all."""
         require_suffix(Path(path), (".json",))
         with atomic(Path(path)) as temporary:
-            temporary.write_text(_short_lists(self.model_dump_json(indent=2, exclude_none=True)) + "\n")
+            temporary.write_text(_short_lists(self._text()) + "\n")
+
+    def _text(self) -> str:
+        return self.model_dump_json(indent=2, exclude_none=True)
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
         """Read a model from JSON; raises `InputError` for no file, `ConfigError` that lists every problem in it."""
-        text = read_bytes(Path(path))
-        try:
-            values = json.loads(text)
-        except ValueError as error:
-            raise ConfigError(f"{path}: not valid JSON: {error}") from error
-        if not isinstance(values, dict):
-            raise ConfigError(f"{path}: expected a JSON object, got {type(values).__name__}")
-        return checked(cls, values, str(path))
+        return checked(cls, stored_values(path), str(path))
 
 
-class ResponseCalibration(Stored, Response):
+class Measured(Stored):
+    """A result of measurements, which nobody edits: its file ends with a digest that tells a changed file.
+
+    A file without one, of an earlier version or written by hand, is read as well.
+    """
+
+    def _text(self) -> str:
+        values = json.loads(super()._text())
+        return json.dumps(values | {DIGEST: digest_of(values)}, indent=2, ensure_ascii=False)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Self:
+        """Read a model as `Stored.load` does; raises `ConfigError` also when the digest shows that it was changed."""
+        stored = stored_values(path)
+        values = {name: value for name, value in stored.items() if name != DIGEST}
+        loaded = checked(cls, values, str(path))
+        if DIGEST in stored and stored[DIGEST] != digest_of(values):
+            raise ConfigError(
+                f"{path}: was changed after it was saved: its {DIGEST} is {brief(stored[DIGEST])}, that of its values "
+                f"{digest_of(values)}; restore the file, or, if the change is meant, remove the key {DIGEST}"
+            )
+        return loaded
+
+
+def stored_values(path: Path | str) -> dict[str, Any]:
+    """Read the JSON object in a file; raises `InputError` for no file, `ConfigError` for anything else in it."""
+    values = json_of(read_bytes(Path(path), TEXT_BYTES), str(path))
+    if not isinstance(values, dict):
+        raise ConfigError(f"{path}: expected a JSON object, got {type(values).__name__}")
+    return values
+
+
+def digest_of(values: Mapping[str, Any]) -> str:
+    """Give the SHA-256 of JSON values; it depends on the values and neither on their order nor on their layout."""
+    text = json.dumps(_as_floats(values), sort_keys=True, separators=(",", ":"))
+    return f"sha256:{sha256(text.encode()).hexdigest()}"
+
+
+def _as_floats(value: Any) -> Any:
+    """Write 5 as 5.0, because programs that lay a file out anew differ in that."""
+    if isinstance(value, dict):
+        return {key: _as_floats(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_as_floats(inner) for inner in value]
+    exact = isinstance(value, int) and not isinstance(value, bool) and abs(value) < EXACT
+    return float(value) if exact else value
+
+
+class ResponseCalibration(Measured, Response):
     """Responses of the channels, and what they were estimated from."""
 
     schema_version: Literal[1] = Field(default=1, description="Version of this format.")
@@ -78,7 +135,7 @@ class CalibrationRecord(Model):
         return all(step.good for step in self.steps)
 
 
-class Calibration(Stored):
+class Calibration(Measured):
     """The data that turn a raw shot into millimetres: the devices, and the defects of the channels (R, G, B, IR).
 
     `response` is corrected before `crosstalk`, `projector_response` after it.

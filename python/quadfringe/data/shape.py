@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.config import checked
+from quadfringe.config import brief, checked
 from quadfringe.data._checks import check_maps
 from quadfringe.data.calibration import Calibration
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
+from quadfringe.io.arrays import read_npz
+from quadfringe.io.texts import json_of
 
 __all__ = ["SUFFIXES", "Shape", "xyz_mm_of"]
 
@@ -147,8 +149,6 @@ class Shape:
     @classmethod
     def load(cls, path: Path | str) -> Shape:
         """Read what `save` wrote as NPZ; raises `InputError` for any other file."""
-        from quadfringe.io.export import read_npz
-
         path = Path(path)
         if path.suffix.lower() in SUFFIXES[1:]:
             raise InputError(f"{path}: expected a shape saved as .npz; .ply and .tif hold only a part of one")
@@ -156,13 +156,37 @@ class Shape:
         missing = [name for name in MAPS if name not in stored]
         if missing:
             raise InputError(f"{path}: not a saved shape: no {', '.join(missing)}")
+        maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
+        if other := [f"{name} of {values.dtype}" for name, values in maps.items() if values.dtype.kind != "f"]:
+            raise InputError(f"{path}: expected maps of float32, got {', '.join(other)}")
         calibration = None
         if "calibration" in stored:
-            values = json.loads(str(stored["calibration"]))
-            calibration = checked(Calibration, values, f"{path}, calibration")
-        config = json.loads(str(stored["config"])) if "config" in stored else {}
-        maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
-        return cls(**maps, config=config, calibration=calibration)
+            calibration = checked(Calibration, _table(stored, "calibration", path), f"{path}, calibration")
+        config = _settings(stored, path)
+        try:
+            return cls(**maps, config=config, calibration=calibration)
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from error
+
+
+def _table(stored: Mapping[str, NDArray[Any]], name: str, path: Path) -> dict[str, Any]:
+    """Give the JSON object in a member of an NPZ file."""
+    member = stored[name]
+    if member.dtype.kind != "U" or member.ndim:
+        raise InputError(f"{path}, {name}: expected a text, got {member.dtype} {member.shape}")
+    values = json_of(str(member), f"{path}, {name}")
+    if not isinstance(values, dict):
+        raise InputError(f"{path}, {name}: expected a JSON object, got {type(values).__name__}")
+    return values
+
+
+def _settings(stored: Mapping[str, NDArray[Any]], path: Path) -> dict[str, Any]:
+    """Give the settings that made a saved shape; `Shape` itself relies on these two types."""
+    config = _table(stored, "config", path) if "config" in stored else {}
+    for name, kind in (("decode", dict), ("warnings", list)):
+        if not isinstance(config.get(name, kind()), kind):
+            raise InputError(f"{path}, config: {name}: expected a {kind.__name__}, got {brief(config[name])}")
+    return config
 
 
 def xyz_mm_of(shape: Shape) -> Map:

@@ -72,6 +72,11 @@ class KernelDecoder:
         decode = self.plan.decode.model_copy(update={"method": method})
         return self.with_plan(replace(self.plan, decode=decode))
 
+    def with_numbers(self, numbers: tuple[float, float, float]) -> KernelDecoder:
+        """Give a decoder of the same plan for other fringe numbers."""
+        fringes = self.plan.fringes.model_copy(update={"numbers": numbers})
+        return KernelDecoder(self._size, self._full_scale, replace(self.plan, fringes=fringes))
+
     def for_rows(self, first: int, count: int) -> KernelDecoder:
         """Give a decoder of the same plan for some rows of the images."""
         calibration = self.plan.calibration

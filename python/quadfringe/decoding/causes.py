@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from quadfringe import _core
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params, symptoms
 from quadfringe.decoding.cause import Cause
@@ -15,7 +16,22 @@ from quadfringe.decoding.fringe_fit import Fit, fit_fringes
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.symptoms import Closure
 
-__all__ = ["after_order", "before_order", "blur", "channels_fit", "registration", "wrong_bits", "wrong_numbers"]
+__all__ = [
+    "NUMBERS_FIX",
+    "after_order",
+    "before_order",
+    "blur",
+    "channels_fit",
+    "listed",
+    "other_numbers",
+    "registration",
+    "wrong_bits",
+    "wrong_numbers",
+]
+
+FringeNumbers = tuple[float, float, float]
+NUMBERS_FIX = "give the numbers that were projected (--fringes), or project these"
+SMALLEST_ROOT, LARGEST_ROOT = 4, 12  # 16, 15, 12 and 144, 143, 132: coarser or finer fringes measure nothing
 
 
 def before_order(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
@@ -87,12 +103,41 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
     if not params.RATIO_OFF < _off(closure) < params.RATIO_STRANGE:
         return None
     first, second, third = plan.fringes.numbers
-    words = f"the fringe numbers {first:g}, {second:g}, {third:g} are not those of this shot: for {first:g} fringes of "
+    words = f"the fringe numbers {listed(plan.fringes.numbers)} are not those of this shot: for {first:g} fringes of "
     words += f"red and blue it has {closure.green * second:.2f} of green and {closure.infrared * third:.2f} of infrared"
-    root = 1 / max(1 - closure.infrared * third / first, 1e-3)
-    n = round(root) ** 2
-    fits = f", which fits {n}, {n - 1}, {n - round(root)}" if abs(root - round(root)) < 0.25 else ""
-    return Cause("fringe numbers", words + fits, "give the numbers that were projected (--fringes), or project these")
+    root = _root(plan, closure)
+    fits = f", which fits {listed(_family(round(root)))}" if abs(root - round(root)) < 0.25 else ""
+    return Cause("fringe numbers", words + fits, NUMBERS_FIX)
+
+
+def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
+    """Give the numbers n, n - 1, n - k of k^2 = n next to the ratio of infrared to red, without those of the plan."""
+    root = _root(plan, closure)
+    families = [_family(whole) for whole in {int(root), int(root) + 1} if SMALLEST_ROOT <= whole <= LARGEST_ROOT]
+    return [numbers for numbers in families if numbers != plan.fringes.numbers and _covers(numbers, plan)]
+
+
+def _root(plan: Plan, closure: Closure) -> float:
+    """Give the k of n, n - 1, n - k with n = k^2, for which infrared has this frequency relative to red."""
+    return 1 / max(1 - closure.infrared * plan.fringes.numbers[2] / plan.fringes.numbers[0], 1e-3)
+
+
+def _family(root: int) -> FringeNumbers:
+    return float(root**2), float(root**2 - 1), float(root**2 - root)
+
+
+def _covers(numbers: FringeNumbers, plan: Plan) -> bool:
+    """Say whether these numbers distinguish the columns of the projector."""
+    try:
+        _core.check_code(numbers, plan.projector_width_px)
+    except ValueError:
+        return False
+    return True
+
+
+def listed(numbers: FringeNumbers) -> str:
+    """Write three fringe numbers."""
+    return ", ".join(f"{number:g}" for number in numbers)
 
 
 def _off(closure: Closure) -> float:

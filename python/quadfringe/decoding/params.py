@@ -27,14 +27,34 @@ SAMPLES_MIN = 100
 # know to a few px at the border. A larger number misses small shifts of the rows.
 ROWS_PX = 8.0
 # Median angle in degrees between the surface and the line of sight from which a calibration is doubted. A projector
-# from another side has 61 or more. A smaller angle warns of objects that are seen at a slant.
-TILT_DEG = 55.0
-# Smallest distance of camera and projector, mm. Follows from the lenses, which are wider than that; a bench of 250 mm
-# has 0.25 when its calibration is in m.
-BASELINE_MM = 2.0
+# from another side has 61 or more, one whose z has the opposite sign 53. A smaller angle warns of objects that are
+# seen at a slant.
+TILT_DEG = 45.0
 # Factor by which the median depth may leave the depths of the board in the calibration. Not measured: between them
 # the calibration is tested, and up to half as far again its lens model still holds.
 CALIBRATED_FACTOR = 1.5
+
+# --- Numbers of a calibration, without a shape
+
+# Focal lengths in units of the longer side of the image: least and largest. Follows from fields of view of 136 and 0.6
+# degrees. Narrower limits refuse rare lenses, wider ones pass a focal length in mm, which is 0.02 sides.
+FOCAL_SIZES = 0.2, 100.0
+# Largest ratio of the focal lengths along x and y. Follows from pixels, which are square, and mirrors in a diamond
+# array, whose columns are half as far apart as their rows. A larger ratio passes a digit too many.
+FOCAL_ASPECT = 2.5
+# Distance of the principal point from the middle, in halves of the image. Follows from projectors that shine upwards,
+# which have up to 1.5. A larger distance passes a digit too many.
+CENTRE_HALVES = 3.0
+# How far a lens may move a point, as a share of its radius: everywhere, and more with the square of the radius in focal
+# lengths. Follows from fisheye lenses, r = atan(R), whose share is R^2 / 3. Larger numbers miss a digit too many.
+BENT_ALL, BENT_WIDE = 0.03, 0.5
+# Distances of camera and projector, mm, below the first and above the last of which a shape is refused, and below the
+# second of which it carries a warning. Follows from lenses, which are 12 mm wide or more, and mostly 30; a bench of
+# 250 mm has 0.25 in m, 25 in cm and 250,000 in um. Closer limits refuse unusual benches.
+BASELINES_MM = 2.0, 30.0, 10_000.0
+# Angle in degrees and distance in mm between the two projectors from which a shape, decoded as of a coaxial pair,
+# contradicts them. Not measured: three times what makes a fault of the doctor. Smaller ones warn of pairs that work.
+PAIR_DEG, PAIR_MM = 18.0, 45.0
 
 # --- Fringe numbers and registration: closure of the three phases
 

@@ -8,6 +8,7 @@ the projector. A few thousand samples decide, so that the time of a decode hardl
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +16,14 @@ from numpy.typing import NDArray
 from quadfringe.data import Calibration, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.device_limits import impossible_devices
 from quadfringe.decoding.fringe_fit import pixels_of
 
-__all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "within_depths"]
+__all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "mirrored", "within_depths"]
 
 # Maps without data outside the range; quality and modulation are known wherever there is light.
 BOUNDED = ("phase_rad", "column_px", "xyz_mm", "wrong_order_probability", "uncertainty_mm")
+FAR_MM = 1e9  # longer than any distance, and a number that float takes
 CALIBRATE = "decode with the calibration of this bench, or calibrate again: quadfringe calibrate"
 FLIP = (
     "switch off mirroring and rotation in the camera's settings, or flip the images back; if they are as the camera "
@@ -80,16 +83,39 @@ def implausible(shape: Shape) -> list[Cause]:
     """Name what the calibration contradicts in a shape, the likeliest first; empty when nothing does."""
     if shape.calibration is None or shape.xyz_mm is None:
         return []
-    if units := _units(shape.calibration):
-        return [units]
+    devices = impossible_devices(shape.calibration, coaxial=_coaxial(shape))
+    if any(cause.fatal for cause in devices):
+        return devices
+    return [*devices, *_contradicted(shape, shape.calibration)]
+
+
+def mirrored(shape: Shape) -> Cause | None:
+    """Find images that are mirrored or turned; the direction of the columns shows it even where orders are wrong."""
+    found = geometry_of(shape)
+    return None if found is None else _backwards(found)
+
+
+def _backwards(found: Geometry) -> Cause | None:
+    if found.backwards <= params.REFUSED_SHARE:
+        return None
+    words = f"fringes run backwards in {found.backwards:.0%} of the image: the calibration says that the projector "
+    words += "columns grow the other way, so the images are mirrored left to right or turned by 180 degrees"
+    return Cause("mirrored or rotated", words, FLIP)
+
+
+def _coaxial(shape: Shape) -> bool:
+    """Say whether the shape was decoded with the infrared projector as coaxial with the visible one."""
+    predeformed = shape.config.get("fringes", {}).get("predeformed_z_mm") is not None
+    return not predeformed and shape.config.get("decode", {}).get("unwrapping") != "pair"
+
+
+def _contradicted(shape: Shape, calibration: Calibration) -> list[Cause]:
     found = geometry_of(shape)
     if found is None:
         return []
-    if found.backwards > params.REFUSED_SHARE:
-        words = f"fringes run backwards in {found.backwards:.0%} of the image: the calibration says that the projector "
-        words += "columns grow the other way, so the images are mirrored left to right or turned by 180 degrees"
-        return [Cause("mirrored or rotated", words, FLIP)]
-    return [*_impossible(found), *_doubtful(found, shape.calibration)]
+    if backwards := _backwards(found):
+        return [backwards]
+    return [*_impossible(found), *_doubtful(found, calibration)]
 
 
 def within_depths(shape: Shape, range_mm: tuple[float, float] | None) -> list[Cause]:
@@ -117,18 +143,17 @@ def calibrated_depths_mm(calibration: Calibration) -> tuple[float, float] | None
     """Give the least and largest depth of the boards that a calibration was made from, if its record holds them."""
     steps = () if calibration.record is None else calibration.record.steps
     poses = [pose for step in steps if step.name == "poses" for pose in step.settings.values()]
-    placed = [pose["T_camera_board"] for pose in poses if isinstance(pose, dict) and "T_camera_board" in pose]
-    depths = [float(np.asarray(pose, np.float64)[2, 3]) for pose in placed]
+    placed: list[Any] = [pose.get("T_camera_board") for pose in poses if isinstance(pose, dict)]
+    depths = [float(pose[2][3]) for pose in placed if _is_pose(pose)]
     return (min(depths), max(depths)) if depths else None
 
 
-def _units(calibration: Calibration) -> Cause | None:
-    devices = calibration.projector
-    apart = float(np.linalg.norm(devices.translation_mm))
-    if not 0 < apart < params.BASELINE_MM:
-        return None
-    words = f"the calibration puts the projector {apart:.3g} mm from the camera, nearer than their lenses allow"
-    return Cause("calibration units", words, "give translation_mm in mm: multiply it by 1000 if it is in m")
+def _is_pose(value: Any) -> bool:
+    """Say whether this is a matrix of 4 x 4 numbers; a record may hold anything, as other programs write it too."""
+    if not (isinstance(value, (list, tuple)) and len(value) == 4):
+        return False
+    rows = [row for row in value if isinstance(row, (list, tuple)) and len(row) == 4]
+    return len(rows) == 4 and all(isinstance(one, (int, float)) and abs(one) < FAR_MM for row in rows for one in row)
 
 
 def _impossible(found: Geometry) -> list[Cause]:

@@ -21,7 +21,7 @@ __all__ = ["Closure", "bits_in_use", "brightness", "closure_of", "rows_match", "
 
 Complex = NDArray[np.complex128]
 Map = NDArray[np.float32]
-DEPTHS = (8, 10, 12)  # bits that cameras deliver in 16-bit files; 14 cannot be told from a dim image of 16
+DEPTHS = (8, 10, 12)  # bits that cameras deliver in 16-bit files; 14 show by clipped pixels only
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,8 @@ def bits_in_use(shot: AnyShot) -> int | None:
     if shot.ir.dtype != np.uint16 or shot.full_scale_value < np.iinfo(np.uint16).max:
         return None
     top = max(int(image.max()) for image in shot.images.values())
-    return next((bits for bits in DEPTHS if 0 < top < 2**bits), None)
+    clipped = 14 if top == 2**14 - 1 and sum(int((image == top).sum()) for image in shot.images.values()) > 1 else None
+    return next((bits for bits in DEPTHS if 0 < top < 2**bits), clipped)
 
 
 def brightness(shot: AnyShot) -> dict[str, float]:

@@ -1,8 +1,8 @@
 """Diagnosis: what is wrong with a shot, a calibration or the installation, and how to fix it."""
 
-from quadfringe.doctor.calibration import examine_calibration
+from quadfringe.doctor.calibration import examine_calibration, examine_digest
 from quadfringe.doctor.finding import Finding
 from quadfringe.doctor.installation import examine_installation
 from quadfringe.doctor.shot import examine_shot
 
-__all__ = ["Finding", "examine_calibration", "examine_installation", "examine_shot"]
+__all__ = ["Finding", "examine_calibration", "examine_digest", "examine_installation", "examine_shot"]

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from datetime import UTC, datetime
+from pathlib import Path
 
 import numpy as np
 
 from quadfringe.config import ChannelResponse, Device, Response
 from quadfringe.data import Calibration
-from quadfringe.doctor.finding import Finding, graded
+from quadfringe.data.calibration import DIGEST, stored_values
+from quadfringe.decoding.device_limits import impossible_devices, pair_offset
+from quadfringe.doctor.finding import Finding, graded, told
 
-__all__ = ["examine_calibration"]
+__all__ = ["examine_calibration", "examine_digest"]
 
 # Limits for a warning and for a fault.
 AGE_DAYS = (90.0, 730.0)  # a bench drifts with temperature and transport within months
@@ -26,14 +29,16 @@ AGAIN = "calibrate again: quadfringe calibrate"
 
 def examine_calibration(calibration: Calibration) -> list[Finding]:
     """Check the record and the numbers of a calibration."""
-    return [
-        *_record(calibration),
-        _baseline(calibration),
-        *(_device(name, getattr(calibration, name)) for name in ("camera", "projector")),
-        *_pair(calibration),
-        *_responses(calibration),
-        _crosstalk(calibration),
-    ]
+    with np.errstate(all="ignore"):  # numbers that no bench has overflow; the findings say so
+        return [
+            *told(impossible_devices(calibration, coaxial=False)),
+            *_record(calibration),
+            _baseline(calibration),
+            *(_device(name, getattr(calibration, name)) for name in ("camera", "projector")),
+            *_pair(calibration),
+            *_responses(calibration),
+            _crosstalk(calibration),
+        ]
 
 
 def _record(calibration: Calibration) -> list[Finding]:
@@ -41,14 +46,37 @@ def _record(calibration: Calibration) -> list[Finding]:
     if record is None:
         words = "the file has no record of how it was made"
         return [Finding("record", "warning", words, f"{AGAIN}, which records inputs and residuals")]
-    age_days = (datetime.now(UTC) - datetime.fromisoformat(record.made_utc)).total_seconds() / 86400
     words = f"made {record.made_utc} by quadfringe {record.quadfringe_version} for {record.rig}"
     fix = f"test it with quadfringe accept, and {AGAIN} when a limit is exceeded"
-    found = [graded("age", age_days, AGE_DAYS, words, fix)]
+    age_days = _age_days(record.made_utc)
+    if age_days is None:
+        found = [Finding("age", "warning", f"{words}; expected a time such as 2026-01-31T12:00:00+00:00", fix)]
+    else:
+        found = [graded("age", age_days, AGE_DAYS, words, fix)]
     for step in record.steps:
         fix = "" if step.good else f"take the captures of this step again as described, then {AGAIN}"
         found.append(Finding(f"step {step.name}", "good" if step.good else "fault", step.verdict, fix))
     return found
+
+
+def examine_digest(path: Path) -> Finding:
+    """Say whether the file of a calibration, which was read before, has a digest that tells a change."""
+    if DIGEST in stored_values(path):
+        return Finding("digest", "good", f"{path} is unchanged since it was saved")
+    words = f"{path} has no digest, so that a changed number cannot be told"
+    return Finding(
+        "digest", "warning", words, "check its numbers, and save it again: Calibration.load(FILE).save(FILE)"
+    )
+
+
+def _age_days(made_utc: str) -> float | None:
+    """Give the days since a time, which is UTC unless it says otherwise; None when it is not a time."""
+    try:
+        made = datetime.fromisoformat(made_utc)
+    except ValueError:
+        return None
+    made = made if made.tzinfo else made.replace(tzinfo=UTC)
+    return (datetime.now(UTC) - made).total_seconds() / 86400
 
 
 def _baseline(calibration: Calibration) -> Finding:
@@ -77,15 +105,10 @@ def _device(name: str, device: Device) -> Finding:
 def _pair(calibration: Calibration) -> list[Finding]:
     if calibration.infrared is None:
         return [Finding("coaxial pair", "good", "the calibration has one projector, so both count as coaxial")]
-    first, second = calibration.projector, calibration.infrared
-    turn = np.array(second.rotation) @ np.array(first.rotation).T
-    shift = np.array(second.translation_mm) - turn @ np.array(first.translation_mm)
-    angle = float(np.degrees(np.arccos(np.clip((np.trace(turn) - 1) / 2, -1, 1))))
-    words = (
-        f"rotated by {angle:.3f} degrees and shifted by {float(np.linalg.norm(shift)):.3f} mm relative to each other"
-    )
+    offset = pair_offset(calibration.projector, calibration.infrared)
+    words = f"rotated by {offset.angle_deg:.3f} degrees and shifted by {offset.shift_mm:.3f} mm relative to each other"
     fix = "align the projectors at the beam splitter, or pre-deform the infrared pattern (--predeformed-z-mm)"
-    return [graded("coaxial pair", max(angle / 2.0, float(np.linalg.norm(shift)) / 5.0), PAIR, words, fix)]
+    return [graded("coaxial pair", max(offset.angle_deg / 2.0, offset.shift_mm / 5.0), PAIR, words, fix)]
 
 
 def _responses(calibration: Calibration) -> list[Finding]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Finding", "Grade", "graded"]
+from quadfringe.decoding.cause import Cause
+
+__all__ = ["Finding", "Grade", "graded", "told"]
 
 Grade = Literal["good", "warning", "fault"]
 
@@ -33,3 +36,10 @@ def graded(name: str, value: float, limits: tuple[float, float], found: str, fix
     beyond = [sign * value > sign * limit for limit in (warning, fault)]
     grade: Grade = "fault" if beyond[1] else "warning" if beyond[0] else "good"
     return Finding(name, grade, found, "" if grade == "good" else fix, value)
+
+
+def told(causes: Iterable[Cause | None]) -> list[Finding]:
+    """Give the causes that a test found as findings: a fault when the shape cannot be trusted, else a warning."""
+    return [
+        Finding(cause.name, "fault" if cause.fatal else "warning", cause.found, cause.fix) for cause in causes if cause
+    ]

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
 from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import blur, registration, wrong_bits
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
 from quadfringe.decoding.plan import stated_response
 from quadfringe.decoding.plausibility import geometry_of, implausible
 from quadfringe.decoding.symptoms import brightness, closure_of, saturation
-from quadfringe.doctor.finding import Finding, graded
+from quadfringe.doctor.finding import Finding, graded, told
 from quadfringe.errors import DecodeError, DecodeWarning
 
 __all__ = ["examine_shot"]
@@ -75,10 +74,10 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"
         few = Finding("fringes", "warning", words, "fill more of the field with the object")
-        return [few, *_told(named)]
+        return [few, *told(named)]
     named.append(blur(shot, fit, plan, closure))
     return [
-        *_told(named),
+        *told(named),
         *_amplitudes(fit, brightness(shot)),
         _linearity(fit, plan),
         _crosstalk(fit, plan),
@@ -86,18 +85,14 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     ]
 
 
-def _told(causes: Iterable[Cause | None]) -> list[Finding]:
-    return [
-        Finding(cause.name, "fault" if cause.fatal else "warning", cause.found, cause.fix) for cause in causes if cause
-    ]
-
-
 def _bits(shot: AnyShot) -> list[Finding]:
-    return _told([wrong_bits(shot)])
+    return told([wrong_bits(shot)])
 
 
 def _geometry(shape: Shape) -> list[Finding]:
     """Check a shape against its calibration; say what a calibration cannot show."""
+    if doubts := told(implausible(shape)):
+        return doubts
     measured = geometry_of(shape)
     if measured is None:
         return []
@@ -105,7 +100,7 @@ def _geometry(shape: Shape) -> list[Finding]:
         "columns run as the calibration demands, and points lie inside the image of the projector. Fringes along the "
     )
     words += "rows do not show images that are flipped up and down or moved along y: check a mark at the upper edge"
-    return _told(implausible(shape)) or [Finding("geometry", "good", words, value=measured.backwards)]
+    return [Finding("geometry", "good", words, value=measured.backwards)]
 
 
 def _saturation(shot: AnyShot) -> list[Finding]:
@@ -156,8 +151,8 @@ def _amplitudes(fit: Fit, tops: Mapping[str, float]) -> list[Finding]:
         words = f"the fringes have an amplitude of {amplitude:.1%} of full scale"
         fix = f"focus the {name} projector and the camera, darken the room, or increase the {name} light"
         dark_object = contrast >= FULL_CONTRAST and tops[name] >= BRIGHTNESS[0] and amplitude >= CONTRAST[1]
-        told = graded(f"modulation {name}", float(amplitude), CONTRAST, words, fix)
-        found.append(Finding(told.name, "good", words, value=told.value) if dark_object else told)
+        one = graded(f"modulation {name}", float(amplitude), CONTRAST, words, fix)
+        found.append(Finding(one.name, "good", words, value=one.value) if dark_object else one)
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -12,14 +11,20 @@ from numpy.typing import NDArray
 
 from quadfringe.config import load_system
 from quadfringe.data import Calibration, ResponseCalibration
-from quadfringe.errors import ConfigError, InputError
-from quadfringe.files import read_bytes
-from quadfringe.io.export import read_npy, read_npz
+from quadfringe.data.calibration import DIGEST
+from quadfringe.errors import InputError
+from quadfringe.files import TEXT_BYTES, read_bytes
+from quadfringe.io.arrays import read_npy, read_npz
 from quadfringe.io.images import read_image
+from quadfringe.io.texts import json_of
 from quadfringe.recording import Recording
 
 __all__ = ["lines_about"]
 
+DIGEST_FOUND = {
+    True: "unchanged since it was saved",
+    False: "without a digest, so a change since it was saved cannot be told",
+}
 IMAGES = (".png", ".tif", ".tiff", ".bmp")
 
 
@@ -61,10 +66,7 @@ def _array(name: str, array: NDArray[Any]) -> str:
 
 
 def _json(path: Path) -> list[str]:
-    try:
-        values = json.loads(read_bytes(path))
-    except ValueError as error:
-        raise ConfigError(f"{path}: not valid JSON: {error}") from error
+    values = json_of(read_bytes(path, TEXT_BYTES), str(path))
     keys = set(values) if isinstance(values, dict) else set()
     if "figures" in keys and isinstance(values["figures"], dict):
         return ["Figures of a command", *(f"{name}: {value}" for name, value in values["figures"].items())]
@@ -75,7 +77,7 @@ def _json(path: Path) -> list[str]:
         )
     loaded = known_by.load(path)
     return [
-        type(loaded).__name__,
+        f"{type(loaded).__name__}, {DIGEST_FOUND[DIGEST in keys]}",
         *loaded.model_dump_json(indent=2, exclude_none=True).splitlines(),
     ]
 

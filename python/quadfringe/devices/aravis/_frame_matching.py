@@ -3,7 +3,8 @@
 A device clock has an arbitrary offset and drifts by up to 100 ppm; frame numbers start anywhere and may jump. A frame
 arrives after its exposure with a delay that has a minimum, so the running minimum of arrival minus device time maps
 each device clock to the host clock, up to the difference of the minimal delays. That suffices to tell one exposure
-from the next. Afterwards frames are matched by the device clocks alone, whose difference drifts but never jumps.
+from the next. Afterwards frames are matched by the device clocks alone, whose difference drifts but never jumps. A
+clock that goes back, because it wrapped around or the device began anew, is compared anew.
 """
 
 from __future__ import annotations
@@ -65,6 +66,11 @@ class Clock:
         self._falling: deque[tuple[int, int]] = deque()  # frame number and offset of the candidates for the minimum
         self._recent: deque[int] = deque(maxlen=CALM)
         self._frames = 0
+        self._device_ns: int | None = None
+
+    def went_back(self, stamp: FrameStamp) -> bool:
+        """Say whether the device clock began anew or wrapped around since the frame before."""
+        return self._device_ns is not None and stamp.device_ns < self._device_ns
 
     @property
     def offset_ns(self) -> int:
@@ -81,6 +87,7 @@ class Clock:
 
     def see(self, stamp: FrameStamp) -> None:
         """Add the stamp of a frame."""
+        self._device_ns = stamp.device_ns
         offset = stamp.arrival_ns - stamp.device_ns
         self._recent.append(offset)
         while self._falling and self._falling[-1][1] >= offset:
@@ -120,6 +127,8 @@ class SingleChip(Generic[Item]):
         before = self._numbers.missed
         number = self._numbers(stamp.id)
         self.missed[chip] += self._numbers.missed - before
+        if self._clock.went_back(stamp):
+            self._clock = Clock()
         self._clock.see(stamp)
         return [(Stamped(stamp, number, item),)]
 
@@ -184,7 +193,14 @@ class FrameMatcher(Generic[Item]):
         return self._host_offset_ns
 
     def _update_clock(self, chip: int, stamp: FrameStamp) -> None:
-        """Update a clock; discard the clock difference when a much shorter delay shows that it was wrong."""
+        """Update a clock; discard the clock difference when it no longer holds.
+
+        It does not when the clock of the chip went back, and was wrong when a much shorter delay shows so.
+        """
+        if self._clocks[chip].went_back(stamp):
+            while len(self._waiting[chip]) > 1:  # their times do not compare with later ones
+                self._give_up(chip)
+            self._forget()
         self._clocks[chip].see(stamp)
         if chip == 0:
             self._host_offset_ns = self._clocks[0].offset_ns

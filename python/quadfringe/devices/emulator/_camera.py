@@ -10,6 +10,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from quadfringe.devices.emulator._control import STREAM_0, STREAM_STEP, Control, Identity, Resend
 from quadfringe.devices.emulator._registers import FEATURES, PIXEL_FORMATS
@@ -22,6 +23,7 @@ LEADER, TRAILER, PAYLOAD = 1, 2, 3
 SHORT_IDS = 65535
 FIRE_TEST = 1 << 31
 KEPT = 8  # frames whose packets can be resent
+Packet: TypeAlias = "tuple[bytes, bytes | memoryview[int]]"  # header and content
 
 
 @dataclass
@@ -39,6 +41,12 @@ class Faults:
     short: bool = False  # the last packets of each frame are missing, and the trailer does not say so
     packet_size: int = 0  # packet size in place of that of the register, bytes
     gone: bool = False  # no answers and no frames, as if without power
+    duplicates: float = 0.0  # share of packets that are sent twice
+    reordered: float = 0.0  # share of packets that are sent after the next one
+    corrupted: float = 0.0  # share of frames in whose payload a byte is inverted
+    swapped: bool = False  # each chip sends the pixels of the other one
+    clock_bits: int = 64  # bits of the device clocks in ns; 32 wrap around every 4.3 s
+    next_id: int = 0  # id of the next frame of each chip; 0: count on
 
 
 @dataclass
@@ -52,9 +60,7 @@ class Chip:
     clock_drift_ppm: float = 0.0
     id: int = 0
     sent: int = 0
-    kept: deque[tuple[int, list[tuple[bytes, bytes | memoryview[int]]]]] = field(
-        default_factory=lambda: deque(maxlen=KEPT)
-    )
+    kept: deque[tuple[int, list[Packet]]] = field(default_factory=lambda: deque(maxlen=KEPT))
 
     def register(self, offset: int) -> int:
         """Read a register of this chip's stream channel."""
@@ -148,6 +154,7 @@ class EmulatedCamera:
         elif len(words) == 2 and hasattr(self.faults, words[0]):
             kind = type(getattr(self.faults, words[0]))
             setattr(self.faults, words[0], kind(float(words[1])))
+            self._renumber()
             for control in self._controls:
                 control.answering = not self.faults.gone
                 if self.faults.gone:
@@ -155,6 +162,13 @@ class EmulatedCamera:
         else:
             raise ValueError(f"expected a fault and its value, line, sent, busy or reset, got {' '.join(words)!r}")
         return "ok"
+
+    def _renumber(self) -> None:
+        """Let the frames of both chips count from the id that was ordered."""
+        if self.faults.next_id:
+            for chip in self.chips:
+                chip.id = self.faults.next_id - 1
+            self.faults.next_id = 0
 
     def _expose(self) -> None:
         """Expose at the frame rate of the first chip, or when triggered; a busy host delays but never skips one."""
@@ -177,7 +191,11 @@ class EmulatedCamera:
     def _send(self, instant_ns: int) -> None:
         self._exposure += 1
         active = [chip for chip in self.chips if self._sends(chip)]
-        trains = [self._packets(chip, chip.device_ns(instant_ns - self._start_ns)) for chip in active]
+        turn_ns = 1 << self.faults.clock_bits
+        trains = [
+            self._on_the_wire(self._packets(chip, chip.device_ns(instant_ns - self._start_ns) % turn_ns))
+            for chip in active
+        ]
         # Both chips share the wire: their packets take turns.
         for turn in range(max((len(packets) for packets in trains), default=0)):
             for chip, packets in zip(active, trains, strict=True):
@@ -185,6 +203,16 @@ class EmulatedCamera:
                     self._socket.sendmsg(packets[turn], (), 0, chip.target)
         for chip in active:
             chip.sent += 1
+
+    def _on_the_wire(self, packets: list[Packet]) -> list[Packet]:
+        """Send some packets twice, and some after the next one, as routers and redundant links do."""
+        if not (self.faults.duplicates or self.faults.reordered):
+            return packets
+        sent = [packet for packet in packets for _ in range(1 + (self._random.random() < self.faults.duplicates))]
+        for at in range(len(sent) - 1):
+            if self._random.random() < self.faults.reordered:
+                sent[at], sent[at + 1] = sent[at + 1], sent[at]
+        return sent
 
     def _sends(self, chip: Chip) -> bool:
         if not chip.control.feature("Acquisition") or not chip.register(0x0) or self.faults.gone:
@@ -196,10 +224,15 @@ class EmulatedCamera:
             return False
         return self._random.random() >= self.faults.lost_frames
 
-    def _packets(self, chip: Chip, device_ns: int) -> list[tuple[bytes, bytes | memoryview[int]]]:
+    def _packets(self, chip: Chip, device_ns: int) -> list[Packet]:
         width, height = (chip.control.feature(name) for name in ("Width", "Height"))
         pixel_format = chip.control[FEATURES["PixelFormat"] + 4 * chip.stream]
-        payload = packed(self._source, chip.index, self._exposure, pixel_format, (width, height))
+        seen = 1 - chip.index if self.faults.swapped else chip.index
+        payload = packed(self._source, seen, self._exposure, pixel_format, (width, height))
+        if self._random.random() < self.faults.corrupted:
+            wrong = bytearray(payload)
+            wrong[self._random.randrange(4, len(wrong))] ^= 0xFF
+            payload = memoryview(wrong)
         if self.faults.wrong_size:
             height //= 2
             payload = payload[: len(payload) // 2]
@@ -210,7 +243,7 @@ class EmulatedCamera:
         parts: list[tuple[int, bytes | memoryview[int]]] = [(LEADER, leader)]
         parts += [(PAYLOAD, part) for part in self._split(chip, payload)]
         parts.append((TRAILER, struct.pack(">HHI", 0, 1, height)))
-        packets: list[tuple[bytes, bytes | memoryview[int]]] = [
+        packets: list[Packet] = [
             (struct.pack(">HHI", 0, chip.id, kind << 24 | number), part) for number, (kind, part) in enumerate(parts)
         ]
         chip.kept.append((chip.id, packets))

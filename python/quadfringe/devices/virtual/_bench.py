@@ -14,7 +14,7 @@ from quadfringe.config.memory import require_memory
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth, core_device, device_from_core
 from quadfringe.devices.light import Levels, Light, Step, eight_bit, predeformation
 from quadfringe.errors import DecodeError, InputError
-from quadfringe.io.export import read_npy
+from quadfringe.io.arrays import read_npy
 
 __all__ = ["PrintedBoard", "VirtualBench"]
 
@@ -216,10 +216,9 @@ class VirtualBench:
         if relief is None:
             return self._bench.cast(self._scene.surface, time_s=time_s)
         heights_mm = read_npy(relief.file)
-        if heights_mm.ndim != 2:
-            raise InputError(
-                f"{relief.file}: expected a height map (rows, columns), got an array of shape {heights_mm.shape}"
-            )
+        if heights_mm.ndim != 2 or heights_mm.dtype.kind not in "fiu":
+            got = f"{heights_mm.dtype} {heights_mm.shape}"
+            raise InputError(f"{relief.file}: expected a height map (rows, columns) of numbers, got {got}")
         place = relief.model_dump(exclude={"file"})
         return self._bench.cast_height_map(heights_mm.astype("float64"), **place)
 

@@ -1,0 +1,99 @@
+"""Read arrays that NumPy saved: NPZ archives and NPY files, with checksums and sizes compared before anything is used.
+
+`numpy.load` reads as many values as the header of an array says, and leaves the rest of the member and its checksum
+aside; a changed header then gives other values without an error.
+"""
+
+from __future__ import annotations
+
+import lzma
+import math
+import struct
+import tokenize
+import zipfile
+import zlib
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.errors import InputError
+from quadfringe.files import FILE_BYTES, read_bytes
+
+__all__ = ["read_npy", "read_npz"]
+
+# A damaged file: numpy parses its header as Python, and zipfile and its decompressors have errors of other kinds.
+DAMAGED = (
+    *(OSError, EOFError, ValueError, TypeError, LookupError, ArithmeticError, RuntimeError, MemoryError, SyntaxError),
+    *(tokenize.TokenError, struct.error, zipfile.BadZipFile, zlib.error, lzma.LZMAError),
+)
+NUMPY_FILES = {"NPZ": "an archive of arrays (.npz)", "NPY": "a single array (.npy)"}
+ARCHIVE, ARRAY = b"PK", np.lib.format.MAGIC_PREFIX
+HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
+
+
+def read_npz(path: Path) -> dict[str, NDArray[Any]]:
+    """Read every array of an NPZ file; raises `InputError` for any other file."""
+    data = _checked(path, "NPZ", {ARCHIVE})
+    try:
+        return _members(data)
+    except DAMAGED as error:
+        raise InputError(f"{path}: not a readable NPZ file: {_words(error)}") from error
+
+
+def read_npy(path: Path) -> NDArray[Any]:
+    """Read the array of an NPY file; raises `InputError` for any other file."""
+    data = _checked(path, "NPY", {ARRAY})
+    try:
+        return _array(data)
+    except DAMAGED as error:
+        raise InputError(f"{path}: not a readable NPY file: {_words(error)}") from error
+
+
+def _checked(path: Path, kind: str, begin: set[bytes]) -> bytes:
+    """Read a file that begins as this kind does."""
+    data = read_bytes(path)
+    if data and not data.startswith(tuple(begin)):
+        others = {ARCHIVE: "an archive of arrays", ARRAY: "a single array"}
+        got = next((words for start, words in others.items() if data.startswith(start)), "another kind of file")
+        raise InputError(f"{path}: expected {NUMPY_FILES[kind]}, got {got}")
+    return data
+
+
+def _members(data: bytes) -> dict[str, NDArray[Any]]:
+    with zipfile.ZipFile(BytesIO(data)) as archive:
+        members = archive.infolist()
+        names = [member.filename.removesuffix(".npy") for member in members]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"it holds {', '.join(twice)} twice")
+        if (size := sum(member.file_size for member in members)) > FILE_BYTES:
+            raise ValueError(f"its arrays have {size / 1e6:.0f} MB, expected at most {FILE_BYTES / 1e6:.0f} MB")
+        found = {}
+        for name, member in zip(names, members, strict=True):
+            try:
+                found[name] = _array(archive.read(member))  # compares the checksum
+            except ValueError as error:
+                raise ValueError(f"{name}: {error}") from error
+        return found
+
+
+def _array(data: bytes) -> NDArray[Any]:
+    """Give the array of an NPY file; raise ValueError unless it has exactly the size that its header says."""
+    stream = BytesIO(data)
+    version = np.lib.format.read_magic(stream)
+    if version not in HEADERS:
+        raise ValueError(f"expected version 1 or 2 of the format NPY, got {version[0]}.{version[1]}")
+    shape, by_columns, dtype = HEADERS[version](stream)
+    if dtype.hasobject or dtype.names is not None or not dtype.itemsize:
+        raise ValueError(f"expected an array of numbers or texts, got {dtype}")
+    size, given = math.prod(shape) * dtype.itemsize, len(data) - stream.tell()
+    if size != given or any(length < 0 for length in shape):
+        raise ValueError(f"expected {size} bytes for an array {shape} of {dtype}, got {given}")
+    values = np.frombuffer(data, dtype, offset=stream.tell()) if size else np.empty(0, dtype)
+    return values.reshape(shape, order="F" if by_columns else "C").copy()
+
+
+def _words(error: BaseException) -> str:
+    return str(error) or type(error).__name__

@@ -1,0 +1,43 @@
+"""A sample of the attack by damaged files; `python -m hostile --count 1000` in the folder tests is the whole."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hostile.files import KINDS, Kind, attack, originals
+
+SAMPLE = 40  # of each of the eight kinds
+
+
+@pytest.fixture(scope="module")
+def sound(tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Path]]:
+    return originals(tmp_path_factory.mktemp("sound"))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_damaged_files_give_what_was_saved_or_one_error(kind: str, sound: dict[str, list[Path]]) -> None:
+    outcomes = list(attack(kind, sound[kind], range(SAMPLE)))
+    assert [outcome for outcome in outcomes if outcome.fault] == []
+    assert sum(outcome.found == "refused" for outcome in outcomes) > SAMPLE / 4
+
+
+@pytest.mark.parametrize(
+    ("faulty", "found"),
+    [
+        (lambda path, _: path.read_bytes(), "changed"),
+        (lambda path, _: {}[path], "traceback"),
+        (lambda _, helper: helper.run(os.abort), "hang or crash"),
+    ],
+)
+def test_the_attack_finds_a_faulty_reader(
+    faulty: Callable[[Path, Any], Any], found: str, sound: dict[str, list[Path]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = sound["opencv"]
+    reader = Kind(lambda path, helper: b"" if path in files else faulty(path, helper), exact=True)
+    monkeypatch.setitem(KINDS, "opencv", reader)
+    outcomes = list(attack("opencv", files, range(3)))
+    assert [(outcome.found, outcome.fault) for outcome in outcomes] == [(found, True)] * 3
