@@ -11,7 +11,7 @@ import pytest
 import quadfringe
 
 PACKAGES = ("config", "data", "decoding", "scanner")
-MODULES = ["quadfringe", "quadfringe.files", "quadfringe.errors"] + [
+MODULES = ["quadfringe", "quadfringe.files", "quadfringe.errors", "quadfringe.io.bounded"] + [
     module.name
     for package in PACKAGES
     for module in pkgutil.walk_packages([f"{quadfringe.__path__[0]}/{package}"], f"quadfringe.{package}.")

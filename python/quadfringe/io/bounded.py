@@ -1,0 +1,178 @@
+"""Run functions that read doubtful files in a helper process, with a limit of time for each call and of memory.
+
+A damaged or hostile file can make a library in C loop without end, take all memory, or crash. In a helper process this
+ends the helper, and the caller gets an error.
+
+>>> with Helper(Limits(time_s=3.0, memory_bytes=1 << 28)) as helper:
+...     helper.run(int, "12")
+12
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import resource
+import signal
+import subprocess
+import sys
+import weakref
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from pathlib import Path
+from threading import Lock
+from typing import Any, NamedTuple, ParamSpec, Self, TypeVar
+
+__all__ = ["BoundedError", "Helper", "Limits"]
+
+START_S = 30.0  # for starting Python and importing the function, in addition to the limit: a busy machine is slow
+SERVE = "import sys; from quadfringe.io.bounded import serve; serve(*map(int, sys.argv[1:4]))"
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class BoundedError(RuntimeError):
+    """The helper process exceeded a limit or crashed; the message says which, without the name of the file."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a helper process: wall-clock time of each call, s; memory beyond that of the started process, bytes."""
+
+    time_s: float
+    memory_bytes: int
+
+
+class _Answer(NamedTuple):
+    """What a call returned or raised."""
+
+    value: Any
+    error: BaseException | None
+
+
+class Helper:
+    """A process that runs functions one at a time; use it in a `with` block.
+
+    The process starts with the first call, and again with the next call after it was ended. It ends by itself when its
+    caller ends, at the latest when the time of the present call is over. It is a protection from faults of libraries,
+    and no prison for their code: it has the rights of the caller.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self._lock = Lock()
+        self._child: _Child | None = None
+
+    def run(self, function: Callable[P, R], /, *arguments: P.args, **named: P.kwargs) -> R:
+        """Return `function(*arguments, **named)` of the helper process, or raise what it raises.
+
+        The function must be importable by name, like those of quadfringe and of Python; arguments and result are
+        pickled. Imports within the function count for the limits. Raises `BoundedError` when the call exceeds a limit
+        or ends the process.
+        """
+        with self._lock:
+            if self._child is None or self._child.owner != os.getpid():
+                self._child = _Child(self.limits)
+            try:
+                answer = self._child.ask(pickle.dumps((function, arguments, named)), self.limits.time_s + START_S)
+            except BaseException:  # also Ctrl-C: an answer that comes later would be taken for that of the next call
+                self._child.end()
+                self._child = None
+                raise
+        if isinstance(answer.error, MemoryError):
+            raise BoundedError(f"needs more than {self.limits.memory_bytes / 1e6:.0f} MB of memory") from answer.error
+        if answer.error is not None:
+            raise answer.error
+        result: R = answer.value
+        return result
+
+    def close(self) -> None:
+        """End the process; further calls do nothing."""
+        with self._lock:
+            if self._child is not None:
+                self._child.end()
+                self._child = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_exception: object) -> None:
+        self.close()
+
+
+class _Child:
+    """The process and the connection to it."""
+
+    def __init__(self, limits: Limits) -> None:
+        self.owner = os.getpid()
+        self.time_s = limits.time_s
+        self.connection, theirs = Pipe()
+        package = str(Path(__file__).parents[2])
+        known = os.environ.get("PYTHONPATH")
+        numbers = (theirs.fileno(), int(1e6 * limits.time_s), limits.memory_bytes)
+        with theirs:
+            self.process = subprocess.Popen(
+                # -P: no module of the working directory is imported, as little as by the console script.
+                [sys.executable, "-P", "-c", SERVE, *map(str, numbers)],
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                env=os.environ | {"PYTHONPATH": os.pathsep.join((package, known)) if known else package},
+                start_new_session=True,  # Ctrl-C in a terminal is for the caller, which decides when reading ends
+            )
+        self.end = weakref.finalize(self, _end, self.process, self.connection, self.owner)
+
+    def ask(self, request: bytes, wait_s: float) -> _Answer:
+        """Send a request and wait for its answer; raise `BoundedError` when none comes."""
+        late = False
+        with suppress(EOFError, OSError):  # the process has ended
+            self.connection.send_bytes(request)
+            if self.connection.poll(wait_s):
+                answer: _Answer = pickle.loads(self.connection.recv_bytes())
+                return answer
+            late = True
+            self.process.kill()
+        status = self.process.wait()
+        if late or status == -signal.SIGALRM:
+            raise BoundedError(f"does not end within {self.time_s:g} s")
+        raise BoundedError(f"crashes ({signal.Signals(-status).name if status < 0 else f'exit status {status}'})")
+
+
+def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -> None:
+    if os.getpid() == owner:  # a forked copy of the caller leaves the process alone
+        process.kill()
+        process.wait()
+    connection.close()
+
+
+def serve(descriptor: int, time_us: int, memory_bytes: int) -> None:
+    """Answer the requests that come through a connection until the other side closes it; runs in the helper."""
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process at once, wherever it is
+    connection, limited = Connection(descriptor), False
+    with suppress(EOFError, OSError):
+        while True:
+            request = connection.recv_bytes()
+            try:
+                function, arguments, named = pickle.loads(request)  # imports the function, before the limits begin
+                if not limited:
+                    _limit_memory(memory_bytes)
+                    limited = True
+                signal.setitimer(signal.ITIMER_REAL, time_us / 1e6)
+                answer = pickle.dumps(_Answer(function(*arguments, **named), None))
+            except Exception as error:  # noqa: BLE001 - raised again in the caller
+                answer = pickle.dumps(_Answer(None, error))
+            connection.send_bytes(answer)
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+def _limit_memory(more_bytes: int) -> None:
+    """Let the address space grow by this much from now on."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+    resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + more_bytes, hard))

@@ -1,0 +1,131 @@
+"""The helper process ends on every fault of the code that it runs, and never outlives its caller."""
+
+from __future__ import annotations
+
+import operator
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from quadfringe.errors import InputError
+from quadfringe.files import read_bytes
+from quadfringe.io.bounded import BoundedError, Helper, Limits
+
+CALLER = """
+import os, time
+from quadfringe.io.bounded import Helper, Limits
+helper = Helper(Limits(time_s={time_s}, memory_bytes=1 << 28))
+print(helper.run(os.getpid), flush=True)
+{then}
+"""
+PATIENCE_S = 60.0
+
+
+@pytest.fixture
+def helper() -> Iterator[Helper]:
+    with Helper(Limits(time_s=0.5, memory_bytes=1 << 28)) as started:
+        yield started
+
+
+def ends(process: int) -> bool:
+    """Wait until a process has ended."""
+    end_s = time.monotonic() + PATIENCE_S
+    while time.monotonic() < end_s:
+        try:
+            state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+        except (FileNotFoundError, ProcessLookupError):
+            return True
+        if state == "Z":  # ended; the process that takes over orphans has not asked for its status yet
+            return True
+        time.sleep(0.02)
+    return False
+
+
+def test_results_come_from_another_process_that_goes_on(helper: Helper) -> None:
+    process = helper.run(os.getpid)
+    assert process != os.getpid()
+    assert helper.run(int, "21", base=3) == 7
+    np.testing.assert_array_equal(helper.run(np.arange, 1 << 20), np.arange(1 << 20))
+    assert helper.run(os.getpid) == process
+    helper.close()
+    helper.close()
+    assert ends(process)
+    assert helper.run(os.getpid) != process
+
+
+def test_errors_of_the_function_are_those_of_a_call(helper: Helper, tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="invalid literal"):
+        helper.run(int, "a word")
+    with pytest.raises(InputError, match=r"no\.json"):
+        helper.run(read_bytes, tmp_path / "no.json")
+    with pytest.raises(TypeError, match=r"cannot pickle .*memoryview"):
+        helper.run(memoryview, b"a")
+
+
+@pytest.mark.parametrize(
+    ("function", "argument", "reason"),
+    [
+        (time.sleep, 3600, r"does not end within 0\.5 s"),
+        (sum, range(1 << 60), r"does not end within 0\.5 s"),
+        (bytearray, 1 << 30, "needs more than 268 MB of memory"),
+        (signal.raise_signal, signal.SIGSEGV, r"crashes \(SIGSEGV\)"),
+        (os._exit, 3, r"crashes \(exit status 3\)"),
+    ],
+    ids=["sleeps", "computes", "memory", "crash", "exit"],
+)
+def test_a_call_without_end_or_measure_is_an_error(
+    helper: Helper, function: object, argument: object, reason: str
+) -> None:
+    with pytest.raises(BoundedError, match=reason):
+        helper.run(operator.call, function, argument)  # type: ignore[arg-type]
+    assert helper.run(int, "7") == 7
+
+
+def test_memory_is_limited_over_all_calls(helper: Helper) -> None:
+    hold = "import builtins; builtins.held = [*getattr(builtins, 'held', []), bytearray(1 << 26)]"
+    helper.run(exec, hold)
+    helper.run(exec, hold)
+    helper.run(exec, hold)
+    with pytest.raises(BoundedError, match="needs more than"):
+        helper.run(exec, hold)
+
+
+@pytest.mark.parametrize("then", ["time.sleep(3600)", "helper.run(time.sleep, 3600)"], ids=["idle", "busy"])
+def test_nothing_is_left_when_the_caller_is_killed(then: str) -> None:
+    command = [sys.executable, "-c", CALLER.format(time_s=1.0, then=then)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as caller:
+        assert caller.stdout is not None
+        process = int(caller.stdout.readline())
+        time.sleep(0.2)
+        caller.kill()
+    assert ends(process)
+
+
+def test_nothing_is_left_when_a_caller_ends_without_closing() -> None:
+    command = [sys.executable, "-W", "error", "-c", CALLER.format(time_s=60.0, then="")]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    assert ends(int(done.stdout))
+
+
+def test_a_module_of_the_working_folder_is_not_imported(
+    helper: Helper, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "colorsys.py").write_text("raise RuntimeError('foreign code')\n")
+    monkeypatch.chdir(tmp_path)
+    assert helper.run(exec, "import colorsys; colorsys.rgb_to_hsv") is None
+
+
+def test_a_forked_copy_gets_its_own_process() -> None:
+    copy = "if os.fork() == 0: print(helper.run(os.getpid), flush=True); os._exit(0)"
+    then = f"{copy}\nos.wait(); print(helper.run(os.getpid))"
+    command = [sys.executable, "-c", CALLER.format(time_s=60.0, then=then)]
+    first, of_the_copy, again = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    assert first == again != of_the_copy
