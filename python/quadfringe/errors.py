@@ -23,6 +23,7 @@ __all__ = [
     "InputError",
     "MissingExtraError",
     "RecordingError",
+    "RecordingWarning",
     "ShotTimeoutError",
     "UnpairedError",
     "WrongFrameError",
@@ -83,6 +84,10 @@ class WrongFrameError(CameraError):
 
 class RecordingError(OSError):
     """A recording cannot continue; the message says why and how many shots are safe."""
+
+
+class RecordingWarning(UserWarning):
+    """A recording is read although it cannot be verified, was cut short, or was changed; the message says which."""
 
 
 class BatchError(RuntimeError):

@@ -1,0 +1,17 @@
+"""The tuned numbers of recordings: value, unit, trade-off, and the command that measured each."""
+
+from __future__ import annotations
+
+__all__: list[str] = []
+
+# Wall-clock time of one read in the helper process, s. A sound read takes milliseconds; of 3000 mutated recordings the
+# longest command stays below 5 s (`python tests/hostile/recordings.py`). A longer time delays the error for a damaged
+# file, a shorter one refuses sound shots of a disk that has to start up.
+READ_S = 3.0
+# Memory of the helper process beyond that of Python, bytes. Follows from the copies that a reply needs: three of four
+# 16-bit images of 40 million pixels. More memory lets a damaged file slow the machine down.
+MEMORY_BYTES = 1 << 30
+# Time that ended helper processes may cost for one file, s. Follows from READ_S: one read without end, or several
+# crashes. Afterwards all further reads of the file fail at once; a longer time rescues more shots behind a damaged
+# table.
+LOST_S = READ_S
