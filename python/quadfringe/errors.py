@@ -87,7 +87,7 @@ class RecordingError(OSError):
 
 
 class RecordingWarning(UserWarning):
-    """A recording is read although it cannot be verified, was cut short, or was changed; the message says which."""
+    """A recording or a result of a batch was changed, was cut short, or cannot be verified; the message says which."""
 
 
 class BatchError(RuntimeError):
