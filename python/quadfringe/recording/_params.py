@@ -6,8 +6,8 @@ __all__: list[str] = []
 
 # Wall-clock time of one read in the helper process, s. A sound read takes milliseconds; of 3000 mutated recordings the
 # longest command stays below 5 s (`python tests/hostile/recordings.py`). A longer time delays the error for a damaged
-# file, a shorter one refuses sound shots of a disk that has to start up.
-READ_S = 3.0
+# file, a shorter one refuses sound shots when the machine is busy.
+READ_S = 2.0
 # Memory of the helper process beyond that of Python, bytes. Follows from the copies that a reply needs: three of four
 # 16-bit images of 40 million pixels. More memory lets a damaged file slow the machine down.
 MEMORY_BYTES = 1 << 30
