@@ -195,7 +195,7 @@ def _bare_header(stored: Stored) -> Header:
     expected: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(images, (dtype, size))
     expected |= {name: (np.dtype(kind).str, shape) for name, (kind, shape) in _numbers(columns, stored.chips).items()}
     odd = [n for n, found in expected.items() if (stored.dtypes.get(n), stored.shapes.get(n, ())[1:]) != found]
-    if odd or len(size) != 2 or dtype[1:] not in PIXELS:
+    if odd or len(size) != 2 or 0 in size or dtype[1:] not in PIXELS:
         raise InputError(f"{', '.join(odd) or dtype}: not the type or size of a recording; copy the file again")
     full_scale, bayer, device = (stored.attributes.get(name) for name in ("full_scale", "bayer", "device"))
     if not isinstance(full_scale, float) or not isinstance(device, str) or bayer not in (None, *get_args(BayerPattern)):

@@ -86,9 +86,11 @@ def read_seal(path: Path) -> Seal | None:
 
 
 def _digest(file: BinaryIO, end: int, extents: NDArray[np.uint64], table: bytes) -> bytes:
-    """Return the SHA-256 of a file up to `end` without the extents, then of their table."""
+    """Return the SHA-256 of a file up to `end` without the extents, then of their table; b"" for a wrong table."""
     digest, place = hashlib.sha256(), 0
     for begin, size in (*extents.tolist(), (end, 0)):
+        if not place <= begin <= begin + size <= end:
+            return b""
         file.seek(place)
         while place < begin and (piece := file.read(min(PIECE_BYTES, begin - place))):
             digest.update(piece)

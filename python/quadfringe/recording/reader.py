@@ -79,8 +79,8 @@ class Recording:
             self._source.close()
             raise type(error)(f"{path}: {error}") from error
         self.faults = tuple(self._found_faults(seal))
-        for fault in self.faults if self.verifiable else (*self.faults, UNVERIFIABLE):
-            warnings.warn(f"{path}: {fault}", RecordingWarning, stacklevel=2)
+        if told := [*self.faults, *([] if self.verifiable else [UNVERIFIABLE])]:
+            warnings.warn(f"{path}: {'; '.join(told)}", RecordingWarning, stacklevel=2)
 
     def __repr__(self) -> str:
         size = f"{self.header.width_px} x {self.header.height_px} {self.header.dtype}"
@@ -173,7 +173,7 @@ class Recording:
         if missing >= (1 if self._closed else self.header.shot_bytes):
             yield f"cut short by {missing} bytes; {AGAIN}"
         elif self._closed and self.verifiable and (seal is None or not seal.holds):
-            yield f"changed since it was closed; every shot is checked by itself; better {AGAIN}"
+            yield f"changed since it was closed, so every shot is checked by itself; {AGAIN}"
         for name in self._header.changed_texts:
             yield f"{name} was changed, and is left out"
         if bad := np.flatnonzero(~self.stamped).tolist():
