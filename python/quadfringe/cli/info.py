@@ -35,7 +35,7 @@ def info(
 
 
 def _verify(path: Path) -> None:
-    """Print what is wrong with a recording; raise `RecordingError` unless it is whole, as far as can be told."""
+    """Print what is wrong with a recording; raise `RecordingError` unless nothing is."""
     from quadfringe.errors import InputError, RecordingError
     from quadfringe.recording import Recording
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 __all__: list[str] = []
 
-# Wall-clock time of one read in the helper process, s. A sound read takes milliseconds; of 3000 mutated recordings the
-# longest command stays below 5 s (`python tests/hostile/recordings.py`). A longer time delays the error for a damaged
-# file, a shorter one refuses sound shots when the machine is busy.
+# Wall-clock time of one read in the helper process, s. A sound read takes milliseconds, and 3000 mutated recordings are
+# answered within 5 s (`python tests/hostile/mutated_recordings.py`). A longer time delays the error for a damaged file,
+# a shorter one refuses sound shots when the machine is busy.
 READ_S = 2.0
 # Memory of the helper process beyond that of Python, bytes. Follows from the copies that a reply needs: three of four
 # 16-bit images of 40 million pixels. More memory lets a damaged file slow the machine down.
