@@ -6,7 +6,7 @@ record      a process that writes shots and reports each; every reported shot mu
             must be found by `recover`
 parent      `quadfringe batch`, whose process is killed; the same command must end with the files of an undisturbed run
 worker      `quadfringe batch`, one of whose workers is killed; the run must end with the files of an undisturbed run
-terminated  as parent, with SIGTERM
+terminated  as parent, with SIGTERM; a fifth as often
 
 A process of a batch that lives 5 s after the end of its parent counts as left. The exit status is 1 if anything is
 lost, wrong or left.
@@ -43,7 +43,7 @@ SYSTEM = qf.SystemConfig(
     scene=qf.SceneConfig(surface="steps", noise=0.01),
     decode=qf.DecodeConfig(method="published"),
 )
-SHOTS = 8
+SHOTS = 6
 
 
 def record_killed(folder: Path, kills: int, chance: random.Random) -> Counter[str]:
@@ -74,22 +74,22 @@ def noisy_take(path: Path) -> Path:
     return path
 
 
-def start_batch(take: Path, out: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "quadfringe", "batch", str(take), "--out", str(out), "--workers", "2"]
+def start_batch(take: Path, out: Path, workers: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "quadfringe", "batch", str(take), "--out", str(out), "--workers", str(workers)]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     return subprocess.Popen(command, env=os.environ | {MARK: str(out)}, start_new_session=True, **quiet)
 
 
-def batch_killed(take: Path, out: Path, who: str, chance: random.Random) -> int:
+def batch_killed(batch: subprocess.Popen[bytes], out: Path, who: str, chance: random.Random) -> int:
     """Kill a batch while it works; return how many processes are left."""
-    at = chance.randrange(SHOTS // 2)
-    with start_batch(take, out) as batch:
+    at = chance.randrange(SHOTS)
+    with batch:
         end_s = time.monotonic() + END_S
         while batch.poll() is None and time.monotonic() < end_s and len(list(out.rglob("shot_*.ply"))) < at:
             time.sleep(0.005)
         time.sleep(chance.uniform(0.0, 0.2))
         if who == "worker":
-            for worker in sorted(workers(batch.pid, out))[:1]:
+            for worker in sorted(workers_of(batch.pid, out))[:1]:
                 os.kill(worker, signal.SIGKILL)
             batch.wait(END_S)
         else:
@@ -97,7 +97,7 @@ def batch_killed(take: Path, out: Path, who: str, chance: random.Random) -> int:
     return left(out)
 
 
-def workers(parent: int, out: Path) -> list[int]:
+def workers_of(parent: int, out: Path) -> list[int]:
     words = {pid: Path(f"/proc/{pid}/cmdline").read_bytes() for pid in processes(out) if pid != parent}
     return [pid for pid, line in words.items() if b"spawn_main" in line]
 
@@ -135,13 +135,13 @@ def differing(out: Path, whole_out: Path) -> int:
 def batches_killed(folder: Path, kills: int, chance: random.Random) -> Counter[str]:
     counts: Counter[str] = Counter()
     take, undisturbed = noisy_take(folder / "take.h5"), folder / "undisturbed"
-    assert start_batch(take, undisturbed).wait(END_S) == 0
+    assert start_batch(take, undisturbed, 2).wait(END_S) == 0
     for who in ("parent", "worker", "terminated"):
-        for number in range(kills):
-            out = folder / f"{who}{number}"
-            counts["processes_left"] += batch_killed(take, out, who, chance)
+        for number in range(-(-kills // 5) if who == "terminated" else kills):
+            out, workers = folder / f"{who}{number}", 1 + number % 2
+            counts["processes_left"] += batch_killed(start_batch(take, out, workers), out, who, chance)
             if who != "worker":
-                assert start_batch(take, out).wait(END_S) == 0
+                assert start_batch(take, out, workers).wait(END_S) == 0
             counts[f"{who}_files_that_differ"] += differing(out, undisturbed)
             shutil.rmtree(out)
     return counts

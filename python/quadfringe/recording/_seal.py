@@ -2,9 +2,9 @@
 
     bytes of HDF5 | extents (n, 2) <u8: begin and size of runs of pixels | FOOTER
 
-HDF5 ignores what stands behind the end that it states. The SHA-256 covers the bytes of HDF5 outside the extents, then the extents;
-each image has its CRC-32 among those bytes. A file whose seal holds is as its writer left it, up to its pixels, so that
-HDF5 reads it without surprises.
+HDF5 ignores what stands behind the end that it states. The SHA-256 covers the bytes of HDF5 outside the extents, then
+the extents; each image has its CRC-32 among those bytes. A file whose seal holds is as its writer left it, up to its
+pixels, so that HDF5 reads it without surprises.
 """
 
 from __future__ import annotations
