@@ -238,6 +238,21 @@ def test_a_recording_of_version_1_is_read_with_a_warning(tmp_path: Path) -> None
         assert recovered.verifiable
 
 
+def test_wild_times_of_version_1_are_described_and_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """They have no checksum there."""
+    path = tmp_path / "take.h5"
+    path.write_bytes(GOLDEN.read_bytes())
+    changed(path, lambda file: file["time_us"].__setitem__(0, (1 << 63) - 1))
+    done = run("info", path)
+    assert done.exit_code == 0, done.output
+    assert "begin: 294247-01-10T04:00:54.775Z" in done.stdout
+    monkeypatch.setattr("quadfringe.recording.replay.TIMEOUT_MAX", 0.0)
+    with pytest.warns(RecordingWarning):
+        camera = ReplayCamera(Recording(path))
+    assert len(list(camera.stream())) == 1
+    camera.close()
+
+
 def test_the_identity_is_that_of_the_content(take: Path, original: Path, tmp_path: Path) -> None:
     with Recording(take) as one, Recording(original) as same:
         assert one.sha256 == same.sha256

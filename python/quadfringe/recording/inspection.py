@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -86,8 +85,9 @@ def _recording(path: Path) -> list[str]:
         ids, times_us = recording.ids[recording.stamped], recording.times_us[recording.stamped]
         if len(ids):
             lost = int(ids[-1]) - int(ids[0]) + 1 - len(ids)
-            begin = datetime.fromtimestamp(times_us[0] / 1e6, UTC).isoformat(timespec="milliseconds")
-            lines.append(f"begin: {begin}, {(times_us[-1] - times_us[0]) / 1e6:.3f} s, {lost} exposures missing")
+            begin = np.datetime_as_string(times_us[0].astype("datetime64[us]"), unit="ms", timezone="UTC")
+            spent_s = (int(times_us[-1]) - int(times_us[0])) / 1e6
+            lines.append(f"begin: {begin}, {spent_s:.3f} s, {lost} exposures missing")
         if not recording.closed_in_order:
             lines.append("not closed: still being written, or its writer was killed (then use quadfringe recover)")
         for name, model in (("calibration", recording.calibration), ("config", recording.config)):

@@ -44,6 +44,7 @@ class Recording:
     The file may still grow; `len` counts the shots that were complete when it was opened. Header, settings, calibration
     and every shot (pixels and stamp) are checked against their checksums. A file that was not closed properly, was
     changed since, or was recorded before version 2 is read by a helper process with a limit of time and memory.
+    `faults` says in words how the file differs from what was recorded; it is found without reading pixels.
 
     Raises `InputError` for a file that is missing, no recording, or has a damaged header, and warns with
     `RecordingWarning` of a file that is incomplete, was changed, or has no checksums. A changed text of settings or

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Iterator
-from threading import Event
+from threading import TIMEOUT_MAX, Event
 from typing import Literal, Self
 
 import numpy as np
@@ -74,7 +74,7 @@ class ReplayCamera:
         try:
             while self._next < end and not self._closed.is_set():
                 if self.paced and (wait_s := due_s[self._next] - time.monotonic()) > 0:
-                    self._closed.wait(wait_s)
+                    self._closed.wait(min(wait_s, TIMEOUT_MAX))
                     continue
                 if self.paced:
                     overdue = int(np.searchsorted(due_s[self._next : end], time.monotonic(), side="right"))
