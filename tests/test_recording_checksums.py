@@ -150,6 +150,8 @@ def test_a_changed_stamp_is_refused_with_its_shot(take: Path, tmp_path: Path) ->
         (lambda file: file.attrs.modify("full_scale", 254.0), "the header does not match its checksum"),
         (lambda file: file.attrs.modify("schema_version", 1), "not the type or size of a recording"),
         (lambda file: file.attrs.modify("schema_version", 3), "recording version 3, expected 2 or 1"),
+        (lambda file: file.attrs.__setitem__("format", [1, 2]), "got another HDF5 file"),
+        (lambda file: file.attrs.__setitem__("schema_version", [1, 2]), r"recording version \[1, 2\]"),
         (lambda file: file.pop("closed"), "lacks closed"),
         (lambda file: file.__setitem__("extra", file.pop("time_us")[:]), "lacks time_us"),
         (lambda file: file["id"].resize((1 << 30,)), "claims 1073741824 shots"),
@@ -195,6 +197,22 @@ def test_a_recording_without_its_tables_is_an_error_in_time(tmp_path: Path, monk
     path.write_bytes(data)
     with pytest.raises(InputError, match=r"killed\.h5: damaged recording: reading it does not end within 0\.5 s"):
         Recording(path)
+
+
+def test_hdf5_opens_only_sealed_files_in_this_process(
+    take: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unsealed = tmp_path / "unsealed.h5"
+    unsealed.write_bytes(take.read_bytes()[:-1])
+
+    def refuse(*_arguments: object, **_named: object) -> None:
+        raise AssertionError("opened in this process")
+
+    monkeypatch.setattr(h5py, "File", refuse)
+    with opened(unsealed, "changed since it was closed") as recording:
+        assert all(whole(shot, number) for number, shot in enumerate(recording))
+    with pytest.raises(AssertionError, match="opened in this process"):
+        Recording(take)
 
 
 def test_verify_names_damaged_shots(take: Path) -> None:

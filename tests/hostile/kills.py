@@ -1,6 +1,6 @@
 """Kill writers and batches with SIGKILL at random times; count what is lost, wrong or left.
 
-    python tests/hostile/kills.py [--kills 50] [--json FILE]
+    python tests/hostile/kills.py [--kills 50] [--only record parent worker terminated] [--json FILE]
 
 record      a process that writes shots and reports each; every reported shot must be on file to the last byte, and
             must be found by `recover`
@@ -37,6 +37,7 @@ from quadfringe.recording import Recorder, Recording, recover
 
 LEFT_S = 5.0
 END_S = 300.0  # limit for one run of a batch
+WHOM = ("record", "parent", "worker", "terminated")
 MARK = "QUADFRINGE_KILLS"  # in the environment of a batch and of all processes that it starts
 SYSTEM = qf.SystemConfig(
     camera=qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5)),
@@ -85,7 +86,7 @@ def batch_killed(batch: subprocess.Popen[bytes], out: Path, who: str, chance: ra
     at = chance.randrange(SHOTS)
     with batch:
         end_s = time.monotonic() + END_S
-        while batch.poll() is None and time.monotonic() < end_s and len(list(out.rglob("shot_*.ply"))) < at:
+        while batch.poll() is None and time.monotonic() < end_s and len(list((out / "take").glob("shot_*.ply"))) < at:
             time.sleep(0.005)
         time.sleep(chance.uniform(0.0, 0.2))
         if who == "worker":
@@ -132,11 +133,11 @@ def differing(out: Path, whole_out: Path) -> int:
     )
 
 
-def batches_killed(folder: Path, kills: int, chance: random.Random) -> Counter[str]:
+def batches_killed(folder: Path, whom: list[str], kills: int, chance: random.Random) -> Counter[str]:
     counts: Counter[str] = Counter()
     take, undisturbed = noisy_take(folder / "take.h5"), folder / "undisturbed"
     assert start_batch(take, undisturbed, 2).wait(END_S) == 0
-    for who in ("parent", "worker", "terminated"):
+    for who in whom:
         for number in range(-(-kills // 5) if who == "terminated" else kills):
             out, workers = folder / f"{who}{number}", 1 + number % 2
             counts["processes_left"] += batch_killed(start_batch(take, out, workers), out, who, chance)
@@ -150,13 +151,15 @@ def batches_killed(folder: Path, kills: int, chance: random.Random) -> Counter[s
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--only", nargs="+", choices=WHOM, default=WHOM)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     chance = random.Random(1)
     folder = Path(tempfile.mkdtemp())
     try:
-        counts = record_killed(folder, options.kills, chance) + Counter()
-        counts.update(batches_killed(folder, options.kills, chance))
+        counts = record_killed(folder, options.kills if "record" in options.only else 0, chance)
+        if whom := [who for who in options.only if who != "record"]:
+            counts.update(batches_killed(folder, whom, options.kills, chance))
     finally:
         shutil.rmtree(folder)
     names = ("record_shots_reported", "record_lost", "record_wrong", "parent_files_that_differ")

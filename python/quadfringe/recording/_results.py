@@ -88,14 +88,20 @@ def open_results(job: Job, take: Recording, settings: dict[str, Any], *, calibra
         return np.zeros(job.shots, bool)
     try:
         group = zarr.open_group(job.store, mode="r")
-        found, status, checksums = dict(group.attrs), group["status"][:], group["checksum"][:]
-        same_arrays = found.pop("arrays_sha256") == _arrays_sha256(job.store)
+        found = dict(group.attrs)
+        arrays_sha256 = found.pop("arrays_sha256", None)
+        if found != attributes:
+            raise InputError(
+                f"{job.store}: made with other settings, from another recording or by an earlier version; "
+                "choose another --out"
+            )
+        if arrays_sha256 != _arrays_sha256(job.store):
+            raise InputError(f"{job.store}: changed since it was made; choose another --out")
+        status, checksums = group["status"][:], group["checksum"][:]
+    except InputError:
+        raise
     except (KeyError, ValueError, OSError, RuntimeError) as error:
         raise InputError(f"{job.store}: expected the result of a batch: {error}; choose another --out") from error
-    if found != attributes or status.shape != (job.shots,):
-        raise InputError(f"{job.store}: made with other settings or from another recording; choose another --out")
-    if not same_arrays:
-        raise InputError(f"{job.store}: changed since it was made; choose another --out")
     return _finished(job, status, checksums)
 
 

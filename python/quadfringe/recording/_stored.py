@@ -54,11 +54,11 @@ class StoredFile:
         arrays = {name: item for name, item in file.items() if isinstance(item, h5py.Dataset) and item.shape}
         stamps = arrays.get("chip_stamps")
         return Stored(
-            {name: value.item() if isinstance(value, np.generic) else value for name, value in file.attrs.items()},
+            {name: np.asarray(value).tolist() for name, value in file.attrs.items()},
             {name: file[name].asstr()[()] for name in ("config", "calibration") if name in file},
             {name: array.shape for name, array in arrays.items()},
             {name: array.dtype.str for name, array in arrays.items()},
-            () if stamps is None else tuple(stamps.attrs["chips"]),
+            () if stamps is None else tuple(map(str, stamps.attrs["chips"])),
             bool(file["closed"][()]) if "closed" in file else None,
         )
 

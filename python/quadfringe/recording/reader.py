@@ -115,17 +115,17 @@ class Recording:
     @property
     def ids(self) -> NDArray[np.uint64]:
         """Exposure numbers, (N,); gaps are exposures that did not become a shot; 0 where `stamped` is False."""
-        return self._table.ids
+        return self._table.ids.copy()
 
     @property
     def times_us(self) -> NDArray[np.int64]:
         """Start of every exposure, (N,), us since 1970 UTC; 0 where `stamped` is False."""
-        return self._table.times_us
+        return self._table.times_us.copy()
 
     @property
     def stamped(self) -> NDArray[np.bool_]:
         """False for shots whose stamp does not match its checksum, (N,)."""
-        return self._table.sound
+        return self._table.sound.copy()
 
     @property
     def sha256(self) -> str:
@@ -154,7 +154,7 @@ class Recording:
         place = index + len(self) if index < 0 else index
         if not 0 <= place < len(self):
             raise IndexError(f"{self.path}: expected a shot from 0 to {len(self) - 1}, got {index}")
-        if not self.stamped[place]:
+        if not self._table.sound[place]:
             return None
         try:
             images = self._source.images(self.header.images, place)
@@ -177,7 +177,7 @@ class Recording:
             yield f"changed since it was closed, so every shot is checked by itself; {AGAIN}"
         for name in self._header.changed_texts:
             yield f"{name} was changed, and is left out"
-        if bad := np.flatnonzero(~self.stamped).tolist():
+        if bad := np.flatnonzero(~self._table.sound).tolist():
             yield f"no sound stamps of {len(bad)} shots: {listed(bad)}"
 
     def close(self) -> None:
