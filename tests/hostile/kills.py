@@ -140,10 +140,13 @@ def batches_killed(folder: Path, whom: list[str], kills: int, chance: random.Ran
     for who in whom:
         for number in range(-(-kills // 5) if who == "terminated" else kills):
             out, workers = folder / f"{who}{number}", 1 + number % 2
-            counts["processes_left"] += batch_killed(start_batch(take, out, workers), out, who, chance)
+            alive = batch_killed(start_batch(take, out, workers), out, who, chance)
             if who != "worker":
                 assert start_batch(take, out, workers).wait(END_S) == 0
-            counts[f"{who}_files_that_differ"] += differing(out, undisturbed)
+            differ = differing(out, undisturbed)
+            print(f"{who} {number}: {alive} processes left, {differ} files differ", file=sys.stderr, flush=True)
+            counts["processes_left"] += alive
+            counts[f"{who}_files_that_differ"] += differ
             shutil.rmtree(out)
     return counts
 
