@@ -199,8 +199,16 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
     if scheduler is None:
         # Spawned, because a process with threads (kernel, HDF5) must not be forked.
         spawned = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(workers or usable_cores(), spawned, initializer=_end_with_parent) as pool:
+        others = multiprocessing.active_children()
+        pool = ProcessPoolExecutor(workers or usable_cores(), spawned, initializer=_end_with_parent)
+        try:
             yield pool
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            # Not asked to end: a worker that was killed while it held the lock of the queue would keep others waiting.
+            for worker in multiprocessing.active_children():
+                if worker not in others:
+                    worker.kill()
         return
     distributed = require("distributed", "batch")
     try:
