@@ -1,30 +1,39 @@
 """Recording: megabytes per second against a plain file, and shots lost to kill -9.
 
     python benches/recording.py [--folder DIR] [--shots 300] [--kills 20] [--json FILE]
+    python benches/recording.py --checksums
 
 Writes raw shots of 1024 x 768 (four images of 8 bit with noise, 3.1 MB) into DIR as fast as possible, in turns with the
 same bytes in a plain file; both are synced to the disk before the clock stops. Then it kills writers with SIGKILL at
 random times: a shot that a writer had reported and that is not on file, to the last byte, counts as lost. The bars are
 150 MB/s or the speed of the plain file, whichever is lower, and no shot lost; the exit status is 1 otherwise.
+
+--checksums prints the time that checksums of a shot take: those of a recording, and others that it could have.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import os
 import random
 import statistics
 import sys
 import tempfile
+import zlib
+from collections.abc import Callable
 from pathlib import Path
 from time import perf_counter, process_time
 
+import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shot
 from quadfringe.evaluation._takes import kill_writer, whole
 from quadfringe.files import figures_text
 from quadfringe.recording import Recorder, Recording
+from quadfringe.recording._checksums import crc_of_shot, crcs_of
 
 SHAPE = (768, 1024)
 BAR_MB_PER_S = 150.0
@@ -64,6 +73,41 @@ def _sync(path: Path) -> None:
         os.fsync(file.fileno())
 
 
+def checksum_times(shot: AnyShot) -> dict[str, float]:
+    """Give ms a shot of the checksums of a recording, and of others over the same bytes."""
+    images = [image.tobytes() for image in shot.images.values()]
+    with tempfile.TemporaryDirectory() as folder, h5py.File(Path(folder) / "memory.h5", "w", driver="core") as file:
+        shape = (len(images), *SHAPE)
+        plain, summed = (
+            file.create_dataset(name, shape, "u1", chunks=(1, *SHAPE), fletcher32=name == "summed")
+            for name in ("plain", "summed")
+        )
+        array = np.stack(list(shot.images.values()))
+        fletcher_ms = fastest_ms(lambda: written(summed, array)) - fastest_ms(lambda: written(plain, array))
+    return {
+        "of_a_recording": fastest_ms(lambda: crc_of_shot("0" * 64, 1, (1, 2), ((1, 2, 3),) * 2, crcs_of(shot.images))),
+        "of_the_images_in_it": fastest_ms(lambda: crcs_of(shot.images)),
+        "zlib_crc32": fastest_ms(lambda: [zlib.crc32(image) for image in images]),
+        "sha256": fastest_ms(lambda: [hashlib.sha256(image).digest() for image in images]),
+        "blake2b": fastest_ms(lambda: [hashlib.blake2b(image).digest() for image in images]),
+        "hdf5_fletcher32": fletcher_ms,
+    }
+
+
+def written(dataset: h5py.Dataset, array: NDArray[np.uint8]) -> None:
+    dataset.write_direct(array)
+    dataset.file.flush()  # HDF5 computes its checksum here
+
+
+def fastest_ms(call: Callable[[], object]) -> float:
+    times = []
+    for _ in range(50):
+        begin = perf_counter()
+        call()
+        times.append(perf_counter() - begin)
+    return 1e3 * min(times)
+
+
 def lost_after_kills(folder: Path, kills: int) -> tuple[int, int]:
     """Give how many reported shots are not on file, and how many were reported."""
     chance = random.Random(1)
@@ -85,8 +129,13 @@ def main() -> int:
     parser.add_argument("--shots", type=int, default=300)
     parser.add_argument("--kills", type=int, default=20)
     parser.add_argument("--json", type=Path)
+    parser.add_argument("--checksums", action="store_true")
     options = parser.parse_args()
     shots = noisy_shots(16)
+    if options.checksums:
+        for key, value in checksum_times(shots[0]).items():
+            print(f"{key:28}{value:12.3f} ms")
+        return 0
     with tempfile.TemporaryDirectory(dir=options.folder) as name:
         folder = Path(name)
         speeds, bare, busy = [], [], []

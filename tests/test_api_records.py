@@ -64,6 +64,7 @@ def records() -> dict[str, Any]:
         Comparison(np.zeros((768, 1024), np.float32), 0.1, 0.2, 0.3),
         devices.CameraStatistics(1, 2, {name: devices.ChipStatistics(1) for name in ("visible", "infrared")}),
         recording.RecorderStatistics(1, 2, 3, (Path("a.h5"),), None),
+        recording.Verification(4, (1,), ("cut short",)),
         recording.Recovered(*range(len(dataclasses.fields(recording.Recovered)))),
     ]
     return {

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
 import time
 from dataclasses import replace
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 import zarr
@@ -17,8 +19,9 @@ from support.bars import tolerance
 
 import quadfringe as qf
 from quadfringe.data import Shot, Stamp
-from quadfringe.errors import InputError
+from quadfringe.errors import InputError, RecordingWarning
 from quadfringe.recording import Recorder, Recording
+from quadfringe.recording._results import locked
 from quadfringe.recording.batch import decode_recordings, executor_for, prepare, run
 
 CAMERA = qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
@@ -100,6 +103,74 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_files(take: Path, whole: Pa
     assert done.returncode == 1, done.stderr
     assert "1 of 6 shots have no shape" in done.stderr
     assert digests(tmp_path) == digests(whole)
+
+
+def another_take(take: Path, path: Path) -> Path:
+    """Record the same shots a second later."""
+    path.parent.mkdir()
+    with Recording(take) as recorded, Recorder(path, recorded.config, recorded.calibration) as recorder:
+        for shot in recorded:
+            assert shot.stamp is not None
+            recorder.write(replace(shot, stamp=replace(shot.stamp, time_us=shot.stamp.time_us + 1_000_000)))
+    return path
+
+
+def test_another_recording_of_the_same_name_does_not_continue_the_results(
+    take: Path, whole: Path, tmp_path: Path
+) -> None:
+    other = another_take(take, tmp_path / "later" / "take.h5")
+    with pytest.raises(InputError, match="from another recording"):
+        list(decode_recordings([other], whole, workers=1))
+
+
+def test_changed_results_are_made_again(take: Path, whole: Path, tmp_path: Path) -> None:
+    out = Path(shutil.copytree(whole, tmp_path / "out"))
+    (out / "take" / "shot_000001.ply").write_bytes(b"ply")
+    chunk = out / "take.zarr" / "phase_rad" / "c" / "2" / "0" / "0"
+    data = bytearray(chunk.read_bytes())
+    data[len(data) // 2] ^= 1
+    chunk.write_bytes(data)
+    shutil.rmtree(out / "take.zarr" / "xyz_mm" / "c" / "4")
+    with pytest.warns(RecordingWarning, match="results of 3 shots were changed and are made again: 1, 2, 4"):
+        again = list(decode_recordings([take], out, workers=1))
+    assert sorted(outcome.shot for outcome in again) == [1, 2, BLACK, 4]
+    assert digests(out) == digests(whole)
+
+
+@pytest.mark.parametrize("changed", ["id/c/0", "phase_rad/zarr.json"])
+def test_results_whose_description_was_changed_are_refused(
+    take: Path, whole: Path, tmp_path: Path, changed: str
+) -> None:
+    out = Path(shutil.copytree(whole, tmp_path / "out"))
+    file = out / "take.zarr" / changed
+    file.write_bytes(file.read_bytes() + b" ")
+    with pytest.raises(InputError, match="changed since it was made"):
+        prepare([take], out)
+
+
+def test_two_runs_into_one_folder_are_refused(take: Path, tmp_path: Path) -> None:
+    with locked(tmp_path), pytest.raises(InputError, match="another batch writes into this folder"):
+        list(decode_recordings([take], tmp_path, workers=1))
+    with locked(tmp_path):
+        assert not (tmp_path / "take.zarr").exists()
+
+
+def test_a_damaged_shot_is_named_and_the_others_are_decoded(take: Path, whole: Path, tmp_path: Path) -> None:
+    """The first shot, which a response would be estimated from."""
+    torn = tmp_path / "take.h5"
+    torn.write_bytes(take.read_bytes())
+    with h5py.File(torn) as file:
+        place = file["blue"].id.get_chunk_info_by_coord((0, 0, 0)).byte_offset
+    with torn.open("r+b") as raw:
+        raw.seek(place + 100)
+        raw.write(b"\xff\x00\xff\x00")
+    outcomes = {outcome.shot: outcome.error for outcome in decode_recordings([torn], tmp_path / "out", workers=1)}
+    assert "shot 0 is damaged" in str(outcomes[0])
+    assert sorted(shot for shot, error in outcomes.items() if error) == [0, BLACK]
+    made = zarr.open_group(tmp_path / "out" / "take.zarr", mode="r")
+    expected = zarr.open_group(whole / "take.zarr", mode="r")
+    np.testing.assert_array_equal(made["phase_rad"][1], expected["phase_rad"][1])
+    assert made["status"][0] == 2
 
 
 def test_a_dask_scheduler_gives_the_same_files(take: Path, whole: Path, tmp_path: Path) -> None:

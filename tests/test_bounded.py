@@ -108,6 +108,17 @@ def test_nothing_is_left_when_the_caller_is_killed(then: str) -> None:
     assert ends(process)
 
 
+def test_ctrl_c_ends_a_call() -> None:
+    command = [sys.executable, "-c", CALLER.format(time_s=3600.0, then="helper.run(time.sleep, 3600)")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as caller:
+        assert caller.stdout is not None
+        process = int(caller.stdout.readline())
+        time.sleep(0.2)
+        caller.send_signal(signal.SIGINT)
+        assert "KeyboardInterrupt" in caller.communicate(timeout=PATIENCE_S)[1]
+    assert ends(process)
+
+
 def test_nothing_is_left_when_a_caller_ends_without_closing() -> None:
     command = [sys.executable, "-W", "error", "-c", CALLER.format(time_s=60.0, then="")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

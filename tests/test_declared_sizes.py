@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import struct
-import zipfile
 import zlib
-from io import BytesIO
+from pathlib import Path
 
 import cv2
 import numpy as np
 import pytest
 
 from quadfringe.errors import InputError
-from quadfringe.io.declared import ARRAYS, ARRAYS_BYTES, check_arrays, check_image, pixels_declared
+from quadfringe.io.declared import check_image, pixels_declared
+from quadfringe.io.images import read_image
 
 
 def png(width: int, height: int) -> bytes:
@@ -59,9 +59,11 @@ def test_the_declared_size_is_that_of_the_image(suffix: str, kind: type, shape: 
     ],
     ids=lambda bomb: repr(bomb[:8]),
 )
-def test_images_that_declare_too_much_are_refused(bomb: bytes) -> None:
-    with pytest.raises(InputError, match=r"^a\.png: declares [\d,]+ pixels; expected at most 268,435,456$"):
-        check_image("a.png", bomb)
+def test_images_that_declare_too_much_are_refused(bomb: bytes, tmp_path: Path) -> None:
+    path = tmp_path / "a.png"
+    path.write_bytes(bomb)
+    with pytest.raises(InputError, match=r"a\.png: declares [\d,]+ pixels; expected at most 268,435,456$"):
+        read_image(path)
 
 
 def test_every_start_of_an_image_is_judged_without_a_crash() -> None:
@@ -76,32 +78,4 @@ def test_every_start_of_an_image_is_judged_without_a_crash() -> None:
             damaged[random.integers(len(data))] = random.integers(256)
             pixels_declared(bytes(damaged))
     for nothing in (b"", b"text", b"II*\0", b"\xff\xd8" + b"\xff\xfe\x00\x00" * 100):
-        with pytest.raises(InputError, match="expected PNG, TIFF or BMP"):
-            check_image("x", nothing)
-
-
-def archive(*sizes: int) -> bytes:
-    """A ZIP archive of zeros, small as long as it is not unpacked."""
-    stream = BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as packed:
-        for index, size in enumerate(sizes):
-            packed.writestr(f"{index}.npy", bytes(size))
-    return stream.getvalue()
-
-
-def test_archives_that_declare_too_much_are_refused() -> None:
-    stream = BytesIO()
-    np.savez_compressed(stream, phase_rad=np.zeros((64, 64), np.float32))
-    check_arrays("a.npz", stream.getvalue())
-    check_arrays("a.npz", b"no archive")
-    packed = archive(1000)
-    place = packed.rindex(b"PK\x01\x02")
-    bomb = packed[: place + 24] + struct.pack("<I", 2**32 - 2) + packed[place + 28 :]
-    check_arrays("a.npz", bomb)
-    directory, end = bomb[place : bomb.rindex(b"PK\x05\x06")], 5
-    several = bomb[:place] + directory * end
-    several += struct.pack("<IHHHHIIH", 0x06054B50, 0, 0, end, end, len(directory) * end, place, 0)
-    with pytest.raises(InputError, match=f"declares 5 arrays with [0-9,]+ bytes; .*{ARRAYS_BYTES:,}"):
-        check_arrays("a.npz", several)
-    with pytest.raises(InputError, match=f"declares {ARRAYS + 1} arrays"):
-        check_arrays("a.npz", archive(*[1] * (ARRAYS + 1)))
+        assert pixels_declared(nothing) is None

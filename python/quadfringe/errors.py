@@ -23,6 +23,7 @@ __all__ = [
     "InputError",
     "MissingExtraError",
     "RecordingError",
+    "RecordingWarning",
     "ShotTimeoutError",
     "UnpairedError",
     "WrongFrameError",
@@ -83,6 +84,10 @@ class WrongFrameError(CameraError):
 
 class RecordingError(OSError):
     """A recording cannot continue; the message says why and how many shots are safe."""
+
+
+class RecordingWarning(UserWarning):
+    """A recording or a result of a batch was changed, was cut short, or cannot be verified; the message says which."""
 
 
 class BatchError(RuntimeError):

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from threading import Event
-from typing import Any, TypeVar
+from typing import Any, TextIO, TypeVar
 from unicodedata import bidirectional, category
 
 import typer
@@ -16,6 +17,7 @@ from quadfringe.files import atomic, figures_text
 
 __all__ = [
     "caution",
+    "cautions",
     "complain",
     "printable",
     "progress",
@@ -40,6 +42,34 @@ def complain(message: str) -> None:
 def caution(message: str) -> None:
     """Print a warning on standard error."""
     typer.echo(printable(f"warning: {message}"), err=True)
+
+
+@contextmanager
+def cautions() -> Iterator[None]:
+    """Print warnings of recordings in the form of `caution`, each once."""
+    from quadfringe.errors import RecordingWarning
+
+    seen: set[str] = set()
+    with warnings.catch_warnings():
+        others = warnings.showwarning
+
+        def show(
+            message: Warning | str,
+            category: type[Warning],
+            filename: str,
+            lineno: int,
+            file: TextIO | None = None,
+            line: str | None = None,
+        ) -> None:
+            if not issubclass(category, RecordingWarning):
+                others(message, category, filename, lineno, file, line)
+            elif str(message) not in seen:
+                seen.add(str(message))
+                caution(str(message))
+
+        warnings.simplefilter("always", RecordingWarning)
+        warnings.showwarning = show
+        yield
 
 
 def say(message: str, json: Path | None = None) -> None:

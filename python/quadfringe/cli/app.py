@@ -27,7 +27,7 @@ from quadfringe.cli import (
     target,
 )
 from quadfringe.cli._options import in_words
-from quadfringe.cli._output import complain
+from quadfringe.cli._output import cautions, complain
 from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
 __all__ = ["app"]
@@ -41,7 +41,8 @@ class Commands(TyperGroup):
     def invoke(self, ctx: Any) -> Any:
         """Run the command and turn its errors into exit statuses."""
         try:
-            return super().invoke(ctx)
+            with cautions():
+                return super().invoke(ctx)
         except typer.BadParameter as error:
             error.message = in_words(error)
             raise

@@ -96,11 +96,12 @@ def recover(
 ) -> None:
     """Copy every whole shot of a damaged recording into a new one, which any HDF5 program opens.
 
-    The damaged file is only read.
+    The damaged file is only read. Settings or a calibration that were changed are left out.
     """
     from quadfringe.recording import recover as recover_file
+    from quadfringe.recording.reader import listed
 
     found = recover_file(file, out)
-    damaged = f", {len(found.damaged)} damaged shots left out" if found.damaged else ""
+    damaged = f", {len(found.damaged)} damaged shots left out ({listed(found.damaged)})" if found.damaged else ""
     say(f"{out}: {found.shots} shots{damaged}", json)
     write_figures({"shots": found.shots, "damaged": len(found.damaged)}, json)

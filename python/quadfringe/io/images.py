@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from quadfringe.errors import InputError
 from quadfringe.files import atomic, read_bytes
+from quadfringe.io.declared import check_image
 
 __all__ = ["full_scale", "read_grey", "read_image", "read_rgb", "write_image"]
 
@@ -38,6 +39,7 @@ def read_image(path: Path) -> NDArray[Any]:
     import cv2
 
     stored = read_bytes(path)
+    check_image(path, stored)
     if _has_more_pages(stored):
         raise InputError(f"{path}: holds several pages; expected one image, so save the page that is meant alone")
     data = np.frombuffer(stored, np.uint8)

@@ -1,25 +1,27 @@
-"""The file format of a recording: one HDF5 file with these attributes, datasets and types.
+"""The file format of a recording, version 2: one HDF5 file with these attributes, datasets and types.
 
-    /               attributes: format, schema_version, software, created_utc, device, full_scale, and bayer
+    /               attributes: format, schema_version, software, created_utc, device, full_scale, and bayer;
+                    header_sha256, config_sha256 and calibration_sha256
     /config         the resolved system, JSON; "null" when there is none
     /calibration    the calibration, JSON; "null" when there is none
     /red /green /blue /ir, or /raw /ir      (N, H, W), one uncompressed chunk per shot
     /id             (N,) uint64, number of the exposure
     /time_us        (N,) int64, start of the exposure, us since 1970 UTC
     /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of the frame of each chip; for camera shots
-    /crc32          (N, images) uint32, of the bytes of each image, in the order above
-    /closed         1 once the file has been closed properly
+    /crc32          (N, images + 1) uint32: of each image, in the order above, and of the shot (see `_checksums`)
+    /closed         1 once the file has been closed properly; then a seal follows behind the HDF5 file (see `_seal`)
 
-All datasets are created before the single-writer multiple-reader mode of HDF5 starts, which permits no new objects.
+Version 1 has no SHA-256, no CRC-32 of shots and no seal. All datasets are created before the single-writer
+multiple-reader mode of HDF5 starts, which permits no new objects.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 import h5py
 import numpy as np
@@ -27,14 +29,18 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config import BayerPattern, SystemConfig, checked
-from quadfringe.data import AnyShot, BayerShot, Calibration, FrameStamp, Shot, Stamp
+from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Stamp
 from quadfringe.errors import InputError
+from quadfringe.recording._checksums import sha256_of
+from quadfringe.recording._stored import Stored
 
-__all__ = ["Header", "crcs_of", "make_datasets", "stamp_at", "stamp_values"]
+__all__ = ["Header", "StoredHeader", "frames_of", "make_datasets"]
 
 FORMAT = "quadfringe recording"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 IMAGES = (("red", "green", "blue", "ir"), ("raw", "ir"))
+PIXELS = ("u1", "u2", "f4")
+TEXTS: dict[str, type[SystemConfig] | type[Calibration]] = {"config": SystemConfig, "calibration": Calibration}
 SHOTS_PER_CHUNK = 512  # of the datasets of numbers; an image is a chunk of its shot
 
 
@@ -104,48 +110,105 @@ class Header:
         red, green, blue, ir = (images[name] for name in ("red", "green", "blue", "ir"))
         return Shot(red, green, blue, ir, self.full_scale, stamp=stamp)
 
-    def write(self, file: h5py.File) -> None:
-        """Write the header to a new file."""
-        file.attrs["format"] = FORMAT
-        file.attrs["schema_version"] = SCHEMA_VERSION
-        file.attrs["software"] = f"quadfringe {_core.__version__}"
-        file.attrs["created_utc"] = datetime.now(UTC).isoformat(timespec="seconds")
-        file.attrs["device"] = self.device
-        file.attrs["full_scale"] = self.full_scale
+    def write(self, file: h5py.File) -> str:
+        """Write the header to a new file; return its SHA-256."""
+        known: dict[str, Any] = {
+            "format": FORMAT,
+            "schema_version": SCHEMA_VERSION,
+            "software": f"quadfringe {_core.__version__}",
+            "created_utc": datetime.now(UTC).isoformat(timespec="seconds"),
+            "device": self.device,
+            "full_scale": float(self.full_scale),
+        }
         if self.bayer is not None:
-            file.attrs["bayer"] = self.bayer
-        for name in ("config", "calibration"):
+            known["bayer"] = self.bayer
+        for name in TEXTS:
             model = getattr(self, name)
-            file[name] = "null" if model is None else model.model_dump_json(exclude_none=True)
+            text = "null" if model is None else model.model_dump_json(exclude_none=True)
+            file[name] = text
+            known[f"{name}_sha256"] = sha256_of(text)
+        digest = sha256_of(known, self._geometry)
+        file.attrs.update(known | {"header_sha256": digest})
+        return digest
+
+    @property
+    def _geometry(self) -> list[Any]:
+        return [self.images, self.height_px, self.width_px, np.dtype(self.dtype).str, self.chips]
+
+
+@dataclass(frozen=True)
+class StoredHeader:
+    """The header of a file.
+
+    `sha256` is that in the file, "" in version 1; `identity` stands for it there; `changed_texts` are left out.
+    """
+
+    header: Header
+    sha256: str
+    identity: str
+    changed_texts: tuple[str, ...]
 
     @classmethod
-    def read(cls, file: h5py.File, source: str) -> Self:
-        """Read the header; raises `InputError` when the file is no recording or has another version."""
-        if file.attrs.get("format") != FORMAT:
-            raise InputError(f"{source}: expected a recording of quadfringe, got another HDF5 file")
-        if (version := file.attrs.get("schema_version")) != SCHEMA_VERSION:
+    def of(cls, stored: Stored) -> Self:
+        """Check what a file contains; raises `InputError` when it is no recording, was changed or has another version.
+
+        The message does not name the file.
+        """
+        attributes = stored.attributes
+        if attributes.get("format") != FORMAT:
+            raise InputError("expected a recording of quadfringe, got another HDF5 file")
+        if (version := attributes.get("schema_version")) not in (1, SCHEMA_VERSION):
             raise InputError(
-                f"{source}: recording version {version}, expected {SCHEMA_VERSION}; read it with the program that "
-                "wrote it"
+                f"recording version {version!r}, expected {SCHEMA_VERSION} or 1; read it with the program that wrote it"
             )
-        images = next((names for names in IMAGES if all(name in file for name in names)), None)
-        missing = [name for name in ("id", "time_us", "crc32", "config", "calibration", "closed") if name not in file]
-        if images is None or missing:
+        bare = _bare_header(stored)
+        said = attributes.get("header_sha256", "")
+        if version == SCHEMA_VERSION:
+            rest = {name: value for name, value in attributes.items() if name != "header_sha256"}
+            if said != sha256_of(rest, bare._geometry):
+                raise InputError(
+                    "the header does not match its checksum; copy the file again from where it was recorded"
+                )
+            changed = tuple(n for n in TEXTS if sha256_of(stored.texts[n]) != attributes.get(f"{n}_sha256"))
+        elif said:
             raise InputError(
-                f"{source}: the recording lacks {', '.join(missing) or 'images'}; copy it again from where it was "
-                "recorded"
+                "version 1 with the checksums of version 2; copy the file again from where it was recorded"
             )
-        first = file[images[0]]
-        chips = tuple(file["chip_stamps"].attrs["chips"]) if "chip_stamps" in file else ()
-        full_scale, bayer, device = (file.attrs.get(name) for name in ("full_scale", "bayer", "device"))
-        _, height_px, width_px = first.shape
-        header = cls(images, height_px, width_px, first.dtype, float(full_scale), bayer, device, chips)
-        config, calibration = (json.loads(file[name].asstr()[()]) for name in ("config", "calibration"))
-        return replace(
-            header,
-            config=None if config is None else checked(SystemConfig, config, f"{source}, config"),
-            calibration=None if calibration is None else checked(Calibration, calibration, f"{source}, calibration"),
+        else:
+            changed = ()
+        models = {name: _model(stored.texts[name], name) for name in TEXTS if name not in changed}
+        identity = said or sha256_of(attributes, bare._geometry, *stored.texts.values())
+        return cls(replace(bare, **models), said, identity, changed)
+
+
+def _bare_header(stored: Stored) -> Header:
+    """Return the header without settings and calibration; raises `InputError` for datasets that do not fit."""
+    images = next((names for names in IMAGES if all(name in stored.shapes for name in names)), None)
+    present = {*stored.shapes, *stored.texts, *(() if stored.closed is None else ("closed",))}
+    missing = [name for name in ("id", "time_us", "crc32", *TEXTS, "closed") if name not in present]
+    if images is None or missing:
+        raise InputError(
+            f"the recording lacks {', '.join(missing) or 'images'}; copy it again from where it was recorded"
         )
+    columns = len(images) + (stored.attributes["schema_version"] == SCHEMA_VERSION)
+    size, dtype = stored.shapes[images[0]][1:], stored.dtypes[images[0]]
+    expected: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(images, (dtype, size))
+    expected |= {name: (np.dtype(kind).str, shape) for name, (kind, shape) in _numbers(columns, stored.chips).items()}
+    odd = [n for n, found in expected.items() if (stored.dtypes.get(n), stored.shapes.get(n, ())[1:]) != found]
+    if odd or len(size) != 2 or 0 in size or dtype[1:] not in PIXELS:
+        raise InputError(f"{', '.join(odd) or dtype}: not the type or size of a recording; copy the file again")
+    full_scale, bayer, device = (stored.attributes.get(name) for name in ("full_scale", "bayer", "device"))
+    if not isinstance(full_scale, float) or not isinstance(device, str) or bayer not in (None, *get_args(BayerPattern)):
+        raise InputError("full_scale, bayer or device: not the values of a recording; copy the file again")
+    return Header(images, *size, np.dtype(dtype), full_scale, bayer, device, stored.chips)
+
+
+def _model(text: str, name: str) -> Any:
+    try:
+        values = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: not valid JSON: {error}; copy the file again") from error
+    return None if values is None else checked(TEXTS[name], values, name)
 
 
 def make_datasets(file: h5py.File, header: Header) -> None:
@@ -153,35 +216,21 @@ def make_datasets(file: h5py.File, header: Header) -> None:
     size = (header.height_px, header.width_px)
     for name in header.images:
         file.create_dataset(name, (0, *size), header.dtype, maxshape=(None, *size), chunks=(1, *size))
-    numbers: dict[str, tuple[type, tuple[int, ...]]] = {
-        "id": (np.uint64, ()),
-        "time_us": (np.int64, ()),
-        "crc32": (np.uint32, (len(header.images),)),
-    }
-    if header.chips:
-        numbers["chip_stamps"] = (np.int64, (len(header.chips), 3))
-    for name, (dtype, shape) in numbers.items():
+    for name, (dtype, shape) in _numbers(len(header.images) + 1, header.chips).items():
         file.create_dataset(name, (0, *shape), dtype, maxshape=(None, *shape), chunks=(SHOTS_PER_CHUNK, *shape))
     if header.chips:
         file["chip_stamps"].attrs["chips"] = list(header.chips)
     file.create_dataset("closed", data=np.uint8(0))
 
 
-def stamp_values(stamp: Stamp) -> dict[str, Any]:
-    """Return the value of a stamp for each dataset of numbers."""
-    values: dict[str, Any] = {"id": stamp.id, "time_us": stamp.time_us}
-    if stamp.frames:
-        values["chip_stamps"] = [(frame.id, frame.device_ns, frame.arrival_ns) for frame in stamp.frames.values()]
-    return values
+def _numbers(crcs: int, chips: Sequence[str]) -> dict[str, tuple[type, tuple[int, ...]]]:
+    """Return type and shape of a row for each dataset of numbers."""
+    numbers: dict[str, tuple[type, tuple[int, ...]]] = {"id": (np.uint64, ()), "time_us": (np.int64, ())}
+    if chips:
+        numbers["chip_stamps"] = (np.int64, (len(chips), 3))
+    return numbers | {"crc32": (np.uint32, (crcs,))}
 
 
-def stamp_at(file: h5py.File, header: Header, index: int) -> Stamp:
-    """Read the stamp of a shot."""
-    rows = file["chip_stamps"][index].tolist() if header.chips else []
-    frames = {chip: FrameStamp(*row) for chip, row in zip(header.chips, rows, strict=True)}
-    return Stamp(int(file["id"][index]), int(file["time_us"][index]), header.device, frames)
-
-
-def crcs_of(images: Mapping[str, NDArray[Any]]) -> list[int]:
-    """Return the CRC-32 of the bytes of each image, in C order."""
-    return [_core.crc32(np.ascontiguousarray(image).view(np.uint8)) for image in images.values()]
+def frames_of(stamp: Stamp) -> list[tuple[int, int, int]]:
+    """Return the row of `chip_stamps` for a stamp."""
+    return [(frame.id, frame.device_ns, frame.arrival_ns) for frame in stamp.frames.values()]

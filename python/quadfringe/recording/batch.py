@@ -2,9 +2,11 @@
 
 The work runs on any executor of `concurrent.futures`; `executor_for` makes one for this machine or a dask cluster.
 Each shot is one task, which writes its status last; a run that was killed can therefore be continued, and ends with the
-same files.
+same files. The results belong to one recording, by its SHA-256, and a finished shot is taken as finished only when its
+files match their checksum. A damaged shot has no shape; if its stamp is damaged, its id and time_us are 0.
 
-    OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status; with the settings
+    OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status, checksum (shot); with
+                         the settings and the SHA-256 of the recording
     OUT/take/shot_000000.ply ...
     OUT/take/errors.json     reason for each shot without a shape; only when there are such shots
 """
@@ -13,56 +15,33 @@ from __future__ import annotations
 
 import json
 import multiprocessing
+import os
 import pickle
+import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any
 
 import numpy as np
 
 from quadfringe.config import SystemConfig
 from quadfringe.config.cameras import ReplayConfig
-from quadfringe.data import Shape
-from quadfringe.errors import BatchError, DecodeError, InputError, require
-from quadfringe.files import atomic, atomic_folder, folder_for
+from quadfringe.errors import BatchError, DecodeError, InputError, RecordingWarning, require
+from quadfringe.files import atomic, folder_for
 from quadfringe.recording import Recording
 from quadfringe.recording._cores import usable_cores
+from quadfringe.recording._results import REFUSED, Job, locked, open_results, save
 from quadfringe.scanner import Scanner, open_system
 
 __all__ = ["Job", "Outcome", "decode_recordings", "executor_for", "prepare", "run"]
 
-MAPS = ("phase_rad", "modulation", "quality")
-DONE, REFUSED = 1, 2
 RESTARTS = 3  # new pools after a worker process died: a shot that kills each of them is not retried for ever
-FORMAT = "quadfringe batch"
-
-
-@dataclass(frozen=True)
-class Job:
-    """One recording, the folder of its results, and the shots that remain to be decoded."""
-
-    recording: Path
-    out: Path
-    config: SystemConfig
-    ply: bool
-    shots: int
-    pending: tuple[int, ...]
-
-    @property
-    def store(self) -> Path:
-        """The zarr group."""
-        return self.out / f"{self.recording.stem}.zarr"
-
-    @property
-    def folder(self) -> Path:
-        """The folder of the PLY files and of errors.json."""
-        return self.out / self.recording.stem
 
 
 @dataclass(frozen=True)
@@ -81,7 +60,8 @@ def prepare(
     """Examine every recording, and create its empty results or find those of an earlier run; decode nothing.
 
     Settings of `system` replace the recorded ones. Raises `InputError` for unreadable recordings, for two recordings of
-    one name, for results of other settings in `out`, and for PLY files without a calibration.
+    one name, for results of other settings in `out`, and for PLY files without a calibration. It does not lock `out`:
+    one run at a time is for the caller to ensure, or for `decode_recordings`.
     """
     require("zarr", "batch")
     if ply:
@@ -102,13 +82,13 @@ def _prepared(recording: Path, out: Path, system: SystemConfig, ply: bool) -> Jo
                 "use --no-ply"
             )
         # Estimated once here: otherwise each process would estimate it from the shots that it happens to get.
-        scanner.change_decode(response=scanner.settle_response(take))
+        sound = (shot for index in range(len(take)) if (shot := take.read(index)) is not None)
+        scanner.change_decode(response=scanner.settle_response(sound))
         config = config.model_copy(update={"decode": scanner.config.decode})
         job = Job(recording.resolve(), out.resolve(), config, ply, len(take), ())
-        status = _open_store(job, take, scanner)[:]
-    pending = tuple(int(shot) for shot in np.flatnonzero(status != DONE))
+        finished = open_results(job, take, _settings(scanner), calibrated=scanner.calibration is not None)
     folder_for(job.folder)
-    return Job(job.recording, job.out, config, ply, job.shots, pending)
+    return replace(job, pending=tuple(np.flatnonzero(~finished).tolist()))
 
 
 def _opened(config: SystemConfig) -> Scanner:
@@ -116,68 +96,6 @@ def _opened(config: SystemConfig) -> Scanner:
     scanner = open_system(config)
     scanner.change_decode(threads=1)
     return scanner
-
-
-def _open_store(job: Job, take: Recording, scanner: Scanner) -> Any:
-    """Return the status array of a store, which is created if missing; raises `InputError` for a foreign store."""
-    import zarr
-
-    attributes = {"format": FORMAT, "source": job.recording.name, "settings": _settings(scanner)}
-    if job.store.exists():
-        try:
-            group = zarr.open_group(job.store, mode="r")
-            found, shots = dict(group.attrs), group["status"].shape[0]
-        except (KeyError, ValueError, OSError) as error:
-            raise InputError(f"{job.store}: expected the result of a batch: {error}; choose another --out") from error
-        if found != attributes or shots != job.shots:
-            raise InputError(f"{job.store}: made with other settings or from another recording; choose another --out")
-        _sweep(job)
-        return group["status"]
-    # Created in a temporary folder and renamed, so that an existing store is complete.
-    with atomic_folder(job.store) as temporary:
-        _fill(
-            zarr.open_group(temporary, mode="w", attributes=attributes),
-            take,
-            calibrated=scanner.calibration is not None,
-        )
-    return zarr.open_group(job.store, mode="r")["status"]
-
-
-def _sweep(job: Job) -> None:
-    """Remove the partial files of a killed worker."""
-    for leftover in (*job.store.rglob("*.partial"), *job.folder.glob(".shot_*")):
-        leftover.unlink(missing_ok=True)
-
-
-def _fill(group: Any, take: Recording, calibrated: bool) -> None:
-    from zarr.codecs import BloscCodec
-
-    packed = [BloscCodec(cname="lz4", clevel=1, shuffle="shuffle", typesize=4)]
-    size = (len(take), take.header.height_px, take.header.width_px)
-    nan, axes = float("nan"), ("shot", "y", "x")
-    for name in MAPS:
-        group.create_array(
-            name,
-            shape=size,
-            chunks=(1, *size[1:]),
-            dtype="f4",
-            fill_value=nan,
-            compressors=packed,
-            dimension_names=axes,
-        )
-    if calibrated:
-        group.create_array(
-            "xyz_mm",
-            shape=(*size, 3),
-            chunks=(1, *size[1:], 3),
-            dtype="f4",
-            fill_value=nan,
-            compressors=packed,
-            dimension_names=(*axes, "xyz"),
-        )
-    for name, numbers in (("id", take.ids), ("time_us", take.times_us)):
-        group.create_array(name, data=numbers, dimension_names=("shot",))
-    group.create_array("status", shape=(len(take),), chunks=(1,), dtype="u1", fill_value=0, dimension_names=("shot",))
 
 
 def _settings(scanner: Scanner) -> dict[str, Any]:
@@ -200,16 +118,18 @@ def decode_recordings(
 ) -> Iterator[Outcome]:
     """Decode all shots that are not decoded yet; yield outcomes as they finish, some twice after a process died.
 
-    Raises `InputError` as `prepare` and `executor_for`, and `BatchError` when worker processes die repeatedly.
+    Raises `InputError` as `prepare` and `executor_for` and while another run writes into `out`, and `BatchError` when
+    worker processes die repeatedly.
     """
-    for _ in range(RESTARTS):
-        jobs = prepare(recordings, out, system, ply=ply)
-        try:
-            with executor_for(workers, scheduler) as executor:
-                yield from run(jobs, executor)
-            return
-        except BrokenProcessPool:
-            continue  # finished shots stay finished
+    with locked(out):
+        for _ in range(RESTARTS):
+            jobs = prepare(recordings, out, system, ply=ply)
+            try:
+                with executor_for(workers, scheduler) as executor:
+                    yield from run(jobs, executor)
+                return
+            except BrokenProcessPool:
+                continue  # finished shots stay finished
     raise BatchError(f"worker processes died {RESTARTS} times; lower --workers, which all need memory")
 
 
@@ -253,8 +173,7 @@ def decode_shot(job: Job, shot: int) -> Outcome:
         except (DecodeError, InputError) as error:
             group["status"][shot] = REFUSED
             return Outcome(job.recording, shot, None, str(error))
-        _save(job, shot, shape, group)
-        group["status"][shot] = DONE
+        save(job, shot, shape, group)
         return Outcome(job.recording, shot, 100.0 * float(shape.returned.mean()), None)
 
 
@@ -265,16 +184,9 @@ def _reader(job: Job) -> tuple[Recording, Scanner]:
 
 @lru_cache(maxsize=2)
 def _planned(recording: Path, config: bytes) -> tuple[Recording, Scanner]:
-    return Recording(recording), _opened(pickle.loads(config))
-
-
-def _save(job: Job, shot: int, shape: Shape, group: Any) -> None:
-    for name in MAPS:
-        group[name][shot] = getattr(shape, name)
-    if shape.xyz_mm is not None:
-        group["xyz_mm"][shot] = shape.xyz_mm
-        if job.ply:
-            shape.save(job.folder / f"shot_{shot:06d}.ply")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", RecordingWarning)  # `prepare` gave the same warnings
+        return Recording(recording), _opened(pickle.loads(config))
 
 
 @contextmanager
@@ -286,8 +198,17 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
     """
     if scheduler is None:
         # Spawned, because a process with threads (kernel, HDF5) must not be forked.
-        with ProcessPoolExecutor(workers or usable_cores(), mp_context=multiprocessing.get_context("spawn")) as pool:
+        spawned = multiprocessing.get_context("spawn")
+        others = multiprocessing.active_children()
+        pool = ProcessPoolExecutor(workers or usable_cores(), spawned, initializer=_end_with_parent)
+        try:
             yield pool
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            # Not asked to end: a worker that was killed while it held the lock of the queue would keep others waiting.
+            for worker in multiprocessing.active_children():
+                if worker not in others:
+                    worker.kill()
         return
     distributed = require("distributed", "batch")
     try:
@@ -296,3 +217,14 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
         raise InputError(f"{scheduler}: no dask scheduler answers: {error}; check the address") from error
     with client, client.get_executor(retries=RESTARTS, pure=False) as cluster:
         yield cluster
+
+
+def _end_with_parent() -> None:
+    """End this worker when its parent ends: a worker waits for work without end, also from a parent that was killed."""
+
+    def wait() -> None:
+        if parent := multiprocessing.parent_process():
+            parent.join()
+            os._exit(1)
+
+    Thread(target=wait, name="end-with-parent", daemon=True).start()

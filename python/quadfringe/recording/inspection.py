@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -83,13 +82,14 @@ def _json(path: Path) -> list[str]:
 
 
 def _recording(path: Path) -> list[str]:
-    with Recording(path) as recording:
-        times_us = recording.times_us
-        lines = [f"Recording: {len(recording)} shots of {recording.header.described}"]
-        if len(recording):
-            lost = int(recording.ids[-1] - recording.ids[0]) + 1 - len(recording)
-            begin = datetime.fromtimestamp(times_us[0] / 1e6, UTC).isoformat(timespec="milliseconds")
-            lines.append(f"begin: {begin}, {(times_us[-1] - times_us[0]) / 1e6:.3f} s, {lost} exposures missing")
+    with Recording(path, rescue=True) as recording:
+        lines = [f"Recording: {len(recording)} shots of {recording.header.described}", f"SHA-256: {recording.sha256}"]
+        ids, times_us = recording.ids[recording.stamped], recording.times_us[recording.stamped]
+        if len(ids):
+            lost = int(ids[-1]) - int(ids[0]) + 1 - len(ids)
+            begin = np.datetime_as_string(times_us[0].astype("datetime64[us]"), unit="ms", timezone="UTC")
+            spent_s = (int(times_us[-1]) - int(times_us[0])) / 1e6
+            lines.append(f"begin: {begin}, {spent_s:.3f} s, {lost} exposures missing")
         if not recording.closed_in_order:
             lines.append("not closed: still being written, or its writer was killed (then use quadfringe recover)")
         for name, model in (("calibration", recording.calibration), ("config", recording.config)):

@@ -2,56 +2,86 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
-from collections.abc import Iterator
-from contextlib import suppress
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import h5py
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import SystemConfig, shortened
-from quadfringe.data import AnyShot, Calibration, Stamp
-from quadfringe.errors import InputError
-from quadfringe.recording._layout import Header, crcs_of, stamp_at
+from quadfringe.data import AnyShot, Calibration
+from quadfringe.errors import InputError, RecordingWarning
+from quadfringe.recording._checksums import crcs_of
+from quadfringe.recording._layout import Header, StoredHeader
+from quadfringe.recording._seal import Seal, read_seal
+from quadfringe.recording._source import DamageError, open_source
+from quadfringe.recording._stored import is_hdf5, missing_bytes, stated_bytes
+from quadfringe.recording._table import read_table
 
-__all__ = ["Recording"]
+__all__ = ["Recording", "Verification", "listed"]
 
-LAST_SHOT_BYTES = 64 << 20  # upper bound of an unfinished shot: four 16-bit images of 8 million pixels
-LOOK_S = 30.0  # limit for the process that checks a cut file: a busy machine starts it slowly
-LOOK = """
-import h5py, sys
-with h5py.File(sys.argv[1], "r", libver="latest", swmr=True) as file:
-    for name in file:
-        if file[name].chunks:
-            [file[name].id.get_chunk_info(i) for i in range(file[name].id.get_num_chunks())]
-"""
+AGAIN = "copy it again from where it was recorded"
+UNVERIFIABLE = (
+    "recorded by an earlier version: stamps, settings and calibration have no checksums and cannot be verified"
+)
+LISTED = 10  # shots that a message names
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Number of shots, indices of the damaged ones, and what else differs from the recording as it was closed."""
+
+    shots: int
+    damaged: tuple[int, ...]
+    faults: tuple[str, ...]
 
 
 class Recording:
     """The shots of one file, oldest first; close it, or use it in a `with` block.
 
-    The file may still grow; `len` counts the shots that were complete when it was opened. Every shot is checked against
-    its CRC-32. Raises `InputError` for a file that is missing, damaged, or no recording.
+    The file may still grow; `len` counts the shots that were complete when it was opened. Header, settings, calibration
+    and every shot (pixels and stamp) are checked against their checksums. A file that was not closed properly, was
+    changed since, or was recorded before version 2 is read by a helper process with a limit of time and memory.
+    `faults` says in words how the file differs from what was recorded; it is found without reading pixels.
+
+    Raises `InputError` for a file that is missing, no recording, or has a damaged header, and warns with
+    `RecordingWarning` of a file that is incomplete, was changed, or has no checksums. A changed text of settings or
+    calibration is an `InputError`, too; with `rescue` it is left out (None) and the warning says so.
 
     >>> with Recording("take.h5") as take:                                          # doctest: +SKIP
     ...     shapes = [decoder.decode(shot) for shot in take]
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, *, rescue: bool = False) -> None:
         self.path = Path(path)
-        self._file = _open(self.path)
+        _require_hdf5(self.path)
+        seal = read_seal(self.path)
+        self._source = open_source(self.path, sealed=seal is not None and seal.holds)
         try:
-            self.header = Header.read(self._file, str(path))
-            self._length = self._complete()
-        except (OSError, RuntimeError, KeyError, ValueError) as error:
-            self._file.close()
-            if isinstance(error, InputError):
-                raise
-            raise InputError(f"{path}: damaged recording: {error}; copy it again from where it was recorded") from error
+            stored = self._source.describe()
+            self._header = StoredHeader.of(stored)
+            if self._header.changed_texts and not rescue:
+                raise InputError(
+                    f"{self._header.changed_texts[0]} was changed; quadfringe recover copies the shots without it"
+                )
+            self._closed = bool(stored.closed)
+            most = max(self.path.stat().st_size, stated_bytes(self.path)) // self.header.shot_bytes + 1
+            self._table = read_table(self._source, stored, self._header, seal.shots if seal else 0, most)
+            if not self._closed and len(self) and self.read(-1) is None:
+                self._table = self._table.without_last  # its writer did not finish it
+        except DamageError as error:
+            self._source.close()
+            missing = missing_bytes(self.path)
+            what = f"cut short by {missing} bytes" if missing else "damaged recording"
+            raise InputError(f"{path}: {what}: {error}; {AGAIN}") from error
+        except InputError as error:
+            self._source.close()
+            raise type(error)(f"{path}: {error}") from error
+        self.faults = tuple(self._found_faults(seal))
+        if told := [*self.faults, *([] if self.verifiable else [UNVERIFIABLE])]:
+            warnings.warn(f"{path}: {'; '.join(told)}", RecordingWarning, stacklevel=2)
 
     def __repr__(self) -> str:
         size = f"{self.header.width_px} x {self.header.height_px} {self.header.dtype}"
@@ -68,64 +98,91 @@ class Recording:
         return self.header.calibration
 
     @property
+    def header(self) -> Header:
+        """The properties that all shots share."""
+        return self._header.header
+
+    @property
+    def verifiable(self) -> bool:
+        """False for recordings of earlier versions, which have checksums of images only."""
+        return bool(self._header.sha256)
+
+    @property
     def closed_in_order(self) -> bool:
         """False while the file is being written, and after its writer was killed."""
-        return bool(self._file["closed"][()])
+        return self._closed
 
     @property
     def ids(self) -> NDArray[np.uint64]:
-        """Exposure numbers, (N,); gaps are exposures that did not become a shot."""
-        ids: NDArray[np.uint64] = self._file["id"][: self._length]
-        return ids
+        """Exposure numbers, (N,); gaps are exposures that did not become a shot; 0 where `stamped` is False."""
+        return self._table.ids.copy()
 
     @property
     def times_us(self) -> NDArray[np.int64]:
-        """Start of every exposure, (N,), us since 1970 UTC."""
-        times: NDArray[np.int64] = self._file["time_us"][: self._length]
-        return times
+        """Start of every exposure, (N,), us since 1970 UTC; 0 where `stamped` is False."""
+        return self._table.times_us.copy()
+
+    @property
+    def stamped(self) -> NDArray[np.bool_]:
+        """False for shots whose stamp does not match its checksum, (N,)."""
+        return self._table.sound.copy()
+
+    @property
+    def sha256(self) -> str:
+        """The identity of the recording: SHA-256 of its header, stamps and CRC-32 of images, 64 hexadecimal digits."""
+        return self._table.sha256(self._header)
 
     def __len__(self) -> int:
-        return self._length
+        return len(self._table)
 
     def __iter__(self) -> Iterator[AnyShot]:
         for index in range(len(self)):
             yield self[index]
 
     def __getitem__(self, index: int) -> AnyShot:
-        place = index + self._length if index < 0 else index
-        if not 0 <= place < self._length:
-            raise IndexError(f"{self.path}: expected a shot from 0 to {self._length - 1}, got {index}")
-        images = self.images(place)
-        if images is None:
+        shot = self.read(index)
+        if shot is None:
+            place = index % len(self)
             raise InputError(
-                f"{self.path}: shot {place} is damaged (CRC mismatch); quadfringe recover rescues the others"
+                f"{self.path}: shot {place} is damaged (it does not match its checksum); "
+                "quadfringe recover rescues the others"
             )
-        return self.header.shot(images, self.stamp(place))
+        return shot
 
-    def stamp(self, index: int) -> Stamp:
-        """Return the stamp of a shot."""
-        return stamp_at(self._file, self.header, index)
-
-    def images(self, index: int) -> dict[str, NDArray[Any]] | None:
-        """Return the images of a shot, or None when they do not match their CRC-32."""
-        try:
-            images = {name: self._file[name][index] for name in self.header.images}
-            expected = self._file["crc32"][index].tolist()
-        except OSError:
+    def read(self, index: int) -> AnyShot | None:
+        """Return a shot, or None when its images or its stamp do not match their checksums or cannot be read."""
+        place = index + len(self) if index < 0 else index
+        if not 0 <= place < len(self):
+            raise IndexError(f"{self.path}: expected a shot from 0 to {len(self) - 1}, got {index}")
+        if not self._table.sound[place]:
             return None
-        return images if crcs_of(images) == expected else None
+        try:
+            images = self._source.images(self.header.images, place)
+        except DamageError:
+            return None
+        if crcs_of(images) != self._table.crc32[place, : len(images)].tolist():
+            return None
+        return self.header.shot(images, self._table.stamp(place, self.header))
 
-    def _complete(self) -> int:
-        """Count the complete shots; a shot that its writer left unfinished is the last and fails its CRC-32."""
-        length = min(len(self._file[name]) for name in (*self.header.images, "id", "time_us", "crc32"))
-        if not self.closed_in_order:
-            while length and self.images(length - 1) is None:
-                length -= 1
-        return int(length)
+    def verify(self, indices: Iterable[int] | None = None) -> Verification:
+        """Check every shot, or those of `indices`, against its checksums; report what is wrong."""
+        chosen = range(len(self)) if indices is None else indices
+        return Verification(len(self), tuple(i for i in chosen if self.read(i) is None), self.faults)
+
+    def _found_faults(self, seal: Seal | None) -> Iterator[str]:
+        missing = missing_bytes(self.path)
+        if missing >= (1 if self._closed else self.header.shot_bytes):
+            yield f"cut short by {missing} bytes; {AGAIN}"
+        elif self._closed and self.verifiable and (seal is None or not seal.holds):
+            yield f"changed since it was closed, so every shot is checked by itself; {AGAIN}"
+        for name in self._header.changed_texts:
+            yield f"{name} was changed, and is left out"
+        if bad := np.flatnonzero(~self._table.sound).tolist():
+            yield f"no sound stamps of {len(bad)} shots: {listed(bad)}"
 
     def close(self) -> None:
         """Close the file; further calls do nothing."""
-        self._file.close()
+        self._source.close()
 
     def __enter__(self) -> Recording:
         return self
@@ -134,30 +191,19 @@ class Recording:
         self.close()
 
 
-def _open(path: Path) -> h5py.File:
+def listed(indices: Sequence[int]) -> str:
+    """Return the first indices in words."""
+    more = ", ..." if len(indices) > LISTED else ""
+    return ", ".join(map(str, indices[:LISTED])) + more
+
+
+def _require_hdf5(path: Path) -> None:
     if not path.is_file():
         reason = "a folder; name a recording (.h5) in it" if path.is_dir() else "no such file; check the path"
         raise InputError(f"{path}: {reason}")
-    if not h5py.is_hdf5(path):
-        raise InputError(f"{path}: expected an HDF5 recording of quadfringe record, got another format")
     try:
-        file = h5py.File(path, "r", libver="latest", swmr=True)
-    except (OSError, RuntimeError) as error:
-        raise InputError(f"{path}: damaged or cut short: {str(error).splitlines()[0]}; copy it again") from error
-    missing = file.id.get_filesize() - path.stat().st_size
-    if missing > 0 and not (missing < LAST_SHOT_BYTES and _has_its_tables(path)):
-        file.close()
-        raise InputError(f"{path}: cut short by {missing} bytes; copy it again from where it was recorded")
-    return file
-
-
-def _has_its_tables(path: Path) -> bool:
-    """Return whether every index table of a cut file is present: a failed writer wrote them before the missing data.
-
-    HDF5 waits forever for a missing table and cannot be interrupted, so another process reads them.
-    """
-    with suppress(subprocess.TimeoutExpired):
-        return (
-            subprocess.run([sys.executable, "-c", LOOK, str(path)], capture_output=True, timeout=LOOK_S).returncode == 0
-        )
-    return False
+        foreign = not is_hdf5(path)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+    if foreign:
+        raise InputError(f"{path}: expected an HDF5 recording of quadfringe record, got another format")

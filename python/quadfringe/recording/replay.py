@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Iterator
-from threading import Event
+from threading import TIMEOUT_MAX, Event
 from typing import Literal, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe.config import SystemConfig
 from quadfringe.config.cameras import ReplayConfig
 from quadfringe.data import AnyShot, Calibration
-from quadfringe.devices import CameraStatistics, Devices, ExternalLight, Keep
-from quadfringe.errors import ConfigError, ShotTimeoutError
+from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, ExternalLight, Keep
+from quadfringe.errors import ConfigError, InputError, RecordingWarning, ShotTimeoutError
 from quadfringe.recording import Recording
 
 __all__ = ["ReplayCamera", "open_devices"]
@@ -25,12 +27,13 @@ class ReplayCamera:
     """Plays a recording once from its first shot; open it again to play it again.
 
     At original speed, shots come at the intervals of their exposures, and shots that are not taken in time are dropped
-    as by a real camera. At full speed, no shot is dropped.
+    as by a real camera. At full speed, no shot is dropped. A damaged shot is an `InputError` of `snap`; a stream warns
+    of it with `RecordingWarning` and goes on. Both count it as a damaged frame of the chip "recording".
     """
 
     def __init__(self, recording: Recording, speed: Literal["original", "full"] = "original") -> None:
         self._recording = recording
-        self._next = self._shots = self._dropped = 0
+        self._next = self._shots = self._dropped = self._damaged = 0
         self._streaming = False
         self._closed = Event()
         self.paced = speed == "original"
@@ -66,19 +69,32 @@ class ReplayCamera:
         self._check_free()
         self._streaming = True
         end = len(self._recording) if count is None else min(len(self._recording), self._next + count)
-        due_s = self._recording.times_us / 1e6
+        due_s = self._due_s()
         due_s += time.monotonic() - (due_s[self._next] if self._next < end else 0.0)
         try:
             while self._next < end and not self._closed.is_set():
                 if self.paced and (wait_s := due_s[self._next] - time.monotonic()) > 0:
-                    self._closed.wait(wait_s)
+                    self._closed.wait(min(wait_s, TIMEOUT_MAX))
                     continue
                 if self.paced:
                     overdue = int(np.searchsorted(due_s[self._next : end], time.monotonic(), side="right"))
                     self._drop(overdue - may_wait)
-                yield self._read()
+                try:
+                    shot = self._read()
+                except InputError as error:
+                    warnings.warn(str(error), RecordingWarning, stacklevel=2)
+                else:
+                    yield shot
         finally:
             self._streaming = False
+
+    def _due_s(self) -> NDArray[np.float64]:
+        """Return the time of every exposure, s; of a shot without a sound stamp, that between its neighbours."""
+        times_us, stamped = self._recording.times_us, np.flatnonzero(self._recording.stamped)
+        if not len(stamped):
+            return np.zeros(len(times_us))
+        due_s: NDArray[np.float64] = np.interp(np.arange(len(times_us)), stamped, times_us[stamped]) / 1e6
+        return due_s
 
     def _drop(self, shots: int) -> None:
         if shots > 0:
@@ -87,8 +103,13 @@ class ReplayCamera:
             self._dropped += shots
 
     def _read(self) -> AnyShot:
-        shot = self._recording[self._next]
+        index = self._next
         self._next += 1
+        try:
+            shot = self._recording[index]
+        except InputError:
+            self._damaged += 1
+            raise
         self._shots += 1
         return shot
 
@@ -99,8 +120,9 @@ class ReplayCamera:
             raise ValueError(f"{self.name} already streams; close that stream first")
 
     def statistics(self) -> CameraStatistics:
-        """Return how many shots were played, and how many of them were dropped."""
-        return CameraStatistics(shots=self._shots, dropped=self._dropped)
+        """Return how many shots were played, how many of them were dropped, and how many others were damaged."""
+        chips = {"recording": ChipStatistics(damaged=self._damaged)} if self._damaged else {}
+        return CameraStatistics(shots=self._shots, dropped=self._dropped, chips=chips)
 
     def close(self) -> None:
         """Close the file; further calls do nothing."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shutil
 import time
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,9 @@ from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Stamp
 from quadfringe.errors import InputError, RecordingError
-from quadfringe.recording._layout import Header, crcs_of, make_datasets, stamp_values
+from quadfringe.recording._checksums import crc_of_shot, crcs_of
+from quadfringe.recording._layout import Header, frames_of, make_datasets
+from quadfringe.recording._seal import pixel_extents, write_seal
 
 __all__ = ["RecordingWriter", "require_room"]
 
@@ -34,7 +37,8 @@ class RecordingWriter:
         self.path, self.header = Path(path), header
         self.written = 0
         self._failed = False
-        self._file = _create(self.path, header)
+        created = _create(self.path, header)
+        self._file, self._header_sha256 = created.file, created.header_sha256
         self._datasets = {name: self._file[name] for name in self._file if self._file[name].chunks}  # slow to look up
         self._dtypes = {name: dataset.dtype for name, dataset in self._datasets.items()}
 
@@ -44,12 +48,8 @@ class RecordingWriter:
         require_room(self.path.parent, self.header.shot_bytes, self.written)
         images = {name: np.ascontiguousarray(image) for name, image in shot.images.items()}
         stamp = shot.stamp or Stamp(self.written, time.time_ns() // 1000, "", {})
-        self.append_images(images, stamp, crcs_of(images))
-
-    def append_images(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
-        """Write images with these CRC-32 values, without checking them."""
         try:
-            self._write(images, stamp, crcs)
+            self._write(images, stamp)
         except (OSError, RuntimeError) as error:  # h5py raises both for a write that failed
             self._failed = True
             raise RecordingError(
@@ -61,22 +61,31 @@ class RecordingWriter:
             raise
         self.written += 1
 
-    def _write(self, images: dict[str, NDArray[Any]], stamp: Stamp, crcs: list[int]) -> None:
+    def _write(self, images: dict[str, NDArray[Any]], stamp: Stamp) -> None:
         n, datasets = self.written, self._datasets
         for name, image in images.items():
             place = datasets[name].id
             place.set_extent((n + 1, *image.shape))
             place.write_direct_chunk((n, 0, 0), image)
-        for name, value in (stamp_values(stamp) | {"crc32": crcs}).items():
+        frames, crcs = frames_of(stamp), crcs_of(images)
+        crcs.append(crc_of_shot(self._header_sha256, n, (stamp.id, stamp.time_us), frames, crcs))
+        rows: dict[str, Any] = {"id": stamp.id, "time_us": stamp.time_us, "crc32": crcs}
+        if frames:
+            rows["chip_stamps"] = frames
+        for name, value in rows.items():
             _append_row(datasets[name].id, n, np.asarray(value, self._dtypes[name]))
         self._file.flush()  # the whole file: after a flush of single datasets, h5clear would lose data
 
     def close(self) -> None:
-        """Close the file and mark it as closed, unless a write failed; further calls do nothing."""
+        """Close the file, mark it as closed and seal it, unless a write failed; further calls do nothing."""
         if not self._file.id.valid:
             return
         with suppress(OSError, RuntimeError):
             self._file["closed"][()] = not self._failed
+            extents = pixel_extents([self._datasets[name] for name in self.header.images])
+            self._file.close()
+            if not self._failed:
+                write_seal(self.path, extents, self.written)
         with suppress(OSError, RuntimeError):
             self._file.close()
 
@@ -97,7 +106,15 @@ def require_room(folder: Path, shot_bytes: int, written: int) -> None:
         )
 
 
-def _create(path: Path, header: Header) -> h5py.File:
+@dataclass(frozen=True)
+class _Created:
+    """A new file, and the SHA-256 of its header."""
+
+    file: h5py.File
+    header_sha256: str
+
+
+def _create(path: Path, header: Header) -> _Created:
     if path.suffix != ".h5":
         raise InputError(f"{path}: expected a name that ends in .h5")
     if not path.parent.is_dir():
@@ -110,7 +127,7 @@ def _create(path: Path, header: Header) -> h5py.File:
     except OSError as error:
         raise InputError(f"{path}: cannot be created: {_first_line(error)}") from error
     try:
-        header.write(file)
+        header_sha256 = header.write(file)
         make_datasets(file, header)
         file.swmr_mode = True
         file.flush()
@@ -119,7 +136,7 @@ def _create(path: Path, header: Header) -> h5py.File:
             file.close()
         path.unlink(missing_ok=True)
         raise RecordingError(f"{path}: cannot be written: {_first_line(error)}") from error
-    return file
+    return _Created(file, header_sha256)
 
 
 def _append_row(dataset: h5py.h5d.DatasetID, n: int, row: NDArray[Any]) -> None:

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from quadfringe.errors import InputError
 from quadfringe.files import atomic
-from quadfringe.recording._layout import crcs_of
 from quadfringe.recording.reader import Recording
 from quadfringe.recording.writer import RecordingWriter
 
@@ -26,18 +25,19 @@ def recover(source: Path, target: Path) -> Recovered:
     """Copy every undamaged shot of `source` to the new recording `target`.
 
     The source is only read, because the repair tool of HDF5 (`h5clear`) can destroy a file whose writer was killed.
-    Raises `InputError` when `source` cannot be read or `target` exists.
+    Settings or a calibration that were changed are left out, with a `RecordingWarning`. Raises `InputError` when
+    `source` cannot be read or `target` exists.
     """
     if target.exists():
         raise InputError(f"{target}: exists already; recordings are never overwritten")
-    with Recording(source) as recording, atomic(target) as temporary:
+    with Recording(source, rescue=True) as recording, atomic(target) as temporary:
         temporary.unlink()
         damaged = []
         with RecordingWriter(temporary, recording.header) as writer:
             for index in range(len(recording)):
-                images = recording.images(index)
-                if images is None:
+                shot = recording.read(index)
+                if shot is None:
                     damaged.append(index)
                 else:
-                    writer.append_images(images, recording.stamp(index), crcs_of(images))
-        return Recovered(len(recording) - len(damaged), tuple(damaged))
+                    writer.append(shot)
+        return Recovered(writer.written, tuple(damaged))

@@ -1,0 +1,179 @@
+"""Kill writers and batches with SIGKILL at random times; count what is lost, wrong or left.
+
+    python tests/hostile/kills.py [--kills 50] [--only record parent worker terminated] [--json FILE]
+
+record      a process that writes shots and reports each; every reported shot must be on file to the last byte, and
+            must be found by `recover`
+parent      `quadfringe batch`, whose process is killed; the same command must end with the files of an undisturbed run
+worker      `quadfringe batch`, one of whose workers is killed; the run must end with the files of an undisturbed run
+terminated  as parent, with SIGTERM; a fifth as often
+
+A process of a batch that lives 5 s after the end of its parent counts as left. The exit status is 1 if anything is
+lost, wrong or left.
+"""
+
+from __future__ import annotations
+
+import argparse
+import filecmp
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+import quadfringe as qf
+from quadfringe.data import Shot
+from quadfringe.evaluation._takes import kill_writer, whole
+from quadfringe.recording import Recorder, Recording, recover
+
+LEFT_S = 5.0
+END_S = 300.0  # limit for one run of a batch
+WHOM = ("record", "parent", "worker", "terminated")
+MARK = "QUADFRINGE_KILLS"  # in the environment of a batch and of all processes that it starts
+SYSTEM = qf.SystemConfig(
+    camera=qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5)),
+    scene=qf.SceneConfig(surface="steps", noise=0.01),
+    decode=qf.DecodeConfig(method="published"),
+)
+SHOTS = 6
+
+
+def record_killed(folder: Path, kills: int, chance: random.Random) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    for number in range(kills):
+        path, rescued = folder / f"kill{number}.h5", folder / f"whole{number}.h5"
+        reported = kill_writer(path, chance.uniform(0.0, 0.5))
+        with Recording(path) as take:
+            found = [take.read(index) for index in range(len(take))]
+        recovered = recover(path, rescued)
+        counts["record_shots_reported"] += reported
+        counts["record_lost"] += max(0, reported - min(len(found), recovered.shots))
+        counts["record_wrong"] += sum(shot is None or not whole(shot, index) for index, shot in enumerate(found))
+        with Recording(rescued) as take:
+            counts["record_wrong"] += sum(not whole(shot, index) for index, shot in enumerate(take))
+        path.unlink()
+        rescued.unlink()
+    return counts
+
+
+def noisy_take(path: Path) -> Path:
+    noise = np.random.default_rng(5)
+    with qf.open(SYSTEM) as scanner, Recorder(path, scanner.config, scanner.calibration) as recorder:
+        shot = scanner.grab()
+        for _ in range(SHOTS):
+            images = {n: (i // 2 + noise.integers(0, 3, i.shape)).astype(np.uint8) for n, i in shot.images.items()}
+            recorder.write(Shot(**images))
+    return path
+
+
+def start_batch(take: Path, out: Path, workers: int) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "quadfringe", "batch", str(take), "--out", str(out), "--workers", str(workers)]
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    return subprocess.Popen(command, env=os.environ | {MARK: str(out)}, start_new_session=True, **quiet)
+
+
+def batch_killed(batch: subprocess.Popen[bytes], out: Path, who: str, chance: random.Random) -> int:
+    """Kill a batch while it works; return how many processes are left."""
+    at = chance.randrange(SHOTS)
+    with batch:
+        end_s = time.monotonic() + END_S
+        while batch.poll() is None and time.monotonic() < end_s and len(list((out / "take").glob("shot_*.ply"))) < at:
+            time.sleep(0.005)
+        time.sleep(chance.uniform(0.0, 0.2))
+        if who == "worker":
+            for worker in sorted(workers_of(batch.pid, out))[:1]:
+                os.kill(worker, signal.SIGKILL)
+            batch.wait(END_S)
+        else:
+            batch.send_signal(signal.SIGTERM if who == "terminated" else signal.SIGKILL)
+    return left(out)
+
+
+def workers_of(parent: int, out: Path) -> list[int]:
+    words = {pid: Path(f"/proc/{pid}/cmdline").read_bytes() for pid in processes(out) if pid != parent}
+    return [pid for pid, line in words.items() if b"spawn_main" in line]
+
+
+def processes(out: Path) -> list[int]:
+    """Return the processes that a batch into this folder started, and itself."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            marked = f"{MARK}={out}\0".encode() in (entry / "environ").read_bytes()
+        except OSError:  # it has ended, or belongs to somebody else
+            continue
+        if marked and int(entry.name) != os.getpid():
+            found.append(int(entry.name))
+    return found
+
+
+def left(out: Path) -> int:
+    end_s = time.monotonic() + LEFT_S
+    while (alive := processes(out)) and time.monotonic() < end_s:
+        time.sleep(0.02)
+    for process in alive:
+        os.kill(process, signal.SIGKILL)
+    return len(alive)
+
+
+def differing(out: Path, whole_out: Path) -> int:
+    files = {path.relative_to(folder) for folder in (out, whole_out) for path in folder.rglob("*") if path.is_file()}
+    return sum(
+        not ((out / f).is_file() and (whole_out / f).is_file() and filecmp.cmp(out / f, whole_out / f, shallow=False))
+        for f in files
+    )
+
+
+def batches_killed(folder: Path, whom: list[str], kills: int, chance: random.Random) -> Counter[str]:
+    counts: Counter[str] = Counter()
+    take, undisturbed = noisy_take(folder / "take.h5"), folder / "undisturbed"
+    assert start_batch(take, undisturbed, 2).wait(END_S) == 0
+    for who in whom:
+        for number in range(-(-kills // 5) if who == "terminated" else kills):
+            out, workers = folder / f"{who}{number}", 1 + number % 2
+            alive = batch_killed(start_batch(take, out, workers), out, who, chance)
+            if who != "worker":
+                assert start_batch(take, out, workers).wait(END_S) == 0
+            differ = differing(out, undisturbed)
+            print(f"{who} {number}: {alive} processes left, {differ} files differ", file=sys.stderr, flush=True)
+            counts["processes_left"] += alive
+            counts[f"{who}_files_that_differ"] += differ
+            shutil.rmtree(out)
+    return counts
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--only", nargs="+", choices=WHOM, default=WHOM)
+    parser.add_argument("--json", type=Path)
+    options = parser.parse_args()
+    chance = random.Random(1)
+    folder = Path(tempfile.mkdtemp())
+    try:
+        counts = record_killed(folder, options.kills if "record" in options.only else 0, chance)
+        if whom := [who for who in options.only if who != "record"]:
+            counts.update(batches_killed(folder, whom, options.kills, chance))
+    finally:
+        shutil.rmtree(folder)
+    names = ("record_shots_reported", "record_lost", "record_wrong", "parent_files_that_differ")
+    names += ("worker_files_that_differ", "terminated_files_that_differ", "processes_left")
+    figures = {"kills_of_each": options.kills, **{name: counts[name] for name in names}}
+    for name, value in figures.items():
+        print(f"{name:32}{value:8}")
+    if options.json:
+        options.json.write_text(json.dumps({"figures": figures}))
+    return int(any(value for name, value in figures.items() if name.endswith(("lost", "wrong", "differ", "left"))))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
