@@ -168,7 +168,8 @@ def test_every_start_method_decodes(scanner: qf.Scanner, method: str) -> None:
 
 
 def test_joblib_decodes(scanner: qf.Scanner) -> None:
-    joblib = pytest.importorskip("joblib")
+    import joblib
+
     shot = scanner.grab()
     found = joblib.Parallel(n_jobs=2, backend="loky")(joblib.delayed(decoded)(shot, scanner.plan) for _ in range(2))
     assert found == [decoded(shot, scanner.plan)] * 2
