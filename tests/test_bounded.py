@@ -19,8 +19,9 @@ from quadfringe.files import read_bytes
 from quadfringe.io.bounded import BoundedError, Helper, Limits
 
 CALLER = """
-import os, time
+import os, signal, time
 from quadfringe.io.bounded import Helper, Limits
+signal.signal(signal.SIGINT, signal.default_int_handler)
 helper = Helper(Limits(time_s={time_s}, memory_bytes=1 << 28))
 print(helper.run(os.getpid), flush=True)
 {then}
