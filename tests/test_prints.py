@@ -7,7 +7,7 @@ import pytest
 from support.bars import hold
 
 import quadfringe as qf
-from quadfringe.evaluation import scoring, world
+from quadfringe.evaluation import scoring
 from quadfringe.evaluation._textures import TEXTURES
 from quadfringe.evaluation.reproduce import WIDTH_PX, inside
 
@@ -31,13 +31,3 @@ def test_textures_leave_the_phase_alone(name: str) -> None:
     for times in (1, 2, 3):
         hold(f"textures.{name}_inside_{times}sd", np.mean(error_rad <= times * sd_rad))
     hold(f"textures.{name}_stated_over_actual", np.median(sd_rad) / (SD_OVER_MEDIAN * np.median(error_rad)))
-
-
-def test_the_right_orders_of_a_painted_face_are_returned() -> None:
-    take = world.take("painted_face", world.REPORT[0])
-    with qf.open(qf.SystemConfig()) as scanner:
-        calibration = scanner.calibration
-    plan = qf.Plan(calibration.projector.width_px, calibration=calibration, response="linear")
-    found = world.judge(qf.decode(take.shot, plan), take)
-    hold("textures.painted_face_returned_percent", found.returned_percent)
-    hold("textures.painted_face_wrong_percent", found.wrong_percent)

@@ -15,8 +15,6 @@ use super::slopes::Slopes;
 use super::smooth::mark_discontinuities;
 use super::window::Window;
 use crate::encoding::FourChannel;
-use crate::parallel::angle::wrap;
-use rayon::prelude::*;
 
 /// The steps on the coarse level, and their results.
 pub(super) struct CoarseLevel {
@@ -150,18 +148,7 @@ impl CoarseLevel {
         // The phase of a textured surface still has errors from the texture, and refined slopes would have them too.
         if moving || !self.textured {
             self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
-        } else {
-            self.confirm_orders(scene);
         }
-    }
-
-    /// Step 4 on textured surfaces, once more: how certain the orders are by the final photometry. That of the local fit mixes the
-    /// colours of a print, and right orders seem doubtful.
-    fn confirm_orders(&mut self, scene: &Scene<'_>) {
-        self.work.par_iter_mut().zip(&self.phase).for_each(|(wrapped, phase)| *wrapped = wrap(*phase));
-        let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
-        let photometry = Some(&self.photometry);
-        self.orders.confirm(scene, &Wrapped { map, fit: &self.fit, photometry, slopes: &self.slopes });
     }
 
     /// A fit of the photometry that does not trust the phase.

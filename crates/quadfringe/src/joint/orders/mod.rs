@@ -52,34 +52,6 @@ impl Orders {
 
     /// Chooses the orders of a wrapped phase. `absolute` receives the absolute phase.
     pub fn choose(&mut self, scene: &Scene<'_>, wrapped: &Wrapped<'_>, absolute: &mut [f32]) {
-        self.match_nodes(scene, wrapped);
-        let (grid, this) = (scene.grid, &*self);
-        absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
-            || self.blocks.take(),
-            |block, (row, absolute)| {
-                for column in 0..grid.columns {
-                    this.write(scene, wrapped, Cell { row, column }, block, absolute);
-                }
-            },
-        );
-    }
-
-    /// Measures the evidence of the orders once more, at a better phase and photometry. Nodes for which it now speaks for another order
-    /// lose their lead.
-    pub fn confirm(&mut self, scene: &Scene<'_>, wrapped: &Wrapped<'_>) {
-        let absolute = |this: &Self| (0..this.phase.len()).map(|node| this.nodes().absolute(node)).collect();
-        let before: Vec<f32> = absolute(self);
-        self.match_nodes(scene, wrapped);
-        let after: Vec<f32> = absolute(self);
-        for (lead, (before, after)) in self.matching.lead.iter_mut().zip(before.iter().zip(after)) {
-            if (after - before).abs() > PI {
-                *lead = 0.0;
-            }
-        }
-    }
-
-    /// Chooses the order of every node.
-    fn match_nodes(&mut self, scene: &Scene<'_>, wrapped: &Wrapped<'_>) {
         let grid = scene.grid;
         self.phase.resize(grid.rows * grid.columns, 0.0);
         self.phase
@@ -92,6 +64,15 @@ impl Orders {
             row_evidence(scene, wrapped, ratios_g_ir, row, nodes, &mut slots.take(), out);
         });
         self.settle_surfaces(scene, wrapped.slopes);
+        let this = &*self;
+        absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
+            || self.blocks.take(),
+            |block, (row, absolute)| {
+                for column in 0..grid.columns {
+                    this.write(scene, wrapped, Cell { row, column }, block, absolute);
+                }
+            },
+        );
     }
 
     /// Gives doubtful surfaces the order with which they continue their neighbours.
