@@ -85,12 +85,16 @@ fuzz:
 	RUSTFLAGS="$(COUNTERS)" cargo run --release --quiet --manifest-path $(FUZZ)/Cargo.toml --target $(FUZZ_HOST) -- \
 		$(FUZZ)/corpus -artifact_prefix=$(FUZZ)/artifacts/ -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -print_final_stats=1
 
-# Damaged files to every reader and spoilt shots to both methods, by seeds; `make test` runs a sample.
+# Damaged files to every reader, spoilt shots to both methods, killed writers and batches, by seeds; `make test` runs a sample.
 HOSTILE_FILES ?= 1000
+HOSTILE_RECORDINGS ?= 3000
 HOSTILE_SHOTS ?= 100
+HOSTILE_KILLS ?= 50
 hostile: $(STAMPS)/built
 	cd tests && ../$(BIN)/python -m hostile --count $(HOSTILE_FILES)
 	cd tests && ../$(BIN)/python -m hostile --shots $(HOSTILE_SHOTS)
+	$(BIN)/python tests/hostile/mutated_recordings.py --count $(HOSTILE_RECORDINGS)
+	$(BIN)/python tests/hostile/kills.py --kills $(HOSTILE_KILLS)
 
 # Share of the lines of the crate lightcrafter that its tests run; fails below 90 %.
 coverage:
