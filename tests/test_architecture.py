@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -86,3 +88,9 @@ def test_the_package_has_few_rooms() -> None:
     ignored = {"__pycache__", *(path.name for path in (ROOT / "python" / "quadfringe").glob("_core.*so*"))}
     entries = {entry.name for entry in (ROOT / "python" / "quadfringe").iterdir()} - ignored
     assert len(entries) <= TOP_LEVEL_ENTRIES, sorted(entries)
+
+
+def test_the_package_is_imported_without_modules_that_windows_lacks() -> None:
+    without = "import sys; sys.modules.update(dict.fromkeys(['fcntl', 'resource', 'termios', 'pwd', 'grp']));"
+    modules = "quadfringe, quadfringe.cli, quadfringe.recording, quadfringe.io.bounded, quadfringe.view.viewer"
+    subprocess.run([sys.executable, "-c", f"{without} import {modules}"], check=True)

@@ -1,7 +1,7 @@
 """Run functions that read doubtful files in a helper process, with a limit of time for each call and of memory.
 
 A damaged or hostile file can make a library in C loop without end, take all memory, or crash. In a helper process this
-ends the helper, and the caller gets an error.
+ends the helper, and the caller gets an error. Windows has no such limits: there the function runs in the process.
 
 >>> with Helper(Limits(time_s=3.0, memory_bytes=1 << 28)) as helper:
 ...     helper.run(int, "12")
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import os
 import pickle
-import resource
 import signal
 import subprocess
 import sys
@@ -74,6 +73,8 @@ class Helper:
         pickled. Imports within the function count for the limits. Raises `BoundedError` when the call exceeds a limit
         or ends the process.
         """
+        if sys.platform == "win32":
+            return function(*arguments, **named)
         with self._lock:
             if self._child is None or self._child.owner != os.getpid():
                 self._child = _Child(self.limits)
@@ -152,6 +153,8 @@ def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -
 
 def serve(descriptor: int, time_us: int, memory_bytes: int) -> None:
     """Answer the requests that come through a connection until the other side closes it; runs in the helper."""
+    import resource  # Windows has no such module
+
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process at once, wherever it is
     connection, limited = Connection(descriptor), False
@@ -172,7 +175,12 @@ def serve(descriptor: int, time_us: int, memory_bytes: int) -> None:
 
 
 def _limit_memory(more_bytes: int) -> None:
-    """Let the address space grow by this much from now on."""
-    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    """Let the address space grow by this much from now on, on systems that tell how large it is."""
+    import resource
+
+    statm = Path("/proc/self/statm")
+    if not statm.exists():
+        return
+    pages = int(statm.read_text().split()[0])
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + more_bytes, hard))

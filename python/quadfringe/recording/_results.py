@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import fcntl
 import shutil
+import sys
 import warnings
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,12 +61,24 @@ def locked(out: Path) -> Iterator[None]:
     """
     with (folder_for(out) / LOCK).open("a") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError as error:
+            _lock(file)
+        except OSError as error:
             raise InputError(
                 f"{out}: another batch writes into this folder; wait for its end or choose another --out"
             ) from error
         yield
+
+
+def _lock(file: IO[str]) -> None:
+    """Lock a file until it is closed; raises OSError if another process has locked it."""
+    if sys.platform == "win32":
+        import msvcrt
+
+        msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)
+    else:
+        import fcntl
+
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def open_results(job: Job, take: Recording, settings: dict[str, Any], *, calibrated: bool) -> NDArray[np.bool_]:
