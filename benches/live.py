@@ -22,17 +22,14 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import replace
-from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import quadfringe as qf
 from quadfringe.config.cameras import VirtualConfig
-from quadfringe.data import AnyShot, Stamp
-from quadfringe.devices import CameraStatistics, Keep
+from quadfringe.data import AnyShot
+from quadfringe.evaluation._live import VIEWPOINT, Carousel
 from quadfringe.evaluation._page import Page
 from quadfringe.evaluation.machine import resident_bytes
 from quadfringe.files import figures_text
@@ -45,18 +42,6 @@ SENT_PER_S = 20.0  # requested clouds: more than the client receives
 CLOUD_BYTES = 5_000_000
 BARS = {"clouds": 10.0}
 BROWSER_BARS = {"clouds": 1.0, "pictures": 5.0, "figures": 5.0}
-CAMERA = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (0.0, 0.0, 0.0),
-    "fov": 1.0,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 800,
-    "image_width": 1280,
-    "look_at": (0.0, 0.0, 1.0),
-    "up_direction": (0.0, -1.0, 0.0),
-}
 COUNTERS = """
 window.counts = {clouds: 0, pictures: 0, figures: 0};
 for (const name of ["bufferData", "bufferSubData"]) {
@@ -77,27 +62,6 @@ document.addEventListener("DOMContentLoaded", () => watch.observe(document.body,
 """
 
 
-class Carousel:
-    """A camera that repeats the same shots at a fixed rate."""
-
-    name, paced, calibration = "carousel", True, None
-
-    def __init__(self, shots: list[AnyShot]) -> None:
-        self._shots = shots
-        self._given = 0
-
-    def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
-        due = time.monotonic()
-        for shot in cycle(self._shots):
-            due += 1 / RATE_HZ
-            time.sleep(max(0.0, due - time.monotonic()))
-            self._given += 1
-            yield replace(shot, stamp=Stamp(self._given, time.time_ns() // 1000, self.name))
-
-    def statistics(self) -> CameraStatistics:
-        return CameraStatistics(shots=self._given)
-
-
 def hand_shots() -> tuple[list[AnyShot], qf.Scanner]:
     scene = qf.SceneConfig(surface="hand", noise=0.01)
     decode = qf.DecodeConfig(method="published")
@@ -114,7 +78,7 @@ def served(seconds: float, clouds_per_s: float, *, browser: bool, screenshot: Pa
     with (
         scanner,
         Viewer(port=8400, stride=4 if browser else 1, clouds_per_s=clouds_per_s) as viewer,
-        LiveStream(Carousel(shots), scanner.decode) as stream,  # type: ignore[arg-type]
+        LiveStream(Carousel(shots, RATE_HZ), scanner.decode) as stream,  # type: ignore[arg-type]
     ):
         follower = threading.Thread(target=viewer.follow, args=(stream,))
         follower.start()
@@ -147,7 +111,7 @@ def client(url: str, seconds: float) -> dict[str, float]:
         protocol: Any = f"viser-v{viser.__version__}"
         address = url.replace("http", "ws")
         async with connect_async(address, subprotocols=[protocol], max_size=None, compression=None) as socket:
-            await socket.send(msgspec.msgpack.encode(CAMERA))  # as a page does; before, it counts as not there yet
+            await socket.send(msgspec.msgpack.encode(VIEWPOINT))  # as a page does; before, it counts as not there yet
             clouds, begin = 0, time.monotonic() + WARM_UP_S
             while (now := time.monotonic()) < begin + seconds:
                 message = await socket.recv()

@@ -7,6 +7,9 @@ from pathlib import Path
 
 import pytest
 
+import quadfringe as qf
+from quadfringe.config import Device
+from quadfringe.data import Calibration
 from quadfringe.evaluation._scenes import data_folder
 
 
@@ -44,3 +47,14 @@ def small_bench(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "system.toml").write_text(SMALL_SYSTEM)
     write_simulation(folder, virtual_bench_config(folder / "system.toml"))
     return folder
+
+
+@pytest.fixture(scope="session")
+def bench() -> tuple[qf.Shot, Calibration]:
+    """A shot of a face, 512 x 384 px, 1 % noise, and the calibration of its bench."""
+    small = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
+    with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface="face", noise=0.01, seed=2))) as scanner:
+        shot, calibration = scanner.grab(), scanner.calibration
+    assert isinstance(shot, qf.Shot)
+    assert calibration is not None
+    return shot, calibration

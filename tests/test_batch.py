@@ -174,7 +174,8 @@ def test_a_damaged_shot_is_named_and_the_others_are_decoded(take: Path, whole: P
 
 
 def test_a_dask_scheduler_gives_the_same_files(take: Path, whole: Path, tmp_path: Path) -> None:
-    distributed = pytest.importorskip("distributed")
+    import distributed
+
     cluster = distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, dashboard_address=None, protocol="tcp://", host="127.0.0.1"
     )

@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 
 import quadfringe as qf
 from quadfringe.cli import app
-from quadfringe.config import Device
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
 from quadfringe.data.shot_files import write_shot
 from quadfringe.decoding import symptoms
@@ -26,16 +25,6 @@ from quadfringe.evaluation import broken
 NAMES = ("red", "green", "blue", "ir")
 # Causes and which of their three strengths; `python evaluation/diagnosis.py` has all thirty shots.
 QUICK = {"infrared registration": 0, "fringe numbers": 0, "bits": 1, "blur": 2}
-
-
-@pytest.fixture(scope="module")
-def bench() -> tuple[qf.Shot, Calibration]:
-    small = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
-    with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface="face", noise=0.01, seed=2))) as scanner:
-        shot, calibration = scanner.grab(), scanner.calibration
-    assert isinstance(shot, qf.Shot)
-    assert calibration is not None
-    return shot, calibration
 
 
 def changed(shot: qf.Shot, change: Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]) -> qf.Shot:

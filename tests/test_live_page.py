@@ -12,11 +12,12 @@ import msgspec
 import numpy as np
 import pytest
 import viser
-from support.page_clients import CAMERA, VALUES, first_messages, opened, update
+from support.page_clients import VALUES, first_messages, opened, update
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 import quadfringe as qf
 from quadfringe.errors import InputError, MissingExtraError
+from quadfringe.evaluation._live import VIEWPOINT
 from quadfringe.scanner.streaming import Measured
 from quadfringe.view import _server
 from quadfringe.view._messages import LARGEST_MESSAGE_BYTES, acceptable
@@ -140,11 +141,11 @@ def test_controls_stay_within_their_limits(measured: Measured) -> None:
 def test_only_viewpoints_and_values_are_accepted() -> None:
     encode = msgspec.msgpack.encode
     value = {"type": "GuiUpdateMessage", "uuid": "u", "updates": {"value": 2}}
-    assert acceptable(encode(CAMERA))
+    assert acceptable(encode(VIEWPOINT))
     assert acceptable(encode(value))
-    assert not acceptable(encode(CAMERA | {"position": (float("nan"), 0.0, 0.0)}))
-    assert not acceptable(encode(CAMERA | {"position": [0.0] * 5}))
-    assert not acceptable(encode(CAMERA | {"fov": "1"}))
+    assert not acceptable(encode(VIEWPOINT | {"position": (float("nan"), 0.0, 0.0)}))
+    assert not acceptable(encode(VIEWPOINT | {"position": [0.0] * 5}))
+    assert not acceptable(encode(VIEWPOINT | {"fov": "1"}))
     assert not acceptable(encode(value | {"updates": {"value": 2, "removed": True}}))
     assert not acceptable(encode(value | {"uuid": []}))
     for kind in viser._messages.Message.get_subclasses():

@@ -1,4 +1,4 @@
-"""What was changed in a recording is found, named and not delivered; version 1 is read with a warning."""
+"""A changed shot of a recording is named and not delivered; a recording of version 1 is read with a warning."""
 
 from __future__ import annotations
 

@@ -25,15 +25,6 @@ from quadfringe.doctor import examine_calibration
 Values = dict[str, Any]
 
 
-@pytest.fixture(scope="module")
-def bench() -> tuple[qf.Shot, Calibration]:
-    small = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
-    with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface="face", noise=0.01, seed=2))) as scanner:
-        shot, calibration = scanner.grab(), scanner.calibration
-    assert isinstance(shot, qf.Shot)
-    return shot, calibration
-
-
 def changed(calibration: Calibration, device: str, **fields: Any) -> Calibration:
     """Change a device, and the infrared projector with the visible one, so that the pair is no evidence."""
     values = calibration.model_dump()
@@ -188,7 +179,8 @@ def test_fourteen_bits_are_told_by_clipped_pixels(bench: tuple[qf.Shot, Calibrat
 
 @pytest.mark.parametrize("version", ["classic", "big"])
 def test_a_tiff_of_several_pages_is_refused(version: str, tmp_path: Path) -> None:
-    tifffile = pytest.importorskip("tifffile")
+    import tifffile
+
     image = np.arange(300, dtype=np.uint16).reshape(15, 20)
     path = tmp_path / "ir.tif"
     tifffile.imwrite(path, image, bigtiff=version == "big")
@@ -199,7 +191,8 @@ def test_a_tiff_of_several_pages_is_refused(version: str, tmp_path: Path) -> Non
 
 
 def test_a_big_endian_tiff_of_one_page_is_read(tmp_path: Path) -> None:
-    tifffile = pytest.importorskip("tifffile")
+    import tifffile
+
     image = np.arange(300, dtype=np.uint16).reshape(15, 20)
     tifffile.imwrite(tmp_path / "x.tif", image, byteorder=">")
     np.testing.assert_array_equal(qf.io.read_image(tmp_path / "x.tif"), image)

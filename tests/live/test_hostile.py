@@ -16,13 +16,10 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import replace
-from itertools import cycle
 from pathlib import Path
 
 import quadfringe as qf
-from quadfringe.data import AnyShot, Stamp
-from quadfringe.devices import CameraStatistics, Keep
+from quadfringe.evaluation._live import Carousel
 from quadfringe.evaluation.machine import resident_bytes
 from quadfringe.recording import Recorder, Recording
 from quadfringe.scanner.streaming import LiveStream
@@ -48,27 +45,6 @@ surface = "hand"
 method = "published"
 response = "linear"
 """
-
-
-class Carousel:
-    """A camera that repeats the same shots, a fixed number of times a second."""
-
-    name, paced, calibration = "carousel", True, None
-
-    def __init__(self, shots: list[AnyShot]) -> None:
-        self._shots = shots
-        self.given = 0
-
-    def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
-        due = time.monotonic()
-        for shot in cycle(self._shots):
-            due += 1 / RATE_HZ
-            time.sleep(max(0.0, due - time.monotonic()))
-            self.given += 1
-            yield replace(shot, stamp=Stamp(self.given, time.time_ns() // 1000, self.name))
-
-    def statistics(self) -> CameraStatistics:
-        return CameraStatistics(shots=self.given)
 
 
 @contextmanager
@@ -97,7 +73,7 @@ def test_recording_and_view_go_on_under_attack(tmp_path: Path) -> None:
     with qf.open(tmp_path / "system.toml") as scanner:
         scanner.projector.show(scanner.config.fringes)
         shots = list(scanner.camera.stream(6, keep="all"))
-        camera = Carousel(shots)
+        camera = Carousel(shots, RATE_HZ)
         recorder = Recorder(tmp_path / "take.h5", scanner.config, scanner.calibration)
         taps = {"record": recorder.write}
         with (

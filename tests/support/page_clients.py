@@ -20,19 +20,9 @@ import zstandard
 from websockets.exceptions import WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
+from quadfringe.evaluation._live import VIEWPOINT
+
 PROTOCOL: Any = f"viser-v{viser.__version__}"
-CAMERA: dict[str, Any] = {
-    "type": "ViewerCameraMessage",
-    "wxyz": (1.0, 0.0, 0.0, 0.0),
-    "position": (0.0, 0.0, 0.0),
-    "fov": 1.0,
-    "near": 0.01,
-    "far": 1000.0,
-    "image_height": 800,
-    "image_width": 1280,
-    "look_at": (0.0, 0.0, 1.0),
-    "up_direction": (0.0, -1.0, 0.0),
-}
 # Values that a control could be sent, of every type that a message can hold.
 VALUES: list[Any] = [
     *(0, -1, 1, 3, 2**63, -(2**63), 0.0, -0.0, 0.5, 1e-300, 1e300, float("nan"), float("inf"), -float("inf")),
@@ -57,7 +47,7 @@ def opened(address: str, host: str | None = None, receive_bytes: int | None = No
 
 def first_messages(client: ClientConnection) -> list[dict[str, Any]]:
     """The messages that the page is built from, after a viewpoint as a browser sends it."""
-    client.send(msgspec.msgpack.encode(CAMERA))
+    client.send(msgspec.msgpack.encode(VIEWPOINT))
     found: list[dict[str, Any]] = []
     while not any(message["type"] == "ReplayDoneMessage" for message in found):
         packed = client.recv(timeout=30)
@@ -76,7 +66,7 @@ def update(control: str, /, **values: Any) -> bytes:
 def read(address: str) -> None:
     """Read everything at once, as a fast browser does."""
     with opened(address) as client:
-        client.send(msgspec.msgpack.encode(CAMERA))
+        client.send(msgspec.msgpack.encode(VIEWPOINT))
         for _ in client:
             pass
 
@@ -84,7 +74,7 @@ def read(address: str) -> None:
 def read_slowly(address: str) -> None:
     """Read one message a second, so that the server can hardly send."""
     with opened(address, receive_bytes=8192, ping_interval=None) as client:
-        client.send(msgspec.msgpack.encode(CAMERA))
+        client.send(msgspec.msgpack.encode(VIEWPOINT))
         for _ in client.recv_streaming():
             time.sleep(1)
 
@@ -112,7 +102,7 @@ def flood(address: str, chance: random.Random) -> None:
     with opened(address) as client:
         for _ in range(2000):
             client.send(chance.randbytes(chance.choice([1, 100, 10_000])))
-            client.send(msgspec.msgpack.encode(CAMERA))
+            client.send(msgspec.msgpack.encode(VIEWPOINT))
         client.send(bytes(1 << 20))
 
 

@@ -24,7 +24,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 @dataclass(frozen=True)
 class Stored:
-    """Attributes, texts, and the shapes and types of the datasets of a file; what is missing is not there, or None."""
+    """Attributes, texts, and the shapes and dtypes of the datasets of a file; None stands for what is missing."""
 
     attributes: dict[str, Any]
     texts: dict[str, str]
