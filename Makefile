@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
-.PHONY: demo test test-usb test-camera test-live fuzz hostile coverage figures evaluation bench rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live wheel audit release fuzz hostile coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
@@ -20,7 +20,7 @@ demo: $(STAMPS)/built
 # The kernel's tests and the wheel are compiled at the same time: each leaves a core idle now and then.
 test:
 	$(MAKE) --jobs 2 rust $(STAMPS)/built
-	$(MAKE) python test-usb test-camera test-live
+	$(MAKE) wheel python test-usb test-camera test-live
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
 # only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
@@ -44,6 +44,25 @@ python: $(STAMPS)/built stubs
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest --numprocesses 2 --dist loadfile
+
+# The wheel for this machine, with the list of all crates in it.
+wheel: $(STAMPS)/built
+	rm -rf dist
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --out dist
+	$(BIN)/python -m zipfile --list dist/quadfringe-*.whl | grep --quiet sboms/quadfringe-python.cyclonedx.json
+
+# Licences and sources of all dependencies, and their known faults, from two databases on the network; the list of the
+# Python packages is written beside the wheel.
+audit: $(STAMPS)/audit wheel
+	cargo deny check
+	$(BIN)/pip-audit --strict --format cyclonedx-json --output dist/python.cdx.json .
+
+release: test audit
+
+$(STAMPS)/audit: $(STAMPS)/built
+	cargo install --quiet --locked cargo-deny
+	$(BIN)/pip install --quiet --disable-pip-version-check "pip-audit>=2.9,<3"
+	touch $@
 
 stubs: $(STAMPS)/built
 	$(BIN)/python -m mypy.stubtest quadfringe._core

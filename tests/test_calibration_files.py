@@ -60,6 +60,15 @@ def test_files_of_schema_1_are_read_and_of_3_refused(calibration: Calibration, t
         Calibration.load(tmp_path / "new.json")
 
 
+@pytest.mark.parametrize("pose", [{"translation_mm": [0, 1, 0]}, {"rotation": [[0, -1, 0], [1, 0, 0], [0, 0, 1]]}])
+def test_a_camera_with_a_pose_is_refused(pose: dict[str, object], calibration: Calibration, tmp_path: Path) -> None:
+    values = calibration.model_dump(mode="json")
+    values["camera"].update(pose)
+    (tmp_path / "c.json").write_text(json.dumps(values))
+    with pytest.raises(ConfigError, match=r"camera: expected a camera without rotation and translation_mm; give those"):
+        Calibration.load(tmp_path / "c.json")
+
+
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_opencv_reads_what_we_write_and_we_what_it_writes(
     calibration: Calibration, tmp_path: Path, suffix: str

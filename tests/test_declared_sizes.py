@@ -66,6 +66,20 @@ def test_images_that_declare_too_much_are_refused(bomb: bytes, tmp_path: Path) -
         read_image(path)
 
 
+@pytest.mark.parametrize("length", [1, 2**31 - 1, 2**32 - 1])
+def test_a_chunk_of_a_png_that_is_longer_than_the_file_is_refused(length: int, tmp_path: Path) -> None:
+    """OpenCV reserves memory for the whole chunk, up to 4 GB, before it reads."""
+    (tmp_path / "i.png").write_bytes(png(48, 32) + struct.pack(">I", length) + b"IDAT")
+    with pytest.raises(InputError, match=rf"i.png: {length + 4:,} bytes of the PNG file are missing"):
+        read_image(tmp_path / "i.png")
+
+
+def test_bytes_after_the_end_of_a_png_do_no_harm(tmp_path: Path) -> None:
+    image = np.arange(48, dtype=np.uint8).reshape(6, 8)
+    (tmp_path / "i.png").write_bytes(cv2.imencode(".png", image)[1].tobytes() + b"\xff" * 9)
+    np.testing.assert_array_equal(read_image(str(tmp_path / "i.png")), image)
+
+
 def test_every_start_of_an_image_is_judged_without_a_crash() -> None:
     images = [png(4, 4), tiff("<", (4, 4), (5, 5)), tiff(">", (4, 4))]
     images += [cv2.imencode(suffix, np.eye(9, dtype=np.uint8))[1].tobytes() for suffix in (".jpg", ".tif", ".bmp")]

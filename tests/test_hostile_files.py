@@ -9,6 +9,7 @@ from typing import Any
 
 import pytest
 from hostile.files import KINDS, Kind, attack, originals
+from hostile.targets import KEPT, TARGETS, corpus, sound_inputs, target
 
 SAMPLE = 40  # of each of the eight kinds
 
@@ -41,3 +42,18 @@ def test_the_attack_finds_a_faulty_reader(
     monkeypatch.setitem(KINDS, "opencv", reader)
     outcomes = list(attack("opencv", files, range(3)))
     assert [(outcome.found, outcome.fault) for outcome in outcomes] == [(found, True)] * 3
+
+
+@pytest.mark.parametrize("kind", TARGETS)
+def test_what_failed_once_gives_a_result_or_one_error(kind: str, tmp_path: Path) -> None:
+    (tmp_path / "sound").mkdir()
+    with target(kind, tmp_path) as attack_by:
+        for data in (*sound_inputs(kind, tmp_path / "sound"), *(path.read_bytes() for path in corpus(kind))):
+            attack_by(data)
+            attack_by(data[: len(data) // 2])
+
+
+def test_the_inputs_that_failed_are_of_known_kinds() -> None:
+    folders = {path.parent.name for path in KEPT.glob("*/*")}
+    assert folders
+    assert folders <= set(TARGETS)

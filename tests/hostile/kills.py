@@ -1,15 +1,16 @@
 """Kill writers and batches with SIGKILL at random times; count what is lost, wrong or left.
 
-    python tests/hostile/kills.py [--kills 50] [--only record parent worker terminated] [--json FILE]
+    python tests/hostile/kills.py [--kills 50] [--only record live parent worker terminated] [--json FILE]
 
 record      a process that writes shots and reports each; every reported shot must be on file to the last byte, and
             must be found by `recover`
+live        the same of a process that measures, records and shows its shots in the live page
 parent      `quadfringe batch`, whose process is killed; the same command must end with the files of an undisturbed run
 worker      `quadfringe batch`, one of whose workers is killed; the run must end with the files of an undisturbed run
 terminated  as parent, with SIGTERM; a fifth as often
 
-A process of a batch that lives 5 s after the end of its parent counts as left. The exit status is 1 if anything is
-lost, wrong or left.
+A process of a batch or of the live view that lives 5 s after the end of its parent counts as left. The exit status is 1
+if anything is lost, wrong or left.
 """
 
 from __future__ import annotations
@@ -26,19 +27,20 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
 import quadfringe as qf
 from quadfringe.data import Shot
-from quadfringe.evaluation._takes import kill_writer, whole
+from quadfringe.evaluation._takes import kill_reporting, start_writer, whole
 from quadfringe.recording import Recorder, Recording, recover
 
 LEFT_S = 5.0
 END_S = 300.0  # limit for one run of a batch
-WHOM = ("record", "parent", "worker", "terminated")
-MARK = "QUADFRINGE_KILLS"  # in the environment of a batch and of all processes that it starts
+WHOM = ("record", "live", "parent", "worker", "terminated")
+MARK = "QUADFRINGE_KILLS"  # in the environment of what is killed and of all processes that it starts
 SYSTEM = qf.SystemConfig(
     camera=qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5)),
     scene=qf.SceneConfig(surface="steps", noise=0.01),
@@ -47,19 +49,29 @@ SYSTEM = qf.SystemConfig(
 SHOTS = 6
 
 
-def record_killed(folder: Path, kills: int, chance: random.Random) -> Counter[str]:
+def start_live(path: Path) -> subprocess.Popen[str]:
+    """Start a measurement with recording and view, which prints how many shots it has reported as written."""
+    command = [sys.executable, str(Path(__file__).with_name("live_writer.py")), str(path)]
+    return subprocess.Popen(command, env=os.environ | {MARK: str(path)}, stdout=subprocess.PIPE, text=True)
+
+
+WRITERS: dict[str, Callable[[Path], subprocess.Popen[str]]] = {"record": start_writer, "live": start_live}
+
+
+def writers_killed(folder: Path, who: str, kills: int, chance: random.Random) -> Counter[str]:
     counts: Counter[str] = Counter()
     for number in range(kills):
         path, rescued = folder / f"kill{number}.h5", folder / f"whole{number}.h5"
-        reported = kill_writer(path, chance.uniform(0.0, 0.5))
+        reported = kill_reporting(WRITERS[who](path), chance.uniform(0.0, 0.5))
+        counts["processes_left"] += left(path)
         with Recording(path) as take:
             found = [take.read(index) for index in range(len(take))]
         recovered = recover(path, rescued)
-        counts["record_shots_reported"] += reported
-        counts["record_lost"] += max(0, reported - min(len(found), recovered.shots))
-        counts["record_wrong"] += sum(shot is None or not whole(shot, index) for index, shot in enumerate(found))
+        counts[f"{who}_shots_reported"] += reported
+        counts[f"{who}_lost"] += max(0, reported - min(len(found), recovered.shots))
+        counts[f"{who}_wrong"] += sum(shot is None or not whole(shot, index) for index, shot in enumerate(found))
         with Recording(rescued) as take:
-            counts["record_wrong"] += sum(not whole(shot, index) for index, shot in enumerate(take))
+            counts[f"{who}_wrong"] += sum(not whole(shot, index) for index, shot in enumerate(take))
         path.unlink()
         rescued.unlink()
     return counts
@@ -160,12 +172,15 @@ def main() -> int:
     chance = random.Random(1)
     folder = Path(tempfile.mkdtemp())
     try:
-        counts = record_killed(folder, options.kills if "record" in options.only else 0, chance)
-        if whom := [who for who in options.only if who != "record"]:
+        counts: Counter[str] = Counter()
+        for who in (who for who in WRITERS if who in options.only):
+            counts.update(writers_killed(folder, who, options.kills, chance))
+        if whom := [who for who in options.only if who not in WRITERS]:
             counts.update(batches_killed(folder, whom, options.kills, chance))
     finally:
         shutil.rmtree(folder)
-    names = ("record_shots_reported", "record_lost", "record_wrong", "parent_files_that_differ")
+    names = tuple(f"{who}_{what}" for who in WRITERS for what in ("shots_reported", "lost", "wrong"))
+    names += ("parent_files_that_differ",)
     names += ("worker_files_that_differ", "terminated_files_that_differ", "processes_left")
     figures = {"kills_of_each": options.kills, **{name: counts[name] for name in names}}
     for name, value in figures.items():

@@ -30,10 +30,13 @@ def test_no_mutated_recording_hangs_crashes_or_lies(tmp_path: Path) -> None:
 def test_nothing_is_lost_or_left_when_processes_are_killed(tmp_path: Path) -> None:
     figures = figures_of("kills.py", tmp_path, "--kills", 2)
     assert figures.pop("record_shots_reported") > 0
+    assert figures.pop("live_shots_reported") > 0
     assert figures == {
         "kills_of_each": 2,
         "record_lost": 0,
         "record_wrong": 0,
+        "live_lost": 0,
+        "live_wrong": 0,
         "parent_files_that_differ": 0,
         "worker_files_that_differ": 0,
         "terminated_files_that_differ": 0,

@@ -20,7 +20,7 @@ from quadfringe.config.decode import (
     ResponseSetting,
     Row4,
 )
-from quadfringe.config.devices import IDENTITY, Device, Pixels, Triple
+from quadfringe.config.devices import IDENTITY, Camera, Device, Pixels, Triple
 from quadfringe.config.projectors import FlashRoute, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.config.scene import Affine, BayerPattern, HeightMapConfig, Matrix4, SceneConfig, Surface
 from quadfringe.config.system import SystemConfig, check_system, load_system
@@ -32,6 +32,7 @@ __all__ = [
     "AnyCapture",
     "AravisConfig",
     "BayerPattern",
+    "Camera",
     "ChannelResponse",
     "ChipConfig",
     "DecodeConfig",

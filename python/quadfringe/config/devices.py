@@ -9,12 +9,12 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Field, field_validator
+from pydantic import AfterValidator, Field, field_validator
 
 from quadfringe import _core
 from quadfringe.config._base import SIZE_MAX, Finite, Model, Positive, kernel_takes
 
-__all__ = ["IDENTITY", "Device", "Pixels", "Triple"]
+__all__ = ["IDENTITY", "Camera", "Device", "Pixels", "Triple"]
 
 Pixels = Annotated[int, Field(gt=0, le=SIZE_MAX)]
 Triple = tuple[Finite, Finite, Finite]
@@ -43,3 +43,12 @@ class Device(Model):
     def _is_a_rotation(cls, rotation: Matrix3) -> Matrix3:
         kernel_takes("rotation", lambda: _core.Device(1, 1, (1.0, 1.0), (0.0, 0.0), rotation=rotation))
         return rotation
+
+
+def _in_own_frame(camera: Device) -> Device:
+    if camera.rotation != IDENTITY or camera.translation_mm != (0.0, 0.0, 0.0):
+        raise ValueError("expected a camera without rotation and translation_mm; give those of the projectors from it")
+    return camera
+
+
+Camera = Annotated[Device, AfterValidator(_in_own_frame)]

@@ -20,7 +20,7 @@ from quadfringe.config._base import Model, checked
 from quadfringe.config._brief import brief
 from quadfringe.config.cameras import AnyCapture, ReplayConfig, VirtualConfig
 from quadfringe.config.decode import DecodeConfig, Fringes
-from quadfringe.config.devices import Device
+from quadfringe.config.devices import Camera, Device
 from quadfringe.config.projectors import ProjectorsConfig
 from quadfringe.config.scene import SceneConfig
 from quadfringe.errors import ConfigError, InputError
@@ -39,7 +39,7 @@ class SystemConfig(Model):
         default=VirtualConfig(),
         description='The camera: a table with its kind, or a word such as "aravis:NAME". Absent: the virtual bench.',
     )
-    camera: Device | None = Field(
+    camera: Camera | None = Field(
         default=None, description="Camera of the virtual bench. Absent: the published camera."
     )
     projector: Device | None = Field(

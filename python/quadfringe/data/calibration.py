@@ -11,7 +11,19 @@ from typing import Any, Literal, Self
 
 from pydantic import Field
 
-from quadfringe.config import Affine, Device, Matrix4, Model, Response, ResponseChoice, Row4, brief, checked, shortened
+from quadfringe.config import (
+    Affine,
+    Camera,
+    Device,
+    Matrix4,
+    Model,
+    Response,
+    ResponseChoice,
+    Row4,
+    brief,
+    checked,
+    shortened,
+)
 from quadfringe.errors import ConfigError
 from quadfringe.files import TEXT_BYTES, atomic, read_bytes, require_suffix
 from quadfringe.io.texts import json_of
@@ -144,7 +156,7 @@ class Calibration(Measured):
     schema_version: Literal[1, 2] = Field(
         default=2, description="Version of this format; files of version 1 have neither `infrared` nor `record`."
     )
-    camera: Device = Field(description="The camera, whose frame holds all coordinates.")
+    camera: Camera = Field(description="The camera, whose frame holds all coordinates.")
     projector: Device = Field(description="The visible projector.")
     infrared: Device | None = Field(
         default=None, description="The infrared projector. Absent: coaxial with `projector`."

@@ -53,7 +53,12 @@ def start_writer(
 
 def kill_writer(path: Path, after_s: float, shape: tuple[int, int] = (HEIGHT_PX, WIDTH_PX)) -> int:
     """Kill a writer with SIGKILL some time after its first shot; give the number of shots that it reported."""
-    with start_writer(path, shape=shape) as writer:
+    return kill_reporting(start_writer(path, shape=shape), after_s)
+
+
+def kill_reporting(process: subprocess.Popen[str], after_s: float) -> int:
+    """Kill a process that prints its number of shots line by line; give the last number that it printed."""
+    with process as writer:
         assert writer.stdout is not None
         first = writer.stdout.readline()
         time.sleep(after_s)

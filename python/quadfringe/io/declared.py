@@ -16,6 +16,7 @@ from quadfringe.errors import InputError
 __all__ = ["IMAGE_PX", "check_image", "pixels_declared"]
 
 IMAGE_PX = 2**28  # 16384 x 16384, the largest camera chip of today has 150 MP
+PNG = b"\x89PNG\r\n\x1a\n"
 TIFF_WIDTH, TIFF_HEIGHT = 256, 257
 TIFF_ENTRIES = 4096
 TIFF_PAGES = 64
@@ -25,10 +26,14 @@ JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
 
 
 def check_image(path: Path | str, data: bytes) -> None:
-    """Raise `InputError` if `data` is an image that declares more than 2**28 pixels.
+    """Raise `InputError` if `data` is an image that declares more than 2**28 pixels, or more bytes than it has.
 
     A file of another kind passes; its reader reports it.
     """
+    if data.startswith(PNG) and (missing := _bytes_missing(data)):
+        raise InputError(
+            f"{path}: {missing:,} bytes of the PNG file are missing; it is cut or damaged, so copy it again"
+        )
     pixels = pixels_declared(data)
     if pixels is not None and pixels > IMAGE_PX:
         raise InputError(f"{path}: declares {pixels:,} pixels; expected at most {IMAGE_PX:,}")
@@ -40,7 +45,7 @@ def pixels_declared(data: bytes) -> int | None:
     PNG, TIFF, BMP, JPEG and PNM are known.
     """
     try:
-        if data.startswith(b"\x89PNG\r\n\x1a\n") and data[12:16] == b"IHDR":
+        if data.startswith(PNG) and data[12:16] == b"IHDR":
             width, height = struct.unpack_from(">II", data, 16)
         elif data.startswith(b"BM"):
             width, height = struct.unpack_from("<ii", data, 18)
@@ -55,6 +60,15 @@ def pixels_declared(data: bytes) -> int | None:
     except (struct.error, IndexError):
         return None
     return int(abs(width * height))
+
+
+def _bytes_missing(data: bytes) -> int:
+    """Return by how many bytes the chunks of a PNG exceed it; OpenCV reserves 4 GB for a chunk that says so."""
+    place, kind = len(PNG), b""
+    while kind != b"IEND" and place < len(data):
+        length, kind = int.from_bytes(data[place : place + 4], "big"), data[place + 4 : place + 8]
+        place += 12 + length
+    return max(0, place - len(data))
 
 
 def _tiff_pages(data: bytes) -> Iterator[int]:

@@ -31,14 +31,14 @@ ORDERS = {b"II": "<", b"MM": ">"}  # of bytes, by the first two of a TIFF
 TIFF = {42: _Tiff(4, "I", "H", 12), 43: _Tiff(8, "Q", "Q", 20)}  # by version: classic, and BigTIFF
 
 
-def read_image(path: Path) -> NDArray[Any]:
+def read_image(path: Path | str) -> NDArray[Any]:
     """Read an image as (H, W) or (H, W, 3), uint8, uint16 or float32; raises `InputError` naming the file.
 
     A TIFF of several pages is an error, because nothing says which of them is meant.
     """
     import cv2
 
-    stored = read_bytes(path)
+    stored = read_bytes(Path(path))
     check_image(path, stored)
     if _has_more_pages(stored):
         raise InputError(f"{path}: holds several pages; expected one image, so save the page that is meant alone")
