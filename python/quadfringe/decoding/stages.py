@@ -175,8 +175,8 @@ def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
 def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     """Give the phases and the modulation of linear light by name, each (H, W) float32 (S2, S3).
 
-    The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes cross
-    the rows.
+    The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes, or
+    less than one, cross the rows.
     """
     first, second, third = three_numbers(fringe_numbers)
     _check_light(light)
@@ -185,6 +185,8 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     if not np.isfinite(carrier(red)[0]):
         raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
     green_px, infrared_px = period_px * first / second, period_px * first / third
+    if (longest := max(green_px, infrared_px)) > red.shape[1]:
+        raise DecodeError(f"a fringe of {longest:.0f} px is wider than the image; the published stages need several")
     rows, columns = block_size(green_px, infrared_px, red.shape[1])
     red_means, red_level = _fringes(red, rows, 1, period_px)
     blue_means, blue_level = _fringes(blue, rows, 1, period_px)
