@@ -13,7 +13,7 @@ import numpy as np
 from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, BayerShot, ChipImage, Shot, Stamp
 from quadfringe.devices.aravis import _profiles as profiles
-from quadfringe.devices.aravis._device import Device, found
+from quadfringe.devices.aravis._device import Device, TooLarge, found
 from quadfringe.devices.aravis._formats import format_named
 from quadfringe.devices.aravis._frame_matching import FrameMatcher, SingleChip, Stamped
 from quadfringe.devices.aravis._profiles import CHIPS, Place
@@ -175,6 +175,13 @@ class Link:
     def forget(self, *, lost: bool = False) -> None:
         """Close streams and devices; a thread closes those of a lost camera, because Aravis waits for seconds."""
         held = [part for device in self._devices.values() for part in device.give_up()]
+    def too_large(self, chip: int) -> TooLarge | None:
+        """Stop, and return the packet size of a chip if its packets no longer arrive; the link must then be forgotten."""
+        self.stop()
+        with suppress(CameraError):  # the failure of the frames is reported, not that of the search for its cause
+            return self.device(chip).too_large(self.places[chip].stream)
+        return None
+
         held += [part for reader in self.readers for part in reader.give_up()]
         self.readers.clear()
         self._devices.clear()

@@ -127,9 +127,11 @@ class _Running(Generic[Item]):
         chips = self._chip_names
         came = {chip: now[chip].frames - before[chip].frames for chip in chips}
         head = f"camera at {self.name}: no shot within {timeout_s:g} s: "
-        for chip, reader in zip(chips, link.readers, strict=True):
+        for n, (chip, reader) in enumerate(zip(chips, link.readers, strict=True)):
             if not came[chip] and now[chip].damaged > before[chip].damaged:
-                return WrongFrameError(f"{head}frames of the {chip} chip were rejected, the last one: {reader.fault}")
+                fault = reader.fault
+                hint = _packet_hint(link, n)
+                return WrongFrameError(f"{head}frames of the {chip} chip were rejected, the last one: {fault}{hint}")
         if all(came.values()):
             return UnpairedError(
                 f"{head}frames of both chips arrived, but none of the same instant; synchronise the chips"
@@ -225,6 +227,26 @@ def _check_connected(link: Link, silent_s: float) -> None:
 
 def open_devices(config: SystemConfig) -> Devices:
     """Open the camera of `capture`, and the projectors of the system."""
+def _packet_hint(link: Link, chip: int) -> str:
+    """Return what to do about packets that are too large for the network; nothing if they arrive."""
+    size = link.too_large(chip)
+    if size is None:
+        return ""
+    if size.carried is None:
+        return (
+            f"; packets have {size.agreed} bytes, and this camera sends no test packets: if network card or switch "
+            f"carry less (MTU), set packet_size to that"
+        )
+    if link.config.packet_size:
+        cure = f"set packet_size to at most {size.carried}, or leave it out"
+    else:
+        cure = "call again, which agrees on a size that arrives"
+    return (
+        f"; packets of {size.agreed} bytes do not arrive, only those up to {size.carried}: {cure}, or raise the MTU of "
+        "network card, switch and camera (jumbo frames)"
+    )
+
+
     assert isinstance(config.capture, AravisConfig)
     camera = AravisCamera(config.capture)
     try:
