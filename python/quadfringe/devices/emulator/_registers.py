@@ -96,7 +96,9 @@ def _float(name: str, register: str, to_register: str, from_register: str, least
 
 def _nodes(formats: list[str], sources: int) -> dict[str, str]:
     """Return the nodes of every feature, by the name of the feature."""
-    return _identity_nodes() | _packet_nodes() | _image_nodes(formats, sources) | _acquisition_nodes() | _exposure_nodes()
+    return (
+        _identity_nodes() | _packet_nodes() | _image_nodes(formats, sources) | _acquisition_nodes() | _exposure_nodes()
+    )
 
 
 def _identity_nodes() -> dict[str, str]:
