@@ -17,6 +17,7 @@ from typing import Self
 
 from quadfringe.config import ResponseChoice, shortened
 from quadfringe.data import AnyShot, Shape
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import Camera, CameraStatistics, Keep
 from quadfringe.devices._queue import DroppingQueue, EndOfQueue, QueueStatistics
 from quadfringe.errors import CameraError, DecodeError
@@ -154,7 +155,7 @@ class LiveStream:
         return shortened(f"LiveStream({self._camera!r}, {self._given} shots decoded{ended})")
 
     def _capture(self) -> None:
-        with _ErrorsTo(self._end):
+        with _ErrorsTo(self._end), HOST_CLOCK.held():
             self._capture_all()
         self._end(None)
 
@@ -218,7 +219,7 @@ class LiveStream:
                 self._order.wait()
             self._refused += error is not None
             self._decoded.tick()
-            latency_ms = (time.time_ns() - _arrival_ns(shot)) / 1e6
+            latency_ms = (HOST_CLOCK.now_ns() - _arrival_ns(shot)) / 1e6
             self._results.put(Measured(shot, shape, error, latency_ms), wait=self._wait)
             self._given += 1
             self._order.notify_all()
@@ -292,6 +293,6 @@ class LiveStream:
 def _arrival_ns(shot: AnyShot) -> int:
     """Give the time at which the last frame of a shot arrived, in ns of the host's clock."""
     if shot.stamp is None:
-        return time.time_ns()
+        return HOST_CLOCK.now_ns()
     frames = shot.stamp.frames.values()
     return max((frame.arrival_ns for frame in frames), default=shot.stamp.time_us * 1000)

@@ -13,6 +13,7 @@ from typing import Generic, Literal, Self, TypeVar
 from quadfringe.config import SystemConfig
 from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, Calibration, ChipImage
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
 from quadfringe.devices._queue import DroppingQueue
 from quadfringe.devices.aravis._link import Link
@@ -73,8 +74,9 @@ class _Running(Generic[Item]):
             self._queue, self._first_id = DroppingQueue(length), self._last_id + 1
             try:
                 _check_connected(link, 0.0)
-                link.start(self._queue.put, borrow=borrow)
-                yield link, self._queue
+                with HOST_CLOCK.held():
+                    link.start(self._queue.put, borrow=borrow)
+                    yield link, self._queue
             except ShotTimeoutError:
                 raise  # the camera is still connected
             except CameraError as error:
@@ -225,8 +227,6 @@ def _check_connected(link: Link, silent_s: float) -> None:
         raise lost from None
 
 
-def open_devices(config: SystemConfig) -> Devices:
-    """Open the camera of `capture`, and the projectors of the system."""
 def _packet_hint(link: Link, chip: int) -> str:
     """Return what to do about packets that are too large for the network; nothing if they arrive."""
     size = link.too_large(chip)
@@ -247,6 +247,8 @@ def _packet_hint(link: Link, chip: int) -> str:
     )
 
 
+def open_devices(config: SystemConfig) -> Devices:
+    """Open the camera of `capture`, and the projectors of the system."""
     assert isinstance(config.capture, AravisConfig)
     camera = AravisCamera(config.capture)
     try:
