@@ -87,6 +87,7 @@ def test_clocks_are_read_together_on_a_busy_host(host: Host, monkeypatch: pytest
 def test_stamps_of_the_virtual_camera_proceed_evenly(host: Host) -> None:
     times_us = []
     with qf.open(qf.SystemConfig()) as scanner:
+        scanner.projector.show(scanner.config.fringes)
         for shot in scanner.camera.stream(3):
             host.ahead_ns -= HOUR_NS
             host.monotonic_ns += 1000

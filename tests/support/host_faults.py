@@ -8,7 +8,7 @@ import struct
 import subprocess
 from pathlib import Path
 
-__all__ = ["HostFaults", "faults_of_this_process", "faulty_host"]
+__all__ = ["VARIABLE", "HostFaults", "faults_of_this_process", "faulty_host"]
 
 VARIABLE = "QUADFRINGE_HOST_FAULTS"
 SOURCE = Path(__file__).with_name("host_faults.c")

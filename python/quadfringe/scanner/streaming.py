@@ -111,10 +111,12 @@ class _ErrorsTo:
 class LiveStream:
     """Iterates over `Measured`; close it, or use it in a `with` block. Made by `Scanner.stream`.
 
-    Every tap gets every captured shot, in a thread with a queue before it. An error of a tap ends the stream. A camera
-    that makes shots on request (`paced` is False) waits for the others, so that no shot is lost. `decode` is called
-    from `at_once` threads; results come in the order of the shots. While `response()` is "auto", shots are decoded one
-    after another, so that the estimate depends on their order alone.
+    Every tap gets the captured shots, in a thread with a queue of 64 shots before it; a tap that is slower than the
+    camera for longer, such as a recorder on a slow disk, loses the oldest of them, and `statistics().queues` counts
+    those. An error of a tap ends the stream. A camera that makes shots on request (`paced` is False) waits for the
+    others, so that no shot is lost. `decode` is called from `at_once` threads; results come in the order of the shots.
+    While `response()` is "auto", shots are decoded one after another, so that the estimate depends on their order
+    alone.
     """
 
     def __init__(

@@ -12,7 +12,7 @@ __all__ = ["EXPOSURE_STEP_US", "FEATURES", "PIXEL_FORMATS", "XML_ADDRESS", "geni
 
 EXPOSURE_STEP_US: Final = 42.07
 XML_ADDRESS: Final = 0x100000
-PACKETS_ADDRESS: Final = 0x0D04  # of stream channel 0; test packets of others are fired through their own register
+PACKETS_ADDRESS: Final = 0x0D04  # of stream channel 0; those of other channels follow
 LARGEST_PACKET: Final = 9000
 PIXEL_FORMATS: Final = {
     "Mono8": 0x01080001,
