@@ -80,6 +80,7 @@ class ChipReader:
         self.agreed = agreed
         self.frames = self.damaged = 0
         self.fault: str | None = None  # of the last rejected frame
+        self.incomplete = False  # whether that frame lacked packets
         self.heard = 0.0  # when the last frame arrived, complete or not
         self._stream = stream
         self._arrivals = ArrivalTimes()
@@ -109,7 +110,7 @@ class ChipReader:
         try:
             fault = self.agreed.fault(buffer)
             if fault is not None:
-                self.fault = fault
+                self.fault, self.incomplete = fault, buffer.status != "success"
                 self.damaged += 1
                 return None
             self.frames += 1

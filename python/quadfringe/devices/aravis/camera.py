@@ -132,7 +132,7 @@ class _Running(Generic[Item]):
         for n, (chip, reader) in enumerate(zip(chips, link.readers, strict=True)):
             if not came[chip] and now[chip].damaged > before[chip].damaged:
                 fault = reader.fault
-                hint = _packet_hint(link, n)
+                hint = _packet_hint(link, n) if reader.incomplete else ""
                 return WrongFrameError(f"{head}frames of the {chip} chip were rejected, the last one: {fault}{hint}")
         if all(came.values()):
             return UnpairedError(
@@ -235,7 +235,7 @@ def _packet_hint(link: Link, chip: int) -> str:
     if size.carried is None:
         return (
             f"; packets have {size.agreed} bytes, and this camera sends no test packets: if network card or switch "
-            f"carry less (MTU), set packet_size to that"
+            "carry less (MTU), set packet_size to that"
         )
     if link.config.packet_size:
         cure = f"set packet_size to at most {size.carried}, or leave it out"
