@@ -199,8 +199,8 @@ def test_a_single_chip_whose_clock_wraps_around_keeps_the_time() -> None:
 
 
 @pytest.mark.parametrize("jump_s", [3600.0, 0.5, -0.5, -3600.0])
-def test_a_host_clock_that_is_set_makes_no_wrong_pair(jump_s: float) -> None:
-    """Stamps follow a clock that is set back at once, and one that is set forward when no older frame is compared."""
+def test_arrival_times_that_jump_make_no_wrong_pair(jump_s: float) -> None:
+    """The host offset follows times that jump back at once, and forward when no older frame is compared."""
     matcher: FrameMatcher[int] = FrameMatcher(TOLERANCE_NS)
     frames = [
         (

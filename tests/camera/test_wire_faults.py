@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import pytest
-from wire import checked_exposure, emulated, pattern
+from wire import OWN, SIZE_PX, checked_exposure, emulated, pattern, two_sources
 
-from quadfringe.data import BayerShot
+from quadfringe.data import AnyShot, BayerShot
 from quadfringe.devices.aravis import AravisCamera
+from quadfringe.devices.aravis._device import TEST_PACKET, Device
 from quadfringe.devices.emulator import Emulator
 from quadfringe.devices.emulator.frames import TestPattern
-from quadfringe.errors import CameraLostError
+from quadfringe.errors import CameraLostError, WrongFrameError
+
+
+def rest(stream: Iterator[AnyShot]) -> None:
+    """Take the remaining shots; all of them are right."""
+    for shot in stream:
+        checked_exposure(shot)
 
 
 def right(camera: AravisCamera, count: int) -> list[int]:
@@ -77,3 +86,50 @@ def test_a_reset_while_frames_come(emulator: Emulator, camera: AravisCamera) -> 
     with pytest.raises(CameraLostError, match=r"no longer answers.* the next call reconnects"):
         camera.snap()
     right(camera, 10)
+
+
+def test_a_path_whose_mtu_falls_while_frames_come(emulator: Emulator) -> None:
+    """The agreed packets are lost from then on; the error says so, and the next call agrees on packets that arrive."""
+    with AravisCamera(emulated(emulator, timeout_s=2.0, packet_size=None)) as camera:
+        stream = camera.stream(keep="all")
+        checked_exposure(next(stream))
+        emulator.order("mtu", 1500)
+        with pytest.raises(WrongFrameError, match=r"packets of \d{4} bytes do not arrive, .* up to 1500: call again"):
+            rest(stream)
+        right(camera, 10)
+
+
+def test_packets_that_are_larger_than_the_network_carries(emulator: Emulator) -> None:
+    emulator.order("mtu", 1500)
+    with AravisCamera(emulated(emulator, packet_size=None)) as agreed:
+        right(agreed, 10)
+    with AravisCamera(emulated(emulator, timeout_s=2.0, packet_size=9000)) as fixed:
+        with pytest.raises(WrongFrameError, match=r"9000 bytes do not arrive.* set packet_size to at most 1500"):
+            fixed.snap()
+        emulator.order("mtu", 0)
+        right(fixed, 10)
+
+
+def test_two_streams_of_one_device_agree_on_packets_that_arrive() -> None:
+    with Emulator(size_px=SIZE_PX, model="two-streams", addresses=OWN) as emulator:
+        emulator.order("mtu", 3000)
+        config = two_sources(emulator).model_copy(update={"timeout_s": 2.0})
+        with AravisCamera(config) as camera:
+            right(camera, 5)
+            emulator.order("mtu", 1500)
+            with pytest.raises(WrongFrameError, match=r"packets of 3000 bytes do not arrive, .* up to 1500"):
+                right(camera, 5)
+            right(camera, 5)
+
+
+def test_packets_that_are_too_large_from_a_camera_without_test_packets(
+    emulator: Emulator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    has = Device.has
+    monkeypatch.setattr(Device, "has", lambda device, name: name != TEST_PACKET and has(device, name))
+    emulator.order("mtu", 1500)
+    with (
+        AravisCamera(emulated(emulator, timeout_s=2.0, packet_size=9000)) as camera,
+        pytest.raises(WrongFrameError, match=r"9000 bytes, and this camera sends no test packets: .* set packet_size"),
+    ):
+        camera.snap()

@@ -31,8 +31,8 @@ def emulated(emulator: Emulator, visible: str | None = None, infrared: str | Non
         name: ChipConfig(device=address, pixel_format=chosen)  # type: ignore[arg-type]
         for name, address, chosen in zip(("visible", "infrared"), emulator.addresses, (visible, infrared), strict=True)
     }
-    # On a busy machine it may take long until the first frames arrive.
-    return AravisConfig(**chips, **({"timeout_s": 10.0} | more))
+    # On a busy machine it may take long until the first frames arrive. Small packets make many of a small frame.
+    return AravisConfig(**chips, **({"timeout_s": 10.0, "packet_size": 1500} | more))
 
 
 def two_sources(emulator: Emulator) -> AravisConfig:

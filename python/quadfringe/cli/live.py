@@ -10,10 +10,12 @@ import typer
 
 from quadfringe.cli._options import FileSizeOption, ShotsOption, SystemFile
 from quadfringe.cli._output import caution, say, stoppable
+from quadfringe.cli.record import require_all_recorded
 
 if TYPE_CHECKING:
     from quadfringe.recording import Recorder
     from quadfringe.scanner import Scanner
+    from quadfringe.scanner.streaming import StreamStatistics
     from quadfringe.view.viewer import Viewer
 
 __all__ = ["live"]
@@ -68,7 +70,8 @@ def live(
 ) -> None:
     """Measure continuously and show the shape, the channels and the figures in a browser, until Ctrl-C or --shots.
 
-    Only this machine can open the page, unless --host says otherwise; then its address contains a token.
+    Only this machine can open the page, unless --host says otherwise; then its address contains a token. Shots that
+    --record loses on a full or slow disk are counted, and make the exit status 1.
     """
     from contextlib import ExitStack
 
@@ -91,28 +94,32 @@ def live(
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))
-        with stoppable():
-            _follow(scanner, viewer, recorder, shots)
-    _report(viewer, recorder)
+        measured = _follow(scanner, viewer, recorder, shots)
+    _report(viewer, recorder, measured)
 
 
-def _report(viewer: Viewer, recorder: Recorder | None) -> None:
+def _report(viewer: Viewer, recorder: Recorder | None, stream: StreamStatistics) -> None:
     if viewer.fault is not None:
         caution(viewer.fault)
     if recorder is not None:
         done = recorder.statistics()
+        dropped = stream.camera.dropped + stream.queues["record"].dropped
         files = ", ".join(str(path) for path in done.files) or "nothing"
-        say(f"{files}: {done.written} shots recorded, {done.refused} refused by the disk")
+        say(f"{files}: {done.written} shots recorded, {done.refused} refused by the disk, {dropped} dropped")
+        require_all_recorded(done, dropped)
 
 
-def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: int | None) -> None:
+def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: int | None) -> StreamStatistics:
+    """Show and record until the shots or the user end it; return the counts."""
     from threading import Event
 
-    say(f"live at {viewer.url}; stop with Ctrl-C")
-    columns = scanner.projector_width_px
     taps = {} if recorder is None else {"record": recorder.write}
-    with scanner.stream(shots, taps=taps, resume=True) as stream:
-        viewer.follow(stream, recorder.statistics if recorder else None, columns)
-    if shots is None:
-        say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
-        Event().wait()
+    stream = scanner.stream(shots, taps=taps, resume=True)
+    with stoppable():
+        with stream:
+            say(f"live at {viewer.url}; stop with Ctrl-C")
+            viewer.follow(stream, recorder.statistics if recorder else None, scanner.projector_width_px)
+        if shots is None:
+            say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")
+            Event().wait()
+    return stream.statistics()

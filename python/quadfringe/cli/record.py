@@ -2,23 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from quadfringe.cli._options import FileSizeOption, JsonOption, ShotsOption, SystemFile
-from quadfringe.cli._output import complain, progress, say, stop_requested, write_figures
+from quadfringe.cli._output import caution, complain, progress, say, stop_requested, write_figures
 
 if TYPE_CHECKING:
     from threading import Event
 
     from quadfringe.data import AnyShot
-    from quadfringe.recording import Recorder
+    from quadfringe.recording import Recorder, RecorderStatistics
     from quadfringe.scanner import Scanner
 
-__all__ = ["record", "recover"]
+__all__ = ["record", "recover", "require_all_recorded"]
+
+SLOW = "the disk is slower than the camera; use a faster disk, a smaller image or a lower frame rate"
+CALM_S = 2.0  # so long no shot must be lost until recording counts as complete again
 
 SecondsOption = Annotated[float | None, typer.Option(min=0, help="Stop after this many seconds; default: no limit.")]
 
@@ -35,9 +38,9 @@ def record(
 ) -> None:
     """Record raw shots with their time stamps, settings and calibration until Ctrl-C, SIGTERM, --shots or --seconds.
 
-    Nothing is decoded. Every shot on file stays readable after a crash and when the disk is full.
+    Nothing is decoded. Every shot on file stays readable after a crash and when the disk is full. While the disk is
+    slower than the camera, up to 64 shots wait in memory; then shots are lost, counted, and make the exit status 1.
     """
-    from quadfringe.errors import RecordingError
     from quadfringe.recording import Recorder
     from quadfringe.scanner import open_system
 
@@ -47,27 +50,60 @@ def record(
         stop_requested() as stop,
         progress(_shots(scanner, shots, seconds, stop), "recording", shots) as taken,
     ):
-        _write_all(taken, recorder)
-        camera = scanner.camera.statistics()
+        _write_all(taken, recorder, lambda: scanner.camera.statistics().dropped)
+        dropped = scanner.camera.statistics().dropped
     done = recorder.statistics()
     files = ", ".join(str(path) for path in done.files) or "nothing"
-    say(f"{files}: {done.written} shots, {done.image_bytes / 1e6:.0f} MB; the camera dropped {camera.dropped}", json)
-    write_figures({"written": done.written, "refused": done.refused, "dropped": camera.dropped}, json)
+    say(f"{files}: {done.written} shots, {done.image_bytes / 1e6:.0f} MB; the camera dropped {dropped}", json)
+    write_figures({"written": done.written, "refused": done.refused, "dropped": dropped}, json)
+    require_all_recorded(done, dropped)
+
+
+def require_all_recorded(done: RecorderStatistics, dropped: int) -> None:
+    """Raise `RecordingError` when the disk refused shots, or some were dropped because it was slow."""
+    from quadfringe.errors import RecordingError
+
+    reasons = []
     if done.refused:
-        raise RecordingError(
-            f"{done.refused} shots were not recorded: {done.fault or 'the disk was full for a while'}; free disk space"
-        )
+        fault = done.fault or "the disk was full for a while"
+        reasons.append(f"{done.refused} shots were not recorded: {fault}; free disk space")
+    if dropped:
+        reasons.append(f"{dropped} shots were not recorded: {SLOW}")
+    if reasons:
+        raise RecordingError("; ".join(reasons))
 
 
-def _write_all(shots: Iterable[AnyShot], recorder: Recorder) -> None:
-    """Write shots; print when the disk starts to refuse them, and when recording resumes."""
-    fault = None
+def _write_all(shots: Iterable[AnyShot], recorder: Recorder, dropped: Callable[[], int]) -> None:
+    """Write shots; print when the disk starts to refuse or lose them, and when recording resumes."""
+    fault, slow = None, _SlowDisk()
     for shot in shots:
         recorder.write(shot)
         now = recorder.statistics().fault
         if (now is None) != (fault is None):
             complain(now) if now else say("recording resumes in a new file")
         fault = now
+        slow.see(dropped())
+
+
+class _SlowDisk:
+    """Prints when shots begin to be lost, and when none was lost for `CALM_S`."""
+
+    def __init__(self) -> None:
+        self._dropped, self._since_s = 0, float("-inf")
+        self._losing = False
+
+    def see(self, dropped: int) -> None:
+        """Take the number of shots that were lost so far."""
+        from time import monotonic
+
+        if dropped > self._dropped:
+            self._dropped, self._since_s = dropped, monotonic()
+            if not self._losing:
+                complain(f"shots are lost: {SLOW}")
+            self._losing = True
+        elif self._losing and monotonic() - self._since_s > CALM_S:
+            self._losing = False
+            caution(f"every shot is recorded again; {dropped} were lost so far")
 
 
 def _shots(scanner: Scanner, shots: int | None, seconds: float | None, stop: Event) -> Iterator[AnyShot]:

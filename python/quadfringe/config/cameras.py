@@ -96,7 +96,9 @@ class AravisConfig(Model):
         description="GenICam features that are set first, in this order, on every device of the camera that has them.",
     )
     packet_size: Annotated[int, Field(ge=576, le=65500)] | None = Field(
-        default=None, description="Bytes of a GigE Vision packet. Absent: the largest that the network carries."
+        default=None,
+        description="Bytes of a GigE Vision packet. Absent: the largest of which test packets arrive; a camera "
+        "without test packets keeps its size.",
     )
     packet_delay_ns: Annotated[int, Field(ge=0)] | None = Field(
         default=None, description="Pause between packets in ns, for two devices on one network link."

@@ -54,7 +54,10 @@ class Truth:
 
 @dataclass(frozen=True)
 class FrameStamp:
-    """One frame of one chip: the device's number and clock, and the host's clock when it began to arrive, in ns."""
+    """One frame of one chip: the device's number and clock, ns, and UTC in ns since 1970 when it began to arrive.
+
+    `arrival_ns` proceeds evenly while a stream runs, as `Stamp.time_us` does.
+    """
 
     id: int
     device_ns: int
@@ -66,7 +69,8 @@ class Stamp:
     """When and by which camera a shot was taken.
 
     `id` numbers the exposures since the camera was opened; it jumps where exposures were lost. `time_us` is UTC in us
-    since 1970 when the exposure began, as well as the host can tell. `frames` are by chip, "visible" and "infrared".
+    since 1970 when the exposure began, as well as the host can tell; setting the clock of the host while a stream runs
+    does not disturb it. `frames` are by chip, "visible" and "infrared".
     """
 
     id: int

@@ -9,6 +9,7 @@ from itertools import cycle
 from typing import Any
 
 from quadfringe.data import AnyShot, Stamp
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import CameraStatistics, Keep
 
 __all__ = ["VIEWPOINT", "Carousel"]
@@ -44,7 +45,7 @@ class Carousel:
             due += 1 / self._rate_hz
             time.sleep(max(0.0, due - time.monotonic()))
             self.given += 1
-            yield replace(shot, stamp=Stamp(self.given, time.time_ns() // 1000, self.name))
+            yield replace(shot, stamp=Stamp(self.given, HOST_CLOCK.now_ns() // 1000, self.name))
 
     def statistics(self) -> CameraStatistics:
         """Count the shots that were given."""

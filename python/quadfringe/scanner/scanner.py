@@ -139,8 +139,9 @@ class Scanner:
 
         Capture, decoding and the caller run at different speeds. With keep="latest" the caller gets the newest shape;
         "all" lets up to 64 shots wait. Both drop the oldest shot when they must, and count it. `taps` get every
-        captured shot, each in its thread: a recorder, for example. With `resume` a camera that fails is tried again
-        until the stream is closed; otherwise its `CameraError` ends the stream. A second stream ends the first.
+        captured shot, each in its thread: a recorder, for example; 64 shots wait for a slow one. With `resume` a camera
+        that fails is tried again until the stream is closed; otherwise its `CameraError` ends the stream. A second
+        stream ends the first.
 
         >>> import quadfringe as qf
         >>> with qf.open() as scanner, scanner.stream(2, keep="all") as stream:

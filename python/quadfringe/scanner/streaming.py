@@ -17,6 +17,7 @@ from typing import Self
 
 from quadfringe.config import ResponseChoice, shortened
 from quadfringe.data import AnyShot, Shape
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import Camera, CameraStatistics, Keep
 from quadfringe.devices._queue import DroppingQueue, EndOfQueue, QueueStatistics
 from quadfringe.errors import CameraError, DecodeError
@@ -110,10 +111,12 @@ class _ErrorsTo:
 class LiveStream:
     """Iterates over `Measured`; close it, or use it in a `with` block. Made by `Scanner.stream`.
 
-    Every tap gets every captured shot, in a thread with a queue before it. An error of a tap ends the stream. A camera
-    that makes shots on request (`paced` is False) waits for the others, so that no shot is lost. `decode` is called
-    from `at_once` threads; results come in the order of the shots. While `response()` is "auto", shots are decoded one
-    after another, so that the estimate depends on their order alone.
+    Every tap gets the captured shots, in a thread with a queue of 64 shots before it; a tap that is slower than the
+    camera for longer, such as a recorder on a slow disk, loses the oldest of them, and `statistics().queues` counts
+    those. An error of a tap ends the stream. A camera that makes shots on request (`paced` is False) waits for the
+    others, so that no shot is lost. `decode` is called from `at_once` threads; results come in the order of the shots.
+    While `response()` is "auto", shots are decoded one after another, so that the estimate depends on their order
+    alone.
     """
 
     def __init__(
@@ -154,7 +157,7 @@ class LiveStream:
         return shortened(f"LiveStream({self._camera!r}, {self._given} shots decoded{ended})")
 
     def _capture(self) -> None:
-        with _ErrorsTo(self._end):
+        with _ErrorsTo(self._end), HOST_CLOCK.held():
             self._capture_all()
         self._end(None)
 
@@ -218,7 +221,7 @@ class LiveStream:
                 self._order.wait()
             self._refused += error is not None
             self._decoded.tick()
-            latency_ms = (time.time_ns() - _arrival_ns(shot)) / 1e6
+            latency_ms = (HOST_CLOCK.now_ns() - _arrival_ns(shot)) / 1e6
             self._results.put(Measured(shot, shape, error, latency_ms), wait=self._wait)
             self._given += 1
             self._order.notify_all()
@@ -292,6 +295,6 @@ class LiveStream:
 def _arrival_ns(shot: AnyShot) -> int:
     """Give the time at which the last frame of a shot arrived, in ns of the host's clock."""
     if shot.stamp is None:
-        return time.time_ns()
+        return HOST_CLOCK.now_ns()
     frames = shot.stamp.frames.values()
     return max((frame.arrival_ns for frame in frames), default=shot.stamp.time_us * 1000)

@@ -274,7 +274,8 @@ def _table(stream: StreamStatistics, recording: RecorderStatistics | None, page_
         rows.append(("frames missed, damaged, unpaired", f"{camera.missed}, {camera.damaged}, {camera.unpaired}"))
     if recording is not None:
         rows.append(("recorded", f"{recording.written} shots, {recording.image_bytes / 1e6:.0f} MB"))
-        rows.append(("not recorded", str(recording.refused)))
+        dropped = stream.queues["record"].dropped if "record" in stream.queues else 0
+        rows.append(("not recorded", f"{recording.refused} refused by the disk, {dropped} because it is slow"))
     faults = [fault for fault in (stream.fault, recording.fault if recording else None, page_fault) if fault]
     lines = [f"| {name} | {value} |" for name, value in rows]
     return ["| figure | value |", "| --- | --- |", *lines, *(f"\n**fault:** {fault}" for fault in faults)]

@@ -11,10 +11,11 @@ from quadfringe.devices.aravis._binding import aravis_binding, translated
 from quadfringe.devices.aravis._stream import Stream
 from quadfringe.errors import CameraError
 
-__all__ = ["Device", "Found", "found"]
+__all__ = ["Device", "Found", "TooLarge", "found"]
 
 GVCP_PORT = 3956  # GigE Vision standard
 CONTROL_PRIVILEGE = 0x0A00  # address of the control privilege register, GigE Vision standard
+TEST_PACKET = "GevSCPSFireTestPacket"  # without it, Aravis keeps the packet size that it finds
 PING_S, PINGS = 0.3, 5  # wait for an answer, s, and attempts: 1.5 s, well below the 5 s after which Aravis gives up
 
 
@@ -49,12 +50,21 @@ def found() -> list[Found]:
     return sorted(set(devices), key=str)
 
 
+@dataclass(frozen=True)
+class TooLarge:
+    """A packet size that was agreed, and the largest that arrives, bytes with all headers; None: there is no test."""
+
+    agreed: int
+    carried: int | None
+
+
 class Device:
     """One device and its features; close its streams before it."""
 
     def __init__(self, where: str) -> None:
         aravis = aravis_binding()
         self.where = where
+        self._packet_bytes: dict[int, int] = {}  # agreed for each stream channel
         with translated(f"camera at {where}"):
             self._camera = aravis.Camera.new(where)
         self._device = self._camera.get_device()
@@ -108,10 +118,10 @@ class Device:
             else:
                 self._device.set_integer_feature_value(name, round(value))
 
-    def set_packets(self, channel: int, size: int | None, delay_ns: int | None) -> int:
-        """Set packet size and delay of a stream channel; size 0 or None takes the largest that arrives. Return it."""
+    def set_packets(self, channel: int, size: int | None, delay_ns: int | None) -> None:
+        """Set packet size and delay of a stream channel; size 0 or None takes the largest that arrives."""
         if not self.ethernet:
-            return 0
+            return
         with translated(f"camera at {self.where}: packets of stream {channel}"):
             if channel:
                 self._camera.gv_select_stream_channel(channel)
@@ -121,7 +131,23 @@ class Device:
                 self._camera.gv_auto_packet_size()
             if delay_ns is not None:
                 self._camera.gv_set_packet_delay(delay_ns)
-            return int(self._camera.gv_get_packet_size())
+            self._packet_bytes[channel] = int(self._camera.gv_get_packet_size())
+
+    def too_large(self, channel: int) -> TooLarge | None:
+        """Return the agreed packet size of a stopped stream unless test packets of that size arrive.
+
+        The stream cannot start again afterwards.
+        """
+        agreed = self._packet_bytes.get(channel)
+        if agreed is None:
+            return None
+        if not self.has(TEST_PACKET):
+            return TooLarge(agreed, None)
+        with translated(f"camera at {self.where}: test packets of stream {channel}"):
+            if channel:
+                self._camera.gv_select_stream_channel(channel)
+            carried = int(self._camera.gv_auto_packet_size())
+        return TooLarge(agreed, carried) if carried < agreed else None
 
     def channels(self) -> int:
         """Return the number of stream channels."""

@@ -6,14 +6,16 @@ import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from quadfringe.config.cameras import AravisConfig
-from quadfringe.data import AnyShot, BayerShot, ChipImage, Shot, Stamp
+from quadfringe.data import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices.aravis import _profiles as profiles
-from quadfringe.devices.aravis._device import Device, found
+from quadfringe.devices.aravis._device import Device, TooLarge, found
 from quadfringe.devices.aravis._formats import format_named
 from quadfringe.devices.aravis._frame_matching import FrameMatcher, SingleChip, Stamped
 from quadfringe.devices.aravis._profiles import CHIPS, Place
@@ -124,8 +126,9 @@ class Link:
 
     def _made(self, frames: tuple[Stamped[Frame], ...], offset_ns: int) -> AnyShot | ChipImage:
         first = frames[0]
-        stamps = {chip: frame.stamp for chip, frame in zip(self.chips, frames, strict=True)}
-        stamp = Stamp(first.number, (first.stamp.device_ns + offset_ns) // 1000, self.name, stamps)
+        stamps = {chip: _in_utc(frame.stamp) for chip, frame in zip(self.chips, frames, strict=True)}
+        time_us = HOST_CLOCK.utc_ns(first.stamp.device_ns + offset_ns) // 1000
+        stamp = Stamp(first.number, time_us, self.name, stamps)
         kind = self.readers[0].agreed.format
         pixels = first.item.pixels
         if len(frames) == 1:
@@ -172,6 +175,13 @@ class Link:
                 )
         return None
 
+    def too_large(self, chip: int) -> TooLarge | None:
+        """Stop, and return the packet size of a chip unless such packets arrive; the link cannot start again."""
+        self.stop()
+        with suppress(CameraError):  # the failure of the frames is reported, not that of the search for its cause
+            return self.device(chip).too_large(self.places[chip].stream)
+        return None
+
     def forget(self, *, lost: bool = False) -> None:
         """Close streams and devices; a thread closes those of a lost camera, because Aravis waits for seconds."""
         held = [part for device in self._devices.values() for part in device.give_up()]
@@ -182,6 +192,10 @@ class Link:
             threading.Thread(target=held.clear, name="closing a camera").start()
         else:
             held.clear()  # drops the streams, which are last, before the devices that they use
+
+
+def _in_utc(stamp: FrameStamp) -> FrameStamp:
+    return replace(stamp, arrival_ns=HOST_CLOCK.utc_ns(stamp.arrival_ns))
 
 
 def _patiently(connect: Callable[[], tuple[Place, ...]], patience_s: float) -> tuple[Place, ...]:

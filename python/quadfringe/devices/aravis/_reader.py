@@ -5,13 +5,14 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import FrameStamp
+from quadfringe.devices.aravis._arrival import ArrivalTimes
 from quadfringe.devices.aravis._formats import PixelFormat
 from quadfringe.devices.aravis._stream import Buffer, Stream
 
@@ -50,7 +51,7 @@ class Agreed:
 
 @dataclass(frozen=True)
 class Frame:
-    """A complete frame: pixels (H, W) or (H, W, 3)."""
+    """A complete frame: pixels (H, W) or (H, W, 3). The arrival time in its stamp is that of the monotonic clock."""
 
     stamp: FrameStamp
     pixels: NDArray[Any]
@@ -79,8 +80,10 @@ class ChipReader:
         self.agreed = agreed
         self.frames = self.damaged = 0
         self.fault: str | None = None  # of the last rejected frame
+        self.incomplete = False  # whether that frame lacked packets
         self.heard = 0.0  # when the last frame arrived, complete or not
         self._stream = stream
+        self._arrivals = ArrivalTimes()
         self._thread: threading.Thread | None = None
         self._stopping = threading.Event()
 
@@ -107,10 +110,12 @@ class ChipReader:
         try:
             fault = self.agreed.fault(buffer)
             if fault is not None:
-                self.fault = fault
+                self.fault, self.incomplete = fault, buffer.status != "success"
                 self.damaged += 1
                 return None
             self.frames += 1
+            stamp = buffer.stamp
+            stamp = replace(stamp, arrival_ns=self._arrivals.monotonic_ns(stamp.arrival_ns))
             agreed = self.agreed
             if borrow and not agreed.format.packed:
                 data = np.asarray(_Loan(self._stream, buffer))
@@ -118,7 +123,7 @@ class ChipReader:
             else:
                 data = buffer.array
             pixels = agreed.format.pixels(data, agreed.width, agreed.height)
-            return Frame(buffer.stamp, pixels if lent or agreed.format.packed else pixels.copy())
+            return Frame(stamp, pixels if lent or agreed.format.packed else pixels.copy())
         finally:
             if not lent:
                 self._stream.push(buffer)

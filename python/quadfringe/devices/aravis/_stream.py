@@ -49,7 +49,7 @@ class Buffer:
 
     @property
     def stamp(self) -> FrameStamp:
-        """Frame id of the device, device clock, and host clock at the arrival of the first packet, ns."""
+        """Frame id of the device, device clock, and UTC of the host at the arrival of the first packet, ns."""
         held = self.held
         return FrameStamp(held.get_frame_id(), held.get_timestamp(), held.get_system_timestamp())
 

@@ -13,6 +13,7 @@ from typing import Generic, Literal, Self, TypeVar
 from quadfringe.config import SystemConfig
 from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, Calibration, ChipImage
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, Keep, open_projector
 from quadfringe.devices._queue import DroppingQueue
 from quadfringe.devices.aravis._link import Link
@@ -73,8 +74,9 @@ class _Running(Generic[Item]):
             self._queue, self._first_id = DroppingQueue(length), self._last_id + 1
             try:
                 _check_connected(link, 0.0)
-                link.start(self._queue.put, borrow=borrow)
-                yield link, self._queue
+                with HOST_CLOCK.held():
+                    link.start(self._queue.put, borrow=borrow)
+                    yield link, self._queue
             except ShotTimeoutError:
                 raise  # the camera is still connected
             except CameraError as error:
@@ -127,9 +129,11 @@ class _Running(Generic[Item]):
         chips = self._chip_names
         came = {chip: now[chip].frames - before[chip].frames for chip in chips}
         head = f"camera at {self.name}: no shot within {timeout_s:g} s: "
-        for chip, reader in zip(chips, link.readers, strict=True):
+        for n, (chip, reader) in enumerate(zip(chips, link.readers, strict=True)):
             if not came[chip] and now[chip].damaged > before[chip].damaged:
-                return WrongFrameError(f"{head}frames of the {chip} chip were rejected, the last one: {reader.fault}")
+                fault = reader.fault
+                hint = _packet_hint(link, n) if reader.incomplete else ""
+                return WrongFrameError(f"{head}frames of the {chip} chip were rejected, the last one: {fault}{hint}")
         if all(came.values()):
             return UnpairedError(
                 f"{head}frames of both chips arrived, but none of the same instant; synchronise the chips"
@@ -221,6 +225,26 @@ def _check_connected(link: Link, silent_s: float) -> None:
     lost = link.lost(silent_s)
     if lost is not None:
         raise lost from None
+
+
+def _packet_hint(link: Link, chip: int) -> str:
+    """Return what to do about packets that are too large for the network; nothing if they arrive."""
+    size = link.too_large(chip)
+    if size is None:
+        return ""
+    if size.carried is None:
+        return (
+            f"; packets have {size.agreed} bytes, and this camera sends no test packets: if network card or switch "
+            "carry less (MTU), set packet_size to that"
+        )
+    if link.config.packet_size:
+        cure = f"set packet_size to at most {size.carried}, or leave it out"
+    else:
+        cure = "call again, which agrees on a size that arrives"
+    return (
+        f"; packets of {size.agreed} bytes do not arrive, only those up to {size.carried}: {cure}, or raise the MTU of "
+        "network card, switch and camera (jumbo frames)"
+    )
 
 
 def open_devices(config: SystemConfig) -> Devices:

@@ -40,6 +40,7 @@ class Faults:
     wrong_format: bool = False  # frames are announced in another pixel format of the same size
     short: bool = False  # the last packets of each frame are missing, and the trailer does not say so
     packet_size: int = 0  # packet size in place of that of the register, bytes
+    mtu: int = 0  # larger packets, bytes with headers of IP and UDP, vanish on the way without a word; 0: none does
     gone: bool = False  # no answers and no frames, as if without power
     duplicates: float = 0.0  # share of packets that are sent twice
     reordered: float = 0.0  # share of packets that are sent after the next one
@@ -124,7 +125,8 @@ class EmulatedCamera:
             stream, register = divmod(address - STREAM_0, STREAM_STEP)
             if 0 <= stream < control.who.streams and register == 4 and value & FIRE_TEST:
                 chip = next(chip for chip in self.chips if chip.control is control and chip.stream == stream)
-                self._socket.sendto(bytes((value & 0xFFFF) - IP_UDP_HEADER), chip.target)
+                control[address] = value & ~FIRE_TEST  # the bit clears itself
+                self._send_packet(chip, (b"", bytes((value & 0xFFFF) - IP_UDP_HEADER)))
 
         return written
 
@@ -137,7 +139,7 @@ class EmulatedCamera:
                 for known, packets in tuple(chip.kept):
                     if known == block:
                         for packet in packets[first : last + 1]:
-                            self._socket.sendmsg(packet, (), 0, chip.target)
+                            self._send_packet(chip, packet)
 
         return resend
 
@@ -200,9 +202,13 @@ class EmulatedCamera:
         for turn in range(max((len(packets) for packets in trains), default=0)):
             for chip, packets in zip(active, trains, strict=True):
                 if turn < len(packets) and self._random.random() >= self.faults.lost_packets:
-                    self._socket.sendmsg(packets[turn], (), 0, chip.target)
+                    self._send_packet(chip, packets[turn])
         for chip in active:
             chip.sent += 1
+
+    def _send_packet(self, chip: Chip, packet: Packet) -> None:
+        if not self.faults.mtu or IP_UDP_HEADER + sum(map(len, packet)) <= self.faults.mtu:
+            self._socket.sendmsg(packet, (), 0, chip.target)
 
     def _on_the_wire(self, packets: list[Packet]) -> list[Packet]:
         """Send some packets twice, and some after the next one, as routers and redundant links do."""

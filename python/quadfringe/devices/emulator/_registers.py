@@ -12,6 +12,8 @@ __all__ = ["EXPOSURE_STEP_US", "FEATURES", "PIXEL_FORMATS", "XML_ADDRESS", "geni
 
 EXPOSURE_STEP_US: Final = 42.07
 XML_ADDRESS: Final = 0x100000
+PACKETS_ADDRESS: Final = 0x0D04  # of stream channel 0; those of other channels follow
+LARGEST_PACKET: Final = 9000
 PIXEL_FORMATS: Final = {
     "Mono8": 0x01080001,
     "Mono10": 0x01100003,
@@ -94,7 +96,9 @@ def _float(name: str, register: str, to_register: str, from_register: str, least
 
 def _nodes(formats: list[str], sources: int) -> dict[str, str]:
     """Return the nodes of every feature, by the name of the feature."""
-    return _identity_nodes() | _image_nodes(formats, sources) | _acquisition_nodes() | _exposure_nodes()
+    return (
+        _identity_nodes() | _packet_nodes() | _image_nodes(formats, sources) | _acquisition_nodes() | _exposure_nodes()
+    )
 
 
 def _identity_nodes() -> dict[str, str]:
@@ -122,6 +126,24 @@ def _image_nodes(formats: list[str], sources: int) -> dict[str, str]:
         "PixelFormat": _enumeration("PixelFormat", known, selector),
         "PayloadSize": f'<IntSwissKnife Name="PayloadSize">{variables}{payload}</IntSwissKnife>',
     }
+
+
+def _packet_nodes() -> dict[str, str]:
+    """Return the nodes of test packets, with which a host finds the largest packet that the network carries."""
+    return {
+        "GevSCPSPacketSize": f'<Integer Name="GevSCPSPacketSize"><pValue>GevSCPSPacketSizeReg</pValue><Min>576</Min>'
+        f"<Max>{LARGEST_PACKET}</Max><Inc>4</Inc></Integer>" + _packet_register("GevSCPSPacketSize", 31, 16),
+        "GevSCPSFireTestPacket": _command("GevSCPSFireTestPacket", "GevSCPSFireTestPacket", 1)
+        + _packet_register("GevSCPSFireTestPacket", 0, 0),
+    }
+
+
+def _packet_register(name: str, lsb: int, msb: int) -> str:
+    return (
+        f'<MaskedIntReg Name="{name}Reg"><Address>{PACKETS_ADDRESS:#x}</Address><Length>4</Length><AccessMode>RW'
+        f"</AccessMode><pPort>Device</pPort><Cachable>NoCache</Cachable><LSB>{lsb}</LSB><MSB>{msb}</MSB>"
+        "<Sign>Unsigned</Sign><Endianess>BigEndian</Endianess></MaskedIntReg>"
+    )
 
 
 def _acquisition_nodes() -> dict[str, str]:

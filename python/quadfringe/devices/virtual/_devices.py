@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import count as numbers
@@ -11,6 +10,7 @@ from typing import Self
 from quadfringe.config import Fringes, SystemConfig
 from quadfringe.config.cameras import VirtualConfig
 from quadfringe.data import AnyShot, Calibration, Stamp
+from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import CameraStatistics, Devices, Keep
 from quadfringe.devices.light import Levels, Light
 from quadfringe.devices.virtual._bench import VirtualBench
@@ -76,20 +76,22 @@ class VirtualCamera:
 
     def snap(self, timeout_s: float | None = None) -> AnyShot:  # noqa: ARG002 - rendering always ends
         """Render one shot of the bench."""
-        return self._expose()
+        with HOST_CLOCK.held():
+            return self._expose()
 
     def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
         """Render one shot after the other."""
         self._check_open()
-        for _ in numbers() if count is None else range(count):
-            yield self._expose()
+        with HOST_CLOCK.held():
+            for _ in numbers() if count is None else range(count):
+                yield self._expose()
 
     def _expose(self) -> AnyShot:
         self._check_open()
         exposure = self._exposures if self._rate_hz else 0
         shot = self._bench.expose(exposure / self._rate_hz if self._rate_hz else 0.0, seed=self._bench.seed(exposure))
         self._exposures += 1
-        return replace(shot, stamp=Stamp(self._exposures, time.time_ns() // 1000, self.name))
+        return replace(shot, stamp=Stamp(self._exposures, HOST_CLOCK.now_ns() // 1000, self.name))
 
     def _check_open(self) -> None:
         if self._closed:
