@@ -32,11 +32,12 @@ def test_a_spoilt_shot_is_refused_with_its_cause(case: str, method: str) -> None
         ("channel missing", "published", 115, "blind channel"),
         ("saturated", "published", 22, "saturation"),
         ("saturated", "published", 146, "saturation"),
+        ("saturated", "joint", 258, "saturation"),
         ("noise only", "published", 126, "no fringes"),
         ("mirrored", "published", 0, "mirrored or rotated"),
     ],
 )
-def test_what_was_returned_once_stays_refused(case: str, method: str, seed: int, reason: str) -> None:
+def test_what_failed_once_is_refused_with_its_cause(case: str, method: str, seed: int, reason: str) -> None:
     (outcome,) = hostile_shots(case, method, range(seed, seed + 1))
     assert (outcome.reason, outcome.wrong) == (reason, 0.0)
 

@@ -114,12 +114,6 @@ def test_a_row_without_fringes_is_an_error() -> None:
         stages.demodulate({"red": flat, "green": flat, "blue": flat, "ir": flat}, NUMBERS)
 
 
-def test_a_fringe_wider_than_the_image_is_an_error() -> None:
-    wave = np.tile(0.5 + 0.3 * np.cos(2 * np.pi * np.arange(256, dtype=np.float32) / 256), (32, 1))
-    with pytest.raises(qf.DecodeError, match="a fringe of 307 px is wider than the image"):
-        stages.demodulate({"red": wave, "green": wave, "blue": wave, "ir": wave}, NUMBERS)
-
-
 def test_a_response_means_the_same_as_in_a_plan(tmp_path: Path) -> None:
     shot, calibration = grab("plane", 7)
     bent = qf.ResponseCalibration(red={"exponent": 0.5})
