@@ -57,6 +57,9 @@ CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged,
 # Least share of lit pixels in an image: objects may fill 0.02 of it, and fewer than this are chance in noise. In an
 # image that is mostly saturated more of them are chance, at the edges of clipped fringes.
 LIT_MIN, UNSATURATED_MIN = 0.005, 0.05
+# Least share of lit pixels among those that are as bright as they. Seven of 1,000 images of noise have 0.006 to 0.045
+# lit pixels by chance (published): `python -m hostile --shots 1000` in the folder tests.
+CHANCE_MAX = 0.1
 
 # A band of rows shows which exchanges can explain a doubtful shot: the share of the rows, and their least number.
 BAND_SHARE, BAND_ROWS_MIN = 1 / 8, 96
@@ -157,10 +160,20 @@ def _lit_share(shape: Shape) -> float:
     return float(np.isfinite(shape.quality[::STRIDE, ::STRIDE]).mean())
 
 
+def _lit_share_of_bright(shape: Shape, shot: AnyShot) -> float:
+    """Return the share of lit pixels among those at least half as bright as lit ones usually are.
+
+    A small object on a dark ground has nearly all of them; in noise, pixels that are lit by chance are like all others.
+    """
+    lit = np.isfinite(shape.quality[::STRIDE, ::STRIDE])
+    light = np.mean([image[::STRIDE, ::STRIDE] for image in shot.channels.values()], axis=0)
+    return float(lit.sum() / np.count_nonzero(light >= 0.5 * np.median(light[lit])))
+
+
 def _by_chance(shape: Shape, shot: AnyShot, margin: float) -> bool:
     """Say whether so few pixels carry fringes, or so many are saturated, that the margin may be chance."""
     share = _lit_share(shape)
-    if share < LIT_MIN:
+    if share < LIT_MIN or (share < CHANCE_MAX and _lit_share_of_bright(shape, shot) < CHANCE_MAX):
         return True
     doubtful = share < UNSATURATED_MIN or margin < DOUBTFUL
     return doubtful and max(saturation(shot).values()) > params.REFUSED_SHARE
