@@ -6,7 +6,7 @@ use super::plane::{Fields, vectors};
 use super::priors::weigh;
 use super::scales::{Determined, Scales, variance_share};
 use super::solve::solve;
-use super::start::{self, smooth};
+use super::start::{self, AlbedoOf, smooth};
 use super::tile::{Found, Tile};
 use crate::joint::params::energy::{
     ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
@@ -18,7 +18,13 @@ impl Tile {
     pub fn minimise(&mut self, noise: f32) {
         self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
         self.unknown.phase.clone_from(&self.start);
-        start::contrast_and_albedo(self);
+        start::contrast_and_albedo(self, AlbedoOf::Neighbours);
+        self.descend(noise);
+        self.restart(noise);
+    }
+
+    /// Lowers the energy from the present unknowns, and estimates the scales; `noise` is the least variance of the noise.
+    pub(super) fn descend(&mut self, noise: f32) {
         let mut determined = Determined::default();
         for outer in 0..OUTER_STEPS {
             let sums = linearise(self);

@@ -13,10 +13,12 @@ mod layout;
 mod plane;
 mod preconditioner;
 mod priors;
+mod restart;
 mod scales;
 mod solve;
 mod start;
 mod tile;
+mod value;
 
 use super::params::energy::{CELL_MAX_PX, CELLS_PER_PERIOD_MIN, SMALL_CELLS_PER_PERIOD_MIN};
 use super::scene::{PhaseMap, Scene};

@@ -42,6 +42,10 @@ impl Plane {
         *self.0[at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
     }
 
+    pub fn copy(&mut self, from: &Self) {
+        self.0.copy_from_slice(&from.0);
+    }
+
     pub fn clear(&mut self) {
         self.0.fill(0.0);
     }

@@ -8,15 +8,24 @@ use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
-/// Estimates, for each channel, the contrast of the light in the tile and the albedo around every cell, alternating.
-pub(super) fn contrast_and_albedo(tile: &mut Tile) {
+/// Which cells determine the albedo of a cell at the start.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum AlbedoOf {
+    /// The cells around it: exact where the phase is not.
+    Neighbours,
+    /// The cell alone: sharp where the albedo has edges.
+    Cell,
+}
+
+/// Estimates, for each channel, the contrast of the light in the tile and the albedo of every cell, alternating.
+pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
     tile.scales.channel_contrast = [1.0; 4];
     let mut contrast = [1.0; 4];
     for c in 0..4 {
         carrier(tile, c);
         for round in 0..START_ROUNDS {
             contrast[c] = contrast_of(tile, c, round == 0);
-            albedo(tile, c, contrast[c]);
+            albedo(tile, c, contrast[c], of);
         }
     }
     let mean = (contrast.iter().map(|value| value.ln()).sum::<f32>() / 4.0).exp();
@@ -65,9 +74,9 @@ fn contrast_of(tile: &Tile, channel: usize, even: bool) -> f32 {
     (ratio as f32).clamp(CONTRAST_START_LIMITS[0], CONTRAST_START_LIMITS[1])
 }
 
-/// Logarithm of the albedo by least squares over the neighbours of every cell.
+/// Logarithm of the albedo by least squares.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn albedo(tile: &mut Tile, channel: usize, contrast: f32) {
+fn albedo(tile: &mut Tile, channel: usize, contrast: f32, of: AlbedoOf) {
     let Tile { light, usable, inside, unknown, product, .. } = tile;
     let [carrier, numerator, denominator, spare, _, _] = product.planes_mut();
     for at in vectors() {
@@ -80,8 +89,9 @@ fn albedo(tile: &mut Tile, channel: usize, contrast: f32) {
         numerator.set(at, over);
         denominator.set(at, under);
     }
-    for plane in [&mut *numerator, &mut *denominator] {
-        smooth(plane, spare);
+    if of == AlbedoOf::Neighbours {
+        smooth(numerator, spare);
+        smooth(denominator, spare);
     }
     for at in vectors() {
         let (over, under, inside) = (numerator.get(at), denominator.get(at), inside.get(at));
@@ -97,13 +107,18 @@ fn albedo(tile: &mut Tile, channel: usize, contrast: f32) {
 /// Averages a plane with the weights [1 4 6 4 1] / 16 in both directions.
 #[inline(always)]
 pub(super) fn smooth(plane: &mut Plane, spare: &mut Plane) {
+    filter(plane, spare, [1.0 / 16.0, 1.0 / 4.0, 3.0 / 8.0]);
+}
+
+/// Sums five neighbours in both directions, with weights for the outer ones, the next ones and the middle.
+#[inline(always)]
+pub(super) fn filter(plane: &mut Plane, spare: &mut Plane, [outer, next, middle]: [f32; 3]) {
     let five = |from: &Plane, at: usize, step: usize| -> Lanes {
         let taps = [at - 2 * step, at - step, at, at + step, at + 2 * step].map(|at| from.get(at));
         let mut out = [0.0; LANES];
         for x in 0..LANES {
-            out[x] = (taps[0][x] + taps[4][x]) * (1.0 / 16.0)
-                + (taps[1][x] + taps[3][x]) * (1.0 / 4.0)
-                + taps[2][x] * (3.0 / 8.0);
+            out[x] =
+                (taps[0][x] + taps[4][x]) * outer + (taps[1][x] + taps[3][x]) * next + taps[2][x] * middle;
         }
         out
     };

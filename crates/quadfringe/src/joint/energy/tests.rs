@@ -6,6 +6,7 @@ use super::preconditioner::{precondition, prepare};
 use super::priors::weigh;
 use super::scales::variance_share;
 use super::solve::multiply;
+use super::start::{AlbedoOf, contrast_and_albedo};
 use super::tile::Tile;
 use crate::joint::params::energy::SIDE;
 
@@ -59,6 +60,55 @@ fn the_minimum_finds_phase_and_contrast_through_an_edge_of_colour() {
     assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
     let contrast = tile.unknown.contrast.row(20)[12].exp();
     assert!((contrast - 0.6).abs() < 0.01, "{contrast}");
+}
+
+/// A white tile with a word in dark ink, whose phase at the start is a radian off wherever there is ink.
+fn printed_tile() -> (Tile, Plane) {
+    let (mut tile, truth) = tile(0.0);
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let ink = (30..40).contains(&y) && (30..50).contains(&x) && (x / 3 + y / 4) % 2 == 0;
+            let phase = truth.row(y)[x];
+            tile.start.row_mut(y)[x] = phase + if ink { 1.0 } else { 0.0 };
+            let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[2] * phase];
+            for c in 0..4 {
+                let albedo = if ink { [0.05, 0.06, 0.05, 0.2][c] } else { 0.5 };
+                let light = albedo * (1.0 + 0.6 * turns[c].cos()) + 0.005 * random(c, y * SIDE + x);
+                tile.light[c].row_mut(y)[x] = light;
+            }
+        }
+    }
+    (tile, truth)
+}
+
+#[test]
+fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
+    let noise = 1e-6;
+    let (mut tile, truth) = printed_tile();
+    tile.unknown.phase.clone_from(&tile.start);
+    contrast_and_albedo(&mut tile, AlbedoOf::Neighbours);
+    tile.descend(noise);
+    let (first, _) = errors(&tile, &truth);
+    let (mut tile, truth) = printed_tile();
+    tile.minimise(noise);
+    let (second, largest) = errors(&tile, &truth);
+    assert!(first > 0.02 && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
+}
+
+#[test]
+fn a_tile_without_texture_has_one_start() {
+    let (mut tile, _) = tile(0.0);
+    for y in 0..SIDE {
+        for x in 0..SIDE {
+            let turns = [1.0, RATIOS[1], 1.0, RATIOS[2]].map(|ratio| ratio * tile.start.row(y)[x]);
+            for c in 0..4 {
+                let ahead = if c == 2 { std::f32::consts::FRAC_PI_2 } else { 0.0 };
+                tile.light[c].row_mut(y)[x] = 0.5 * (1.0 + 0.6 * (turns[c] + ahead).cos());
+            }
+        }
+    }
+    tile.minimise(1e-8);
+    assert!(tile.first.phase.row(40).iter().all(|&phase| phase == 0.0), "a second start was made");
 }
 
 #[test]

@@ -29,6 +29,9 @@ pub(super) struct Tile {
     pub ratios: [f32; 3],
     pub scales: Scales,
     pub unknown: Fields,
+    /// Unknowns from the first start, and the lit cells, while there is a second start.
+    pub first: Fields,
+    pub lit: Plane,
     pub derivatives: Derivatives,
     pub weights: Weights,
     pub preconditioner: Preconditioner,

@@ -123,3 +123,25 @@ pub const CONTRAST_RIDGE: f32 = 1e-4;
 /// more of the painted face are returned, and 0.5 % more of the bottle).
 /// `python evaluation/world.py --half tune`, `python evaluation/captures_report.py`.
 pub const MOVED_MAX_RAD: f32 = 0.3;
+
+/// Error of the phase at the start next to a texture whose albedo changes by a factor of e from cell to cell, in rad. Larger: the
+/// surroundings determine more cells of the second start. Smaller: fewer. From 1 to 1000 nothing changes by more than 10 %.
+/// `python evaluation/world.py --half tune --only painted photographs rods`.
+pub const TEXTURE_RAD: f32 = 1.0;
+/// Difference of the logarithm of the albedo between neighbouring cells from which a tile has a second start. Larger: patches of
+/// similar colours have one start (with 0.8 they are 0.3 % worse). Smaller: time (with 0.2 white surfaces take 20 % longer).
+/// `python evaluation/world.py --half tune`, `quadfringe bench`.
+pub const TEXTURE_MIN: f32 = 0.4;
+/// Error of the phase of a cell without texture, in rad, and the least difference between two starts. Larger: wrong minima stay
+/// (with 0.05 the painted face has an RMS of 0.18 instead of 0.14 mm). Smaller: time, and with 0.01 rods are 14 % worse.
+/// `python evaluation/world.py --half tune --only painted photographs rods`.
+pub const SAME_RAD: f32 = 0.02;
+/// Greatest number of steps of conjugate gradients for the bridging surface. More: time. Fewer: wide gaps are not bridged.
+/// `python evaluation/world.py --half tune --only painted photographs rods` (with 15 nothing changes).
+pub const BRIDGE_STEPS: usize = 20;
+/// Least excess of the energy of the first minimum, summed over 5 x 5 cells and over the scales of either start, at which the
+/// second one is kept; a difference of 1 is a factor of e in probability. Larger: wrong minima stay (with 20 the painted face has
+/// an RMS of 0.21 instead of 0.16 mm). Smaller: where the model is wrong it decides by chance (with 0 the bottle has 0.095 instead
+/// of 0.089 rad).
+/// `python evaluation/world.py --half tune --only painted photographs rods`, `python evaluation/captures_report.py`.
+pub const GAIN_MIN: f32 = 5.0;

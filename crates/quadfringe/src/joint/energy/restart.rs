@@ -1,0 +1,178 @@
+//! A second start (J29). At the edges of a print, texture spoils the phase at the start by up to a radian, and the minimum that
+//! is found from there can be a wrong one. The second start is the surface that bends least through the cells without texture.
+//! Every cell keeps the start around which the energy is lower.
+
+use super::data::linearise;
+use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, total, vectors};
+use super::priors::weigh;
+use super::scales::Scales;
+use super::solve::solve;
+use super::start::{self, AlbedoOf, filter};
+use super::tile::Tile;
+use super::value::add_energy;
+use crate::joint::params::energy::{BRIDGE_STEPS, GAIN_MIN, SAME_RAD, SIDE, TEXTURE_MIN, TEXTURE_RAD};
+use crate::parallel::lanes::{LANES, Lanes};
+use multiversion::multiversion;
+
+/// Taps of sums over three and over five neighbours.
+const THREE: [f32; 3] = [0.0, 1.0, 1.0];
+const FIVE: [f32; 3] = [1.0; 3];
+
+impl Tile {
+    /// Minimises once more from the second start, if there is texture, and keeps the lower energy; `noise` as in `minimise`.
+    pub(super) fn restart(&mut self, noise: f32) {
+        if !has_texture(self) {
+            return;
+        }
+        let scales = self.scales;
+        let Self { inside, lit, unknown, first, derivatives, weights, residual, .. } = self;
+        for (to, from) in first.planes_mut().into_iter().zip(unknown.planes()).chain([(&mut *lit, &*inside)])
+        {
+            to.copy(from);
+        }
+        hold_by_phase(inside, first, scales.noise, derivatives);
+        bend_everywhere(scales.noise / scales.bend, weights);
+        residual.planes_mut().into_iter().for_each(Plane::clear);
+        // The surface continues through cells without light.
+        vectors().for_each(|at| inside.set(at, [1.0; LANES]));
+        solve(self, BRIDGE_STEPS);
+        std::mem::swap(&mut self.inside, &mut self.lit);
+        if take_step(self) {
+            self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
+            start::contrast_and_albedo(self, AlbedoOf::Cell);
+            self.descend(noise);
+            keep_lower(self, &scales);
+            self.scales = scales;
+        } else {
+            std::mem::swap(&mut self.unknown, &mut self.first);
+        }
+        linearise(self);
+        weigh(self);
+    }
+}
+
+/// Squared difference of the logarithms of the albedo between a cell and its neighbours: the largest of the four, each the mean of
+/// the channels.
+#[inline(always)]
+fn texture(inside: &Plane, albedo: &[Plane; 4], at: usize) -> Lanes {
+    let lit = inside.get(at);
+    let mut most = [0.0; LANES];
+    for there in [at - 1, at + 1, at - STRIDE, at + STRIDE] {
+        let also = inside.get(there);
+        let mut sum = [0.0; LANES];
+        for plane in albedo {
+            let (here, next) = (plane.get(at), plane.get(there));
+            for x in 0..LANES {
+                sum[x] += 0.25 * lit[x] * also[x] * (next[x] - here[x]).powi(2);
+            }
+        }
+        for x in 0..LANES {
+            most[x] = if sum[x] > most[x] { sum[x] } else { most[x] };
+        }
+    }
+    most
+}
+
+/// Whether there is an edge of the albedo that may have spoilt the phase at the start.
+fn has_texture(tile: &Tile) -> bool {
+    vectors().any(|at| {
+        texture(&tile.inside, &tile.unknown.albedo, at).iter().any(|&found| found > TEXTURE_MIN * TEXTURE_MIN)
+    })
+}
+
+/// Sets the derivatives as if the phase were measured in every cell, the less certainly the more texture there is.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn hold_by_phase(inside: &Plane, first: &Fields, noise: f32, derivatives: &mut Derivatives) {
+    let Derivatives { phase, albedo, contrast } = derivatives;
+    phase.iter_mut().chain(albedo).chain(contrast).for_each(Plane::clear);
+    for at in vectors() {
+        let (lit, texture) = (inside.get(at), texture(inside, &first.albedo, at));
+        let mut out = [0.0; LANES];
+        for x in 0..LANES {
+            out[x] = lit[x] * (noise / (SAME_RAD * SAME_RAD + TEXTURE_RAD * TEXTURE_RAD * texture[x])).sqrt();
+        }
+        phase[0].set(at, out);
+    }
+}
+
+/// Gives all second differences within the tile the same weight, and all first differences none.
+fn bend_everywhere(weight: f32, weights: &mut Weights) {
+    let Weights { bend: [along, down, mixed], brightness, colour, contrast } = weights;
+    brightness.iter_mut().chain(colour).chain(contrast).for_each(Plane::clear);
+    for y in 0..SIDE {
+        let (last, inner) = (y == SIDE - 1, y > 0 && y < SIDE - 1);
+        along.row_mut(y).fill(weight);
+        (along.row_mut(y)[0], along.row_mut(y)[SIDE - 1]) = (0.0, 0.0);
+        down.row_mut(y).fill(if inner { weight } else { 0.0 });
+        mixed.row_mut(y).fill(if last { 0.0 } else { 2.0 * weight });
+        mixed.row_mut(y)[SIDE - 1] = 0.0;
+    }
+}
+
+/// Moves the phase to the bridging surface around cells where it differs; returns whether there are any.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn take_step(tile: &mut Tile) -> bool {
+    let Tile { inside, unknown, step, product, .. } = tile;
+    let [around, spare, ..] = product.planes_mut();
+    let mut cells = 0.0;
+    for at in vectors() {
+        let differs = farther(step.phase.get(at), [0.0; LANES], inside.get(at));
+        cells += total(differs);
+        around.set(at, differs);
+    }
+    filter(around, spare, FIVE);
+    for at in vectors() {
+        let (around, step, mut phase) = (around.get(at), step.phase.get(at), unknown.phase.get(at));
+        for x in 0..LANES {
+            phase[x] += if around[x] > 0.5 { step[x] } else { 0.0 };
+        }
+        unknown.phase.set(at, phase);
+    }
+    cells > 0.0
+}
+
+/// 1 for lit cells in which two phases differ.
+#[inline(always)]
+fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = if (one[x] - other[x]).abs() > SAME_RAD { lit[x] } else { 0.0 };
+    }
+    out
+}
+
+/// Goes back to the first unknowns in all cells but those around which the second ones differ and have the lower energy. The
+/// energies are sums over the scales that either start has found, so that neither is preferred.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn keep_lower(tile: &mut Tile, scales: &Scales) {
+    let mut working = std::mem::take(&mut tile.product);
+    let [gain, around, spare, ..] = working.planes_mut();
+    gain.clear();
+    for scales in [scales, &tile.scales] {
+        add_energy(1.0, tile, &tile.first, scales, gain);
+        add_energy(-1.0, tile, &tile.unknown, scales, gain);
+    }
+    let Tile { inside, unknown, first, .. } = tile;
+    for at in vectors() {
+        around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
+    }
+    filter(around, spare, THREE);
+    for at in vectors() {
+        let (mut counted, around) = (gain.get(at), around.get(at));
+        for x in 0..LANES {
+            counted[x] *= if around[x] > 0.5 { 1.0 } else { 0.0 };
+        }
+        gain.set(at, counted);
+    }
+    filter(gain, spare, FIVE);
+    for (kept, unknown) in first.planes().into_iter().zip(unknown.planes_mut()) {
+        for at in vectors() {
+            let (gain, around, kept, mut out) = (gain.get(at), around.get(at), kept.get(at), unknown.get(at));
+            for x in 0..LANES {
+                out[x] = if around[x] > 0.5 && gain[x] > GAIN_MIN { out[x] } else { kept[x] };
+            }
+            unknown.set(at, out);
+        }
+    }
+    tile.product = working;
+}
