@@ -92,17 +92,33 @@ test-live: $(STAMPS)/built
 	scripts/set-up browser
 	QUADFRINGE_BROWSER=1 $(BIN)/pytest tests/live
 
-# Random bytes to the decoders, the driver and the emulator: libFuzzer on the stable compiler, with LLVM's counters.
+# Random bytes to the projector driver and its emulator, and as images and numbers of the kernel: libFuzzer on the stable
+# compiler, with LLVM's counters. Changed files to every reader: libFuzzer in Python, by Atheris. Each gets an equal share
+# of the seconds.
 FUZZ_SECONDS ?= 300
-FUZZ := crates/lightcrafter/fuzz
+FUZZ_CRATES := crates/lightcrafter/fuzz crates/quadfringe/fuzz
+FUZZ_READERS := recording calibration response system shape member npy opencv png image
+FUZZ_TARGETS := $(FUZZ_CRATES:%=%/run) $(FUZZ_READERS:%=fuzz-%)
+FUZZ_SHARE = $$(( $(FUZZ_SECONDS) / $(words $(FUZZ_TARGETS)) ))
 COUNTERS := -Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4 \
 	-Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
 	-Cllvm-args=-sanitizer-coverage-trace-compares -Ccodegen-units=1
 FUZZ_HOST := $(shell rustc -vV 2>/dev/null | sed -n 's/^host: //p')
-fuzz:
-	mkdir -p $(FUZZ)/corpus $(FUZZ)/artifacts
-	RUSTFLAGS="$(COUNTERS)" cargo run --release --quiet --manifest-path $(FUZZ)/Cargo.toml --target $(FUZZ_HOST) -- \
-		$(FUZZ)/corpus -artifact_prefix=$(FUZZ)/artifacts/ -max_total_time=$(FUZZ_SECONDS) -max_len=4096 -print_final_stats=1
+.PHONY: $(FUZZ_TARGETS)
+fuzz: $(FUZZ_TARGETS)
+
+$(FUZZ_CRATES:%=%/run): %/run:
+	mkdir -p $*/corpus $*/artifacts
+	RUSTFLAGS="$(COUNTERS)" cargo run --release --quiet --manifest-path $*/Cargo.toml --target $(FUZZ_HOST) -- \
+		$*/corpus -artifact_prefix=$*/artifacts/ -max_total_time=$(FUZZ_SHARE) -max_len=4096 -timeout=20 -print_final_stats=1
+
+$(FUZZ_READERS:%=fuzz-%): fuzz-%: $(STAMPS)/fuzz
+	cd tests && ../$(BIN)/python -m hostile.fuzz $* -max_total_time=$(FUZZ_SHARE) -print_final_stats=1
+
+# Atheris has wheels for Linux on x86-64.
+$(STAMPS)/fuzz: $(STAMPS)/built
+	$(BIN)/pip install --quiet --disable-pip-version-check "atheris>=3,<4"
+	touch $@
 
 # Damaged files to every reader, spoilt shots to both methods, killed writers and batches, by seeds; `make test` runs a sample.
 HOSTILE_FILES ?= 1000

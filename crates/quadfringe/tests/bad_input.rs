@@ -83,6 +83,31 @@ fn codes_that_cannot_number_the_field_name_two_columns() {
     assert_says(Encoding::four_channel([-36.0, 35.0, 30.0], 912), &["-36"]);
     assert_says(Encoding::four_channel([500.0, 35.0, 30.0], 912), &["500"]);
     assert_says(Encoding::optimum(35, 912), &["35"]);
+    assert_says(Encoding::optimum(36, usize::MAX), &["projector_width", "from 2 to 65536"]);
+}
+
+#[test]
+fn light_far_beyond_full_scale_is_refused() {
+    let bright = Array2::<f32>::from_elem((384, 512), 1e30);
+    let shot = Shot::new([bright.view(), bright.view(), bright.view(), bright.view()]).expect("finite");
+    let parts = ["intensity of a shot", "10000 times full scale"];
+    for method in [Method::joint(), Method::published()] {
+        assert_says(decoder(method).decode(&shot), &parts);
+    }
+    assert_says(condition::linearise(&shot, &Conditioner::default()), &parts);
+    let counts = shot.with_full_scale(1e30).expect("positive");
+    assert!(condition::linearise(&counts, &Conditioner::default()).is_ok());
+}
+
+/// Green fringes of a period far beyond the width of the image.
+#[test]
+fn a_period_far_beyond_the_image_is_no_data() {
+    let wide = Encoding::four_channel([4.0, 0.001, 3.0], 64).expect("distinct columns");
+    let options = Options::default().with_method(Method::published());
+    let mut decoder = Decoder::builder(&wide, [16, 20]).options(options).build().expect("valid plan");
+    let flat = [(); 4].map(|()| Array2::<u8>::from_elem((16, 20), 90));
+    let decoded = decoder.decode(&Shot::try_from(&flat).expect("one size")).expect("a valid shot");
+    assert_eq!(returned(&decoded), 0.0);
 }
 
 #[test]
@@ -92,7 +117,9 @@ fn plans_out_of_range_are_refused() {
     let plain = Options::default();
     assert_says(settings(plain.clone().with_modulation_min(f32::NAN)), &["modulation_min", "NaN"]);
     assert_says(settings(plain.clone().with_quality_min(1.0)), &["quality_min"]);
-    assert_says(settings(plain.clone().with_period_px(1.0)), &["period_px"]);
+    for period_px in [1.0, 64.5, 1e300, f64::NAN] {
+        assert_says(settings(plain.clone().with_period_px(period_px)), &["period_px", "from 3 to 64"]);
+    }
     let instants = |instants| {
         settings(plain.clone().with_method(JointOptions::default().with_channel_instants_us(instants)))
     };
@@ -112,6 +139,12 @@ fn stages_refuse_maps_that_do_not_fit() {
     let black = Array3::<f32>::zeros((12, 32, 32));
     assert!(condition::estimate_response(&[black.view()]).is_err());
     assert!(Device::pinhole(0, 8, [10.0; 2], [4.0; 2]).is_err());
+    for shape in [(0, 64), (3, 0), (3, 2), (3, 7)] {
+        let (image, none) = (Array2::<f32>::zeros(shape), f64::INFINITY);
+        assert_eq!(stages::carrier(image.view()).period_px(), none);
+        assert_eq!(stages::quadrature_carrier(image.view(), image.view()).period_px(), none);
+        assert_eq!(stages::row_period_px(image.view()), f64::max(shape.1 as f64, 3.0));
+    }
 }
 
 #[test]

@@ -161,6 +161,7 @@ fn bad_input_is_refused() {
     let refused = |options: RenderOptions| bench.render(&cast, &white(), &options).is_err();
     assert!(refused(RenderOptions { noise: -0.1, ..clean() }));
     assert!(refused(RenderOptions { blur_px: f64::NAN, ..clean() }));
+    assert!(refused(RenderOptions { blur_px: 1e300, ..clean() }));
     assert!(refused(RenderOptions { camera_exponent: [0.0; 4], ..clean() }));
     assert!(refused(RenderOptions { albedo: Albedo::Image(Array3::zeros((2, 2, 4))), ..clean() }));
     assert!(bench.clone().with_infrared_chip([[0.0; 3]; 2]).is_err());

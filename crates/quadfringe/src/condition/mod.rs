@@ -147,7 +147,7 @@ impl Conditioner {
 /// infrared chip does not see the point.
 ///
 /// # Errors
-/// As [`Conditioner::check`].
+/// As [`Conditioner::check`]; [`Error::Value`] also when an intensity is more than 10 000 times full scale.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -159,6 +159,7 @@ impl Conditioner {
 /// ```
 pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
     let mut plan = conditioner.plan()?;
+    shot.check_light()?;
     plan.prepare(shot);
     let mut planes = [(); 4].map(|()| Array2::zeros(shot.shape()));
     for y in 0..shot.shape()[0] {

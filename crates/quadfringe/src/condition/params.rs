@@ -6,6 +6,10 @@
 
 // Conditioning.
 
+/// Greatest intensity of a shot, in fractions of full scale. Images of a greater range than the camera's stay far below it;
+/// beyond it, products of intensities overflow in `f32`. `cargo test -p quadfringe --test fuzzed` decodes such shots.
+pub(super) const LIGHT_MAX: f32 = 1e4;
+
 /// A pixel with at least this intensity counts as saturated, fraction of full scale. Follows from the format of an
 /// 8-bit camera: 0.998 lies between its last two values (254 and 255 of 255). A smaller value discards highlights that
 /// are still linear; a larger one misses clipped pixels of cameras whose last value is below full scale.

@@ -23,12 +23,12 @@ pub trait Sample: sealed::Sealed + Copy + Send + Sync + 'static {
     /// The intensity as a number.
     fn intensity(self) -> f32;
 
-    /// Refuses NaN and infinity.
+    /// The greatest magnitude that an intensity of the image has, or can have.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] with the number of such values and the position of the first.
-    fn check_finite(_plane: &ArrayView2<'_, Self>, _channel: &str) -> Result<()> {
-        Ok(())
+    /// [`Error::NotFinite`] for NaN and infinity, with the number of such values and the position of the first.
+    fn greatest(_plane: &ArrayView2<'_, Self>, _channel: &str) -> Result<f32> {
+        Ok(Self::FULL_SCALE)
     }
 }
 
@@ -76,16 +76,15 @@ impl Sample for f32 {
         self
     }
 
-    fn check_finite(plane: &ArrayView2<'_, Self>, channel: &str) -> Result<()> {
-        let mut bad = plane.indexed_iter().filter(|(_, v)| !v.is_finite());
-        match bad.next() {
-            None => Ok(()),
-            Some(((row, column), _)) => Err(Error::NotFinite {
-                what: format!("{channel} image").into(),
-                count: 1 + bad.count(),
-                row,
-                column,
-            }),
+    fn greatest(plane: &ArrayView2<'_, Self>, channel: &str) -> Result<f32> {
+        // Bits of positive numbers have the order of the numbers, and those of infinity and NaN are the greatest.
+        let bits = plane.fold(0, |greatest: u32, value| greatest.max(value.abs().to_bits()));
+        let greatest = Self::from_bits(bits);
+        if greatest.is_finite() {
+            return Ok(greatest);
         }
+        let mut bad = plane.indexed_iter().filter(|(_, v)| !v.is_finite()).map(|(at, _)| at);
+        let (row, column) = bad.next().unwrap_or_default();
+        Err(Error::NotFinite { what: format!("{channel} image").into(), count: 1 + bad.count(), row, column })
     }
 }

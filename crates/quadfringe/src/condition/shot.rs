@@ -1,6 +1,7 @@
 //! The images of one exposure, borrowed: four planes, or the raw mosaic of a Bayer chip and an infrared image.
 
 use super::Sample;
+use super::params::LIGHT_MAX;
 use crate::error::Limit;
 use crate::{BayerPattern, Channel, Error, Result};
 use ndarray::{Array2, ArrayView2};
@@ -10,6 +11,8 @@ use ndarray::{Array2, ArrayView2};
 pub struct Shot<'a, T> {
     pub(super) images: Images<'a, T>,
     full_scale: f32,
+    /// Greatest magnitude of the intensities.
+    greatest: f32,
 }
 
 /// The images that the chips of the camera deliver.
@@ -41,14 +44,15 @@ impl<'a, T: Sample> Shot<'a, T> {
         if shape.contains(&0) {
             return Err(Error::shape("red image", &[1, 1], &shape));
         }
+        let mut greatest = 0.0f32;
         for (plane, channel) in planes.iter().zip(Channel::ALL) {
             if plane.shape() != shape {
                 let what = format!("{} image", channel.name());
                 return Err(Error::shape(what, &shape, plane.shape()));
             }
-            T::check_finite(plane, channel.name())?;
+            greatest = greatest.max(T::greatest(plane, channel.name())?);
         }
-        Ok(Self { images: Images::Planes(planes), full_scale: T::FULL_SCALE })
+        Ok(Self { images: Images::Planes(planes), full_scale: T::FULL_SCALE, greatest })
     }
 
     /// A shot of a camera with two chips: the raw mosaic of the visible one and the infrared image. Full scale is the
@@ -79,9 +83,9 @@ impl<'a, T: Sample> Shot<'a, T> {
         if infrared.shape() != raw.shape() {
             return Err(Error::shape("IR image", raw.shape(), infrared.shape()));
         }
-        T::check_finite(&raw, "raw mosaic")?;
-        T::check_finite(&infrared, Channel::Ir.name())?;
-        Ok(Self { images: Images::Bayer { raw, pattern, infrared }, full_scale: T::FULL_SCALE })
+        let greatest = T::greatest(&raw, "raw mosaic")?.max(T::greatest(&infrared, Channel::Ir.name())?);
+        let images = Images::Bayer { raw, pattern, infrared };
+        Ok(Self { images, full_scale: T::FULL_SCALE, greatest })
     }
 
     /// Set the intensity of full scale, for example 4095 for 12-bit data in 16-bit words.
@@ -126,6 +130,19 @@ impl<'a, T: Sample> Shot<'a, T> {
     #[must_use]
     pub fn full_scale(&self) -> f32 {
         self.full_scale
+    }
+
+    /// Refuses intensities that are no fractions of full scale by any measure; their squares would overflow.
+    ///
+    /// # Errors
+    /// [`Error::Value`] when the greatest intensity is more than 10 000 times full scale.
+    pub(crate) fn check_light(&self) -> Result<()> {
+        let light = self.greatest / self.full_scale;
+        if light <= LIGHT_MAX {
+            return Ok(());
+        }
+        let expected = format!("at most {LIGHT_MAX} times full scale, which is {} here", self.full_scale);
+        Err(Error::value("intensity of a shot", expected, self.greatest))
     }
 
     pub(super) fn infrared(&self) -> &ArrayView2<'a, T> {

@@ -105,11 +105,13 @@ impl Decoder {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Shape`] when the shot does not have the size that the decoder was planned for.
+    /// [`Error::Shape`] when the shot does not have the size that the decoder was planned for; [`Error::Value`] when an
+    /// intensity is more than 10 000 times full scale.
     pub fn decode_into<T: Sample>(&mut self, shot: &Shot<'_, T>, out: &mut Decoded) -> Result<()> {
         if shot.shape() != self.shape {
             return Err(Error::shape("shot", &self.shape, &shot.shape()));
         }
+        shot.check_light()?;
         out.fit(self.shape, self.triangulator.is_some());
         self.plan.prepare(shot);
         let finish = Finish { four: &self.four, triangulator: self.triangulator.as_ref() };

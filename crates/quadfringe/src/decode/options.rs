@@ -1,7 +1,7 @@
 //! The decoding method, and the thresholds that both methods have.
 
 use super::method::Method;
-use super::params::{MODULATION_MIN, QUALITY_MIN};
+use super::params::{MODULATION_MIN, PERIOD_MIN_PX, QUALITY_MIN};
 use crate::error::{Error, Limit, Result};
 
 /// The options of decoding. This is the only place that defines their defaults.
@@ -22,8 +22,8 @@ pub struct Options {
     /// Least quality of a fringe order that is returned, in [0, 1]. A higher value removes more wrong orders, and
     /// correct points with them. Default: 0.15.
     pub quality_min: f32,
-    /// Fringe period across the fringes in camera pixels, at least 3, good to a third; `None` estimates it from every
-    /// shot. Set it if the estimate fails, for example for an object narrower than two fringes. Default: `None`.
+    /// Fringe period across the fringes in camera pixels, from 3 to the longer side of the image, good to a third; `None`
+    /// estimates it from every shot. Set it if the estimate fails, for example for an object narrower than two fringes. Default: `None`.
     pub period_px: Option<f64>,
 }
 
@@ -90,9 +90,11 @@ impl Options {
                 return Err(Error::value(name, Limit::Fraction, value));
             }
         }
+        let longest = shape[0].max(shape[1]) as f64;
         match self.period_px {
-            Some(period) if !(period.is_finite() && period >= 3.0) => {
-                return Err(Error::value("period_px (camera pixels)", Limit::AtLeast(3.0), period));
+            Some(period) if !(PERIOD_MIN_PX..=longest).contains(&period) => {
+                let expected = Limit::Range { from: PERIOD_MIN_PX, to: longest };
+                return Err(Error::value("period_px (camera pixels)", expected, period));
             }
             _ => {}
         }

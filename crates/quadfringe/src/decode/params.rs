@@ -4,6 +4,10 @@
 /// no neighbourhood to fit; `cargo test -p quadfringe --test bad_input` checks that it is refused.
 pub(super) const SIDE_MIN_PX: usize = 16;
 
+/// Least fringe period that can be set, camera pixels. A fringe of fewer pixels has too few samples for its phase;
+/// `cargo test -p quadfringe --test bad_input` checks that it is refused.
+pub(super) const PERIOD_MIN_PX: f64 = 3.0;
+
 /// Least number of rows that a thread takes at once. With more rows there are fewer tasks to share among threads; with
 /// fewer rows the time between tasks grows. It changes no result, only the time: `cargo bench -p quadfringe -- shot`.
 pub(crate) const ROWS_AT_ONCE: usize = 8;

@@ -20,7 +20,7 @@ pub use layout::{Axis, DmdLayout, mirror_column, pattern, step_pattern};
 use crate::error::{Error, Limit, Result};
 use ambiguity::Closest;
 use ndarray::Array2;
-use params::MARGIN_NEEDED_RAD;
+use params::{MARGIN_NEEDED_RAD, PROJECTOR_WIDTH_MAX};
 use std::f64::consts::FRAC_PI_2;
 
 /// The channels that are projected. Every value of this type is valid: the phases of the channels distinguish all
@@ -57,8 +57,8 @@ impl Encoding {
     /// Makes an encoding from any channels over `projector_width` columns.
     ///
     /// # Errors
-    /// [`Error::Value`] for an empty list, a projector of less than two columns, a fringe number that is not above 0 and
-    /// below half the width (a fringe needs more than two columns), and a shift that is not finite;
+    /// [`Error::Value`] for an empty list, a projector of less than 2 or more than 65 536 columns, a fringe number that is
+    /// not above 0 and below half the width (a fringe needs more than two columns), and a shift that is not finite;
     /// [`Error::JointRange`] when two columns of the projector have nearly the same phases.
     pub fn new(channels: impl Into<Vec<ChannelCode>>, projector_width: usize) -> Result<Self> {
         let encoding = Self { channels: channels.into(), projector_width };
@@ -165,8 +165,9 @@ impl Encoding {
         if self.channels.is_empty() {
             return Err(Error::value("channels of an encoding", Limit::AtLeast(1.0), 0.0));
         }
-        if self.projector_width < 2 {
-            return Err(Error::value("projector_width", Limit::AtLeast(2.0), self.projector_width));
+        if !(2..=PROJECTOR_WIDTH_MAX).contains(&self.projector_width) {
+            let expected = Limit::Range { from: 2.0, to: PROJECTOR_WIDTH_MAX as f64 };
+            return Err(Error::value("projector_width", expected, self.projector_width));
         }
         let limit = self.projector_width as f64 / 2.0;
         for channel in &self.channels {

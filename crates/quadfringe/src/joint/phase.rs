@@ -253,7 +253,9 @@ fn linearise(model: &ModelRow, albedo: &SmoothAlbedo, lit: Lit, normal: NormalRo
             found[0][x] = if on { numerator } else { 0.0 };
             found[1][x] = if on { denominator } else { 0.0 };
             found[2][x] = if square > 0.0 { 0.25 * square } else { 0.0 };
-            found[3][x] = if modulation[x] > 0.0 { albedo * amplitude[x] } else { 0.0 };
+            // Where light differs from any fringes, the fitted amplitude can be negative.
+            let lit = (modulation[x] > 0.0) & (amplitude[x] > 0.0);
+            found[3][x] = if lit { albedo * amplitude[x] } else { 0.0 };
         }
         put(&mut out, i, &found);
     }

@@ -2,10 +2,11 @@
 
 use ndarray::Array3;
 
-use crate::error::{Error, Result};
+use crate::error::{Error, Limit, Result};
 use crate::optics::BayerPattern;
 
 use super::Projector;
+use super::params::BLUR_MAX_PX;
 
 /// Albedo of the surface in each channel.
 ///
@@ -48,9 +49,9 @@ impl Albedo {
         match self {
             Self::Uniform(albedo) => *albedo,
             Self::Patches { side_mm, albedo } => {
-                let square = |v: f64| (v / side_mm).floor() as i64;
-                let count = PATCH_COLOURS.len() as i64;
-                let colour = (square(x) + 2 * square(y)).rem_euclid(count) as usize;
+                let count = PATCH_COLOURS.len();
+                let square = |v: f64| ((v / side_mm).floor() as i64).rem_euclid(count as i64) as usize;
+                let colour = (square(x) + 2 * square(y)) % count;
                 std::array::from_fn(|c| albedo[c] * PATCH_COLOURS[colour][c])
             }
             Self::Image(image) => {
@@ -175,7 +176,7 @@ pub struct RenderOptions {
     pub crosstalk: [[f64; 4]; 4],
     /// Exposure: captured share of full scale for light 1 from a surface of albedo 1.
     pub gain: [f64; 4],
-    /// Lens blur: standard deviation of a Gaussian, px.
+    /// Lens blur: standard deviation of a Gaussian, px; at most 100.
     pub blur_px: f64,
     /// Sensor noise: standard deviation as a share of full scale.
     pub noise: f64,
@@ -238,6 +239,10 @@ impl RenderOptions {
                     return Err(Error::value(name, expected, value));
                 }
             }
+        }
+        if self.blur_px > BLUR_MAX_PX {
+            let expected = Limit::Range { from: 0.0, to: BLUR_MAX_PX };
+            return Err(Error::value("blur_px", expected, self.blur_px));
         }
         if self.demosaic.is_some() && self.bayer.is_none() {
             return Err(Error::value("demosaic", "a Bayer pattern to interpolate", "none"));

@@ -5,6 +5,10 @@
 /// normal distribution: the part beyond 4 is 6e-5 of the light.
 pub(super) const BLUR_REACH_SIGMAS: f64 = 4.0;
 
+/// Greatest standard deviation of the lens blur, px, the same as in the settings of Python. The time of the blur grows with
+/// it without end. `cargo test -p quadfringe --test forward` checks that more is refused.
+pub(super) const BLUR_MAX_PX: f64 = 100.0;
+
 /// A shadow ray ends this far in front of its surface point, mm. With a shorter gap, rounding can put the point into the
 /// shadow of its surface; a longer gap misses objects that are nearer to the surface than the gap. Not measured: hits are
 /// exact to 1e-10 mm.

@@ -55,14 +55,15 @@ fn line_period(image: ArrayView2<'_, f32>) -> f64 {
         return f64::INFINITY;
     }
     let mut spectrum = LineSpectrum::new(length);
-    for line in (0..lines).step_by(lines.div_ceil(CARRIER_LINES)) {
+    for line in (0..lines).step_by(lines.div_ceil(CARRIER_LINES).max(1)) {
         spectrum.add(image.row(line));
     }
     spectrum.take_period_px()
 }
 
 /// Fringe period along the rows in camera pixels, as the published decoder estimates it from linear red light. The
-/// result lies between 3 pixels and the width of the image; it is the width if no carrier stands out.
+/// result lies between 3 pixels and the width of the image; it is the width if no carrier stands out. It is 3 pixels for a
+/// narrower image.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -154,7 +155,7 @@ impl LineSpectrum {
     /// As [`Self::take_period_px`], within the limits of [`row_period_px`].
     pub fn take_row_period_px(&mut self) -> f64 {
         let width = self.length() as f64;
-        self.take_period_px().clamp(PERIOD_MIN_PX, width)
+        self.take_period_px().clamp(PERIOD_MIN_PX, width.max(PERIOD_MIN_PX))
     }
 
     fn length(&self) -> usize {
@@ -162,13 +163,15 @@ impl LineSpectrum {
     }
 }
 
-/// Centre of gravity of the strongest peak in cycles per line, if the peak holds enough of the power.
+/// Centre of gravity of the strongest peak in cycles per line, if the peak holds enough of the power. Lines that are too
+/// short for a carrier, or whose power is beyond `f32`, have none.
 fn strongest(power: &[f32], least: f32) -> Option<f64> {
-    let total: f32 = power[CARRIER_CYCLES_MIN..].iter().sum();
+    let total: f32 = power.get(CARRIER_CYCLES_MIN..)?.iter().sum();
     let peak = (CARRIER_CYCLES_MIN..power.len()).max_by(|&a, &b| power[a].total_cmp(&power[b]))?;
     // Three bins to each side cover the main lobe of the window.
     let around = peak.saturating_sub(3).max(CARRIER_CYCLES_MIN)..(peak + 4).min(power.len());
     let near: f32 = power[around.clone()].iter().sum();
     let moment: f32 = around.map(|bin| bin as f32 * power[bin]).sum();
-    (near > least && near > CARRIER_SHARE_MIN * total).then(|| f64::from(moment / near))
+    let stands_out = near > least && near > CARRIER_SHARE_MIN * total && moment.is_finite();
+    stands_out.then(|| f64::from(moment / near))
 }

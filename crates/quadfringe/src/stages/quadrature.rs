@@ -59,7 +59,7 @@ fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
     }
     let [mut r, mut b] = [(); 2].map(|()| LineTransform::new(length));
     let (mut quadrature, mut level) = (vec![0.0; length / 2 + 1], 0.0);
-    let sampled = (0..lines).step_by(lines.div_ceil(CARRIER_LINES));
+    let sampled = (0..lines).step_by(lines.div_ceil(CARRIER_LINES).max(1));
     let count = sampled.len() as f64;
     for line in sampled {
         let means = r.run(red.row(line)) * b.run(blue.row(line));
@@ -96,8 +96,8 @@ fn strongest_band(quadrature: &[f32], least: f32) -> Option<Band> {
     let weights = band(best).iter().map(|q| f64::from((sum.signum() * q).max(0.0)).powi(2));
     let weight: f64 = weights.clone().sum();
     let moment: f64 = weights.enumerate().map(|(i, weight)| (first + i as f64) * weight).sum();
-    (sum.abs() > least && sum.abs() > QUADRATURE_SHARE_MIN * total)
-        .then(|| Band { cycles: moment / weight, sum: f64::from(sum.abs()) })
+    let stands_out = sum.abs() > least && sum.abs() > QUADRATURE_SHARE_MIN * total && sum.is_finite();
+    stands_out.then(|| Band { cycles: moment / weight, sum: f64::from(sum.abs()) })
 }
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! First intersection of a ray with an implicit surface.
 
 use super::Surface;
-use super::params::{CLOSED_MM, REFINEMENTS_MAX, STEP_MIN_MM};
+use super::params::{CLOSED_MM, REFINEMENTS_MAX, STEP_MIN_MM, STEPS_MAX};
 use crate::optics::Ray;
 
 /// Distance along the ray at which the value of the surface first is not positive, within the range and the bounds of
@@ -13,7 +13,10 @@ pub(super) fn first_crossing<S: Surface + ?Sized>(surface: &S, ray: &Ray, range_
     if value <= 0.0 {
         return Some(t);
     }
-    while t < end {
+    for _ in 0..STEPS_MAX {
+        if t >= end {
+            break;
+        }
         let next = (t + (value / rate).max(STEP_MIN_MM)).min(end);
         let next_value = surface.value(ray.at(next));
         if next_value <= 0.0 {
@@ -70,4 +73,17 @@ fn close<S: Surface + ?Sized>(surface: &S, ray: &Ray, bracket: [f64; 2], values:
         }
     }
     b
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::surface::Peaks;
+
+    /// The ray runs along an endless relief and never leaves its bounds.
+    #[test]
+    fn a_ray_that_never_arrives_meets_nothing() {
+        let ray = Ray { origin_mm: [0.0, 400.0, 799.0], direction: [0.0, 1.0, 0.0] };
+        assert_eq!(first_crossing(&Peaks::default(), &ray, [0.0, f64::INFINITY]), None);
+    }
 }

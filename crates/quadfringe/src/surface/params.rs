@@ -6,6 +6,11 @@
 /// compares hits with closed forms.
 pub(super) const STEP_MIN_MM: f64 = 0.05;
 
+/// Greatest number of steps of the march along a ray. A ray that needs more of them meets nothing; without this limit, a ray
+/// inside an endless relief would never end. It is 5 m in steps of [`STEP_MIN_MM`], more than the scenes of any test need.
+/// `cargo test -p quadfringe --lib march` checks that such a ray ends.
+pub(super) const STEPS_MAX: usize = 100_000;
+
 /// The search ends when the bracket around a crossing is narrower than this, mm. Follows from the rounding of `f64`,
 /// which is 1e-13 mm at 1 m; the search may never reach a smaller width.
 pub(super) const CLOSED_MM: f64 = 1e-10;

@@ -144,7 +144,7 @@ fn check(stacks: &[ArrayView3<'_, f32>]) -> Result<()> {
             return Err(Error::value(format!("stack {i}"), expected, stack.shape()[0]));
         }
         for (s, image) in stack.outer_iter().enumerate() {
-            f32::check_finite(&image, &format!("stack {i}, step {s}"))?;
+            f32::greatest(&image, &format!("stack {i}, step {s}"))?;
             if let Some(value) = image.iter().find(|v| !(0.0..=1.0).contains(*v)) {
                 let expected = "fractions of full scale in [0, 1] (divide 8 bit by 255, 12 bit by 4095, 16 bit by 65535)";
                 return Err(Error::value(format!("stack {i}, step {s}"), expected, value));

@@ -52,7 +52,7 @@ pub(super) fn mean_envelope(
     scratch: &mut Scratch,
     out: &mut [f32],
 ) -> bool {
-    let step = coarseness(period_px);
+    let step = coarseness(period_px, row.len());
     let period = period_px / step as f32;
     let Scratch { coarse, smooth, middle, waves, knots, levels, lines } = scratch;
     coarsen(row, step, coarse, smooth);
@@ -73,9 +73,10 @@ pub(super) fn mean_envelope(
     true
 }
 
-fn coarseness(period_px: f32) -> usize {
+/// Number of pixels in a sample. A row has at least one sample, however long the period is.
+fn coarseness(period_px: f32, row_px: usize) -> usize {
     let mut step = 1;
-    while period_px >= 2.0 * ENVELOPE_SAMPLES_PER_FRINGE * step as f32 {
+    while period_px >= 2.0 * ENVELOPE_SAMPLES_PER_FRINGE * step as f32 && 2 * step <= row_px {
         step *= 2;
     }
     step
