@@ -27,6 +27,7 @@ def test_a_spoilt_shot_is_refused_with_its_cause(case: str, method: str) -> None
         ("wrong code", "joint", 2, "fringe numbers"),
         ("wrong code", "joint", 5, "fringe numbers"),
         ("wrong code", "published", 6, "fringe numbers"),
+        ("wrong code", "published", 435, "fringe orders"),
         ("channel missing", "published", 18, "blind channel"),
         ("channel missing", "published", 29, "blind channel"),
         ("channel missing", "published", 115, "blind channel"),
