@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
-.PHONY: demo test test-usb test-camera test-live wheel audit release fuzz hostile coverage figures evaluation bench rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live wheel audit release fuzz miri hostile coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo

@@ -141,8 +141,11 @@ pub enum Limit {
         /// The greatest value.
         to: f64,
     },
-    /// A fringe number: positive and below half the projector columns, as a fringe needs more than two.
+    /// A fringe number: so great that its fringes can be measured, and below half the projector columns, as a fringe needs
+    /// more than two.
     FringeNumber {
+        /// The least number.
+        from: f64,
         /// Half the projector columns.
         below: f64,
     },
@@ -167,8 +170,8 @@ impl fmt::Display for Limit {
             Self::Fraction => f.write_str("a fraction in [0, 1)"),
             Self::AtLeast(least) => write!(f, "at least {least}"),
             Self::Range { from, to } => write!(f, "a number from {from} to {to}"),
-            Self::FringeNumber { below } => {
-                write!(f, "a number above 0 and below {below} (half the projector width)")
+            Self::FringeNumber { from, below } => {
+                write!(f, "a number of at least {from} and below {below} (half the projector width)")
             }
             Self::OneOf([first @ .., before, last]) => {
                 first.iter().try_for_each(|name| write!(f, "{name}, "))?;

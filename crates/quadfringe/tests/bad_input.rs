@@ -81,6 +81,7 @@ fn codes_that_cannot_number_the_field_name_two_columns() {
     }
     assert_says(Encoding::four_channel([f64::NAN, 35.0, 30.0], 912), &["fringe number"]);
     assert_says(Encoding::four_channel([-36.0, 35.0, 30.0], 912), &["-36"]);
+    assert_says(Encoding::four_channel([5e-324, 35.0, 30.0], 912), &["fringe number", "at least 0.001"]);
     assert_says(Encoding::four_channel([500.0, 35.0, 30.0], 912), &["500"]);
     assert_says(Encoding::optimum(35, 912), &["35"]);
     assert_says(Encoding::optimum(36, usize::MAX), &["projector_width", "from 2 to 65536"]);

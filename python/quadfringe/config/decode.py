@@ -30,6 +30,7 @@ __all__ = [
 FringeNumbers = tuple[float, float, float]
 Row4 = tuple[Finite, Finite, Finite, Finite]
 SMALLEST = 16, 16  # rows and columns of the smallest image that the kernel decodes
+PERIOD_MIN_PX = 3.0  # the least that the kernel takes; the most is the longer side of the image
 # Older settings and files call the joint method "best".
 Method = Annotated[Literal["published", "joint"], BeforeValidator(lambda v: "joint" if v == "best" else v)]
 
@@ -175,7 +176,7 @@ class DecodeConfig(Model):
         description="Least quality of a valid pixel, from 0 to below 1. Raise it for fewer wrong orders and fewer "
         "pixels.",
     )
-    period_px: Annotated[Finite, Field(le=SIZE_MAX)] | None = Field(
+    period_px: Annotated[Finite, Field(ge=PERIOD_MIN_PX, le=SIZE_MAX)] | None = Field(
         default=None,
         description="Fringe period across the fringes in camera pixels, from 3 to the longer side of the image, good "
         "to a third. Absent: estimated from every shot. Give it if the estimate fails, as on an object narrower than "
@@ -190,7 +191,7 @@ class DecodeConfig(Model):
         default=None, description="Threads of one decoder, at most 1024. Absent: as many as the machine has cores."
     )
 
-    @field_validator("modulation_min", "quality_min", "period_px", "channel_instants_us")
+    @field_validator("modulation_min", "quality_min", "channel_instants_us")
     @classmethod
     def _decoder_takes(cls, value: Any, info: ValidationInfo) -> Any:
         if value is not None and info.field_name is not None:

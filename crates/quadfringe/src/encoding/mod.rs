@@ -20,7 +20,7 @@ pub use layout::{Axis, DmdLayout, mirror_column, pattern, step_pattern};
 use crate::error::{Error, Limit, Result};
 use ambiguity::Closest;
 use ndarray::Array2;
-use params::{MARGIN_NEEDED_RAD, PROJECTOR_WIDTH_MAX};
+use params::{FRINGE_NUMBER_MIN, MARGIN_NEEDED_RAD, PROJECTOR_WIDTH_MAX};
 use std::f64::consts::FRAC_PI_2;
 
 /// The channels that are projected. Every value of this type is valid: the phases of the channels distinguish all
@@ -57,8 +57,8 @@ impl Encoding {
     /// Makes an encoding from any channels over `projector_width` columns.
     ///
     /// # Errors
-    /// [`Error::Value`] for an empty list, a projector of less than 2 or more than 65 536 columns, a fringe number that is
-    /// not above 0 and below half the width (a fringe needs more than two columns), and a shift that is not finite;
+    /// [`Error::Value`] for an empty list, a projector of less than 2 or more than 65 536 columns, a fringe number below
+    /// 0.001 or not below half the width (a fringe needs more than two columns), and a shift that is not finite;
     /// [`Error::JointRange`] when two columns of the projector have nearly the same phases.
     pub fn new(channels: impl Into<Vec<ChannelCode>>, projector_width: usize) -> Result<Self> {
         let encoding = Self { channels: channels.into(), projector_width };
@@ -172,8 +172,8 @@ impl Encoding {
         let limit = self.projector_width as f64 / 2.0;
         for channel in &self.channels {
             let number = channel.fringe_number;
-            if !(number > 0.0 && number < limit) {
-                let expected = Limit::FringeNumber { below: limit };
+            if !(FRINGE_NUMBER_MIN..limit).contains(&number) {
+                let expected = Limit::FringeNumber { from: FRINGE_NUMBER_MIN, below: limit };
                 return Err(Error::value("fringe number", expected, number));
             }
             if !channel.shift_rad.is_finite() {

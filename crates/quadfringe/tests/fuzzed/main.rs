@@ -7,7 +7,7 @@ use std::path::Path;
 use targets::TARGETS;
 
 /// Random inputs of each target.
-const SAMPLE: u32 = 60;
+const SAMPLE: u32 = 40;
 const BYTES: usize = 400;
 
 #[test]

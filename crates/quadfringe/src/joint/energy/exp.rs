@@ -26,8 +26,8 @@ const LOGARITHM: [f32; 8] = [
     0.197_950_3,
     -0.250_080_27,
     0.333_379_9,
-    -0.499_999_32,
-    0.999_999_84,
+    -0.499_999_3,
+    0.999_999_8,
 ];
 
 /// Logarithm of 1 + x for x >= 0; error below 1e-6 of the result plus 1e-6. It has no branches, so loops vectorise.
