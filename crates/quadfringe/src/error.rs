@@ -7,8 +7,7 @@ use std::fmt::{self, Formatter};
 /// Result of every fallible call of this crate.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// The reason why an input cannot be used. Every message gives the expected and the actual value, and the remedy if it
-/// is not obvious.
+/// The reason why an input cannot be used. A message gives the expected and the actual value, and what to do.
 ///
 /// ```
 /// use quadfringe::error::{Error, Limit};
@@ -141,8 +140,7 @@ pub enum Limit {
         /// The greatest value.
         to: f64,
     },
-    /// A fringe number: so great that its fringes can be measured, and below half the projector columns, as a fringe needs
-    /// more than two.
+    /// A fringe number: measurable, and below half the projector columns, as a fringe needs more than two.
     FringeNumber {
         /// The least number.
         from: f64,
@@ -171,7 +169,7 @@ impl fmt::Display for Limit {
             Self::AtLeast(least) => write!(f, "at least {least}"),
             Self::Range { from, to } => write!(f, "a number from {from} to {to}"),
             Self::FringeNumber { from, below } => {
-                write!(f, "a number of at least {from} and below {below} (half the projector width)")
+                write!(f, "a number from {from} to below {below} (half the projector width)")
             }
             Self::OneOf([first @ .., before, last]) => {
                 first.iter().try_for_each(|name| write!(f, "{name}, "))?;
@@ -183,14 +181,8 @@ impl fmt::Display for Limit {
     }
 }
 
-impl From<&'static str> for Limit {
-    fn from(text: &'static str) -> Self {
-        Self::words(text)
-    }
-}
-
-impl From<String> for Limit {
-    fn from(text: String) -> Self {
+impl<T: Into<Cow<'static, str>>> From<T> for Limit {
+    fn from(text: T) -> Self {
         Self::words(text)
     }
 }

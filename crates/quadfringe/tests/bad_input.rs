@@ -81,7 +81,10 @@ fn codes_that_cannot_number_the_field_name_two_columns() {
     }
     assert_says(Encoding::four_channel([f64::NAN, 35.0, 30.0], 912), &["fringe number"]);
     assert_says(Encoding::four_channel([-36.0, 35.0, 30.0], 912), &["-36"]);
-    assert_says(Encoding::four_channel([5e-324, 35.0, 30.0], 912), &["fringe number", "at least 0.001"]);
+    assert_says(
+        Encoding::four_channel([5e-324, 35.0, 30.0], 912),
+        &["fringe number", "a number from 0.001 to below 456"],
+    );
     assert_says(Encoding::four_channel([500.0, 35.0, 30.0], 912), &["500"]);
     assert_says(Encoding::optimum(35, 912), &["35"]);
     assert_says(Encoding::optimum(36, usize::MAX), &["projector_width", "from 2 to 65536"]);
@@ -140,6 +143,9 @@ fn stages_refuse_maps_that_do_not_fit() {
     let black = Array3::<f32>::zeros((12, 32, 32));
     assert!(condition::estimate_response(&[black.view()]).is_err());
     assert!(Device::pinhole(0, 8, [10.0; 2], [4.0; 2]).is_err());
+    let narrow = Array2::<f32>::zeros((2, 7));
+    let phase = stages::fourier(narrow.view(), stages::Band::Improved, stages::Background::MovingMean, 3.0);
+    assert_says(phase, &["samples in a row of fringes", "at least 8", "got 7"]);
     for shape in [(0, 64), (3, 0), (3, 2), (3, 7)] {
         let (image, none) = (Array2::<f32>::zeros(shape), f64::INFINITY);
         assert_eq!(stages::carrier(image.view()).period_px(), none);

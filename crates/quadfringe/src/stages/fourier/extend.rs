@@ -1,6 +1,9 @@
 //! Continuation of the fringes beyond the ends of a row. The transform treats a row as a ring, and a jump from its end to
 //! its beginning would leak into all frequencies.
 
+/// Least number of samples of a row: the search for an extremum at each end needs them.
+pub(super) const ROW_MIN: usize = 8;
+
 /// Writes fringes into `tail` that continue the end of `row` and, with the weights `fade` (0 to 1), fade into fringes
 /// that lead to its beginning.
 ///
@@ -9,7 +12,7 @@
 #[inline(always)]
 pub(super) fn extend(row: &[f32], period_px: f32, fade: &[f32], scratch: &mut Scratch, tail: &mut [f32]) {
     let n = row.len();
-    let quarter = ((period_px / 4.0) as usize).clamp(1, n / 8);
+    let quarter = ((period_px / 4.0) as usize).clamp(1, n / ROW_MIN);
     let Scratch { edge, misses } = scratch;
     edge.resize(6 * quarter + 2, 0.0);
     reversed(row, edge);

@@ -10,6 +10,7 @@ mod interpolate;
 
 use super::background::{Background, background, check_period};
 use super::params::{BandEdges, IMPROVED_BAND, TRADITIONAL_BAND};
+use crate::error::Limit;
 use crate::parallel::angle::atan2;
 use crate::{Error, Result};
 pub(crate) use filter::{Half, RowFilter, RowPair, RowScratch};
@@ -54,7 +55,7 @@ fn raised_cosine(t: f32) -> f32 {
 /// of each row; the improved band subtracts the background, which is estimated by `removal`. NaN spreads along its row.
 ///
 /// # Errors
-/// [`Error::Value`] when the period is below 3 pixels or longer than a row.
+/// [`Error::Value`] when a row has fewer than 8 pixels, or the period is below 3 pixels or longer than a row.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -72,7 +73,7 @@ pub fn fourier(
     period_px: f64,
 ) -> Result<Array2<f32>> {
     let columns = image.ncols();
-    check_period(period_px, columns)?;
+    check_row(period_px, columns)?;
     let level = match band {
         Band::Improved => background(image, removal, period_px)?,
         Band::Traditional => row_means(image)?,
@@ -102,6 +103,14 @@ pub fn fourier(
             },
         );
     Ok(out)
+}
+
+fn check_row(period: f64, samples: usize) -> Result<()> {
+    if samples < extend::ROW_MIN {
+        let expected = Limit::AtLeast(extend::ROW_MIN as f64);
+        return Err(Error::value("samples in a row of fringes", expected, samples));
+    }
+    check_period(period, samples)
 }
 
 fn row_means(image: ArrayView2<'_, f32>) -> Result<Array2<f32>> {
@@ -141,7 +150,7 @@ pub struct Demodulated {
 ///
 /// # Errors
 /// [`Error::Shape`] when the two images differ in size or do not have `width / columns` columns; [`Error::Value`] when
-/// `columns` is not 1, 2 or 4, or a period is below 3 samples or longer than a row.
+/// `columns` is not 1, 2 or 4, a row has fewer than 8 samples, or a period is below 3 samples or longer than a row.
 ///
 /// ```
 /// use ndarray::Array2;
@@ -205,7 +214,7 @@ impl Fringes<'_> {
         if self.means.shape() != shape {
             return Err(Error::shape(name.to_owned(), &shape, self.means.shape()));
         }
-        check_period(self.period, shape[1])
+        check_row(self.period, shape[1])
     }
 }
 
