@@ -107,3 +107,7 @@ pub(crate) const BEAT_SIGMA_MIN_RAD: f32 = 0.02;
 /// the median less exact. Follows from the standard error of a median: 16 rows of 1024 columns give 5,500 pixels, whose
 /// median is certain to 2 %.
 pub(crate) const SAMPLE_STRIDE: usize = 3;
+
+/// Least number of samples of a row for the Fourier stage, of which the search for an extremum at each end needs an eighth.
+/// Follows from the search; `cargo test -p quadfringe --test bad_input` checks that shorter rows are refused.
+pub(crate) const ROW_MIN: usize = 8;

@@ -1,8 +1,7 @@
 //! Continuation of the fringes beyond the ends of a row. The transform treats a row as a ring, and a jump from its end to
 //! its beginning would leak into all frequencies.
 
-/// Least number of samples of a row: the search for an extremum at each end needs them.
-pub(super) const ROW_MIN: usize = 8;
+use crate::stages::params::ROW_MIN;
 
 /// Writes fringes into `tail` that continue the end of `row` and, with the weights `fade` (0 to 1), fade into fringes
 /// that lead to its beginning.

@@ -9,7 +9,7 @@ mod filter;
 mod interpolate;
 
 use super::background::{Background, background, check_period};
-use super::params::{BandEdges, IMPROVED_BAND, TRADITIONAL_BAND};
+use super::params::{BandEdges, IMPROVED_BAND, ROW_MIN, TRADITIONAL_BAND};
 use crate::error::Limit;
 use crate::parallel::angle::atan2;
 use crate::{Error, Result};
@@ -106,8 +106,8 @@ pub fn fourier(
 }
 
 fn check_row(period: f64, samples: usize) -> Result<()> {
-    if samples < extend::ROW_MIN {
-        let expected = Limit::AtLeast(extend::ROW_MIN as f64);
+    if samples < ROW_MIN {
+        let expected = Limit::AtLeast(ROW_MIN as f64);
         return Err(Error::value("samples in a row of fringes", expected, samples));
     }
     check_period(period, samples)
