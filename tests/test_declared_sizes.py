@@ -70,7 +70,9 @@ def test_images_that_declare_too_much_are_refused(bomb: bytes, tmp_path: Path) -
 def test_a_chunk_of_a_png_that_is_longer_than_the_file_is_refused(length: int, tmp_path: Path) -> None:
     """OpenCV reserves memory for the whole chunk, up to 4 GB, before it reads."""
     (tmp_path / "i.png").write_bytes(png(48, 32) + struct.pack(">I", length) + b"IDAT")
-    with pytest.raises(InputError, match=rf"i.png: not a readable image: {length + 4:,} bytes of the PNG file are missing"):
+    with pytest.raises(
+        InputError, match=rf"i.png: not a readable image: {length + 4:,} bytes of the PNG file are missing"
+    ):
         read_image(tmp_path / "i.png")
 
 
