@@ -32,8 +32,8 @@ def check_image(path: Path | str, data: bytes) -> None:
     """
     if data.startswith(PNG) and (missing := _bytes_missing(data)):
         raise InputError(
-            f"{path}: not a readable image: {missing:,} bytes of the PNG file are missing; it is cut or damaged, so copy "
-            "it again"
+            f"{path}: not a readable image: {missing:,} bytes of the PNG file are missing; it is cut or damaged, so "
+            "copy it again"
         )
     pixels = pixels_declared(data)
     if pixels is not None and pixels > IMAGE_PX:
