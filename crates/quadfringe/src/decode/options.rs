@@ -23,7 +23,8 @@ pub struct Options {
     /// correct points with them. Default: 0.15.
     pub quality_min: f32,
     /// Fringe period across the fringes in camera pixels, from 3 to the longer side of the image, good to a third; `None`
-    /// estimates it from every shot. Set it if the estimate fails, for example for an object narrower than two fringes. Default: `None`.
+    /// estimates it from every shot. Set it if the estimate fails, for example for an object narrower than two fringes.
+    /// Default: `None`.
     pub period_px: Option<f64>,
 }
 

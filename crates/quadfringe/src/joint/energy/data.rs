@@ -26,11 +26,7 @@ pub(super) fn linearise(tile: &mut Tile) -> DataSums {
             let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
             let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
             let cells = Cells { phase, modulation, usable, albedo, light };
-            let model = if c == 2 {
-                predict::<true>(&cells, ratio, scales.channel_contrast[c])
-            } else {
-                predict::<false>(&cells, ratio, scales.channel_contrast[c])
-            };
+            let model = predict(&cells, c, ratio, scales.channel_contrast[c]);
             let Gradient { whole, by_albedo, cross, power } = shared.add(&model, cut);
             derivatives.phase[c].set(at, model.slope);
             derivatives.albedo[c].set(at, whole);
@@ -86,25 +82,30 @@ impl Shared {
 }
 
 /// One channel of a vector of cells.
-struct Cells {
-    phase: Lanes,
-    modulation: Lanes,
-    usable: Lanes,
-    albedo: Lanes,
-    light: Lanes,
+pub(super) struct Cells {
+    pub phase: Lanes,
+    pub modulation: Lanes,
+    pub usable: Lanes,
+    pub albedo: Lanes,
+    pub light: Lanes,
 }
 
 /// Offset and fringe of the light, the derivative of the fringe with respect to the phase, and the residual.
-struct Model {
+pub(super) struct Model {
     offset: Lanes,
     fringe: Lanes,
     slope: Lanes,
-    rest: Lanes,
+    pub rest: Lanes,
 }
 
-/// Predicts the light of one channel; in `QUADRATURE` the fringes are a quarter period ahead.
+/// Predicts the light of channel `c`. The fringes of B are a quarter period ahead.
 #[inline(always)]
-fn predict<const QUADRATURE: bool>(cells: &Cells, ratio: f32, kept: f32) -> Model {
+pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32) -> Model {
+    if c == 2 { predicted::<true>(cells, ratio, kept) } else { predicted::<false>(cells, ratio, kept) }
+}
+
+#[inline(always)]
+fn predicted<const QUADRATURE: bool>(cells: &Cells, ratio: f32, kept: f32) -> Model {
     let Cells { phase, modulation, usable, albedo, light } = cells;
     let [mut offset, mut fringe, mut slope, mut rest] = [[0.0; LANES]; 4];
     for x in 0..LANES {

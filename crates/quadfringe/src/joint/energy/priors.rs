@@ -1,6 +1,6 @@
 //! The priors: how much neighbouring cells differ in surface, brightness, colour and contrast.
 
-use super::plane::{STRIDE, four, total, vectors};
+use super::plane::{Column, Plane, STRIDE, total, vectors};
 use super::scales::PriorSums;
 use super::tile::Tile;
 use crate::joint::params::energy::{BEND_FREEDOM, BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM};
@@ -26,33 +26,53 @@ pub(super) fn weigh(tile: &mut Tile) -> PriorSums {
     sums
 }
 
+/// The bending of a vector of cells; 1 for each second difference that stays within the lit cells, else 0.
+pub(super) struct Bending {
+    along: Lanes,
+    down: Lanes,
+    mixed: Lanes,
+    /// Number of second differences, in thirds.
+    pub count: Lanes,
+    /// Sum of their squares, rad^2.
+    pub square: Lanes,
+}
+
 #[inline(always)]
-fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
-    let Tile { inside, unknown, weights, scales, .. } = tile;
-    let p = |to: usize| unknown.phase.get(to);
+pub(super) fn bending(inside: &Plane, phase: &Plane, at: usize) -> Bending {
+    let p = |to: usize| phase.get(to);
     let i = |to: usize| inside.get(to);
     let (middle, left, right, above, below, corner) =
         (p(at), p(at - 1), p(at + 1), p(at - STRIDE), p(at + STRIDE), p(at + STRIDE + 1));
     let lit = i(at);
     let (lit_left, lit_right, lit_above, lit_below, lit_corner) =
         (i(at - 1), i(at + 1), i(at - STRIDE), i(at + STRIDE), i(at + STRIDE + 1));
+    let [mut along, mut down, mut mixed, mut count, mut square] = [[0.0; LANES]; 5];
+    for x in 0..LANES {
+        along[x] = lit[x] * lit_left[x] * lit_right[x];
+        down[x] = lit[x] * lit_above[x] * lit_below[x];
+        mixed[x] = lit[x] * lit_right[x] * lit_below[x] * lit_corner[x];
+        let xx = along[x] * (left[x] - 2.0 * middle[x] + right[x]);
+        let yy = down[x] * (above[x] - 2.0 * middle[x] + below[x]);
+        let xy = mixed[x] * (middle[x] - right[x] - below[x] + corner[x]);
+        square[x] = xx * xx + yy * yy + 2.0 * xy * xy;
+        count[x] = (along[x] + down[x] + mixed[x]) * (1.0 / 3.0);
+    }
+    Bending { along, down, mixed, count, square }
+}
+
+#[inline(always)]
+fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
+    let Tile { inside, unknown, weights, scales, .. } = tile;
+    let Bending { along, down, mixed, count, square } = bending(inside, &unknown.phase, at);
     let (noise, inverse) = (scales.noise, 1.0 / scales.bend);
     let mut out = [[0.0; LANES]; 3];
-    let [mut energy, mut count, mut mean] = [[0.0; LANES]; 3];
+    let [mut energy, mut mean] = [[0.0; LANES]; 2];
     for x in 0..LANES {
-        let along = lit[x] * lit_left[x] * lit_right[x];
-        let down = lit[x] * lit_above[x] * lit_below[x];
-        let mixed = lit[x] * lit_right[x] * lit_below[x] * lit_corner[x];
-        let xx = along * (left[x] - 2.0 * middle[x] + right[x]);
-        let yy = down * (above[x] - 2.0 * middle[x] + below[x]);
-        let xy = mixed * (middle[x] - right[x] - below[x] + corner[x]);
-        let square = xx * xx + yy * yy + 2.0 * xy * xy;
-        count[x] = (along + down + mixed) * (1.0 / 3.0);
-        let student = student(BEND_FREEDOM, count[x], square * inverse);
-        energy[x] = student * square;
+        let student = student(BEND_FREEDOM, count[x], square[x] * inverse);
+        energy[x] = student * square[x];
         mean[x] = count[x] * student;
         let weight = student * inverse * noise;
-        (out[0][x], out[1][x], out[2][x]) = (along * weight, down * weight, 2.0 * mixed * weight);
+        (out[0][x], out[1][x], out[2][x]) = (along[x] * weight, down[x] * weight, 2.0 * mixed[x] * weight);
     }
     for (plane, out) in weights.bend.iter_mut().zip(out) {
         plane.set(at, out);
@@ -60,35 +80,46 @@ fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
     sums.bend.add(energy, count, mean);
 }
 
+/// Degrees of freedom of the differences in brightness, colour and contrast.
+pub(super) const FREEDOM: [f32; 3] = [BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM];
+/// Number of unknowns for each of them.
+pub(super) const COUNT: [f32; 3] = [0.5, 1.5, 0.5];
+
+/// Squared differences of a vector of cells and their neighbours in brightness, colour and contrast.
+#[inline(always)]
+pub(super) fn squares(here: &Column, there: &Column) -> [Lanes; 3] {
+    let mut out = [[0.0; LANES]; 3];
+    for x in 0..LANES {
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for c in 0..4 {
+            let difference = there.albedo[c][x] - here.albedo[c][x];
+            sum += difference;
+            squares += difference * difference;
+        }
+        let turn = there.contrast[x] - here.contrast[x];
+        let brightness = 0.25 * sum * sum;
+        let colour = squares - brightness;
+        (out[0][x], out[1][x]) = (brightness, if colour > 0.0 { colour } else { 0.0 });
+        out[2][x] = turn * turn;
+    }
+    out
+}
+
 /// Weights of the differences between the cells of a vector and those `step` places further on, in direction `k`.
 #[inline(always)]
 fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut PriorSums) {
     let Tile { inside, unknown, weights, scales, .. } = tile;
     let (lit, next_lit) = (inside.get(at), inside.get(at + step));
-    let albedo = four(&unknown.albedo, at);
-    let next = four(&unknown.albedo, at + step);
-    let (contrast, next_contrast) = (unknown.contrast.get(at), unknown.contrast.get(at + step));
+    let squares = squares(&Column::of(unknown, at), &Column::of(unknown, at + step));
     let noise = scales.noise;
     let inverse = [1.0 / scales.brightness, 1.0 / scales.colour, 1.0 / scales.contrast];
     let (mut out, mut energy, mut mean) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3], [[0.0; LANES]; 3]);
     let mut both: Lanes = [0.0; LANES];
     for x in 0..LANES {
         both[x] = lit[x] * next_lit[x];
-        let (mut sum, mut squares) = (0.0, 0.0);
-        for c in 0..4 {
-            let difference = next[c][x] - albedo[c][x];
-            sum += difference;
-            squares += difference * difference;
-        }
-        let turn = next_contrast[x] - contrast[x];
-        let brightness = 0.25 * sum * sum;
-        let colour = squares - brightness;
-        let square = [brightness, if colour > 0.0 { colour } else { 0.0 }, turn * turn];
-        let freedom = [BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM];
-        let count = [0.5, 1.5, 0.5];
         for n in 0..3 {
-            let student = both[x] * student(freedom[n], count[n], square[n] * inverse[n]);
-            energy[n][x] = student * square[n];
+            let student = both[x] * student(FREEDOM[n], COUNT[n], squares[n][x] * inverse[n]);
+            energy[n][x] = student * squares[n][x];
             mean[n][x] = student;
             out[n][x] = student * inverse[n] * noise;
         }

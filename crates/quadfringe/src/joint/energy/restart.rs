@@ -9,7 +9,7 @@ use super::scales::Scales;
 use super::solve::solve;
 use super::start::{self, AlbedoOf, filter};
 use super::tile::Tile;
-use super::value::add_energy;
+use super::value::{Given, add_energy};
 use crate::joint::params::energy::{BRIDGE_STEPS, GAIN_MIN, SAME_RAD, SIDE, TEXTURE_MIN, TEXTURE_RAD};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -43,8 +43,6 @@ impl Tile {
             self.descend(noise);
             keep_lower(self, &scales);
             self.scales = scales;
-        } else {
-            std::mem::swap(&mut self.unknown, &mut self.first);
         }
         linearise(self);
         weigh(self);
@@ -145,14 +143,14 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
 /// energies are sums over the scales that either start has found, so that neither is preferred.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    let mut working = std::mem::take(&mut tile.product);
-    let [gain, around, spare, ..] = working.planes_mut();
+    let Tile { light, usable, inside, ratios, scales: found, unknown, first, product, .. } = tile;
+    let given = Given { light, usable, inside, ratios: *ratios };
+    let [gain, around, spare, ..] = product.planes_mut();
     gain.clear();
-    for scales in [scales, &tile.scales] {
-        add_energy(1.0, tile, &tile.first, scales, gain);
-        add_energy(-1.0, tile, &tile.unknown, scales, gain);
+    for scales in [scales, found] {
+        add_energy(1.0, &given, first, scales, gain);
+        add_energy(-1.0, &given, unknown, scales, gain);
     }
-    let Tile { inside, unknown, first, .. } = tile;
     for at in vectors() {
         around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
     }
@@ -174,5 +172,4 @@ fn keep_lower(tile: &mut Tile, scales: &Scales) {
             unknown.set(at, out);
         }
     }
-    tile.product = working;
 }
