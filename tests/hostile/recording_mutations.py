@@ -4,16 +4,38 @@ from __future__ import annotations
 
 import random
 import re
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from quadfringe.recording._seal import FOOTER, MAGIC, write_seal
 
 IMAGE_BYTES = 1536  # of an image of 48 x 32
 
 
 def mutated(data: bytes, chance: random.Random) -> bytes:
-    """Change a file in one of several ways; the changed bytes lie often in tables, which are a small part of it."""
+    """Change a file in one of several ways; the changed bytes lie often in tables, which are a small part of it.
+
+    Every second change of a sealed file comes with a new seal, as from somebody who wants it to be opened.
+    """
     change = chance.choice((flip, flip, flip, digit, scribble, zeros, cut, swap, doubled, tail))
     changed = bytearray(data)
     change(changed, chance)
-    return bytes(changed)
+    return resealed(changed) if len(changed) == len(data) and chance.random() < 0.5 else bytes(changed)
+
+
+def resealed(data: bytearray) -> bytes:
+    """Give the same bytes with a seal that holds, if they have a seal whose size is known."""
+    magic, end, shots, count, _, _ = FOOTER.unpack(data[-FOOTER.size :])
+    if magic != MAGIC or end + 16 * count + FOOTER.size != len(data):
+        return bytes(data)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "resealed.h5"
+        path.write_bytes(data[:end])
+        extents = np.frombuffer(bytes(data[end : end + 16 * count]), "<u8").reshape(count, 2)
+        write_seal(path, extents, shots)
+        return path.read_bytes()
 
 
 def place(data: bytearray, chance: random.Random) -> int:

@@ -8,7 +8,6 @@ from dataclasses import replace
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
-from quadfringe.decoding._locks import ForkedLock
 from quadfringe.decoding.black import below_black, too_black
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import wrong_bits
@@ -18,6 +17,7 @@ from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, respo
 from quadfringe.decoding.verdict import judge
 from quadfringe.errors import DecodeWarning, InputError
 from quadfringe.io.images import full_scale
+from quadfringe.io.locks import ForkedLock
 
 __all__ = ["Decoder", "decode"]
 

@@ -22,8 +22,9 @@ from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from pathlib import Path
-from threading import Lock
 from typing import Any, NamedTuple, ParamSpec, Self, TypeVar
+
+from quadfringe.io.locks import ForkedLock
 
 __all__ = ["BoundedError", "Helper", "Limits"]
 
@@ -63,7 +64,7 @@ class Helper:
 
     def __init__(self, limits: Limits) -> None:
         self.limits = limits
-        self._lock = Lock()
+        self._lock = ForkedLock()
         self._child: _Child | None = None
 
     def run(self, function: Callable[P, R], /, *arguments: P.args, **named: P.kwargs) -> R:

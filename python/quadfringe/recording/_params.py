@@ -15,3 +15,7 @@ MEMORY_BYTES = 1 << 30
 # crashes. Afterwards all further reads of the file fail at once; a longer time rescues more shots behind a damaged
 # table.
 LOST_S = READ_S
+# Files that the helper process keeps open. A program that opens more at a time, or never closes one, makes the helper
+# open them again, which takes milliseconds; more cost memory and file descriptors. Follows from the descriptors that a
+# process may have, 1024 on Linux, and is far from them.
+OPEN_MAX = 32

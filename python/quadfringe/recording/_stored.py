@@ -1,14 +1,13 @@
 """The content of the HDF5 file of a recording as plain values, unchecked.
 
-A damaged file can make HDF5 hang or crash. Unless its seal holds, this module therefore runs in a helper process
-(`ask`), and imports little, so that the process starts quickly.
+A damaged file can make HDF5 hang or crash. This module therefore runs in a helper process (`ask`), and imports little,
+so that the process starts quickly.
 """
 
 from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +15,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Stored", "StoredFile", "ask", "is_hdf5", "missing_bytes", "stated_bytes"]
+from quadfringe.recording._params import OPEN_MAX
+
+__all__ = ["Extent", "Stored", "ask", "close", "is_hdf5", "missing_bytes", "stated_bytes"]
 
 SUPERBLOCK = struct.Struct("<8sB2xB16xQ")  # signature, version, flags and end of the file: superblocks 2 and 3 of HDF5
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -35,6 +36,15 @@ class Stored:
 
 
 @dataclass(frozen=True)
+class Extent:
+    """Where the pixels of an image begin in the file, byte; and their shape and dtype."""
+
+    begin: int
+    shape: tuple[int, ...]
+    dtype: str
+
+
+@dataclass(frozen=True)
 class _Superblock:
     """Flags of writers that have not closed the file, and the length that the file states."""
 
@@ -42,7 +52,7 @@ class _Superblock:
     end: int
 
 
-class StoredFile:
+class _StoredFile:
     """An open file."""
 
     def __init__(self, path: str) -> None:
@@ -67,8 +77,14 @@ class StoredFile:
         rows: NDArray[Any] = self._file[name][:count]
         return rows
 
+    def extents(self, names: tuple[str, ...], index: int) -> dict[str, Extent] | None:
+        """Find the images of a shot; None unless each is stored as it is, in one piece, as the writer does it."""
+        found = {name: _extent(self._file[name], index) for name in names}
+        whole = {name: extent for name, extent in found.items() if extent is not None}
+        return whole if len(whole) == len(found) else None
+
     def images(self, names: tuple[str, ...], index: int) -> dict[str, NDArray[Any]]:
-        """Read the images of a shot."""
+        """Read the images of a shot, however they are stored."""
         return {name: self._file[name][index] for name in names}
 
     def close(self) -> None:
@@ -76,14 +92,31 @@ class StoredFile:
         self._file.close()
 
 
-def ask(path: str, method: str, *arguments: Any) -> Any:
-    """Call a method of a file that this process keeps open."""
-    return getattr(_kept(path), method)(*arguments)
+_files: dict[int, _StoredFile] = {}
 
 
-@lru_cache(maxsize=1)
-def _kept(path: str) -> StoredFile:
-    return StoredFile(path)
+def ask(path: str, number: int, method: str, *arguments: Any) -> Any:
+    """Call a method of a file, which this process keeps open under its number until `close`, or opens again."""
+    file = _files.pop(number, None) or _StoredFile(path)
+    _files[number] = file  # the one last in use is the last of the dictionary
+    while len(_files) > OPEN_MAX:
+        close(next(iter(_files)))
+    return getattr(file, method)(*arguments)
+
+
+def close(number: int) -> None:
+    """Close a file, if it is open."""
+    if number in _files:
+        _files.pop(number).close()
+
+
+def _extent(dataset: h5py.Dataset, index: int) -> Extent | None:
+    shape = dataset.shape[1:]
+    if dataset.chunks != (1, *shape) or dataset.id.get_create_plist().get_nfilters():
+        return None
+    chunk = dataset.id.get_chunk_info_by_coord((index, *[0] * len(shape)))
+    size = dataset.dtype.itemsize * int(np.prod(shape))
+    return Extent(chunk.byte_offset, shape, dataset.dtype.str) if chunk.byte_offset and chunk.size == size else None
 
 
 def _opened(path: Path) -> h5py.File:

@@ -16,7 +16,7 @@ from quadfringe.errors import InputError, RecordingWarning
 from quadfringe.recording._checksums import crcs_of
 from quadfringe.recording._layout import Header, StoredHeader
 from quadfringe.recording._seal import Seal, read_seal
-from quadfringe.recording._source import DamageError, open_source
+from quadfringe.recording._source import DamageError, Source
 from quadfringe.recording._stored import is_hdf5, missing_bytes, stated_bytes
 from quadfringe.recording._table import read_table
 
@@ -42,9 +42,9 @@ class Recording:
     """The shots of one file, oldest first; close it, or use it in a `with` block.
 
     The file may still grow; `len` counts the shots that were complete when it was opened. Header, settings, calibration
-    and every shot (pixels and stamp) are checked against their checksums. A file that was not closed properly, was
-    changed since, or was recorded before version 2 is read by a helper process with a limit of time and memory.
-    `faults` says in words how the file differs from what was recorded; it is found without reading pixels.
+    and every shot (pixels and stamp) are checked against their checksums. A helper process with a limit of time and
+    memory reads the file, because a damaged one can hang or crash HDF5. `faults` says in words how the file differs
+    from what was recorded; it is found without reading pixels.
 
     Raises `InputError` for a file that is missing, no recording, or has a damaged header, and warns with
     `RecordingWarning` of a file that is incomplete, was changed, or has no checksums. A changed text of settings or
@@ -58,7 +58,7 @@ class Recording:
         self.path = Path(path)
         _require_hdf5(self.path)
         seal = read_seal(self.path)
-        self._source = open_source(self.path, sealed=seal is not None and seal.holds)
+        self._source = Source(self.path)
         try:
             stored = self._source.describe()
             self._header = StoredHeader.of(stored)

@@ -19,10 +19,10 @@ from typing import Any
 from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, check_system, load_system, shortened
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding._locks import ForkedLock
 from quadfringe.decoding.plan import calibration_of, stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
 from quadfringe.errors import DecodeError, InputError
+from quadfringe.io.locks import ForkedLock
 from quadfringe.scanner.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
