@@ -132,8 +132,8 @@ pub const TEXTURE_RAD: f32 = 1.0;
 /// similar colours have one start (with 0.8 they are 0.3 % worse). Smaller: time (with 0.2 white surfaces take 20 % longer).
 /// `python evaluation/world.py --half tune`, `quadfringe bench`.
 pub const TEXTURE_MIN: f32 = 0.4;
-/// Error of the phase of a cell without texture, in rad, and the least difference between two starts. Larger: wrong minima stay
-/// (with 0.05 the painted face has an RMS of 0.18 instead of 0.14 mm). Smaller: time, and with 0.01 rods are 14 % worse.
+/// Error of the phase of a cell without texture, in rad, and the least difference between two starts. Larger: fewer cells are
+/// compared. Smaller: more. With 0.05 the painted face is 3 % better and rods are 1 % worse.
 /// `python evaluation/world.py --half tune --only painted photographs rods`.
 pub const SAME_RAD: f32 = 0.02;
 /// Greatest number of steps of conjugate gradients for the bridging surface. More: time. Fewer: wide gaps are not bridged.
@@ -141,7 +141,7 @@ pub const SAME_RAD: f32 = 0.02;
 pub const BRIDGE_STEPS: usize = 20;
 /// Least excess of the energy of the first minimum, summed over 5 x 5 cells and over the scales of either start, at which the
 /// second one is kept; a difference of 1 is a factor of e in probability. Larger: wrong minima stay (with 20 the painted face has
-/// an RMS of 0.21 instead of 0.16 mm). Smaller: where the model is wrong it decides by chance (with 0 the bottle has 0.095 instead
-/// of 0.089 rad).
+/// an RMS of 0.21 instead of 0.16 mm). Smaller: where the model is wrong it decides by chance (with 0 the painted face has
+/// 0.14 mm, but the bottle has 0.1 % less right orders with the response of the shot).
 /// `python evaluation/world.py --half tune --only painted photographs rods`, `python evaluation/captures_report.py`.
 pub const GAIN_MIN: f32 = 5.0;
