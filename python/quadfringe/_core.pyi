@@ -265,6 +265,7 @@ class Decoder:
         quality_min: float | None = None,
         period_px: float | None = None,
         channel_instants_us: Sequence[float] | None = None,
+        albedo: bool | None = None,
         threads: int | None = None,
         dark: Sequence[float] | None = None,
         response: Sequence[_Vector3] | None = None,
@@ -289,7 +290,8 @@ class Decoder:
         """Give maps (H, W) by name.
 
         phase_rad, column_px, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
-        when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3).
+        when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3); with method
+        joint, unless `albedo` is False, albedo (H, W, 4), the light of R, G, B, IR without fringes.
 
         The images are (H, W) uint8, uint16 or float32, all of one type; strided views are welcome, nothing is
         copied. Raises TypeError for another type, ValueError for another size or values that are not finite.

@@ -48,7 +48,7 @@ struct Inner {
 impl Decoder {
     #[new]
     #[pyo3(signature = (shape, fringe_numbers, projector_width, *, full_scale = None, method = None,
-        modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, threads = None, dark = None, response = None,
+        modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, albedo = None, threads = None, dark = None, response = None,
         crosstalk = None, projector_response = None, ir_registration = None, camera = None, projector = None, infrared = None,
         predeformed_z_mm = None, depth_range_mm = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -63,6 +63,7 @@ impl Decoder {
         quality_min: Option<f32>,
         period_px: Option<f64>,
         channel_instants_us: Option<[f32; 4]>,
+        albedo: Option<bool>,
         threads: Option<usize>,
         dark: Option<[f32; 4]>,
         response: Option<[ResponseNumbers; 4]>,
@@ -76,7 +77,7 @@ impl Decoder {
         depth_range_mm: Option<[f64; 2]>,
     ) -> PyResult<Self> {
         let conditioner = conditioner_of(dark, response, crosstalk, projector_response, ir_registration);
-        let choices = Choices { method, modulation_min, quality_min, period_px, channel_instants_us };
+        let choices = Choices { method, modulation_min, quality_min, period_px, channel_instants_us, albedo };
         let geometry = Geometry { camera, projector, infrared, predeformed_z_mm, depth_range_mm };
         let plan = || {
             let encoding = Encoding::four_channel(fringe_numbers, projector_width)?;
@@ -104,6 +105,7 @@ impl Decoder {
         named.set_item("quality_min", options.quality_min)?;
         named.set_item("period_px", options.period_px)?;
         named.set_item("channel_instants_us", options.channel_instants_us())?;
+        named.set_item("albedo", options.gives_albedo())?;
         named.set_item("unwrapping", if options.searches_along_rays() { "pair" } else { "coaxial" })?;
         Ok(named)
     }
@@ -182,6 +184,9 @@ impl Decoder {
         if let Some(xyz_mm) = decoded.xyz_mm {
             named.set_item("xyz_mm", self.0.memory.lend(py, xyz_mm)?)?;
         }
+        if let Some(albedo) = decoded.albedo {
+            named.set_item("albedo", self.0.memory.lend(py, albedo)?)?;
+        }
         Ok(named)
     }
 }
@@ -197,7 +202,7 @@ impl Inner {
         let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
         let work = || {
             let shot = scaled(shot()?, self.full_scale)?;
-            let mut maps = self.memory.maps(self.shape, self.calibrated);
+            let mut maps = self.memory.maps(self.shape, self.calibrated, kernel.options().gives_albedo());
             kernel.decode_into(&shot, &mut maps).map(|()| maps)
         };
         match pool {

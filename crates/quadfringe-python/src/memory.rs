@@ -19,7 +19,7 @@ pub struct Memory {
 
 impl Memory {
     /// Maps for the kernel to fill, in memory of earlier shots. The kernel allocates those for which no memory is left.
-    pub fn maps(&self, [rows, columns]: [usize; 2], calibrated: bool) -> Decoded {
+    pub fn maps(&self, [rows, columns]: [usize; 2], calibrated: bool, albedo: bool) -> Decoded {
         let map = || self.take(Ix2(rows, columns)).unwrap_or_default();
         let mut maps = Decoded::default();
         maps.phase_rad = map();
@@ -32,6 +32,9 @@ impl Memory {
             maps.xyz_mm = self.take(Ix3(rows, columns, 3));
         } else {
             maps.uncertainty_rad = self.take(Ix2(rows, columns));
+        }
+        if albedo {
+            maps.albedo = self.take(Ix3(rows, columns, 4));
         }
         maps
     }

@@ -12,6 +12,7 @@ pub struct Choices<'a> {
     pub quality_min: Option<f32>,
     pub period_px: Option<f64>,
     pub channel_instants_us: Option<[f32; 4]>,
+    pub albedo: Option<bool>,
 }
 
 /// Calibrated devices.
@@ -45,6 +46,7 @@ pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geomet
     options.modulation_min = choices.modulation_min.unwrap_or(options.modulation_min);
     options.quality_min = choices.quality_min.unwrap_or(options.quality_min);
     options.period_px = choices.period_px;
+    options.albedo = choices.albedo.unwrap_or(options.albedo);
     let builder = builder.options(options);
     match geometry.devices() {
         Some((camera, projector)) => {

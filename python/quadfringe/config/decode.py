@@ -187,6 +187,11 @@ class DecodeConfig(Model):
         description="Times in us at which R, G, B and IR are exposed, relative to the instant of the shape. For "
         "moving surfaces and a projector that shows its colours one after another (method joint).",
     )
+    albedo: bool | None = Field(
+        default=None,
+        description="Whether shapes have the albedo: the light of each channel without fringes. Absent: yes with method "
+        "joint; the published method has none.",
+    )
     threads: Annotated[int, Field(gt=0, le=_core.THREADS_MAX)] | None = Field(
         default=None, description="Threads of one decoder, at most 1024. Absent: as many as the machine has cores."
     )
@@ -215,6 +220,10 @@ class DecodeConfig(Model):
             raise ValueError(
                 f'unwrapping = "pair" needs method = "published", and the method is {got}: '
                 "change the method, or leave unwrapping out"
+            )
+        if self.albedo and self.method == "published":
+            raise ValueError(
+                'albedo needs method = "joint", and the method is published: change the method, or leave albedo out'
             )
         if self.channel_instants_us is not None and self.method == "published":
             raise ValueError(

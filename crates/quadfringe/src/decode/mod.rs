@@ -29,7 +29,7 @@ use crate::error::{Error, Result};
 use crate::height::Triangulator;
 use crate::joint::Joint;
 use crate::published::Published;
-use output::Finish;
+use output::{Finish, Wanted};
 
 /// Decodes shots of one size and one encoding. A decoder is planned once and used for many shots. Results are
 /// bit-identical for any number of threads.
@@ -112,7 +112,10 @@ impl Decoder {
             return Err(Error::shape("shot", &self.shape, &shot.shape()));
         }
         shot.check_light()?;
-        out.fit(self.shape, self.triangulator.is_some());
+        out.fit(
+            self.shape,
+            Wanted { points: self.triangulator.is_some(), albedo: self.options.gives_albedo() },
+        );
         self.plan.prepare(shot);
         let finish = Finish { four: &self.four, triangulator: self.triangulator.as_ref() };
         let Self { plan, options, engine, .. } = self;

@@ -26,6 +26,8 @@ pub struct Options {
     /// estimates it from every shot. Set it if the estimate fails, for example for an object narrower than two fringes.
     /// Default: `None`.
     pub period_px: Option<f64>,
+    /// Whether the joint method gives the albedo. It takes a twentieth of the time of a decode. Default: true.
+    pub albedo: bool,
 }
 
 impl Default for Options {
@@ -35,6 +37,7 @@ impl Default for Options {
             modulation_min: MODULATION_MIN,
             quality_min: QUALITY_MIN,
             period_px: None,
+            albedo: true,
         }
     }
 }
@@ -66,6 +69,19 @@ impl Options {
     pub const fn with_period_px(mut self, period_px: f64) -> Self {
         self.period_px = Some(period_px);
         self
+    }
+
+    /// These options with or without the albedo.
+    #[must_use]
+    pub const fn with_albedo(mut self, albedo: bool) -> Self {
+        self.albedo = albedo;
+        self
+    }
+
+    /// Whether decoded shots have the albedo, which only the joint method gives.
+    #[must_use]
+    pub const fn gives_albedo(&self) -> bool {
+        self.albedo && matches!(&self.method, Method::Joint(_))
     }
 
     /// Instants of the channels; `None` if they are not set or the method does not have them.

@@ -36,6 +36,17 @@ pub struct Decoded {
     pub uncertainty_mm: Option<Array2<f32>>,
     /// Points in the camera frame in mm, `(rows, columns, 3)`. Only from a decoder with triangulator.
     pub xyz_mm: Option<Array3<f32>>,
+    /// Light of R, G, B, IR without fringes, linear, as a fraction of full scale, `(rows, columns, 4)`: the albedo of the surface
+    /// times the light on it. Only from the joint method, if [`Options::albedo`](crate::Options::albedo) is set.
+    pub albedo: Option<Array3<f32>>,
+}
+
+/// Which of the optional maps are wanted.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wanted {
+    /// Points and the uncertainty of their depth, in place of the uncertainty of the phase.
+    pub points: bool,
+    pub albedo: bool,
 }
 
 /// Zeros of `shape` that start at a cache line. A vector that lies across two cache lines takes two stores, which slows
@@ -78,7 +89,7 @@ impl Decoded {
     }
 
     /// Prepares every map for a decoder of images of `shape`. Maps that already fit keep their memory.
-    pub(super) fn fit(&mut self, shape: [usize; 2], calibrated: bool) {
+    pub(super) fn fit(&mut self, shape: [usize; 2], wanted: Wanted) {
         let [rows, columns] = shape;
         let maps = [
             &mut self.phase_rad,
@@ -88,9 +99,11 @@ impl Decoded {
             &mut self.wrong_order_probability,
         ];
         maps.into_iter().for_each(|map| fit(map, Ix2(rows, columns)));
-        fit_if(!calibrated, &mut self.uncertainty_rad, Ix2(rows, columns));
-        fit_if(calibrated, &mut self.uncertainty_mm, Ix2(rows, columns));
-        fit_if(calibrated, &mut self.xyz_mm, Ix3(rows, columns, 3));
+        let Wanted { points, albedo } = wanted;
+        fit_if(!points, &mut self.uncertainty_rad, Ix2(rows, columns));
+        fit_if(points, &mut self.uncertainty_mm, Ix2(rows, columns));
+        fit_if(points, &mut self.xyz_mm, Ix3(rows, columns, 3));
+        fit_if(albedo, &mut self.albedo, Ix3(rows, columns, 4));
     }
 
     /// The rows of all maps, for parallel iteration.

@@ -13,12 +13,14 @@
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement
 //! 10 heights                                                             (S7)  decode::output, height
 //! 11 doubtful orders become as certain as their surface                        propagation
+//! 12 albedo of every pixel (optional)                                          albedo
 //! ```
 //!
 //! The steps share the model of the intensities (`model`), a grid of cells for slowly varying quantities (`cells`), and the tuned
 //! numbers (`params`). `docs/method/joint.md` derives the steps and numbers them in the same way.
 
 mod agreement;
+mod albedo;
 mod cells;
 mod coarse;
 mod disjoint;
@@ -52,6 +54,7 @@ use crate::decode::output::{Decoded, Finish};
 use crate::encoding::FourChannel;
 use crate::parallel::lanes::LANES;
 use agreement::Agreement;
+use albedo::{Albedo, Known};
 use cells::{Grid, RowMaps};
 use coarse::CoarseLevel;
 use energy::{Energy, Prior};
@@ -77,6 +80,7 @@ pub(crate) struct Joint {
     /// Fringe numbers divided by the first.
     ratios: [f32; 3],
     energy: Energy,
+    albedo: Albedo,
     pyramid: Pyramid,
     coarse: CoarseLevel,
     upsampler: Upsampler,
@@ -105,6 +109,7 @@ impl Joint {
             stride,
             ratios: numbers.map(|n| (n / numbers[0]) as f32),
             energy: Energy::default(),
+            albedo: Albedo::default(),
             pyramid: Pyramid::new(stride * shape[0]),
             coarse: CoarseLevel::new(code),
             upsampler: Upsampler::default(),
@@ -159,6 +164,10 @@ impl Joint {
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
         let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
         self.propagation.run(&grid, &self.phase, &self.validity.components, wrong_order, quality);
+        // 12. Albedo.
+        if let Some(albedo) = &mut out.albedo {
+            self.write_albedo(&frame, albedo.as_slice_mut().expect("checked layout"));
+        }
     }
 
     /// Steps 2 to 6.
@@ -294,5 +303,17 @@ impl Joint {
                 finish.row(y, &mut row);
             },
         );
+    }
+
+    /// Step 12: the albedo of every pixel.
+    fn write_albedo(&self, frame: &Frame<'_>, out: &mut [f32]) {
+        let scene = self.pyramid.full.scene(frame.full);
+        let known = Known {
+            phase: &self.phase,
+            valid: &self.validity.valid,
+            ratios: self.ratios,
+            noise: self.coarse.noise,
+        };
+        self.albedo.write(&scene, &self.energy, known, out);
     }
 }

@@ -16,6 +16,7 @@ from quadfringe.evaluation._scenes import noisy_8bit
 from quadfringe.evaluation.world import albedo, relief
 
 TUNE, REPORT = (1, 3), (2, 4)
+WIDTH_PX = 912  # of the projector of the bench
 NOISE = 0.03  # standard deviation, share of full scale
 FRINGES = (36.0, 35.0, 30.0)
 EDGE_PX = 2.0  # nearer pixels mix two sides of an edge

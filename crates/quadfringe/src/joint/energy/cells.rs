@@ -15,14 +15,53 @@ pub(super) struct Cells {
     /// Pixels along a side of a cell.
     factor: usize,
     stride: usize,
-    /// Means of linear light.
+    /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
+    /// After the fit the contrast times `inside`.
+    contrast: [Vec<f32>; 4],
     /// Mean phase in rad; after the fit the correction times `inside`.
     phase: Vec<f32>,
     /// 1 for cells that can be used in the fit; after it the variance times `inside`.
     usable: Vec<f32>,
     /// 1 for cells whose pixels are all lit and lie on one surface.
     inside: Vec<f32>,
+}
+
+/// What the fit has found for one cell.
+#[derive(Debug, Default)]
+pub(super) struct CellFit {
+    /// Change of the phase, rad.
+    pub correction: f32,
+    /// Variance of the phase by noise, rad^2.
+    pub variance: f32,
+    /// Light without fringes, linear.
+    pub albedo: [f32; 4],
+    pub contrast: [f32; 4],
+}
+
+impl CellFit {
+    pub fn divided_by(self, sum: f32) -> Self {
+        let share = 1.0 / sum;
+        Self {
+            correction: share * self.correction,
+            variance: share * self.variance,
+            albedo: self.albedo.map(|albedo| share * albedo),
+            contrast: self.contrast.map(|contrast| share * contrast),
+        }
+    }
+}
+
+/// Albedo and contrast of R, G, B, IR along a row of pixels; 0 far from all cells of the fit.
+#[derive(Debug, Default)]
+pub(in crate::joint) struct FringeRows {
+    pub albedo: [Vec<f32>; 4],
+    pub contrast: [Vec<f32>; 4],
+    /// Albedo of the cells above, at and below, one value for all pixels of a cell, 0 outside the lit cells. Pixel `x` is at
+    /// `x + cell_px`.
+    pub cells: [[Vec<f32>; 4]; 3],
+    /// Pixels along a side of a cell.
+    pub cell_px: usize,
+    rows: Rows,
 }
 
 /// Working rows.
@@ -86,21 +125,26 @@ impl Cells {
         any
     }
 
-    /// Replaces phase and usability by correction and variance, each times `inside`.
-    pub fn replace(&mut self, found: impl Fn(usize, usize) -> Option<[f32; 2]> + Sync) {
-        let Self { phase, usable, inside, stride, width, .. } = self;
-        let rows = phase
-            .par_chunks_mut(*stride)
-            .zip(usable.par_chunks_mut(*stride))
-            .zip(inside.par_chunks_mut(*stride));
-        rows.enumerate().for_each(|(y, ((phase, variance), inside))| {
-            phase.fill(0.0);
-            variance.fill(0.0);
+    /// Replaces phase, usability and light by correction, variance, albedo and contrast, each times `inside`.
+    pub fn replace(&mut self, found: impl Fn(usize, usize) -> Option<CellFit> + Sync) {
+        let Self { light, contrast, phase, usable, inside, stride, width, .. } = self;
+        for plane in contrast.iter_mut() {
+            plane.resize(inside.len(), 0.0);
+        }
+        let mut planes = [phase, usable].into_iter().chain(light).chain(contrast).chain([inside]);
+        let mut planes: [_; 11] =
+            std::array::from_fn(|_| planes.next().expect("eleven planes").chunks_mut(*stride));
+        let rows: Vec<[&mut [f32]; 11]> = (0..self.height)
+            .map(|_| planes.each_mut().map(|rows| rows.next().expect("as many rows as cells are high")))
+            .collect();
+        rows.into_par_iter().enumerate().for_each(|(y, mut rows)| {
+            let [values @ .., inside] = &mut rows;
             for x in 0..*width {
-                match found(y, x) {
-                    Some(values) if inside[x] > 0.0 => [phase[x], variance[x]] = values,
-                    _ => inside[x] = 0.0,
-                }
+                let fit = found(y, x).filter(|_| inside[x] > 0.0);
+                inside[x] = f32::from(u8::from(fit.is_some()));
+                let CellFit { correction, variance, albedo, contrast } = fit.unwrap_or_default();
+                let fitted = [correction, variance].into_iter().chain(albedo).chain(contrast);
+                values.iter_mut().zip(fitted).for_each(|(row, value)| row[x] = value);
             }
         });
     }
@@ -131,21 +175,56 @@ impl Cells {
         &rows.sum
     }
 
+    /// Albedo and contrast along row `y` of the scene.
+    pub fn fringes(&self, scene: &Scene<'_>, y: usize, out: &mut FringeRows) {
+        let FringeRows { albedo, contrast, cells, cell_px, rows } = out;
+        *cell_px = self.factor;
+        let middle = (y / self.factor).min(self.height - 1);
+        let around = [middle.saturating_sub(1), middle, (middle + 1).min(self.height - 1)];
+        for (row, out) in around.into_iter().zip(cells) {
+            for (map, out) in self.light.iter().zip(out) {
+                let row = &map[row * self.stride..][..self.stride];
+                repeat(row, self.factor, scene.grid.stride, out);
+            }
+        }
+        self.between(&self.inside, scene, y, &mut rows.mix, &mut rows.weight);
+        let maps = self.light.iter().chain(&self.contrast).zip(albedo.iter_mut().chain(contrast));
+        for (map, out) in maps {
+            self.between(map, scene, y, &mut rows.mix, out);
+            for (value, weight) in out.iter_mut().zip(&rows.weight) {
+                *value = if *weight > 0.0 { *value / weight } else { 0.0 };
+            }
+        }
+    }
+
     /// Interpolates a map and the weight of its cells bilinearly along row `y` of the scene.
     fn interpolate(&self, map: &[f32], scene: &Scene<'_>, y: usize, rows: &mut Rows) {
-        let Self { height, stride, factor, inside, .. } = self;
+        let Rows { mix, sum, weight } = rows;
+        self.between(map, scene, y, mix, sum);
+        self.between(&self.inside, scene, y, mix, weight);
+    }
+
+    /// Interpolates one map, which is 0 outside the lit cells.
+    fn between(&self, map: &[f32], scene: &Scene<'_>, y: usize, mix: &mut Vec<f32>, out: &mut Vec<f32>) {
+        let Self { height, stride, factor, .. } = self;
         let place = (y as f32 + 0.5) / *factor as f32 - 0.5;
         let above = place.floor();
         let row = |at: f32| at.clamp(0.0, (height - 1) as f32) as usize * stride;
-        let Rows { mix, sum, weight } = rows;
+        let (a, b) = (&map[row(above)..][..*stride], &map[row(above + 1.0)..][..*stride]);
         mix.resize(stride + 2, 0.0);
-        for (plane, out) in [(map, sum), (inside, weight)] {
-            out.resize(scene.grid.stride.max(stride * factor), 0.0);
-            let (a, b) = (&plane[row(above)..][..*stride], &plane[row(above + 1.0)..][..*stride]);
-            blend(a, b, place - above, &mut mix[1..=*stride]);
-            (mix[0], mix[stride + 1]) = (mix[1], mix[*stride]);
-            spread(*factor, mix, out);
-        }
+        out.resize(scene.grid.stride.max(stride * factor), 0.0);
+        blend(a, b, place - above, &mut mix[1..=*stride]);
+        (mix[0], mix[stride + 1]) = (mix[1], mix[*stride]);
+        spread(*factor, mix, out);
+    }
+}
+
+/// Writes the value of each cell `factor` times, for `length` pixels and one cell of zeros at both ends.
+fn repeat(row: &[f32], factor: usize, length: usize, out: &mut Vec<f32>) {
+    out.clear();
+    out.resize(length + 2 * factor, 0.0);
+    for (pixels, value) in out[factor..factor + length].chunks_mut(factor).zip(row) {
+        pixels.fill(*value);
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::blocks::{information, phase_information};
 use super::data::linearise;
-use super::plane::{Fields, vectors};
+use super::exp::exp;
+use super::plane::{Column, Fields, vectors};
 use super::priors::weigh;
 use super::scales::{Determined, Scales, variance_share};
 use super::solve::solve;
@@ -11,7 +12,21 @@ use super::tile::{Found, Tile};
 use crate::joint::params::energy::{
     ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
 };
-use crate::parallel::lanes::LANES;
+use crate::parallel::lanes::{LANES, Lanes};
+
+/// Writes albedo and contrast of a vector of cells.
+#[inline(always)]
+fn write_light(cells: &Column, inside: Lanes, channel_contrast: [f32; 4], at: usize, found: &mut Found) {
+    for c in 0..4 {
+        let (mut albedo, mut contrast) = ([0.0; LANES], [0.0; LANES]);
+        for x in 0..LANES {
+            albedo[x] = inside[x] * exp(cells.albedo[c][x]);
+            contrast[x] = inside[x] * channel_contrast[c] * exp(cells.contrast[x]);
+        }
+        found.albedo[c].set(at, albedo);
+        found.contrast[c].set(at, contrast);
+    }
+}
 
 impl Tile {
     /// Minimises the energy. The phase and the light must be set; `noise` is the variance of the intensity of a cell.
@@ -43,7 +58,7 @@ impl Tile {
         }
     }
 
-    /// Writes the correction of the phase and its variance.
+    /// Writes the correction of the phase, its variance, and the albedo and contrast of every channel.
     pub fn write(&mut self, found: &mut Found) {
         let Self { start, inside, unknown, scales, derivatives, weights, product, .. } = self;
         let Fields { phase: information, contrast: spare, .. } = product;
@@ -63,6 +78,7 @@ impl Tile {
             found.correction.set(at, correction);
             found.variance.set(at, variance);
             found.inside.set(at, inside.get(at));
+            write_light(&Column::of(unknown, at), inside.get(at), scales.channel_contrast, at, found);
         }
     }
 

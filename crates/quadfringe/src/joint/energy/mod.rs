@@ -23,7 +23,7 @@ mod value;
 use super::params::energy::{CELL_MAX_PX, CELLS_PER_PERIOD_MIN, SMALL_CELLS_PER_PERIOD_MIN};
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::slots::Slots;
-use cells::Cells;
+use cells::{CellFit, Cells};
 use layout::Axis;
 use plane::Plane;
 use rayon::prelude::*;
@@ -74,13 +74,20 @@ impl Energy {
         cells.correct(scene, phase, modulation);
     }
 
+    /// Albedo and contrast along row `y` of the scene.
+    pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut FringeRows) -> &'a FringeRows {
+        self.cells.fringes(scene, y, rows);
+        rows
+    }
+
     /// Variance of the phase by noise along row `y` of the scene, rad^2; 0 where there is no lit cell.
     pub fn variance<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut cells::Rows) -> &'a [f32] {
         self.cells.variance(scene, y, rows)
     }
 }
 
-pub(super) use cells::Rows;
+pub(super) use cells::{FringeRows, Rows};
+pub(super) use exp::exp;
 
 /// Side of the cells in pixels: the largest power of two that resolves the fringes.
 fn cell_px(period_px: f64) -> usize {
@@ -91,21 +98,24 @@ fn cell_px(period_px: f64) -> usize {
     side
 }
 
-/// Blends the tiles at one cell: correction and variance, none outside the lit cells.
-fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Option<[f32; 2]> {
-    let mut sums = [0.0; 3];
+/// Blends the tiles at one cell; none outside the lit cells.
+fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Option<CellFit> {
+    let (mut sum, mut fit) = (0.0, CellFit::default());
     for row in rows.around(y) {
         for column in columns.around(x) {
             let found = &tiles[row.tile * columns.origins.len() + column.tile];
             let value = |plane: &Plane| plane.row(row.inner)[column.inner];
             let weight = row.weight * column.weight * value(&found.inside);
-            sums[0] += weight;
-            sums[1] += weight * value(&found.correction);
-            sums[2] += weight * value(&found.variance);
+            sum += weight;
+            fit.correction += weight * value(&found.correction);
+            fit.variance += weight * value(&found.variance);
+            for c in 0..4 {
+                fit.albedo[c] += weight * value(&found.albedo[c]);
+                fit.contrast[c] += weight * value(&found.contrast[c]);
+            }
         }
     }
-    let [weight, correction, variance] = sums;
-    (weight > 0.0).then(|| [correction / weight, variance / weight])
+    (sum > 0.0).then(|| fit.divided_by(sum))
 }
 
 #[cfg(test)]

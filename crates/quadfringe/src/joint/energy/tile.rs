@@ -12,6 +12,10 @@ pub(super) struct Found {
     pub correction: Plane,
     /// Variance of the phase by noise, rad^2.
     pub variance: Plane,
+    /// Light without fringes of R, G, B, IR, linear.
+    pub albedo: [Plane; 4],
+    /// Contrast of the fringes of R, G, B, IR.
+    pub contrast: [Plane; 4],
 }
 
 /// A square of cells and everything that is known about it.

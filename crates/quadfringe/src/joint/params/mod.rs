@@ -12,6 +12,7 @@
 //! number is not critical on these shots. The rims of the dim steps are close to the limits of textured surfaces, so many
 //! numbers change their RMS near edges by a fifth.
 
+pub mod albedo;
 pub mod energy;
 pub mod illumination;
 pub mod local_fit;
