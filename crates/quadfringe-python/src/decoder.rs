@@ -122,7 +122,7 @@ impl Decoder {
             Images::U16(four) => self.run(py, four, |four| Shot::new(four)),
             Images::F32(four) => self.run(py, four, |four| Shot::new(four)),
         }?;
-        self.maps_by_name(py, decoded)
+        self.0.memory.named(py, decoded)
     }
 
     /// Decode the raw mosaic of a Bayer chip and an infrared image into maps by name.
@@ -139,7 +139,7 @@ impl Decoder {
             Images::U16(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
             Images::F32(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
         }?;
-        self.maps_by_name(py, decoded)
+        self.0.memory.named(py, decoded)
     }
 }
 
@@ -162,27 +162,6 @@ impl Decoder {
             py.detach(|| self.0.decode(pool.as_deref(), || shot(views)))
         };
         decoded.map_err(value_error)
-    }
-
-    fn maps_by_name<'py>(&self, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
-        let named = PyDict::new(py);
-        named.set_item("phase_rad", self.0.memory.lend(py, decoded.phase_rad)?)?;
-        named.set_item("column_px", self.0.memory.lend(py, decoded.column_px)?)?;
-        named.set_item("modulation", self.0.memory.lend(py, decoded.modulation)?)?;
-        named.set_item("quality", self.0.memory.lend(py, decoded.quality)?)?;
-        named
-            .set_item("wrong_order_probability", self.0.memory.lend(py, decoded.wrong_order_probability)?)?;
-        let uncertain =
-            [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
-        for (name, map) in uncertain {
-            if let Some(map) = map {
-                named.set_item(name, self.0.memory.lend(py, map)?)?;
-            }
-        }
-        if let Some(xyz_mm) = decoded.xyz_mm {
-            named.set_item("xyz_mm", self.0.memory.lend(py, xyz_mm)?)?;
-        }
-        Ok(named)
     }
 }
 

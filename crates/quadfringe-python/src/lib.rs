@@ -12,6 +12,7 @@ mod pair;
 mod plan;
 mod projector;
 mod published_stages;
+mod reference;
 mod render;
 mod stages;
 mod workers;
@@ -29,6 +30,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<decoder::Decoder>()?;
     module.add_class::<height::PolynomialHeight>()?;
     module.add_class::<pair::PairTable>()?;
+    module.add_class::<reference::StepDecoder>()?;
     module.add_class::<projector::LightCrafter>()?;
     module.add_class::<projector::Pattern>()?;
     module.add_class::<projector::PatternSequence>()?;

@@ -5,6 +5,7 @@ use ndarray::{Array, Array1, Dimension, Ix2, Ix3, ShapeError};
 use numpy::PyArray;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use quadfringe::Decoded;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -62,6 +63,28 @@ impl Memory {
             reason = "no safe call lends memory to NumPy and notices when the array is gone"
         )]
         Ok(unsafe { PyArray::borrow_from_array(&view, loan.clone().into_any()) })
+    }
+
+    /// Lend the maps of a decoded measurement to Python, by name.
+    pub fn named<'py>(self: &Arc<Self>, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
+        let named = PyDict::new(py);
+        named.set_item("phase_rad", self.lend(py, decoded.phase_rad)?)?;
+        named.set_item("column_px", self.lend(py, decoded.column_px)?)?;
+        named.set_item("modulation", self.lend(py, decoded.modulation)?)?;
+        named.set_item("quality", self.lend(py, decoded.quality)?)?;
+        named
+            .set_item("wrong_order_probability", self.lend(py, decoded.wrong_order_probability)?)?;
+        let uncertain =
+            [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
+        for (name, map) in uncertain {
+            if let Some(map) = map {
+                named.set_item(name, self.lend(py, map)?)?;
+            }
+        }
+        if let Some(xyz_mm) = decoded.xyz_mm {
+            named.set_item("xyz_mm", self.lend(py, xyz_mm)?)?;
+        }
+        Ok(named)
     }
 
     fn give_back(&self, values: Array1<f32>) {

@@ -1,6 +1,6 @@
 //! The data term: residuals of the intensities and their derivatives with respect to the unknowns.
 
-use super::exp::exp;
+use crate::parallel::exp::exp;
 use super::plane::{total, vectors};
 use super::scales::DataSums;
 use super::tile::Tile;

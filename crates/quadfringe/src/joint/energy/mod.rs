@@ -8,7 +8,6 @@ mod blocks;
 mod cells;
 mod data;
 mod descent;
-mod exp;
 mod layout;
 mod plane;
 mod preconditioner;

@@ -1,7 +1,7 @@
 //! The energy of every cell (J16): the data, and the priors of the differences that begin at the cell.
 
 use super::data::{Cells, predict};
-use super::exp::{exp, ln_1p};
+use crate::parallel::exp::{exp, ln_1p};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
 use super::priors::{COUNT, FREEDOM, bending, squares};
 use super::scales::Scales;
