@@ -20,8 +20,8 @@ pub(super) const BLOCK: usize = 64;
 pub(super) struct Wave {
     real: f32,
     imaginary: f32,
-    cos: f64,
-    sin: f64,
+    pub cos: f64,
+    pub sin: f64,
 }
 
 /// One fringe number, prepared.

@@ -1,6 +1,6 @@
 //! Step 2: the noise of the intensities, from what the fits leave (R3) or, with few steps, from second differences (R4).
 
-use super::demodulate::{SetPlan, SetRow, Source};
+use super::demodulate::{SetPlan, SetRow, Source, Wave};
 use super::params::{KEPT_SHARE, NOISE_MIN, RESIDUAL_STEPS_MIN, SAMPLE_STRIDE};
 use crate::condition::Sample;
 use std::f64::consts::TAU;
@@ -30,7 +30,7 @@ impl NoiseSamples {
                 self.bends.push((bend_rad * bend_rad / (6.0 * f64::from(plan.gain()))) as f32);
             }
             for (samples, frequency) in self.residuals.iter_mut().zip(2..) {
-                let power = power_at(frequency, rows.iter().map(|row| f64::from(light.of(row[x]))), steps);
+                let power = power_at(frequency, rows.iter().map(|row| f64::from(light.of(row[x]))), &plan.waves);
                 samples.push((power / steps as f64) as f32);
             }
         }
@@ -60,10 +60,10 @@ impl NoiseSamples {
 }
 
 /// Squared size of a frequency of the samples of a pixel.
-fn power_at(frequency: usize, samples: impl Iterator<Item = f64>, steps: usize) -> f64 {
+fn power_at(frequency: usize, samples: impl Iterator<Item = f64>, waves: &[Wave]) -> f64 {
     let (mut real, mut imaginary) = (0.0, 0.0);
     for (s, value) in samples.enumerate() {
-        let (sin, cos) = (TAU * (frequency * s % steps) as f64 / steps as f64).sin_cos();
+        let Wave { cos, sin, .. } = waves[frequency * s % waves.len()];
         real += value * cos;
         imaginary += value * sin;
     }
