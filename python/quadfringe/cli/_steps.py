@@ -15,8 +15,9 @@ from quadfringe.cli._options import Bits
 
 if TYPE_CHECKING:
     from quadfringe.data import Shape
+    from quadfringe.decoding.reference import Channel
 
-__all__ = ["NumbersOption", "OrderOption", "StepOrder", "StepWords", "StepsOption", "decoded_steps", "separated"]
+__all__ = ["Beam", "BeamOption", "NumbersOption", "OrderOption", "StepOrder", "StepWords", "StepsOption", "decoded_steps", "separated"]
 
 
 class StepOrder(StrEnum):
@@ -26,6 +27,16 @@ class StepOrder(StrEnum):
     step = "step"
 
 
+class Beam(StrEnum):
+    """The projector that shows the steps."""
+
+    visible = "visible"
+    infrared = "infrared"
+
+
+BeamOption = Annotated[
+    Beam | None, typer.Option(help="Projector that shows the steps; default: visible. Its calibration is used.")
+]
 StepsOption = Annotated[
     int | None,
     typer.Option(
@@ -66,6 +77,7 @@ class StepWords:
     numbers: list[float]
     steps: int | None
     order: StepOrder | None
+    beam: Beam | None
     bits: Bits | None
 
 
@@ -88,7 +100,8 @@ def decoded_steps(
     order = (words.order or StepOrder.frequency).value
     stacks = read_steps(words.files, len(words.numbers), words.steps, order)
     wide = words.bits is not None and stacks[0].dtype.itemsize == 2
-    settings = StepSettings(full_scale=float(2 ** int(words.bits) - 1) if wide and words.bits else None)
+    channel: Channel = "ir" if words.beam is Beam.infrared else "green"
+    settings = StepSettings(channel=channel, full_scale=float(2 ** int(words.bits) - 1) if wide and words.bits else None)
     return decode_steps(
         stacks, words.numbers, projector_width, calibration=calibration, response=response, settings=settings
     )

@@ -23,7 +23,7 @@ from quadfringe.cli._options import (
     method_named,
 )
 from quadfringe.cli._output import caution, say, write_figures
-from quadfringe.cli._steps import NumbersOption, OrderOption, StepsOption, StepWords, decoded_steps, separated
+from quadfringe.cli._steps import BeamOption, NumbersOption, OrderOption, StepsOption, StepWords, decoded_steps, separated
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
@@ -129,6 +129,7 @@ def decode(
     steps: StepsOption = None,
     numbers: NumbersOption = None,
     order: OrderOption = None,
+    beam: BeamOption = None,
     red: ImageOption = None,
     green: ImageOption = None,
     blue: ImageOption = None,
@@ -156,8 +157,8 @@ def decode(
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
     fringe_words = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm}
-    if steps is not None or numbers or order:
-        words = StepWords(files, fringe_numbers, steps, order, bits)
+    if steps is not None or numbers or order or beam:
+        words = StepWords(files, fringe_numbers, steps, order, beam, bits)
         others = {**fringe_words, **images, **settings, "bayer": bayer}
         shape = decoded_steps(words, projector_width, calibration, correction, others)
     else:
