@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -14,18 +15,27 @@ from quadfringe.devices import Camera, Projector
 from quadfringe.devices.light import Step
 from quadfringe.errors import InputError
 
-__all__ = ["REFERENCE_STEPS", "measure_reference"]
+__all__ = ["REFERENCE_STEPS", "Beam", "StepsTaken", "measure_reference", "take_steps"]
 
+Beam = Literal["visible", "infrared"]
+STEPS_MIN = 3  # background, modulation and phase are three unknowns
 # With 12 steps, harmonics of the response up to the tenth do not change the phase, so that none need be known.
 REFERENCE_STEPS = 12
 
 
-def measure_reference(
-    projector: Projector, camera: Camera, plan: Plan, steps: int, beam: Literal["visible", "infrared"]
-) -> Shape:
-    """Show and take `steps` phase shifts of each fringe number of the plan with one projector, and decode them."""
-    if steps < 3:
-        raise InputError(f"steps: expected at least 3, got {steps}")
+@dataclass(frozen=True)
+class StepsTaken:
+    """The images of a reference measurement: one stack (steps, H, W) for each fringe number, and how they are read."""
+
+    stacks: list[NDArray[Any]]
+    numbers: list[float]
+    settings: StepSettings
+
+
+def take_steps(projector: Projector, camera: Camera, plan: Plan, steps: int, beam: Beam) -> StepsTaken:
+    """Show `steps` phase shifts of each fringe number of the plan with one projector, and take a shot of each."""
+    if steps < STEPS_MIN:
+        raise InputError(f"steps: expected at least {STEPS_MIN}, got {steps}")
     channel: Channel = "ir" if beam == "infrared" else "green"
     numbers = list(dict.fromkeys(plan.fringes.numbers))
     stacks, full_scale = [], 1.0
@@ -37,13 +47,19 @@ def measure_reference(
             images.append(_image(shot, channel, plan.calibration))
             full_scale = 1.0 if images[0].dtype.kind == "f" else shot.full_scale_value
         stacks.append(np.stack(images))
+    return StepsTaken(stacks, numbers, StepSettings(channel, full_scale, plan.decode.modulation_min))
+
+
+def measure_reference(projector: Projector, camera: Camera, plan: Plan, steps: int, beam: Beam) -> Shape:
+    """Take the steps and decode them to one shape."""
+    taken = take_steps(projector, camera, plan, steps, beam)
     return decode_steps(
-        stacks,
-        numbers,
+        taken.stacks,
+        taken.numbers,
         plan.projector_width_px,
         calibration=plan.calibration,
-        response="linear" if _is_registered(channel, plan.calibration) else plan.response,
-        settings=StepSettings(channel, full_scale, plan.decode.modulation_min),
+        response="linear" if _is_registered(taken.settings.channel, plan.calibration) else plan.response,
+        settings=taken.settings,
     )
 
 

@@ -14,7 +14,7 @@ from contextlib import suppress
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, check_system, load_system, shortened
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
@@ -23,7 +23,7 @@ from quadfringe.decoding._locks import ForkedLock
 from quadfringe.decoding.plan import calibration_of, stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
 from quadfringe.errors import DecodeError, InputError
-from quadfringe.scanner.reference import REFERENCE_STEPS, measure_reference
+from quadfringe.scanner.reference import REFERENCE_STEPS, Beam, measure_reference
 from quadfringe.scanner.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
@@ -134,7 +134,7 @@ class Scanner:
         if not reference:
             return self.decode(self.grab())
         self._end_stream()
-        beam: Literal["visible", "infrared"] = "infrared" if infrared else "visible"
+        beam: Beam = "infrared" if infrared else "visible"
         shape = measure_reference(self.projector, self.camera, self.plan, steps, beam)
         return replace(shape, config=self._settings | dict(shape.config))
 

@@ -86,6 +86,8 @@ pub(super) struct Source<'a, 'i, T> {
     pub k: usize,
     pub plan: &'a SetPlan,
     pub light: &'a Light,
+    /// Standard deviation of an intensity, fraction of full scale; 0 as long as it is not known.
+    pub noise: f32,
 }
 
 impl<T> Clone for Source<'_, '_, T> {
@@ -120,7 +122,7 @@ impl SetRow {
     /// Fringes of row `y`.
     #[inline(always)]
     pub fn fill<T: Sample>(&mut self, source: Source<'_, '_, T>, y: usize) {
-        let Source { images, k, plan, light } = source;
+        let Source { images, k, plan, light, .. } = source;
         for row in [&mut self.turns, &mut self.modulation, &mut self.peak] {
             row.fill(0.0);
         }
@@ -160,17 +162,26 @@ impl SetRow {
         }
     }
 
-    /// Fits the pixels with saturated samples without these.
+    /// Fits the pixels with saturated samples without these, unless that would add more noise than they add bias (R2).
     #[cold]
     fn refit<T: Sample>(&mut self, source: Source<'_, '_, T>, y: usize) {
-        let Source { images, k, plan, light } = source;
+        let Source { images, k, plan, light, noise } = source;
         let rows: Vec<_> = (0..plan.waves.len()).map(|s| images.row(k, s, y)).collect();
+        let limit = f64::from(light.response.linear(light.saturation));
         for x in (0..rows[0].len()).filter(|x| self.peak[*x] >= light.saturation) {
-            let sound = rows.iter().zip(&plan.waves).filter(|(row, _)| row[x].intensity() * light.scale < light.saturation);
+            let samples = rows.iter().map(|row| row[x]).zip(&plan.waves);
+            let is_sound = |raw: &T| raw.intensity() * light.scale < light.saturation;
             let mut fit = Fit::default();
-            sound.for_each(|(row, wave)| fit.add(*wave, f64::from(light.of(row[x]))));
+            let sound = samples.clone().filter(|(raw, _)| is_sound(raw));
+            sound.for_each(|(raw, wave)| fit.add(*wave, f64::from(light.of(raw))));
             let loss_max = SATURATED_LOSS_MAX * f64::from(plan.gain());
             let found = fit.solve().filter(|found| found.gain <= loss_max).unwrap_or(Fringe::NONE);
+            let clipped = samples.filter(|(raw, _)| !is_sound(raw));
+            let cut: f64 = clipped.map(|(_, wave)| (found.at(*wave) - limit).max(0.0)).sum();
+            let (bias, loss) = (f64::from(plan.gain()) * cut, found.gain - f64::from(plan.gain()));
+            if bias * bias <= f64::from(noise * noise) * loss {
+                continue;
+            }
             self.turns[x] = (found.phase_rad / TAU) as f32;
             self.modulation[x] = found.modulation as f32;
             self.gain[x] = found.gain as f32;
@@ -185,13 +196,21 @@ impl SetRow {
 
 /// A fringe that was fitted to some of the steps.
 struct Fringe {
+    background: f64,
     phase_rad: f64,
     modulation: f64,
     gain: f64,
 }
 
 impl Fringe {
-    const NONE: Self = Self { phase_rad: f64::NAN, modulation: f64::NAN, gain: f64::NAN };
+    const NONE: Self =
+        Self { background: f64::NAN, phase_rad: f64::NAN, modulation: f64::NAN, gain: f64::NAN };
+
+    /// The light of a step.
+    fn at(&self, Wave { cos, sin, .. }: Wave) -> f64 {
+        let (phase_sin, phase_cos) = self.phase_rad.sin_cos();
+        self.background + self.modulation * (phase_cos * cos - phase_sin * sin)
+    }
 }
 
 /// Normal equations of `a + c cos(theta) - d sin(theta)` with `c = b cos(Phi)`, `d = b sin(Phi)`.
@@ -240,7 +259,8 @@ impl Fit {
         let (sin, cos) = (d / modulation, c / modulation);
         // The covariance of (c, d) is the inverse of the matrix; only its part across the phasor turns the phase.
         let gain = (sin * sin * sin_sin + 2.0 * sin * cos * cos_sin + cos * cos * cos_cos) / determinant;
-        Some(Fringe { phase_rad: d.atan2(c), modulation, gain })
+        let background = mean * (self.light - c * self.cos - d * self.sin);
+        Some(Fringe { background, phase_rad: d.atan2(c), modulation, gain })
     }
 }
 
@@ -262,7 +282,7 @@ mod tests {
         for left_out in [&[][..], &[0], &[0, 7], &[0, 1, 2, 3, 4]] {
             let found = fitted(8, left_out).expect("three samples determine it");
             assert!((found.phase_rad - 1.1).abs() < 1e-9 && (found.modulation - 0.3).abs() < 1e-9);
-            assert!(found.gain >= 0.25 - 1e-9);
+            assert!(found.gain >= 0.25 - 1e-9 && (found.background - 0.6).abs() < 1e-9);
         }
         assert!((fitted(8, &[]).expect("all samples").gain - 0.25).abs() < 1e-9);
         assert!(fitted(8, &[0, 1, 2, 3, 4, 5]).is_none() && fitted(3, &[0, 1, 2]).is_none());

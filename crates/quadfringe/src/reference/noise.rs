@@ -17,7 +17,7 @@ pub(super) struct NoiseSamples {
 impl NoiseSamples {
     /// Adds the pixels of row `y`, whose fringes are known.
     pub fn add<T: Sample>(&mut self, source: Source<'_, '_, T>, y: usize, fringes: &SetRow, modulation_min: f32) {
-        let Source { images, k, plan, light } = source;
+        let Source { images, k, plan, light, .. } = source;
         let steps = plan.waves.len();
         let rows: Vec<_> = (0..steps).map(|s| images.row(k, s, y)).collect();
         let usable = |x: usize| fringes.modulation[x] >= modulation_min && fringes.is_sound(x, light);

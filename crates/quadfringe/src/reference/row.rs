@@ -40,16 +40,16 @@ pub(super) struct Writer {
 }
 
 impl<'i, T: Sample> RowPlan<'_, 'i, T> {
-    fn source(&self, k: usize) -> Source<'_, 'i, T> {
-        Source { images: self.images, k, plan: &self.plans[k], light: self.light }
+    fn source(&self, k: usize, noise: f32) -> Source<'_, 'i, T> {
+        Source { images: self.images, k, plan: &self.plans[k], light: self.light, noise }
     }
 
     /// Samples of the noise of row `y`, for each fringe number.
     pub fn noise(&self, work: &mut Work, y: usize) -> Vec<NoiseSamples> {
-        demodulate_row(self, work, y);
+        demodulate_row(self, work, y, 0.0);
         let sampled = work.rows.iter().enumerate().map(|(k, fringes)| {
             let mut samples = NoiseSamples::default();
-            samples.add(self.source(k), y, fringes, self.modulation_min);
+            samples.add(self.source(k, 0.0), y, fringes, self.modulation_min);
             samples
         });
         sampled.collect()
@@ -78,7 +78,7 @@ impl<'i, T: Sample> RowPlan<'_, 'i, T> {
         variances: Variances,
         mut take: impl FnMut(&Phases, &Found, usize),
     ) {
-        demodulate_row(self, work, y);
+        demodulate_row(self, work, y, variances.noise);
         let width = self.images.shape()[1];
         for b in 0..width.div_ceil(BLOCK) {
             search_block(self, work, b, variances);
@@ -95,8 +95,8 @@ impl<'i, T: Sample> RowPlan<'_, 'i, T> {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn demodulate_row<T: Sample>(plan: &RowPlan<'_, '_, T>, work: &mut Work, y: usize) {
-    fill(plan, work, y);
+fn demodulate_row<T: Sample>(plan: &RowPlan<'_, '_, T>, work: &mut Work, y: usize, noise: f32) {
+    fill(plan, work, y, noise);
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
@@ -113,7 +113,7 @@ fn decode_row<T: Sample>(
     writer: &Writer,
     out: &mut OutputRow<'_>,
 ) {
-    fill(plan, work, y);
+    fill(plan, work, y, writer.variances.noise);
     for b in 0..out.phase.len().div_ceil(BLOCK) {
         work.phases.take(&work.rows, b, writer.variances);
         plan.search.run(&work.phases, &mut work.found);
@@ -122,11 +122,11 @@ fn decode_row<T: Sample>(
 }
 
 #[inline(always)]
-fn fill<T: Sample>(plan: &RowPlan<'_, '_, T>, work: &mut Work, y: usize) {
+fn fill<T: Sample>(plan: &RowPlan<'_, '_, T>, work: &mut Work, y: usize, noise: f32) {
     work.rows.resize_with(plan.plans.len(), SetRow::default);
     for (k, row) in work.rows.iter_mut().enumerate() {
         row.resize(plan.images.shape()[1]);
-        row.fill(plan.source(k), y);
+        row.fill(plan.source(k, noise), y);
     }
 }
 

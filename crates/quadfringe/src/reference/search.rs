@@ -199,15 +199,27 @@ impl Search {
 /// Likelihood of a cost (R8), without its constant: `(1 + cost / n)^(-(n + freedom) / 2)` with `n = 2 TAIL`.
 #[inline(always)]
 fn student(cost: &Pixels, freedom: usize, likelihood: &mut Pixels) {
-    let mut base = [0.0; BLOCK];
-    for i in 0..BLOCK {
-        base[i] = 1.0 / (1.0 + cost[i] * (0.5 / TAIL as f32));
-        likelihood[i] = if freedom % 2 == 1 { base[i].sqrt() } else { 1.0 };
-    }
-    for _ in 0..TAIL + freedom / 2 {
-        for i in 0..BLOCK {
-            likelihood[i] *= base[i];
+    match freedom {
+        0 => student_power::<TAIL, false>(cost, likelihood),
+        1 => student_power::<TAIL, true>(cost, likelihood),
+        2 => student_power::<{ TAIL + 1 }, false>(cost, likelihood),
+        _ => {
+            let base = cost.map(|cost| 1.0 / (1.0 + cost * (0.5 / TAIL as f32)));
+            *likelihood = if freedom % 2 == 1 { base.map(f32::sqrt) } else { [1.0; BLOCK] };
+            for _ in 0..TAIL + freedom / 2 {
+                likelihood.iter_mut().zip(&base).for_each(|(likelihood, base)| *likelihood *= base);
+            }
         }
+    }
+}
+
+/// The powers of the common numbers of phases, which the compiler writes out.
+#[inline(always)]
+fn student_power<const WHOLE: usize, const HALF: bool>(cost: &Pixels, likelihood: &mut Pixels) {
+    for i in 0..BLOCK {
+        let base = 1.0 / (1.0 + cost[i] * (0.5 / TAIL as f32));
+        let start = if HALF { base.sqrt() } else { 1.0 };
+        likelihood[i] = (0..WHOLE).fold(start, |product, _| product * base);
     }
 }
 
@@ -243,13 +255,20 @@ impl Found {
     fn try_order(&mut self, column: &Pixels, cost: &Pixels, likelihood: &Pixels) {
         for i in 0..BLOCK {
             let is_better = cost[i] < self.cost[i];
-            let behind = if is_better { self.cost[i] } else { cost[i] };
-            self.next[i] = if behind < self.next[i] { behind } else { self.next[i] };
-            self.cost[i] = if is_better { cost[i] } else { self.cost[i] };
-            self.column[i] = if is_better { column[i] } else { self.column[i] };
+            let (low, high) = (select(is_better, cost[i], self.cost[i]), select(is_better, self.cost[i], cost[i]));
+            self.next[i] = if high < self.next[i] { high } else { self.next[i] };
+            self.cost[i] = low;
+            self.column[i] = select(is_better, column[i], self.column[i]);
             self.likelihoods[i] += likelihood[i];
         }
     }
+}
+
+/// One of two numbers, by their bits. Of a choice between two places in memory the compiler would make a branch.
+#[inline(always)]
+fn select(is_first: bool, first: f32, second: f32) -> f32 {
+    let mask = u32::from(is_first).wrapping_neg();
+    f32::from_bits((first.to_bits() & mask) | (second.to_bits() & !mask))
 }
 
 #[cfg(test)]
