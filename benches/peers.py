@@ -12,8 +12,8 @@ precede the timed one. They do not all do the same job, and the table states the
 - OpenCV structured_light: wrapped phase alone, from one image (FTP) or three (PSP). Its sign and constant offset are
   corrected; its patterns have a whole number of pixels per period, so the bench shows the fringes instead.
 - scikit-image unwrap_phase: the wrapped two-step phase to one without jumps; relative, without holes or steps.
-- reference, the same likelihood in plain NumPy, and Fringes: the same twelve images, 36, 35 and 30 fringes in four steps
-  each, to the projector column; the reference with uncertainty and the probability of a wrong order too.
+- reference, the same likelihood in plain NumPy, and Fringes: the same twelve images, 36, 35 and 30 fringes in four
+  steps each, to the projector column; the reference with uncertainty and the probability of a wrong order too.
 
 Errors are RMS in rad of the 36-fringe phase over pixels a fringe away from edges, border and shadow; a wrong order is
 an error beyond pi. For a wrapped phase whole periods are left out. A package that is not installed is an error; --skip

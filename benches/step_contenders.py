@@ -1,4 +1,4 @@
-"""The programs of `peers.py` that take many images: the reference measurement, plain NumPy, and Fringes, on the same twelve."""
+"""The programs of `peers.py` that take the same twelve images: the reference measurement, plain NumPy, and Fringes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def reference(bench: Bench, stacks: list[NDArray[np.uint8]]) -> list[Contender]:
 
 
 def numpy_steps(bench: Bench, stacks: list[NDArray[np.uint8]]) -> Contender:
-    """The same likelihood in plain NumPy, float32: least squares, all orders in turn, the mean of all phases by weight."""
+    """The same likelihood in plain NumPy, float32: least squares, all orders in turn, all phases by weight."""
     numbers, width = np.array(bench.config.fringes.numbers), bench.scene.projector_width
     turns_of_steps = np.exp(-2j * np.pi * np.arange(STEPS) / STEPS).astype(np.complex64)
 

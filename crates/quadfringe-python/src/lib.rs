@@ -53,6 +53,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
     module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
+    projector_functions(module)
+}
+
+/// Add the functions of the projector driver to the module.
+fn projector_functions(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
     module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;
     module.add_function(wrap_pyfunction!(projector::power_on_drive, module)?)?;

@@ -16,8 +16,19 @@ from quadfringe.cli._options import Bits
 if TYPE_CHECKING:
     from quadfringe.data import Shape
     from quadfringe.decoding.reference import Channel
+    from quadfringe.decoding.step_files import Order
 
-__all__ = ["Beam", "BeamOption", "NumbersOption", "OrderOption", "StepOrder", "StepWords", "StepsOption", "decoded_steps", "separated"]
+__all__ = [
+    "Beam",
+    "BeamOption",
+    "NumbersOption",
+    "OrderOption",
+    "StepOrder",
+    "StepWords",
+    "StepsOption",
+    "from_steps",
+    "step_words",
+]
 
 
 class StepOrder(StrEnum):
@@ -57,16 +68,6 @@ OrderOption = Annotated[
         "alternate (step).",
     ),
 ]
-def separated(sources: list[str] | None, numbers: list[float] | None) -> tuple[list[float], list[Path]]:
-    """Give the fringe numbers and the files: an option takes one value, so the numbers after the first come as files."""
-    found, files = list(numbers or []), []
-    for word in sources or []:
-        if numbers and not Path(word).exists():
-            with suppress(ValueError):
-                found.append(float(word))
-                continue
-        files.append(Path(word))
-    return found, files
 
 
 @dataclass(frozen=True)
@@ -80,8 +81,32 @@ class StepWords:
     beam: Beam | None
     bits: Bits | None
 
+    @property
+    def given(self) -> bool:
+        """Whether step images are meant."""
+        return bool(self.steps or self.numbers or self.order or self.beam)
 
-def decoded_steps(
+
+def step_words(
+    sources: list[str] | None,
+    numbers: list[float] | None,
+    steps: int | None,
+    order: StepOrder | None,
+    beam: Beam | None,
+    bits: Bits | None,
+) -> StepWords:
+    """Sort the words of the command line. An option takes one value, so the other numbers come among the files."""
+    found, files = list(numbers or []), []
+    for word in sources or []:
+        if numbers and not Path(word).exists():
+            with suppress(ValueError):
+                found.append(float(word))
+                continue
+        files.append(Path(word))
+    return StepWords(files, found, steps, order, beam, bits)
+
+
+def from_steps(
     words: StepWords,
     projector_width: int,
     calibration: Path | None,
@@ -97,11 +122,11 @@ def decoded_steps(
         raise InputError(f"{', '.join(given)}: only for a single shot; leave out, or leave out --steps and --numbers")
     if words.steps is None or not words.numbers or not words.files:
         raise InputError("step images need --steps N, --numbers N..., and their folder or FILES")
-    order = (words.order or StepOrder.frequency).value
+    order: Order = "step" if words.order is StepOrder.step else "frequency"
     stacks = read_steps(words.files, len(words.numbers), words.steps, order)
-    wide = words.bits is not None and stacks[0].dtype.itemsize == 2
+    full_scale = float(2 ** int(words.bits) - 1) if words.bits and stacks[0].dtype == "uint16" else None
     channel: Channel = "ir" if words.beam is Beam.infrared else "green"
-    settings = StepSettings(channel=channel, full_scale=float(2 ** int(words.bits) - 1) if wide and words.bits else None)
+    settings = StepSettings(channel=channel, full_scale=full_scale)
     return decode_steps(
         stacks, words.numbers, projector_width, calibration=calibration, response=response, settings=settings
     )

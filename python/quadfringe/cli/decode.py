@@ -23,7 +23,14 @@ from quadfringe.cli._options import (
     method_named,
 )
 from quadfringe.cli._output import caution, say, write_figures
-from quadfringe.cli._steps import BeamOption, NumbersOption, OrderOption, StepsOption, StepWords, decoded_steps, separated
+from quadfringe.cli._steps import (
+    BeamOption,
+    NumbersOption,
+    OrderOption,
+    StepsOption,
+    from_steps,
+    step_words,
+)
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
@@ -151,20 +158,16 @@ def decode(
 ) -> None:
     """Decode the images of one shot, or of --steps, to absolute phase, and with --calibration to millimetres."""
     _check_given(out, calibration, depth_range_mm)
-    fringe_numbers, files = separated(sources, numbers)
-    correction = _response(response, linear)
+    words = step_words(sources, numbers, steps, order, beam, bits)
     images = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
-    fringe_words = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm}
-    if steps is not None or numbers or order or beam:
-        words = StepWords(files, fringe_numbers, steps, order, beam, bits)
-        others = {**fringe_words, **images, **settings, "bayer": bayer}
-        shape = decoded_steps(words, projector_width, calibration, correction, others)
-    else:
-        plan = _plan(projector_width, fringe_words, calibration, correction, settings)
-        shape = _decoded(_shot(files, images, bayer, bits), plan)
-    _save(shape, out, json)
+    code = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm, "bayer": bayer}
+    if words.given:
+        shape = from_steps(words, projector_width, calibration, _response(response, linear), code | images | settings)
+        return _save(shape, out, json)
+    plan = _plan(projector_width, code, calibration, _response(response, linear), settings)
+    return _save(_decoded(_shot(words.files, images, bayer, bits), plan), out, json)
 
 
 def _plan(

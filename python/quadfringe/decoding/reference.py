@@ -77,43 +77,42 @@ def decode_steps(
     `DecodeError` when no pixel is lit, or when the phases contradict each other as they do with images in another
     order.
     """
-    images = [_stack(stack, k) for k, stack in enumerate(stacks)]
     numbers = [float(number) for number in fringe_numbers]
-    if len(images) != len(numbers):
-        raise InputError(
-            f"stacks: expected {len(numbers)}, one for each fringe number, got {len(images)}; a stack is (steps, H, W)"
-        )
-    if not images:
-        raise InputError("fringe_numbers: expected at least one, with its stack of images")
+    images = _stacks(stacks, len(numbers))
     known, steps, size = calibration_of(calibration), [len(stack) for stack in images], images[0].shape[1:]
     require_memory("decoding", size, STEP_BYTES_PER_PX)
     choice = _response(response, known)
-    core = _core.StepDecoder(
-        size,
-        numbers,
-        steps,
-        projector_width_px,
-        **_given(settings, choice),
-        **_devices(known, settings.channel, size, projector_width_px),
-    )
+    devices: dict[str, Any] = _devices(known, settings.channel, size, projector_width_px)
+    core = _core.StepDecoder(size, numbers, steps, projector_width_px, **_given(settings, choice), **devices)
     described = {
-        "quadfringe_version": _core.__version__,
         "projector_width_px": projector_width_px,
         "fringes": {"numbers": numbers},
         "steps": steps,
         "channel": settings.channel,
-        "response": None if choice == "linear" else choice.model_dump(include=set(Response.model_fields)),
-        "response_from": "calibration" if response == "auto" else "plan",
+        **_described(choice, "calibration" if response == "auto" else "plan"),
         "decode": rounded(core.settings()),
     }
     return _trusted(Shape(**core.decode(images), config=described, calibration=known))
 
 
-def _stack(stack: Any, k: int) -> NDArray[Any]:
-    if not isinstance(stack, np.ndarray) or stack.ndim != 3:
-        got = f"an array of shape {stack.shape}" if isinstance(stack, np.ndarray) else brief(stack)
-        raise InputError(f"stack {k}: expected an array (steps, H, W), got {got}")
-    return stack
+def _described(response: Response | Literal["linear"], source: str) -> dict[str, Any]:
+    corrected = None if response == "linear" else response.model_dump(include=set(Response.model_fields))
+    return {"quadfringe_version": _core.__version__, "response": corrected, "response_from": source}
+
+
+def _stacks(stacks: Sequence[Any], count: int) -> list[NDArray[Any]]:
+    """Give the stacks; raise `InputError` unless there is one for each fringe number."""
+    if count == 0:
+        raise InputError("fringe_numbers: expected at least one, with its stack of images")
+    if len(stacks) != count:
+        raise InputError(
+            f"stacks: expected {count}, one for each fringe number, got {len(stacks)}; a stack is (steps, H, W)"
+        )
+    for k, stack in enumerate(stacks):
+        if not isinstance(stack, np.ndarray) or stack.ndim != 3:
+            got = f"an array of shape {stack.shape}" if isinstance(stack, np.ndarray) else brief(stack)
+            raise InputError(f"stack {k}: expected an array (steps, H, W), got {got}")
+    return list(stacks)
 
 
 def _response(response: Any, calibration: Calibration | None) -> Response | Literal["linear"]:

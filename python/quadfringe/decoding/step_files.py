@@ -48,8 +48,7 @@ def _files(paths: list[Path], wanted: int, words: str) -> list[Path]:
         return files
     advice = "give the missing ones too"
     if len(files) > wanted:
-        beyond = ", ".join(path.name for path in files[wanted : wanted + 3]) + (" ..." if len(files) > wanted + 3 else "")
-        advice = f"name only the images of the steps (by name, the first {wanted} are followed by {beyond})"
+        advice = f"name only the images of the steps (after the first {wanted} comes {files[wanted].name})"
     raise InputError(f"{words}: expected {wanted} images, {len(files)} are {where}; {advice}")
 
 
@@ -60,6 +59,6 @@ def _read_alike(files: list[Path]) -> list[NDArray[Any]]:
         image = read_grey(path)
         if images and (image.shape, image.dtype) != (images[0].shape, images[0].dtype):
             kinds = [f"{one.shape[1]} x {one.shape[0]} {one.dtype}" for one in (image, images[0])]
-            raise InputError(f"{path}: {kinds[0]}, but {files[0]} is {kinds[1]}; all images must have one size and type")
+            raise InputError(f"{path}: {kinds[0]}, but {files[0]} is {kinds[1]}; all must have one size and type")
         images.append(image)
     return images

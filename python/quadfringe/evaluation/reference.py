@@ -1,4 +1,4 @@
-"""How right the reference measurement is: on the captures with truth, and on the virtual bench against its least noise."""
+"""How right the reference measurement is: on captures with truth, and on the virtual bench against its least noise."""
 
 from __future__ import annotations
 
@@ -47,12 +47,13 @@ def capture_figures(data: Path, name: str) -> dict[str, float]:
 
 
 def cramer_rao_rad(modulations: Sequence[Map], numbers: Sequence[float], steps: int, noise: float) -> Map:
-    """Give the least standard deviation of the phase of the first fringe number, rad, for any unbiased measurement (R9).
+    """Give the least standard deviation of an unbiased phase of the first fringe number, (H, W) rad (R9).
 
     `modulations` are the true ones of each fringe number, (H, W); `noise` is that of an intensity, in the same unit.
     """
-    information = sum((n / numbers[0]) ** 2 * 0.5 * steps * (b / noise) ** 2 for n, b in zip(numbers, modulations, strict=True))
-    return np.asarray(1 / np.sqrt(information))
+    squares = (np.square(n / numbers[0] * b) for n, b in zip(numbers, modulations, strict=True))
+    amplitude = np.sqrt(0.5 * steps * sum(squares))
+    return np.asarray(np.divide(noise, amplitude, out=np.full(amplitude.shape, np.inf), where=amplitude > 0))
 
 
 def virtual_figures(surface: str, steps: int, noise: float, **scene: Any) -> dict[str, float]:
@@ -64,7 +65,7 @@ def virtual_figures(surface: str, steps: int, noise: float, **scene: Any) -> dic
     clean = config.model_copy(update={"scene": SceneConfig(surface=surface, bit_depth=12, **scene)})
     with open_system(clean) as scanner:
         taken = take_steps(scanner.projector, scanner.camera, scanner.plan, steps, "visible")
-    modulations = [_core.n_step(stack.astype(np.float32) / 4095)[2] for stack in taken.stacks]
+    modulations = [_core.n_step((stack / 4095).astype(np.float32))[2] for stack in taken.stacks]
     with open_system(config) as scanner:
         shape, shot = scanner.measure(reference=True, steps=steps), scanner.grab()
     truth = shot.truth

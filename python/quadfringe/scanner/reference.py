@@ -71,8 +71,8 @@ def _is_registered(channel: Channel, calibration: Calibration | None) -> bool:
 def _image(shot: AnyShot, channel: Channel, calibration: Calibration | None) -> NDArray[Any]:
     """Give the channel at every pixel of the visible chip: as captured, else interpolated or registered, as float32.
 
-    Green of a mosaic is interpolated. Infrared is moved to the visible pixels where the calibration registers the chips;
-    pixels that the infrared chip does not see become dark.
+    Green of a mosaic is interpolated. Infrared is moved to the visible pixels where the calibration registers the
+    chips; pixels that the infrared chip does not see become dark.
     """
     if _is_registered(channel, calibration):
         return np.nan_to_num(stages.linear_light(shot, calibration)[channel], nan=0.0)

@@ -127,8 +127,8 @@ class Scanner:
     def measure(self, *, reference: bool = False, steps: int = REFERENCE_STEPS, infrared: bool = False) -> Shape:
         """Project, grab, decode: one exposure in, one metric shape out.
 
-        With `reference`, the projector shows `steps` phase shifts of each of the fringe numbers, and all images give one
-        shape: the criterion for single shots, for objects that keep still. `infrared` measures with the infrared
+        With `reference`, the projector shows `steps` phase shifts of each of the fringe numbers, and all images give
+        one shape: the criterion for single shots, for objects that keep still. `infrared` measures with the infrared
         projector and chip. Raises `ConfigError` or ValueError when the projector cannot show single steps.
         """
         if not reference:

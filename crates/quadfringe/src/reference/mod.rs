@@ -1,6 +1,6 @@
 //! The reference measurement: N-step phase shifting at several fringe numbers, from many images of a still object.
 //!
-//! It is the criterion by which a single shot is judged, and a scanner of its own for objects that keep still. Any number of
+//! It is the criterion by which a single shot is judged, and a way to scan objects that keep still. Any number of
 //! fringe numbers, each with three steps or more. The steps of `docs/method/reference.md`:
 //!
 //! | step | file | equation |

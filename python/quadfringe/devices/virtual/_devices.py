@@ -47,8 +47,8 @@ class VirtualProjector:
 class VirtualCamera:
     """The camera of the virtual bench; its shots carry the truth.
 
-    With a frame rate, the scene advances by one frame period from shot to shot and each shot has new noise; each step of
-    an N-step capture has new noise too. A shot is rendered when it is requested, so none is ever dropped.
+    With a frame rate, the scene advances by one frame period from shot to shot and each shot has new noise; each step
+    of an N-step capture has new noise too. A shot is rendered when it is requested, so none is ever dropped.
     """
 
     name = "virtual bench"
