@@ -14,9 +14,10 @@ from typer.testing import CliRunner
 
 import quadfringe as qf
 from quadfringe.cli import app
-from quadfringe.decoding import read_steps
+from quadfringe.decoding import StepSettings, decode_steps, read_steps
 from quadfringe.devices import ExternalLight
-from quadfringe.errors import ConfigError, InputError
+from quadfringe.errors import ConfigError, DecodeError, DecodeWarning, InputError
+from quadfringe.scanner.reference import take_steps
 
 
 def run(*words: object) -> tuple[int, str]:
@@ -108,3 +109,23 @@ def test_a_system_without_projector_says_so(small_bench: Path) -> None:
         scanner.projector = ExternalLight()
         with pytest.raises(ConfigError, match="no projector"):
             scanner.measure(reference=True)
+
+
+def test_a_calibration_that_contradicts_and_depths_outside_a_range(small_bench: Path) -> None:
+    with qf.open(small_bench / "system.toml") as scanner:
+        taken = take_steps(scanner.projector, scanner.camera, scanner.plan, 4, "visible")
+        known = scanner.calibration
+    turned = [np.ascontiguousarray(stack[:, :, ::-1]) for stack in taken.stacks]
+    with pytest.raises(DecodeError, match="run backwards"):
+        decode_steps(turned, NUMBERS, WIDTH_PX, calibration=known)
+    whole = decode_steps(taken.stacks, NUMBERS, WIDTH_PX, calibration=known)
+    assert whole.depth_mm is not None
+    middle_mm = float(np.nanmedian(whole.depth_mm))
+    near = StepSettings(depth_range_mm=(middle_mm - 1, 2 * middle_mm))
+    part = decode_steps(taken.stacks, NUMBERS, WIDTH_PX, calibration=known, settings=near)
+    assert part.depth_mm is not None
+    assert np.nanmin(part.depth_mm) >= middle_mm - 1
+    assert part.warnings == ()
+    far = StepSettings(depth_range_mm=(2 * middle_mm, 3 * middle_mm))
+    with pytest.warns(DecodeWarning, match="outside the stated depths"):
+        decode_steps(taken.stacks, NUMBERS, WIDTH_PX, calibration=known, settings=far)

@@ -72,8 +72,7 @@ impl Memory {
         named.set_item("column_px", self.lend(py, decoded.column_px)?)?;
         named.set_item("modulation", self.lend(py, decoded.modulation)?)?;
         named.set_item("quality", self.lend(py, decoded.quality)?)?;
-        named
-            .set_item("wrong_order_probability", self.lend(py, decoded.wrong_order_probability)?)?;
+        named.set_item("wrong_order_probability", self.lend(py, decoded.wrong_order_probability)?)?;
         let uncertain =
             [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
         for (name, map) in uncertain {

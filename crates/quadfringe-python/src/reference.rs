@@ -47,8 +47,11 @@ impl StepDecoder {
         camera: Option<Device>,
         projector: Option<Device>,
     ) -> PyResult<Self> {
-        let sets: Vec<_> =
-            fringe_numbers.into_iter().zip(steps).map(|(number, steps)| StepSet::new(number, steps)).collect();
+        let sets: Vec<_> = fringe_numbers
+            .into_iter()
+            .zip(steps)
+            .map(|(number, steps)| StepSet::new(number, steps))
+            .collect();
         let mut options = ReferenceOptions::default();
         options.modulation_min = modulation_min.unwrap_or(options.modulation_min);
         options.saturation = saturation.unwrap_or(options.saturation);
@@ -73,7 +76,10 @@ impl StepDecoder {
         named.set_item("method_version", Reference::VERSION)?;
         named.set_item("modulation_min", options.modulation_min)?;
         named.set_item("saturation", options.saturation)?;
-        named.set_item("columns_px", options.columns_px.as_ref().map(|columns| [columns.start, columns.end]))?;
+        named.set_item(
+            "columns_px",
+            options.columns_px.as_ref().map(|columns| [columns.start, columns.end]),
+        )?;
         Ok(named)
     }
 

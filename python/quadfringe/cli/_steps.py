@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -111,13 +112,14 @@ def from_steps(
     projector_width: int,
     calibration: Path | None,
     response: str,
-    others: Mapping[str, object],
+    others: Mapping[str, Any],
 ) -> Shape:
     """Read the images and decode them; `InputError` for any of the `others`, options that only a single shot has."""
     from quadfringe.decoding import StepSettings, decode_steps, read_steps
-    from quadfringe.errors import InputError
+    from quadfringe.errors import DecodeWarning, InputError
 
-    given = [f"--{name.replace('_', '-')}" for name, value in others.items() if value is not None]
+    single = (name for name, value in others.items() if value is not None and name != "depth_range_mm")
+    given = [f"--{name.replace('_', '-')}" for name in single]
     if given:
         raise InputError(f"{', '.join(given)}: only for a single shot; leave out, or leave out --steps and --numbers")
     if words.steps is None or not words.numbers or not words.files:
@@ -126,7 +128,9 @@ def from_steps(
     stacks = read_steps(words.files, len(words.numbers), words.steps, order)
     full_scale = float(2 ** int(words.bits) - 1) if words.bits and stacks[0].dtype == "uint16" else None
     channel: Channel = "ir" if words.beam is Beam.infrared else "green"
-    settings = StepSettings(channel=channel, full_scale=full_scale)
-    return decode_steps(
-        stacks, words.numbers, projector_width, calibration=calibration, response=response, settings=settings
-    )
+    settings = StepSettings(channel, full_scale, depth_range_mm=others["depth_range_mm"])
+    with warnings.catch_warnings():  # they are printed in the words of the shape
+        warnings.simplefilter("ignore", DecodeWarning)
+        return decode_steps(
+            stacks, words.numbers, projector_width, calibration=calibration, response=response, settings=settings
+        )

@@ -13,8 +13,9 @@ True
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -29,7 +30,8 @@ from quadfringe.data.optics import core_device
 from quadfringe.decoding._kernel import rounded
 from quadfringe.decoding.params import CONTRADICTED_SHARE, STEP_BYTES_PER_PX
 from quadfringe.decoding.plan import calibration_of, response_of
-from quadfringe.errors import DecodeError, InputError
+from quadfringe.decoding.plausibility import mirrored, within_depths
+from quadfringe.errors import DecodeError, DecodeWarning, InputError
 
 __all__ = ["Channel", "StepSettings", "decode_steps"]
 
@@ -44,7 +46,8 @@ class StepSettings:
     the intensity of a saturated pixel (default: the largest value of the dtype, 1 for float32). `modulation_min`, a
     fraction of full scale, is the least fringe amplitude that counts as light; samples from `saturation` on, a fraction
     too, are left out of the fit. `columns_px` are the first and the last projector column that the camera can see: with
-    it, fringe numbers that repeat over the whole projector may be used.
+    it, fringe numbers that repeat over the whole projector may be used. Points outside `depth_range_mm` are no data; it
+    needs a calibration.
     """
 
     channel: Channel = "green"
@@ -52,6 +55,7 @@ class StepSettings:
     modulation_min: float | None = None
     saturation: float | None = None
     columns_px: tuple[float, float] | None = None
+    depth_range_mm: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.channel not in get_args(Channel):
@@ -92,7 +96,7 @@ def decode_steps(
         **_described(choice, "calibration" if response == "auto" else "plan"),
         "decode": rounded(core.settings()),
     }
-    return _trusted(Shape(**core.decode(images), config=described, calibration=known))
+    return _trusted(Shape(**core.decode(images), config=described, calibration=known), settings)
 
 
 def _described(response: Response | Literal["linear"], source: str) -> dict[str, Any]:
@@ -154,8 +158,8 @@ def _devices(
     return {"camera": core_device(camera), "projector": core_device(projector)}
 
 
-def _trusted(shape: Shape) -> Shape:
-    """Refuse a measurement without light, and one whose phases contradict each other."""
+def _trusted(shape: Shape, settings: StepSettings) -> Shape:
+    """Refuse a measurement without light, and one whose phases contradict each other or the calibration."""
     lit = np.isfinite(shape.quality)
     if not lit.any():
         least = shape.config["decode"]["modulation_min"]
@@ -170,4 +174,10 @@ def _trusted(shape: Shape) -> Shape:
             "images (steps of one fringe number after each other, or the numbers alternating), the fringe numbers, and "
             "the projector width"
         )
-    return shape
+    # The check is for the visible projector.
+    if settings.channel != "ir" and (cause := mirrored(shape)) is not None:
+        raise cause.error
+    words = [f"{cause.found}; {cause.fix}" for cause in within_depths(shape, settings.depth_range_mm)]
+    for text in words:
+        warnings.warn(text, DecodeWarning, stacklevel=3)
+    return replace(shape, config={**shape.config, "warnings": words}) if words else shape

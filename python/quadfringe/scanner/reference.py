@@ -47,7 +47,8 @@ def take_steps(projector: Projector, camera: Camera, plan: Plan, steps: int, bea
             images.append(_image(shot, channel, plan.calibration))
             full_scale = 1.0 if images[0].dtype.kind == "f" else shot.full_scale_value
         stacks.append(np.stack(images))
-    return StepsTaken(stacks, numbers, StepSettings(channel, full_scale, plan.decode.modulation_min))
+    settings = StepSettings(channel, full_scale, plan.decode.modulation_min, depth_range_mm=plan.decode.depth_range_mm)
+    return StepsTaken(stacks, numbers, settings)
 
 
 def measure_reference(projector: Projector, camera: Camera, plan: Plan, steps: int, beam: Beam) -> Shape:

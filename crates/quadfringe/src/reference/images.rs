@@ -28,7 +28,11 @@ impl<'a, T: Sample> StepImages<'a, T> {
             let (steps, ..) = stack.dim();
             let wanted = [steps.max(1), rows.max(1), columns.max(1)];
             if stack.shape() != wanted {
-                return Err(Error::shape(format!("stack {k} (steps, rows, columns)"), &wanted, stack.shape()));
+                return Err(Error::shape(
+                    format!("stack {k} (steps, rows, columns)"),
+                    &wanted,
+                    stack.shape(),
+                ));
             }
         }
         let found = Self { stacks, full_scale: T::FULL_SCALE };

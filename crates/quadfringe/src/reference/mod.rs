@@ -152,10 +152,8 @@ impl Reference {
         let height = self.shape[0];
         let every = height.div_ceil(SAMPLE_ROWS).max(1);
         let sampled: Vec<usize> = (every / 2..height).step_by(every).collect();
-        let noise: Vec<Vec<NoiseSamples>> = sampled
-            .par_iter()
-            .map_init(|| self.slots.take(), |work, y| row.noise(work, *y))
-            .collect();
+        let noise: Vec<Vec<NoiseSamples>> =
+            sampled.par_iter().map_init(|| self.slots.take(), |work, y| row.noise(work, *y)).collect();
         let mut joined = vec![NoiseSamples::default(); self.plans.len()];
         for row in noise {
             joined.iter_mut().zip(row).for_each(|(joined, samples)| joined.join(samples));
@@ -178,5 +176,58 @@ impl Reference {
         let freedom = self.search.freedom();
         let usual = if freedom > 0 { chi_square(freedom, EXCESS_QUANTILE) as f32 } else { f32::MAX };
         Writer { variances, strays, usual, number: self.code.sets[0].fringe_number as f32 }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ndarray::{Array3, s};
+    use rayon::ThreadPoolBuilder;
+    use std::f64::consts::TAU;
+
+    /// Steps with a little arbitrary noise; every tenth row and a block are dark.
+    fn stacks(sets: &[StepSet]) -> Vec<Array3<u8>> {
+        let light = |set: &StepSet| {
+            let (number, steps) = (set.fringe_number, set.steps);
+            Array3::from_shape_fn((steps, 50, 150), |(s, y, x)| {
+                let turns =
+                    number * (3.0 + 5.7 * x as f64 + 0.2 * y as f64) / 912.0 + s as f64 / steps as f64;
+                let noise = ((s * 7919 + y * 104_729 + x * 1_299_709) % 101) as f64 / 10.0;
+                let amplitude = if y % 10 == 3 { 0.0 } else { 80.0 };
+                (120.0 + noise + amplitude * (TAU * turns).cos()).round() as u8
+            })
+        };
+        sets.iter().map(light).collect()
+    }
+
+    fn bits(decoded: &Decoded) -> Vec<u32> {
+        let sigma = decoded.uncertainty_rad.as_ref().expect("not calibrated");
+        let maps = [&decoded.phase_rad, &decoded.quality, &decoded.wrong_order_probability, sigma];
+        maps.into_iter().flatten().map(|value| value.to_bits()).collect()
+    }
+
+    #[test]
+    fn results_are_the_same_for_any_number_of_threads_and_any_strides() {
+        let sets = [StepSet::new(36.0, 5), StepSet::new(35.0, 4), StepSet::new(30.0, 3)];
+        let stacks = stacks(&sets);
+        let reference =
+            Reference::new(sets, 912, [50, 150], ReferenceOptions::default(), None).expect("a plan");
+        let images = StepImages::new(stacks.iter().map(|stack| stack.view()).collect()).expect("images");
+        let expected = bits(&reference.decode(&images).expect("decodes"));
+        for threads in [1, 2, 5] {
+            let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+            let found = pool.install(|| reference.decode(&images)).expect("decodes");
+            assert_eq!(bits(&found), expected, "{threads} threads");
+        }
+        let wide: Vec<_> = stacks
+            .iter()
+            .map(|stack| Array3::from_shape_fn((stack.dim().0, 50, 300), |(s, y, x)| stack[[s, y, x / 2]]))
+            .collect();
+        let strided = wide.iter().map(|stack| stack.slice(s![.., .., ..;2])).collect();
+        let found = reference.decode(&StepImages::new(strided).expect("images")).expect("decodes");
+        assert_eq!(bits(&found), expected);
+        let dark = found.phase_rad.row(13);
+        assert!(dark.iter().all(|phase| phase.is_nan()) && found.phase_rad[[20, 75]].is_finite());
     }
 }

@@ -16,7 +16,13 @@ pub(super) struct NoiseSamples {
 
 impl NoiseSamples {
     /// Adds the pixels of row `y`, whose fringes are known.
-    pub fn add<T: Sample>(&mut self, source: Source<'_, '_, T>, y: usize, fringes: &SetRow, modulation_min: f32) {
+    pub fn add<T: Sample>(
+        &mut self,
+        source: Source<'_, '_, T>,
+        y: usize,
+        fringes: &SetRow,
+        modulation_min: f32,
+    ) {
         let Source { images, k, plan, light, .. } = source;
         let steps = plan.waves.len();
         let rows: Vec<_> = (0..steps).map(|s| images.row(k, s, y)).collect();
@@ -30,7 +36,8 @@ impl NoiseSamples {
                 self.bends.push((bend_rad * bend_rad / (6.0 * f64::from(plan.gain()))) as f32);
             }
             for (samples, frequency) in self.residuals.iter_mut().zip(2..) {
-                let power = power_at(frequency, rows.iter().map(|row| f64::from(light.of(row[x]))), &plan.waves);
+                let power =
+                    power_at(frequency, rows.iter().map(|row| f64::from(light.of(row[x]))), &plan.waves);
                 samples.push((power / steps as f64) as f32);
             }
         }

@@ -97,7 +97,9 @@ impl ReferenceOptions {
         self.response.check("response", "the camera")?;
         let width = projector_width as f64;
         match &self.columns_px {
-            Some(columns) if !(0.0 <= columns.start && columns.start < columns.end && columns.end <= width) => {
+            Some(columns)
+                if !(0.0 <= columns.start && columns.start < columns.end && columns.end <= width) =>
+            {
                 let expected = format!("first and last column in ascending order, from 0 to {width}");
                 Err(Error::value("columns_px", expected, format!("{} to {}", columns.start, columns.end)))
             }

@@ -189,7 +189,8 @@ impl Search {
         student(&found.cost, self.freedom(), &mut likelihood);
         for i in 0..BLOCK {
             let own = finest * phases.weights[self.finest_at][i] / found.precision[i];
-            let density = self.others.iter().fold(own, |product, other| product * phases.weights[other.at][i]);
+            let density =
+                self.others.iter().fold(own, |product, other| product * phases.weights[other.at][i]);
             found.evidence[i] = normal * density.sqrt() * found.likelihoods[i];
             found.likelihoods[i] /= likelihood[i];
         }
@@ -255,7 +256,8 @@ impl Found {
     fn try_order(&mut self, column: &Pixels, cost: &Pixels, likelihood: &Pixels) {
         for i in 0..BLOCK {
             let is_better = cost[i] < self.cost[i];
-            let (low, high) = (select(is_better, cost[i], self.cost[i]), select(is_better, self.cost[i], cost[i]));
+            let (low, high) =
+                (select(is_better, cost[i], self.cost[i]), select(is_better, self.cost[i], cost[i]));
             self.next[i] = if high < self.next[i] { high } else { self.next[i] };
             self.cost[i] = low;
             self.column[i] = select(is_better, column[i], self.column[i]);
