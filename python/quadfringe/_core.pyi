@@ -22,6 +22,7 @@ __all__ = [
     "PatternSequence",
     "PatternWindow",
     "PolynomialHeight",
+    "StepDecoder",
     "__profile__",
     "__version__",
     "background",
