@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import logging
 import os
 import subprocess
 import time
@@ -180,42 +179,3 @@ def scikit_image(bench: Bench) -> list[Contender]:
         return np.ma.filled(unwrap_phase(masked, rng=0), np.nan)
 
     return [Contender("scikit_image_unwrap", "wrapped phase", "relative phase", 1, timed(run), run, "relative")]
-
-
-def fringes(bench: Bench) -> list[Contender]:
-    logging.disable(logging.WARNING)  # it announces its first compilation
-    from fringes import Fringes
-
-    numbers, width = bench.config.fringes.numbers, bench.scene.projector_width
-    decoder = Fringes()
-    # One by one: given to the constructor together, it puts them back to its defaults.
-    decoder.X, decoder.Y, decoder.axes, decoder.K, decoder.N = width, bench.shot.red.shape[0], 1, len(numbers), 4
-    decoder.v = numbers
-    if width != decoder.X or list(decoder.v) != list(numbers) or list(decoder.N) != [4] * len(numbers):
-        raise SystemExit("fringes: this version does not take X, K, N, v as 2.1 does; --skip fringes")
-    shifts_rad = [np.pi - 0.5 * np.pi * i for i in range(4)]
-    stack = np.stack([image for i, n in enumerate(numbers) for image in bench.steps(n, shifts_rad, seed=200 + 4 * i)])
-
-    def run() -> Map:
-        column_px = np.asarray(decoder.decode(stack[..., None]).x).reshape(bench.shot.red.shape)
-        return 2 * np.pi * numbers[0] / width * column_px
-
-    return [Contender("fringes", "12", "column", usable_cores(), timed(run), run)]
-
-
-def peers(bench: Bench, skip: list[str], stack: ExitStack) -> list[Contender]:
-    makers: dict[str, Callable[[], list[Contender]]] = {
-        "floor": lambda: floor(stack),
-        "opencv": lambda: opencv(bench),
-        "scikit-image": lambda: scikit_image(bench),
-        "fringes": lambda: fringes(bench),
-    }
-    found = []
-    for name, make in makers.items():
-        if name in skip:
-            continue
-        try:
-            found += make()
-        except (ImportError, FileNotFoundError) as error:
-            raise SystemExit(f"{name}: {error}; install it by `make peers` (floor: Rust), or --skip {name}") from error
-    return found

@@ -12,7 +12,8 @@ precede the timed one. They do not all do the same job, and the table states the
 - OpenCV structured_light: wrapped phase alone, from one image (FTP) or three (PSP). Its sign and constant offset are
   corrected; its patterns have a whole number of pixels per period, so the bench shows the fringes instead.
 - scikit-image unwrap_phase: the wrapped two-step phase to one without jumps; relative, without holes or steps.
-- Fringes: twelve images, 36, 35 and 30 fringes in four steps each, to the projector column.
+- reference, the same likelihood in plain NumPy, and Fringes: the same twelve images, 36, 35 and 30 fringes in four
+  steps each, to the projector column; the reference with uncertainty and the probability of a wrong order too.
 
 Errors are RMS in rad of the 36-fringe phase over pixels a fringe away from edges, border and shadow; a wrong order is
 an error beyond pi. For a wrapped phase whole periods are left out. A package that is not installed is an error; --skip
@@ -25,12 +26,25 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from contenders import NOISE, SURFACE, Bench, Contender, bench_shot, peers, plain_numpy, product
+import step_contenders as many
+from contenders import (
+    NOISE,
+    SURFACE,
+    Bench,
+    Contender,
+    bench_shot,
+    floor,
+    opencv,
+    plain_numpy,
+    product,
+    scikit_image,
+)
 
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation.machine import described
@@ -106,6 +120,25 @@ def show(found: list[dict[str, Any]]) -> None:
         cells = [entry.get(key) for key in columns]
         numbers = "".join(f"{'' if cell is None else f'{cell:.4g}':>9}" for cell in cells)
         print(f"{entry['name']:28}{entry['images']:>15}{entry['gives']:>16}{entry['threads']:9}{numbers}")
+
+
+def peers(bench: Bench, skip: list[str], stack: ExitStack) -> list[Contender]:
+    stacks = many.step_stacks(bench)
+    makers: dict[str, Callable[[], list[Contender]]] = {
+        "floor": lambda: floor(stack),
+        "opencv": lambda: opencv(bench),
+        "scikit-image": lambda: scikit_image(bench),
+        "fringes": lambda: many.fringes(bench, stacks),
+    }
+    found = [*many.reference(bench, stacks), many.numpy_steps(bench, stacks)]
+    for name, make in makers.items():
+        if name in skip:
+            continue
+        try:
+            found += make()
+        except (ImportError, FileNotFoundError) as error:
+            raise SystemExit(f"{name}: {error}; install it by `make peers` (floor: Rust), or --skip {name}") from error
+    return found
 
 
 def main() -> None:

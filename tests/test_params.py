@@ -31,6 +31,7 @@ ALLOWED: dict[tuple[str, str], str] = {
         [
             ("condition", "BLOCK"),
             ("height", "BLOCK"),
+            ("reference", "BLOCK"),
             ("stages", "BLOCK"),
             ("joint", "LANES"),
             ("parallel", "LANES"),

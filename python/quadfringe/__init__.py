@@ -45,7 +45,7 @@ if TYPE_CHECKING:
         Truth,
         read_shot,
     )
-    from quadfringe.decoding import Decoder, Plan, decode, estimate_response, stages
+    from quadfringe.decoding import Decoder, Plan, decode, decode_steps, estimate_response, stages
     from quadfringe.devices import open_camera, open_projector
     from quadfringe.errors import (
         BatchError,
@@ -104,6 +104,7 @@ __all__ = [
     "__version__",
     "check_code",
     "decode",
+    "decode_steps",
     "estimate_response",
     "open_camera",
     "open_projector",
@@ -128,7 +129,7 @@ _NAMES_IN = {
         "Truth",
         "read_shot",
     ),
-    "decoding": ("Decoder", "Plan", "decode", "estimate_response"),
+    "decoding": ("Decoder", "Plan", "decode", "decode_steps", "estimate_response"),
     "devices": ("open_camera", "open_projector"),
     "scanner": ("Scanner", "open_system"),
 }

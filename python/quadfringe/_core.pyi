@@ -22,6 +22,7 @@ __all__ = [
     "PatternSequence",
     "PatternWindow",
     "PolynomialHeight",
+    "StepDecoder",
     "__profile__",
     "__version__",
     "background",
@@ -301,6 +302,41 @@ class Decoder:
         """Give the same maps from the raw mosaic of a Bayer chip (rggb, grbg, gbrg or bggr) and an infrared image.
 
         Images and errors as those of `decode`; ValueError for another pattern.
+        """
+
+@final
+class StepDecoder:
+    """Decodes N-step images of one size at several fringe numbers; planned and checked when made.
+
+    `steps` holds the number of steps of each fringe number, 3 or more; `columns_px` the first and the last projector
+    column that can be seen. An argument that is absent takes the kernel's default. Raises ValueError when the fringe
+    numbers do not distinguish these columns, or a setting is out of range.
+    """
+
+    def __new__(
+        cls,
+        shape: tuple[int, int],
+        fringe_numbers: Sequence[float],
+        steps: Sequence[int],
+        projector_width: int,
+        *,
+        full_scale: float | None = None,
+        modulation_min: float | None = None,
+        saturation: float | None = None,
+        response: _Vector3 | None = None,
+        columns_px: _Vector2 | None = None,
+        threads: int | None = None,
+        camera: Device | None = None,
+        projector: Device | None = None,
+    ) -> StepDecoder: ...
+    def settings(self) -> dict[str, str | float | list[float] | None]:
+        """Give every setting in force, defaults included, and `method_version`, for saved results."""
+
+    def decode(self, stacks: Sequence[NDArray[Any]]) -> dict[str, NDArray[np.float32]]:
+        """Give maps (H, W) by name, as `Decoder.decode`, from one stack (steps, H, W) for each fringe number.
+
+        The stacks are uint8, uint16 or float32, all of one type; nothing is copied. Raises TypeError for another type,
+        ValueError for other numbers of steps, another size or values that are not finite.
         """
 
 def optimum(n: int, projector_width: int) -> _Vector3:

@@ -6,7 +6,7 @@ use quadfringe::{Conditioner, Response, Shot};
 
 /// The response of a channel: offset, exponent and knee.
 #[derive(Clone, Copy)]
-pub struct ResponseNumbers(Response);
+pub struct ResponseNumbers(pub Response);
 
 impl<'a, 'py> FromPyObject<'a, 'py> for ResponseNumbers {
     type Error = PyErr;

@@ -3,7 +3,7 @@
 use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, value_error, views};
 use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
 use crate::device::Device;
-use crate::memory::Memory;
+use crate::memory::{Memory, Optional};
 use crate::plan::{Choices, Geometry, planned};
 use crate::workers::{Workers, detached, interruptible};
 use numpy::ndarray::{ArrayView2, Ix2};
@@ -124,7 +124,7 @@ impl Decoder {
             Images::U16(four) => self.run(py, four, |four| Shot::new(four)),
             Images::F32(four) => self.run(py, four, |four| Shot::new(four)),
         }?;
-        self.maps_by_name(py, decoded)
+        self.0.memory.named(py, decoded)
     }
 
     /// Decode the raw mosaic of a Bayer chip and an infrared image into maps by name.
@@ -141,7 +141,7 @@ impl Decoder {
             Images::U16(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
             Images::F32(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
         }?;
-        self.maps_by_name(py, decoded)
+        self.0.memory.named(py, decoded)
     }
 }
 
@@ -165,30 +165,6 @@ impl Decoder {
         };
         decoded.map_err(value_error)
     }
-
-    fn maps_by_name<'py>(&self, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
-        let named = PyDict::new(py);
-        named.set_item("phase_rad", self.0.memory.lend(py, decoded.phase_rad)?)?;
-        named.set_item("column_px", self.0.memory.lend(py, decoded.column_px)?)?;
-        named.set_item("modulation", self.0.memory.lend(py, decoded.modulation)?)?;
-        named.set_item("quality", self.0.memory.lend(py, decoded.quality)?)?;
-        named
-            .set_item("wrong_order_probability", self.0.memory.lend(py, decoded.wrong_order_probability)?)?;
-        let uncertain =
-            [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
-        for (name, map) in uncertain {
-            if let Some(map) = map {
-                named.set_item(name, self.0.memory.lend(py, map)?)?;
-            }
-        }
-        if let Some(xyz_mm) = decoded.xyz_mm {
-            named.set_item("xyz_mm", self.0.memory.lend(py, xyz_mm)?)?;
-        }
-        if let Some(albedo) = decoded.albedo {
-            named.set_item("albedo", self.0.memory.lend(py, albedo)?)?;
-        }
-        Ok(named)
-    }
 }
 
 impl Inner {
@@ -202,7 +178,8 @@ impl Inner {
         let kernel = &mut *self.kernel.lock().unwrap_or_else(PoisonError::into_inner);
         let work = || {
             let shot = scaled(shot()?, self.full_scale)?;
-            let mut maps = self.memory.maps(self.shape, self.calibrated, kernel.options().gives_albedo());
+            let optional = Optional { points: self.calibrated, albedo: kernel.options().gives_albedo() };
+            let mut maps = self.memory.maps(self.shape, optional);
             kernel.decode_into(&shot, &mut maps).map(|()| maps)
         };
         match pool {

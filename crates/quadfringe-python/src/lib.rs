@@ -12,6 +12,7 @@ mod pair;
 mod plan;
 mod projector;
 mod published_stages;
+mod reference;
 mod render;
 mod stages;
 mod workers;
@@ -29,6 +30,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<decoder::Decoder>()?;
     module.add_class::<height::PolynomialHeight>()?;
     module.add_class::<pair::PairTable>()?;
+    module.add_class::<reference::StepDecoder>()?;
     module.add_class::<projector::LightCrafter>()?;
     module.add_class::<projector::Pattern>()?;
     module.add_class::<projector::PatternSequence>()?;
@@ -51,6 +53,11 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
     module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
+    projector_functions(module)
+}
+
+/// Add the functions of the projector driver to the module.
+fn projector_functions(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
     module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;
     module.add_function(wrap_pyfunction!(projector::power_on_drive, module)?)?;

@@ -5,11 +5,20 @@ use ndarray::{Array, Array1, Dimension, Ix2, Ix3, ShapeError};
 use numpy::PyArray;
 use pyo3::exceptions::PyRuntimeError;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use quadfringe::Decoded;
 use std::sync::{Arc, Mutex, PoisonError};
 
 /// Largest number of maps kept for later shots: those of two shots.
 const WAITING: usize = 16;
+
+/// Which of the optional maps a decoder gives.
+#[derive(Clone, Copy)]
+pub struct Optional {
+    /// Points and the uncertainty of their depth, in place of the uncertainty of the phase.
+    pub points: bool,
+    pub albedo: bool,
+}
 
 /// Maps kept for the next shot.
 #[derive(Default)]
@@ -19,7 +28,7 @@ pub struct Memory {
 
 impl Memory {
     /// Maps for the kernel to fill, in memory of earlier shots. The kernel allocates those for which no memory is left.
-    pub fn maps(&self, [rows, columns]: [usize; 2], calibrated: bool, albedo: bool) -> Decoded {
+    pub fn maps(&self, [rows, columns]: [usize; 2], Optional { points, albedo }: Optional) -> Decoded {
         let map = || self.take(Ix2(rows, columns)).unwrap_or_default();
         let mut maps = Decoded::default();
         maps.phase_rad = map();
@@ -27,7 +36,7 @@ impl Memory {
         maps.modulation = map();
         maps.quality = map();
         maps.wrong_order_probability = map();
-        if calibrated {
+        if points {
             maps.uncertainty_mm = self.take(Ix2(rows, columns));
             maps.xyz_mm = self.take(Ix3(rows, columns, 3));
         } else {
@@ -65,6 +74,30 @@ impl Memory {
             reason = "no safe call lends memory to NumPy and notices when the array is gone"
         )]
         Ok(unsafe { PyArray::borrow_from_array(&view, loan.clone().into_any()) })
+    }
+
+    /// Lend the maps of a decoded measurement to Python, by name.
+    pub fn named<'py>(self: &Arc<Self>, py: Python<'py>, decoded: Decoded) -> PyResult<Bound<'py, PyDict>> {
+        let named = PyDict::new(py);
+        named.set_item("phase_rad", self.lend(py, decoded.phase_rad)?)?;
+        named.set_item("column_px", self.lend(py, decoded.column_px)?)?;
+        named.set_item("modulation", self.lend(py, decoded.modulation)?)?;
+        named.set_item("quality", self.lend(py, decoded.quality)?)?;
+        named.set_item("wrong_order_probability", self.lend(py, decoded.wrong_order_probability)?)?;
+        let uncertain =
+            [("uncertainty_rad", decoded.uncertainty_rad), ("uncertainty_mm", decoded.uncertainty_mm)];
+        for (name, map) in uncertain {
+            if let Some(map) = map {
+                named.set_item(name, self.lend(py, map)?)?;
+            }
+        }
+        if let Some(xyz_mm) = decoded.xyz_mm {
+            named.set_item("xyz_mm", self.lend(py, xyz_mm)?)?;
+        }
+        if let Some(albedo) = decoded.albedo {
+            named.set_item("albedo", self.lend(py, albedo)?)?;
+        }
+        Ok(named)
     }
 
     fn give_back(&self, values: Array1<f32>) {

@@ -41,8 +41,9 @@
 //! | `published` | inverse: the method of the paper |
 //! | `joint` | inverse: the default method, which fits all four channels together |
 //! | [`decode`] | inverse: one shot through all steps, by either method |
+//! | [`reference`] | inverse: the reference measurement, from many images of a still object |
 //!
-//! The forward half (surface, rig) and the inverse half (condition to decode) never import each other. Only tests use
+//! The forward half (surface, rig) and the inverse half (condition to reference) never import each other. Only tests use
 //! both: they render a surface, decode it and compare. The two methods never import each other either.
 //!
 //! # Render a shot and decode it
@@ -98,6 +99,8 @@ mod published;
 mod joint;
 
 pub mod decode;
+
+pub mod reference;
 
 pub use condition::{Conditioner, Response, Shot};
 pub use decode::{Decoded, Decoder, DecoderBuilder, JointOptions, Method, Options, PublishedOptions};

@@ -1,4 +1,4 @@
-"""`quadfringe decode`: the image files of one shot to absolute phase and shape."""
+"""`quadfringe decode`: the image files of one shot, or of a reference measurement, to absolute phase and shape."""
 
 from __future__ import annotations
 
@@ -17,13 +17,20 @@ from quadfringe.cli._options import (
     BitsOption,
     CalibrationOption,
     ColumnsOption,
-    Fringes3,
     JsonOption,
     PredeformedOption,
     decode_settings,
     method_named,
 )
 from quadfringe.cli._output import caution, say, write_figures
+from quadfringe.cli._steps import (
+    BeamOption,
+    NumbersOption,
+    OrderOption,
+    StepsOption,
+    from_steps,
+    step_words,
+)
 
 if TYPE_CHECKING:
     from quadfringe.config import BayerPattern
@@ -43,12 +50,20 @@ class Unwrapping(StrEnum):
 ResultOption = Annotated[
     Path, typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply or .tif.")
 ]
-FolderArgument = Annotated[
-    Path | None,
+SourcesArgument = Annotated[
+    list[str] | None,
     typer.Argument(
-        metavar="[FOLDER]",
+        metavar="[FOLDER | FILES...]",
         help="Folder with red.png, green.png, blue.png and ir.png (or rgb.png and ir.png; with --bayer raw.png and "
-        "ir.png), in place of the options of single images.",
+        "ir.png), in place of the options of single images. With --steps, the images of the steps or their folder, "
+        "sorted by name.",
+    ),
+]
+FringesOption = Annotated[
+    tuple[float, float, float] | None,
+    typer.Option(
+        metavar="N N N",
+        help="Number of fringes over the projector width of a single shot: of red and blue, of green, of infrared.",
     ),
 ]
 ImageOption = Annotated[
@@ -114,10 +129,14 @@ InstantsOption = Annotated[
 
 
 def decode(
-    fringes: Fringes3,
     projector_width: ColumnsOption,
     out: ResultOption,
-    folder: FolderArgument = None,
+    sources: SourcesArgument = None,
+    fringes: FringesOption = None,
+    steps: StepsOption = None,
+    numbers: NumbersOption = None,
+    order: OrderOption = None,
+    beam: BeamOption = None,
     red: ImageOption = None,
     green: ImageOption = None,
     blue: ImageOption = None,
@@ -137,22 +156,36 @@ def decode(
     channel_instants_us: InstantsOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Decode the images of one shot to absolute phase, and with --calibration to millimetres."""
-    from quadfringe import decoding
-    from quadfringe.config import Fringes, checked
-
+    """Decode the images of one shot, or of --steps, to absolute phase, and with --calibration to millimetres."""
     _check_given(out, calibration, depth_range_mm)
+    words = step_words(sources, numbers, steps, order, beam, bits)
+    images = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
     settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
     settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
-    plan = decoding.Plan(
-        projector_width,
-        checked(Fringes, {"numbers": fringes, "predeformed_z_mm": predeformed_z_mm}, "--fringes"),
-        calibration,
-        _response(response, linear),
-        decode_settings(settings),
-    )
-    files = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    _save(_decoded(_shot(folder, files, bayer, bits), plan), out, json)
+    code = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm, "bayer": bayer}
+    if words.given:
+        shape = from_steps(words, projector_width, calibration, _response(response, linear), code | images | settings)
+        return _save(shape, out, json)
+    plan = _plan(projector_width, code, calibration, _response(response, linear), settings)
+    return _save(_decoded(_shot(words.files, images, bayer, bits), plan), out, json)
+
+
+def _plan(
+    projector_width: int,
+    fringes: Mapping[str, Any],
+    calibration: Path | None,
+    response: str,
+    settings: Mapping[str, Any],
+) -> Plan:
+    from quadfringe import decoding
+    from quadfringe.config import Fringes, checked
+    from quadfringe.errors import InputError
+
+    if fringes["fringes"] is None:
+        raise InputError("a single shot needs --fringes N N N, step images --steps N and --numbers N...; give one")
+    named = {"numbers": fringes["fringes"], "predeformed_z_mm": fringes["predeformed_z_mm"]}
+    found = checked(Fringes, named, "--fringes")
+    return decoding.Plan(projector_width, found, calibration, response, decode_settings(settings))
 
 
 def _decoded(shot: AnyShot, plan: Plan) -> Shape:
@@ -186,11 +219,14 @@ def _response(response: str | None, linear: bool) -> str:
     return "linear" if linear else response or "auto"
 
 
-def _shot(folder: Path | None, files: Mapping[str, Path | None], bayer: Bayer | None, bits: Bits | None) -> AnyShot:
+def _shot(folders: list[Path], files: Mapping[str, Path | None], bayer: Bayer | None, bits: Bits | None) -> AnyShot:
     """Read the shot from a folder, or from separate images, a colour image, or a raw mosaic."""
     from quadfringe.data import read_shot
     from quadfringe.errors import InputError
 
+    if len(folders) > 1:
+        raise InputError(f"expected one folder, got {len(folders)} files and folders; step images need --steps")
+    folder = folders[0] if folders else None
     given = [f"--{name}" for name, path in files.items() if path is not None]
     if folder is not None and given:
         raise InputError(f"{folder}: a folder holds all images; leave out {', '.join(given)}, or the folder")

@@ -16,7 +16,7 @@ from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, Shot, condit
 from quadfringe.decoding.plan import Plan
 from quadfringe.errors import InputError
 
-__all__ = ["KernelDecoder", "Size", "check_shot", "size_of"]
+__all__ = ["KernelDecoder", "Size", "check_shot", "rounded", "size_of"]
 
 Size = tuple[int, int]
 # Peak memory of a decoder with two shapes, bytes per pixel, at fringes of 24 px (`pytest tests/test_size_limits.py`
@@ -41,7 +41,7 @@ class KernelDecoder:
         self._described = (
             plan.described
             | self._response_described(source)
-            | {"decode": _rounded(self._idle[0].settings()) | _stated_depths(plan)}
+            | {"decode": rounded(self._idle[0].settings()) | _stated_depths(plan)}
         )
 
     @property
@@ -123,7 +123,7 @@ class KernelDecoder:
         }
 
 
-def _rounded(settings: Mapping[str, Any]) -> dict[str, Any]:
+def rounded(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Give the settings with the shortest decimals of the kernel's float32: 0.02 in place of 0.0199999995529..."""
     return {
         name: float(str(np.float32(value))) if isinstance(value, float) and float(np.float32(value)) == value else value

@@ -134,3 +134,11 @@ BELOW_BLACK, BELOW_NOISES = 0.25, 3.0
 BELOW_SHARE = 0.05
 # Median of the absolute value of a normal deviation, in standard deviations. Follows from the distribution.
 MEDIAN_OF_NORMAL = 0.6745
+
+# --- The reference measurement
+
+# Share of the lit pixels whose fringe numbers contradict each other from which a reference measurement is refused. With
+# images in a wrong order it is 0.9 and more, on the captures 0.001 (`pytest tests/test_reference.py`).
+CONTRADICTED_SHARE = 0.5
+# Peak memory of a reference measurement beyond its images, bytes per pixel: its maps. Not measured with other inputs.
+STEP_BYTES_PER_PX = 60

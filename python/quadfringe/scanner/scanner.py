@@ -23,6 +23,7 @@ from quadfringe.decoding.plan import calibration_of, stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.io.locks import ForkedLock
+from quadfringe.scanner.reference import REFERENCE_STEPS, Beam, measure_reference
 from quadfringe.scanner.streaming import LiveStream, Tap
 
 __all__ = ["Scanner", "open_system"]
@@ -123,9 +124,19 @@ class Scanner:
                 return self.response
         return "linear"
 
-    def measure(self) -> Shape:
-        """Project, grab, decode: one exposure in, one metric shape out."""
-        return self.decode(self.grab())
+    def measure(self, *, reference: bool = False, steps: int = REFERENCE_STEPS, infrared: bool = False) -> Shape:
+        """Project, grab, decode: one exposure in, one metric shape out.
+
+        With `reference`, the projector shows `steps` phase shifts of each of the fringe numbers, and all images give
+        one shape: the criterion for single shots, for objects that keep still. `infrared` measures with the infrared
+        projector and chip. Raises `ConfigError` or ValueError when the projector cannot show single steps.
+        """
+        if not reference:
+            return self.decode(self.grab())
+        self._end_stream()
+        beam: Beam = "infrared" if infrared else "visible"
+        shape = measure_reference(self.projector, self.camera, self.plan, steps, beam)
+        return replace(shape, config=self._settings | dict(shape.config))
 
     def stream(
         self,

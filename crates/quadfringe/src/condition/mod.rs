@@ -17,6 +17,7 @@ mod shot;
 mod unmix;
 
 pub use estimate::{ResponseEstimate, estimate_response, estimate_response_of_shot};
+pub(crate) use params::{CLIPPED, LIGHT_MAX};
 pub(crate) use plan::Plan;
 pub use response::Response;
 pub use sample::Sample;

@@ -8,12 +8,12 @@
 
 /// Greatest intensity of a shot, in fractions of full scale. Images of a greater range than the camera's stay far below it;
 /// beyond it, products of intensities overflow in `f32`. `cargo test -p quadfringe --test fuzzed` decodes such shots.
-pub(super) const LIGHT_MAX: f32 = 1e4;
+pub(crate) const LIGHT_MAX: f32 = 1e4;
 
 /// A pixel with at least this intensity counts as saturated, fraction of full scale. Follows from the format of an
 /// 8-bit camera: 0.998 lies between its last two values (254 and 255 of 255). A smaller value discards highlights that
 /// are still linear; a larger one misses clipped pixels of cameras whose last value is below full scale.
-pub(super) const CLIPPED: f32 = 0.998;
+pub(crate) const CLIPPED: f32 = 0.998;
 
 /// Exponent of the knee `1 - knee I^20`, which compresses highlights. With a smaller exponent the knee would also bend
 /// middle tones, which the power law describes. Not measured: at 20 the knee acts above 0.85 of full scale, where

@@ -117,7 +117,11 @@ impl Decoder {
             Wanted { points: self.triangulator.is_some(), albedo: self.options.gives_albedo() },
         );
         self.plan.prepare(shot);
-        let finish = Finish { four: &self.four, triangulator: self.triangulator.as_ref() };
+        let finish = Finish {
+            period_px: self.four.period_px(),
+            projector_width: self.four.projector_width,
+            triangulator: self.triangulator.as_ref(),
+        };
         let Self { plan, options, engine, .. } = self;
         // Enters the thread pool once. Otherwise every parallel stage would enter it from outside and have to wake its
         // threads.

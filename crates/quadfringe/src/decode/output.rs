@@ -1,7 +1,6 @@
-//! The maps of a decoded shot, and the last step of both methods: columns and points from the absolute phase.
+//! The maps of a decoded shot, and the last step of every method: columns and points from the absolute phase.
 
 use super::params::ROWS_AT_ONCE;
-use crate::encoding::FourChannel;
 use crate::height::Triangulator;
 use crate::parallel::{first_of_line, spare};
 use multiversion::multiversion;
@@ -43,7 +42,7 @@ pub struct Decoded {
 
 /// Which of the optional maps are wanted.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Wanted {
+pub(crate) struct Wanted {
     /// Points and the uncertainty of their depth, in place of the uncertainty of the phase.
     pub points: bool,
     pub albedo: bool,
@@ -89,7 +88,7 @@ impl Decoded {
     }
 
     /// Prepares every map for a decoder of images of `shape`. Maps that already fit keep their memory.
-    pub(super) fn fit(&mut self, shape: [usize; 2], wanted: Wanted) {
+    pub(crate) fn fit(&mut self, shape: [usize; 2], wanted: Wanted) {
         let [rows, columns] = shape;
         let maps = [
             &mut self.phase_rad,
@@ -156,9 +155,11 @@ pub(crate) struct OutputRow<'a> {
     pub xyz: Option<&'a mut [f32]>,
 }
 
-/// The last step of both methods, row by row: columns and points from the absolute phase, with their uncertainty.
+/// The last step of every method, row by row: columns and points from the absolute phase, with their uncertainty.
 pub(crate) struct Finish<'a> {
-    pub four: &'a FourChannel,
+    /// Projector columns in one turn of the absolute phase.
+    pub period_px: f64,
+    pub projector_width: usize,
     pub triangulator: Option<&'a Triangulator>,
 }
 
@@ -166,8 +167,8 @@ impl Finish<'_> {
     /// Finishes row `y`. Its phase, modulation, quality, uncertainty of the phase and wrong-order probability must be
     /// known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
-        let columns_per_rad = self.four.period_px() as f32 / TAU;
-        let end = self.four.projector_width as f32 + 0.5;
+        let columns_per_rad = self.period_px as f32 / TAU;
+        let end = self.projector_width as f32 + 0.5;
         let sigma_unit = if self.triangulator.is_some() { columns_per_rad } else { 1.0 };
         fill_columns(Projection { columns_per_rad, end, sigma_unit }, row);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {

@@ -1,13 +1,15 @@
 //! Step 12: the albedo of every pixel, which is its light without fringes.
 //!
-//! The energy gives albedo and contrast of cells of a few pixels, so the light that a pixel of the mean albedo would have is known.
-//! What differs is texture or noise. Texture is a relative change of all channels in common and one of each channel, with
-//! variances that are estimated in blocks of pixels (empirical Bayes); the change of a pixel is its expectation (J30).
+//! The energy gives albedo and contrast of cells of a few pixels. A pixel at an edge takes the albedo of the cells on its side
+//! (J30). What then differs from its light is texture or noise. Texture is a relative change of all channels in common and one of
+//! each channel, with variances that are estimated in blocks of pixels (empirical Bayes); the change of a pixel is its expectation
+//! (J31).
 
-use super::energy::{Energy, FringeRows, exp};
+use super::energy::{Energy, FringeRows};
 use super::params::albedo::{CANDIDATES, EXPONENT_MAX, ROWS};
 use super::scene::Scene;
 use crate::parallel::angle::sin_cos;
+use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
@@ -111,7 +113,9 @@ impl Row {
         let Self { albedo, signal, rest } = self;
         for c in 0..4 {
             albedo[c].clone_from(&fringes.albedo[c]);
-            [&mut albedo[c], &mut signal[c], &mut rest[c]].map(|row| row.resize(scene.grid.stride, 0.0));
+            [&mut albedo[c], &mut signal[c], &mut rest[c]]
+                .into_iter()
+                .for_each(|row| row.resize(scene.grid.stride, 0.0));
         }
         let [first, green, infrared] = known.ratios;
         let contrast = fringes.contrast.each_ref().map(Vec::as_slice);
@@ -207,7 +211,7 @@ fn choose(
         for c in 0..4 {
             let out = &mut lanes_mut(&mut albedo[c])[at];
             for x in 0..LANES {
-                out[x] = if weights[x] > 0.0 { sums[c][x] / weights[x] } else { out[x] };
+                out[x] = if (weights[x] > 0.0) & (out[x] > 0.0) { sums[c][x] / weights[x] } else { out[x] };
             }
         }
     }

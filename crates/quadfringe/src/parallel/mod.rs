@@ -3,6 +3,7 @@
 
 pub(crate) mod aligned;
 pub(crate) mod angle;
+pub(crate) mod exp;
 pub(crate) mod lanes;
 pub(crate) mod slots;
 

@@ -12,7 +12,7 @@ from quadfringe.config.cameras import VirtualConfig
 from quadfringe.data import AnyShot, Calibration, Stamp
 from quadfringe.data.host_clock import HOST_CLOCK
 from quadfringe.devices import CameraStatistics, Devices, Keep
-from quadfringe.devices.light import Levels, Light
+from quadfringe.devices.light import Levels, Light, Step
 from quadfringe.devices.virtual._bench import VirtualBench
 from quadfringe.errors import ConfigError
 
@@ -47,8 +47,8 @@ class VirtualProjector:
 class VirtualCamera:
     """The camera of the virtual bench; its shots carry the truth.
 
-    With a frame rate, the scene advances by one frame period from shot to shot and each shot has new noise. A shot is
-    rendered when it is requested, so none is ever dropped.
+    With a frame rate, the scene advances by one frame period from shot to shot and each shot has new noise; each step
+    of an N-step capture has new noise too. A shot is rendered when it is requested, so none is ever dropped.
     """
 
     name = "virtual bench"
@@ -89,7 +89,9 @@ class VirtualCamera:
     def _expose(self) -> AnyShot:
         self._check_open()
         exposure = self._exposures if self._rate_hz else 0
-        shot = self._bench.expose(exposure / self._rate_hz if self._rate_hz else 0.0, seed=self._bench.seed(exposure))
+        # Steps are combined to one measurement, in which equal noise would cancel.
+        seed = self._bench.seed(self._exposures if isinstance(self._bench.projected, Step) else exposure)
+        shot = self._bench.expose(exposure / self._rate_hz if self._rate_hz else 0.0, seed=seed)
         self._exposures += 1
         return replace(shot, stamp=Stamp(self._exposures, HOST_CLOCK.now_ns() // 1000, self.name))
 

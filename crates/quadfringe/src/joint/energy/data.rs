@@ -1,10 +1,10 @@
 //! The data term: residuals of the intensities and their derivatives with respect to the unknowns.
 
-use super::exp::exp;
 use super::plane::{total, vectors};
 use super::scales::DataSums;
 use super::tile::Tile;
 use crate::parallel::angle::sin_cos;
+use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 

@@ -2,7 +2,6 @@
 
 use super::blocks::{information, phase_information};
 use super::data::linearise;
-use super::exp::exp;
 use super::plane::{Column, Fields, vectors};
 use super::priors::weigh;
 use super::scales::{Determined, Scales, variance_share};
@@ -12,6 +11,7 @@ use super::tile::{Found, Tile};
 use crate::joint::params::energy::{
     ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
 };
+use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
 
 /// Writes albedo and contrast of a vector of cells.

@@ -8,7 +8,6 @@ mod blocks;
 mod cells;
 mod data;
 mod descent;
-mod exp;
 mod layout;
 mod plane;
 mod preconditioner;
@@ -87,7 +86,6 @@ impl Energy {
 }
 
 pub(super) use cells::{FringeRows, Rows};
-pub(super) use exp::exp;
 
 /// Side of the cells in pixels: the largest power of two that resolves the fringes.
 fn cell_px(period_px: f64) -> usize {

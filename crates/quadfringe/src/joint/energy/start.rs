@@ -1,10 +1,10 @@
 //! The start: contrast and albedo that explain the light with the phase as it is.
 
-use super::exp::exp;
 use super::plane::{Plane, STRIDE, total, vectors};
 use super::tile::Tile;
 use crate::joint::params::energy::{ALBEDO_LIMITS, CONTRAST_START_LIMITS, START_ROUNDS};
 use crate::parallel::angle::sin_cos;
+use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 

@@ -1,11 +1,11 @@
 //! The energy of every cell (J16): the data, and the priors of the differences that begin at the cell.
 
 use super::data::{Cells, predict};
-use super::exp::{exp, ln_1p};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
 use super::priors::{COUNT, FREEDOM, bending, squares};
 use super::scales::Scales;
 use crate::joint::params::energy::BEND_FREEDOM;
+use crate::parallel::exp::{exp, ln_1p};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 

@@ -7,7 +7,7 @@ const POWERS: [f32; 6] = [0.000_154_03, 0.001_333_36, 0.009_618_13, 0.055_504_11
 
 /// Exponential function; relative error below 8e-6 for |x| < 79, limited beyond. It has no branches, so loops vectorise.
 #[inline(always)]
-pub(super) fn exp(x: f32) -> f32 {
+pub(crate) fn exp(x: f32) -> f32 {
     let power = x * LOG2_E;
     let power = if power > 115.0 { 115.0 } else { power };
     let power = if power > -115.0 { power } else { -115.0 };
@@ -32,7 +32,7 @@ const LOGARITHM: [f32; 8] = [
 
 /// Logarithm of 1 + x for x >= 0; error below 1e-6 of the result plus 1e-6. It has no branches, so loops vectorise.
 #[inline(always)]
-pub(super) fn ln_1p(x: f32) -> f32 {
+pub(crate) fn ln_1p(x: f32) -> f32 {
     // 1 + x = 2^whole (1 + part), with 1 + part from 2/3 to 4/3.
     let two_thirds = 0x3F2A_AAAB_u32;
     let bits = (1.0 + x).to_bits().wrapping_sub(two_thirds);
