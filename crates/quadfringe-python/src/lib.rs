@@ -8,6 +8,7 @@ mod decoder;
 mod device;
 mod height;
 mod memory;
+mod mesh;
 mod pair;
 mod plan;
 mod projector;
@@ -51,6 +52,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
     module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::mesh_from_points, module)?)?;
+    module.add_function(wrap_pyfunction!(mesh::normals_from_points, module)?)?;
     module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
     module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;
     module.add_function(wrap_pyfunction!(projector::power_on_drive, module)?)?;

@@ -41,7 +41,7 @@ class Unwrapping(StrEnum):
 
 
 ResultOption = Annotated[
-    Path, typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply or .tif.")
+    Path, typer.Option(metavar="FILE", help="Result: .npz; with --calibration also .ply, .pcd, .stl, .obj, .glb or .tif.")
 ]
 FolderArgument = Annotated[
     Path | None,

@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 /// Rooms in the order of `lib.rs`. A file belongs to the longest name that its path begins with: what every method of
 /// decoding takes and gives stands above the methods, the decoder that chooses between them below.
-const ORDER: [&str; 16] = [
+const ORDER: [&str; 17] = [
     "error",
     "parallel",
     "encoding",
@@ -20,6 +20,7 @@ const ORDER: [&str; 16] = [
     "condition",
     "stages",
     "height",
+    "mesh",
     "decode/params",
     "decode/method",
     "decode/options",
@@ -35,7 +36,7 @@ const METHODS: [&str; 2] = ["published", "joint"];
 
 /// Rooms in which a child and the module around it may use each other: types that all files of the room share stand in its
 /// `mod.rs`.
-const SHARING: [&str; 5] = ["optics", "surface", "condition", "stages", "published"];
+const SHARING: [&str; 6] = ["optics", "surface", "condition", "stages", "mesh", "published"];
 
 fn is_strict(path: &str) -> bool {
     room_of(path).is_none_or(|room| !SHARING.contains(&ORDER[room]))

@@ -1,0 +1,27 @@
+//! Tuned numbers of the mesh, each with its unit, its trade-off and the command that measures it.
+
+/// Cotangent of the least angle between a piece of surface and the line of sight, 14 degrees. Two neighbouring points whose
+/// connection is nearer to the line of sight belong to two surfaces: their depths differ by more than four footprints of a
+/// pixel, where the virtual bench as well says that its scenes have a step. Larger: connections over steps in depth stay.
+/// Smaller: the flanks of round objects are cut off. `python evaluation/mesh.py` prints what is cut off and what stays.
+pub(super) const COTANGENT: f64 = 4.0;
+
+/// Squared cosine of the same angle. Follows from [`COTANGENT`].
+pub(super) const COSINE2: f64 = COTANGENT * COTANGENT / (1.0 + COTANGENT * COTANGENT);
+
+/// Number of standard deviations by which noise may move two neighbours apart along the line of sight. Fewer: noisy
+/// surfaces fall apart. More: connections over steps stay where the noise is large. `python evaluation/mesh.py` prints
+/// both.
+pub(super) const DEVIATIONS: f64 = 3.0;
+
+/// Greatest number of pixels of a hole that may be filled. A larger hole hides shapes that its rim does not show. The time
+/// grows with its square. Not measured.
+pub(super) const HOLE_MAX_PX: usize = 1000;
+
+/// Change of a filled value, as a share of it, below which the relaxation ends. Follows from the rounding of `f32`, 6e-8,
+/// in which points are given.
+pub(super) const FILL_TOLERANCE: f64 = 1e-8;
+
+/// Greatest number of sweeps of the relaxation. Follows from [`HOLE_MAX_PX`]: a round hole of that size is 36 pixels wide,
+/// and the slowest part of the error falls by 0.4 % in each sweep.
+pub(super) const FILL_SWEEPS: usize = 5000;
