@@ -29,7 +29,7 @@ impl Cell {
         let falls = falls(corners);
         let diagonal = if falls { are_joined(a, d) } else { are_joined(b, c) };
         let holds = if falls { [left && bottom, top && right] } else { [left && top, right && bottom] };
-        Self { falls, holds: holds.map(|holds| holds && diagonal) }
+        Self { falls, holds: [holds[0] && diagonal, holds[1] && diagonal] }
     }
 
     /// The triangles, as corners of the cell, counter-clockwise as the camera sees them.
@@ -75,7 +75,7 @@ impl Cells {
         all.par_chunks_mut(columns.max(1)).enumerate().for_each(|(y, out)| {
             for (x, out) in out.iter_mut().enumerate() {
                 let i = y * stride + x;
-                let corners = [i, i + 1, i + stride, i + stride + 1].map(|i| nodes[i]);
+                let corners = [nodes[i], nodes[i + 1], nodes[i + stride], nodes[i + stride + 1]];
                 let sides = Sides {
                     top: links.right[i],
                     bottom: links.right[i + stride],

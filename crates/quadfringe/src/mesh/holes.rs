@@ -103,7 +103,7 @@ impl Rim {
         }
     }
 
-    /// Whether the rim lies on one plane within the step that neighbouring pixels of a surface may have (M4).
+    /// Whether the rim lies on one plane within the step that neighbouring pixels of a surface may have (T5).
     fn is_one_surface(&self) -> bool {
         let mean = mean_of(&self.values);
         let slope = slope_of(&self.values, mean);

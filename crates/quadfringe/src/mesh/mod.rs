@@ -1,10 +1,12 @@
 //! A surface from the points of a shot: triangles on the grid of pixels, normals, and small holes filled.
 //!
 //! Two neighbouring pixels are joined unless only a surface that the camera sees at a grazing angle could hold both of their
-//! points, noise allowed for (M1). Four joined neighbours give two triangles, three give one. The normal of a point is that
-//! of the triangles around it (M2); its uncertainty follows from that of the depths (M3).
+//! points, noise allowed for (T1). Four joined neighbours give two triangles, three give one. The normal of a point is that
+//! of its neighbours along row and column (T2); its uncertainty follows from that of the depths (T3) and from how much the
+//! errors of neighbours have in common (T4). Small holes may be filled from their rims (T5).
 
 mod cells;
+mod correlation;
 mod holes;
 mod nodes;
 mod normals;
@@ -14,7 +16,7 @@ mod vector;
 use cells::Cells;
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 use nodes::{Grid, Links, Nodes};
-use normals::Normal;
+use normals::{Field, Normal};
 use params::HOLE_MAX_PX;
 use rayon::prelude::*;
 
@@ -64,7 +66,8 @@ pub struct Mesh {
 /// Normals of an image.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Normals {
-    /// Unit normals towards the camera, `(rows, columns, 3)`; NaN where a point is in no triangle.
+    /// Unit normals towards the camera, `(rows, columns, 3)`; NaN where a point has no
+    /// neighbours on its surface.
     pub normals: Array3<f32>,
     /// As [`Mesh::normal_uncertainty_rad`], `(rows, columns)`.
     pub uncertainty_rad: Array2<f32>,
@@ -128,6 +131,7 @@ pub fn normals_from_points(points: &Points<'_>) -> Result<Normals> {
     let links = Links::new(&nodes);
     let grid = nodes::thinned(nodes, links, &MeshOptions::default());
     let cells = Cells::new(&grid);
+    let field = Field::new(&grid, &cells);
     let (rows, columns, _) = points.xyz_mm.dim();
     let mut normals = Array3::zeros((rows, columns, 3));
     let mut uncertainty_rad = Array2::zeros((rows, columns));
@@ -135,7 +139,7 @@ pub fn normals_from_points(points: &Points<'_>) -> Result<Normals> {
     outs.enumerate().for_each(|(y, (mut directions, mut uncertainties))| {
         let row = directions.rows_mut().into_iter().zip(&mut uncertainties).enumerate();
         row.for_each(|(x, (mut out, uncertainty_rad))| {
-            let normal = Normal::new(&grid, &cells, [y, x]);
+            let normal = field.normal([y, x]);
             out.iter_mut().zip(normal.direction).for_each(|(out, c)| *out = c);
             *uncertainty_rad = normal.uncertainty_rad;
         });
@@ -165,10 +169,10 @@ fn gathered(grid: &Grid, step: usize, is_filled: impl Fn([u32; 2]) -> bool + Syn
     let places = cells.used(nodes);
     let mut numbers = vec![0; nodes.all.len()];
     places.iter().zip(0..).for_each(|(i, number)| numbers[*i as usize] = number);
-    let columns = nodes.columns as u32;
+    let (columns, field) = (nodes.columns as u32, Field::new(grid, &cells));
     let normals = places.par_iter().map(|i| {
         let Normal { direction, uncertainty_rad } =
-            Normal::new(grid, &cells, [i / columns, i % columns].map(|at| at as usize));
+            field.normal([i / columns, i % columns].map(|at| at as usize));
         (direction, uncertainty_rad)
     });
     let (normals, normal_uncertainty_rad) = normals.unzip();

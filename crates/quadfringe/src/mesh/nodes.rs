@@ -1,7 +1,7 @@
 //! The points as nodes of a grid, and which neighbours are joined by one surface.
 
 use super::params::{COSINE2, COTANGENT, DEVIATIONS};
-use super::vector::{difference, dot, length, sum, wide};
+use super::vector::{difference, dot, sum, wide};
 use super::{MeshOptions, Points};
 use ndarray::{ArrayView1, Axis};
 use rayon::prelude::*;
@@ -39,6 +39,12 @@ impl Node {
         }
         let deviation = depth_deviation_mm / point[2];
         Self { point, deviation: if deviation.is_finite() { deviation.max(0.0) } else { 0.0 } }
+    }
+
+    /// Squared distance by which one standard deviation moves the point along its ray, mm^2.
+    fn moved2(&self) -> f64 {
+        let (p, deviation) = (wide(self.point), f64::from(self.deviation));
+        deviation * deviation * dot(p, p)
     }
 
     pub fn is_some(&self) -> bool {
@@ -129,6 +135,7 @@ pub(super) struct Connection {
 }
 
 impl Connection {
+    #[inline]
     pub fn new(a: Node, b: Node) -> Self {
         let (a, b) = (wide(a.point), wide(b.point));
         let (connection, middle) = (difference(b, a), sum(a, b));
@@ -143,14 +150,15 @@ impl Connection {
 }
 
 /// Whether a surface that the camera sees may hold both points: the angle between their connection and the line of sight
-/// is at least the limit, or noise explains the rest (M1). False where there is no point.
+/// is at least the limit, or noise explains the rest (T1). False where there is no point.
+#[inline]
 pub(super) fn are_joined(a: Node, b: Node) -> bool {
     let Connection { length2, along2 } = Connection::new(a, b);
     // The cosine is smaller than that of the limit; this needs no root and is true nearly everywhere.
     along2 <= COSINE2 * length2 || {
         let across = (length2 - along2).max(0.0).sqrt();
-        let moved = [a, b].map(|node| f64::from(node.deviation) * length(wide(node.point)));
-        along2.sqrt() <= across * COTANGENT + DEVIATIONS * moved[0].hypot(moved[1])
+        let moved2 = a.moved2() + b.moved2();
+        along2.sqrt() <= across * COTANGENT + DEVIATIONS * moved2.sqrt()
     }
 }
 

@@ -1,6 +1,7 @@
-//! Normals of the nodes and their uncertainty (M2, M3).
+//! Normals of the nodes and their uncertainty (T2, T3).
 
 use super::cells::Cells;
+use super::correlation::Shares;
 use super::nodes::{Grid, Node, Nodes};
 use super::vector::{Vector, cross, difference, dot, length, scaled, sum, wide};
 
@@ -11,22 +12,41 @@ pub(super) struct Normal {
     pub uncertainty_rad: f32,
 }
 
-impl Normal {
-    pub const NONE: Self = Self { direction: [f32::NAN; 3], uncertainty_rad: f32::NAN };
+/// What the normals of a grid are made from.
+pub(super) struct Field<'a> {
+    grid: &'a Grid,
+    cells: &'a Cells,
+    rows: Shares,
+    columns: Shares,
+}
 
-    /// The normal of a node, from its neighbours along row and column, else from the triangles that hold it.
-    pub fn new(grid: &Grid, cells: &Cells, at: [usize; 2]) -> Self {
-        let tangents = Tangent::along_column(grid, at).zip(Tangent::along_row(grid, at));
-        let node = wide(grid.nodes.all[at[0] * grid.nodes.columns + at[1]].point);
-        match tangents {
-            Some((down, right)) => {
-                let sum = cross(down.vector, right.vector);
-                let levers = [Lever::new(&down, right.vector), Lever::new(&right, down.vector)];
-                Self::of(node, sum, &levers)
-            }
-            None => Star::new(&grid.nodes, cells, at).normal(node),
-        }
+impl<'a> Field<'a> {
+    pub fn new(grid: &'a Grid, cells: &'a Cells) -> Self {
+        let Grid { nodes, links } = grid;
+        let [rows, columns] = [(&links.right, 1), (&links.down, nodes.columns)]
+            .map(|(links, stride)| Shares::new(nodes, links, stride));
+        Self { grid, cells, rows, columns }
     }
+
+    /// The normal of the node at (row, column), from its neighbours along row and column, else from the triangles that
+    /// hold it.
+    pub fn normal(&self, [y, x]: [usize; 2]) -> Normal {
+        let Grid { nodes, links } = self.grid;
+        let i = y * nodes.columns + x;
+        let node = wide(nodes.all[i].point);
+        let right = Tangent::new(nodes, &links.right, self.rows, [i, 1]);
+        let down = Tangent::new(nodes, &links.down, self.columns, [i, nodes.columns]);
+        if let Some((down, right)) = down.zip(right) {
+            let levers = [Lever::new(&down, right.vector), Lever::new(&right, down.vector)];
+            return Normal::of(node, cross(down.vector, right.vector), &levers);
+        }
+        let share = 0.5 * (self.rows.next + self.columns.next);
+        Star::new(nodes, self.cells, [y, x]).normal(node, share)
+    }
+}
+
+impl Normal {
+    const NONE: Self = Self { direction: [f32::NAN; 3], uncertainty_rad: f32::NAN };
 
     /// The direction of a normal of any length that changes by `p x lever` times the deviation when noise moves a point
     /// `p` of the surface. All points near the node have its ray.
@@ -43,7 +63,8 @@ impl Normal {
             lever.deviation2 * (node2 * dot(v, v) - dot(node, v).powi(2) - dot(across, v).powi(2)).max(0.0)
         };
         let variance: f64 = levers.iter().map(turned2).sum();
-        Self { direction: direction.map(|c| c as f32), uncertainty_rad: (variance.sqrt() / size) as f32 }
+        let [x, y, z] = direction;
+        Self { direction: [x as f32, y as f32, z as f32], uncertainty_rad: (variance.sqrt() / size) as f32 }
     }
 }
 
@@ -72,28 +93,17 @@ struct Tangent {
 }
 
 impl Tangent {
-    fn along_row(grid: &Grid, [y, x]: [usize; 2]) -> Option<Self> {
-        let i = y * grid.nodes.columns + x;
-        let before = (x > 0 && grid.links.right[i - 1]).then(|| i - 1);
-        let after = grid.links.right[i].then_some(i + 1);
-        Self::new(&grid.nodes, before, i, after)
-    }
-
-    fn along_column(grid: &Grid, [y, x]: [usize; 2]) -> Option<Self> {
-        let columns = grid.nodes.columns;
-        let i = y * columns + x;
-        let before = (y > 0 && grid.links.down[i - columns]).then(|| i - columns);
-        let after = grid.links.down[i].then(|| i + columns);
-        Self::new(&grid.nodes, before, i, after)
-    }
-
-    /// The central difference where both neighbours are joined, else that to the one that is.
-    fn new(nodes: &Nodes, before: Option<usize>, here: usize, after: Option<usize>) -> Option<Self> {
+    /// The central difference at a node where both neighbours at this distance are joined to it, else that to the one
+    /// which is.
+    fn new(nodes: &Nodes, links: &[bool], shares: Shares, [i, stride]: [usize; 2]) -> Option<Self> {
+        let before = i.checked_sub(stride).filter(|before| links[*before]);
+        let after = links[i].then_some(i + stride);
+        let share = if before.is_some() && after.is_some() { shares.central } else { shares.next };
         let (from, to) = match (before, after) {
             (None, None) => return None,
-            (before, after) => (nodes.all[before.unwrap_or(here)], nodes.all[after.unwrap_or(here)]),
+            (before, after) => (nodes.all[before.unwrap_or(i)], nodes.all[after.unwrap_or(i)]),
         };
-        let deviation2 = square(from.deviation) + square(to.deviation);
+        let deviation2 = share * (square(from.deviation) + square(to.deviation));
         Some(Self { vector: difference(wide(to.point), wide(from.point)), deviation2 })
     }
 }
@@ -124,7 +134,8 @@ impl Star {
         star
     }
 
-    fn normal(&self, node: Vector) -> Normal {
+    fn normal(mut self, node: Vector, share: f64) -> Normal {
+        self.levers.iter_mut().for_each(|lever| lever.deviation2 *= share);
         Normal::of(node, self.normal, &self.levers)
     }
 }

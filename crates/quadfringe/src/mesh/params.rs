@@ -25,3 +25,14 @@ pub(super) const FILL_TOLERANCE: f64 = 1e-8;
 /// Greatest number of sweeps of the relaxation. Follows from [`HOLE_MAX_PX`]: a round hole of that size is 36 pixels wide,
 /// and the slowest part of the error falls by 0.4 % in each sweep.
 pub(super) const FILL_SWEEPS: usize = 5000;
+
+/// Median of the size of a normal value, in standard deviations. Follows from the normal distribution.
+pub(super) const NORMAL_MEDIAN: f64 = 0.6745;
+
+/// Every such row is asked how much the errors of neighbours have in common. More: faster. Fewer: more samples. Not
+/// measured: 1024 x 768 pixels leave some 100 000 samples.
+pub(super) const SAMPLE_ROWS: usize = 8;
+
+/// Least number of samples for the same; with fewer the errors count as independent, and the stated uncertainty of normals
+/// is too large. The median of so many samples is right within 12 %. Follows from the median of normal values.
+pub(super) const CORRELATION_SAMPLES_MIN: usize = 100;
