@@ -2,10 +2,10 @@
 
     python evaluation/mesh.py [--json FILE] [--scenes NAME ...]
 
-1024 x 768 px, 8 bit, 3 % noise, fixed seed. For each scene: triangles that cross a true step in depth, share of returned
-pixels in the mesh, share of neighbours on one surface that are cut apart, and the error of the normals more than 20 px
-from edges, as root mean square over what is stated. With `--limits`, the same shares of neighbours for other angles and
-numbers of standard deviations, computed in NumPy: cut apart on one surface, and joined across a step.
+1024 x 768 px, 8 bit, 3 % noise, fixed seed. For each scene: triangles that cross a true step in depth, share of
+returned pixels in the mesh, and error of the normals more than 20 px from edges, as root mean square over what is
+stated. With `--limits`, for other angles and numbers of standard deviations, computed in NumPy: the share of neighbours
+on one surface that are cut apart, and the number of neighbours that are joined across a step.
 """
 
 from __future__ import annotations

@@ -372,8 +372,9 @@ def mesh_from_points(
 ) -> dict[str, NDArray[Any]]:
     """Triangulate points (H, W, 3) on the grid of pixels, with the standard deviation of their depth (H, W).
 
-    Gives pixels (M, 2) uint32, points_mm and normals (M, 3) float32, normal_uncertainty_rad (M,) float32 and filled (M,)
-    bool of the vertices, and faces (F, 3) uint32. Raises ValueError for maps of unequal size and numbers out of range.
+    Gives pixels (M, 2) uint32, points_mm and normals (M, 3) float32, normal_uncertainty_rad (M,) float32 and filled
+    (M,) bool of the vertices, and faces (F, 3) uint32. Raises ValueError for maps of unequal size and numbers out of
+    range.
     """
 
 def normals_from_points(

@@ -28,7 +28,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;
     module.add_class::<decoder::Decoder>()?;
-    module.add_class::<height::PolynomialHeight>()?;
     module.add_class::<pair::PairTable>()?;
     module.add_class::<projector::LightCrafter>()?;
     module.add_class::<projector::Pattern>()?;
@@ -51,9 +50,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     published_stages::register(module)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
-    module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
-    module.add_function(wrap_pyfunction!(mesh::mesh_from_points, module)?)?;
-    module.add_function(wrap_pyfunction!(mesh::normals_from_points, module)?)?;
+    height::register(module)?;
+    mesh::register(module)?;
     module.add_function(wrap_pyfunction!(projector::lightcrafters, module)?)?;
     module.add_function(wrap_pyfunction!(projector::udev_rule, module)?)?;
     module.add_function(wrap_pyfunction!(projector::power_on_drive, module)?)?;

@@ -8,6 +8,12 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::mesh::{self, MeshOptions, Points};
 
+/// Add the functions of this file to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_function(wrap_pyfunction!(mesh_from_points, module)?)?;
+    module.add_function(wrap_pyfunction!(normals_from_points, module)?)
+}
+
 /// The map of uncertainties, if there is one.
 fn borrowed_map<'py>(map: Option<&Bound<'py, PyAny>>) -> PyResult<Option<PyReadonlyArray2<'py, f32>>> {
     map.map(|map| expected::<f32, 2>("uncertainty_mm", map)).transpose()

@@ -41,7 +41,8 @@ class Unwrapping(StrEnum):
 
 
 ResultOption = Annotated[
-    Path, typer.Option(metavar="FILE", help="Result: .npz; with --calibration also .ply, .pcd, .stl, .obj, .glb or .tif.")
+    Path,
+    typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply .pcd .stl .obj .glb .tif."),
 ]
 FolderArgument = Annotated[
     Path | None,

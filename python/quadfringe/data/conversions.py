@@ -47,10 +47,10 @@ def xarray_of(shape: Shape, texts: dict[str, str]) -> Any:
     """Give the maps as `xarray.Dataset`; see `Shape.to_xarray`."""
     xarray = require("xarray", "xarray")
     rows, columns = shape.phase_rad.shape
-    coordinates: dict[str, Any] = {
-        "row": ("row", np.arange(rows), {"units": "px", "long_name": "row of the camera image, 0 at the top"}),
-        "column": ("column", np.arange(columns), {"units": "px", "long_name": "column of the camera image, 0 at the left"}),
-    }
+    coordinates: dict[str, Any] = {}
+    for name, count, first in (("row", rows, "at the top"), ("column", columns, "at the left")):
+        attributes = {"units": "px", "long_name": f"{name} of the camera image, 0 {first}"}
+        coordinates[name] = (name, np.arange(count), attributes)
     if shape.xyz_mm is not None:
         coordinates["axis"] = ("axis", ["x", "y", "z"])
     variables = {}

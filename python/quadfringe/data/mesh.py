@@ -93,7 +93,7 @@ class Mesh:
         path = Path(path)
         require_suffix(path, SUFFIXES)
         if not len(self.faces):
-            raise InputError(f"{path}: the mesh has no triangles: nowhere do three neighbouring pixels lie on one surface")
+            raise InputError(f"{path}: the mesh has no triangles: no three neighbouring pixels lie on one surface")
         export.write_mesh(path, self._triangles())
 
     def _triangles(self) -> export.Triangles:

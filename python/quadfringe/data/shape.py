@@ -122,14 +122,12 @@ class Shape:
         """Give the same maps with the settings that made them."""
         return replace(self, config=config, calibration=calibration)
 
-    def mesh(
-        self, *, step: int = 1, fill_holes_px: int = 0, colour: NDArray[np.uint8] | None = None
-    ) -> Mesh:
+    def mesh(self, *, step: int = 1, fill_holes_px: int = 0, colour: NDArray[np.uint8] | None = None) -> Mesh:
         """Triangulate the points on the grid of pixels; no triangle lies across a step in depth.
 
-        `step` takes every n-th pixel of every n-th row. Holes of at most `fill_holes_px` pixels (0 to 1000) whose rim is one
-        smooth surface are filled, and their vertices marked. `colour` is a picture (H, W, 3) uint8; the default is the
-        modulation in grey. Raises `InputError` without a calibration, and for values out of range.
+        `step` takes every n-th pixel of every n-th row. Holes of at most `fill_holes_px` pixels (0 to 1000) whose
+        rim is one smooth surface are filled, and their vertices marked. `colour` is a picture (H, W, 3) uint8; the
+        default is the modulation in grey. Raises `InputError` without a calibration, and for values out of range.
 
         >>> import numpy as np
         >>> rows, columns = np.mgrid[0:4, 0:6].astype(np.float32)
@@ -154,8 +152,8 @@ class Shape:
     def to_open3d(self) -> Any:
         """Give the points as `open3d.geometry.PointCloud` in mm, with normals and grey colours.
 
-        For a `TriangleMesh`, use `mesh().to_open3d()`. Raises `InputError` without a calibration, and `MissingExtraError`
-        without Open3D.
+        For a `TriangleMesh`, use `mesh().to_open3d()`. Raises `InputError` without a calibration, and
+        `MissingExtraError` without Open3D.
         """
         from quadfringe.data.conversions import open3d_of
 
@@ -174,12 +172,12 @@ class Shape:
     def save(self, path: Path | str, *, faces: bool = False, step: int = 1, fill_holes_px: int = 0) -> None:
         """Write by suffix; whole or not at all.
 
-        .npz: every map, config and calibration, the only file that `load` reads. .ply and .pcd: points with normals, grey
-        colour, `quality`, `uncertainty_mm` and `wrong_order_probability`; PLY holds the valid points with their row and
-        column, PCD one point for each pixel. .stl, .obj, .glb, and with `faces` .ply: the mesh, for which `step` and
-        `fill_holes_px` are those of `mesh`; see `Mesh.save`. .tif: depth in mm. Raises `InputError` for another suffix, a
-        folder that does not exist, a choice that the kind of file does not have, and without a calibration for all but
-        .npz; `MissingExtraError` without trimesh or tifffile.
+        .npz: every map, config and calibration, the only file that `load` reads. .ply and .pcd: points with
+        normals, grey colour, `quality`, `uncertainty_mm` and `wrong_order_probability`; PLY holds the valid points
+        with their row and column, PCD one point for each pixel. .stl, .obj, .glb, and with `faces` .ply: the mesh,
+        for which `step` and `fill_holes_px` are those of `mesh`; see `Mesh.save`. .tif: depth in mm. Raises
+        `InputError` for another suffix, a folder that does not exist, a choice that the kind of file does not have,
+        and without a calibration for all but .npz; `MissingExtraError` without trimesh or tifffile.
         """
         from quadfringe.data import shape_files
         from quadfringe.io import export

@@ -37,7 +37,7 @@ def write_pixels(shape: Shape, path: Path, suffix: str) -> None:
     """Write the points as .ply or .pcd, or the depth as TIFF."""
     if suffix == ".ply":
         points_mm = xyz_mm_of(shape)
-        valid = np.isfinite(points_mm).all(axis=2)
+        valid = np.asarray(np.isfinite(points_mm).all(axis=2))
         export.write_ply(path, points_mm[valid], export.grey(shape.modulation)[valid], _of_points(shape, valid))
     elif suffix == ".pcd":
         write_pcd(path, _organised(shape))

@@ -1,7 +1,8 @@
 """Compare meshes with the truth of the virtual bench: steps in depth that they cross, normals, holes.
 
-A true step lies between two pixels whose depths differ by more than `STEP_FOOTPRINTS` footprints, and where at least half
-of the difference lies between two of the rays that divide a pixel into `RAYS`. A steep but smooth surface has no step.
+A true step lies between two pixels whose depths differ by more than `STEP_FOOTPRINTS` footprints, and where at
+least half of the difference lies between two of the rays that divide a pixel into `RAYS`. A steep but smooth
+surface has no step.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ Caster = Callable[[_core.Bench], _core.Cast]
 
 @dataclass(frozen=True)
 class Steps:
-    """True steps in depth, mm, 0 where there is none: between a pixel and the next one to the right or below, (H, W)."""
+    """True steps in depth, mm, 0 where there is none, (H, W): between a pixel and the next to the right or below."""
 
     right: Map
     down: Map
@@ -95,7 +96,7 @@ def normal_errors_rad(directions: NDArray[np.float32], truth: NDArray[np.float32
 
 @dataclass(frozen=True)
 class Topology:
-    """Euler number (vertices - edges + triangles) and number of closed border lines; a disc without holes has 1 and 1."""
+    """Euler number (vertices - edges + triangles) and number of border lines; a disc without holes has 1 and 1."""
 
     euler: int
     borders: int

@@ -76,8 +76,9 @@ def write_mesh(path: Path, mesh: Triangles) -> None:
 
     suffix = path.suffix.lower()
     if suffix == ".glb":
-        turned = {"vertices_mm": mesh.vertices_mm * GLB_FROM_MM, "normals": mesh.normals * np.sign(GLB_FROM_MM)}
-        content = gltf.export_glb(replace(mesh, scalars={}, **turned).to_trimesh().scene(), include_normals=True)
+        points, normals = mesh.vertices_mm * GLB_FROM_MM, mesh.normals * np.sign(GLB_FROM_MM)
+        turned = replace(mesh, vertices_mm=points, normals=normals, scalars={})
+        content = gltf.export_glb(turned.to_trimesh().scene(), include_normals=True)
     elif suffix == ".obj":
         content = obj.export_obj(mesh.to_trimesh(), include_normals=True).encode()
     elif suffix == ".ply":

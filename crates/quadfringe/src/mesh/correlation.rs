@@ -1,7 +1,7 @@
 //! How much the errors of neighbours have in common, estimated from the surface itself (T4).
 
 use super::nodes::Nodes;
-use super::params::{CORRELATION_SAMPLES_MIN, NORMAL_MEDIAN, SAMPLE_ROWS};
+use super::params::{CORRELATION_ROWS, CORRELATION_SAMPLES_MIN, NORMAL_MEDIAN};
 
 /// Share of the variance of two independent errors that their difference has.
 #[derive(Debug, Clone, Copy)]
@@ -15,7 +15,7 @@ pub(super) struct Shares {
 impl Shares {
     /// Along the rows (`stride` 1) or along the columns of the nodes, whose `links` tell which neighbours are joined.
     pub fn new(nodes: &Nodes, links: &[bool], stride: usize) -> Self {
-        let rows = (0..nodes.rows).step_by(SAMPLE_ROWS);
+        let rows = (0..nodes.rows).step_by(CORRELATION_ROWS);
         let places = rows.flat_map(|y| y * nodes.columns..(y + 1) * nodes.columns);
         let mut found: Vec<f64> = places.filter_map(|i| second_difference(nodes, links, i, stride)).collect();
         if found.len() < CORRELATION_SAMPLES_MIN {

@@ -172,11 +172,12 @@ mod tests {
 
     #[test]
     fn the_angle_decides_and_noise_is_allowed_for() {
-        // 0.3 mm apart across the line of sight: four times as much along it is a little less than 14 degrees.
-        assert!(are_joined(node(0.0, 800.0, 0.0), node(0.3, 801.1, 0.0)));
-        assert!(!are_joined(node(0.0, 800.0, 0.0), node(0.3, 801.3, 0.0)));
-        assert!(are_joined(node(0.0, 800.0, 0.05), node(0.3, 801.3, 0.05)));
-        assert!(!are_joined(node(0.0, 800.0, 0.05), node(0.3, 802.0, 0.05)));
+        // 0.3 mm apart across the line of sight and 1.7 mm along it are 10 degrees.
+        let noise = 0.05 / 800.0;
+        assert!(are_joined(node(0.0, 800.0, 0.0), node(0.3, 801.6, 0.0)));
+        assert!(!are_joined(node(0.0, 800.0, 0.0), node(0.3, 801.8, 0.0)));
+        assert!(are_joined(node(0.0, 800.0, noise), node(0.3, 801.8, noise)));
+        assert!(!are_joined(node(0.0, 800.0, noise), node(0.3, 802.0, noise)));
         assert!(!are_joined(node(0.0, 800.0, 0.0), Node::NONE));
     }
 
