@@ -1,6 +1,6 @@
 //! Small holes, filled from their rims.
 
-use super::nodes::{Node, Nodes};
+use super::nodes::{Node, Nodes, are_joined};
 use super::params::{COTANGENT, DEVIATIONS, FILL_SWEEPS, FILL_TOLERANCE};
 use super::vector::{Vector, difference, scaled, sum, wide};
 
@@ -73,6 +73,8 @@ struct Rim {
     deviations: Vec<f32>,
     /// Distance of the rays of neighbouring pixels at depth 1.
     pitch: f64,
+    /// Whether all neighbours along the rim are joined.
+    is_joined: bool,
 }
 
 /// A pixel of the hole, or the value of one of the rim.
@@ -94,26 +96,33 @@ impl Rim {
         };
         let cross = |i: &usize| [i - nodes.columns, i - 1, i + 1, i + nodes.columns].map(place);
         let values: Vec<Value> = pixels.iter().map(|i| value_of(nodes.all[*i])).collect();
+        let next = |i: usize, stride: usize| {
+            let neighbour = pixels.binary_search(&(i + stride)).is_ok();
+            !neighbour || are_joined(nodes.all[i], nodes.all[i + stride])
+        };
         let width_px = range(pixels.iter().map(|i| (i % nodes.columns) as f64));
         Self {
             crosses: hole.iter().map(cross).collect(),
             pitch: range(values.iter().map(|value| value[0])) / width_px,
+            is_joined: pixels.iter().all(|i| next(*i, 1) && next(*i, nodes.columns)),
             deviations: pixels.iter().map(|i| nodes.all[*i].deviation).collect(),
             values,
         }
     }
 
-    /// Whether the rim lies on one plane within the step that neighbouring pixels of a surface may have (T5).
+    /// Whether neighbours along the rim are joined, and all of it lies on one plane within the step that neighbouring pixels of
+    /// a surface may have (T5).
     fn is_one_surface(&self) -> bool {
         let mean = mean_of(&self.values);
         let slope = slope_of(&self.values, mean);
         let step = self.pitch * COTANGENT;
-        self.values.iter().zip(&self.deviations).all(|([x, y, inverse], deviation)| {
+        let near_plane = |([x, y, inverse], deviation): (&Value, &f32)| {
             let plane = mean[2] + slope[0] * (x - mean[0]) + slope[1] * (y - mean[1]);
             // As shares of the depth.
             let limit = step + DEVIATIONS * f64::from(*deviation);
             plane > 0.0 && (inverse / plane - 1.0).abs() <= limit
-        })
+        };
+        self.is_joined && self.values.iter().zip(&self.deviations).all(near_plane)
     }
 
     /// Values of the hole of which each is the mean of the four around it.
