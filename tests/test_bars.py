@@ -33,6 +33,9 @@ NOT_BARS = {
         "the noise of four steps; checks the score"
     ),
     ("test_evaluation.py", "rel=0.05"): "a planted wave; checks the score",
+    ("test_mesh.py", "atol=0.001"): "a plane is exact, its points are float32",
+    ("test_mesh.py", "atol=0.02"): "a slope that is nearly a plane, where a plane would be exact",
+    ("test_shape_files.py", "atol=1"): "one grey level, by which files round colours",
     ("test_stages.py", "np.isfinite(shape.phase_rad).mean() > 0.1"): "enough pixels to compare",
     ("test_targets.py", "rel=0.001"): "area of a drawing",
     ("test_timing.py", "5.0 < cost.off_percent < 25.0"): "planted times",

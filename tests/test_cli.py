@@ -247,7 +247,7 @@ def test_measure_refuses_a_bad_system(tmp_path: Path) -> None:
     refused(result, 2, "scene.nose: this key is not known")
     (tmp_path / "s.toml").write_text("[scene]\nsurface = 'unicorn'\n")
     refused(run("measure", tmp_path / "s.toml", "--out", tmp_path / "a.ply"), 2, "unicorn")
-    refused(run("measure", tmp_path / "s.toml", "--out", tmp_path / "a.obj"), 2, "a.obj")
+    refused(run("measure", tmp_path / "s.toml", "--out", tmp_path / "a.doc"), 2, "a.doc")
 
 
 def test_info_tells_what_a_file_holds(small_bench: Path, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ TAG = re.compile(r"\\tag\{([A-Z]\d+)\}")
 # Code cites (S4), (S8, S9) and "(step 1 of the chain, S1)"; other letters, as in (J2), stand alone in parentheses.
 PARENTHESES = re.compile(r"\(([^()\n]*)\)")
 MAIN = re.compile(r"\bS\d{1,2}\b")
-OTHER = re.compile(r"\b[JU]\d{1,2}\b")
+OTHER = re.compile(r"\b[JTU]\d{1,2}\b")
 CITED_ON_PAGE = re.compile(r"\(([A-Z]\d{1,2})\)")
 
 LINK = re.compile(r"\[[^\]\n]*\]\(([^)\s]+)\)")

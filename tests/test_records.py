@@ -97,8 +97,8 @@ def test_a_shape_without_millimetres_says_so(tmp_path: Path, shape: Shape, name:
 
 
 def test_an_unknown_suffix_is_refused(tmp_path: Path, shape: Shape) -> None:
-    with pytest.raises(InputError, match=r"\.npz, \.ply, \.tif"):
-        shape.save(tmp_path / "shape.stl")
+    with pytest.raises(InputError, match=r"\.npz, \.ply, \.pcd"):
+        shape.save(tmp_path / "shape.xyz")
 
 
 @pytest.mark.parametrize("keep", [0, 1, 100, 1000, -1])

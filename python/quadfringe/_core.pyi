@@ -42,9 +42,11 @@ __all__ = [
     "lightcrafters",
     "linear_light",
     "linear_light_bayer",
+    "mesh_from_points",
     "modulation_ratio",
     "n_step",
     "nearest_turn",
+    "normals_from_points",
     "optimum",
     "outputs",
     "pack_flash",
@@ -400,6 +402,25 @@ def step_pattern(
 
     Fringes count over the "columns" or the "rows" of mirrors in the layout.
     """
+
+def mesh_from_points(
+    xyz_mm: NDArray[np.float32],
+    uncertainty_mm: NDArray[np.float32] | None = None,
+    *,
+    step: int | None = None,
+    holes_px: int | None = None,
+) -> dict[str, NDArray[Any]]:
+    """Triangulate points (H, W, 3) on the grid of pixels, with the standard deviation of their depth (H, W).
+
+    Gives pixels (M, 2) uint32, points_mm and normals (M, 3) float32, normal_uncertainty_rad (M,) float32 and filled
+    (M,) bool of the vertices, and faces (F, 3) uint32. Raises ValueError for maps of unequal size and numbers out of
+    range.
+    """
+
+def normals_from_points(
+    xyz_mm: NDArray[np.float32], uncertainty_mm: NDArray[np.float32] | None = None
+) -> dict[str, NDArray[np.float32]]:
+    """Give the normals (H, W, 3) of points, and their uncertainty_rad (H, W); errors as `mesh_from_points`."""
 
 def linear_light(
     red: NDArray[Any],

@@ -7,6 +7,12 @@ use numpy::{IntoPyArray, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, T
 use pyo3::prelude::*;
 use quadfringe::height::{self, Triangulator};
 
+/// Add the class and the function of this file to the module.
+pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<PolynomialHeight>()?;
+    module.add_function(wrap_pyfunction!(xyz_from_column, module)?)
+}
+
 /// Height as a polynomial of phase for each pixel.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct PolynomialHeight(height::PolynomialHeight);

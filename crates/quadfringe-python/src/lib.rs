@@ -8,6 +8,7 @@ mod decoder;
 mod device;
 mod height;
 mod memory;
+mod mesh;
 mod pair;
 mod plan;
 mod projector;
@@ -28,7 +29,6 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;
     module.add_class::<decoder::Decoder>()?;
-    module.add_class::<height::PolynomialHeight>()?;
     module.add_class::<pair::PairTable>()?;
     module.add_class::<reference::StepDecoder>()?;
     module.add_class::<projector::LightCrafter>()?;
@@ -52,7 +52,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     published_stages::register(module)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response_of_shot, module)?)?;
-    module.add_function(wrap_pyfunction!(height::xyz_from_column, module)?)?;
+    height::register(module)?;
+    mesh::register(module)?;
     projector_functions(module)
 }
 

@@ -38,6 +38,7 @@
 //! | [`condition`] | inverse: raw images to linear light |
 //! | [`stages`] | inverse: linear light to wrapped phases and to absolute phase, step by step |
 //! | [`height`] | inverse: absolute phase to mm |
+//! | [`mesh`] | inverse: points to triangles and normals |
 //! | `published` | inverse: the method of the paper |
 //! | `joint` | inverse: the default method, which fits all four channels together |
 //! | [`decode`] | inverse: one shot through all steps, by either method |
@@ -93,6 +94,8 @@ pub mod condition;
 pub mod stages;
 
 pub mod height;
+
+pub mod mesh;
 
 mod published;
 

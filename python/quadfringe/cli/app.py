@@ -13,6 +13,7 @@ from quadfringe.cli import (
     bench,
     calibrate,
     camera,
+    convert,
     decode,
     demo,
     doctor,
@@ -89,6 +90,7 @@ app.command("target")(target.target)
 app.command("pattern")(pattern.pattern)
 app.command("simulate")(simulate.simulate)
 app.command("decode")(decode.decode)
+app.command("convert")(convert.convert)
 app.command("measure")(measure.measure)
 app.command("live")(live.live)
 app.command("record")(record.record)

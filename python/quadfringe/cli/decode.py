@@ -48,7 +48,8 @@ class Unwrapping(StrEnum):
 
 
 ResultOption = Annotated[
-    Path, typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply or .tif.")
+    Path,
+    typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply .pcd .stl .obj .glb .tif."),
 ]
 SourcesArgument = Annotated[
     list[str] | None,

@@ -7,8 +7,10 @@ from quadfringe.data.calibration import (
     ResponseCalibration,
     conditioning,
 )
+from quadfringe.data.mesh import Mesh, Normals
 from quadfringe.data.optics import core_device, device_from_core
-from quadfringe.data.shape import Shape, xyz_mm_of
+from quadfringe.data.points import xyz_mm_of
+from quadfringe.data.shape import Shape
 from quadfringe.data.shot import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp, Truth
 from quadfringe.data.shot_files import read_shot, write_shot
 
@@ -20,6 +22,8 @@ __all__ = [
     "CalibrationStep",
     "ChipImage",
     "FrameStamp",
+    "Mesh",
+    "Normals",
     "ResponseCalibration",
     "Shape",
     "Shot",

@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +14,21 @@ from numpy.typing import NDArray
 from quadfringe.config import brief, checked
 from quadfringe.data._checks import check_maps
 from quadfringe.data.calibration import Calibration
+from quadfringe.data.points import xyz_mm_of
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
 from quadfringe.io.arrays import read_npz
 from quadfringe.io.texts import json_of
+
+if TYPE_CHECKING:
+    from quadfringe.data.mesh import Mesh, Normals
 
 __all__ = ["SUFFIXES", "Shape", "xyz_mm_of"]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "modulation", "quality")
 MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm")
-SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
-SUFFIXES = (".npz", ".ply", ".tif", ".tiff")
+SUFFIXES = (".npz", ".ply", ".pcd", ".stl", ".obj", ".glb", ".tif", ".tiff")
 
 
 @dataclass(frozen=True, repr=False)
@@ -119,26 +122,74 @@ class Shape:
         """Give the same maps with the settings that made them."""
         return replace(self, config=config, calibration=calibration)
 
-    def save(self, path: Path | str) -> None:
-        """Write by suffix: .ply points, .tif depth in mm, .npz every map, config and calibration. Whole or not at all.
+    def mesh(self, *, step: int = 1, fill_holes_px: int = 0, colour: NDArray[np.uint8] | None = None) -> Mesh:
+        """Triangulate the points on the grid of pixels; no triangle lies across a step in depth.
 
-        PLY holds the valid points only, with the modulation as grey colour, and as scalars `quality`, `uncertainty_mm`
-        and `wrong_order_probability`. Raises `InputError` for another suffix, a folder that does not exist, and for
-        .ply and .tif without a calibration.
+        `step` takes every n-th pixel of every n-th row. Holes of at most `fill_holes_px` pixels (0 to 1000) whose
+        rim is one smooth surface are filled, and their vertices marked. `colour` is a picture (H, W, 3) uint8; the
+        default is the modulation in grey. Raises `InputError` without a calibration, and for values out of range.
+
+        >>> import numpy as np
+        >>> rows, columns = np.mgrid[0:4, 0:6].astype(np.float32)
+        >>> plane = np.stack([columns, rows, np.full_like(rows, 800)], axis=2)
+        >>> Shape(rows, rows, rows, rows, xyz_mm=plane).mesh()
+        Mesh(24 vertices, 30 triangles)
         """
+        from quadfringe.data.mesh import mesh_of
+
+        return mesh_of(self, step, fill_holes_px, colour)
+
+    def normals(self) -> Normals:
+        """Find the normals (H, W, 3) and their uncertainty (H, W), rad; raises `InputError` without a calibration."""
+        from quadfringe.data.mesh import normals_of
+
+        return normals_of(self)
+
+    def to_trimesh(self) -> Any:
+        """Give the mesh as `trimesh.Trimesh`, as `Mesh.to_trimesh` does; for choices, use `mesh`."""
+        return self.mesh().to_trimesh()
+
+    def to_open3d(self) -> Any:
+        """Give the points as `open3d.geometry.PointCloud` in mm, with normals and grey colours.
+
+        For a `TriangleMesh`, use `mesh().to_open3d()`. Raises `InputError` without a calibration, and
+        `MissingExtraError` without Open3D.
+        """
+        from quadfringe.data.conversions import open3d_of
+
+        return open3d_of(self)
+
+    def to_xarray(self) -> Any:
+        """Give all `maps` as `xarray.Dataset` with dimensions row, column, and for points axis (x, y, z).
+
+        Each variable has the attributes `units` and `long_name`; the data set has `config` and `calibration` as JSON.
+        Raises `MissingExtraError` without xarray.
+        """
+        from quadfringe.data.conversions import xarray_of
+
+        return xarray_of(self, self._texts())
+
+    def save(self, path: Path | str, *, faces: bool = False, step: int = 1, fill_holes_px: int = 0) -> None:
+        """Write by suffix; whole or not at all.
+
+        .npz: every map, config and calibration, the only file that `load` reads. .ply and .pcd: points with
+        normals, grey colour, `quality`, `uncertainty_mm` and `wrong_order_probability`; PLY holds the valid points
+        with their row and column, PCD one point for each pixel. .stl, .obj, .glb, and with `faces` .ply: the mesh,
+        for which `step` and `fill_holes_px` are those of `mesh`; see `Mesh.save`. .tif: depth in mm. Raises
+        `InputError` for another suffix, a folder that does not exist, a choice that the kind of file does not have,
+        and without a calibration for all but .npz; `MissingExtraError` without trimesh or tifffile.
+        """
+        from quadfringe.data import shape_files
         from quadfringe.io import export
 
         path = Path(path)
         suffix = require_suffix(path, SUFFIXES)
-        if suffix == ".npz":
+        if shape_files.check_choices(path, suffix, faces=faces, step=step, fill_holes_px=fill_holes_px):
+            self.mesh(step=step, fill_holes_px=fill_holes_px).save(path)
+        elif suffix == ".npz":
             export.write_npz(path, self.maps, self._texts())
-        elif suffix == ".ply":
-            points = xyz_mm_of(self)
-            valid = np.isfinite(points).all(axis=2)
-            scalars = {name: values[valid] for name, values in self.maps.items() if name in SCALARS}
-            export.write_ply(path, points[valid], export.grey(self.modulation)[valid], scalars)
         else:
-            export.write_depth(path, xyz_mm_of(self)[:, :, 2])
+            shape_files.write_pixels(self, path, suffix)
 
     def _texts(self) -> dict[str, str]:
         texts = {"config": json.dumps(dict(self.config))}
@@ -151,7 +202,7 @@ class Shape:
         """Read what `save` wrote as NPZ; raises `InputError` for any other file."""
         path = Path(path)
         if path.suffix.lower() in SUFFIXES[1:]:
-            raise InputError(f"{path}: expected a shape saved as .npz; .ply and .tif hold only a part of one")
+            raise InputError(f"{path}: expected a shape saved as .npz; the other files hold only a part of one")
         stored = read_npz(path)
         missing = [name for name in MAPS if name not in stored]
         if missing:
@@ -187,10 +238,3 @@ def _settings(stored: Mapping[str, NDArray[Any]], path: Path) -> dict[str, Any]:
         if not isinstance(config.get(name, kind()), kind):
             raise InputError(f"{path}, config: {name}: expected a {kind.__name__}, got {brief(config[name])}")
     return config
-
-
-def xyz_mm_of(shape: Shape) -> Map:
-    """Give the points, (H, W, 3) mm; raises `InputError` when the shape holds phase only."""
-    if shape.xyz_mm is None:
-        raise InputError("this shape holds phase only: decode with a calibration to get millimetres")
-    return shape.xyz_mm

@@ -1,8 +1,9 @@
-"""Write arrays for other programs: PLY for MeshLab and CloudCompare, TIFF for image tools, NPZ for NumPy."""
+"""Write arrays for other programs: PLY and meshes for MeshLab and CloudCompare, TIFF for image tools, NPZ for NumPy."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,10 @@ from numpy.typing import NDArray
 from quadfringe.errors import require
 from quadfringe.files import atomic
 
-__all__ = ["grey", "write_depth", "write_npz", "write_ply"]
+__all__ = ["Triangles", "grey", "write_depth", "write_mesh", "write_npz", "write_ply"]
+
+# From mm in the camera frame (y down, z forward) to metres with y up: half a turn around x.
+GLB_FROM_MM = np.array([1e-3, -1e-3, -1e-3], np.float32)
 
 
 def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
@@ -26,7 +30,7 @@ def write_ply(
     path: Path,
     points_mm: NDArray[np.float32],
     colour: NDArray[np.uint8],
-    scalars: Mapping[str, NDArray[np.float32]],
+    scalars: Mapping[str, NDArray[Any]],
 ) -> None:
     """Write N points as binary PLY: x, y, z (N, 3), mm, colour (N, 3), and scalars (N,) by name."""
     require("trimesh", "export")
@@ -34,9 +38,55 @@ def write_ply(
     from trimesh.exchange.ply import export_ply
 
     cloud = PointCloud(points_mm, colors=colour)
-    cloud.vertex_attributes = {name: np.ascontiguousarray(values, np.float32) for name, values in scalars.items()}
+    cloud.vertex_attributes = {name: np.ascontiguousarray(values) for name, values in scalars.items()}
     with atomic(path) as temporary:
         temporary.write_bytes(export_ply(cloud))
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """A mesh: vertices (M, 3) mm, faces (F, 3), normals (M, 3), colour (M, 3) uint8, and scalars (M,) by name."""
+
+    vertices_mm: NDArray[np.float32]
+    faces: NDArray[np.uint32]
+    normals: NDArray[np.float32]
+    colour: NDArray[np.uint8]
+    scalars: Mapping[str, NDArray[Any]]
+
+    def to_trimesh(self) -> Any:
+        """Give a `trimesh.Trimesh`; a normal is 0, 0, 0 where there is none."""
+        trimesh = require("trimesh", "export")
+        return trimesh.Trimesh(
+            self.vertices_mm,
+            self.faces.astype(np.int64),
+            vertex_normals=np.nan_to_num(self.normals),
+            vertex_colors=self.colour,
+            vertex_attributes=dict(self.scalars),
+            process=False,
+        )
+
+
+def write_mesh(path: Path, mesh: Triangles) -> None:
+    """Write a mesh by suffix: .stl, .obj, .ply, or .glb.
+
+    glTF wants metres and y up, and allows neither NaN nor whole numbers of 32 bit: a GLB is turned and has no scalars.
+    """
+    require("trimesh", "export")
+    from trimesh.exchange import gltf, obj, ply, stl
+
+    suffix = path.suffix.lower()
+    if suffix == ".glb":
+        points, normals = mesh.vertices_mm * GLB_FROM_MM, mesh.normals * np.sign(GLB_FROM_MM)
+        turned = replace(mesh, vertices_mm=points, normals=normals, scalars={})
+        content = gltf.export_glb(turned.to_trimesh().scene(), include_normals=True)
+    elif suffix == ".obj":
+        content = obj.export_obj(mesh.to_trimesh(), include_normals=True).encode()
+    elif suffix == ".ply":
+        content = ply.export_ply(mesh.to_trimesh(), vertex_normal=True)
+    else:
+        content = stl.export_stl(mesh.to_trimesh())
+    with atomic(path) as temporary:
+        temporary.write_bytes(content)
 
 
 def write_depth(path: Path, depth_mm: NDArray[np.float32]) -> None:

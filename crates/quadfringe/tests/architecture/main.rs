@@ -20,6 +20,7 @@ const ORDER: [&str; 17] = [
     "condition",
     "stages",
     "height",
+    "mesh",
     "decode/params",
     "decode/method",
     "decode/options",
@@ -36,7 +37,7 @@ const METHODS: [&str; 2] = ["published", "joint"];
 
 /// Rooms in which a child and the module around it may use each other: types that all files of the room share stand in its
 /// `mod.rs`.
-const SHARING: [&str; 5] = ["optics", "surface", "condition", "stages", "published"];
+const SHARING: [&str; 6] = ["optics", "surface", "condition", "stages", "mesh", "published"];
 
 fn is_strict(path: &str) -> bool {
     room_of(path).is_none_or(|room| !SHARING.contains(&ORDER[room]))

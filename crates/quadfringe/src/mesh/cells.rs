@@ -1,0 +1,151 @@
+//! Triangles of each cell of the grid, which are four neighbouring nodes.
+
+use super::nodes::{Connection, Grid, Node, Nodes, are_joined};
+use rayon::prelude::*;
+
+/// Nodes of a cell: upper left, upper right, lower left and lower right, as (row, column) from the upper left one.
+const CORNERS: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
+
+/// The triangles of a cell. Its diagonal falls from the upper left to the lower right node, or rises from the lower left
+/// to the upper right one.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Cell {
+    falls: bool,
+    holds: [bool; 2],
+}
+
+/// Which sides of a cell are joined.
+#[derive(Clone, Copy)]
+struct Sides {
+    top: bool,
+    bottom: bool,
+    left: bool,
+    right: bool,
+}
+
+impl Cell {
+    fn new(corners: [Node; 4], Sides { top, bottom, left, right }: Sides) -> Self {
+        let [a, b, c, d] = corners;
+        let falls = falls(corners);
+        let diagonal = if falls { are_joined(a, d) } else { are_joined(b, c) };
+        let holds = if falls { [left && bottom, top && right] } else { [left && top, right && bottom] };
+        Self { falls, holds: [holds[0] && diagonal, holds[1] && diagonal] }
+    }
+
+    /// The triangles, as corners of the cell, counter-clockwise as the camera sees them.
+    fn triangles(self) -> impl Iterator<Item = [usize; 3]> {
+        let both = if self.falls { [[0, 2, 3], [0, 3, 1]] } else { [[0, 2, 1], [1, 2, 3]] };
+        both.into_iter().zip(self.holds).filter(|(_, holds)| *holds).map(|(corners, _)| corners)
+    }
+
+    fn count(self) -> usize {
+        usize::from(self.holds[0]) + usize::from(self.holds[1])
+    }
+
+    /// Whether a triangle holds each of the corners.
+    fn touches(self) -> [bool; 4] {
+        let [first, second] = self.holds;
+        let any = first | second;
+        if self.falls { [any, second, first, any] } else { [first, any, any, second] }
+    }
+}
+
+/// Which diagonal divides a cell: of two, the one with the smaller step along the line of sight, so that an edge runs
+/// along it and not across it; the rising one where both are the same.
+fn falls([a, b, c, d]: [Node; 4]) -> bool {
+    let (falling, rising) = (a.is_some() && d.is_some(), b.is_some() && c.is_some());
+    if falling && rising {
+        return Connection::new(a, d).is_flatter_than(&Connection::new(b, c));
+    }
+    falling
+}
+
+/// The cells of a grid, row by row; there is one row and one column less than of nodes.
+pub(super) struct Cells {
+    rows: usize,
+    columns: usize,
+    all: Vec<Cell>,
+}
+
+impl Cells {
+    pub fn new(grid: &Grid) -> Self {
+        let (nodes, links, stride) = (&grid.nodes.all, &grid.links, grid.nodes.columns);
+        let (rows, columns) = (grid.nodes.rows.saturating_sub(1), stride.saturating_sub(1));
+        let mut all = vec![Cell::default(); rows * columns];
+        all.par_chunks_mut(columns.max(1)).enumerate().for_each(|(y, out)| {
+            for (x, out) in out.iter_mut().enumerate() {
+                let i = y * stride + x;
+                let corners = [nodes[i], nodes[i + 1], nodes[i + stride], nodes[i + stride + 1]];
+                let sides = Sides {
+                    top: links.right[i],
+                    bottom: links.right[i + stride],
+                    left: links.down[i],
+                    right: links.down[i + 1],
+                };
+                *out = Cell::new(corners, sides);
+            }
+        });
+        Self { rows, columns, all }
+    }
+
+    /// Nodes that a triangle holds, in the order of the image.
+    pub fn used(&self, nodes: &Nodes) -> Vec<u32> {
+        let mut used = vec![false; nodes.all.len()];
+        for (y, row) in self.all.chunks(self.columns.max(1)).enumerate() {
+            let (above, below) = used[y * nodes.columns..].split_at_mut(nodes.columns);
+            for (x, cell) in row.iter().enumerate() {
+                let [a, b, c, d] = cell.touches();
+                above[x] |= a;
+                above[x + 1] |= b;
+                below[x] |= c;
+                below[x + 1] |= d;
+            }
+        }
+        used.iter().zip(0..).filter(|(used, _)| **used).map(|(_, i)| i).collect()
+    }
+
+    /// All triangles, of nodes numbered by `numbers`.
+    pub fn faces(&self, numbers: &[u32]) -> Vec<[u32; 3]> {
+        let rows = self.all.par_chunks(self.columns.max(1));
+        let counts: Vec<usize> = rows.clone().map(|row| row.iter().map(|cell| cell.count()).sum()).collect();
+        let mut faces = vec![[0; 3]; counts.iter().sum()];
+        let mut rest = faces.as_mut_slice();
+        let mut parts = Vec::with_capacity(counts.len());
+        for count in counts {
+            let part;
+            (part, rest) = rest.split_at_mut(count);
+            parts.push(part);
+        }
+        let stride = self.columns + 1;
+        parts.into_par_iter().zip(rows).enumerate().for_each(|(y, (out, row))| {
+            let mut out = out.iter_mut();
+            for (x, cell) in row.iter().enumerate() {
+                let i = y * stride + x;
+                for corners in cell.triangles() {
+                    let number = |k: usize| numbers[i + CORNERS[k][0] * stride + CORNERS[k][1]];
+                    *out.next().expect("as many as counted") = corners.map(number);
+                }
+            }
+        });
+        faces
+    }
+
+    /// The triangles that hold the node at (`y`, `x`), each as places (row, column) relative to the node, plus one; the
+    /// node itself, (1, 1), comes first.
+    pub fn around(&self, [y, x]: [usize; 2]) -> impl Iterator<Item = [[usize; 2]; 3]> {
+        CORNERS.into_iter().flat_map(move |[down, right]| {
+            // The cell whose corner (1 - down, 1 - right) is the node.
+            let inside = (y + down).checked_sub(1).zip((x + right).checked_sub(1));
+            let inside = inside.filter(|(y, x)| *y < self.rows && *x < self.columns);
+            let cell = inside.map_or_else(Cell::default, |(y, x)| self.all[y * self.columns + x]);
+            let node = [1 - down, 1 - right];
+            cell.triangles().filter_map(move |corners| {
+                let first = corners.iter().position(|corner| CORNERS[*corner] == node)?;
+                Some([0, 1, 2].map(|k| {
+                    let [row, column] = CORNERS[corners[(first + k) % 3]];
+                    [row + down, column + right]
+                }))
+            })
+        })
+    }
+}
