@@ -1,6 +1,6 @@
 """Causes that a comparison names, on shots with one fault each and on sound ones, as one table.
 
-    python evaluation/comparison.py [--tune] [--seeds N ...]
+    python evaluation/comparison.py [--tune] [--scenes NAME ...] [--seeds N ...]
 
 A shot with the fault is compared with one without it: other noise, the same scene. The limits of the comparison were
 chosen with `--tune`, on half of the scenes and seeds; without it the other half reports.
@@ -17,10 +17,11 @@ def main() -> None:
     """Print one line for each pair, and the share of right names."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--tune", action="store_true", help="the half on which the limits were chosen")
+    options.add_argument("--scenes", nargs="+", help="other scenes")
     options.add_argument("--seeds", type=int, nargs="+", help="other seeds")
     chosen = options.parse_args()
     half = TUNE if chosen.tune else REPORT
-    half = Half(half.scenes, tuple(chosen.seeds or half.seeds))
+    half = Half(tuple(chosen.scenes or half.scenes), tuple(chosen.seeds or half.seeds))
     cases: dict[str, list[Case]] = {cause: [] for cause in CAUSES}
     print("cause      strength            scene         seed  named")
     for cause in CAUSES:

@@ -78,7 +78,7 @@ def _limit(distances: NDArray[np.float64]) -> float:
 
 
 def _refined(points: Points, surface: Surface, transform: NDArray[np.float64], most: int) -> NDArray[np.float64]:
-    """Repeat: closest points, then the small motion that lowers the distances along the normals (V6)."""
+    """Repeat: closest points, then the small motion that lowers the distances along the normals (D6)."""
     from scipy.spatial.transform import Rotation
 
     for _ in range(most):

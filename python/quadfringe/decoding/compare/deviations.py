@@ -21,7 +21,7 @@ class Deviations:
 
     bias: their median. rms: their root mean square. robust_rms: 1.4826 times the median size of their distances from
     the bias, the standard deviation of a normal distribution with the same middle half. p95: the size that 95 % keep.
-    inside_percent: share of the pixels whose difference is at most 1, 2 and 3 combined uncertainties (V1); NaN where no
+    inside_percent: share of the pixels whose difference is at most 1, 2 and 3 combined uncertainties (D1); NaN where no
     uncertainty is known. A normal distribution has 68.3, 95.4 and 99.7. All are NaN without pixels.
     """
 
@@ -81,7 +81,7 @@ def deviations_of(difference: Map, counted: Mask, uncertainty: Map | None, unit:
 
 
 def bands_of(difference: Map, counted: Mask, sigma_px: float) -> Bands:
-    """Split a difference (H, W) by a Gaussian mean over the counted pixels (V2); form is NaN elsewhere."""
+    """Split a difference (H, W) by a Gaussian mean over the counted pixels (D2); form is NaN elsewhere."""
     import cv2
 
     weight = cv2.GaussianBlur(counted.astype(np.float64), (0, 0), sigma_px)

@@ -42,7 +42,7 @@ def fit_form(values: Map) -> Fitted:
 
 
 def blur_of(loss: Map, frequency: Map) -> float:
-    """Give the square of the blur, px2, that a loss of modulation shows by its growth with the frequency (V5)."""
+    """Give the square of the blur, px2, that a loss of modulation shows by its growth with the frequency (D5)."""
     known = np.isfinite(loss) & np.isfinite(frequency) & (frequency < 0.25)
     if not known.any():
         return 0.0

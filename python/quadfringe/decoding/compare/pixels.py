@@ -118,7 +118,7 @@ def compare_pixels(pair: Pair) -> ShapeComparison:
 
 
 def combined_uncertainty(pair: Pair, unit: str) -> Map | None:
-    """Give the combined standard uncertainty of a difference (V1), (H, W) in `unit`; None when A states none."""
+    """Give the combined standard uncertainty of a difference (D1), (H, W) in `unit`; None when A states none."""
     parts = [uncertainty_of(shape, unit, pair.period_px) for shape in (pair.a, pair.b) if isinstance(shape, Shape)]
     if any(part is None for part in parts):
         return None

@@ -50,9 +50,9 @@ class _Group:
         self._tree = cKDTree(centres)
 
     def nearest(self, points: Points, count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Give how far the last of `count` centres is, and the triangles of all, (N, count)."""
+        """Give how far the nearest centres are, and their triangles, both (N, count)."""
         away, found = self._tree.query(points, k=list(range(1, count + 1)), workers=-1)
-        return away[:, -1], self.faces[found]
+        return away, self.faces[found]
 
 
 class Surface:
@@ -84,12 +84,13 @@ class Surface:
         for group in self._groups:
             count, near = min(CANDIDATES, len(group.faces)), np.arange(len(points))
             while near.size:
-                last, faces = group.nearest(points[near], count)
-                on, d, face = _nearest(points[near], self.triangles_mm, faces)
+                away, faces = group.nearest(points[near], count)
+                bound = np.minimum(distance[near], reach_mm) + group.radius_mm
+                on, d, face = _nearest(points[near], self.triangles_mm, faces, away < bound[:, None])
                 closer = d < distance[near]
                 which = near[closer]
                 best[which], distance[which], normal[which] = on[closer], d[closer], self.normals[face[closer]]
-                beyond = last - group.radius_mm  # no triangle of the group that was left out is closer than this
+                beyond = away[:, -1] - group.radius_mm  # no triangle of the group that was left out is closer than this
                 least = np.minimum(distance[near], reach_mm)
                 least = np.where(least > FAR_SIZES * group.radius_mm, 0.9 * least, least)
                 unsure = (beyond < least) & (count < len(group.faces))
@@ -103,18 +104,20 @@ def _chunks(count: int) -> Iterator[slice]:
 
 
 def _nearest(
-    points: Points, triangles: Points, faces: NDArray[Any]
+    points: Points, triangles: Points, faces: NDArray[Any], worth: NDArray[np.bool_]
 ) -> tuple[Points, NDArray[np.float64], NDArray[Any]]:
-    """Give the closest point on any of the triangles (N, k) of each point, its distance, and its triangle."""
+    """Give the closest point on any of the triangles (N, k) of each point that are worth a look, distance, triangle."""
     from trimesh.triangles import closest_point
 
-    rows, k = faces.shape
-    repeated = np.repeat(points, k, axis=0)
-    on = np.asarray(closest_point(triangles[faces.ravel()], repeated)).reshape(rows, k, 3)
-    squares = ((on - points[:, None]) ** 2).sum(axis=-1)
+    row, column = np.nonzero(worth)
+    on = np.asarray(closest_point(triangles[faces[row, column]], points[row])) if row.size else np.empty((0, 3))
+    squares = np.full(faces.shape, np.inf)
+    squares[row, column] = ((on - points[row]) ** 2).sum(axis=1)
     chosen = squares.argmin(axis=1)
-    place = np.arange(rows), chosen
-    return on[place], np.sqrt(squares[place]), faces[place]
+    place = np.arange(len(points)), chosen
+    found = np.full((*faces.shape, 3), np.nan)
+    found[row, column] = on
+    return found[place], np.sqrt(squares[place]), faces[place]
 
 
 def _divided(triangles: Points) -> Points:

@@ -2,7 +2,7 @@
 
 A fault of a channel moves the phase in a way that depends on the decoder: how it weighs the channels, and how far it
 smooths. So the decoder itself is asked. From the columns of a shape follows the light of every channel without any
-fault (V4); with a little of a fault added, the decoder gives columns that differ by the pattern of that fault.
+fault (D3); with a little of a fault added, the decoder gives columns that differ by the pattern of that fault.
 """
 
 from __future__ import annotations

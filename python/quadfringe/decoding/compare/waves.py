@@ -1,7 +1,7 @@
 """Gamma and crosstalk: how much of a difference these faults explain.
 
 `synthesis` makes the pattern of every fault. The fit is least squares over offset, tilt, bow and the patterns together
-(V4), so that what is smooth over the image speaks for no fault. Decoders are not quite linear: what a family explains
+(D4), so that what is smooth over the image speaks for no fault. Decoders are not quite linear: what a family explains
 is measured with one more shot, which has all its faults in the sizes that were found.
 """
 
