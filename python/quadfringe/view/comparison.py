@@ -17,7 +17,7 @@ __all__ = ["write_comparison"]
 Comparison = ShapeComparison | MeshComparison
 BINS = 80
 RANGE_SPREADS = 4.0  # half the range of the colours, in robust spreads of the difference around 0
-WORDS_PER_LINE = 150
+LETTERS_PER_LINE = 100
 PROFILES = ("modulation", "surface angle", "fringe phase", "image column", "image row")
 
 
@@ -44,7 +44,7 @@ def _lines(found: Comparison) -> list[str]:
         f"bias {one.bias:+.4g}, RMS {one.rms:.4g}, robust {one.robust_rms:.4g}, 95 % within {one.p95:.4g} {one.unit}"
     )
     causes = [f"{cause.name} ({cause.share:.0%}): {cause.evidence}" for cause in found.causes]
-    return [words, *(line for cause in causes for line in wrap(cause, WORDS_PER_LINE))]
+    return [words, *(line for cause in causes for line in wrap(cause, LETTERS_PER_LINE))]
 
 
 def _range(found: Comparison) -> float:
