@@ -1,4 +1,4 @@
-"""The causes of a difference, each named from evidence of its own; a sound pair has none."""
+"""The causes of a difference, each named from separate evidence; a sound pair has none."""
 
 from __future__ import annotations
 

@@ -72,17 +72,17 @@ def compare(
     >>> found.returned_percent > 95, found.right.rms < 0.1, found.causes
     (True, True, ())
     """
-    a = _shape(a, "A")
-    b = _other(b)
+    a, b = _shape(a, "A"), _other(b)
     if not isinstance(b, (Shape, Truth)) or align:
         from quadfringe.decoding.compare.meshes import compare_surface
 
         return compare_surface(a, _surface(b), align=align)
-    period_px = fringe_period_px_of(a) if fringe_period_px is None else fringe_period_px
-    if not period_px > 0 and isinstance(b, Shape):
-        period_px = fringe_period_px_of(b)
-    pair = pair_of(a, b, period_px)
-    found = replace(compare_pixels(pair), warnings=_doubts(pair))
+    return _compare_pixels(pair_of(a, b, fringe_period_px or fringe_period_px_of(a)), causes)
+
+
+def _compare_pixels(pair: Pair, causes: bool) -> ShapeComparison:
+    doubts = _doubts(pair)
+    found = replace(compare_pixels(pair), warnings=doubts)
     if not causes or not found.overall.pixels:
         return found
     from quadfringe.decoding.compare.causes import causes_of

@@ -35,7 +35,8 @@ PIXELS_MIN, ROWS = 5000, 256
 OUTLIER_SIGMAS = 5.0
 # Exponent and share of foreign light of the shots that are made. The answer of a decoder is near linear up to about
 # four times this. Smaller ones are closer to linear and nearer to rounding.
-GAMMA_STEP, STRAY_STEP = 0.1, 0.05
+GAMMA_STEP = 0.1
+STRAY_STEP = 0.05
 # Least and largest exponent of a made shot. Follows from what projectors and displays have.
 EXPONENTS = 0.2, 5.0
 # Noise of the shots that are made, standard deviation, share of full scale: it sets how far a decoder smooths. Not
@@ -44,7 +45,8 @@ SYNTHETIC_NOISE = 0.02
 # Share of the difference that waves must explain, once the smooth part is taken out of both, alone and next to the
 # other family. Sound and blurred shots reach 0.08, faults have 0.3 or more; gamma adds at most 0.03 to crosstalk and
 # crosstalk as much to gamma. Larger numbers miss weak faults under noise, smaller ones name noise.
-WAVES_SHARE, WAVES_MORE = 0.2, 0.1
+WAVES_SHARE = 0.2
+WAVES_MORE = 0.1
 # Least size of what is named: difference of exponents, share of foreign light. Smaller ones harm nobody.
 GAMMA_MIN, STRAY_MIN = 0.02, 0.01
 
@@ -53,7 +55,8 @@ GAMMA_MIN, STRAY_MIN = 0.02, 0.01
 # Square of the blur in px2 that the fall of the modulation with the frequency of the fringes must show, and its share
 # of the blur that would explain the whole loss. Sound shots and half the light show 0.1 px2; steps, whose edges light
 # their neighbours, show 0.4 of the whole. Smaller ones name vignetting, larger ones miss blur of steps.
-BLUR_PX2, BLUR_AGREES = 1.0, 0.3
+BLUR_PX2 = 1.0
+BLUR_AGREES = 0.3
 # Loss of modulation (natural logarithm) from which it is a cause. Not measured: 5 % more noise.
 LOSS_MIN = 0.05
 # Share of the difference that lost modulation must explain. A smaller one names what is hardly seen.
@@ -63,9 +66,11 @@ LOSS_SHARE = 0.2
 
 # Share that offset, tilt and bow must explain, and their RMS in combined uncertainties. The mean of thousands of
 # pixels is good to a tenth of an uncertainty. Smaller ones name slow noise.
-FORM_SHARE, FORM_SIGMAS = 0.3, 0.3
+FORM_SHARE = 0.3
+FORM_SIGMAS = 0.3
 # Share of the pixels with a wrong order, and their share of the mean square. Smaller ones name stray pixels.
-WRONG_PERCENT, WRONG_SHARE = 0.1, 0.3
+WRONG_PERCENT = 0.1
+WRONG_SHARE = 0.3
 
 # --- Meshes and alignment
 
