@@ -181,6 +181,19 @@ def test_few_pixels_name_no_waves(plane: qf.Shape) -> None:
     assert recipe_of(replace(plane, config={})) is None
 
 
+@pytest.mark.parametrize("size", [(1, 1), (9, 9), (12, 700)])
+def test_small_shapes_are_compared(size: tuple[int, int]) -> None:
+    column_px = np.tile(np.linspace(300, 310, size[1], dtype=np.float32), (size[0], 1))
+    even = np.full(size, 0.4, np.float32)
+    shape = qf.Shape(np.float32(2 * np.pi * 36 / 912) * column_px, column_px, even, even)
+    found = qf.compare(shape, shape)
+    assert (found.overall.unit, found.overall.rms, found.causes) == ("rad", 0, ())
+
+
+def test_a_shape_without_modulation_names_no_loss(plane: qf.Shape) -> None:
+    assert qf.compare(replace(plane, modulation=plane.modulation * np.float32(np.nan)), plane).causes == ()
+
+
 def test_records_read_well() -> None:
     one = Deviations("mm", 10, 0.1, 0.2, 0.15, 0.4, (60.0, 90.0, 99.0))
     words = repr(Explanation("gamma", "because", 0.5, 0.2)) + repr(one)

@@ -82,18 +82,17 @@ def _lost_modulation(pair: Pair, difference_px: Map, rest_px: Map, *, alone: boo
     """Name defocus, or less light, when one shape has less modulation and the errors that go with it."""
     if not isinstance(pair.b, Shape):
         return None
-    known = np.isfinite(rest_px)
     with np.errstate(invalid="ignore", divide="ignore"):
         loss = np.log(pair.b.modulation.astype(np.float64) / pair.a.modulation)
-    loss[~np.isfinite(loss)] = np.nan
-    name, strong = ("A", pair.b) if np.nanmedian(loss[known]) > 0 else ("B", pair.a)
-    loss = loss if name == "A" else -loss
-    level = float(np.nanmedian(loss[known]))
+    frequency = np.hypot(*slopes(pair.column_b_px)) / pair.period_px
+    known = np.isfinite(rest_px) & np.isfinite(loss) & (frequency > 0)
+    level = float(np.median(loss[known])) if int(known.sum()) >= params.PIXELS_MIN else 0.0
+    name, strong = ("A", pair.b) if level > 0 else ("B", pair.a)
+    loss, level = (loss, level) if level > 0 else (-loss, -level)
     if level < params.LOSS_MIN:
         return None
-    frequency = np.hypot(*slopes(strong.column_px.astype(np.float64))) / pair.period_px
     blur_px2 = blur_of(loss[known], frequency[known])
-    whole_px2 = level / (2 * np.pi**2 * float(np.nanmedian(frequency[known])) ** 2)
+    whole_px2 = level / (2 * np.pi**2 * float(np.median(frequency[known])) ** 2)
     fall = f"the fringes of {name} have {100 * (1 - np.exp(-level)):.0f} % less modulation"
     total, left = _middle(difference_px[known]), _middle(rest_px[known])
     added = left * (1 - np.exp(-2 * level)) / total if total > 0 else 0.0  # noise is inverse to the modulation

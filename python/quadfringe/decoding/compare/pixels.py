@@ -79,6 +79,8 @@ def pair_of(a: Shape, b: Shape | Truth, period_px: float) -> Pair:
             f"compare: expected two shapes of one camera, got {columns} x {rows} and {other_columns} x {other_rows} "
             "pixels; for shapes of different cameras align them: align=True, or --align"
         )
+    if not period_px > 0 and isinstance(b, Shape):
+        period_px = fringe_period_px_of(b)
     column_a, column_b = a.column_px.astype(np.float64), b.column_px.astype(np.float64)
     judged = a.returned  # the truth knows of every pixel whether it is lit
     if isinstance(b, Truth):

@@ -83,12 +83,12 @@ def recipe_of(shape: Shape) -> Plan | None:
     """Give the plan that decodes linear light as the shape was decoded; None for a shape that no single shot made."""
     config = shape.config
     decode: Mapping[str, Any] = config.get("decode", {})
-    known = {"fringes", "projector_width_px"} <= config.keys()
-    if not known or decode.get("method") not in ("joint", "published"):
+    fringes, width = config.get("fringes"), config.get("projector_width_px")
+    if not isinstance(fringes, Mapping) or width is None or decode.get("method") not in ("joint", "published"):
         return None
     kept = {name: decode[name] for name in ("method", "modulation_min", "quality_min") if name in decode}
-    numbers = config["fringes"]["numbers"]
-    return Plan(config["projector_width_px"], numbers, response="linear", decode=kept)
+    numbers = fringes.get("numbers")
+    return Plan(width, () if numbers is None else numbers, response="linear", decode=kept)
 
 
 def _light(column_px: Map, plan: Plan) -> Map:
