@@ -27,8 +27,8 @@ def main() -> None:
         for name, gain in gains(*shot.ir.shape).items():
             uneven = {channel: (image / 4095 * gain).astype(np.float32) for channel, image in shot.channels.items()}
             shape = qf.decode(qf.Shot(**uneven, full_scale=1.0), qf.Plan(912, calibration=scanner.calibration))
-            found = compare(shape, shot.truth, 912 / 36)
-            figures = (found.depth_rms_mm, found.wrong_order_percent, found.returned_percent)
+            found = compare(shape, shot.truth, causes=False)
+            figures = (found.overall.rms, found.wrong_order_percent, found.returned_percent)
             print(f"{surface:8} {name:19}", *(f"{figure:13.4f}" for figure in figures))
 
 

@@ -16,7 +16,6 @@ from pydantic import BaseModel
 import quadfringe as qf
 from quadfringe import _core, config, data, devices, recording, scanner
 from quadfringe.config import Surface
-from quadfringe.decoding.compare import Comparison
 
 MODELS = sorted(
     {m for m in vars(config).values() if inspect.isclass(m) and issubclass(m, BaseModel)}
@@ -39,6 +38,7 @@ def records() -> dict[str, Any]:
         calibration, system = bench.calibration, bench.config
     assert measured.shot.truth is not None
     shape = measured.result()
+    compared = qf.compare(shape, measured.shot.truth, causes=False)
     crosstalk = tuple(tuple(float(a == b) for b in range(4)) for a in range(4))
     found = [
         measured.shot,
@@ -61,7 +61,8 @@ def records() -> dict[str, Any]:
             device="AD-080GE", visible={"pixel_format": "BayerRG12"}, features={f"Feature{i}": i for i in range(40)}
         ),
         qf.Plan(912, calibration=calibration, response=qf.Response(red={"exponent": 0.5})),
-        Comparison(np.zeros((768, 1024), np.float32), 0.1, 0.2, 0.3),
+        compared,
+        *(compared.profiles[name] for name in ("fringe phase", "surface angle")),
         devices.CameraStatistics(1, 2, {name: devices.ChipStatistics(1) for name in ("visible", "infrared")}),
         recording.RecorderStatistics(1, 2, 3, (Path("a.h5"),), None),
         recording.Verification(4, (1,), ("cut short",)),

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from support.bars import hold, tolerance
+from support.bars import bar, hold, tolerance
 from typer.testing import CliRunner
 
 import quadfringe as qf
@@ -21,6 +21,12 @@ from quadfringe.calibration.surfaces import (
     fit_sphere,
     form_of,
     measure_steps,
+)
+from quadfringe.calibration.trueness import (
+    dimension_trueness_percent,
+    global_planarity_mm,
+    local_planarity_mm,
+    point_precision_mm,
 )
 from quadfringe.cli import app
 from quadfringe.config import Device, SceneConfig, SystemConfig
@@ -107,6 +113,29 @@ def test_the_instrument_is_accepted(accepted: Acceptance) -> None:
     hold("acceptance.sphere_form_mm", accepted.figures["sphere_1_form_6sigma_mm"])
     hold("acceptance.plane_form_mm", accepted.figures["plane_1_form_6sigma_mm"])
     assert len(accepted.lines) == 2 + 2 + 9
+
+
+def test_precision_and_trueness_are_stated(accepted: Acceptance) -> None:
+    hold("acceptance.point_precision_mm", accepted.figures["point_precision_mm"])
+    for plane in ("plane_1", "plane_2"):
+        hold("acceptance.local_planarity_mm", accepted.figures[f"{plane}_local_planarity_precision_mm"])
+        hold("acceptance.global_planarity_mm", accepted.figures[f"{plane}_global_planarity_trueness_mm"])
+    for artefact in ("sphere_1", "steps_1"):
+        hold("acceptance.dimension_percent", accepted.figures[f"{artefact}_dimension_trueness_percent"])
+
+
+def test_precision_and_trueness_of_known_points() -> None:
+    random = np.random.default_rng(0)
+    y, x = np.mgrid[:256, :256].astype(float)
+    scatter = 0.02 * random.standard_normal((2, *x.shape))
+    bowed = 0.1 * np.cos(np.pi * x / 255)  # mean deviations of up to 0.1 mm, nearly flat within a tile
+    assert local_planarity_mm(bowed + scatter[0]) == pytest.approx(0.02, rel=bar("compare.normal").upper)
+    assert global_planarity_mm(bowed) == pytest.approx(0.1, rel=bar("acceptance.tile_share").upper)
+    shapes = [np.stack([x, y, 800 + part], axis=-1) for part in scatter]
+    assert point_precision_mm(shapes) == pytest.approx(0.02, rel=bar("compare.normal").upper)
+    assert point_precision_mm([shapes[0], shapes[1] + 2.0]) is None
+    assert point_precision_mm([shapes[0], shapes[1][:100]]) is None
+    assert dimension_trueness_percent([0.1, -0.3], [10.0, 60.0]) == pytest.approx(1.0)
 
 
 def test_the_report_is_drawn(accepted: Acceptance, tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """quadfringe: one exposure in, one metric 3D shape out.
 
 Three levels of detail: one call (`open` gives a `Scanner`), the steps (`read_shot`, `decode`, `Shape.save`; many shots
-with a `Decoder`), and the stages of the published method one by one (`stages`).
+with a `Decoder`; `compare`), and the stages of the published method one by one (`stages`).
 
 Conventions: arrays are (H, W), x to the right, y down, z forward, pixel centres at integers; phase in rad, lengths in
 mm; NaN means no data. A property holds data or follows from it without arguments, and cannot fail. A method reads,
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
         read_shot,
     )
     from quadfringe.decoding import Decoder, Plan, decode, decode_steps, estimate_response, stages
+    from quadfringe.decoding.compare import compare
     from quadfringe.devices import open_camera, open_projector
     from quadfringe.errors import (
         BatchError,
@@ -103,6 +104,7 @@ __all__ = [
     "WrongFrameError",
     "__version__",
     "check_code",
+    "compare",
     "decode",
     "decode_steps",
     "estimate_response",
@@ -129,6 +131,7 @@ _NAMES_IN = {
         "Truth",
         "read_shot",
     ),
+    "decoding.compare": ("compare",),
     "decoding": ("Decoder", "Plan", "decode", "decode_steps", "estimate_response"),
     "devices": ("open_camera", "open_projector"),
     "scanner": ("Scanner", "open_system"),

@@ -166,3 +166,12 @@ SESSION_DARK_MAX = 0.1  # share of full scale
 HOT_PIXELS_MAX = 500  # of the image: 0.06 % of 1024 x 768
 LEFT_MAX_PERCENT = 0.5  # stray light and RMS level error that may be left, per cent of full light
 UNEVEN_MAX_PERCENT = 5.0  # unevenness left after correction, per cent: more means that the light flickers
+
+# --- Precision and trueness: quadfringe accept
+
+# Side of a tile of local planarity, px, and share of it that must be filled. A larger tile counts form as scatter, a
+# smaller one counts the noise that neighbours share as form. Not measured: about a fringe.
+TILE_PX, TILE_FILLED = 32, 0.9
+# Difference of depth in mm up to which two captures show one pose. Not measured: above the errors of a bench, below a
+# pose that was changed on purpose.
+SAME_POSE_MM = 0.5

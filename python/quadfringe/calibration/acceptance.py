@@ -20,6 +20,12 @@ from quadfringe.calibration.surfaces import (
     form_of,
     measure_steps,
 )
+from quadfringe.calibration.trueness import (
+    dimension_trueness_percent,
+    global_planarity_mm,
+    local_planarity_mm,
+    point_precision_mm,
+)
 from quadfringe.config import SystemConfig
 from quadfringe.data import AnyShot, Calibration, Shape, xyz_mm_of
 from quadfringe.decoding import Decoder, Plan
@@ -57,13 +63,17 @@ class Limits:
 
 @dataclass(frozen=True)
 class Artefacts:
-    """Measured points (H, W, 3), mm, of each artefact, and its calibrated sizes; every kind may be absent."""
+    """Measured points (H, W, 3), mm, of each artefact, and its calibrated sizes; every kind may be absent.
+
+    `repeats` are further captures of the first plane, for the precision of a point alone.
+    """
 
     planes: tuple[Map, ...] = ()
     spheres: tuple[Map, ...] = ()
     sphere_diameter_mm: float = 0.0
     steps: tuple[Map, ...] = ()
     step_heights_mm: tuple[float, ...] = ()
+    repeats: tuple[Map, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -108,9 +118,11 @@ def accept(artefacts: Artefacts, limits: Limits | None = None) -> Acceptance:
         *(_sphere(f"sphere_{i}", xyz, artefacts, limits) for i, xyz in enumerate(artefacts.spheres, 1)),
         *(_steps(f"steps_{i}", xyz, artefacts, limits) for i, xyz in enumerate(artefacts.steps, 1)),
     ]
+    point = point_precision_mm([*reversed(artefacts.repeats), *artefacts.planes])
+    precision = {} if point is None else {"point_precision_mm": point}
     return Acceptance(
         lines=tuple(line for one in found for line in one.lines),
-        figures={name: value for one in found for name, value in one.figures.items()},
+        figures=precision | {name: value for one in found for name, value in one.figures.items()},
         deviations_mm={name: image for one in found for name, image in one.deviations_mm.items()},
     )
 
@@ -122,7 +134,12 @@ def _plane(name: str, xyz_mm: Map, limits: Limits) -> Acceptance:
     distances = fit_plane(part).distances_mm(part)
     form = form_of(distances)
     lines = (Line(f"{name}_form_mm", form.form_mm, limits.plane_form_mm),)
-    return Acceptance(lines, _form_figures(name, form), {name: distances})
+    words = {
+        f"{name}_local_planarity_precision_mm": local_planarity_mm(distances),
+        f"{name}_global_planarity_trueness_mm": global_planarity_mm(distances),
+    }
+    known = {key: value for key, value in words.items() if np.isfinite(value)}
+    return Acceptance(lines, _form_figures(name, form) | known, {name: distances})
 
 
 def _sphere(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acceptance:
@@ -141,6 +158,7 @@ def _sphere(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acc
     )
     x, y, z = (float(c) for c in sphere.centre_mm)
     place = {f"{name}_x_mm": x, f"{name}_y_mm": y, f"{name}_z_mm": z}
+    place[f"{name}_dimension_trueness_percent"] = dimension_trueness_percent([size], [artefacts.sphere_diameter_mm])
     return Acceptance(lines, _form_figures(name, form) | place, {name: distances})
 
 
@@ -148,7 +166,8 @@ def _steps(name: str, xyz_mm: Map, artefacts: Artefacts, limits: Limits) -> Acce
     found = measure_steps(_without_border(xyz_mm), artefacts.step_heights_mm)
     pairs = zip(found.nominal_mm, found.errors_mm, strict=True)
     lines = tuple(Line(f"{name}_{nominal:g}mm_error_mm", error, limits.step_mm) for nominal, error in pairs)
-    return Acceptance(lines, _form_figures(f"{name}_base", found.base), {name: found.height_mm})
+    words = {f"{name}_dimension_trueness_percent": dimension_trueness_percent(found.errors_mm, found.nominal_mm)}
+    return Acceptance(lines, _form_figures(f"{name}_base", found.base) | words, {name: found.height_mm})
 
 
 def _without_border(xyz_mm: Map) -> Map:
@@ -168,24 +187,28 @@ def _form_figures(name: str, form: Form) -> dict[str, float]:
 def measure_artefacts(config: SystemConfig, calibration: Calibration | None = None) -> Artefacts:
     """Measure two planes, a sphere and steps on the virtual bench of `config`, about 800 mm away.
 
-    One plane faces the camera and one is tilted by 15 degrees; sphere and steps are built-in scenes. Light and camera
-    are those of the scene of `config`, with new noise for each shot. Without a calibration, the exact one is used.
+    One plane faces the camera, twice, and one is tilted by 15 degrees; sphere and steps are built-in scenes. Light
+    and camera are those of the scene of `config`, with new noise for each shot. Without a calibration, the exact one is
+    used.
     """
     bench = VirtualBench(config)
     known = calibration or bench.calibration()
     bench.project(config.fringes)
     tilt = np.radians(15.0)
     shots: list[AnyShot] = []
-    for normal in ((0.0, 0.0, -1.0), (float(np.sin(tilt)), 0.0, -float(np.cos(tilt)))):
+    facing = (0.0, 0.0, -1.0)
+    for normal in (facing, (float(np.sin(tilt)), 0.0, -float(np.cos(tilt)))):
         bench.place_plane((0.0, 0.0, 800.0), normal)
         shots.append(bench.expose(seed=_seed(config, len(shots))))
     for surface in ("sphere", "steps"):
         bench.place_scene(surface)
         shots.append(bench.expose(seed=_seed(config, len(shots))))
+    bench.place_plane((0.0, 0.0, 800.0), facing)
+    shots.append(bench.expose(seed=_seed(config, len(shots))))
     plan = Plan(known.projector.width_px, config.fringes, known, decode=config.decode)
     decoder = Decoder(shots[0], plan)
     points = [xyz_mm_of(decoder.decode(shot)) for shot in shots]
-    return Artefacts(tuple(points[:2]), (points[2],), SPHERE_DIAMETER_MM, (points[3],), STEP_HEIGHTS_MM)
+    return Artefacts(tuple(points[:2]), (points[2],), SPHERE_DIAMETER_MM, (points[3],), STEP_HEIGHTS_MM, (points[4],))
 
 
 def _seed(config: SystemConfig, number: int) -> int:

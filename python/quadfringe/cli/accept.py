@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from quadfringe.cli._options import JsonOption, VirtualSystemOption
-from quadfringe.cli._output import rows, say, write_figures
+from quadfringe.cli._output import rows, say, table, write_figures
 
 if TYPE_CHECKING:
     from quadfringe.calibration.acceptance import Artefacts, Limits
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 __all__ = ["accept"]
 
 NOT_ACCEPTED = 1
+WORDS = ("precision", "trueness")  # of figures in the words of data sheets
 ShapesOption = Annotated[
     list[Path] | None, typer.Option(metavar="FILE", help="Measured shape of this artefact, .npz; may be repeated.")
 ]
@@ -92,6 +93,9 @@ def _report(artefacts: Artefacts, limits: Limits, out: Path | None, json: Path |
     found = accept(artefacts, limits)
     lines = [(line.name, line.value_mm, line.limit_mm, "yes" if line.accepted else "NO") for line in found.lines]
     rows("acceptance, mm", ("figure", "value", "limit", "accepted"), lines, json)
+    words = {name: value for name, value in found.figures.items() if any(word in name for word in WORDS)}
+    if words:
+        table("precision (one standard deviation) and trueness", words, json)
     write_figures({line.name: line.value_mm for line in found.lines} | dict(found.figures), json)
     if out is not None:
         write_acceptance(out, found)

@@ -13,6 +13,7 @@ from quadfringe.cli import (
     bench,
     calibrate,
     camera,
+    compare,
     convert,
     decode,
     demo,
@@ -96,6 +97,7 @@ app.command("live")(live.live)
 app.command("record")(record.record)
 app.command("recover")(record.recover)
 app.command("batch")(batch.batch)
+app.command("compare")(compare.compare)
 app.command("accept")(accept.accept)
 app.command("doctor")(doctor.doctor)
 app.command("info")(info.info)

@@ -15,7 +15,7 @@ import numpy as np
 from quadfringe.config import SceneConfig, SystemConfig
 from quadfringe.config.cameras import AravisConfig, ChipConfig, ReplayConfig, VirtualConfig
 from quadfringe.data import AnyShot, BayerShot, Shape, Truth
-from quadfringe.decoding.compare import Comparison, compare
+from quadfringe.decoding.compare import ShapeComparison, compare
 from quadfringe.devices.emulator import Emulator
 from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.files import folder_for
@@ -143,9 +143,8 @@ def measure_scene(
     folder = folder_for(out / name)
     for earlier in (*folder.glob("shot_*.ply"), out / f"{name}.h5"):
         earlier.unlink(missing_ok=True)
-    found: list[Comparison] = []
+    found: list[ShapeComparison] = []
     shapes = 0
-    period_px = scanner.projector_width_px / scanner.config.fringes.numbers[0]
     with (
         Recorder(out / f"{name}.h5", scanner.config, scanner.calibration) as recorder,
         movie(out / f"{name}.mp4", RATE_HZ) as pictures,
@@ -158,7 +157,7 @@ def measure_scene(
             shape.save(folder / f"shot_{shapes:06d}.ply")
             pictures.add(_picture(shot, shape, shapes, shots))
             if truth_of is not None and (truth := truth_of(shot)) is not None:
-                found.append(compare(shape, truth, period_px))
+                found.append(compare(shape, truth, causes=False))
             shapes += 1
         counted = stream.statistics()
     return MovingScene(
@@ -167,7 +166,7 @@ def measure_scene(
         recorder.statistics().written,
         shapes,
         counted.camera.dropped + counted.camera.unpaired + sum(queue.dropped for queue in counted.queues.values()),
-        tuple(comparison.depth_rms_mm for comparison in found),
+        tuple(comparison.overall.rms for comparison in found),
         tuple(comparison.wrong_order_percent for comparison in found),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape, xyz_mm_of
-from quadfringe.decoding.compare import Comparison
+from quadfringe.decoding.compare import ShapeComparison
 from quadfringe.errors import require
 from quadfringe.files import atomic
 
@@ -124,12 +124,13 @@ def write_report(
     shot: AnyShot,
     shape: Shape,
     wrapped: Sequence[NDArray[np.float32]],
-    found: Comparison,
+    found: ShapeComparison,
 ) -> None:
     """Write the report of a calibrated shape and of its comparison with the truth to a PNG."""
     names = ("red and blue, two-step", "green, Fourier", "infrared, Fourier")
     turn = (-np.pi, np.pi)
-    error_mm = 4 * found.depth_rms_mm if np.isfinite(found.depth_rms_mm) else 1.0
+    rms_mm = found.overall.rms
+    error_mm = 4 * rms_mm if np.isfinite(rms_mm) else 1.0
     rows = [
         fringe_panels(shot),
         [
@@ -140,7 +141,7 @@ def write_report(
             Panel("absolute phase", shape.phase_rad, "rad", "turbo"),
             Panel("quality", shape.quality, "", "viridis"),
             Panel("depth", xyz_mm_of(shape)[:, :, 2], "mm", "viridis_r"),
-            Panel("depth error", found.depth_error_mm, "mm", "coolwarm", (-error_mm, error_mm)),
+            Panel("depth error", found.difference, "mm", "coolwarm", (-error_mm, error_mm)),
         ],
     ]
-    draw_panels(path, f"{title}: depth RMS {found.depth_rms_mm:.3f} mm", rows)
+    draw_panels(path, f"{title}: depth RMS {rms_mm:.3f} mm", rows)

@@ -9,7 +9,7 @@ the seeds `REPORT`.
 from quadfringe.evaluation.world.doubt import Doubts
 from quadfringe.evaluation.world.judging import Figures, judge
 from quadfringe.evaluation.world.resolution import edge_width_px, half_height_period_px, height_ratios
-from quadfringe.evaluation.world.scenes import REPORT, SCENES, TUNE, Take, expose, take
+from quadfringe.evaluation.world.scenes import REPORT, SCENES, TUNE, Take, World, expose, take
 
 __all__ = [
     "REPORT",
@@ -18,6 +18,7 @@ __all__ = [
     "Doubts",
     "Figures",
     "Take",
+    "World",
     "edge_width_px",
     "expose",
     "half_height_period_px",
