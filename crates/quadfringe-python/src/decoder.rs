@@ -81,11 +81,8 @@ impl Decoder {
         let geometry = Geometry { camera, projector, infrared, predeformed_z_mm, depth_range_mm };
         let plan = || {
             let encoding = Encoding::four_channel(fringe_numbers, projector_width)?;
-            planned(
-                quadfringe::Decoder::builder(&encoding, shape).conditioner(conditioner),
-                &choices,
-                &geometry,
-            )
+            let builder = quadfringe::Decoder::builder(&encoding, shape).conditioner(conditioner);
+            planned(builder, &choices, &geometry)
         };
         let kernel = detached(py, plan)?.map_err(value_error)?;
         let long = is_long(&kernel.options().method, shape);

@@ -189,8 +189,8 @@ class DecodeConfig(Model):
     )
     albedo: bool | None = Field(
         default=None,
-        description="Whether shapes have the albedo: the light of each channel without fringes. Absent: yes with method "
-        "joint; the published method has none.",
+        description="Whether shapes have the albedo, the light of each channel without fringes. Absent: yes with "
+        "method joint; the published method has none.",
     )
     threads: Annotated[int, Field(gt=0, le=_core.THREADS_MAX)] | None = Field(
         default=None, description="Threads of one decoder, at most 1024. Absent: as many as the machine has cores."

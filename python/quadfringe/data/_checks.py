@@ -38,13 +38,13 @@ def check_full_scale(full_scale: float | None) -> None:
 
 
 def check_maps(maps: Mapping[str, Any]) -> None:
-    """Raise `InputError` unless all maps are (H, W), or (H, W, 3) when their name begins with xyz, of one size."""
+    """Raise `InputError` unless all maps are of one size: (H, W), points (H, W, 3), albedo (H, W, 4)."""
     for name, values in maps.items():
-        last = (3,) if name.startswith("xyz") else ()
+        last = (3,) if name.startswith("xyz") else (4,) if name == "albedo" else ()
         shape = values.shape if isinstance(values, np.ndarray) else None
         if shape is None or shape[2:] != last or len(shape) < 2 or 0 in shape:
             got = type(values).__name__ if shape is None else f"an array of shape {shape}"
-            raise InputError(f"{name}: expected an array {'(H, W, 3)' if last else '(H, W)'}, got {got}")
+            raise InputError(f"{name}: expected an array ({', '.join(['H', 'W', *map(str, last)])}), got {got}")
     _check_equal("size", {name: f"{values.shape[1]} x {values.shape[0]}" for name, values in maps.items()})
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from quadfringe.data.mesh import normals_of
 from quadfringe.data.points import xyz_mm_of
 from quadfringe.errors import require
-from quadfringe.io import export
 
 if TYPE_CHECKING:
     from quadfringe.data.shape import Shape
@@ -39,7 +38,7 @@ def open3d_of(shape: Shape) -> Any:
     cloud = open3d.geometry.PointCloud()
     cloud.points = vectors(points_mm[valid].astype(np.float64))
     cloud.normals = vectors(np.nan_to_num(normals_of(shape).directions[valid]).astype(np.float64))
-    cloud.colors = vectors(export.grey(shape.modulation)[valid] / 255.0)
+    cloud.colors = vectors(shape.colour[valid] / 255.0)
     return cloud
 
 

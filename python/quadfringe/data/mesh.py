@@ -120,7 +120,7 @@ def mesh_of(shape: Shape, step: int, fill_holes_px: int, colour: NDArray[np.uint
     for name, value, least in (("step", step, 1), ("fill_holes_px", fill_holes_px, 0)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
             raise InputError(f"{name}: expected a whole number of at least {least}, got {value!r}")
-    colour = export.grey(shape.modulation) if colour is None else _colour(colour, xyz_mm.shape)
+    colour = shape.colour if colour is None else _colour(colour, xyz_mm.shape)
     try:
         found = _core.mesh_from_points(xyz_mm, _deviations(shape), step=int(step), holes_px=int(fill_holes_px))
     except ValueError as error:

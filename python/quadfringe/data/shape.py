@@ -18,6 +18,7 @@ from quadfringe.data.points import xyz_mm_of
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
 from quadfringe.io.arrays import read_npz
+from quadfringe.io.export import grey, srgb
 from quadfringe.io.texts import json_of
 
 if TYPE_CHECKING:
@@ -27,13 +28,13 @@ __all__ = ["SUFFIXES", "Shape", "xyz_mm_of"]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "modulation", "quality")
-MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm")
+MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm", "albedo")
 SUFFIXES = (".npz", ".ply", ".pcd", ".stl", ".obj", ".glb", ".tif", ".tiff")
 
 
 @dataclass(frozen=True, repr=False)
 class Shape:
-    """A decoded shot: maps (H, W) float32, points (H, W, 3) float32; NaN where there is no data.
+    """A decoded shot: maps (H, W), points (H, W, 3) and albedo (H, W, 4), float32; NaN where there is no data.
 
     phase_rad: absolute phase of the first fringe number, 0 at projector column 0.
     column_px: projector column that lights the point.
@@ -43,6 +44,8 @@ class Shape:
     wrong_order_probability: probability that the fringe order is wrong, an upper bound.
     uncertainty_rad, uncertainty_mm: standard deviation of the phase, or with a calibration of the depth, for the order
     that was chosen; the other one is None.
+    albedo: light of R, G, B and IR without fringes, linear, fraction of full scale, (H, W, 4): the albedo of the
+    surface times the mean light on it. None by methods other than joint, and with `albedo = false` in `[decode]`.
 
     `config` holds the settings in force, with method, response and version, and `calibration` the calibration; both are
     saved in an NPZ file. Raises `InputError` for maps of unequal size.
@@ -56,6 +59,7 @@ class Shape:
     wrong_order_probability: Map | None = None
     uncertainty_rad: Map | None = None
     uncertainty_mm: Map | None = None
+    albedo: Map | None = None
     config: Mapping[str, Any] = field(default_factory=dict)
     calibration: Calibration | None = None
 
@@ -97,6 +101,17 @@ class Shape:
         return None if self.xyz_mm is None else self.xyz_mm[:, :, 2]
 
     @property
+    def colour(self) -> NDArray[np.uint8]:
+        """The surface without fringes as a picture, (H, W, 3) sRGB: the albedo, or without one the modulation in grey.
+
+        White is the brightest hundredth. Pixels without albedo are grey by their modulation, without data black.
+        """
+        shades = grey(self.modulation)
+        if self.albedo is None:
+            return shades
+        return np.where(np.isfinite(self.albedo[:, :, :1]), srgb(self.albedo), shades)
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """What is doubtful about the shape, and what to do about it, in words; empty when nothing is."""
         return tuple(self.config.get("warnings", ()))
@@ -127,7 +142,7 @@ class Shape:
 
         `step` takes every n-th pixel of every n-th row. Holes of at most `fill_holes_px` pixels (0 to 1000) whose
         rim is one smooth surface are filled, and their vertices marked. `colour` is a picture (H, W, 3) uint8; the
-        default is the modulation in grey. Raises `InputError` without a calibration, and for values out of range.
+        default is `Shape.colour`. Raises `InputError` without a calibration, and for values out of range.
 
         >>> import numpy as np
         >>> rows, columns = np.mgrid[0:4, 0:6].astype(np.float32)
@@ -150,7 +165,7 @@ class Shape:
         return self.mesh().to_trimesh()
 
     def to_open3d(self) -> Any:
-        """Give the points as `open3d.geometry.PointCloud` in mm, with normals and grey colours.
+        """Give the points as `open3d.geometry.PointCloud` in mm, with normals and colours.
 
         For a `TriangleMesh`, use `mesh().to_open3d()`. Raises `InputError` without a calibration, and
         `MissingExtraError` without Open3D.
@@ -173,7 +188,7 @@ class Shape:
         """Write by suffix; whole or not at all.
 
         .npz: every map, config and calibration, the only file that `load` reads. .ply and .pcd: points with
-        normals, grey colour, `quality`, `uncertainty_mm` and `wrong_order_probability`; PLY holds the valid points
+        normals, colour, `quality`, `uncertainty_mm` and `wrong_order_probability`; PLY holds the valid points
         with their row and column, PCD one point for each pixel. .stl, .obj, .glb, and with `faces` .ply: the mesh,
         for which `step` and `fill_holes_px` are those of `mesh`; see `Mesh.save`. .tif: depth in mm. Raises
         `InputError` for another suffix, a folder that does not exist, a choice that the kind of file does not have,

@@ -38,7 +38,7 @@ def write_pixels(shape: Shape, path: Path, suffix: str) -> None:
     if suffix == ".ply":
         points_mm = xyz_mm_of(shape)
         valid = np.asarray(np.isfinite(points_mm).all(axis=2))
-        export.write_ply(path, points_mm[valid], export.grey(shape.modulation)[valid], _of_points(shape, valid))
+        export.write_ply(path, points_mm[valid], shape.colour[valid], _of_points(shape, valid))
     elif suffix == ".pcd":
         write_pcd(path, _organised(shape))
     else:
@@ -60,7 +60,7 @@ def _of_points(shape: Shape, valid: NDArray[np.bool_]) -> dict[str, NDArray[Any]
 def _organised(shape: Shape) -> dict[str, NDArray[Any]]:
     """Give the fields of a PCD file by name, (H, W); NaN where there is no data, as PCL has it."""
     points_mm, directions = xyz_mm_of(shape), normals_of(shape).directions
-    red, green, blue = (export.grey(shape.modulation)[:, :, k].astype(np.uint32) for k in range(3))
+    red, green, blue = (shape.colour[:, :, k].astype(np.uint32) for k in range(3))
     fields: dict[str, NDArray[Any]] = {axis: points_mm[:, :, k] for k, axis in enumerate("xyz")}
     fields["rgb"] = (red << 16 | green << 8 | blue).view(np.float32)
     fields |= {f"normal_{axis}": directions[:, :, k] for k, axis in enumerate("xyz")}

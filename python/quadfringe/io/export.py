@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from quadfringe.errors import require
 from quadfringe.files import atomic
 
-__all__ = ["Triangles", "grey", "write_depth", "write_mesh", "write_npz", "write_ply"]
+__all__ = ["Triangles", "grey", "srgb", "write_depth", "write_mesh", "write_npz", "write_ply"]
 
 # From mm in the camera frame (y down, z forward) to metres with y up: half a turn around x.
 GLB_FROM_MM = np.array([1e-3, -1e-3, -1e-3], np.float32)
@@ -24,6 +24,16 @@ def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
     top = np.nanquantile(modulation, 0.99) if np.isfinite(modulation).any() else 1.0
     shades = np.nan_to_num(modulation / max(float(top), 1e-9)).clip(0, 1) * 255
     return np.repeat(shades.astype(np.uint8)[:, :, None], 3, axis=2)
+
+
+def srgb(albedo: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Convert albedo (H, W, 4) to a picture (H, W, 3) sRGB; the brightest hundredth is white, no data is black."""
+    light = np.nan_to_num(albedo[:, :, :3])
+    brightest = light.max(axis=2)
+    top = float(np.quantile(brightest[brightest > 0], 0.99)) if (brightest > 0).any() else 1.0
+    share = (light / max(top, 1e-9)).clip(0, 1)
+    coded = np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
+    return (coded * 255 + 0.5).astype(np.uint8)
 
 
 def write_ply(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
+from quadfringe.io.export import srgb
 
 __all__ = ["Picture", "channels_picture", "coloured", "limits_of", "phase_picture", "texture"]
 
@@ -67,8 +68,11 @@ def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes:
 def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
     """Return the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
 
-    The brightness is the modulation, and the colour comes from the mean light in the neighbourhood.
+    This is the albedo. Without one, the brightness is the modulation, and the colour comes from the mean light in the
+    neighbourhood.
     """
+    if shape.albedo is not None:
+        return srgb(shape.albedo[::stride, ::stride])
     top = max(limits_of(shape.modulation)[1], 1e-6)
     modulation = np.nan_to_num(shape.modulation[::stride, ::stride])
     brightness = cv2.convertScaleAbs(modulation, alpha=255 / top)

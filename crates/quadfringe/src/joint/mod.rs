@@ -160,14 +160,8 @@ impl Joint {
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
         let noise = self.uncertainty(&frame);
         self.write(&frame, &noise, finish, out);
-        // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image.
-        let maps = [&mut out.wrong_order_probability, &mut out.quality];
-        let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
-        self.propagation.run(&grid, &self.phase, &self.validity.components, wrong_order, quality);
-        // 12. Albedo.
-        if let Some(albedo) = &mut out.albedo {
-            self.write_albedo(&frame, albedo.as_slice_mut().expect("checked layout"));
-        }
+        // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image. 12. Albedo.
+        self.complete(&frame, out);
     }
 
     /// Steps 2 to 6.
@@ -305,15 +299,16 @@ impl Joint {
         );
     }
 
-    /// Step 12: the albedo of every pixel.
-    fn write_albedo(&self, frame: &Frame<'_>, out: &mut [f32]) {
-        let scene = self.pyramid.full.scene(frame.full);
-        let known = Known {
-            phase: &self.phase,
-            valid: &self.validity.valid,
-            ratios: self.ratios,
-            noise: self.coarse.noise,
-        };
-        self.albedo.write(&scene, &self.energy, known, out);
+    /// Steps 11 and 12, on the maps that step 10 has written.
+    fn complete(&mut self, frame: &Frame<'_>, out: &mut Decoded) {
+        let maps = [&mut out.wrong_order_probability, &mut out.quality];
+        let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
+        let Self { phase, validity, ratios, coarse, .. } = self;
+        self.propagation.run(frame.full.grid, phase, &validity.components, wrong_order, quality);
+        if let Some(albedo) = &mut out.albedo {
+            let known = Known { phase, valid: &validity.valid, ratios: *ratios, noise: coarse.noise };
+            let (scene, out) = (self.pyramid.full.scene(frame.full), albedo.as_slice_mut());
+            self.albedo.write(&scene, &self.energy, known, out.expect("checked layout"));
+        }
     }
 }
