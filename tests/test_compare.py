@@ -98,6 +98,9 @@ def test_a_step_of_a_tenth_of_a_millimetre_in_a_plane_is_found(stage: Stage, pla
     profile = found.profiles["image column"]
     left, right = (np.median(profile.bias[part]) for part in (profile.at < 230, profile.at > 280))
     hold("compare.step_mm", left - right)
+    plane_albedo = found.profiles["albedo"]
+    assert plane_albedo.unit == "share of full scale"
+    assert 0.4 < np.average(plane_albedo.at, weights=plane_albedo.pixels) < 0.6
 
 
 @pytest.mark.parametrize("surface", ["plane", "face", "peaks"])

@@ -18,7 +18,7 @@ Comparison = ShapeComparison | MeshComparison
 BINS = 80
 RANGE_SPREADS = 4.0  # half the range of the colours, in robust spreads of the difference around 0
 LETTERS_PER_LINE = 100
-PROFILES = ("modulation", "surface angle", "fringe phase", "image column", "image row")
+PROFILES = ("modulation", "albedo", "surface angle", "fringe phase", "image column", "image row")
 
 
 def write_comparison(path: Path, title: str, found: Comparison) -> None:

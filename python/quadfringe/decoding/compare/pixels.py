@@ -157,6 +157,8 @@ def quantities_of(pair: Pair) -> dict[str, tuple[str, Map]]:
         "image column": ("px", x),
         "image row": ("px", y),
     }
+    if pair.a.albedo is not None:
+        found["albedo"] = ("share of full scale", pair.a.albedo.mean(axis=2, dtype=np.float64))
     points = pair.b.xyz_mm if pair.b.xyz_mm is not None else pair.a.xyz_mm
     if points is not None:
         found["surface angle"] = ("degrees from the line of sight", surface_angle_deg(points))
