@@ -61,6 +61,8 @@ def records() -> dict[str, Any]:
             device="AD-080GE", visible={"pixel_format": "BayerRG12"}, features={f"Feature{i}": i for i in range(40)}
         ),
         qf.Plan(912, calibration=calibration, response=qf.Response(red={"exponent": 0.5})),
+        shape.mesh(),
+        shape.normals(),
         compared,
         *(compared.profiles[name] for name in ("fringe phase", "surface angle")),
         devices.CameraStatistics(1, 2, {name: devices.ChipStatistics(1) for name in ("visible", "infrared")}),

@@ -22,7 +22,7 @@ from quadfringe.decoding.fringe_fit import pixels_of
 __all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "mirrored", "within_depths"]
 
 # Maps without data outside the range; quality and modulation are known wherever there is light.
-BOUNDED = ("phase_rad", "column_px", "xyz_mm", "wrong_order_probability", "uncertainty_mm")
+BOUNDED = ("phase_rad", "column_px", "xyz_mm", "wrong_order_probability", "uncertainty_mm", "albedo")
 FAR_MM = 1e9  # longer than any distance, and a number that float takes
 CALIBRATE = "decode with the calibration of this bench, or calibrate again: quadfringe calibrate"
 FLIP = (
