@@ -100,7 +100,7 @@ class Mesh:
         return export.Triangles(self.vertices_mm, self.faces, self.normals, self.colour, self.scalars)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Normals:
     """Normals of a shape; `Shape.normals` makes them.
 
@@ -110,6 +110,10 @@ class Normals:
 
     directions: Floats
     uncertainty_rad: Floats
+
+    def __repr__(self) -> str:
+        rows, columns = self.uncertainty_rad.shape
+        return f"Normals({columns} x {rows}, {np.isfinite(self.uncertainty_rad).mean():.1%} known)"
 
 
 def mesh_of(shape: Shape, step: int, fill_holes_px: int, colour: NDArray[np.uint8] | None) -> Mesh:
