@@ -122,7 +122,7 @@ def test_a_helper_that_cannot_start_says_why(
     finally:
         multiprocessing.set_executable(before)
     monkeypatch.setattr("quadfringe.io.bounded.Pipe", _without_descriptors)
-    with pytest.raises(UnansweredError, match="cannot be started: .*Too many open files"):
+    with pytest.raises(UnansweredError, match=r"cannot be started: .*Too many open files"):
         helper.run(int, "7")
 
 

@@ -41,6 +41,7 @@ from typer.testing import CliRunner
 import quadfringe as qf
 from quadfringe.cli import app
 from quadfringe.data import AnyShot, BayerShot, Calibration, FrameStamp, Stamp
+from quadfringe.errors import RecordingError
 from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.recording import Recorder, Recording, RecordingWriter
 from quadfringe.recording._layout import Header
@@ -112,7 +113,7 @@ def read_all(path: Path, base: Base) -> list[str]:
                 shots = [take.read(index) for index in range(len(take))]
                 faults = compare(take, [shot for shot in shots if shot is not None], base, warned=bool(warned))
                 known = len(shots) >= len(base.shots) or bool(warned) or not base.closed
-        except qf.InputError:
+        except (qf.InputError, RecordingError):
             return []
     return faults if known else [*faults, "silent"]
 
@@ -187,7 +188,7 @@ def replay(path: Path, base: Base) -> list[str]:
         warnings.simplefilter("always")
         try:
             take = Recording(path)
-        except qf.InputError:
+        except (qf.InputError, RecordingError):
             return []
         with ReplayCamera(take, "full") as camera:
             shots = list(camera.stream(keep="all"))

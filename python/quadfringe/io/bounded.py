@@ -103,6 +103,11 @@ class Helper:
         result: R = answer.value
         return result
 
+    @property
+    def running(self) -> bool:
+        """Whether calls reach a process that earlier calls reached."""
+        return sys.platform == "win32" or (self._child is not None and self._child.owner == os.getpid())
+
     def close(self) -> None:
         """End the process; further calls do nothing."""
         with self._lock:
