@@ -33,6 +33,7 @@ UNVERIFIABLE = (
 )
 COPIED = "copied from a recording of an earlier version, whose stamps, settings and calibration could not be verified"
 OTHER_SHOTS = "quadfringe recover rescues the others"
+TRY = "try again, and suspect the file if that does not help"
 UNMATCHED = "it does not match its checksum"
 LISTED = 10  # shots that a message names
 
@@ -99,7 +100,7 @@ class Recording:
             raise InputError(f"{self.path}: {what}: {error}; {AGAIN}") from error
         except UnreadableError as error:
             self._source.close()
-            raise RecordingError(f"{self.path}: cannot be read: {error}; try again, then {AGAIN}") from error
+            raise RecordingError(f"{self.path}: cannot be read: {error}; {TRY}") from error
         except InputError as error:
             self._source.close()
             raise type(error)(f"{self.path}: {error}") from error
