@@ -178,7 +178,7 @@ def recover(path: Path, base: Base) -> list[str]:
     result = run("recover", path, "--out", whole)
     faults = traceback_in(result)
     if result.exit_code == 0:
-        with Recording(whole) as take:
+        with warnings.catch_warnings(action="ignore"), Recording(whole) as take:
             faults += compare(take, list(take), base, warned=bool(result.stderr))
     return faults
 
