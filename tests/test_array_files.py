@@ -95,3 +95,16 @@ def test_arrays_in_every_layout_are_read(tmp_path: Path) -> None:
     for kept, array in zip(read_npz(tmp_path / "a.npz").values(), kinds, strict=True):
         np.testing.assert_array_equal(kept, array)
         assert kept.flags.writeable
+
+
+def test_an_archive_of_many_members_or_bytes_is_refused(tmp_path: Path) -> None:
+    one = npy(np.zeros(1))
+    with pytest.raises(qf.InputError, match=r"many\.npz: .*it holds 20000 arrays, expected at most 1000"):
+        read_npz(archive(tmp_path / "many.npz", {f"m{number}.npy": one for number in range(20_000)}))
+    bomb = tmp_path / "bomb.npz"
+    with zipfile.ZipFile(bomb, "w", zipfile.ZIP_DEFLATED) as stored:
+        stored.writestr("a.npy", one)
+        size, stored.filelist[0].file_size = stored.filelist[0].file_size, 1 << 31
+    assert size == len(one)
+    with pytest.raises(qf.InputError, match=r"bomb\.npz: .*its arrays have 2147 MB, expected at most 1074 MB"):
+        read_npz(bomb)

@@ -8,6 +8,7 @@ import shutil
 import subprocess
 import sys
 import time
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,8 +19,8 @@ import zarr
 from support.bars import tolerance
 
 import quadfringe as qf
-from quadfringe.data import Shot, Stamp
-from quadfringe.errors import InputError, RecordingWarning
+from quadfringe.data import AnyShot, Shot, Stamp
+from quadfringe.errors import InputError, RecordingError, RecordingWarning
 from quadfringe.recording import Recorder, Recording
 from quadfringe.recording._results import locked
 from quadfringe.recording.batch import decode_recordings, executor_for, prepare, run
@@ -230,3 +231,22 @@ def test_a_response_that_nobody_states_is_the_same_in_every_process(take: Path, 
     assert digests(tmp_path / "1") == digests(tmp_path / "2")
     response = zarr.open_group(tmp_path / "1" / "bent.zarr", mode="r").attrs["settings"]["config"]["decode"]["response"]
     assert response["red"]["exponent"] == pytest.approx(1 / 1.6, rel=tolerance("response.exponent_error_part"))
+
+
+def test_a_shot_that_cannot_be_read_now_is_tried_again_by_the_next_run(
+    take: Path, whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs, getitem = prepare([take], tmp_path), Recording.__getitem__
+
+    def busy(recording: Recording, index: int) -> AnyShot:
+        if index == 1:
+            raise RecordingError("take.h5: shot 1 cannot be read: reading it does not end within 1.5 s")
+        return getitem(recording, index)
+
+    with monkeypatch.context() as patched, ThreadPoolExecutor(1) as pool:
+        patched.setattr(Recording, "__getitem__", busy)
+        assert {o.shot for o in run(jobs, pool) if o.error} == {1, BLACK}
+    assert prepare([take], tmp_path)[0].pending == (1, BLACK)
+    with ThreadPoolExecutor(1) as pool:
+        assert {o.shot for o in run(prepare([take], tmp_path), pool) if o.error} == {BLACK}
+    assert digests(tmp_path / "take.zarr") == digests(whole / "take.zarr")

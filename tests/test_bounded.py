@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import errno
+import multiprocessing
+import multiprocessing.spawn
 import operator
 import os
 import signal
@@ -16,7 +19,7 @@ import pytest
 
 from quadfringe.errors import InputError
 from quadfringe.files import read_bytes
-from quadfringe.io.bounded import BoundedError, Helper, Limits
+from quadfringe.io.bounded import BoundedError, Helper, Limits, UnansweredError
 
 CALLER = """
 import os, signal, time
@@ -78,8 +81,9 @@ def test_errors_of_the_function_are_those_of_a_call(helper: Helper, tmp_path: Pa
         (bytearray, 1 << 30, "needs more than 268 MB of memory"),
         (signal.raise_signal, signal.SIGSEGV, r"crashes \(SIGSEGV\)"),
         (os._exit, 3, r"crashes \(exit status 3\)"),
+        (signal.raise_signal, signal.SIGKILL, r"was stopped from outside \(SIGKILL\)"),
     ],
-    ids=["sleeps", "computes", "memory", "crash", "exit"],
+    ids=["sleeps", "computes", "memory", "crash", "exit", "killed"],
 )
 def test_a_call_without_end_or_measure_is_an_error(
     helper: Helper, function: object, argument: object, reason: str
@@ -87,6 +91,43 @@ def test_a_call_without_end_or_measure_is_an_error(
     with pytest.raises(BoundedError, match=reason):
         helper.run(operator.call, function, argument)  # type: ignore[arg-type]
     assert helper.run(int, "7") == 7
+
+
+def test_what_need_not_be_the_fault_of_the_function_is_told_apart(helper: Helper) -> None:
+    for function, argument in ((time.sleep, 3600), (signal.raise_signal, signal.SIGTERM)):
+        with pytest.raises(UnansweredError):
+            helper.run(operator.call, function, argument)  # type: ignore[arg-type]
+    with pytest.raises(BoundedError) as crash:
+        helper.run(os.abort)
+    assert not isinstance(crash.value, UnansweredError)
+
+
+@pytest.mark.parametrize(
+    ("python", "reason"),
+    [
+        ("/bin/true", r"ended when it started \(exit status 0\); name the Python interpreter"),
+        ("/no/python", r"cannot be started: .*No such file"),
+        ("", "this program is no Python; name the Python interpreter with multiprocessing.set_executable"),
+    ],
+)
+def test_a_helper_that_cannot_start_says_why(
+    python: str, reason: str, helper: Helper, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In a program that embeds Python, sys.executable is that program."""
+    before = multiprocessing.spawn.get_executable()
+    multiprocessing.set_executable(python)
+    try:
+        with pytest.raises(UnansweredError, match=reason):
+            helper.run(int, "7")
+    finally:
+        multiprocessing.set_executable(before)
+    monkeypatch.setattr("quadfringe.io.bounded.Pipe", _without_descriptors)
+    with pytest.raises(UnansweredError, match=r"cannot be started: .*Too many open files"):
+        helper.run(int, "7")
+
+
+def _without_descriptors() -> None:
+    raise OSError(errno.EMFILE, os.strerror(errno.EMFILE))
 
 
 def test_memory_is_limited_over_all_calls(helper: Helper) -> None:

@@ -122,6 +122,37 @@ def test_toml_is_not_nested_without_end(text: str, tmp_path: Path) -> None:
         load_system(path)
 
 
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("a" + ".b" * 20_000 + "=1", "expected keys of at most 16 parts"),
+        ("[" + "a . " * 20_000 + "a]", "expected keys of at most 16 parts"),
+        ("x = {a" + ".'b'" * 20_000 + "=1}", "expected keys of at most 16 parts"),
+        ("\n".join(f"k{n}=1" for n in range(40_000)), "has 349 kB; expected at most 262 kB"),
+        ("\n".join(f"k{n}=1" for n in range(20_000)), "20000 problems"),
+        ("\n".join(f"[a{n}{'.b' * 15}]" for n in range(5_000)), "5000 problems"),
+        ("capture = '" + "../" * 40 + "take'\nx = [" + "0.5, " * 999 + "0.5]", "capture: "),
+    ],
+)
+def test_toml_is_limited_in_keys_and_length(text: str, reason: str, tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(text)
+    with pytest.raises(qf.ConfigError, match=rf"s\.toml: (\d problems?\n\s*)?{reason}"):
+        load_system(path)
+
+
+def test_a_message_names_ten_of_many_problems(tmp_path: Path) -> None:
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps({f"k{n}": 1 for n in range(90_000)}))
+    with pytest.raises(qf.ConfigError, match=r"c\.json: 90002 problems") as failed:
+        Calibration.load(path)
+    assert len(str(failed.value).splitlines()) == 12
+    assert str(failed.value).endswith("\n  and 89992 more")
+    path.write_text(json.dumps({f"k{n}": 1 for n in range(100_001)}))
+    with pytest.raises(qf.ConfigError, match=r"c\.json: not valid JSON: it has more than 100000 keys"):
+        Calibration.load(path)
+
+
 # Files that are not files
 
 
@@ -138,7 +169,7 @@ def test_devices_and_pipes_are_refused(name: str, tmp_path: Path) -> None:
 def test_a_file_beyond_the_limit_is_refused_by_its_size(tmp_path: Path) -> None:
     with (tmp_path / "c.json").open("wb") as file:
         file.truncate(1 << 40)
-    with pytest.raises(qf.InputError, match=r"c.json: has 1099512 MB; expected at most 67 MB"):
+    with pytest.raises(qf.InputError, match=r"c.json: has 1099512 MB; expected at most 8 MB"):
         Calibration.load(tmp_path / "c.json")
     with pytest.raises(qf.InputError, match=r"c.json: has 1099512 MB; expected at most 4295 MB"):
         read_bytes(tmp_path / "c.json")
@@ -229,5 +260,5 @@ def test_messages_and_tables_are_escaped(tmp_path: Path, capsys: pytest.CaptureF
 @pytest.mark.parametrize("method", ["joint", "published"])
 def test_small_images_are_told(size: tuple[int, int], method: str) -> None:
     shot = qf.Shot(*np.zeros((4, *size), np.uint8))
-    with pytest.raises(ValueError, match=r"too small to decode; give at least \[16, 16\]"):
+    with pytest.raises(qf.InputError, match=r"too small to decode; give at least \[16, 16\]"):
         qf.decode(shot, qf.Plan(912, decode={"method": method}))

@@ -36,7 +36,7 @@ class InputError(ValueError):
 
 
 class ConfigError(InputError):
-    """Settings or a calibration have unknown keys or wrong values; the message lists every one with its path."""
+    """Settings or a calibration have unknown keys or wrong values; the message lists the first ten with their paths."""
 
 
 class DecodeError(RuntimeError):

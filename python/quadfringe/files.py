@@ -21,10 +21,19 @@ from pathlib import Path
 
 from quadfringe.errors import InputError
 
-__all__ = ["TEXT_BYTES", "atomic", "atomic_folder", "figures_text", "folder_for", "read_bytes", "require_suffix"]
+__all__ = [
+    "TEXT_BYTES",
+    "atomic",
+    "atomic_folder",
+    "figures_text",
+    "folder_for",
+    "kind_of",
+    "read_bytes",
+    "require_suffix",
+]
 
 FILE_BYTES = 4 << 30  # no image, shape or recording that is read as a whole is larger
-TEXT_BYTES = 64 << 20  # the same for settings and calibrations, which have up to some 100 kB
+TEXT_BYTES = 8 << 20  # of settings and calibrations, which have up to some 100 kB; JSON of 8 MB is read in a second
 KINDS = {stat.S_IFDIR: "folder", stat.S_IFCHR: "device", stat.S_IFBLK: "device", stat.S_IFIFO: "pipe"}
 
 
@@ -99,6 +108,13 @@ def read_bytes(path: Path, most: int = FILE_BYTES) -> bytes:
         raise InputError(f"{path}: does not fit into memory") from error
     except OSError as error:
         raise InputError(f"{path}: {error.strerror or error}") from error
+
+
+def kind_of(path: Path) -> str:
+    """Return "file", "folder", "device", "pipe" or "socket"; "" for a path that names nothing."""
+    if path.is_file():
+        return "file"
+    return _kind(path.stat().st_mode) if path.exists() else ""
 
 
 def _kind(mode: int) -> str:

@@ -1,12 +1,13 @@
 """Kill writers and batches with SIGKILL at random times; count what is lost, wrong or left.
 
-    python tests/hostile/kills.py [--kills 50] [--only record live parent worker terminated] [--json FILE]
+    python tests/hostile/kills.py [--kills 50] [--only record live parent worker helper terminated] [--json FILE]
 
 record      a process that writes shots and reports each; every reported shot must be on file to the last byte, and
             must be found by `recover`
 live        the same of a process that measures, records and shows its shots in the live page
 parent      `quadfringe batch`, whose process is killed; the same command must end with the files of an undisturbed run
 worker      `quadfringe batch`, one of whose workers is killed; the run must end with the files of an undisturbed run
+helper      `quadfringe batch`, whose helper processes that read recordings are killed; as worker
 terminated  as parent, with SIGTERM; a fifth as often
 
 A run that ends before it is killed does not count, and another one takes its place. A process of a batch or of the live
@@ -41,7 +42,8 @@ from quadfringe.recording import Recorder, Recording, recover
 
 LEFT_S = 5.0
 END_S = 300.0  # limit for one run of a batch
-WHOM = ("record", "live", "parent", "worker", "terminated")
+WHOM = ("record", "live", "parent", "worker", "helper", "terminated")
+COMMANDS = {"worker": b"spawn_main", "helper": b"io.bounded import serve"}  # in the command line of those processes
 MARK = "QUADFRINGE_KILLS"  # in the environment of what is killed and of all processes that it starts
 SYSTEM = qf.SystemConfig(
     camera=qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5)),
@@ -104,23 +106,24 @@ def batch_killed(batch: subprocess.Popen[bytes], out: Path, who: str, chance: ra
             time.sleep(0.005)
         time.sleep(chance.uniform(0.0, 0.2))
         working = batch.poll() is None
-        if who == "worker":
-            workers = sorted(workers_of(batch.pid, out)) if working else []
-            for worker in workers[:1]:
-                os.kill(worker, signal.SIGKILL)
+        if who in COMMANDS:
+            found = sorted(children_of(batch.pid, out, COMMANDS[who])) if working else []
+            chosen = found if who == "helper" else found[:1]
+            for child in chosen:
+                os.kill(child, signal.SIGKILL)
             batch.wait(END_S)
-            working = bool(workers)
+            working = bool(chosen)
         else:
             batch.send_signal(signal.SIGTERM if who == "terminated" else signal.SIGKILL)
     return working, left(out)
 
 
-def workers_of(parent: int, out: Path) -> list[int]:
+def children_of(parent: int, out: Path, command: bytes) -> list[int]:
     words = {}
     for pid in processes(out):
         with suppress(OSError):  # it has ended
             words[pid] = Path(f"/proc/{pid}/cmdline").read_bytes()
-    return [pid for pid, line in words.items() if pid != parent and b"spawn_main" in line]
+    return [pid for pid, line in words.items() if pid != parent and command in line]
 
 
 def processes(out: Path) -> list[int]:
@@ -164,7 +167,7 @@ def batches_killed(folder: Path, whom: list[str], kills: int, chance: random.Ran
             out, workers = folder / f"{who}{number}", 1 + number % 2
             killed, alive = batch_killed(start_batch(take, out, workers), out, who, chance)
             counts[f"{who}_killed"] += killed
-            if who != "worker":
+            if who not in COMMANDS:
                 assert start_batch(take, out, workers).wait(END_S) == 0
             differ = differing(out, undisturbed)
             print(f"{who} {number}: {alive} processes left, {differ} files differ", file=sys.stderr, flush=True)
@@ -191,8 +194,8 @@ def main() -> int:
     finally:
         shutil.rmtree(folder)
     names = tuple(f"{who}_{what}" for who in WRITERS for what in ("shots_reported", "lost", "wrong"))
-    names += ("parent_killed", "worker_killed", "terminated_killed", "parent_files_that_differ")
-    names += ("worker_files_that_differ", "terminated_files_that_differ", "processes_left")
+    batches = [who for who in WHOM if who not in WRITERS]
+    names += (*(f"{who}_killed" for who in batches), *(f"{who}_files_that_differ" for who in batches), "processes_left")
     figures = {"kills_of_each": options.kills, **{name: counts[name] for name in names}}
     for name, value in figures.items():
         print(f"{name:32}{value:8}")

@@ -41,6 +41,7 @@ from typer.testing import CliRunner
 import quadfringe as qf
 from quadfringe.cli import app
 from quadfringe.data import AnyShot, BayerShot, Calibration, FrameStamp, Stamp
+from quadfringe.errors import RecordingError
 from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.recording import Recorder, Recording, RecordingWriter
 from quadfringe.recording._layout import Header
@@ -112,7 +113,7 @@ def read_all(path: Path, base: Base) -> list[str]:
                 shots = [take.read(index) for index in range(len(take))]
                 faults = compare(take, [shot for shot in shots if shot is not None], base, warned=bool(warned))
                 known = len(shots) >= len(base.shots) or bool(warned) or not base.closed
-        except qf.InputError:
+        except (qf.InputError, RecordingError):
             return []
     return faults if known else [*faults, "silent"]
 
@@ -177,7 +178,7 @@ def recover(path: Path, base: Base) -> list[str]:
     result = run("recover", path, "--out", whole)
     faults = traceback_in(result)
     if result.exit_code == 0:
-        with Recording(whole) as take:
+        with warnings.catch_warnings(action="ignore"), Recording(whole) as take:
             faults += compare(take, list(take), base, warned=bool(result.stderr))
     return faults
 
@@ -187,13 +188,18 @@ def replay(path: Path, base: Base) -> list[str]:
         warnings.simplefilter("always")
         try:
             take = Recording(path)
-        except qf.InputError:
+        except (qf.InputError, RecordingError):
             return []
         with ReplayCamera(take, "full") as camera:
-            shots = list(camera.stream(keep="all"))
+            shots: list[AnyShot] = []
+            told = False
+            try:
+                shots.extend(camera.stream(keep="all"))
+            except RecordingError:
+                told = True
             counted = len(shots) + camera.statistics().damaged
             faults = compare(take, shots, base, warned=bool(warned))
-    return faults if counted >= len(base.shots) or warned or not base.closed else [*faults, "silent"]
+    return faults if counted >= len(base.shots) or warned or told or not base.closed else [*faults, "silent"]
 
 
 READERS: tuple[Callable[[Path, Base], list[str]], ...] = (read_all, info, verify, recover, replay)

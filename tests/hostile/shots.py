@@ -60,7 +60,9 @@ class ShotOutcome:
 
     @property
     def fault(self) -> bool:
-        return self.reason == "traceback" or self.wrong > WRONG_SHARE
+        """Whether it failed, returned wrong orders, or was refused for a cause that it does not have."""
+        misnamed = self.reason != "returned" and not self.named
+        return misnamed or self.wrong > WRONG_SHARE
 
 
 def _dark(images: Images, random: np.random.Generator) -> Images:

@@ -1,4 +1,4 @@
-"""Readers as targets of `hostile.fuzz`: each takes the bytes of a file, and raises nothing but `InputError`."""
+"""Readers as targets of `hostile.fuzz`: each takes the bytes of a file, and raises `InputError` or `RecordingError`."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ import quadfringe as qf
 from hostile.files import KINDS, LIMITS, originals
 from quadfringe.config import SystemConfig, load_system
 from quadfringe.data import Calibration
-from quadfringe.errors import InputError
+from quadfringe.errors import InputError, RecordingError
 from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.io.bounded import Helper
 from quadfringe.recording import Recorder, Recording
@@ -99,7 +99,7 @@ def target(kind: str, folder: Path) -> Iterator[Target]:
 
         def attack(data: bytes) -> None:
             path.write_bytes(archive_with(sound, data) if kind == "member" else data)
-            with warnings.catch_warnings(action="ignore"), suppress(InputError):
+            with warnings.catch_warnings(action="ignore"), suppress(InputError, RecordingError):
                 read(path)
 
         yield attack

@@ -31,7 +31,7 @@ def test_nothing_is_lost_or_left_when_processes_are_killed(tmp_path: Path) -> No
     figures = figures_of("kills.py", tmp_path, "--kills", 2)
     assert figures.pop("record_shots_reported") > 0
     assert figures.pop("live_shots_reported") > 0
-    assert [figures.pop(f"{who}_killed") for who in ("parent", "worker", "terminated")] == [2, 2, 1]
+    assert [figures.pop(f"{who}_killed") for who in ("parent", "worker", "helper", "terminated")] == [2, 2, 2, 1]
     assert figures == {
         "kills_of_each": 2,
         "record_lost": 0,
@@ -40,6 +40,7 @@ def test_nothing_is_lost_or_left_when_processes_are_killed(tmp_path: Path) -> No
         "live_wrong": 0,
         "parent_files_that_differ": 0,
         "worker_files_that_differ": 0,
+        "helper_files_that_differ": 0,
         "terminated_files_that_differ": 0,
         "processes_left": 0,
     }

@@ -100,11 +100,13 @@ def _matrices_in(path: Path) -> dict[str, NDArray[np.float64]]:
 
 
 def _depth(text: bytes) -> int:
-    """Give how many lists, tables and elements stand inside one another, of JSON, YAML in brackets, or XML."""
+    """Give how many lists, tables and elements stand inside one another, in JSON, YAML or XML; at most DEPTH + 1."""
     depth = deepest = 0
     for found in BRACKETS.finditer(text):
         depth += -1 if found[0] in CLOSING else 1
         deepest = max(deepest, depth)
+        if deepest > DEPTH:
+            break
     return deepest
 
 

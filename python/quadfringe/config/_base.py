@@ -85,7 +85,7 @@ AnyModel = TypeVar("AnyModel", bound=Model)
 
 
 def checked(model: type[AnyModel], values: Mapping[str, Any], source: str) -> AnyModel:
-    """Validate `values`; raise `ConfigError` that lists every problem of `source` with its path."""
+    """Validate `values`; raise `ConfigError` that lists the problems of `source` with their paths."""
     try:
         made: AnyModel = model.__pydantic_validator__.validate_python(values)
     except ValidationError as error:

@@ -12,6 +12,7 @@ from quadfringe.config._brief import brief
 
 __all__ = ["reason", "report"]
 
+LISTED = 10  # problems of a message; a file of another kind has thousands
 # What is expected, by pydantic's name of the problem. The words in braces are its names of the limits.
 EXPECTED = {
     "greater_than": "a number above {gt}",
@@ -45,10 +46,11 @@ EXPECTED = {
 
 
 def report(model: type[BaseModel], error: ValidationError, source: str) -> str:
-    """List every problem of `source`, with its path in the model."""
-    problems = [f"  {_path(p['loc'])}{_in_model(model, p)}" for p in error.errors(include_url=False)]
-    count = f"{len(problems)} problem{'s' if len(problems) > 1 else ''}"
-    return "\n".join([f"{source}: {count}", *problems])
+    """List the first problems of `source`, each with its path in the model."""
+    count = error.error_count()
+    problems = [f"  {_path(p['loc'])}{_in_model(model, p)}" for p in error.errors(include_url=False)[:LISTED]]
+    more = [f"  and {count - LISTED} more"] if count > LISTED else []
+    return "\n".join([f"{source}: {count} problem{'s' if count > 1 else ''}", *problems, *more])
 
 
 def reason(problem: Any) -> str:

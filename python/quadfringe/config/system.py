@@ -10,7 +10,6 @@ once, in Rust.
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Literal
 
@@ -23,8 +22,9 @@ from quadfringe.config.decode import DecodeConfig, Fringes
 from quadfringe.config.devices import Camera, Device
 from quadfringe.config.projectors import ProjectorsConfig
 from quadfringe.config.scene import SceneConfig
-from quadfringe.errors import ConfigError, InputError
+from quadfringe.errors import InputError
 from quadfringe.files import TEXT_BYTES, read_bytes
+from quadfringe.io.texts import toml_of
 
 __all__ = ["SystemConfig", "check_system", "load_system"]
 
@@ -69,20 +69,14 @@ def check_system(config: object) -> None:
 def load_system(path: Path | str) -> SystemConfig:
     """Read a system file, or system.toml of a folder; paths inside the file are relative to it.
 
-    Raises `ConfigError` that lists all problems, `InputError` when the file cannot be read.
+    Raises `ConfigError` that lists the problems, `InputError` when the file cannot be read.
     """
     path = Path(path)
     if path.is_dir():
         if not (path / FILE).is_file():
             raise InputError(f"{path}: a folder without {FILE}; name the system file")
         path /= FILE
-    text = read_bytes(path, TEXT_BYTES)
-    try:
-        values = tomllib.loads(text.decode())
-    except RecursionError:
-        raise ConfigError(f"{path}: lists and tables are nested too deep; expected at most four levels") from None
-    except ValueError as error:  # TOML, UTF-8, and integers of thousands of digits
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+    values = toml_of(read_bytes(path, TEXT_BYTES), str(path))
     config = checked(SystemConfig, values, str(path))
     return _with_absolute_paths(config, path.resolve().parent)
 

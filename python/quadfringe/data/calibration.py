@@ -62,7 +62,7 @@ class Stored(Model):
 
     @classmethod
     def load(cls, path: Path | str) -> Self:
-        """Read a model from JSON; raises `InputError` for no file, `ConfigError` that lists every problem in it."""
+        """Read a model from JSON; raises `InputError` for no file, `ConfigError` that lists the problems in it."""
         return checked(cls, stored_values(path), str(path))
 
 

@@ -103,15 +103,18 @@ class KernelDecoder:
         # Only the search along rays takes the range; else depths outside become no data after decoding.
         after = set() if plan.decode.unwrapping == "pair" else {"depth_range_mm"}
         settings = plan.decode.model_dump(exclude_none=True, exclude={"unwrapping", "response", *after})
-        return _core.Decoder(
-            self._size,
-            plan.fringes.numbers,
-            plan.projector_width_px,
-            full_scale=self._full_scale,
-            **conditioning(plan.calibration, plan.response),
-            **_geometry(plan),
-            **settings,
-        )
+        try:
+            return _core.Decoder(
+                self._size,
+                plan.fringes.numbers,
+                plan.projector_width_px,
+                full_scale=self._full_scale,
+                **conditioning(plan.calibration, plan.response),
+                **_geometry(plan),
+                **settings,
+            )
+        except ValueError as error:  # images too small, fringes that do not cover the field
+            raise InputError(str(error)) from error
 
     def _response_described(self, source: str | None) -> dict[str, Any]:
         """Tell which response is corrected, None for none, and whether plan, calibration or shots gave it."""

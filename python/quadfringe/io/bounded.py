@@ -3,6 +3,9 @@
 A damaged or hostile file can make a library in C loop without end, take all memory, or crash. In a helper process this
 ends the helper, and the caller gets an error. Windows has no such limits: there the function runs in the process.
 
+An error of the function and a crash by itself say something of the file. That a call takes too long, that somebody
+kills the helper, and that it cannot start, may have other causes: `UnansweredError`.
+
 >>> with Helper(Limits(time_s=3.0, memory_bytes=1 << 28)) as helper:
 ...     helper.run(int, "12")
 12
@@ -21,14 +24,18 @@ from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
+from multiprocessing.spawn import get_executable
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, Self, TypeVar
 
 from quadfringe.io.locks import ForkedLock
 
-__all__ = ["BoundedError", "Helper", "Limits"]
+__all__ = ["BoundedError", "Helper", "Limits", "UnansweredError"]
 
 START_S = 30.0  # for starting Python and importing the function, in addition to the limit: a busy machine is slow
+READY = b"ready"
+CRASHES = [getattr(signal, name, None) for name in ("SIGSEGV", "SIGABRT", "SIGBUS", "SIGFPE", "SIGILL", "SIGSYS")]
+EXECUTABLE = "name the Python interpreter with multiprocessing.set_executable"
 SERVE = "import sys; from quadfringe.io.bounded import serve; serve(*map(int, sys.argv[1:4]))"
 
 P = ParamSpec("P")
@@ -37,6 +44,10 @@ R = TypeVar("R")
 
 class BoundedError(RuntimeError):
     """The helper process exceeded a limit or crashed; the message says which, without the name of the file."""
+
+
+class UnansweredError(BoundedError):
+    """No answer, for a reason that need not be the function: too late, killed by another process, or not started."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +83,7 @@ class Helper:
 
         The function must be importable by name, like those of quadfringe and of Python; arguments and result are
         pickled. Imports within the function count for the limits. Raises `BoundedError` when the call exceeds a limit
-        or ends the process.
+        or ends the process, and `UnansweredError`, which is one, when another cause is as likely.
         """
         if sys.platform == "win32":
             return function(*arguments, **named)
@@ -91,6 +102,11 @@ class Helper:
             raise answer.error
         result: R = answer.value
         return result
+
+    @property
+    def running(self) -> bool:
+        """Whether calls reach a process that earlier calls reached."""
+        return sys.platform == "win32" or (self._child is not None and self._child.owner == os.getpid())
 
     def close(self) -> None:
         """End the process; further calls do nothing."""
@@ -112,22 +128,24 @@ class _Child:
     def __init__(self, limits: Limits) -> None:
         self.owner = os.getpid()
         self.time_s = limits.time_s
-        self.connection, theirs = Pipe()
-        package = str(Path(__file__).parents[2])
-        known = os.environ.get("PYTHONPATH")
-        numbers = (theirs.fileno(), int(1e6 * limits.time_s), limits.memory_bytes)
-        with theirs:
-            self.process = subprocess.Popen(
-                # -P: no module of the working directory is imported, as little as by the console script.
-                [sys.executable, "-P", "-c", SERVE, *map(str, numbers)],
-                pass_fds=[theirs.fileno()],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                env=os.environ | {"PYTHONPATH": os.pathsep.join((package, known)) if known else package},
-                start_new_session=True,  # Ctrl-C in a terminal is for the caller, which decides when reading ends
-            )
+        try:
+            self.connection, theirs = Pipe()
+            with theirs:
+                self.process = _started(theirs.fileno(), limits)
+        except OSError as error:  # no descriptors, no processes, no memory
+            raise UnansweredError(f"needs a helper process, which cannot be started: {error}") from error
         self.end = weakref.finalize(self, _end, self.process, self.connection, self.owner)
+        self._await_start()
+
+    def _await_start(self) -> None:
+        """Raise `UnansweredError` unless the process says that it is ready: the program may be no Python."""
+        with suppress(EOFError, OSError):
+            if self.connection.poll(START_S) and self.connection.recv_bytes() == READY:
+                return
+        self.end()
+        raise UnansweredError(
+            f"needs a helper process, which ended when it started ({_ended(self.process.returncode)}); {EXECUTABLE}"
+        )
 
     def ask(self, request: bytes, wait_s: float) -> _Answer:
         """Send a request and wait for its answer; raise `BoundedError` when none comes."""
@@ -141,8 +159,32 @@ class _Child:
             self.process.kill()
         status = self.process.wait()
         if late or status == -signal.SIGALRM:
-            raise BoundedError(f"does not end within {self.time_s:g} s")
-        raise BoundedError(f"crashes ({signal.Signals(-status).name if status < 0 else f'exit status {status}'})")
+            raise UnansweredError(f"does not end within {self.time_s:g} s")
+        if status < 0 and -status not in CRASHES:
+            raise UnansweredError(f"was stopped from outside ({_ended(status)})")
+        raise BoundedError(f"crashes ({_ended(status)})")
+
+
+def _started(descriptor: int, limits: Limits) -> subprocess.Popen[bytes]:
+    python = os.fsdecode(get_executable() or b"")  # an embedding program can set it, as for multiprocessing
+    if not python or (getattr(sys, "frozen", False) and python == sys.executable):
+        raise UnansweredError(f"needs a helper process, and this program is no Python; {EXECUTABLE}")
+    package = str(Path(__file__).parents[2])
+    known = os.environ.get("PYTHONPATH")
+    return subprocess.Popen(
+        # -P: no module of the working directory is imported, as little as by the console script.
+        [python, "-P", "-c", SERVE, str(descriptor), str(int(1e6 * limits.time_s)), str(limits.memory_bytes)],
+        pass_fds=[descriptor],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": os.pathsep.join((package, known)) if known else package},
+        start_new_session=True,  # Ctrl-C in a terminal is for the caller, which decides when reading ends
+    )
+
+
+def _ended(status: int) -> str:
+    return signal.Signals(-status).name if status < 0 else f"exit status {status}"
 
 
 def _end(process: subprocess.Popen[bytes], connection: Connection, owner: int) -> None:
@@ -160,6 +202,7 @@ def serve(descriptor: int, time_us: int, memory_bytes: int) -> None:
     signal.signal(signal.SIGALRM, signal.SIG_DFL)  # ends the process at once, wherever it is
     connection, limited = Connection(descriptor), False
     with suppress(EOFError, OSError):
+        connection.send_bytes(READY)
         while True:
             request = connection.recv_bytes()
             try:

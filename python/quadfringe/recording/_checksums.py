@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 
-__all__ = ["crc_of_shot", "crcs_of", "sha256_of"]
+__all__ = ["crc_of_shot", "crcs_of", "crcs_of_shots", "sha256_of"]
 
 
 def crcs_of(images: Mapping[str, NDArray[Any]]) -> list[int]:
@@ -34,6 +34,21 @@ def crc_of_shot(
     frames = [number for chip in chip_stamps for number in chip]
     row = struct.pack(f"<QQq{len(frames)}q{len(crcs)}I", index, *stamp, *frames, *crcs)
     return zlib.crc32(row, zlib.crc32(header_sha256.encode()))
+
+
+def crcs_of_shots(
+    header_sha256: str,
+    ids: NDArray[np.uint64],
+    times_us: NDArray[np.int64],
+    chip_stamps: NDArray[np.int64],
+    crcs: NDArray[np.uint32],
+) -> NDArray[np.uint32]:
+    """Return the CRC-32 of many shots from the first on, (N,), as `crc_of_shot` does for one."""
+    columns = (np.arange(len(ids), dtype="<u8"), ids.astype("<u8"), times_us.astype("<i8"), chip_stamps.astype("<i8"))
+    bytes_of = [np.ascontiguousarray(c).view(np.uint8).reshape(len(ids), -1) for c in (*columns, crcs.astype("<u4"))]
+    rows = np.hstack(bytes_of) if len(ids) else np.empty((0, 0), np.uint8)
+    begin = zlib.crc32(header_sha256.encode())
+    return np.array([zlib.crc32(row, begin) for row in rows], np.uint32)
 
 
 def sha256_of(*parts: object) -> str:

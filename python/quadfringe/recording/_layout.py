@@ -1,7 +1,8 @@
 """The file format of a recording, version 2: one HDF5 file with these attributes, datasets and types.
 
     /               attributes: format, schema_version, software, created_utc, device, full_scale, and bayer;
-                    header_sha256, config_sha256 and calibration_sha256
+                    header_sha256, config_sha256 and calibration_sha256; origin, when the shots were copied from a file
+                    of version 1, whose stamps, settings and calibration nobody verified
     /config         the resolved system, JSON; "null" when there is none
     /calibration    the calibration, JSON; "null" when there is none
     /red /green /blue /ir, or /raw /ir      (N, H, W), one uncompressed chunk per shot
@@ -17,9 +18,8 @@ multiple-reader mode of HDF5 starts, which permits no new objects.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime
 from typing import Any, Self, get_args
 
@@ -30,7 +30,8 @@ from numpy.typing import NDArray
 from quadfringe import _core
 from quadfringe.config import BayerPattern, SystemConfig, checked
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Stamp
-from quadfringe.errors import InputError
+from quadfringe.errors import ConfigError, InputError
+from quadfringe.io.texts import json_of
 from quadfringe.recording._checksums import sha256_of
 from quadfringe.recording._stored import Stored
 
@@ -39,14 +40,18 @@ __all__ = ["Header", "StoredHeader", "frames_of", "make_datasets"]
 FORMAT = "quadfringe recording"
 SCHEMA_VERSION = 2
 IMAGES = (("red", "green", "blue", "ir"), ("raw", "ir"))
-PIXELS = ("u1", "u2", "f4")
+PIXELS = tuple(np.dtype(kind).str for kind in ("u1", "u2", "f4"))  # in the order of bytes of this machine
 TEXTS: dict[str, type[SystemConfig] | type[Calibration]] = {"config": SystemConfig, "calibration": Calibration}
+UNVERIFIED = "version 1"
 SHOTS_PER_CHUNK = 512  # of the datasets of numbers; an image is a chunk of its shot
 
 
 @dataclass(frozen=True)
 class Header:
-    """The properties that all shots of a recording share."""
+    """The properties that all shots of a recording share.
+
+    `origin` is `UNVERIFIED` for shots from a recording of version 1, and "" for all others.
+    """
 
     images: tuple[str, ...]
     height_px: int
@@ -58,6 +63,7 @@ class Header:
     chips: tuple[str, ...] = ()
     config: SystemConfig | None = None
     calibration: Calibration | None = None
+    origin: str = field(default="", compare=False)
 
     @classmethod
     def of(cls, shot: AnyShot, config: SystemConfig | None, calibration: Calibration | None) -> Self:
@@ -69,6 +75,8 @@ class Header:
                 f"recording: expected images (H, W) of one size and type; {', '.join(odd)} differ from ir with "
                 f"{image.dtype} {image.shape}"
             )
+        if image.dtype.str not in PIXELS:
+            raise InputError(f"recording: expected images of uint8, uint16 or float32, got {image.dtype.str}")
         height_px, width_px = image.shape
         return cls(
             tuple(shot.images),
@@ -120,8 +128,7 @@ class Header:
             "device": self.device,
             "full_scale": float(self.full_scale),
         }
-        if self.bayer is not None:
-            known["bayer"] = self.bayer
+        known |= {name: text for name, text in (("bayer", self.bayer), ("origin", self.origin)) if text}
         for name in TEXTS:
             model = getattr(self, name)
             text = "null" if model is None else model.model_dump_json(exclude_none=True)
@@ -195,19 +202,21 @@ def _bare_header(stored: Stored) -> Header:
     expected: dict[str, tuple[str, tuple[int, ...]]] = dict.fromkeys(images, (dtype, size))
     expected |= {name: (np.dtype(kind).str, shape) for name, (kind, shape) in _numbers(columns, stored.chips).items()}
     odd = [n for n, found in expected.items() if (stored.dtypes.get(n), stored.shapes.get(n, ())[1:]) != found]
-    if odd or len(size) != 2 or 0 in size or dtype[1:] not in PIXELS:
+    if odd or len(size) != 2 or 0 in size or dtype not in PIXELS:
         raise InputError(f"{', '.join(odd) or dtype}: not the type or size of a recording; copy the file again")
     full_scale, bayer, device = (stored.attributes.get(name) for name in ("full_scale", "bayer", "device"))
     if not isinstance(full_scale, float) or not isinstance(device, str) or bayer not in (None, *get_args(BayerPattern)):
         raise InputError("full_scale, bayer or device: not the values of a recording; copy the file again")
-    return Header(images, *size, np.dtype(dtype), full_scale, bayer, device, stored.chips)
+    unverified = stored.attributes["schema_version"] == 1 or "origin" in stored.attributes
+    origin = UNVERIFIED if unverified else ""
+    return Header(images, *size, np.dtype(dtype), full_scale, bayer, device, stored.chips, origin=origin)
 
 
 def _model(text: str, name: str) -> Any:
     try:
-        values = json.loads(text)
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{name}: not valid JSON: {error}; copy the file again") from error
+        values = json_of(text, name)
+    except ConfigError as error:
+        raise InputError(f"{error}; copy the file again") from error
     return None if values is None else checked(TEXTS[name], values, name)
 
 

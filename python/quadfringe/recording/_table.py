@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -10,12 +11,21 @@ from numpy.typing import NDArray
 
 from quadfringe.data import FrameStamp, Stamp
 from quadfringe.errors import InputError
-from quadfringe.recording._checksums import crc_of_shot, sha256_of
+from quadfringe.recording._checksums import crcs_of_shots, sha256_of
 from quadfringe.recording._layout import Header, StoredHeader
+from quadfringe.recording._seal import Seal
 from quadfringe.recording._source import Source
 from quadfringe.recording._stored import Stored
 
-__all__ = ["Table", "read_table"]
+__all__ = ["FileSize", "Table", "read_table"]
+
+
+@dataclass(frozen=True)
+class FileSize:
+    """The number of bytes that a file has, and that it states at its beginning."""
+
+    found: int
+    stated: int
 
 
 @dataclass(frozen=True)
@@ -50,16 +60,19 @@ class Table:
         return Stamp(int(self.ids[index]), int(self.times_us[index]), header.device, frames)
 
 
-def read_table(source: Source, stored: Stored, header: StoredHeader, sealed_shots: int, most: int) -> Table:
-    """Read the table of a file of at least `sealed_shots`; raises `InputError` when it claims more shots than `most`.
+def read_table(source: Source, stored: Stored, header: StoredHeader, size: FileSize, seal: Seal | None) -> Table:
+    """Read the table of a file; raises `InputError` when it claims more shots than its size allows.
 
-    In a closed file, a shot that any dataset holds counts, and is not sound when others lack it. In another file, the
-    last shot may be unfinished.
+    In a closed file, a shot that any dataset or the seal holds counts, and is not sound when others lack it. In another
+    file, the last shot may be unfinished.
     """
     images, chips = header.header.images, header.header.chips
     names = ("id", "time_us", *(("chip_stamps",) if chips else ()), "crc32")
     lengths = [stored.shapes[name][0] for name in (*images, *names)]
-    length = max(*lengths, sealed_shots) if stored.closed else min(lengths)
+    length = max(*lengths, seal.shots if seal else 0) if seal or stored.closed else min(lengths)
+    row_bytes = sum(np.dtype(stored.dtypes[n]).itemsize * math.prod(stored.shapes[n][1:]) for n in names)
+    # Of a file that was cut short, the images may be missing, but not the table.
+    most = min(size.found // row_bytes, max(size.found, size.stated) // header.header.shot_bytes + 1)
     if length > most:
         raise InputError(f"claims {length} shots, but its size is that of {most}; copy it again")
     rows = min(length, *(stored.shapes[name][0] for name in names))
@@ -79,9 +92,8 @@ def _only(rows: NDArray[Any], sound: NDArray[np.bool_], length: int) -> NDArray[
 
 def _sound(header_sha256: str, found: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
     """Return which rows match the CRC-32 of their shot, (N,)."""
-    columns = (found[name].tolist() for name in ("id", "time_us", "chip_stamps", "crc32"))
-    matches = [
-        crc_of_shot(header_sha256, index, (number, time_us), frames, crcs) == expected
-        for index, (number, time_us, frames, (*crcs, expected)) in enumerate(zip(*columns, strict=True))
-    ]
-    return np.array(matches, bool)
+    crcs = found["crc32"]
+    matches: NDArray[np.bool_] = crcs[:, -1] == crcs_of_shots(
+        header_sha256, found["id"], found["time_us"], found["chip_stamps"], crcs[:, :-1]
+    )
+    return matches

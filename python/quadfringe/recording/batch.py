@@ -3,7 +3,8 @@
 The work runs on any executor of `concurrent.futures`; `executor_for` makes one for this machine or a dask cluster.
 Each shot is one task, which writes its status last; a run that was killed can therefore be continued, and ends with the
 same files. The results belong to one recording, by its SHA-256, and a finished shot is taken as finished only when its
-files match their checksum. A damaged shot has no shape; if its stamp is damaged, its id and time_us are 0.
+files match their checksum. A damaged shot has no shape; if its stamp is damaged, its id and time_us are 0. A shot that
+cannot be read now, damaged or not, is reported, and the same command tries it again.
 
     OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status, checksum (shot); with
                          the settings and the SHA-256 of the recording
@@ -32,7 +33,7 @@ import numpy as np
 
 from quadfringe.config import SystemConfig
 from quadfringe.config.cameras import ReplayConfig
-from quadfringe.errors import BatchError, DecodeError, InputError, RecordingWarning, require
+from quadfringe.errors import BatchError, DecodeError, InputError, RecordingError, RecordingWarning, require
 from quadfringe.files import atomic, folder_for
 from quadfringe.recording import Recording
 from quadfringe.recording._cores import usable_cores
@@ -170,6 +171,9 @@ def decode_shot(job: Job, shot: int) -> Outcome:
         group = zarr.open_group(job.store, mode="r+")
         try:
             shape = scanner.decode(take[shot])
+        except RecordingError as error:  # not the fault of the shot, which stays pending
+            _planned.cache_clear()
+            return Outcome(job.recording, shot, None, str(error))
         except (DecodeError, InputError) as error:
             group["status"][shot] = REFUSED
             return Outcome(job.recording, shot, None, str(error))

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import SystemConfig, shortened
 from quadfringe.data import AnyShot, Calibration
-from quadfringe.errors import InputError, RecordingWarning
+from quadfringe.errors import InputError, RecordingError, RecordingWarning
+from quadfringe.files import kind_of
 from quadfringe.recording._checksums import crcs_of
-from quadfringe.recording._layout import Header, StoredHeader
+from quadfringe.recording._held import HeldFile
+from quadfringe.recording._layout import UNVERIFIED, Header, StoredHeader
 from quadfringe.recording._seal import Seal, read_seal
-from quadfringe.recording._source import DamageError, Source
+from quadfringe.recording._source import DamageError, Source, UnreadableError
 from quadfringe.recording._stored import is_hdf5, missing_bytes, stated_bytes
-from quadfringe.recording._table import read_table
+from quadfringe.recording._table import FileSize, read_table
 
 __all__ = ["Recording", "Verification", "listed"]
 
@@ -26,6 +31,10 @@ AGAIN = "copy it again from where it was recorded"
 UNVERIFIABLE = (
     "recorded by an earlier version: stamps, settings and calibration have no checksums and cannot be verified"
 )
+COPIED = "copied from a recording of an earlier version, whose stamps, settings and calibration could not be verified"
+OTHER_SHOTS = "quadfringe recover rescues the others"
+TRY = "try again, and suspect the file if that does not help"
+UNMATCHED = "it does not match its checksum"
 LISTED = 10  # shots that a message names
 
 
@@ -44,11 +53,13 @@ class Recording:
     The file may still grow; `len` counts the shots that were complete when it was opened. Header, settings, calibration
     and every shot (pixels and stamp) are checked against their checksums. A helper process with a limit of time and
     memory reads the file, because a damaged one can hang or crash HDF5. `faults` says in words how the file differs
-    from what was recorded; it is found without reading pixels.
+    from what was recorded; it is found without reading pixels. A copy made by pickle opens the file anew.
 
     Raises `InputError` for a file that is missing, no recording, or has a damaged header, and warns with
     `RecordingWarning` of a file that is incomplete, was changed, or has no checksums. A changed text of settings or
-    calibration is an `InputError`, too; with `rescue` it is left out (None) and the warning says so.
+    calibration is an `InputError`, too; with `rescue` it is left out (None) and the warning says so. Opening and every
+    read raise `RecordingError` for a file that cannot be read now, damaged or not: HDF5 needs too long, another process
+    ends the helper, the file was replaced or shortened. After `close`, reads raise `ValueError`.
 
     >>> with Recording("take.h5") as take:                                          # doctest: +SKIP
     ...     shapes = [decoder.decode(shot) for shot in take]
@@ -56,32 +67,46 @@ class Recording:
 
     def __init__(self, path: Path | str, *, rescue: bool = False) -> None:
         self.path = Path(path)
+        self._rescue = rescue
         _require_hdf5(self.path)
+        file = _held(self.path)
         seal = read_seal(self.path)
-        self._source = Source(self.path)
-        try:
+        self._source = Source(self.path, file, sealed=seal is not None)
+        with self._closed_on_error():
             stored = self._source.describe()
             self._header = StoredHeader.of(stored)
             if self._header.changed_texts and not rescue:
                 raise InputError(
                     f"{self._header.changed_texts[0]} was changed; quadfringe recover copies the shots without it"
                 )
-            self._closed = bool(stored.closed)
-            most = max(self.path.stat().st_size, stated_bytes(self.path)) // self.header.shot_bytes + 1
-            self._table = read_table(self._source, stored, self._header, seal.shots if seal else 0, most)
-            if not self._closed and len(self) and self.read(-1) is None:
+            self._closed = bool(stored.closed) or seal is not None
+            size = FileSize(file.size, stated_bytes(self.path))
+            self._table = read_table(self._source, stored, self._header, size, seal)
+            if not self._closed and len(self) and isinstance(self._found(-1), str):
                 self._table = self._table.without_last  # its writer did not finish it
+        self.faults = tuple(self._found_faults(seal))
+        if told := [*self.faults, *self._found_doubts()]:
+            warnings.warn(f"{path}: {'; '.join(told)}", RecordingWarning, stacklevel=2)
+
+    @contextmanager
+    def _closed_on_error(self) -> Iterator[None]:
+        """Close the file when it cannot be opened as a recording, and name it in the error."""
+        try:
+            yield
         except DamageError as error:
             self._source.close()
             missing = missing_bytes(self.path)
             what = f"cut short by {missing} bytes" if missing else "damaged recording"
-            raise InputError(f"{path}: {what}: {error}; {AGAIN}") from error
+            raise InputError(f"{self.path}: {what}: {error}; {AGAIN}") from error
+        except UnreadableError as error:
+            self._source.close()
+            raise RecordingError(f"{self.path}: cannot be read: {error}; {TRY}") from error
         except InputError as error:
             self._source.close()
-            raise type(error)(f"{path}: {error}") from error
-        self.faults = tuple(self._found_faults(seal))
-        if told := [*self.faults, *([] if self.verifiable else [UNVERIFIABLE])]:
-            warnings.warn(f"{path}: {'; '.join(told)}", RecordingWarning, stacklevel=2)
+            raise type(error)(f"{self.path}: {error}") from error
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return partial(Recording, self.path.absolute(), rescue=self._rescue), ()
 
     def __repr__(self) -> str:
         size = f"{self.header.width_px} x {self.header.height_px} {self.header.dtype}"
@@ -104,8 +129,8 @@ class Recording:
 
     @property
     def verifiable(self) -> bool:
-        """False for recordings of earlier versions, which have checksums of images only."""
-        return bool(self._header.sha256)
+        """False for recordings of earlier versions, which have checksums of images only, and for copies of them."""
+        return not self.header.origin
 
     @property
     def closed_in_order(self) -> bool:
@@ -140,28 +165,38 @@ class Recording:
             yield self[index]
 
     def __getitem__(self, index: int) -> AnyShot:
-        shot = self.read(index)
-        if shot is None:
-            place = index % len(self)
-            raise InputError(
-                f"{self.path}: shot {place} is damaged (it does not match its checksum); "
-                "quadfringe recover rescues the others"
-            )
+        shot = self._shot(index)
+        if isinstance(shot, str):
+            raise InputError(f"{self.path}: shot {index % len(self)} is damaged ({shot}); {OTHER_SHOTS}")
         return shot
 
     def read(self, index: int) -> AnyShot | None:
-        """Return a shot, or None when its images or its stamp do not match their checksums or cannot be read."""
+        """Return a shot, or None when its images or its stamp are damaged."""
+        shot = self._shot(index)
+        return None if isinstance(shot, str) else shot
+
+    def _shot(self, index: int) -> AnyShot | str:
+        try:
+            return self._found(index)
+        except UnreadableError as error:
+            place = index % len(self)
+            raise RecordingError(
+                f"{self.path}: shot {place} cannot be read: {error}; open the recording again to try again"
+            ) from error
+
+    def _found(self, index: int) -> AnyShot | str:
+        """Return a shot, or in words how it is damaged."""
         place = index + len(self) if index < 0 else index
         if not 0 <= place < len(self):
             raise IndexError(f"{self.path}: expected a shot from 0 to {len(self) - 1}, got {index}")
         if not self._table.sound[place]:
-            return None
+            return UNMATCHED
         try:
             images = self._source.images(self.header.images, place)
-        except DamageError:
-            return None
+        except DamageError as error:
+            return str(error)
         if crcs_of(images) != self._table.crc32[place, : len(images)].tolist():
-            return None
+            return UNMATCHED
         return self.header.shot(images, self._table.stamp(place, self.header))
 
     def verify(self, indices: Iterable[int] | None = None) -> Verification:
@@ -173,12 +208,18 @@ class Recording:
         missing = missing_bytes(self.path)
         if missing >= (1 if self._closed else self.header.shot_bytes):
             yield f"cut short by {missing} bytes; {AGAIN}"
-        elif self._closed and self.verifiable and (seal is None or not seal.holds):
+        elif self._closed and self._header.sha256 and (seal is None or not seal.holds):
             yield f"changed since it was closed, so every shot is checked by itself; {AGAIN}"
         for name in self._header.changed_texts:
             yield f"{name} was changed, and is left out"
         if bad := np.flatnonzero(~self._table.sound).tolist():
             yield f"no sound stamps of {len(bad)} shots: {listed(bad)}"
+
+    def _found_doubts(self) -> Iterator[str]:
+        if not self._header.sha256:
+            yield UNVERIFIABLE
+        elif self.header.origin == UNVERIFIED:
+            yield COPIED
 
     def close(self) -> None:
         """Close the file; further calls do nothing."""
@@ -197,10 +238,18 @@ def listed(indices: Sequence[int]) -> str:
     return ", ".join(map(str, indices[:LISTED])) + more
 
 
+def _held(path: Path) -> HeldFile:
+    try:
+        return HeldFile(path)
+    except OSError as error:
+        raise InputError(f"{path}: {error.strerror or error}") from error
+
+
 def _require_hdf5(path: Path) -> None:
     if not path.is_file():
-        reason = "a folder; name a recording (.h5) in it" if path.is_dir() else "no such file; check the path"
-        raise InputError(f"{path}: {reason}")
+        kind = kind_of(path)
+        words = {"folder": "a folder; name a recording (.h5) in it", "": "no such file; check the path"}
+        raise InputError(f"{path}: {words.get(kind, f'is a {kind}; name a file')}")
     try:
         foreign = not is_hdf5(path)
     except OSError as error:

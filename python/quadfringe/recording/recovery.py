@@ -25,8 +25,9 @@ def recover(source: Path, target: Path) -> Recovered:
     """Copy every undamaged shot of `source` to the new recording `target`.
 
     The source is only read, because the repair tool of HDF5 (`h5clear`) can destroy a file whose writer was killed.
-    Settings or a calibration that were changed are left out, with a `RecordingWarning`. Raises `InputError` when
-    `source` cannot be read or `target` exists.
+    Settings or a calibration that were changed are left out, with a `RecordingWarning`. A copy of a recording of
+    version 1 says that its stamps were never verified. Raises `InputError` when `source` is no recording or `target`
+    exists, and `RecordingError` when `source` cannot be read now, as it does not say which shots are sound.
     """
     if target.exists():
         raise InputError(f"{target}: exists already; recordings are never overwritten")

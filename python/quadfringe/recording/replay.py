@@ -29,6 +29,7 @@ class ReplayCamera:
     At original speed, shots come at the intervals of their exposures, and shots that are not taken in time are dropped
     as by a real camera. At full speed, no shot is dropped. A damaged shot is an `InputError` of `snap`; a stream warns
     of it with `RecordingWarning` and goes on. Both count it as a damaged frame of the chip "recording".
+    A shot that cannot be read now, damaged or not, is a `RecordingError` of both.
     """
 
     def __init__(self, recording: Recording, speed: Literal["original", "full"] = "original") -> None:

@@ -1,0 +1,184 @@
+"""Recordings that somebody made to mislead: no other file is read, and what they claim is limited by their size."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from quadfringe.data import Shot
+from quadfringe.errors import InputError, RecordingWarning
+from quadfringe.evaluation._takes import numbered_shot
+from quadfringe.files import TEXT_BYTES
+from quadfringe.recording import Recorder, Recording
+from quadfringe.recording._checksums import crc_of_shot, crcs_of_shots
+from quadfringe.recording._source import Source
+
+SHOTS = 6
+GOLDEN = Path(__file__).parent / "golden" / "take.h5"
+Change = Callable[[h5py.File], object]
+
+
+def recorded(path: Path, first: int = 0, shots: int = SHOTS) -> Path:
+    with Recorder(path) as recorder:
+        for number in range(first, first + shots):
+            recorder.write(numbered_shot(number))
+    return path
+
+
+@pytest.fixture
+def take(tmp_path: Path) -> Path:
+    return recorded(tmp_path / "take.h5")
+
+
+@pytest.fixture
+def hostile(tmp_path: Path) -> Path:
+    """A recording without checksums of its stamps, as a file that somebody else made."""
+    path = tmp_path / "hostile.h5"
+    path.write_bytes(GOLDEN.read_bytes())
+    return path
+
+
+def changed(path: Path, change: Change) -> Path:
+    with h5py.File(path, "r+") as file:
+        change(file)
+    return path
+
+
+def external(file: h5py.File, secret: Path) -> None:
+    file.create_dataset("id", (1,), "<u8", external=[(str(secret), 0, 8)])
+
+
+def linked(file: h5py.File, secret: Path) -> None:
+    file["id"] = h5py.ExternalLink(str(secret), "id")
+
+
+def soft(file: h5py.File, _secret: Path) -> None:
+    file["id"] = h5py.SoftLink("/time_us")
+
+
+def virtual(file: h5py.File, secret: Path) -> None:
+    layout = h5py.VirtualLayout((1,), "<u8")
+    layout[:] = h5py.VirtualSource(str(secret), "id", (1,))
+    file.create_virtual_dataset("id", layout)
+
+
+@pytest.mark.parametrize("place", [external, linked, soft, virtual])
+def test_a_recording_makes_the_program_read_no_other_file(
+    place: Callable[[h5py.File, Path], None], hostile: Path, tmp_path: Path
+) -> None:
+    with h5py.File(tmp_path / "secret.h5", "w") as secret:
+        secret["id"] = np.array([42], "<u8")
+    changed(hostile, lambda file: (file.pop("id"), place(file, tmp_path / "secret.h5")))
+    with pytest.raises(InputError, match=r"hostile\.h5: damaged recording: id is no dataset of this file itself"):
+        Recording(hostile)
+
+
+def test_long_texts_and_attributes_are_refused(hostile: Path) -> None:
+    text = b"[" + b"1," * (TEXT_BYTES // 2) + b"1]"
+    sound = hostile.read_bytes()
+    changed(hostile, lambda file: (file.pop("config"), file.__setitem__("config", np.array(text, f"S{len(text)}"))))
+    with pytest.raises(InputError, match=r"/config has 8 MB; expected at most 8 MB"):
+        Recording(hostile)
+    hostile.write_bytes(sound)
+    changed(hostile, lambda file: file.attrs.__setitem__("more", "a" * 70_000))
+    with pytest.raises(InputError, match="the attribute more has more than 65536 bytes"):
+        Recording(hostile)
+
+
+def test_keys_that_a_calibration_gives_twice_are_refused(hostile: Path) -> None:
+    def double(file: h5py.File) -> None:
+        text = file.pop("calibration").asstr()[()]
+        file["calibration"] = text[:-1] + ',"camera":' + json.dumps(json.loads(text)["camera"]) + "}"
+
+    with pytest.raises(InputError, match="calibration: not valid JSON: the key 'camera' is given twice"):
+        Recording(changed(hostile, double))
+
+
+def test_images_in_another_order_of_bytes_are_refused(hostile: Path) -> None:
+    def turn(file: h5py.File) -> None:
+        for name in ("red", "green", "blue", "ir"):
+            file[name] = file.pop(name)[:].astype(">u2")
+
+    with pytest.raises(InputError, match=">u2: not the type or size of a recording"):
+        Recording(changed(hostile, turn))
+    images = np.zeros((4, 16, 16), ">u2")
+    with (
+        pytest.raises(InputError, match=r"expected images of uint8, uint16 or float32, got >u2"),
+        Recorder(hostile.with_name("new.h5")) as recorder,
+    ):
+        recorder.write(Shot(*images))
+
+
+def test_an_image_beyond_the_end_is_damage(take: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for begin in ((1 << 63) - 1, 1 << 63, (1 << 64) - 2):
+        with Recording(take) as recording:
+            ask = Source._ask
+
+            def moved(source: Source, *arguments: Any, ask: Any = ask, begin: int = begin) -> Any:
+                return {name: replace(extent, begin=begin) for name, extent in ask(source, *arguments).items()}
+
+            monkeypatch.setattr(Source, "_ask", moved)
+            with pytest.raises(InputError, match=r"shot 1 is damaged \(an image ends beyond the end"):
+                recording[1]
+            monkeypatch.undo()
+
+
+def test_more_rows_than_the_file_holds_are_refused(tmp_path: Path) -> None:
+    """Each row of the table needs its bytes, also when the images are smaller."""
+    take = tmp_path / "take.h5"
+    with Recorder(take) as recorder:
+        recorder.write(numbered_shot(0, (1, 4)))
+
+    def lengthen(file: h5py.File) -> None:
+        for name in ("red", "green", "blue", "ir", "id", "time_us", "crc32"):
+            file[name].resize(300_000, axis=0)
+
+    changed(take, lengthen)
+    os.truncate(take, 8_000_000)
+    with pytest.raises(InputError, match="claims 300000 shots, but its size is that of 222222"):
+        Recording(take)
+
+
+def test_the_checksums_of_many_shots_are_those_of_each() -> None:
+    chance = np.random.default_rng(0)
+    rows = 50
+    ids, times_us = chance.integers(0, 1 << 60, rows).astype(np.uint64), chance.integers(-9, 1 << 60, rows)
+    for chips in (0, 2):
+        stamps = chance.integers(-(1 << 60), 1 << 60, (rows, chips, 3))
+        crcs = chance.integers(0, 1 << 32, (rows, 4)).astype(np.uint32)
+        one_by_one = [
+            crc_of_shot("ab", n, (int(ids[n]), int(times_us[n])), stamps[n].tolist(), crcs[n].tolist())
+            for n in range(rows)
+        ]
+        assert crcs_of_shots("ab", ids, times_us, stamps, crcs).tolist() == one_by_one
+
+
+def test_a_seal_says_that_the_file_was_closed(take: Path) -> None:
+    """Otherwise a damaged last shot would pass as one that the writer did not finish."""
+    with h5py.File(take) as file:
+        closed = file["closed"].id.get_offset()
+        last = file["red"].id.get_chunk_info_by_coord((SHOTS - 1, 0, 0)).byte_offset
+    data = bytearray(take.read_bytes())
+    assert data[closed] == 1
+    data[closed] = 0
+    data[last] ^= 1
+    take.write_bytes(data)
+    with pytest.warns(RecordingWarning, match="changed since it was closed"):
+        recording = Recording(take)
+    with recording:
+        assert (len(recording), recording.closed_in_order) == (SHOTS, True)
+        assert recording.verify().damaged == (SHOTS - 1,)
+
+
+def test_a_pipe_is_no_missing_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "take.h5")
+    with pytest.raises(InputError, match=r"take\.h5: is a pipe; name a file"):
+        Recording(tmp_path / "take.h5")
