@@ -41,12 +41,11 @@ pub(super) struct CellFit {
 
 impl CellFit {
     pub fn divided_by(self, sum: f32) -> Self {
-        let share = 1.0 / sum;
         Self {
-            correction: share * self.correction,
-            variance: share * self.variance,
-            albedo: self.albedo.map(|albedo| share * albedo),
-            contrast: self.contrast.map(|contrast| share * contrast),
+            correction: self.correction / sum,
+            variance: self.variance / sum,
+            albedo: self.albedo.map(|albedo| albedo / sum),
+            contrast: self.contrast.map(|contrast| contrast / sum),
         }
     }
 }
@@ -139,6 +138,8 @@ impl Cells {
             .collect();
         rows.into_par_iter().enumerate().for_each(|(y, mut rows)| {
             let [values @ .., inside] = &mut rows;
+            // The padding is interpolated, too.
+            values.iter_mut().for_each(|row| row[*width..].fill(0.0));
             for x in 0..*width {
                 let fit = found(y, x).filter(|_| inside[x] > 0.0);
                 inside[x] = f32::from(u8::from(fit.is_some()));
