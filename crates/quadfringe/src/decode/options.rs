@@ -26,7 +26,7 @@ pub struct Options {
     /// estimates it from every shot. Set it if the estimate fails, for example for an object narrower than two fringes.
     /// Default: `None`.
     pub period_px: Option<f64>,
-    /// Whether the joint method gives the albedo. It takes a twentieth of the time of a decode. Default: true.
+    /// Whether the joint method gives the albedo. Without it, a decode takes less time. Default: true.
     pub albedo: bool,
 }
 
