@@ -42,7 +42,7 @@
 //! | `published` | inverse: the method of the paper |
 //! | `joint` | inverse: the default method, which fits all four channels together |
 //! | [`decode`] | inverse: one shot through all steps, by either method |
-//! | [`reference`] | inverse: the reference measurement, from many images of a still object |
+//! | [`mod@reference`] | inverse: the reference measurement, from many images of a still object |
 //!
 //! The forward half (surface, rig) and the inverse half (condition to reference) never import each other. Only tests use
 //! both: they render a surface, decode it and compare. The two methods never import each other either.
