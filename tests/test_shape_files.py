@@ -156,7 +156,7 @@ def test_open3d_gets_points_and_mesh(face: Shape, monkeypatch: pytest.MonkeyPatc
 
 def test_xarray_gets_every_map_with_its_unit(face: Shape) -> None:
     found = face.to_xarray()
-    assert found.sizes == {"row": 384, "column": 512, "axis": 3}
+    assert found.sizes == {"row": 384, "column": 512, "axis": 3, "channel": 4}
     assert set(found.data_vars) == set(face.maps)
     for name, values in face.maps.items():
         np.testing.assert_array_equal(found[name].values, values)

@@ -26,7 +26,9 @@ UNITS = {
     "uncertainty_rad": ("rad", "standard deviation of the phase"),
     "uncertainty_mm": ("mm", "standard deviation of the depth"),
     "xyz_mm": ("mm", "point in the camera frame: x right, y down, z forward"),
+    "albedo": ("1", "light without fringes, linear, fraction of full scale"),
 }
+LAST = {"xyz_mm": "axis", "albedo": "channel"}  # the third dimension of a map
 
 
 def open3d_of(shape: Shape) -> Any:
@@ -52,9 +54,11 @@ def xarray_of(shape: Shape, texts: dict[str, str]) -> Any:
         coordinates[name] = (name, np.arange(count), attributes)
     if shape.xyz_mm is not None:
         coordinates["axis"] = ("axis", ["x", "y", "z"])
+    if shape.albedo is not None:
+        coordinates["channel"] = ("channel", ["red", "green", "blue", "ir"])
     variables = {}
     for name, values in shape.maps.items():
         unit, meaning = UNITS[name]
-        dimensions = ("row", "column", "axis")[: values.ndim]
+        dimensions = ("row", "column", LAST.get(name, ""))[: values.ndim]
         variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
     return xarray.Dataset(variables, coordinates, texts)

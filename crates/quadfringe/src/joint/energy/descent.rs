@@ -16,15 +16,16 @@ use crate::parallel::lanes::{LANES, Lanes};
 
 /// Writes albedo and contrast of a vector of cells.
 #[inline(always)]
-fn write_light(cells: &Column, inside: Lanes, channel_contrast: [f32; 4], at: usize, found: &mut Found) {
-    for c in 0..4 {
-        let (mut albedo, mut contrast) = ([0.0; LANES], [0.0; LANES]);
+fn write_light(cells: &Column, inside: Lanes, at: usize, found: &mut Found) {
+    let [red, green, blue, infrared] = &mut found.albedo;
+    let planes = [red, green, blue, infrared, &mut found.contrast];
+    let [red, green, blue, infrared] = &cells.albedo;
+    for (plane, logarithm) in planes.into_iter().zip([red, green, blue, infrared, &cells.contrast]) {
+        let mut value = [0.0; LANES];
         for x in 0..LANES {
-            albedo[x] = inside[x] * exp(cells.albedo[c][x]);
-            contrast[x] = inside[x] * channel_contrast[c] * exp(cells.contrast[x]);
+            value[x] = inside[x] * exp(logarithm[x]);
         }
-        found.albedo[c].set(at, albedo);
-        found.contrast[c].set(at, contrast);
+        plane.set(at, value);
     }
 }
 
@@ -78,8 +79,9 @@ impl Tile {
             found.correction.set(at, correction);
             found.variance.set(at, variance);
             found.inside.set(at, inside.get(at));
-            write_light(&Column::of(unknown, at), inside.get(at), scales.channel_contrast, at, found);
+            write_light(&Column::of(unknown, at), inside.get(at), at, found);
         }
+        found.channel_contrast = scales.channel_contrast;
     }
 
     /// Adds the step to the unknowns; returns the root mean square of the change of the phase.

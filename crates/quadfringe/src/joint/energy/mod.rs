@@ -109,7 +109,7 @@ fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Op
             fit.variance += weight * value(&found.variance);
             for c in 0..4 {
                 fit.albedo[c] += weight * value(&found.albedo[c]);
-                fit.contrast[c] += weight * value(&found.contrast[c]);
+                fit.contrast[c] += weight * found.channel_contrast[c] * value(&found.contrast);
             }
         }
     }

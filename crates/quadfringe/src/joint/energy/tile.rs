@@ -14,8 +14,9 @@ pub(super) struct Found {
     pub variance: Plane,
     /// Light without fringes of R, G, B, IR, linear.
     pub albedo: [Plane; 4],
-    /// Contrast of the fringes of R, G, B, IR.
-    pub contrast: [Plane; 4],
+    /// Mean contrast of the fringes, and that of R, G, B, IR relative to it.
+    pub contrast: Plane,
+    pub channel_contrast: [f32; 4],
 }
 
 /// A square of cells and everything that is known about it.
