@@ -1,4 +1,4 @@
-"""Recordings that somebody made to mislead: no other file is read, and what they claim is limited by their size."""
+"""Recordings made to mislead the reader: it opens no other file, and trusts no size that the file cannot hold."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
+from support.takes import SHOTS, changed, recorded
 
 from quadfringe.data import Shot
 from quadfringe.errors import InputError, RecordingWarning
@@ -21,16 +22,7 @@ from quadfringe.recording import Recorder, Recording
 from quadfringe.recording._checksums import crc_of_shot, crcs_of_shots
 from quadfringe.recording._source import Source
 
-SHOTS = 6
 GOLDEN = Path(__file__).parent / "golden" / "take.h5"
-Change = Callable[[h5py.File], object]
-
-
-def recorded(path: Path, first: int = 0, shots: int = SHOTS) -> Path:
-    with Recorder(path) as recorder:
-        for number in range(first, first + shots):
-            recorder.write(numbered_shot(number))
-    return path
 
 
 @pytest.fixture
@@ -43,12 +35,6 @@ def hostile(tmp_path: Path) -> Path:
     """A recording without checksums of its stamps, as a file that somebody else made."""
     path = tmp_path / "hostile.h5"
     path.write_bytes(GOLDEN.read_bytes())
-    return path
-
-
-def changed(path: Path, change: Change) -> Path:
-    with h5py.File(path, "r+") as file:
-        change(file)
     return path
 
 

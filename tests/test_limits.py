@@ -32,7 +32,6 @@ JOINT = "crates/quadfringe/src/joint"
 REPLACED = "the joint energy replaces this step; to polish it before that would be work for nothing"
 EXCEPTIONS = {
     "python/quadfringe/_core.pyi": "one compiled module has one stub file; type checkers do not read several",
-    f"{JOINT}/mod.rs": "the recipe, twelve steps, is read in one piece",
     f"{JOINT}/photometry/choice/mod.rs::make": REPLACED,
     f"{JOINT}/photometry/project.rs::project": REPLACED,
     f"{JOINT}/photometry/solve.rs::new": REPLACED,

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from support.takes import SHOTS, Change, changed
 from typer.testing import CliRunner, Result
 
 import quadfringe as qf
@@ -26,8 +26,6 @@ from quadfringe.recording._source import other_reader
 from quadfringe.recording.replay import ReplayCamera
 
 GOLDEN = Path(__file__).parent / "golden" / "take.h5"
-SHOTS = 6
-Change = Callable[[h5py.File], object]
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +44,6 @@ def take(original: Path, tmp_path: Path) -> Path:
     path = tmp_path / "take.h5"
     path.write_bytes(original.read_bytes())
     return path
-
-
-def changed(take: Path, change: Change) -> Path:
-    """Change a file as another HDF5 program would, which leaves no seal."""
-    with h5py.File(take, "r+") as file:
-        change(file)
-    return take
 
 
 def overwrite(take: Path, old: bytes, new: bytes) -> Path:

@@ -13,27 +13,18 @@ from pathlib import Path
 from threading import Thread, Timer
 from typing import Any
 
-import h5py
 import pytest
+from support.takes import SHOTS, changed, recorded
 
 from quadfringe.errors import InputError, RecordingError
-from quadfringe.evaluation._takes import numbered_shot, whole
+from quadfringe.evaluation._takes import whole
 from quadfringe.io.bounded import Helper, Limits, UnansweredError
-from quadfringe.recording import Recorder, Recording, recover
+from quadfringe.recording import Recording, recover
 from quadfringe.recording._params import READ_S
 from quadfringe.recording._source import Source, other_reader, sealed_reader
 from quadfringe.recording._stored import Place
 
-SHOTS = 6
 METHODS = ("spawn", "fork", "forkserver")
-Change = Callable[[h5py.File], object]
-
-
-def recorded(path: Path, first: int = 0, shots: int = SHOTS) -> Path:
-    with Recorder(path) as recorder:
-        for number in range(first, first + shots):
-            recorder.write(numbered_shot(number))
-    return path
 
 
 @pytest.fixture
@@ -44,12 +35,6 @@ def take(tmp_path: Path) -> Path:
 @pytest.fixture
 def other(tmp_path: Path) -> Path:
     return recorded(tmp_path / "other.h5", first=100, shots=3)
-
-
-def changed(path: Path, change: Change) -> Path:
-    with h5py.File(path, "r+") as file:
-        change(file)
-    return path
 
 
 def helper_pid() -> int:

@@ -18,10 +18,10 @@ mod unmix;
 
 pub use estimate::{ResponseEstimate, estimate_response, estimate_response_of_shot};
 pub(crate) use params::{CLIPPED, LIGHT_MAX};
-pub(crate) use plan::Plan;
 pub use response::Response;
 pub use sample::Sample;
 pub use shot::Shot;
+pub(crate) use {plan::Plan, shot::checked_full_scale};
 
 use crate::error::Limit;
 use crate::{Channel, Error, Result};

@@ -93,10 +93,7 @@ impl<'a, T: Sample> Shot<'a, T> {
     /// # Errors
     /// [`Error::Value`] unless positive and finite.
     pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
-        if !(full_scale.is_finite() && full_scale > 0.0) {
-            return Err(Error::value("full_scale", Limit::Positive, full_scale));
-        }
-        self.full_scale = full_scale;
+        self.full_scale = checked_full_scale(full_scale)?;
         Ok(self)
     }
 
@@ -179,4 +176,12 @@ impl<'a, T: Sample> TryFrom<&'a [Array2<T>]> for Shot<'a, T> {
             .map_err(|_| Error::value("images of a shot", "four images: R, G, B and IR", images.len()));
         Self::try_from(four?)
     }
+}
+
+/// The intensity of full scale, if it is positive and finite.
+pub(crate) fn checked_full_scale(full_scale: f32) -> Result<f32> {
+    if full_scale.is_finite() && full_scale > 0.0 {
+        return Ok(full_scale);
+    }
+    Err(Error::value("full_scale", Limit::Positive, full_scale))
 }

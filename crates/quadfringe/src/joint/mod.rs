@@ -65,9 +65,9 @@ use params::motion::ROUNDS;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
 use phase::PhaseModel;
 use propagation::Propagation;
-use pyramid::{Level, Levels, Pyramid, Upsampler};
+use pyramid::{Levels, Pyramid, Upsampler};
 use rayon::prelude::*;
-use scene::{Frame, PhaseMap, ScaledGrid, Scene};
+use scene::{Frame, PhaseMap};
 use uncertainty::PhaseNoise;
 use validity::{PixelFit, Validity};
 use window::Window;
@@ -89,8 +89,6 @@ pub(crate) struct Joint {
     /// Modulation of R and B in linear light, 0 where there is no light.
     modulation: Vec<f32>,
     motion: Motion,
-    /// Light before compensation, if motion is compensated.
-    captured: [Vec<f32>; 4],
     validity: Validity,
     agreement: Agreement,
     propagation: Propagation,
@@ -116,7 +114,6 @@ impl Joint {
             phase: Vec::new(),
             modulation: Vec::new(),
             motion: Motion::default(),
-            captured: Default::default(),
             validity: Validity::default(),
             agreement: Agreement::default(),
             propagation: Propagation::default(),
@@ -171,13 +168,8 @@ impl Joint {
         pyramid.shrink(frame);
         let level = &mut pyramid.coarse;
         // 2. Mask of lit pixels.
-        coarse.find_light(
-            level,
-            frame.coarse,
-            frame.coarse_reach_px(),
-            options.modulation_min,
-            memory.scratch.lend(),
-        );
+        let (reach_px, least) = (frame.coarse_reach_px(), options.modulation_min);
+        coarse.find_light(level, frame.coarse, reach_px, least, memory.scratch.lend());
         // 3. Coarse level: wrapped phase of R and B (S2), beats of G and IR (S3).
         let scene = level.scene(frame.coarse);
         coarse.fit_fringes(&scene, &level.lit, options.modulation_min);
@@ -232,18 +224,10 @@ impl Joint {
         options: &Options,
         memory: &mut OutputMemory<'_>,
     ) {
-        self.captured.clone_from(&self.pyramid.full.light);
-        self.motion.reset(&self.pyramid.full.scene(frame.full));
+        self.motion.begin(&self.pyramid.full.scene(frame.full));
         for _ in 0..ROUNDS {
             let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
-            let (level, photometry) = (&mut self.pyramid.full, &self.coarse.photometry);
-            self.motion.measure(&level.scene(frame.full), timing, photometry, map);
-            let Level { light, usable, .. } = level;
-            let ScaledGrid { grid, period_px, factor } = frame.full;
-            let captured = self.captured.each_ref().map(Vec::as_slice);
-            let scene = Scene { light: captured, usable, grid, period_px, factor };
-            let light = light.each_mut().map(Vec::as_mut_slice);
-            self.motion.compensate(&scene, timing, photometry, &self.phase, light);
+            self.motion.step(&mut self.pyramid.full, frame.full, timing, &self.coarse.photometry, map);
             self.absolute_phase(frame, options, memory);
         }
     }

@@ -11,7 +11,8 @@ use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{FringeRows, carriers};
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
-use super::scene::{PhaseMap, PixelRow, Scene};
+use super::pyramid::Level;
+use super::scene::{PhaseMap, PixelRow, ScaledGrid, Scene};
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
@@ -42,6 +43,8 @@ pub(super) struct Motion {
     change: CellMaps,
     sums: CellMaps,
     slots: Slots<TaskWork<Rows>>,
+    /// Light of the shot before compensation.
+    captured: [Vec<f32>; 4],
 }
 
 impl Default for Motion {
@@ -51,18 +54,39 @@ impl Default for Motion {
             change: CellMaps::new(1),
             sums: CellMaps::default(),
             slots: Slots::default(),
+            captured: Default::default(),
         }
     }
 }
 
 impl Motion {
-    /// Start a new shot with a velocity of 0.
-    pub fn reset(&mut self, scene: &Scene<'_>) {
+    /// Starts a new shot with a velocity of 0, and keeps its light.
+    pub fn begin(&mut self, scene: &Scene<'_>) {
+        for (kept, light) in self.captured.iter_mut().zip(scene.light) {
+            kept.clear();
+            kept.extend_from_slice(light);
+        }
         self.velocity.fill::<1>(scene.grid, |_, [line]| line.fill(0.0));
     }
 
-    /// Improve the velocity by a Gauss-Newton step on compensated light, at an absolute phase.
-    pub fn measure(&mut self, scene: &Scene<'_>, timing: Timing, photometry: &Photometry, map: PhaseMap<'_>) {
+    /// Improves the velocity, and brings the light of a level from that of the shot to the instant 0.
+    pub fn step(
+        &mut self,
+        level: &mut Level,
+        scaled: ScaledGrid<'_>,
+        timing: Timing,
+        photometry: &Photometry,
+        map: PhaseMap<'_>,
+    ) {
+        self.measure(&level.scene(scaled), timing, photometry, map);
+        let (Level { light, usable, .. }, ScaledGrid { grid, period_px, factor }) = (level, scaled);
+        let captured = self.captured.each_ref().map(Vec::as_slice);
+        let scene = Scene { light: captured, usable, grid, period_px, factor };
+        self.compensate(&scene, timing, photometry, map.phase, light.each_mut().map(Vec::as_mut_slice));
+    }
+
+    /// Improves the velocity by a Gauss-Newton step on compensated light, at an absolute phase.
+    fn measure(&mut self, scene: &Scene<'_>, timing: Timing, photometry: &Photometry, map: PhaseMap<'_>) {
         let grid = scene.grid;
         grid.window_sums::<2, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
@@ -85,8 +109,8 @@ impl Motion {
         });
     }
 
-    /// Bring the light of a scene, as it was captured, to the instant 0.
-    pub fn compensate(
+    /// Brings the light of a scene, as it was captured, to the instant 0.
+    fn compensate(
         &self,
         scene: &Scene<'_>,
         timing: Timing,

@@ -1,8 +1,8 @@
 //! The images of a reference measurement, borrowed.
 
 use super::plan::StepSet;
-use crate::condition::{LIGHT_MAX, Sample};
-use crate::error::{Error, Limit, Result};
+use crate::condition::{LIGHT_MAX, Sample, checked_full_scale};
+use crate::error::{Error, Result};
 use ndarray::{ArrayView3, Axis};
 use std::borrow::Cow;
 
@@ -44,10 +44,7 @@ impl<'a, T: Sample> StepImages<'a, T> {
     /// # Errors
     /// [`Error::Value`] unless positive and finite.
     pub fn with_full_scale(mut self, full_scale: f32) -> Result<Self> {
-        if !(full_scale.is_finite() && full_scale > 0.0) {
-            return Err(Error::value("full_scale", Limit::Positive, full_scale));
-        }
-        self.full_scale = full_scale;
+        self.full_scale = checked_full_scale(full_scale)?;
         Ok(self)
     }
 

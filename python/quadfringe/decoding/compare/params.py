@@ -92,9 +92,6 @@ ITERATIONS, STILL_MM = 60, 1e-5
 # Residuals beyond this many robust deviations are left out of the alignment. A smaller one keeps fewer points of a
 # partial overlap, a larger one lets clutter pull.
 TRIM_SIGMAS = 3.0
-# Longest edge of a triangle between pixels, in medians of all: longer ones span a step of depth. A larger one closes
-# steps, a smaller one opens steep surfaces, which have 6 at 80 degrees.
-STEP_PITCHES = 6.0
 
 # --- Doubts
 

@@ -151,12 +151,10 @@ def surface_from(mesh: Trimesh | Path | str) -> Surface:
 
 
 def surface_of_grid(xyz_mm: NDArray[np.floating]) -> Surface:
-    """Give the surface of a shape, (H, W, 3) mm; no triangle spans a step of depth. Raises `InputError` for none."""
-    points = xyz_mm.astype(np.float64)
-    a, b, c, d = points[:-1, :-1], points[:-1, 1:], points[1:, :-1], points[1:, 1:]
-    triangles = np.concatenate([np.stack(t, axis=-2).reshape(-1, 3, 3) for t in ((a, c, b), (b, c, d))])
-    triangles = triangles[np.isfinite(triangles).all(axis=(1, 2))]
-    if not len(triangles):
+    """Give the surface of a shape, (H, W, 3) mm, with the triangles of `Shape.mesh`; raises `InputError` for none."""
+    from quadfringe import _core
+
+    found = _core.mesh_from_points(np.ascontiguousarray(xyz_mm, np.float32))
+    if not len(found["faces"]):
         raise InputError("compare: the second shape has no surface: no neighbouring pixels are returned")
-    edges = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
-    return Surface(triangles[edges < params.STEP_PITCHES * np.median(edges)])
+    return Surface(found["points_mm"][found["faces"]].astype(np.float64))
