@@ -217,6 +217,20 @@ def test_opencv_is_not_given_what_crashes_it(name: str, text: str, tmp_path: Pat
         read_opencv(tmp_path / name)
 
 
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("c.yml", "%YAML:1.0\n---\na: [ " + "[], " * 100_000 + "]\n"),
+        ("c.json", '{"a": [' + "[]," * 100_000 + "1]}"),
+        ("c.xml", '<?xml version="1.0"?><opencv_storage>' + "<a></a>" * 100_000 + "</opencv_storage>"),
+    ],
+)
+def test_opencv_is_not_given_what_takes_it_long(name: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(qf.InputError, match=rf"{name}: expected at most 100,000 beginnings and ends of lists"):
+        read_opencv(tmp_path / name)
+
+
 def test_a_crash_of_opencv_is_an_error(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("quadfringe.calibration.opencv_files.DEPTH", 10**6)
     (tmp_path / "c.yml").write_text("%YAML:1.0\n---\na: " + "[ " * 100_000)

@@ -22,8 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.io.locks import ForkedLock
+from quadfringe.recording._params import COMPRESSION, HOLES_FREE_BYTES
 
-__all__ = ["FileId", "HeldFile"]
+__all__ = ["FileId", "HeldFile", "tables_most"]
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,16 @@ class FileId:
     def of(cls, stat: os.stat_result) -> Self:
         """Take it from the status of a file."""
         return cls(stat.st_dev, stat.st_ino)
+
+
+def tables_most(stat: os.stat_result) -> int:
+    """Return how many bytes of a file may be tables and texts, which take memory and time, unlike pixels.
+
+    A file can state any size and have next to nothing on the disk, because holes take no room and are read as zeros.
+    Nobody writes holes into tables. File systems that compress store them smaller, and some do not tell their room.
+    """
+    room: int = 512 * getattr(stat, "st_blocks", 0)
+    return min(stat.st_size, HOLES_FREE_BYTES + COMPRESSION * room) if room else stat.st_size
 
 
 class HeldFile:
@@ -54,6 +65,11 @@ class HeldFile:
     def size(self) -> int:
         """Number of bytes that the file has now."""
         return os.fstat(self._descriptor).st_size
+
+    @property
+    def tables_most(self) -> int:
+        """Number of bytes that tables may have: see `tables_most`."""
+        return tables_most(os.fstat(self._descriptor))
 
     @property
     def shortened(self) -> bool:

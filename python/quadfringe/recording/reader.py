@@ -80,7 +80,7 @@ class Recording:
                     f"{self._header.changed_texts[0]} was changed; quadfringe recover copies the shots without it"
                 )
             self._closed = bool(stored.closed) or seal is not None
-            size = FileSize(file.size, stated_bytes(self.path))
+            size = FileSize(file.size, stated_bytes(self.path), file.tables_most)
             self._table = read_table(self._source, stored, self._header, size, seal)
             if not self._closed and len(self) and isinstance(self._found(-1), str):
                 self._table = self._table.without_last  # its writer did not finish it
