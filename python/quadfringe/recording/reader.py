@@ -100,7 +100,9 @@ class Recording:
             raise InputError(f"{self.path}: {what}: {error}; {AGAIN}") from error
         except UnreadableError as error:
             self._source.close()
-            raise RecordingError(f"{self.path}: cannot be read: {error}; {TRY}") from error
+            missing = missing_bytes(self.path) if self.path.exists() else 0
+            what = f"{missing} bytes are missing, and it cannot be read" if missing else "cannot be read"
+            raise RecordingError(f"{self.path}: {what}: {error}; {AGAIN if missing else TRY}") from error
         except InputError as error:
             self._source.close()
             raise type(error)(f"{self.path}: {error}") from error
