@@ -134,7 +134,7 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
     pose = {}
     if name != "camera":
         rotation = _matrix(f"R_{name}_camera", (3, 3), matrices, source)
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > ROUNDING or np.linalg.det(rotation) < 0:
+        if not _is_rotation(rotation):
             raise ConfigError(f"{source}: R_{name}_camera: expected a rotation matrix, got {rotation.tolist()}")
         translation = _matrix(f"T_{name}_camera", (3, 1), matrices, source)[:, 0]
         pose = {"rotation": rotation.tolist(), "translation_mm": translation.tolist()}
@@ -150,6 +150,12 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
         },
         f"{source}, {name}",
     )
+
+
+def _is_rotation(matrix: NDArray[np.float64]) -> bool:
+    if np.abs(matrix).max() > 1 + ROUNDING:  # also numbers that would overflow
+        return False
+    return bool(np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROUNDING and np.linalg.det(matrix) > 0)
 
 
 def _matrix(

@@ -21,10 +21,10 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.files import believable_bytes
 from quadfringe.io.locks import ForkedLock
-from quadfringe.recording._params import COMPRESSION, HOLES_FREE_BYTES
 
-__all__ = ["FileId", "HeldFile", "tables_most"]
+__all__ = ["FileId", "HeldFile"]
 
 
 @dataclass(frozen=True)
@@ -38,16 +38,6 @@ class FileId:
     def of(cls, stat: os.stat_result) -> Self:
         """Take it from the status of a file."""
         return cls(stat.st_dev, stat.st_ino)
-
-
-def tables_most(stat: os.stat_result) -> int:
-    """Return how many bytes of a file may be tables and texts, which take memory and time, unlike pixels.
-
-    A file can state any size and have next to nothing on the disk, because holes take no room and are read as zeros.
-    Nobody writes holes into tables. File systems that compress store them smaller, and some do not tell their room.
-    """
-    room: int = 512 * getattr(stat, "st_blocks", 0)
-    return min(stat.st_size, HOLES_FREE_BYTES + COMPRESSION * room) if room else stat.st_size
 
 
 class HeldFile:
@@ -68,8 +58,8 @@ class HeldFile:
 
     @property
     def tables_most(self) -> int:
-        """Number of bytes that tables may have: see `tables_most`."""
-        return tables_most(os.fstat(self._descriptor))
+        """Number of bytes that tables and texts may have; pixels may be holes, as copies of black images are."""
+        return believable_bytes(os.fstat(self._descriptor))
 
     @property
     def shortened(self) -> bool:

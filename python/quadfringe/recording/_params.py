@@ -19,7 +19,3 @@ LOST_S = 2 * READ_S
 # open them again, which takes milliseconds; more cost memory and file descriptors. Follows from the descriptors that a
 # process may have, 1024 on Linux, and is far from them.
 OPEN_MAX = 32
-# How many times larger the tables of a file may be than its room on the disk, and bytes that are free. Not measured:
-# tables hold checksums, which no file system compresses much. Larger numbers let a sparse file of some kB keep a reader
-# busy for longer, smaller ones doubt files on a file system that compresses.
-COMPRESSION, HOLES_FREE_BYTES = 8, 1 << 20

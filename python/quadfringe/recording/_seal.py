@@ -22,7 +22,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.recording._held import tables_most
+from quadfringe.files import believable_bytes
 
 __all__ = ["Seal", "pixel_extents", "read_seal", "write_seal"]
 
@@ -81,7 +81,7 @@ def read_seal(path: Path) -> Seal | None:
         file.seek(size - FOOTER.size)
         footer = file.read(FOOTER.size)
         magic, end, shots, count, digest, crc = FOOTER.unpack(footer)
-        most = tables_most(os.fstat(file.fileno()))
+        most = believable_bytes(os.fstat(file.fileno()))
         if magic != MAGIC or end + 16 * count + FOOTER.size != size or 16 * count > most:
             return None
         file.seek(end)
