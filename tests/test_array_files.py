@@ -108,3 +108,24 @@ def test_an_archive_of_many_members_or_bytes_is_refused(tmp_path: Path) -> None:
     assert size == len(one)
     with pytest.raises(qf.InputError, match=r"bomb\.npz: .*its arrays have 2147 MB, expected at most 1074 MB"):
         read_npz(bomb)
+
+
+@pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
+def test_archives_that_are_compressed_as_numpy_never_does_are_refused(method: int, tmp_path: Path) -> None:
+    """BZIP2 makes a kB of a GB of zeros."""
+    with zipfile.ZipFile(tmp_path / "a.npz", "w", method) as stored:
+        stored.writestr("a.npy", npy(np.zeros(9)))
+    with pytest.raises(qf.InputError, match=r"a\.npz: .*its arrays are compressed as NumPy never does"):
+        read_npz(tmp_path / "a.npz")
+
+
+def test_an_array_that_ends_early_is_refused(tmp_path: Path) -> None:
+    path = archive(tmp_path / "a.npz", {"a.npy": npy(np.zeros(1 << 17))})
+    data = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as stored:
+        found = stored.infolist()[0]
+    place = data.rindex(b"PK\x01\x02")
+    data[place + 20 : place + 24] = (found.compress_size // 2).to_bytes(4, "little")
+    path.write_bytes(data)
+    with pytest.raises(qf.InputError, match=r"a\.npz: not a readable NPZ file: "):
+        read_npz(path)

@@ -155,6 +155,14 @@ def test_phase_alone_is_compared_in_radians(plane: qf.Shape) -> None:
     assert "B holds phase only" in mixed.warnings[0]
 
 
+def test_shapes_without_a_common_point_are_doubted(plane: qf.Shape) -> None:
+    assert plane.xyz_mm is not None
+    nowhere = replace(plane, xyz_mm=np.full_like(plane.xyz_mm, np.nan))
+    assert qf.compare(plane, nowhere, causes=False).warnings == (
+        "no pixel has a point in both, so that no depths are compared",
+    )
+
+
 def test_other_calibrations_and_fringes_are_doubted(plane: qf.Shape) -> None:
     assert plane.calibration is not None
     other = plane.calibration.model_copy(update={"response": None})

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import struct
 from dataclasses import replace
 from pathlib import Path
 
@@ -140,3 +142,57 @@ def test_the_command_compares_two_shapes(seen: np.ndarray, tmp_path: Path) -> No
     wrong = CliRunner().invoke(app, ["compare", str(tmp_path / "a.npz"), str(tmp_path / "none.npz")])
     assert wrong.exit_code == 2
     assert "Traceback" not in wrong.output
+
+
+def glb(document: str) -> bytes:
+    text = document.encode() + b" " * (-len(document) % 4)
+    return b"glTF" + struct.pack("<II", 2, 20 + len(text)) + struct.pack("<I4s", len(text), b"JSON") + text
+
+
+WITHOUT_DATA = (
+    '{"asset": {"version": "2.0"}, "accessors": [{"componentType": 5126, "count": 300000000, "type": "VEC3"}], '
+    '"meshes": [{"primitives": [{"attributes": {"POSITION": 0}}]}], "nodes": [{"mesh": 0}], '
+    '"scenes": [{"nodes": [0]}]}'
+)
+CORNERS = "v 0 0 0\nv 1 0 0\nv 0 1 0\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        ("m.glb", glb("[" * 100_000), "cannot be read as a mesh: "),
+        ("m.glb", glb(WITHOUT_DATA), "cannot be read as a mesh: "),
+        ("m.obj", (CORNERS + "f 1 2 99999999\n").encode(), "cannot be read as a mesh: index 99999998 is out of bounds"),
+        (
+            "m.obj",
+            CORNERS.replace("1", "1e308").encode() + b"f 1 2 3\n",
+            r"expected a mesh in mm within a kilometre, got .* 1e\+308 mm",
+        ),
+        ("m.stl", bytes(80) + b"\xff" * 4 + bytes(50), "expected a mesh with triangles"),
+        (
+            "m.ply",
+            b"ply\nformat ascii 1.0\nelement vertex -5\nproperty zzz x\nend_header\n",
+            "cannot be read as a mesh",
+        ),
+        ("m.dae", b"<COLLADA/>", r"expected a name that ends in \.stl, \.ply, \.obj, \.glb"),
+        ("m.zip", b"PK\5\6" + bytes(18), r"expected a name that ends in \.stl, \.ply, \.obj, \.glb"),
+    ],
+)
+def test_hostile_meshes_are_refused_with_one_line(name: str, content: bytes, reason: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(content)
+    with pytest.raises(qf.InputError, match=rf"{name}: {reason}") as found:
+        surface_from(tmp_path / name)
+    assert "\n" not in str(found.value)
+
+
+def test_a_mesh_that_takes_too_long_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("quadfringe.decoding.compare.params.MESH_S", 0.001)
+    (tmp_path / "m.obj").write_text(CORNERS + "f 1 2 3\n")
+    with pytest.raises(qf.InputError, match=r"m\.obj: cannot be read as a mesh: it does not end within"):
+        surface_from(tmp_path / "m.obj")
+
+
+def test_a_mesh_makes_the_program_read_no_other_file(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "m.mtl")  # who opens it waits
+    (tmp_path / "m.obj").write_text("mtllib m.mtl\nusemtl a\n" + CORNERS + "f 1 2 3\n")
+    assert len(surface_from(tmp_path / "m.obj").triangles_mm) == 1

@@ -107,6 +107,13 @@ def test_json_is_not_nested_without_end(text: str, tmp_path: Path) -> None:
     assert json_of("[" * 64 + "]" * 64, "deep") != []
 
 
+@pytest.mark.parametrize("text", ["[" + "0," * 1_000_001 + "0]", "[" + "[]," * 100_001 + "0]"])
+def test_json_is_not_long_without_end(text: str) -> None:
+    for form in (text, text.encode()):
+        with pytest.raises(qf.ConfigError, match=r"c: expected at most 1,000,000 values and 100,000 lists, got more"):
+            json_of(form, "c")
+
+
 def test_a_key_that_is_given_twice_is_an_error(saved: Path) -> None:
     text = saved.read_text().replace('"width_px": 512', '"width_px": 511,\n    "width_px": 512', 1)
     saved.write_text(text)
@@ -215,6 +222,30 @@ def test_opencv_is_not_given_what_crashes_it(name: str, text: str, tmp_path: Pat
     (tmp_path / name).write_text(text)
     with pytest.raises(qf.InputError, match=rf"{name}: expected at most 32 lists and tables inside one another"):
         read_opencv(tmp_path / name)
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("c.yml", "%YAML:1.0\n---\na: [ " + "[], " * 100_000 + "]\n"),
+        ("c.json", '{"a": [' + "[]," * 100_000 + "1]}"),
+        ("c.xml", '<?xml version="1.0"?><opencv_storage>' + "<a></a>" * 100_000 + "</opencv_storage>"),
+    ],
+)
+def test_opencv_is_not_given_what_takes_it_long(name: str, text: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_text(text)
+    with pytest.raises(qf.InputError, match=rf"{name}: expected at most 100,000 beginnings and ends of lists"):
+        read_opencv(tmp_path / name)
+
+
+@pytest.mark.parametrize("number", ["1e300", "-1e200", "2."])
+def test_a_rotation_that_overflows_is_an_error(number: str, saved: Path, tmp_path: Path) -> None:
+    write_opencv(tmp_path / "c.yml", Calibration.load(saved))
+    text = (tmp_path / "c.yml").read_text()
+    place = text.index("data: [", text.index("R_projector_camera")) + len("data: [")
+    (tmp_path / "c.yml").write_text(text[:place] + number + text[text.index(",", place) :])
+    with pytest.raises(qf.ConfigError, match=r"c\.yml: R_projector_camera: expected a rotation matrix"):
+        read_opencv(tmp_path / "c.yml")
 
 
 def test_a_crash_of_opencv_is_an_error(saved: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 
 import pytest
 
 from quadfringe.errors import InputError, MissingExtraError, require
-from quadfringe.files import atomic, figures_text, folder_for, require_suffix
+from quadfringe.files import atomic, believable_bytes, figures_text, folder_for, read_bytes, require_suffix
 
 
 def test_a_failed_write_leaves_nothing(tmp_path: Path) -> None:
@@ -67,3 +68,18 @@ def test_suffixes_are_checked() -> None:
 def test_a_missing_library_names_its_extra() -> None:
     with pytest.raises(MissingExtraError, match=r'pip install "quadfringe\[plot\]"'):
         require("no_such_module_at_all", "plot")
+
+
+def test_a_file_of_holes_is_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "a.bmp"
+    path.write_bytes(b"BM")
+    os.truncate(path, 4_000_000_000)
+    with pytest.raises(InputError, match=r"a\.bmp: has 4000 MB, and nearly all of it are holes that take no room"):
+        read_bytes(path)
+    os.truncate(path, 1_000_000)
+    assert len(read_bytes(path)) == 1_000_000
+
+
+def test_a_file_system_that_does_not_tell_the_room_is_believed() -> None:
+    found = os.stat_result((0o100644, 1, 1, 1, 0, 0, 4_000_000_000, 0, 0, 0))
+    assert believable_bytes(found) == 4_000_000_000

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hostile.files import KINDS, Kind, attack, originals
-from hostile.targets import KEPT, TARGETS, corpus, sound_inputs, target
+from hostile.files import KINDS, LIMITS, Kind, attack, importable, originals
+from hostile.targets import KEPT, TARGETS, corpus, input_name, refusal, sound_inputs, target
+
+from quadfringe.io.bounded import Helper
 
 SAMPLE = 40  # of each of the eight kinds
+HARMLESS = {"png/compressed-text-of-8-MB", "png/1-bit-grey", "png/two-billion-frames"}  # inputs that are read
+REPORTS = ("calibration", "response", "system")  # their errors have a line for each problem
 
 
 @pytest.fixture(scope="module")
@@ -48,9 +52,31 @@ def test_the_attack_finds_a_faulty_reader(
 def test_what_failed_once_gives_a_result_or_one_error(kind: str, tmp_path: Path) -> None:
     (tmp_path / "sound").mkdir()
     with target(kind, tmp_path) as attack_by:
-        for data in (*sound_inputs(kind, tmp_path / "sound"), *(path.read_bytes() for path in corpus(kind))):
+        for data in sound_inputs(kind, tmp_path / "sound"):
             attack_by(data)
             attack_by(data[: len(data) // 2])
+        for path in corpus(kind):
+            attack_by(path.read_bytes())
+
+
+@pytest.fixture(scope="module")
+def bounded() -> Iterator[Helper]:
+    """A helper process that ends when it reads for longer than a file may take."""
+    with importable(), Helper(LIMITS) as helper:
+        yield helper
+
+
+@pytest.mark.parametrize("path", sorted(KEPT.glob("*/*")), ids=lambda path: f"{path.parent.name}-{path.name}")
+def test_kept_inputs_are_refused_in_time_with_one_line(path: Path, bounded: Helper, tmp_path: Path) -> None:
+    kind = path.parent.name
+    name = input_name(kind)
+    (tmp_path / name).write_bytes(path.read_bytes())
+    words = bounded.run(refusal, kind, tmp_path / name)
+    if f"{kind}/{path.name}" in HARMLESS:
+        assert words == ""
+    else:
+        assert name in words or "/dev/zero" in words
+        assert words.isprintable() or kind in REPORTS
 
 
 def test_the_inputs_that_failed_are_of_known_kinds() -> None:

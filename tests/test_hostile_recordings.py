@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.files import TEXT_BYTES
 from quadfringe.recording import Recorder, Recording
 from quadfringe.recording._checksums import crc_of_shot, crcs_of_shots
+from quadfringe.recording._seal import FOOTER
 from quadfringe.recording._source import Source
 
 GOLDEN = Path(__file__).parent / "golden" / "take.h5"
@@ -127,14 +129,37 @@ def test_more_rows_than_the_file_holds_are_refused(tmp_path: Path) -> None:
         for name in ("red", "green", "blue", "ir", "id", "time_us", "crc32"):
             file[name].resize(300_000, axis=0)
 
-    changed(take, lengthen)
-    os.truncate(take, 8_000_000)
+    size = changed(take, lengthen).stat().st_size
+    with take.open("ab") as file:
+        file.write(bytes(8_000_000 - size))
     with pytest.raises(InputError, match="claims 300000 shots, but its size is that of 222222"):
         Recording(take)
+    os.truncate(take, size)
+    os.truncate(take, 8_000_000)  # a hole: the file has room on the disk for some thousand rows
+    with pytest.raises(InputError, match=r"claims 300000 shots, but its size is that of \d{4,5};"):
+        Recording(take)
+
+
+@pytest.mark.parametrize("extents", [0, 1 << 28])
+def test_the_seal_of_a_sparse_file_takes_no_time(extents: int, take: Path) -> None:
+    """Some kB on the disk would be 5 GB to hash, or a table of 4 GB of extents."""
+    data = take.read_bytes()
+    magic, end, shots, *_ = FOOTER.unpack(data[-FOOTER.size :])
+    hole = 1 << 32
+    with take.open("wb") as file:
+        file.write(data[:end])
+        file.seek(hole + 16 * extents)
+        file.write(FOOTER.pack(magic, hole, shots, extents, bytes(32), 0))
+    begin_s = time.process_time()
+    with pytest.warns(RecordingWarning, match="changed since it was closed"), Recording(take) as recording:
+        assert recording.verify().damaged == ()
+    assert time.process_time() - begin_s < 1.0
 
 
 def test_the_checksums_of_many_shots_are_those_of_each() -> None:
     chance = np.random.default_rng(0)
+    nothing = np.zeros(0, np.uint64), np.zeros(0, np.int64), np.zeros((0, 2, 3), np.int64), np.zeros((0, 4), np.uint32)
+    assert crcs_of_shots("ab", *nothing).shape == (0,)
     rows = 50
     ids, times_us = chance.integers(0, 1 << 60, rows).astype(np.uint64), chance.integers(-9, 1 << 60, rows)
     for chips in (0, 2):

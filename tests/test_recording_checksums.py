@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -190,6 +191,11 @@ def test_a_recording_without_its_tables_is_an_error_in_time(tmp_path: Path, monk
         data[place + 6] ^= 0x40
     path.write_bytes(data)
     with pytest.raises(RecordingError, match=r"killed\.h5: cannot be read: reading it does not end within 0\.5 s"):
+        Recording(path)
+    os.truncate(path, len(data) // 2)
+    with pytest.raises(
+        RecordingError, match=r"killed\.h5: \d+ bytes are missing, and it cannot be read: .*copy it again"
+    ):
         Recording(path)
 
 

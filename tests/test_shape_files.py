@@ -236,3 +236,12 @@ def test_convert_refuses(saved: Path, monkeypatch: pytest.MonkeyPatch, words: tu
     assert result.exit_code == 2
     assert reason in result.output.replace("\n", " ")
     assert [path.name for path in saved.parent.iterdir()] == ["face.npz"]
+
+
+def test_convert_counts_points_and_not_pixels(saved: Path, tmp_path: Path) -> None:
+    shape = qf.Shape.load(saved)
+    assert shape.xyz_mm is not None
+    shape.xyz_mm[1:] = np.nan
+    shape.save(tmp_path / "row.npz")
+    count = np.isfinite(shape.xyz_mm[0, :, 2]).sum()
+    assert f", from {count} points\n" in run(tmp_path / "row.npz", tmp_path / "row.ply").output

@@ -20,6 +20,7 @@ from quadfringe.config import Device
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep
 from quadfringe.data.shot_files import write_shot
 from quadfringe.decoding import symptoms
+from quadfringe.decoding.plausibility import implausible
 from quadfringe.doctor import examine_calibration
 
 Values = dict[str, Any]
@@ -90,6 +91,18 @@ WRONG: dict[str, tuple[Callable[[Calibration], Calibration], str]] = {
     "distortion beyond a fisheye lens": (
         lambda c: changed(c, "camera", distortion=(-3, 0, 0, 0, 0)),
         "camera.distortion .* bends 80% of the image more than a fisheye lens",
+    ),
+    "exchanged principal point": (
+        lambda c: changed(c, "camera", centre_px=c.camera.centre_px[::-1]),
+        "camera.centre_px is 191.5, 255.5; 255.5, 191.5 would be in the middle of the 512 columns: x and y seem",
+    ),
+    "exchanged principal point of the projector": (
+        lambda c: changed(c, "projector", centre_px=c.projector.centre_px[::-1]),
+        "projector.centre_px is 569.5, 455.5; 455.5, 569.5 would be in the middle of the 912 columns: x and y seem",
+    ),
+    "half of the focal length": (
+        lambda c: changed(c, "projector", focal_px=[f / 2 for f in c.projector.focal_px]),
+        "half of the surface is seen at more than 72 degrees|of the points are farther than 3 times the median depth",
     ),
     "principal point": (lambda c: changed(c, "camera", centre_px=(1e9, 0)), "refused: no shape: camera.centre_px"),
 }
@@ -167,7 +180,69 @@ def test_the_doctor_writes_json_of_a_calibration_that_is_infinitely_wrong(
     ].items()
 
 
+@pytest.mark.parametrize("centre", [(255.5, 191.5), (270.0, 180.0), (240.0, 383.0), (255.5, 255.5)])
+def test_principal_points_that_exist_are_not_doubted(
+    centre: tuple[float, float], bench: tuple[qf.Shot, Calibration]
+) -> None:
+    known = changed(bench[1], "camera", centre_px=centre)
+    assert [one.found for one in examine_calibration(known) if one.name.startswith("calibration")] == []
+
+
+def test_points_of_wrong_orders_far_behind_the_object_are_told(bench: tuple[qf.Shot, Calibration]) -> None:
+    shot, calibration = bench
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", qf.DecodeWarning)
+        shape = qf.decode(shot, qf.Plan(912, calibration=calibration, decode={"method": "published"}))
+    assert shape.xyz_mm is not None
+    assert implausible(shape) == []
+    shape.xyz_mm[:, :64] *= 4
+    (cause,) = implausible(shape)
+    assert (cause.name, cause.fatal) == ("far points", False)
+    assert re.match(r"1[234]% of the points are farther than 3 times the median depth of 800 mm", cause.found)
+
+
 # Images
+
+
+def flipped(shot: qf.Shot, *axes: int) -> qf.Shot:
+    return qf.Shot(*(np.ascontiguousarray(np.flip(image, axes)) for image in shot.channels.values()))
+
+
+@pytest.mark.parametrize("method", ["joint", "published"])
+@pytest.mark.parametrize("axes", [(1,), (0, 1)])
+@pytest.mark.parametrize("surface", ["plane", "steps"])
+def test_mirrored_and_turned_images_are_refused(axes: tuple[int, ...], method: str, surface: str) -> None:
+    """The published method hides the direction of mirrored columns behind wrong orders, which have no whole turns."""
+    small = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(259.0, 180.0))
+    with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface=surface, noise=0.01))) as scanner:
+        shot, calibration = scanner.grab(), scanner.calibration
+    assert isinstance(shot, qf.Shot)
+    plan = qf.Plan(912, calibration=calibration, decode={"method": method})
+    with pytest.raises(qf.DecodeError, match=r"fringes run backwards in (9\d|100)% of the image"):
+        qf.decode(flipped(shot, *axes), plan)
+
+
+def test_rows_that_are_flipped_cannot_be_seen_on_a_symmetric_bench(bench: tuple[qf.Shot, Calibration]) -> None:
+    """They are the image of a scene that is flipped itself: every depth is that of the flipped scene."""
+    projector = bench[1].projector
+    turn, _ = cv2.Rodrigues(np.array([0.0, 0.32, 0.0]))
+    pose = {"rotation": turn.tolist(), "translation_mm": (-252.6, 0.0, -126.1)}
+    level = Device.model_validate(projector.model_dump() | pose)
+    small = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
+    system = qf.SystemConfig(camera=small, projector=level, scene=qf.SceneConfig(surface="face", noise=0.01))
+    with qf.open(system) as scanner:
+        shot, calibration = scanner.grab(), scanner.calibration
+    assert isinstance(shot, qf.Shot)
+    plan = qf.Plan(912, calibration=calibration)
+    upright, upside_down = qf.decode(shot, plan), qf.decode(flipped(shot, 0), plan)
+    assert (upright.warnings, upside_down.warnings) == ((), ())
+    assert upright.depth_mm is not None
+    assert upside_down.depth_mm is not None
+    apart_mm = np.abs(upright.depth_mm - upside_down.depth_mm[::-1])
+    both, sigma_mm = np.isfinite(apart_mm), upright.uncertainty_mm
+    assert sigma_mm is not None
+    assert np.median(apart_mm[both]) < np.median(sigma_mm[both])
+    assert np.quantile(apart_mm[both], 0.95) < np.quantile(sigma_mm[both], 0.95)
 
 
 def test_fourteen_bits_are_told_by_clipped_pixels(bench: tuple[qf.Shot, Calibration]) -> None:

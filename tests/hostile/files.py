@@ -22,7 +22,7 @@ from quadfringe.errors import InputError
 from quadfringe.io import read_image, read_npy
 from quadfringe.io.bounded import BoundedError, Helper, Limits
 
-__all__ = ["KINDS", "Outcome", "attack", "originals"]
+__all__ = ["KINDS", "LIMITS", "Outcome", "attack", "importable", "originals"]
 
 TIME_S = 5.0
 LIMITS = Limits(time_s=TIME_S, memory_bytes=4 << 30)
@@ -133,7 +133,7 @@ def originals(folder: Path) -> dict[str, list[Path]]:
 
 
 @contextmanager
-def _importable() -> Iterator[None]:
+def importable() -> Iterator[None]:
     """Let helper processes import this package."""
     before = os.environ.get("PYTHONPATH", "")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, (str(Path(__file__).parents[1]), before)))
@@ -145,7 +145,7 @@ def _importable() -> Iterator[None]:
 
 def attack(kind: str, files: list[Path], seeds: range, keep: Path | None = None) -> Iterator[Outcome]:
     """Read files of a kind, damaged by one seed after another; `keep` is a folder that keeps them."""
-    with tempfile.TemporaryDirectory() as folder, _importable(), Helper(LIMITS) as helper:
+    with tempfile.TemporaryDirectory() as folder, importable(), Helper(LIMITS) as helper:
         sound = {file: KINDS[kind].read(file, helper) for file in files}
         for seed in seeds:
             random = np.random.default_rng(seed)

@@ -22,11 +22,11 @@ from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.io.bounded import Helper
 from quadfringe.recording import Recorder, Recording
 
-__all__ = ["KEPT", "TARGETS", "corpus", "sound_inputs", "target"]
+__all__ = ["KEPT", "TARGETS", "corpus", "input_name", "refusal", "sound_inputs", "target"]
 
 # "member" is one member of the archive of a shape, with the right checksum around it.
 TARGETS = ("recording", "calibration", "response", "system", "shape", "member", "npy", "opencv", "png", "image")
-KEPT = Path(__file__).with_name("corpus")  # inputs that failed once
+KEPT = Path(__file__).with_name("corpus")  # inputs that failed once, or are made to mislead a reader
 SUFFIXES = {"recording": ".h5", "system": ".toml", "shape": ".npz", "member": ".npz", "opencv": ".yml"}
 SMALL_PX = 1 << 14  # cameras up to this size are simulated
 
@@ -85,14 +85,14 @@ def sound_inputs(kind: str, folder: Path) -> list[bytes]:
 
 
 def corpus(kind: str) -> list[Path]:
-    """Return the inputs of a kind that failed once."""
+    """Return the kept inputs of a kind."""
     return sorted((KEPT / kind).glob("*"))
 
 
 @contextmanager
 def target(kind: str, folder: Path) -> Iterator[Target]:
     """Give the function that libFuzzer calls; `folder` holds the file that is read."""
-    path = folder / f"input{SUFFIXES.get(kind, '')}"
+    path = folder / input_name(kind)
     sound = originals(folder)["shape"][0].read_bytes() if kind == "member" else b""
     with Helper(LIMITS) as helper:
         read = reader(kind, helper)
@@ -103,6 +103,21 @@ def target(kind: str, folder: Path) -> Iterator[Target]:
                 read(path)
 
         yield attack
+
+
+def input_name(kind: str) -> str:
+    """Return the name of a file of this kind."""
+    return f"input{SUFFIXES.get(kind, '')}"
+
+
+def refusal(kind: str, path: Path) -> str:
+    """Read a file; return the words of the error, "" when there is none."""
+    with warnings.catch_warnings(action="ignore"), Helper(LIMITS) as helper:
+        try:
+            reader(kind, helper)(path)
+        except (InputError, RecordingError) as error:
+            return str(error)
+    return ""
 
 
 def reader(kind: str, helper: Helper) -> Callable[[Path], Any]:

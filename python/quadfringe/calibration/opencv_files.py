@@ -24,11 +24,12 @@ __all__ = ["SUFFIXES", "devices_from_opencv", "read_opencv", "read_opencv_by", "
 
 SUFFIXES = (".yml", ".yaml", ".xml", ".json")
 DEVICES = ("camera", "projector", "infrared")
-FILE_BYTES = 16 << 20  # a calibration has some 10 kB, and with the points of all its views some MB
+FILE_BYTES = 4 << 20  # a calibration has some 10 kB, and with the points of all its views some MB
 DEPTH = 32  # lists and tables inside one another; OpenCV follows them until its stack is full
+NODES = 100_000  # lists, tables and elements, begun or ended; a calibration with all its views has some 100
 BRACKETS = re.compile(rb"[\[{\]}]|</|/>|<[A-Za-z_]")
 CLOSING = (b"]", b"}", b"</", b"/>")
-LIMITS = Limits(time_s=5.0, memory_bytes=2 << 30)  # of which OpenCV itself takes half a second and 0.4 GB
+LIMITS = Limits(time_s=4.0, memory_bytes=2 << 30)  # of which OpenCV itself takes half a second and 0.4 GB
 ROUNDING = 1e-6  # of matrix entries that a text file holds with fewer digits
 
 
@@ -75,8 +76,8 @@ def read_opencv(path: Path) -> Calibration:
 def read_opencv_by(helper: Helper, path: Path) -> Calibration:
     """Read as `read_opencv` does, with a helper process that reads several files."""
     require_suffix(path, SUFFIXES)
-    if _depth(read_bytes(path, FILE_BYTES)) > DEPTH:
-        raise InputError(f"{path}: expected at most {DEPTH} lists and tables inside one another, got more")
+    if found := _too_nested(read_bytes(path, FILE_BYTES)):
+        raise InputError(f"{path}: expected at most {found}, got more")
     try:
         matrices = helper.run(_matrices_in, path)
     except BoundedError as error:
@@ -99,15 +100,16 @@ def _matrices_in(path: Path) -> dict[str, NDArray[np.float64]]:
     return {key: np.asarray(matrix, float) for key, matrix in nodes.items() if matrix is not None}
 
 
-def _depth(text: bytes) -> int:
-    """Give how many lists, tables and elements stand inside one another, in JSON, YAML or XML; at most DEPTH + 1."""
-    depth = deepest = 0
-    for found in BRACKETS.finditer(text):
+def _too_nested(text: bytes) -> str:
+    """Say which limit of lists, tables and elements a text in JSON, YAML or XML exceeds; "" for none."""
+    depth = 0
+    for number, found in enumerate(BRACKETS.finditer(text)):
         depth += -1 if found[0] in CLOSING else 1
-        deepest = max(deepest, depth)
-        if deepest > DEPTH:
-            break
-    return deepest
+        if depth > DEPTH:
+            return f"{DEPTH} lists and tables inside one another"
+        if number >= NODES:
+            return f"{NODES:,} beginnings and ends of lists and tables"
+    return ""
 
 
 def devices_from_opencv(matrices: dict[str, NDArray[np.float64]], source: str = "matrices") -> Calibration:
@@ -132,7 +134,7 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
     pose = {}
     if name != "camera":
         rotation = _matrix(f"R_{name}_camera", (3, 3), matrices, source)
-        if np.abs(rotation @ rotation.T - np.eye(3)).max() > ROUNDING or np.linalg.det(rotation) < 0:
+        if not _is_rotation(rotation):
             raise ConfigError(f"{source}: R_{name}_camera: expected a rotation matrix, got {rotation.tolist()}")
         translation = _matrix(f"T_{name}_camera", (3, 1), matrices, source)[:, 0]
         pose = {"rotation": rotation.tolist(), "translation_mm": translation.tolist()}
@@ -148,6 +150,12 @@ def _device(name: str, matrices: dict[str, NDArray[np.float64]], source: str) ->
         },
         f"{source}, {name}",
     )
+
+
+def _is_rotation(matrix: NDArray[np.float64]) -> bool:
+    if np.abs(matrix).max() > 1 + ROUNDING:  # also numbers that would overflow
+        return False
+    return bool(np.abs(matrix @ matrix.T - np.eye(3)).max() <= ROUNDING and np.linalg.det(matrix) > 0)
 
 
 def _matrix(

@@ -30,6 +30,8 @@ def convert(
     ] = 0,
 ) -> None:
     """Convert a saved shape to a mesh, points or a depth map. Lengths are mm, in .glb metres."""
+    import numpy as np
+
     from quadfringe.data import Shape
     from quadfringe.data.shape import SUFFIXES
     from quadfringe.data.shape_files import check_choices
@@ -38,4 +40,6 @@ def convert(
     check_choices(out, require_suffix(out, SUFFIXES), faces=faces, step=step, fill_holes_px=fill_holes_px)
     loaded = Shape.load(shape)
     loaded.save(out, faces=faces, step=step, fill_holes_px=fill_holes_px)
-    say(f"{out}: {out.stat().st_size / 1e6:.1f} MB, from {int(loaded.returned.sum())} points")
+    depth_mm = loaded.depth_mm
+    known = loaded.returned if depth_mm is None else np.isfinite(depth_mm)
+    say(f"{out}: {out.stat().st_size / 1e6:.1f} MB, from {int(known.sum())} points")

@@ -70,13 +70,22 @@ def _focal(name: str, device: Device) -> list[Cause]:
 
 
 def _centre(name: str, device: Device) -> list[Cause]:
-    halves = np.array((device.width_px, device.height_px)) / 2
-    away = float(np.abs((np.array(device.centre_px) - (halves - 0.5)) / halves).max())
-    if away <= params.CENTRE_HALVES:
-        return []
     column, row = device.centre_px
-    words = f"{name}.centre_px is {column:.6g}, {row:.6g}, far outside the {device.width_px} x {device.height_px} px"
-    return [Cause("calibration principal point", words, CORRECT)]
+    halves = np.array((device.width_px, device.height_px)) / 2
+    away, exchanged = (
+        np.abs((np.array(centre) - (halves - 0.5)) / halves) for centre in ((column, row), (row, column))
+    )
+    if away.max() > params.CENTRE_HALVES:
+        words = (
+            f"{name}.centre_px is {column:.6g}, {row:.6g}, far outside the {device.width_px} x {device.height_px} px"
+        )
+        return [Cause("calibration principal point", words, CORRECT)]
+    # Projectors that shine upwards have it anywhere along y.
+    if away[0] > params.CENTRE_ASIDE and exchanged[0] < params.CENTRE_EXCHANGED * away[0]:
+        words = f"{name}.centre_px is {column:.6g}, {row:.6g}; {row:.6g}, {column:.6g} would be in the middle of the "
+        words += f"{device.width_px} columns: x and y seem to be exchanged"
+        return [Cause("calibration principal point", words, f"give the column first; {CORRECT}", fatal=False)]
+    return []
 
 
 def _lens(name: str, device: Device) -> list[Cause]:

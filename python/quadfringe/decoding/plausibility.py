@@ -36,13 +36,14 @@ class Geometry:
     """Shares of the samples of a shape that contradict its calibration, and where its points lie.
 
     `backwards`: columns run against the direction that the calibration demands. `nowhere`: rays do not meet before the
-    camera. `outside`: points above or below the image of the projector. `tilt_deg`: median angle between surface and
-    line of sight. `depth_mm`: median.
+    camera. `outside`: points above or below the image of the projector. `far`: points at several times the median
+    depth. `tilt_deg`: median angle between surface and line of sight. `depth_mm`: median.
     """
 
     backwards: float
     nowhere: float
     outside: float
+    far: float
     tilt_deg: float
     depth_mm: float
 
@@ -65,18 +66,49 @@ def geometry_of(shape: Shape) -> Geometry | None:
     points = shape.xyz_mm[here].astype(np.float64)
     met = returned & np.isfinite(points[..., 2])
     if met.sum() < params.SAMPLES_MIN:
-        return Geometry(0.0, 1.0, 0.0, float("nan"), float("nan"))
-    growth = (shape.column_px[right] - columns)[met] * _direction(points[met], shape.calibration)
+        return Geometry(0.0, 1.0, 0.0, 0.0, float("nan"), float("nan"))
+    direction = _direction(points[met], shape.calibration)
+    growth = (shape.column_px[right] - columns)[met] * direction
+    turns = _turns(shape.phase_rad, stride)[met] * direction
+    depth_mm = float(np.median(points[..., 2][met]))
     rows = pixels_of(points[met], shape.calibration.projector)[:, 1]
     off = np.maximum(-0.5 - rows, rows - (shape.calibration.projector.height_px - 0.5))
     tilt = _tilt_deg(points, shape.xyz_mm[right] - points, shape.xyz_mm[below] - points)
     return Geometry(
-        backwards=_share(growth < 0, np.isfinite(growth)),
+        backwards=_most_backwards(growth, turns),
         nowhere=1 - float(met.sum()) / float(returned.sum()),
         outside=float(np.mean(off > params.ROWS_PX)),
+        far=float(np.mean(points[..., 2][met] > params.FAR_MEDIANS * depth_mm)),
         tilt_deg=tilt,
-        depth_mm=float(np.median(points[..., 2][met])),
+        depth_mm=depth_mm,
     )
+
+
+def _most_backwards(growth: NDArray[np.float32], turns: NDArray[np.float32]) -> float:
+    """Give the share of columns that run backwards; that of their phase where most of it does, behind wrong orders."""
+    columns, phase = (_share(values < 0, np.isfinite(values)) for values in (growth, turns))
+    return max(columns, phase) if phase > params.REFUSED_SHARE else columns
+
+
+def _turns(phase_rad: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
+    """Give the phase at the samples of a shape to the right of them, over a quarter of a fringe, without whole turns.
+
+    Wrong orders, as the published method makes them of images that are mirrored, hide the direction of the columns.
+    """
+    reach, width = params.REACH_PX, phase_rad.shape[1]
+
+    def step(length: int) -> NDArray[np.float32]:
+        rows = np.s_[:-reach:stride]
+        here, there = (
+            phase_rad[rows, : width - reach : stride],
+            phase_rad[rows, length : width - reach + length : stride],
+        )
+        turns = (there - here) / (2 * np.pi)
+        return np.asarray(turns - np.round(turns), np.float32)
+
+    one = np.abs(step(1))
+    rate = float(np.nanmedian(one)) if np.isfinite(one).any() else 0.0
+    return step(int(np.clip(0.25 / max(rate, 1e-6), 1, reach)))
 
 
 def implausible(shape: Shape) -> list[Cause]:
@@ -176,6 +208,10 @@ def _doubtful(found: Geometry, calibration: Calibration) -> list[Cause]:
         words = f"half of the surface is seen at more than {found.tilt_deg:.0f} degrees from its normal, which no "
         words += "camera sees well: the calibration seems to be of another bench"
         return [Cause("calibration", words, CALIBRATE, fatal=False)]
+    if found.far > params.WARNED_SHARE:
+        words = f"{found.far:.0%} of the points are farther than {params.FAR_MEDIANS:g} times the median depth of "
+        words += f"{found.depth_mm:.0f} mm, where there is a ninth of the light"
+        return [Cause("far points", words, f"state depth_range_mm (--depth-range-mm), or {CALIBRATE}", fatal=False)]
     depths = calibrated_depths_mm(calibration)
     if depths is None:
         return []

@@ -15,7 +15,7 @@ import zlib
 from collections import Counter
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +35,8 @@ MEMBERS = 1000  # arrays of an archive; a shape has some 20
 # Bytes that an archive may unpack to: those of a shape of 25 million pixels, or four times those of a larger file,
 # since measured values hardly shrink.
 UNPACKED_BYTES, UNPACKED_RATIO = 1 << 30, 4
+PIECE_BYTES = 1 << 18
+METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # that NumPy writes; others shrink zeros to a millionth
 ARCHIVE, ARRAY = b"PK", np.lib.format.MAGIC_PREFIX
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 
@@ -52,7 +54,7 @@ def read_npy(path: Path) -> NDArray[Any]:
     """Read the array of an NPY file; raises `InputError` for any other file."""
     data = _checked(path, "NPY", {ARRAY})
     try:
-        return _array(data)
+        return _array(BytesIO(data), len(data))
     except DAMAGED as error:
         raise InputError(f"{path}: not a readable NPY file: {_words(error)}") from error
 
@@ -75,32 +77,44 @@ def _members(data: bytes) -> dict[str, NDArray[Any]]:
             raise ValueError(f"it holds {len(members)} arrays, expected at most {MEMBERS}")
         if twice := sorted(name for name, number in Counter(names).items() if number > 1):
             raise ValueError(f"it holds {', '.join(twice)} twice")
+        if any(member.compress_type not in METHODS for member in members):
+            raise ValueError("its arrays are compressed as NumPy never does; save it with numpy.savez_compressed")
         size, most = sum(member.file_size for member in members), max(UNPACKED_BYTES, UNPACKED_RATIO * len(data))
         if size > most:
             raise ValueError(f"its arrays have {size / 1e6:.0f} MB, expected at most {most / 1e6:.0f} MB")
         found = {}
         for name, member in zip(names, members, strict=True):
             try:
-                found[name] = _array(archive.read(member))  # compares the checksum
+                with archive.open(member) as stream:
+                    found[name] = _array(stream, member.file_size)  # reading to its end compares the checksum
             except ValueError as error:
                 raise ValueError(f"{name}: {error}") from error
         return found
 
 
-def _array(data: bytes) -> NDArray[Any]:
-    """Give the array of an NPY file; raise ValueError unless it has exactly the size that its header says."""
-    stream = BytesIO(data)
+def _array(stream: IO[bytes], length: int) -> NDArray[Any]:
+    """Read an NPY file of this many bytes; raise ValueError unless it has exactly the size that its header says."""
     version = np.lib.format.read_magic(stream)
     if version not in HEADERS:
         raise ValueError(f"expected version 1 or 2 of the format NPY, got {version[0]}.{version[1]}")
     shape, by_columns, dtype = HEADERS[version](stream)
     if dtype.hasobject or dtype.names is not None or not dtype.itemsize:
         raise ValueError(f"expected an array of numbers or texts, got {dtype}")
-    size, given = math.prod(shape) * dtype.itemsize, len(data) - stream.tell()
-    if size != given or any(length < 0 for length in shape):
+    size, given = math.prod(shape) * dtype.itemsize, length - stream.tell()
+    if size != given or any(side < 0 for side in shape):
         raise ValueError(f"expected {size} bytes for an array {shape} of {dtype}, got {given}")
-    values = np.frombuffer(data, dtype, offset=stream.tell()) if size else np.empty(0, dtype)
-    return values.reshape(shape, order="F" if by_columns else "C").copy()
+    values = np.empty(size, np.uint8)
+    _fill(values, stream)
+    return values.view(dtype).reshape(shape, order="F" if by_columns else "C")
+
+
+def _fill(values: NDArray[np.uint8], stream: IO[bytes]) -> None:
+    """Fill an array from a stream, in pieces: a copy of the whole would take as long as reading it."""
+    for begin in range(0, len(values), PIECE_BYTES):
+        piece = stream.read(min(PIECE_BYTES, len(values) - begin))
+        if len(piece) < min(PIECE_BYTES, len(values) - begin):
+            raise ValueError(f"it ends after {begin + len(piece)} of {len(values)} bytes")
+        values[begin : begin + len(piece)] = np.frombuffer(piece, np.uint8)
 
 
 def _words(error: BaseException) -> str:

@@ -10,34 +10,57 @@ import re
 import struct
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from quadfringe.errors import InputError
+from quadfringe.io.tiff import is_tiff, pages_of
 
-__all__ = ["IMAGE_PX", "check_image", "pixels_declared"]
+__all__ = ["IMAGE_PX", "check_image", "pixels_declared", "without_texts"]
 
 IMAGE_PX = 2**28  # 16384 x 16384, the largest camera chip of today has 150 MP
+# Bytes that the pixels of an image may take: 44 million pixels of three 16-bit colours, which take 2 s; or 16 times
+# those of a larger file, which measured pixels never reach: of a black image a thousandth is left.
+DECODED_BYTES, DECODED_RATIO = 1 << 28, 16
 PNG = b"\x89PNG\r\n\x1a\n"
-TIFF_WIDTH, TIFF_HEIGHT = 256, 257
-TIFF_ENTRIES = 4096
-TIFF_PAGES = 64
-SHORT, LONG = 3, 4
+PNG_CHANNELS = {0: 1, 2: 3, 3: 3, 4: 2, 6: 4}  # by type of colour
+PNG_CHUNKS = 1_000_000  # 900 MB in pieces of 8 kB have 110,000
+PNG_TEXTS = (b"zTXt", b"iTXt", b"iCCP")  # compressed texts, each up to a thousand times larger when unpacked
 # The start of a frame: baseline, extended, progressive, lossless and the like, without tables (C4, C8, CC).
 JPEG_FRAMES = frozenset(range(0xC0, 0xD0)) - {0xC4, 0xC8, 0xCC}
+JPEG_SCAN, JPEG_SCANS = b"\xff\xda", 16  # a progressive image has some ten; each goes over all pixels
+PNM = re.compile(rb"P([1-6])(?:\s+|#[^\n]*\n)+(\d{1,9})\s+(\d{1,9})\s")
+
+
+class _Declared(NamedTuple):
+    """Number of pixels, and of the bytes that they take in memory."""
+
+    pixels: int
+    bytes: int
 
 
 def check_image(path: Path | str, data: bytes) -> None:
-    """Raise `InputError` if `data` is an image that declares more than 2**28 pixels, or more bytes than it has.
+    """Raise `InputError` for an image that declares more pixels than 2**28, or than `data` can reasonably hold.
 
-    A file of another kind passes; its reader reports it.
+    So is one of unknown kind, and a PNG that is cut. Damage elsewhere is reported by the decoder.
     """
-    if data.startswith(PNG) and (missing := _bytes_missing(data)):
+    if data.startswith(PNG) and (missing := _bytes_missing(path, data)):
         raise InputError(
             f"{path}: not a readable image: {missing:,} bytes of the PNG file are missing; it is cut or damaged, so "
             "copy it again"
         )
-    pixels = pixels_declared(data)
-    if pixels is not None and pixels > IMAGE_PX:
-        raise InputError(f"{path}: declares {pixels:,} pixels; expected at most {IMAGE_PX:,}")
+    found = _declared(data)
+    if found is None:
+        raise InputError(
+            f"{path}: not a readable image; expected PNG, TIFF or BMP, got {len(data)} bytes of something else"
+        )
+    if found.pixels > IMAGE_PX:
+        raise InputError(f"{path}: declares {found.pixels:,} pixels; expected at most {IMAGE_PX:,}")
+    most = max(DECODED_BYTES, DECODED_RATIO * len(data))
+    if found.bytes > most:
+        raise InputError(
+            f"{path}: declares pixels of {found.bytes / 1e6:.0f} MB in a file of {len(data) / 1e6:.1f} MB; expected at "
+            f"most {most / 1e6:.0f} MB, so save it without compression if it is an image"
+        )
 
 
 def pixels_declared(data: bytes) -> int | None:
@@ -45,48 +68,63 @@ def pixels_declared(data: bytes) -> int | None:
 
     PNG, TIFF, BMP, JPEG and PNM are known.
     """
+    found = _declared(data)
+    return None if found is None else found.pixels
+
+
+def _declared(data: bytes) -> _Declared | None:
     try:
         if data.startswith(PNG) and data[12:16] == b"IHDR":
-            width, height = struct.unpack_from(">II", data, 16)
-        elif data.startswith(b"BM"):
+            width, height, bits, colour = struct.unpack_from(">IIBB", data, 16)
+            return _of(width * height, PNG_CHANNELS.get(colour, 4) * (2 if bits > 8 else 1))
+        if data.startswith(b"BM"):
             width, height = struct.unpack_from("<ii", data, 18)
-        elif data.startswith((b"II*\0", b"MM\0*")):
-            return max(_tiff_pages(data), default=None)
-        elif data.startswith(b"\xff\xd8"):
-            return _jpeg_pixels(data)
-        elif matched := re.match(rb"P[1-6](?:\s+|#[^\n]*\n)+(\d{1,9})\s+(\d{1,9})\s", data[:1024]):
-            width, height = int(matched[1]), int(matched[2])
-        else:
-            return None
+            return _of(abs(width * height), 4)
+        if is_tiff(data):
+            pages = list(pages_of(data))
+            return _Declared(max(p.pixels for p in pages), max(p.decoded_bytes for p in pages)) if pages else None
+        if data.startswith(b"\xff\xd8"):
+            pixels = _jpeg_pixels(data)
+            return None if pixels is None else _of(pixels, 3 * (1 + data.count(JPEG_SCAN) // JPEG_SCANS))
+        if matched := PNM.match(data[:1024]):
+            return _of(int(matched[2]) * int(matched[3]), 6)
     except (struct.error, IndexError):
-        return None
-    return int(abs(width * height))
+        pass
+    return None
 
 
-def _bytes_missing(data: bytes) -> int:
-    """Return by how many bytes the chunks of a PNG exceed it; OpenCV reserves 4 GB for a chunk that says so."""
+def _of(pixels: int, bytes_each: int) -> _Declared:
+    return _Declared(int(pixels), int(pixels * bytes_each))
+
+
+def without_texts(data: bytes) -> bytes:
+    """Leave the compressed texts of a PNG out, which the decoder would unpack: some MB of them take minutes."""
+    if not data.startswith(PNG) or not any(kind in data for kind in PNG_TEXTS):
+        return data
+    kept, begin = [data[: len(PNG)]], len(PNG)
+    for end, kind in _chunks(data):
+        if kind not in PNG_TEXTS:
+            kept.append(data[begin:end])
+        begin = end
+    return b"".join([*kept, data[begin:]])
+
+
+def _chunks(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """Give end and kind of the chunks of a PNG up to the last one, or to the end of the file."""
     place, kind = len(PNG), b""
     while kind != b"IEND" and place < len(data):
         length, kind = int.from_bytes(data[place : place + 4], "big"), data[place + 4 : place + 8]
         place += 12 + length
-    return max(0, place - len(data))
+        yield place, kind
 
 
-def _tiff_pages(data: bytes) -> Iterator[int]:
-    """Give the pixels of each page of a TIFF."""
-    order = "<" if data.startswith(b"II") else ">"
-    (place,) = struct.unpack_from(f"{order}I", data, 4)
-    for _ in range(TIFF_PAGES):
-        (entries,) = struct.unpack_from(f"{order}H", data, place)
-        size = {TIFF_WIDTH: 0, TIFF_HEIGHT: 0}
-        for entry in range(place + 2, place + 2 + 12 * min(entries, TIFF_ENTRIES), 12):
-            tag, kind = struct.unpack_from(f"{order}HH", data, entry)
-            if tag in size and kind in (SHORT, LONG):
-                (size[tag],) = struct.unpack_from(f"{order}{'H' if kind == SHORT else 'I'}", data, entry + 8)
-        yield size[TIFF_WIDTH] * size[TIFF_HEIGHT]
-        (place,) = struct.unpack_from(f"{order}I", data, place + 2 + 12 * entries)
-        if place == 0:
-            return
+def _bytes_missing(path: Path | str, data: bytes) -> int:
+    """Return by how many bytes the chunks of a PNG exceed it; OpenCV reserves 4 GB for a chunk that says so."""
+    end = len(PNG)
+    for number, (end, _) in enumerate(_chunks(data)):  # noqa: B007 - the last end is wanted
+        if number >= PNG_CHUNKS:
+            raise InputError(f"{path}: expected a PNG of at most {PNG_CHUNKS:,} chunks, got more; save it again")
+    return max(0, end - len(data))
 
 
 def _jpeg_pixels(data: bytes) -> int | None:

@@ -2,33 +2,20 @@
 
 from __future__ import annotations
 
-import struct
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.errors import InputError
 from quadfringe.files import atomic, read_bytes
-from quadfringe.io.declared import check_image
+from quadfringe.io.declared import check_image, without_texts
+from quadfringe.io.tiff import has_more_pages
 
 __all__ = ["full_scale", "read_grey", "read_image", "read_rgb", "write_image"]
 
 DTYPES = ("uint8", "uint16", "float32")
-
-
-class _Tiff(NamedTuple):
-    """Layout of a TIFF: place of the offset of the first page, types of offsets and tag counts, bytes of a tag."""
-
-    first: int
-    offset: str
-    number: str
-    tag_bytes: int
-
-
-ORDERS = {b"II": "<", b"MM": ">"}  # of bytes, by the first two of a TIFF
-TIFF = {42: _Tiff(4, "I", "H", 12), 43: _Tiff(8, "Q", "Q", 20)}  # by version: classic, and BigTIFF
 
 
 def read_image(path: Path | str) -> NDArray[Any]:
@@ -40,9 +27,9 @@ def read_image(path: Path | str) -> NDArray[Any]:
 
     stored = read_bytes(Path(path))
     check_image(path, stored)
-    if _has_more_pages(stored):
+    if has_more_pages(stored):
         raise InputError(f"{path}: holds several pages; expected one image, so save the page that is meant alone")
-    data = np.frombuffer(stored, np.uint8)
+    data = np.frombuffer(without_texts(stored), np.uint8)
     try:
         image = cv2.imdecode(data, cv2.IMREAD_UNCHANGED) if data.size else None
     except cv2.error:
@@ -57,23 +44,6 @@ def read_image(path: Path | str) -> NDArray[Any]:
         image = image[:, :, :3]  # an alpha channel carries no light
     colour: NDArray[Any] = image if image.ndim == 2 else np.ascontiguousarray(image[:, :, ::-1])
     return colour
-
-
-def _has_more_pages(data: bytes) -> bool:
-    """Say whether a TIFF names a page after the first one; False for any other file."""
-    if data[:2] not in ORDERS:
-        return False
-    order = ORDERS[data[:2]]
-    try:
-        layout = TIFF.get(struct.unpack_from(f"{order}H", data, 2)[0])
-        if layout is None:
-            return False
-        (page,) = struct.unpack_from(order + layout.offset, data, layout.first)
-        (tags,) = struct.unpack_from(order + layout.number, data, page)
-        after = page + struct.calcsize(layout.number) + layout.tag_bytes * tags
-        return bool(struct.unpack_from(order + layout.offset, data, after)[0])
-    except struct.error:  # the places are outside the file; the decoder says so
-        return False
 
 
 def full_scale(image: NDArray[Any]) -> np.float32:

@@ -19,6 +19,7 @@ __all__ = ["TOML_BYTES", "json_of", "toml_of"]
 
 DEPTH = 64  # lists and tables inside one another; a calibration has 7
 KEYS = 100_000  # of all tables of a text; a calibration has some 1000
+VALUES = 1_000_000  # between commas; a calibration has some 10,000
 TOML_BYTES = 1 << 18  # a system file has some kB; the time to read TOML grows with the square of a key of many parts
 KEY_PARTS = 16  # of a dotted key; a system file has 4
 DOT = re.compile(r"""(?<=[\w"'-])[ \t]*\.[ \t]*(?=[\w"'-])""")  # between the parts of a key
@@ -30,8 +31,11 @@ def json_of(text: bytes | str, source: str) -> Any:
     """Give the value of a JSON text; raise `ConfigError` that names `source` when it is not valid.
 
     A key that a table holds twice is an error, because programs differ in which of the two they take. So are lists and
-    tables that are nested more than 64 deep, and more than 100,000 keys.
+    tables that are nested more than 64 deep, more than 100,000 keys or lists, and more than 1,000,000 values.
     """
+    commas, brackets = (text.count(b) for b in (b",", b"[")) if isinstance(text, bytes) else map(text.count, ",[")
+    if commas > VALUES or brackets > KEYS:
+        raise ConfigError(f"{source}: expected at most {VALUES:,} values and {KEYS:,} lists, got more")
     keys = 0
 
     def table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -45,8 +45,10 @@ def crcs_of_shots(
 ) -> NDArray[np.uint32]:
     """Return the CRC-32 of many shots from the first on, (N,), as `crc_of_shot` does for one."""
     columns = (np.arange(len(ids), dtype="<u8"), ids.astype("<u8"), times_us.astype("<i8"), chip_stamps.astype("<i8"))
+    if not len(ids):
+        return np.zeros(0, np.uint32)
     bytes_of = [np.ascontiguousarray(c).view(np.uint8).reshape(len(ids), -1) for c in (*columns, crcs.astype("<u4"))]
-    rows = np.hstack(bytes_of) if len(ids) else np.empty((0, 0), np.uint8)
+    rows = np.hstack(bytes_of)
     begin = zlib.crc32(header_sha256.encode())
     return np.array([zlib.crc32(row, begin) for row in rows], np.uint32)
 

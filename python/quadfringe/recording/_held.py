@@ -21,6 +21,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.files import believable_bytes
 from quadfringe.io.locks import ForkedLock
 
 __all__ = ["FileId", "HeldFile"]
@@ -54,6 +55,11 @@ class HeldFile:
     def size(self) -> int:
         """Number of bytes that the file has now."""
         return os.fstat(self._descriptor).st_size
+
+    @property
+    def tables_most(self) -> int:
+        """Number of bytes that tables and texts may have; pixels may be holes, as copies of black images are."""
+        return believable_bytes(os.fstat(self._descriptor))
 
     @property
     def shortened(self) -> bool:

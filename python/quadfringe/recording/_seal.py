@@ -10,6 +10,7 @@ pixels, so that HDF5 reads it without surprises.
 from __future__ import annotations
 
 import hashlib
+import os
 import struct
 import zlib
 from collections.abc import Sequence
@@ -20,6 +21,8 @@ from typing import Any, BinaryIO
 import h5py
 import numpy as np
 from numpy.typing import NDArray
+
+from quadfringe.files import believable_bytes
 
 __all__ = ["Seal", "pixel_extents", "read_seal", "write_seal"]
 
@@ -67,7 +70,10 @@ def write_seal(path: Path, extents: NDArray[np.uint64], shots: int) -> None:
 
 
 def read_seal(path: Path) -> Seal | None:
-    """Return the seal of a file and check it; None when the file has none that is readable."""
+    """Return the seal of a file and check it; None when the file has none that is readable.
+
+    It does not hold when more bytes would have to be hashed than the file can have in tables: those of holes.
+    """
     size = path.stat().st_size
     with path.open("rb") as file:
         if size < FOOTER.size:
@@ -75,14 +81,16 @@ def read_seal(path: Path) -> Seal | None:
         file.seek(size - FOOTER.size)
         footer = file.read(FOOTER.size)
         magic, end, shots, count, digest, crc = FOOTER.unpack(footer)
-        if magic != MAGIC or end + 16 * count + FOOTER.size != size:
+        most = believable_bytes(os.fstat(file.fileno()))
+        if magic != MAGIC or end + 16 * count + FOOTER.size != size or 16 * count > most:
             return None
         file.seek(end)
         table = file.read(16 * count)
         if zlib.crc32(footer[: -struct.calcsize("<I")], zlib.crc32(table)) != crc:
             return None
         extents = np.frombuffer(table, "<u8").reshape(count, 2)
-        return Seal(shots, _digest(file, end, extents, table) == digest)
+        hashed = end - int(extents[:, 1].sum(dtype=float))
+        return Seal(shots, hashed <= most and _digest(file, end, extents, table) == digest)
 
 
 def _digest(file: BinaryIO, end: int, extents: NDArray[np.uint64], table: bytes) -> bytes:

@@ -22,10 +22,11 @@ __all__ = ["FileSize", "Table", "read_table"]
 
 @dataclass(frozen=True)
 class FileSize:
-    """The number of bytes that a file has, and that it states at its beginning."""
+    """The number of bytes that a file has, that it states at its beginning, and that its tables may have."""
 
     found: int
     stated: int
+    tables_most: int
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ def read_table(source: Source, stored: Stored, header: StoredHeader, size: FileS
     length = max(*lengths, seal.shots if seal else 0) if seal or stored.closed else min(lengths)
     row_bytes = sum(np.dtype(stored.dtypes[n]).itemsize * math.prod(stored.shapes[n][1:]) for n in names)
     # Of a file that was cut short, the images may be missing, but not the table.
-    most = min(size.found // row_bytes, max(size.found, size.stated) // header.header.shot_bytes + 1)
+    most = min(size.tables_most // row_bytes, max(size.found, size.stated) // header.header.shot_bytes + 1)
     if length > most:
         raise InputError(f"claims {length} shots, but its size is that of {most}; copy it again")
     rows = min(length, *(stored.shapes[name][0] for name in names))

@@ -80,7 +80,7 @@ class Recording:
                     f"{self._header.changed_texts[0]} was changed; quadfringe recover copies the shots without it"
                 )
             self._closed = bool(stored.closed) or seal is not None
-            size = FileSize(file.size, stated_bytes(self.path))
+            size = FileSize(file.size, stated_bytes(self.path), file.tables_most)
             self._table = read_table(self._source, stored, self._header, size, seal)
             if not self._closed and len(self) and isinstance(self._found(-1), str):
                 self._table = self._table.without_last  # its writer did not finish it
@@ -100,7 +100,9 @@ class Recording:
             raise InputError(f"{self.path}: {what}: {error}; {AGAIN}") from error
         except UnreadableError as error:
             self._source.close()
-            raise RecordingError(f"{self.path}: cannot be read: {error}; {TRY}") from error
+            missing = missing_bytes(self.path) if self.path.exists() else 0
+            what = f"{missing} bytes are missing, and it cannot be read" if missing else "cannot be read"
+            raise RecordingError(f"{self.path}: {what}: {error}; {AGAIN if missing else TRY}") from error
         except InputError as error:
             self._source.close()
             raise type(error)(f"{self.path}: {error}") from error

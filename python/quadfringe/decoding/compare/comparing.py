@@ -131,6 +131,10 @@ def _doubts(pair: Pair) -> tuple[str, ...]:
         found.append("the calibrations of A and B differ, so that a difference may come from them")
     if (a.xyz_mm is None) != (b.xyz_mm is None):
         found.append(f"{'A' if a.xyz_mm is None else 'B'} holds phase only, so that phases are compared and no depths")
+    if a.xyz_mm is not None and b.xyz_mm is not None:
+        both = np.isfinite(a.xyz_mm[..., 2]) & np.isfinite(b.xyz_mm[..., 2])
+        if not both.any():
+            found.append("no pixel has a point in both, so that no depths are compared")
     other_px = fringe_period_px_of(b)
     if np.isfinite(other_px) and abs(other_px / pair.period_px - 1) > params.PERIOD_OFF:
         found.append(

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.decoding.compare import params
+from quadfringe.decoding.compare.mesh_files import triangles_in
 from quadfringe.errors import InputError, require
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ Points = NDArray[np.float64]
 CHUNK = 20_000  # points at a time: bounds the memory
 OCTAVES = 6  # groups of triangles by size; the last one holds all smaller ones
 FAR_SIZES = 10  # distance in sizes of a triangle from which a point is far
+FARTHEST_MM = 1e6  # the largest coordinate of a mesh
 CANDIDATES = 6  # triangles of a group at first
 
 
@@ -135,18 +137,16 @@ def _divided(triangles: Points) -> Points:
 
 def surface_from(mesh: Trimesh | Path | str) -> Surface:
     """Read a mesh, in mm, from a file or take one of trimesh; raises `InputError` unless it has triangles."""
-    trimesh = require("trimesh", "export")
+    require("trimesh", "export")
     name = str(mesh) if isinstance(mesh, (str, Path)) else "mesh"
     if isinstance(mesh, (str, Path)):
-        if not Path(mesh).is_file():
-            raise InputError(f"{name}: no such file; expected a mesh such as .stl, .ply, .obj or .glb")
-        try:
-            mesh = trimesh.load_mesh(mesh)
-        except (ValueError, TypeError, KeyError, IndexError, AttributeError, EOFError, UnicodeDecodeError) as error:
-            raise InputError(f"{name}: cannot be read as a mesh: {error}") from error
-    triangles = np.asarray(getattr(mesh, "triangles", np.empty((0, 3, 3))), np.float64)
+        triangles = triangles_in(Path(mesh))
+    else:
+        triangles = np.asarray(getattr(mesh, "triangles", np.empty((0, 3, 3))), np.float64)
     if triangles.ndim != 3 or not len(triangles) or not np.isfinite(triangles).all():
         raise InputError(f"{name}: expected a mesh with triangles, in mm; a cloud of points has none")
+    if (farthest := np.abs(triangles).max()) > FARTHEST_MM:
+        raise InputError(f"{name}: expected a mesh in mm within a kilometre, got a coordinate of {farthest:.3g} mm")
     return Surface(triangles)
 
 
