@@ -50,7 +50,7 @@ class Unwrapping(StrEnum):
 
 ResultOption = Annotated[
     Path,
-    typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply .pcd .stl .obj .glb .tif."),
+    typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply .pcd .stl .obj .glb .e57 .tif."),
 ]
 SourcesArgument = Annotated[
     list[str] | None,

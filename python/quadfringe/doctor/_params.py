@@ -56,8 +56,8 @@ SCALE_SDS, FORM_SDS, BOW_SDS = 4.0, 2.0, 3.0
 # Scatter of the points over the stated one. Sound: 0.6 to 0.9; gamma 1.3 to 2 that nobody corrects: 1.9 to 2.5; a
 # distortion of 0.1: up to 1.4, so that a smaller limit would blame the decoding for it.
 SCATTER_RATIO = (1.5, 2.5)
-# Amplitude of the waves that follow the fringes, rad. Sound: 0.003, on a print; gamma 1.3: 0.045 and more. Smaller limits
-# name the edges of a print.
+# Amplitude of the waves that follow the fringes, rad. Sound: 0.003, on a print; gamma 1.3: 0.045 and more. Smaller
+# limits name the edges of a print.
 WAVE_RAD = (0.012, 0.025)
 # Share of the pixels of the plate with a wrong order. Sound: up to 0.001, on a print with 3 % noise. Smaller limits
 # name single pixels at its edges.
