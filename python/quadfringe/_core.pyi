@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "REASONS",
     "THREADS_MAX",
     "Bench",
     "Cast",
@@ -64,6 +65,7 @@ __all__ = [
 
 __profile__: Final[str]
 THREADS_MAX: Final[int]
+REASONS: Final[list[str]]
 __version__: Final[str]
 
 _Vector2 = tuple[float, float]

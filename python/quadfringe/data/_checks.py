@@ -53,16 +53,18 @@ def check_maps(maps: Mapping[str, Any]) -> None:
 
 def check_types(maps: Mapping[str, NDArray[Any]], path: Path) -> None:
     """Raise `InputError` unless the maps of a file are floating, and the reasons uint8 with a meaning."""
-    other = [f"{name} of {values.dtype}" for name, values in maps.items() if not _is_typed(name, values)]
-    if other:
-        raise InputError(f"{path}: expected maps of float32, and reason of uint8, got {', '.join(other)}")
     reason = maps.get("reason")
-    if reason is not None and reason.max(initial=0) >= len(Reason):
+    other = [
+        f"{name} of {values.dtype}" for name, values in maps.items() if name != "reason" and values.dtype.kind != "f"
+    ]
+    if other:
+        raise InputError(f"{path}: expected maps of float32, got {', '.join(other)}")
+    if reason is None:
+        return
+    if reason.dtype != np.uint8:
+        raise InputError(f"{path}, reason: expected uint8, got {reason.dtype}")
+    if reason.max(initial=0) >= len(Reason):
         raise InputError(f"{path}, reason: expected 0 to {len(Reason) - 1}, got {int(reason.max())}")
-
-
-def _is_typed(name: str, values: NDArray[Any]) -> bool:
-    return values.dtype == np.uint8 if name == "reason" else values.dtype.kind == "f"
 
 
 def check_stamp(number: Any, time_us: Any, device: Any) -> None:

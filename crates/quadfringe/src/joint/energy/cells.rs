@@ -1,9 +1,10 @@
 //! The cells of a shot: means of a few pixels, which the tiles read, and the way back to the pixels.
 
 use super::tile::Tile;
+use crate::Reason;
 use crate::joint::cells::{blend, spread};
 use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, SPREAD_MAX_RAD, USABLE_MIN};
-use crate::joint::scene::{PhaseMap, Scene};
+use crate::joint::scene::{PhaseMap, Pixels, Scene};
 use crate::parallel::lanes::LANES;
 use rayon::prelude::*;
 
@@ -151,17 +152,20 @@ impl Cells {
     }
 
     /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], modulation: &mut [f32]) {
+    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
         let stride = scene.grid.stride;
-        let pixels = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride)).enumerate();
-        pixels.for_each_init(Rows::default, |rows, (y, (phase, modulation))| {
+        let Pixels { phase, modulation, excluded } = pixels;
+        let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
+        let rows = planes.zip(excluded.par_chunks_mut(stride)).enumerate();
+        rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
             self.interpolate(&self.phase, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);
-            for ((phase, modulation), (sum, weight)) in phase.iter_mut().zip(modulation).zip(found) {
+            let pixels = phase.iter_mut().zip(modulation).zip(reasons);
+            for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
                 let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
                 *phase += correction;
-                if correction.abs() > MOVED_MAX_RAD {
-                    *modulation = 0.0;
+                if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
+                    (*modulation, *reason) = (0.0, Reason::Misfit);
                 }
             }
         });
