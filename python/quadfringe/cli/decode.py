@@ -168,14 +168,26 @@ def decode(
     _check_given(out, report, calibration, depth_range_mm)
     words = step_words(sources, numbers, steps, order, beam, bits)
     images = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
-    settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
+    settings = _settings(method, unwrapping, depth_range_mm, period_px, channel_instants_us)
     code = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm, "bayer": bayer}
     if words.given:
         shape = from_steps(words, projector_width, calibration, _response(response, linear), code | images | settings)
         return _save(shape, _Results(out, report), json)
     plan = _plan(projector_width, code, calibration, _response(response, linear), settings)
     return _save(_decoded(_shot(words.files, images, bayer, bits), plan), _Results(out, report), json)
+
+
+def _settings(
+    method: str | None,
+    unwrapping: Unwrapping | None,
+    depth_range_mm: tuple[float, float] | None,
+    period_px: float | None,
+    channel_instants_us: tuple[float, float, float, float] | None,
+) -> dict[str, Any]:
+    """Give the options of the method by the names of the settings."""
+    given: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
+    given |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
+    return given
 
 
 def _plan(

@@ -82,7 +82,11 @@ def _share(name: str, percent: float, colour: str | None = None) -> str:
     if colour is not None:
         box = f'<svg class="box" viewBox="0 0 10 10" aria-hidden="true"><rect width="10" height="10" fill="{colour}"/>'
         box += "</svg>"
-    return f'<tr><td>{box}{escaped(name)}</td><td class="number">{percent:.2f} %</td></tr>'
+    return f'<tr><td>{box}{escaped(name)}</td><td class="number">{_percent(percent)} %</td></tr>'
+
+
+def _percent(share: float) -> str:
+    return "&lt; 0.01" if 0 < share < 0.005 else f"{share:.2f}"
 
 
 def about(shape: Shape) -> str:
@@ -121,8 +125,17 @@ def _rows(facts: Mapping[str, object]) -> list[str]:
 
 
 def _short(value: Any) -> str:
-    text = value if isinstance(value, str) else json.dumps(value, ensure_ascii=False, default=str)
+    text = _told(value)
     return text if len(text) <= LETTERS_MAX else text[:LETTERS_MAX] + " ..."
+
+
+def _told(value: Any) -> str:
+    """Write settings as a person would: no brackets, nothing that is absent."""
+    if isinstance(value, Mapping):
+        return "; ".join(f"{name} {_told(inner)}" for name, inner in value.items() if inner is not None)
+    if isinstance(value, (list, tuple)):
+        return ", ".join(_told(inner) for inner in value)
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def _table(title: str, rows: Iterable[str]) -> str:
