@@ -109,10 +109,11 @@ class Shape:
 
         White is the brightest hundredth. Pixels without albedo are grey by their modulation, without data black.
         """
-        shades = grey(self.modulation)
         if self.albedo is None:
-            return shades
-        return np.where(np.isfinite(self.albedo[:, :, :1]), srgb(self.albedo), shades)
+            return grey(self.modulation)
+        picture, dark = srgb(self.albedo), np.isnan(self.albedo[:, :, 0])
+        picture[dark] = grey(self.modulation)[dark]
+        return picture
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -61,7 +61,16 @@ pub(in crate::joint) struct FringeRows {
     pub cells: [[Vec<f32>; 4]; 3],
     /// Pixels along a side of a cell.
     pub cell_px: usize,
+    /// Row of cells in the middle of `cells`; `None` before the first row of a shot.
+    middle: Option<usize>,
     rows: Rows,
+}
+
+impl FringeRows {
+    /// Forgets the rows of an earlier shot.
+    pub fn clear(&mut self) {
+        self.middle = None;
+    }
 }
 
 /// Working rows.
@@ -182,14 +191,16 @@ impl Cells {
 
     /// Albedo and contrast along row `y` of the scene.
     pub fn fringes(&self, scene: &Scene<'_>, y: usize, out: &mut FringeRows) {
-        let FringeRows { albedo, contrast, cells, cell_px, rows } = out;
+        let FringeRows { albedo, contrast, cells, cell_px, middle, rows } = out;
         *cell_px = self.factor;
-        let middle = (y / self.factor).min(self.height - 1);
-        let around = [middle.saturating_sub(1), middle, (middle + 1).min(self.height - 1)];
-        for (row, out) in around.into_iter().zip(cells) {
-            for (map, out) in self.light.iter().zip(out) {
-                let row = &map[row * self.stride..][..self.stride];
-                repeat(row, self.factor, scene.grid.stride, out);
+        let here = (y / self.factor).min(self.height - 1);
+        if middle.replace(here) != Some(here) {
+            let around = [here.saturating_sub(1), here, (here + 1).min(self.height - 1)];
+            for (row, out) in around.into_iter().zip(cells) {
+                for (map, out) in self.light.iter().zip(out) {
+                    let row = &map[row * self.stride..][..self.stride];
+                    repeat(row, self.factor, scene.grid.stride, out);
+                }
             }
         }
         self.between(&self.inside, scene, y, &mut rows.mix, &mut rows.weight);
