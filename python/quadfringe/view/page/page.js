@@ -95,7 +95,7 @@
   const FIELD = 0.6; // rad
   let eye;
   const home = () => {
-    eye = { yaw: 0.35, pitch: 0.25, far: 0.8 * facts.radius / Math.sin(FIELD / 2), about: [...facts.centre] };
+    eye = { yaw: 0.35, pitch: 0.25, far: 0.92 * facts.radius / Math.sin(FIELD / 2), about: [...facts.centre] };
   };
   const axes = () => {
     const [cy, sy, cp, sp] = [Math.cos(eye.yaw), Math.sin(eye.yaw), Math.cos(eye.pitch), Math.sin(eye.pitch)];
