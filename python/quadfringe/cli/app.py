@@ -24,6 +24,7 @@ from quadfringe.cli import (
     pattern,
     projector,
     record,
+    report,
     reproduce,
     simulate,
     target,
@@ -97,6 +98,7 @@ app.command("live")(live.live)
 app.command("record")(record.record)
 app.command("recover")(record.recover)
 app.command("batch")(batch.batch)
+app.command("report")(report.report)
 app.command("compare")(compare.compare)
 app.command("accept")(accept.accept)
 app.command("doctor")(doctor.doctor)

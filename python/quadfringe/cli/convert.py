@@ -18,7 +18,7 @@ def convert(
         Path,
         typer.Argument(
             metavar="OUT",
-            help="Result by suffix: .glb, .stl or .obj mesh, .ply or .pcd points, .tif depth, .npz copy.",
+            help="Result by suffix: .glb, .stl or .obj mesh, .ply, .pcd or .e57 points, .tif depth, .npz copy.",
         ),
     ],
     faces: Annotated[bool, typer.Option("--faces", help="Write a mesh to a .ply in place of points.")] = False,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -49,7 +50,7 @@ class Unwrapping(StrEnum):
 
 ResultOption = Annotated[
     Path,
-    typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply .pcd .stl .obj .glb .tif."),
+    typer.Option(metavar="FILE", help="Result: .npz, or with --calibration also .ply .pcd .stl .obj .glb .e57 .tif."),
 ]
 SourcesArgument = Annotated[
     list[str] | None,
@@ -128,6 +129,11 @@ InstantsOption = Annotated[
     ),
 ]
 
+ReportOption = Annotated[
+    Path | None,
+    typer.Option(metavar="FILE", help="Write the page of `quadfringe report`, .html, as well; needs the extra plot."),
+]
+
 
 def decode(
     projector_width: ColumnsOption,
@@ -155,20 +161,33 @@ def decode(
     bits: BitsOption = None,
     period_px: PeriodOption = None,
     channel_instants_us: InstantsOption = None,
+    report: ReportOption = None,
     json: JsonOption = None,
 ) -> None:
     """Decode the images of one shot, or of --steps, to absolute phase, and with --calibration to millimetres."""
-    _check_given(out, calibration, depth_range_mm)
+    _check_given(out, report, calibration, depth_range_mm)
     words = step_words(sources, numbers, steps, order, beam, bits)
     images = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
-    settings: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
-    settings |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
+    settings = _settings(method, unwrapping, depth_range_mm, period_px, channel_instants_us)
     code = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm, "bayer": bayer}
     if words.given:
         shape = from_steps(words, projector_width, calibration, _response(response, linear), code | images | settings)
-        return _save(shape, out, json)
+        return _save(shape, _Results(out, report), json)
     plan = _plan(projector_width, code, calibration, _response(response, linear), settings)
-    return _save(_decoded(_shot(words.files, images, bayer, bits), plan), out, json)
+    return _save(_decoded(_shot(words.files, images, bayer, bits), plan), _Results(out, report), json)
+
+
+def _settings(
+    method: str | None,
+    unwrapping: Unwrapping | None,
+    depth_range_mm: tuple[float, float] | None,
+    period_px: float | None,
+    channel_instants_us: tuple[float, float, float, float] | None,
+) -> dict[str, Any]:
+    """Give the options of the method by the names of the settings."""
+    given: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
+    given |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
+    return given
 
 
 def _plan(
@@ -199,12 +218,23 @@ def _decoded(shot: AnyShot, plan: Plan) -> Shape:
         return decoding.decode(shot, plan)
 
 
-def _check_given(out: Path, calibration: Path | None, depths: tuple[float, float] | None) -> None:
-    """Refuse a result file that could not be written, and depths without a calibration, before anything is decoded."""
+@dataclass(frozen=True)
+class _Results:
+    """The files to write: the shape, and its page if there is to be one."""
+
+    shape: Path
+    page: Path | None
+
+
+def _check_given(out: Path, report: Path | None, calibration: Path | None, depths: tuple[float, float] | None) -> None:
+    """Refuse result files that could not be written, and depths without a calibration, before anything is decoded."""
     from quadfringe.data.shape import SUFFIXES
-    from quadfringe.errors import InputError
+    from quadfringe.errors import InputError, require
     from quadfringe.files import require_suffix
 
+    if report is not None:
+        require_suffix(report, (".html", ".htm"))
+        require("matplotlib", "plot")
     if require_suffix(out, SUFFIXES) != ".npz" and calibration is None:
         raise InputError(f"{out}: millimetres need --calibration FILE; without a calibration, write .npz")
     if depths is not None and calibration is None:
@@ -235,9 +265,14 @@ def _shot(folders: list[Path], files: Mapping[str, Path | None], bayer: Bayer | 
     return read_shot(files if folder is None else folder, None if bits is None else int(bits), bayer=pattern)
 
 
-def _save(shape: Shape, out: Path, json: Path | None) -> None:
-    """Save the shape, print a summary and its warnings, and write its figures."""
+def _save(shape: Shape, results: _Results, json: Path | None) -> None:
+    """Save the shape and its page, print a summary and its warnings, and write its figures."""
+    out = results.shape
     shape.save(out)
+    if results.page is not None:
+        from quadfringe.view.page import write_page
+
+        write_page(results.page, shape, out.name)
     for text in shape.warnings:
         caution(text)
     figures = shape.figures()

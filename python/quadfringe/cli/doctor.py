@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -14,6 +15,7 @@ from quadfringe.cli._output import say, write_record
 
 if TYPE_CHECKING:
     from quadfringe.data import AnyShot
+    from quadfringe.decoding import Plan
     from quadfringe.doctor import Finding
 
 __all__ = ["doctor"]
@@ -25,7 +27,7 @@ PathsArgument = Annotated[
     typer.Argument(
         metavar="[PATH]...",
         help="A folder with a shot (red, green, blue and ir, or raw and ir, .png), a calibration .json, or both; "
-        "without a path, the installation is examined.",
+        "with --board or --plane several folders and a calibration; without a path, the installation is examined.",
     ),
 ]
 FringesOption = Annotated[
@@ -35,6 +37,18 @@ FringesOption = Annotated[
 BayerOption = Annotated[
     Bayer | None, typer.Option(help="Filter colours of the first 2 x 2 pixels of raw.png; needed for a raw mosaic.")
 ]
+BoardOption = Annotated[
+    bool, typer.Option("--board", help="The shots show a calibration board: compare its decoded points with it.")
+]
+TargetOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--target", metavar="FILE", help="Board of --board, .json of quadfringe target; default: the ring board."
+    ),
+]
+PlaneOption = Annotated[
+    bool, typer.Option("--plane", help="The shots show a flat plate that fills most of the image: measure its bow.")
+]
 
 
 def doctor(
@@ -43,45 +57,83 @@ def doctor(
     projector_width: ColumnsOption = 912,
     bayer: BayerOption = None,
     bits: BitsOption = None,
+    board: BoardOption = False,
+    target: TargetOption = None,
+    plane: PlaneOption = False,
     json: JsonOption = None,
 ) -> None:
     """Examine the installation, or a shot or a calibration; say what is wrong and how to fix it.
 
-    The exit status is 1 when a fault is found.
+    With --board or --plane, tell a fault of the calibration from one of the decoding. The exit status is 1 when a fault
+    is found.
     """
     from quadfringe.config import Fringes, checked
     from quadfringe.data import Calibration
     from quadfringe.decoding import Plan
-    from quadfringe.doctor import examine_calibration, examine_digest, examine_installation, examine_shot
+    from quadfringe.doctor import examine_calibration, examine_digest, examine_installation
 
-    given = _sorted_paths(files or [])
+    surface = _surface(board, target, plane)
+    given = _sorted_paths(files or [], several=surface is not None)
     calibration = None if given.calibration is None else Calibration.load(given.calibration)
     found: list[Finding] = [] if files else examine_installation()
     if calibration is not None and given.calibration is not None:
         found += [examine_digest(given.calibration), *examine_calibration(calibration)]
-    if given.shot is not None:
-        plan = Plan(projector_width, checked(Fringes, {"numbers": fringes}, "--fringes"), calibration)
-        found += examine_shot(_shot_in(given.shot, bayer, bits), plan)
+    plan = Plan(projector_width, checked(Fringes, {"numbers": fringes}, "--fringes"), calibration)
+    for folder in given.shots:
+        one = _examined(_shot_in(folder, bayer, bits), plan, surface)
+        found += [replace(each, name=f"{folder.name} {each.name}") for each in one] if len(given.shots) > 1 else one
     _report(found, json)
 
 
-class _Paths(NamedTuple):
-    """The folder of a shot and the file of a calibration, where given."""
+Examined = Callable[["AnyShot", "Plan"], "list[Finding]"]
 
-    shot: Path | None
+
+def _surface(board: bool, target: Path | None, plane: bool) -> Examined | None:
+    """Give the check of what the shots show, where it is known; raise `InputError` for options that contradict."""
+    from quadfringe.calibration.targets import Target
+    from quadfringe.config import checked
+    from quadfringe.data.calibration import stored_values
+    from quadfringe.doctor import examine_board, examine_plane
+    from quadfringe.errors import InputError
+
+    if board and plane:
+        raise InputError("--board checks that the board is flat, too; leave out --plane")
+    if target is not None and not board:
+        raise InputError("--target describes the board of --board; add --board")
+    if plane:
+        return examine_plane
+    if not board:
+        return None
+    shown = None if target is None else checked(Target, stored_values(target), str(target))
+    return lambda shot, plan: examine_board(shot, plan, shown)
+
+
+def _examined(shot: AnyShot, plan: Plan, surface: Examined | None) -> list[Finding]:
+    """Examine a shot, and what it shows; the verdict on calibration and decoding comes first."""
+    from quadfringe.doctor import examine_shot
+
+    return ([] if surface is None else surface(shot, plan)) + examine_shot(shot, plan)
+
+
+class _Paths(NamedTuple):
+    """The folders of shots and the file of a calibration, where given."""
+
+    shots: list[Path]
     calibration: Path | None
 
 
-def _sorted_paths(paths: Sequence[Path]) -> _Paths:
-    """Tell the shot from the calibration; raise `InputError` for anything else, and for two of a kind."""
+def _sorted_paths(paths: Sequence[Path], *, several: bool) -> _Paths:
+    """Tell shots from the calibration; raise `InputError` for anything else, and for two unless `several` may be."""
     from quadfringe.errors import InputError
 
     folders = [path for path in paths if path.is_dir()]
     calibrations = [path for path in paths if path.suffix.lower() == ".json"]
-    if len(folders) > 1 or len(calibrations) > 1 or len(folders) + len(calibrations) < len(paths):
-        wrong = ", ".join(str(path) for path in paths)
+    wrong = ", ".join(str(path) for path in paths)
+    if several and not (folders and len(calibrations) == 1 and len(folders) + 1 == len(paths)):
+        raise InputError(f"--board and --plane: expected folders with shots and one calibration .json, got {wrong}")
+    if len(calibrations) > 1 or len(folders) + len(calibrations) < len(paths) or (len(folders) > 1 and not several):
         raise InputError(f"expected one folder with a shot, one calibration .json, or both, got {wrong}")
-    return _Paths(folders[0] if folders else None, calibrations[0] if calibrations else None)
+    return _Paths(folders, calibrations[0] if calibrations else None)
 
 
 def _shot_in(folder: Path, bayer: Bayer | None, bits: Bits | None) -> AnyShot:

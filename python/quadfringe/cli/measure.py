@@ -17,7 +17,9 @@ __all__ = ["measure"]
 def measure(
     out: Annotated[
         list[Path],
-        typer.Option(metavar="FILE", help="Result file: .npz, .ply, .pcd, .stl, .obj, .glb or .tif; may be repeated."),
+        typer.Option(
+            metavar="FILE", help="Result file: .npz, .ply, .pcd, .stl, .obj, .glb, .e57 or .tif; may be repeated."
+        ),
     ],
     system: SystemFile = None,
     reference: Annotated[

@@ -30,7 +30,7 @@ __all__ = ["SUFFIXES", "Shape", "xyz_mm_of"]
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "modulation", "quality")
 MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm", "albedo", "reason")
-SUFFIXES = (".npz", ".ply", ".pcd", ".stl", ".obj", ".glb", ".tif", ".tiff")
+SUFFIXES = (".npz", ".ply", ".pcd", ".stl", ".obj", ".glb", ".e57", ".tif", ".tiff")
 
 
 @dataclass(frozen=True, repr=False)
@@ -201,9 +201,10 @@ class Shape:
         .npz: every map, config and calibration, the only file that `load` reads. .ply and .pcd: points with
         normals, colour, `quality`, `uncertainty_mm` and `wrong_order_probability`; PLY holds the valid points
         with their row and column, PCD one point for each pixel. .stl, .obj, .glb, and with `faces` .ply: the mesh,
-        for which `step` and `fill_holes_px` are those of `mesh`; see `Mesh.save`. .tif: depth in mm. Raises
+        for which `step` and `fill_holes_px` are those of `mesh`; see `Mesh.save`. .e57: valid points in metres with
+        colour, row and column. .tif: depth in mm. Raises
         `InputError` for another suffix, a folder that does not exist, a choice that the kind of file does not have,
-        and without a calibration for all but .npz; `MissingExtraError` without trimesh or tifffile.
+        and without a calibration for all but .npz; `MissingExtraError` without trimesh, pye57 or tifffile.
         """
         from quadfringe.data import shape_files
         from quadfringe.io import export

@@ -12,6 +12,7 @@ from quadfringe.data.mesh import SCALARS, normals_of
 from quadfringe.data.points import xyz_mm_of
 from quadfringe.errors import InputError
 from quadfringe.io import export
+from quadfringe.io.e57 import write_e57
 from quadfringe.io.pcd import write_pcd
 
 if TYPE_CHECKING:
@@ -34,13 +35,15 @@ def check_choices(path: Path, suffix: str, *, faces: bool, step: int, fill_holes
 
 
 def write_pixels(shape: Shape, path: Path, suffix: str) -> None:
-    """Write the points as .ply or .pcd, or the depth as TIFF."""
+    """Write the points as .ply, .pcd or .e57, or the depth as TIFF."""
     if suffix == ".ply":
         points_mm = xyz_mm_of(shape)
         valid = np.asarray(np.isfinite(points_mm).all(axis=2))
         export.write_ply(path, points_mm[valid], shape.colour[valid], _of_points(shape, valid))
     elif suffix == ".pcd":
         write_pcd(path, _organised(shape))
+    elif suffix == ".e57":
+        write_e57(path, xyz_mm_of(shape), shape.colour, shape.modulation)
     else:
         export.write_depth(path, xyz_mm_of(shape)[:, :, 2])
 

@@ -3,6 +3,15 @@
 from quadfringe.doctor.calibration import examine_calibration, examine_digest
 from quadfringe.doctor.finding import Finding
 from quadfringe.doctor.installation import examine_installation
+from quadfringe.doctor.plate import examine_board, examine_plane
 from quadfringe.doctor.shot import examine_shot
 
-__all__ = ["Finding", "examine_calibration", "examine_digest", "examine_installation", "examine_shot"]
+__all__ = [
+    "Finding",
+    "examine_board",
+    "examine_calibration",
+    "examine_digest",
+    "examine_installation",
+    "examine_plane",
+    "examine_shot",
+]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from quadfringe.decoding.compare import ShapeComparison
 from quadfringe.errors import require
 from quadfringe.files import atomic
 
-__all__ = ["Graph", "Panel", "draw_panels", "write_report"]
+__all__ = ["Graph", "Panel", "draw_panels", "drawn", "write_report"]
 
 NO_DATA = "#d8d8d8"
 
@@ -98,11 +99,8 @@ def _limits(image: NDArray[Any]) -> tuple[float, float]:
 
 def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]]) -> None:
     """Write rows of panels and graphs to one PNG; needs matplotlib (extra `plot`)."""
-    require("matplotlib", "plot")
-    from matplotlib.figure import Figure
-
     columns = max(len(row) for row in rows)
-    figure = Figure(figsize=(4.2 * columns, 3.4 * len(rows)), layout="constrained")
+    figure = _figure((4.2 * columns, 3.4 * len(rows)))
     figure.suptitle(title, fontsize=14)
     grid = figure.add_gridspec(len(rows), columns)
     for i, row in enumerate(rows):
@@ -110,6 +108,22 @@ def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]])
             panel.draw(figure, figure.add_subplot(grid[i, j]))
     with atomic(path) as temporary:
         figure.savefig(temporary, format="png")
+
+
+def drawn(panel: Panel | Graph, inches: tuple[float, float], dpi: int) -> bytes:
+    """Give one panel or graph as the bytes of a PNG of this width and height; needs matplotlib (extra `plot`)."""
+    figure = _figure(inches)
+    panel.draw(figure, figure.add_subplot())
+    stream = BytesIO()
+    figure.savefig(stream, format="png", dpi=dpi)
+    return stream.getvalue()
+
+
+def _figure(inches: tuple[float, float]) -> Any:
+    require("matplotlib", "plot")
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=inches, layout="constrained")
 
 
 def fringe_panels(shot: AnyShot) -> list[Panel]:
