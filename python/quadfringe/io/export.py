@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from quadfringe.errors import require
 from quadfringe.files import atomic
+from quadfringe.io.glb import encoded, glb_bytes
 
 __all__ = ["Triangles", "grey", "srgb", "write_depth", "write_mesh", "write_npz", "write_ply"]
 
@@ -31,9 +32,7 @@ def srgb(albedo: NDArray[np.float32]) -> NDArray[np.uint8]:
     light = np.nan_to_num(albedo[:, :, :3])
     brightest = light.max(axis=2)
     top = float(np.quantile(brightest[brightest > 0], 0.99)) if (brightest > 0).any() else 1.0
-    share = (light / max(top, 1e-9)).clip(0, 1)
-    coded = np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
-    return (coded * 255 + 0.5).astype(np.uint8)
+    return encoded(light / max(top, 1e-9))
 
 
 def write_ply(
@@ -79,16 +78,15 @@ class Triangles:
 def write_mesh(path: Path, mesh: Triangles) -> None:
     """Write a mesh by suffix: .stl, .obj, .ply, or .glb.
 
-    glTF wants metres and y up, and allows neither NaN nor whole numbers of 32 bit: a GLB is turned and has no scalars.
+    glTF wants metres and y up: a GLB is turned and has no scalars.
     """
     require("trimesh", "export")
-    from trimesh.exchange import gltf, obj, ply, stl
+    from trimesh.exchange import obj, ply, stl
 
     suffix = path.suffix.lower()
     if suffix == ".glb":
-        points, normals = mesh.vertices_mm * GLB_FROM_MM, mesh.normals * np.sign(GLB_FROM_MM)
-        turned = replace(mesh, vertices_mm=points, normals=normals, scalars={})
-        content = gltf.export_glb(turned.to_trimesh().scene(), include_normals=True)
+        points, normals = mesh.vertices_mm * GLB_FROM_MM, np.nan_to_num(mesh.normals * np.sign(GLB_FROM_MM))
+        content = glb_bytes(points, mesh.faces, mesh.colour, normals)
     elif suffix == ".obj":
         content = obj.export_obj(mesh.to_trimesh(), include_normals=True).encode()
     elif suffix == ".ply":

@@ -1,0 +1,82 @@
+"""Meshes as binary glTF 2.0, for other programs and for the page in the browser.
+
+glTF wants linear colours, and shows a mesh without a material as polished metal; so colours are decoded, and the
+material is matt.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["decoded", "encoded", "glb_bytes"]
+
+FLOAT, UNSIGNED_INT = 5126, 5125
+VERTICES, INDICES = 34962, 34963  # what a part of the binary chunk holds
+MATERIAL = {"pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}, "doubleSided": True}
+
+
+def decoded(colour: NDArray[np.uint8]) -> NDArray[np.float32]:
+    """Convert sRGB of 8 bit to linear light, 0 to 1 (IEC 61966-2-1)."""
+    coded = np.arange(256) / 255
+    linear = np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+    return linear.astype(np.float32)[colour]
+
+
+def encoded(light: NDArray[np.floating[Any]]) -> NDArray[np.uint8]:
+    """Convert linear light, 0 to 1, to sRGB of 8 bit (IEC 61966-2-1)."""
+    share = np.clip(light, 0, 1)
+    coded = np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
+    return (coded * 255 + 0.5).astype(np.uint8)
+
+
+def glb_bytes(
+    points: NDArray[np.float32],
+    faces: NDArray[np.uint32],
+    colour: NDArray[np.uint8],
+    normals: NDArray[np.float32] | None = None,
+) -> bytes:
+    """Give a GLB of points (M, 3), faces (F, 3), sRGB colour (M, 3), and normals (M, 3) unless the reader finds them.
+
+    >>> corners = np.eye(3, dtype=np.float32)
+    >>> glb_bytes(corners, np.array([[0, 1, 2]], np.uint32), np.full((3, 3), 255, np.uint8))[:4]
+    b'glTF'
+    """
+    places: dict[str, Any] = {"min": points.min(axis=0).tolist(), "max": points.max(axis=0).tolist()}
+    parts = {
+        "POSITION": (np.asarray(points, np.float32), {"componentType": FLOAT, "type": "VEC3", **places}),
+        # 8 bit are too coarse for dark linear colours, and some readers take 16 bit for 8.
+        "COLOR_0": (decoded(colour), {"componentType": FLOAT, "type": "VEC3"}),
+    }
+    if normals is not None:
+        parts["NORMAL"] = (np.asarray(normals, np.float32), {"componentType": FLOAT, "type": "VEC3"})
+    corners = np.asarray(faces, np.uint32).ravel()
+    parts["faces"] = (corners, {"componentType": UNSIGNED_INT, "type": "SCALAR"})
+    views, accessors, first = [], [], 0
+    for name, (values, kind) in parts.items():
+        target = INDICES if name == "faces" else VERTICES
+        views.append({"buffer": 0, "byteOffset": first, "byteLength": values.nbytes, "target": target})
+        accessors.append({"bufferView": len(accessors), "count": len(values), **kind})
+        first += values.nbytes
+    attributes = {name: place for place, name in enumerate(parts) if name != "faces"}
+    primitive = {"attributes": attributes, "indices": len(parts) - 1, "material": 0, "mode": 4}
+    tree = {
+        "asset": {"version": "2.0", "generator": "quadfringe"},
+        "scene": 0,
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [primitive]}],
+        "materials": [MATERIAL],
+        "buffers": [{"byteLength": first}],
+        "bufferViews": views,
+        "accessors": accessors,
+    }
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    text += b" " * (-len(text) % 4)
+    binary = b"".join(values.tobytes() for values, _ in parts.values())
+    chunks = struct.pack("<I4s", len(text), b"JSON") + text + struct.pack("<I4s", len(binary), b"BIN\0") + binary
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
