@@ -13,7 +13,7 @@ from PIL import Image
 
 __all__ = ["painted", "picture", "shape_on", "still_shape_on", "until"]
 
-PATIENCE_S = 120.0
+PATIENCE_S = 90.0
 
 
 def until(what: Callable[[], Any], why: str) -> Any:

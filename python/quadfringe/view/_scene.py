@@ -28,12 +28,14 @@ UP = (0.0, -1.0, 0.0)
 # From the upper left as in drawings, weaker from the right, and some from everywhere: relief shows, white stays white.
 LIGHTS = {"key": ((-0.7, -0.9, -0.8), 2.6), "fill": ((0.9, 0.1, -0.6), 0.6)}
 AMBIENT = 0.4
+POINT_SHARE = 0.7  # of the distance of neighbours: viser 1.1 draws points twice as large as it is told
 TINY = Body(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32), np.zeros((3, 3), np.uint8), 1e-3)
 MARK_COLOUR = (224, 49, 49)
 LINE_PX = 3.0
 MARK_SHARE = 0.012  # radius of a mark, of that of the body
 VIEW = np.array([-0.30, -0.22, -0.80])  # from the middle of a body to the eye: nearly where its camera stood
 VIEW_RADII = 1.7  # from the middle to the eye: the body fills most of the picture
+INNER = 0.7  # share of the points whose size is taken
 CLOSEST = 0.5  # of the distance to the camera of the scanner
 
 
@@ -128,7 +130,7 @@ class Scene:
             name,
             points=body.points_mm,
             colors=body.colour,
-            point_size=1.5 * M_PER_MM * body.size_mm,
+            point_size=POINT_SHARE * body.size_mm,  # the scale applies to it
             point_shape="square",
             point_shading="flat",
             precision="float32",
@@ -164,8 +166,9 @@ class Scene:
     def look_at(self, points_mm: NDArray[np.float32]) -> None:
         """Set the viewpoint of all pages: near the camera of the scanner, slightly from the side."""
         sample = points_mm[:: max(1, len(points_mm) // 5000)]
-        low, high = np.quantile(sample, (0.02, 0.98), axis=0)
-        middle, radius = M_PER_MM * (low + high) / 2, M_PER_MM * float(np.linalg.norm(high - low)) / 2
+        # Points of wrong orders lie far behind and before, so that a part of them is left out.
+        low, middle, high = M_PER_MM * np.quantile(sample, (0.5 - INNER / 2, 0.5, 0.5 + INNER / 2), axis=0)
+        radius = float(np.linalg.norm(high - low)) / (2 * INNER)
         away = VIEW_RADII * max(radius, 1e-4)
         self._mark = MARK_SHARE * max(radius, 1e-4)
         if middle[2] > radius:  # a scan: not farther than its camera
