@@ -7,8 +7,8 @@ the viewer serves them. A client in another process receives full-resolution clo
 figure is the growth of the serving process from the second third of the time to the last. With --browser, Debian's
 chromium draws every 4th point of every 4th row in software, at the rate of `quadfringe live`; --clouds sets another
 rate: more clouds leave less time for pictures and figures. With --surface, a cloud is a surface through these points.
-Clouds are counted at their upload to OpenGL, pictures and figures at changes of the page. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and 5 figures/s in the
-browser; the exit status is 1 below them.
+Clouds are counted at their upload to OpenGL, pictures and figures at changes of the page. Bars: 10 clouds/s to the
+client; 1 cloud/s, 5 pictures/s and 5 figures/s in the browser; the exit status is 1 below them.
 """
 
 from __future__ import annotations

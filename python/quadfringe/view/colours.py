@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
-from quadfringe.io.export import srgb
+from quadfringe.io.export import grey, srgb
 
 __all__ = [
     "COLOURINGS",
@@ -88,11 +88,13 @@ def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes:
 def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
     """Return the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
 
-    This is the albedo. Without one, the brightness is the modulation, and the colour comes from the mean light in the
-    neighbourhood.
+    This is the albedo, grey by the modulation where it is not known. Without one, the brightness is the modulation, and
+    the colour comes from the mean light in the neighbourhood.
     """
     if shape.albedo is not None:
-        return srgb(shape.albedo[::stride, ::stride])
+        albedo = shape.albedo[::stride, ::stride]
+        shades = grey(shape.modulation[::stride, ::stride])
+        return np.where(np.isfinite(albedo[:, :, :1]), srgb(albedo), shades)
     top = max(limits_of(shape.modulation)[1], 1e-6)
     modulation = np.nan_to_num(shape.modulation[::stride, ::stride])
     brightness = cv2.convertScaleAbs(modulation, alpha=255 / top)
