@@ -36,10 +36,10 @@ def test_the_foremost_surface_is_taken() -> None:
     assert measuring.nearest(near, Ray(np.array([0.0, 0.0, 600.0]), ray.direction), 1.0) is None, "it lies behind"
 
 
-def test_a_ray_beside_a_thin_part_finds_it_and_far_away_nothing() -> None:
+def test_a_ray_near_a_thin_part_finds_it_and_far_away_nothing() -> None:
     point = np.array([[0.0, 0.0, 1000.0]])
-    for beside_mm, expected in ((4.0, 0), (8.0, None)):
-        ray = Ray(np.array([beside_mm, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    for off_mm, expected in ((4.0, 0), (8.0, None)):
+        ray = Ray(np.array([off_mm, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
         assert measuring.nearest(point, ray, 0.3) == expected
 
 
@@ -108,8 +108,8 @@ def test_a_section_of_triangles_follows_a_ball() -> None:
     found = measuring.plane_section(ball.vertices, ball.faces, first, last, view)
     expected = np.sqrt(50.0**2 - (found.along - 40) ** 2) - 30
     np.testing.assert_allclose(found.height_mm[2:-2], expected[2:-2], atol=0.1)
-    beside = measuring.plane_section(ball.vertices, ball.faces, (-60.0, 0.0, -60.0), (60.0, 0.0, -60.0), view)
-    assert np.isnan(beside.height_mm[[0, -1]]).all()
-    assert np.isfinite(beside.height_mm[200])
+    wide = measuring.plane_section(ball.vertices, ball.faces, (-60.0, 0.0, -60.0), (60.0, 0.0, -60.0), view)
+    assert np.isnan(wide.height_mm[[0, -1]]).all()
+    assert np.isfinite(wide.height_mm[200])
     along = measuring.plane_section(ball.vertices, ball.faces, (0.0, 0.0, -50.0), (0.0, 0.0, 50.0), view)
     assert np.isfinite(along.height_mm).any(), "the line lies in the direction of sight"

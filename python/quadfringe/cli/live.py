@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -70,16 +70,9 @@ def live(
 
     with ExitStack() as stack:
         # Before the scanner, so that a wrong address is reported before a camera is taken.
-        viewer = Viewer(
-            host,
-            port,
-            stride=view_stride,
-            colouring=colour.value,
-            clouds_per_s=clouds_per_s,
-            drawn="surface" if surface else "points",
-            allow_hosts=allow_host or (),
-        )
-        stack.enter_context(viewer)
+        shown: dict[str, Any] = {"stride": view_stride, "colouring": colour.value, "clouds_per_s": clouds_per_s}
+        shown["drawn"] = "surface" if surface else "points"
+        viewer = stack.enter_context(Viewer(host, port, allow_hosts=allow_host or (), **shown))
         scanner = stack.enter_context(open_system(system))
         recorder = None
         if record is not None:

@@ -42,7 +42,7 @@ class Item(Protocol):
         """Size, for people."""
 
     def body(self, colouring: Colouring, step: int, *, surface: bool) -> Body:
-        """Give every `step`-th pixel of every `step`-th row, as far as there are pixels, as surface or points."""
+        """Give every `step`-th pixel of every `step`-th row as surface or points; triangles of a file as they are."""
 
     def spot(self, ray: Ray) -> Spot | None:
         """Return where a ray first meets the item; None when it passes by."""
@@ -52,7 +52,7 @@ class Item(Protocol):
 
 
 class Grid:
-    """A shape, in the colours of a picture (H, W, 3), or in its own."""
+    """A shape, in the colours of a picture (H, W, 3), or in those of its albedo."""
 
     def __init__(self, shape: Shape, picture: Picture | None = None) -> None:
         self._xyz_mm = xyz_mm_of(shape)

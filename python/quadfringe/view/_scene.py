@@ -28,7 +28,7 @@ UP = (0.0, -1.0, 0.0)
 # From the upper left as in drawings, weaker from the right, and some from everywhere: relief shows, white stays white.
 LIGHTS = {"key": ((-0.7, -0.9, -0.8), 2.6), "fill": ((0.9, 0.1, -0.6), 0.6)}
 AMBIENT = 0.4
-POINT_SHARE = 0.7  # of the distance of neighbours: viser 1.1 draws points twice as large as it is told
+POINT_SHARE = 0.7  # of the distance of neighbours: viser 1.1 draws points of twice the size
 TINY = Body(np.zeros((3, 3), np.float32), np.array([[0, 1, 2]], np.uint32), np.zeros((3, 3), np.uint8), 1e-3)
 MARK_COLOUR = (224, 49, 49)
 LINE_PX = 3.0

@@ -1,6 +1,6 @@
 """Measuring on a shape: the point under a pointer, the distance of two points, and the section between them.
 
-Lengths are mm, and rays start anywhere. The uncertainty is that of the noise, which each pixel has for itself; errors
+Lengths are mm, and rays start anywhere. The uncertainty is that of the noise, which each pixel has; errors
 of the calibration move neighbours alike and are not part of it.
 
 >>> a = Spot((0.0, 0.0, 800.0), (10, 20), 0.1)
@@ -22,7 +22,7 @@ __all__ = ["Distance", "Ray", "Section", "Spot", "distance", "grid_section", "hi
 
 Floats = NDArray[np.floating[Any]]
 Place = tuple[float, float, float]
-REACH_RAD = 5e-3  # three pixels of a page: a click so far beside a thin part still means it
+NEAR_RAD = 5e-3  # three pixels of a page: a click so far from a thin part still means it
 LAYER = 6.0  # in spacings: how far behind the foremost point near the ray the surface that it meets may lie
 SAMPLES = 400  # of a section through triangles: as many as a plot has pixels
 
@@ -79,12 +79,12 @@ def nearest(points_mm: Floats, ray: Ray, spacing_mm: float) -> int | None:
     """
     away = np.asarray(points_mm, np.float32) - ray.origin.astype(np.float32)
     depth = away @ ray.direction.astype(np.float32)
-    beside = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - depth**2, 0))
-    for reach in (np.float32(spacing_mm), np.maximum(np.float32(spacing_mm), REACH_RAD * depth)):
-        near = np.flatnonzero((depth > 0) & (beside <= reach))
+    off = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - depth**2, 0))
+    for reach in (np.float32(spacing_mm), np.maximum(np.float32(spacing_mm), NEAR_RAD * depth)):
+        near = np.flatnonzero((depth > 0) & (off <= reach))
         if near.size:
             layer = near[depth[near] <= depth[near].min() + LAYER * spacing_mm]
-            return int(layer[np.argmin(beside[layer])])
+            return int(layer[np.argmin(off[layer])])
     return None
 
 
