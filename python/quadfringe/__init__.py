@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from quadfringe.data import (
         BayerShot,
         Calibration,
+        Reason,
         ResponseCalibration,
         Shape,
         Shot,
@@ -88,6 +89,7 @@ __all__ = [
     "InputError",
     "MissingExtraError",
     "Plan",
+    "Reason",
     "RecordingError",
     "RecordingWarning",
     "Response",
@@ -124,6 +126,7 @@ _NAMES_IN = {
     "data": (
         "BayerShot",
         "Calibration",
+        "Reason",
         "ResponseCalibration",
         "Shape",
         "Shot",

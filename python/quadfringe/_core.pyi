@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
+    "REASONS",
     "THREADS_MAX",
     "Bench",
     "Cast",
@@ -64,6 +65,7 @@ __all__ = [
 
 __profile__: Final[str]
 THREADS_MAX: Final[int]
+REASONS: Final[list[str]]
 __version__: Final[str]
 
 _Vector2 = tuple[float, float]
@@ -289,18 +291,19 @@ class Decoder:
 
     def decode(
         self, red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], ir: NDArray[Any]
-    ) -> dict[str, NDArray[np.float32]]:
-        """Give maps (H, W) by name.
+    ) -> dict[str, NDArray[Any]]:
+        """Give maps (H, W) by name, float32 but for reason (uint8).
 
         phase_rad, column_px, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
         when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3); with method
-        joint, unless `albedo` is False, albedo (H, W, 4), the light of R, G, B, IR without fringes.
+        joint, unless `albedo` is False, albedo (H, W, 4), the light of R, G, B, IR without fringes; and reason, why
+        there is no data, a value of `quadfringe.Reason`.
 
         The images are (H, W) uint8, uint16 or float32, all of one type; strided views are welcome, nothing is
         copied. Raises TypeError for another type, ValueError for another size or values that are not finite.
         """
 
-    def decode_bayer(self, raw: NDArray[Any], bayer: str, ir: NDArray[Any]) -> dict[str, NDArray[np.float32]]:
+    def decode_bayer(self, raw: NDArray[Any], bayer: str, ir: NDArray[Any]) -> dict[str, NDArray[Any]]:
         """Give the same maps from the raw mosaic of a Bayer chip (rggb, grbg, gbrg or bggr) and an infrared image.
 
         Images and errors as those of `decode`; ValueError for another pattern.
@@ -334,7 +337,7 @@ class StepDecoder:
     def settings(self) -> dict[str, str | float | list[float] | None]:
         """Give every setting in force, defaults included, and `method_version`, for saved results."""
 
-    def decode(self, stacks: Sequence[NDArray[Any]]) -> dict[str, NDArray[np.float32]]:
+    def decode(self, stacks: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
         """Give maps (H, W) by name, as `Decoder.decode`, from one stack (steps, H, W) for each fringe number.
 
         The stacks are uint8, uint16 or float32, all of one type; nothing is copied. Raises TypeError for another type,

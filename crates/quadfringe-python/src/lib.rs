@@ -25,6 +25,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add("__profile__", if cfg!(debug_assertions) { "debug" } else { "release" })?;
     module.add("THREADS_MAX", workers::THREADS_MAX)?;
+    module.add("REASONS", quadfringe::Reason::ALL.map(quadfringe::Reason::name).to_vec())?;
     module.add_class::<device::Device>()?;
     module.add_class::<bench::Bench>()?;
     module.add_class::<bench::Cast>()?;

@@ -97,6 +97,8 @@ impl Memory {
         if let Some(albedo) = decoded.albedo {
             named.set_item("albedo", self.lend(py, albedo)?)?;
         }
+        let reasons = decoded.reason.mapv(|reason| reason as u8);
+        named.set_item("reason", PyArray::from_owned_array(py, reasons))?;
         Ok(named)
     }
 

@@ -106,7 +106,7 @@ pub mod decode;
 pub mod reference;
 
 pub use condition::{Conditioner, Response, Shot};
-pub use decode::{Decoded, Decoder, DecoderBuilder, JointOptions, Method, Options, PublishedOptions};
+pub use decode::{Decoded, Decoder, DecoderBuilder, JointOptions, Method, Options, PublishedOptions, Reason};
 pub use encoding::{Channel, DmdLayout, Encoding};
 pub use error::{Error, Result};
 pub use optics::{BayerPattern, Device};

@@ -10,6 +10,7 @@ from quadfringe.data.calibration import (
 from quadfringe.data.mesh import Mesh, Normals
 from quadfringe.data.optics import core_device, device_from_core
 from quadfringe.data.points import xyz_mm_of
+from quadfringe.data.reason import Reason
 from quadfringe.data.shape import Shape
 from quadfringe.data.shot import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp, Truth
 from quadfringe.data.shot_files import read_shot, write_shot
@@ -24,6 +25,7 @@ __all__ = [
     "FrameStamp",
     "Mesh",
     "Normals",
+    "Reason",
     "ResponseCalibration",
     "Shape",
     "Shot",

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from quadfringe.data.reason import Reason
 from quadfringe.errors import InputError
 
-__all__ = ["check_full_scale", "check_images", "check_maps", "check_stamp"]
+__all__ = ["check_full_scale", "check_images", "check_maps", "check_stamp", "check_types"]
 
 DTYPES = ("uint8", "uint16", "float32")
 
@@ -46,6 +49,22 @@ def check_maps(maps: Mapping[str, Any]) -> None:
             got = type(values).__name__ if shape is None else f"an array of shape {shape}"
             raise InputError(f"{name}: expected an array ({', '.join(['H', 'W', *map(str, last)])}), got {got}")
     _check_equal("size", {name: f"{values.shape[1]} x {values.shape[0]}" for name, values in maps.items()})
+
+
+def check_types(maps: Mapping[str, NDArray[Any]], path: Path) -> None:
+    """Raise `InputError` unless the maps of a file are floating, and the reasons uint8 with a meaning."""
+    reason = maps.get("reason")
+    other = [
+        f"{name} of {values.dtype}" for name, values in maps.items() if name != "reason" and values.dtype.kind != "f"
+    ]
+    if other:
+        raise InputError(f"{path}: expected maps of float32, got {', '.join(other)}")
+    if reason is None:
+        return
+    if reason.dtype != np.uint8:
+        raise InputError(f"{path}, reason: expected uint8, got {reason.dtype}")
+    if reason.max(initial=0) >= len(Reason):
+        raise InputError(f"{path}, reason: expected 0 to {len(Reason) - 1}, got {int(reason.max())}")
 
 
 def check_stamp(number: Any, time_us: Any, device: Any) -> None:

@@ -26,6 +26,7 @@ UNITS = {
     "uncertainty_rad": ("rad", "standard deviation of the phase"),
     "uncertainty_mm": ("mm", "standard deviation of the depth"),
     "xyz_mm": ("mm", "point in the camera frame: x right, y down, z forward"),
+    "reason": ("1", "why there is no data: a value of quadfringe.Reason, 0 where there is"),
     "albedo": ("1", "light without fringes, linear, fraction of full scale"),
 }
 LAST = {"xyz_mm": "axis", "albedo": "channel"}  # the third dimension of a map

@@ -132,7 +132,7 @@ def mesh_of(shape: Shape, step: int, fill_holes_px: int, colour: NDArray[np.uint
     row, column = found["pixels"].T
     place = row.astype(np.intp) * xyz_mm.shape[1] + column
     scalars = {name: getattr(shape, name) for name in SCALARS}
-    taken = {name: None if values is None else values.ravel()[place] for name, values in scalars.items()}
+    taken = {name: None if values is None else values.ravel().take(place) for name, values in scalars.items()}
     for values in taken.values():
         if values is not None and fill_holes_px:
             values[found["filled"]] = np.nan
@@ -142,7 +142,7 @@ def mesh_of(shape: Shape, step: int, fill_holes_px: int, colour: NDArray[np.uint
         normals=found["normals"],
         normal_uncertainty_rad=found["normal_uncertainty_rad"],
         pixel=found["pixels"],
-        colour=colour.reshape(-1, 3)[place],
+        colour=colour.reshape(-1, 3).take(place, axis=0),
         filled=found["filled"],
         **taken,
     )

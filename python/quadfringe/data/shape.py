@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import brief, checked
-from quadfringe.data._checks import check_maps
+from quadfringe.data._checks import check_maps, check_types
 from quadfringe.data.calibration import Calibration
 from quadfringe.data.points import xyz_mm_of
+from quadfringe.data.reason import Reason
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
 from quadfringe.io.arrays import read_npz
@@ -28,7 +29,7 @@ __all__ = ["SUFFIXES", "Shape", "xyz_mm_of"]
 
 Map = NDArray[np.float32]
 MAPS = ("phase_rad", "column_px", "modulation", "quality")
-MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm", "albedo")
+MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "xyz_mm", "albedo", "reason")
 SUFFIXES = (".npz", ".ply", ".pcd", ".stl", ".obj", ".glb", ".tif", ".tiff")
 
 
@@ -46,6 +47,7 @@ class Shape:
     that was chosen; the other one is None.
     albedo: light of R, G, B and IR without fringes, linear, fraction of full scale, (H, W, 4): the albedo of the
     surface times the mean light on it. None by methods other than joint, and with `albedo = false` in `[decode]`.
+    reason: why each pixel has no data, values of `Reason`, (H, W) uint8; None in files of earlier versions.
 
     `config` holds the settings in force, with method, response and version, and `calibration` the calibration; both are
     saved in an NPZ file. Raises `InputError` for maps of unequal size.
@@ -60,6 +62,7 @@ class Shape:
     uncertainty_rad: Map | None = None
     uncertainty_mm: Map | None = None
     albedo: Map | None = None
+    reason: NDArray[np.uint8] | None = None
     config: Mapping[str, Any] = field(default_factory=dict)
     calibration: Calibration | None = None
 
@@ -79,7 +82,7 @@ class Shape:
         return f"Shape({', '.join(words)})"
 
     @property
-    def maps(self) -> dict[str, Map]:
+    def maps(self) -> dict[str, NDArray[Any]]:
         """Every map by name; with a calibration `xyz_mm` too, and `uncertainty_mm` in place of `uncertainty_rad`."""
         maps = {name: getattr(self, name) for name in (*MAPS, "order", *MORE_MAPS)}
         return {name: values for name, values in maps.items() if values is not None}
@@ -106,10 +109,11 @@ class Shape:
 
         White is the brightest hundredth. Pixels without albedo are grey by their modulation, without data black.
         """
-        shades = grey(self.modulation)
         if self.albedo is None:
-            return shades
-        return np.where(np.isfinite(self.albedo[:, :, :1]), srgb(self.albedo), shades)
+            return grey(self.modulation)
+        picture, dark = srgb(self.albedo), np.isnan(self.albedo[:, :, 0])
+        picture[dark] = grey(self.modulation)[dark]
+        return picture
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -132,6 +136,13 @@ class Shape:
         if self.wrong_order_probability is not None:
             found["wrong_orders_at_most"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
         return found
+
+    def reasons(self) -> dict[Reason, float]:
+        """Give the share of pixels of each reason that occurs, in percent; empty without a map of reasons."""
+        if self.reason is None:
+            return {}
+        counts = np.bincount(self.reason.ravel(), minlength=len(Reason))
+        return {reason: 100.0 * float(counts[reason]) / self.reason.size for reason in Reason if counts[reason]}
 
     def with_settings(self, config: Mapping[str, Any], calibration: Calibration | None) -> Shape:
         """Give the same maps with the settings that made them."""
@@ -223,8 +234,7 @@ class Shape:
         if missing:
             raise InputError(f"{path}: not a saved shape: no {', '.join(missing)}")
         maps = {name: stored[name] for name in (*MAPS, *MORE_MAPS) if name in stored}
-        if other := [f"{name} of {values.dtype}" for name, values in maps.items() if values.dtype.kind != "f"]:
-            raise InputError(f"{path}: expected maps of float32, got {', '.join(other)}")
+        check_types(maps, path)
         calibration = None
         if "calibration" in stored:
             calibration = checked(Calibration, _table(stored, "calibration", path), f"{path}, calibration")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.data import Calibration, Shape
+from quadfringe.data import Calibration, Reason, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.device_limits import impossible_devices
@@ -132,6 +132,8 @@ def within_depths(shape: Shape, range_mm: tuple[float, float] | None) -> list[Ca
     for values in (getattr(shape, name) for name in BOUNDED):
         if values is not None:
             values[out] = np.nan
+    if shape.reason is not None:
+        shape.reason[out] = Reason.OUT_OF_RANGE
     if share <= params.REFUSED_SHARE:
         return []
     words = f"{share:.0%} of the points lie outside the stated depths of {range_mm[0]:g} to {range_mm[1]:g} mm, at a "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -16,23 +17,42 @@ from quadfringe.io.glb import encoded, glb_bytes
 
 __all__ = ["Triangles", "grey", "srgb", "write_depth", "write_mesh", "write_npz", "write_ply"]
 
+SAMPLES = 50_000  # pixels of a quantile: 500 lie above it
 # From mm in the camera frame (y down, z forward) to metres with y up: half a turn around x.
 GLB_FROM_MM = np.array([1e-3, -1e-3, -1e-3], np.float32)
 
 
 def grey(modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Convert modulation (H, W) to a grey picture (H, W, 3) uint8; it follows the albedo and shows no fringes."""
-    top = np.nanquantile(modulation, 0.99) if np.isfinite(modulation).any() else 1.0
-    shades = np.nan_to_num(modulation / max(float(top), 1e-9)).clip(0, 1) * 255
+    shades = np.fmax(modulation * np.float32(255 / _white(_sampled(modulation))), 0).clip(0, 255)
     return np.repeat(shades.astype(np.uint8)[:, :, None], 3, axis=2)
 
 
 def srgb(albedo: NDArray[np.float32]) -> NDArray[np.uint8]:
     """Convert albedo (H, W, 4) to a picture (H, W, 3) sRGB; the brightest hundredth is white, no data is black."""
-    light = np.nan_to_num(albedo[:, :, :3])
-    brightest = light.max(axis=2)
-    top = float(np.quantile(brightest[brightest > 0], 0.99)) if (brightest > 0).any() else 1.0
-    return encoded(light / max(top, 1e-9))
+    table = _srgb_table()
+    last = len(table) - 1
+    white = _white(_sampled(albedo)[:, :, :3].max(axis=2))
+    level = np.fmax(albedo * np.float32(last / white), 0).clip(0, last).astype(np.uint16)
+    return np.ascontiguousarray(table[level][:, :, :3])
+
+
+def _sampled(values: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Give every n-th pixel of every n-th row, so that enough are left for a quantile."""
+    stride = max(1, int((values.shape[0] * values.shape[1] / SAMPLES) ** 0.5))
+    return values[::stride, ::stride]
+
+
+def _white(light: NDArray[np.float32]) -> float:
+    """Give the light that only the brightest hundredth of the lit pixels exceeds."""
+    lit = light[light > 0]
+    return max(float(np.quantile(lit, 0.99)), 1e-9) if lit.size else 1.0
+
+
+@cache
+def _srgb_table() -> NDArray[np.uint8]:
+    """Give the code of each of 4096 levels of light (IEC 61966-2-1)."""
+    return encoded(np.linspace(0, 1, 4096))
 
 
 def write_ply(

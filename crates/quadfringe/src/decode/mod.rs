@@ -17,11 +17,13 @@ pub(crate) mod method;
 pub(crate) mod options;
 pub(crate) mod output;
 pub(crate) mod params;
+pub(crate) mod reason;
 
 pub use builder::DecoderBuilder;
 pub use method::{JointOptions, Method, PublishedOptions};
 pub use options::Options;
 pub use output::Decoded;
+pub use reason::Reason;
 
 use crate::condition::{Plan, Sample, Shot};
 use crate::encoding::{Encoding, FourChannel};

@@ -1,6 +1,7 @@
 //! The maps of a decoded shot, and the last step of every method: columns and points from the absolute phase.
 
 use super::params::ROWS_AT_ONCE;
+use super::reason::{Reason, mark_out_of_range};
 use crate::height::Triangulator;
 use crate::parallel::{first_of_line, spare};
 use multiversion::multiversion;
@@ -38,6 +39,8 @@ pub struct Decoded {
     /// Light of R, G, B, IR without fringes, linear, as a fraction of full scale, `(rows, columns, 4)`: the albedo of the surface
     /// times the light on it. Only from the joint method, if [`Options::albedo`](crate::Options::albedo) is set.
     pub albedo: Option<Array3<f32>>,
+    /// Why a pixel has no data.
+    pub reason: Array2<Reason>,
 }
 
 /// Which of the optional maps are wanted.
@@ -50,16 +53,16 @@ pub(crate) struct Wanted {
 
 /// Zeros of `shape` that start at a cache line. A vector that lies across two cache lines takes two stores, which slows
 /// the decoder down.
-fn aligned_zeros<D: Dimension>(shape: D) -> Array<f32, D> {
+fn aligned_zeros<T: Clone + Default, D: Dimension>(shape: D) -> Array<T, D> {
     let count = shape.size();
-    let memory = vec![0.0; count + spare::<f32>()];
+    let memory = vec![T::default(); count + spare::<T>()];
     let start = first_of_line(&memory);
     let aligned = Array1::from_vec(memory).slice_move(s![start..start + count]);
     aligned.into_shape_with_order(shape).expect("as many numbers as the shape has")
 }
 
 /// Replaces a map if it has another shape or layout.
-fn fit<D: Dimension>(map: &mut Array<f32, D>, shape: D) {
+fn fit<T: Clone + Default, D: Dimension>(map: &mut Array<T, D>, shape: D) {
     if map.raw_dim() != shape || !map.is_standard_layout() {
         *map = aligned_zeros(shape);
     }
@@ -98,6 +101,7 @@ impl Decoded {
             &mut self.wrong_order_probability,
         ];
         maps.into_iter().for_each(|map| fit(map, Ix2(rows, columns)));
+        fit(&mut self.reason, Ix2(rows, columns));
         let Wanted { points, albedo } = wanted;
         fit_if(!points, &mut self.uncertainty_rad, Ix2(rows, columns));
         fit_if(points, &mut self.uncertainty_mm, Ix2(rows, columns));
@@ -123,6 +127,8 @@ impl Decoded {
         ];
         let mut maps =
             maps.map(|map| map.as_slice_mut().expect("fitted maps are contiguous").chunks_exact_mut(width));
+        let reasons = self.reason.as_slice_mut().expect("fitted maps are contiguous");
+        let mut reasons = reasons.chunks_exact_mut(width);
         let xyz = self.xyz_mm.as_mut().map(|xyz| xyz.as_slice_mut().expect("fitted maps are contiguous"));
         let mut xyz = xyz.map(|xyz| xyz.chunks_exact_mut(3 * width));
         let mut next = || {
@@ -134,6 +140,7 @@ impl Decoded {
                 quality: quality?,
                 sigma: sigma?,
                 wrong: wrong?,
+                reason: reasons.next()?,
                 xyz: xyz.as_mut().and_then(Iterator::next),
             })
         };
@@ -153,6 +160,7 @@ pub(crate) struct OutputRow<'a> {
     /// deviation of the depth.
     pub sigma: &'a mut [f32],
     pub xyz: Option<&'a mut [f32]>,
+    pub reason: &'a mut [Reason],
 }
 
 /// The last step of every method, row by row: columns and points from the absolute phase, with their uncertainty.
@@ -164,8 +172,8 @@ pub(crate) struct Finish<'a> {
 }
 
 impl Finish<'_> {
-    /// Finishes row `y`. Its phase, modulation, quality, uncertainty of the phase and wrong-order probability must be
-    /// known.
+    /// Finishes row `y`. Its phase, modulation, quality, uncertainty of the phase, wrong-order probability and reasons must
+    /// be known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
         let columns_per_rad = self.period_px as f32 / TAU;
         let end = self.projector_width as f32 + 0.5;
@@ -173,6 +181,9 @@ impl Finish<'_> {
         fill_columns(Projection { columns_per_rad, end, sigma_unit }, row);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
             triangulator.finish_row(y, row.column, xyz, row.sigma);
+            mark_out_of_range(xyz.iter().skip(2).step_by(3), row.reason);
+        } else {
+            mark_out_of_range(row.column.iter(), row.reason);
         }
     }
 }

@@ -28,6 +28,8 @@ pub(super) struct LitMask {
     slots: Slots<TaskWork<Rows>>,
     /// Standard deviation of the intensities in the last image, in linear light.
     pub noise: f32,
+    /// Least range of fringes, in linear light.
+    pub range_min: f32,
 }
 
 /// Rows of one task.
@@ -48,7 +50,7 @@ struct LevelRows<'a> {
 }
 
 impl LitMask {
-    /// Writes 1 for every lit pixel, 0 elsewhere. `range_min` is the least range of fringes, in linear light.
+    /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`.
     pub fn find(
         &mut self,
         ScaledGrid { grid, period_px, .. }: ScaledGrid<'_>,
@@ -56,6 +58,7 @@ impl LitMask {
         range_min: f32,
         lit: &mut [f32],
     ) {
+        self.range_min = range_min;
         let reach = (REACH * period_px as f32 / grid.step as f32).ceil();
         self.cell_means(grid, light);
         self.cell_extremes(grid, reach as usize);
@@ -72,6 +75,11 @@ impl LitMask {
             || this.slots.take(),
             |slot, (block, lit)| this.find_rows(grid, light, block * ROWS, &mut slot.rows, lit),
         );
+    }
+
+    /// 1 / range^2 of the four channels around the pixels of row `y`; the range is at least [`Self::range_min`].
+    pub fn precision<'a>(&self, grid: &Grid, y: usize, maps: &'a mut RowMaps) -> [&'a [f32]; 4] {
+        LevelRows::new(maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y)).precision
     }
 
     /// Computes the mask of the rows from `first` on.

@@ -2,27 +2,37 @@
 
 use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
 use super::pyramid::Level;
-use crate::Shot;
 use crate::condition::{Plan, Sample};
 use crate::stages::quadrature_carrier;
+use crate::{Reason, Shot};
 use multiversion::multiversion;
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
 /// Writes the linear light of a shot into the planes of a level. The mask `lit` becomes 0 for glare and for pixels that the
-/// infrared chip does not see; the mask `usable` becomes 0 also for saturated pixels.
-pub(super) fn linear_light<T: Sample>(plan: &Plan, shot: &Shot<'_, T>, shape: [usize; 2], level: &mut Level) {
+/// infrared chip does not see; the mask `usable` becomes 0 also for saturated pixels. `reasons` tells one from the other, in
+/// rows as wide as those of the level.
+pub(super) fn linear_light<T: Sample>(
+    plan: &Plan,
+    shot: &Shot<'_, T>,
+    shape: [usize; 2],
+    level: &mut Level,
+    reasons: &mut Vec<Reason>,
+) {
     let [height, width] = shape;
     let stride = level.lit.len() / height;
     let Level { light, lit, usable } = level;
+    reasons.resize(lit.len(), Reason::Returned);
     let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
     let masks = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));
+    let masks = masks.zip(reasons.par_chunks_mut(stride));
     let rows = red.zip(green).zip(blue.zip(infrared)).zip(masks).enumerate();
     rows.for_each_init(
         || Saturation { unsaturated: vec![false; width], glare: vec![false; width] },
-        |saturation, (y, (((red, green), (blue, infrared)), (usable, lit)))| {
+        |saturation, (y, (((red, green), (blue, infrared)), ((usable, lit), reasons)))| {
             let rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
-            let masks = MaskRows { usable: &mut usable[..width], lit: &mut lit[..width] };
+            let [usable, lit] = [usable, lit].map(|row| &mut row[..width]);
+            let masks = MaskRows { usable, lit, reasons: &mut reasons[..width] };
             linear_row(plan, shot, y, saturation, rows, masks);
         },
     );
@@ -38,6 +48,7 @@ struct Saturation {
 struct MaskRows<'a> {
     usable: &'a mut [f32],
     lit: &'a mut [f32],
+    reasons: &'a mut [Reason],
 }
 
 #[multiversion(targets("x86_64+avx2"))]
@@ -53,12 +64,15 @@ fn linear_row<T: Sample>(
     plan.saturation_row(shot, y, unsaturated, glare);
     plan.row(shot, y, &mut rows);
     let [.., infrared] = rows;
-    let masks = masks.usable.iter_mut().zip(masks.lit).zip(unsaturated.iter().zip(glare.iter()));
-    for (infrared, ((usable, lit), (unsaturated, glare))) in infrared.iter().zip(masks) {
+    let MaskRows { usable, lit, reasons } = masks;
+    let masks = usable.iter_mut().zip(lit).zip(reasons).zip(unsaturated.iter().zip(glare.iter()));
+    for (infrared, (((usable, lit), reason), (unsaturated, glare))) in infrared.iter().zip(masks) {
         // A pixel that the infrared chip does not see takes no part in any fit.
         let seen = infrared.is_finite();
         *usable = if seen & *unsaturated { 1.0 } else { 0.0 };
         *lit = if seen & !*glare { 1.0 } else { 0.0 };
+        let blind = if seen { Reason::Saturated } else { Reason::NoImage };
+        *reason = if seen & *unsaturated { Reason::Returned } else { blind };
     }
     plan.continue_infrared(y, infrared);
 }

@@ -39,6 +39,7 @@ mod phase;
 mod photometry;
 mod propagation;
 mod pyramid;
+mod reasons;
 mod residuals;
 mod scene;
 mod slopes;
@@ -67,7 +68,8 @@ use phase::PhaseModel;
 use propagation::Propagation;
 use pyramid::{Levels, Pyramid, Upsampler};
 use rayon::prelude::*;
-use scene::{Frame, PhaseMap};
+use reasons::Reasons;
+use scene::{Frame, Pixels};
 use uncertainty::PhaseNoise;
 use validity::{PixelFit, Validity};
 use window::Window;
@@ -84,10 +86,7 @@ pub(crate) struct Joint {
     pyramid: Pyramid,
     coarse: CoarseLevel,
     upsampler: Upsampler,
-    /// Absolute phase of every pixel in rad.
-    phase: Vec<f32>,
-    /// Modulation of R and B in linear light, 0 where there is no light.
-    modulation: Vec<f32>,
+    pixels: Pixels,
     motion: Motion,
     validity: Validity,
     agreement: Agreement,
@@ -111,8 +110,7 @@ impl Joint {
             pyramid: Pyramid::new(stride * shape[0]),
             coarse: CoarseLevel::new(code),
             upsampler: Upsampler::default(),
-            phase: Vec::new(),
-            modulation: Vec::new(),
+            pixels: Pixels::default(),
             motion: Motion::default(),
             validity: Validity::default(),
             agreement: Agreement::default(),
@@ -131,7 +129,7 @@ impl Joint {
         out: &mut Decoded,
     ) {
         // 1. Linear light of the four channels (S1).
-        linear_light(plan, shot, self.shape, &mut self.pyramid.full);
+        linear_light(plan, shot, self.shape, &mut self.pyramid.full, &mut self.pixels.excluded);
         // 2. The fringe period scales all windows, cells and the coarse level.
         let found = || fringe_period_px(&self.pyramid.full.light, self.shape);
         let period_px = options.period_px.unwrap_or_else(found);
@@ -151,7 +149,7 @@ impl Joint {
         // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
         let (ratios, noise) = (self.ratios, self.coarse.noise);
         let scene = self.pyramid.full.scene(frame.full);
-        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.phase, &mut self.modulation);
+        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.pixels);
         // 8. Validity.
         self.validate(&frame, instants, options.quality_min, out);
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
@@ -187,11 +185,11 @@ impl Joint {
     fn upsample(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
         let (grid, coarse) = (frame.full.grid, &mut self.coarse);
         if frame.coarse.factor == 1 {
-            std::mem::swap(&mut self.phase, &mut coarse.phase);
-            std::mem::swap(&mut self.modulation, &mut coarse.modulation);
+            std::mem::swap(&mut self.pixels.phase, &mut coarse.phase);
+            std::mem::swap(&mut self.pixels.modulation, &mut coarse.modulation);
             return;
         }
-        for plane in [&mut self.phase, &mut self.modulation] {
+        for plane in [&mut self.pixels.phase, &mut self.pixels.modulation] {
             plane.resize(grid.pixels(), 0.0);
         }
         let (scratch, lit) = (&mut *memory.scratch.first, &mut *memory.scratch.second);
@@ -203,17 +201,17 @@ impl Joint {
         let [coarse_scene, scene] = self.pyramid.scenes(frame);
         let lit = &self.pyramid.full.lit;
         let levels = Levels { coarse: &coarse_scene, fine: &scene, found: coarse, ratios: self.ratios, lit };
-        self.upsampler.run(levels, &mut self.phase, &mut self.modulation);
+        self.upsampler.run(levels, &mut self.pixels.phase, &mut self.pixels.modulation);
     }
 
     /// Step 6: fits the phase at full resolution.
     fn fit_phase(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
         let (scene, ratios) = (self.pyramid.full.scene(frame.full), self.ratios);
         let CoarseLevel { slopes, noise, photometry, phase_fit, .. } = &mut self.coarse;
-        let window = Window::new(&scene, slopes, &self.modulation, *noise);
+        let window = Window::new(&scene, slopes, &self.pixels.modulation, *noise);
         let OutputMemory { scratch, found } = memory;
         let model = PhaseModel { scene: &scene, photometry, ratios, window };
-        phase_fit.step(model, &mut self.phase, scratch.lend(), found);
+        phase_fit.step(model, &mut self.pixels.phase, scratch.lend(), found);
     }
 
     /// Step 7: estimates the motion, brings the light to one instant and repeats steps 2 to 6.
@@ -226,7 +224,7 @@ impl Joint {
     ) {
         self.motion.begin(&self.pyramid.full.scene(frame.full));
         for _ in 0..ROUNDS {
-            let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+            let map = self.pixels.map();
             self.motion.step(&mut self.pyramid.full, frame.full, timing, &self.coarse.photometry, map);
             self.absolute_phase(frame, options, memory);
         }
@@ -245,13 +243,14 @@ impl Joint {
             squared_residual: out.wrong_order_probability.as_slice().expect("checked layout"),
             modulation: out.modulation.as_slice().expect("checked layout"),
         };
-        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        let map = self.pixels.map();
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
         let evidence = validity::Evidence { map, pixel, orders: &self.coarse.orders, limits };
         self.validity.run(&scene, evidence, quality);
         if let Some(instants) = instants {
-            self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid);
+            let Validity { valid, reasons, .. } = &mut self.validity;
+            self.motion.invalidate_fast(&scene, instants, valid, reasons);
         }
     }
 
@@ -259,21 +258,24 @@ impl Joint {
     fn uncertainty(&mut self, frame: &Frame<'_>) -> PhaseNoise {
         let scene = self.pyramid.full.scene(frame.full);
         let CoarseLevel { noise, photometry, orders, slopes, .. } = &self.coarse;
-        let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
+        let map = self.pixels.map();
         self.agreement.measure(&scene, self.ratios, *noise, photometry, map);
         orders.wrong_order_probability(&scene, &mut self.wrong_order);
-        PhaseNoise::new(*noise, Window::new(&scene, slopes, &self.modulation, *noise).share())
+        PhaseNoise::new(*noise, Window::new(&scene, slopes, &self.pixels.modulation, *noise).share())
     }
 
     /// Steps 9 and 10, row by row: the maps of the result.
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
         let scene = self.pyramid.full.scene(frame.full);
         let grid = scene.grid;
+        let (pixels, validity) = (&self.pixels, &self.validity);
+        let reasons = Reasons { pixels, validity, lit_mask: &self.coarse.lit_mask };
         out.rows().enumerate().for_each_init(
             Default::default,
             |(maps, rows): &mut (RowMaps, energy::Rows), (y, mut row)| {
                 let at = y * grid.stride..y * grid.stride + grid.width;
-                validity::copy_valid(&self.validity.valid[at.clone()], &self.phase[at], row.phase);
+                validity::copy_valid(&validity.valid[at.clone()], &pixels.phase[at], row.phase);
+                reasons.write(&scene, y, maps, row.reason);
                 let variance = self.energy.variance(&scene, y, rows);
                 noise.deviations(variance, self.agreement.row(&scene, y, maps), row.sigma);
                 let nodes = &self.wrong_order[y / grid.step * grid.columns..];
@@ -287,7 +289,7 @@ impl Joint {
     fn complete(&mut self, frame: &Frame<'_>, out: &mut Decoded) {
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
         let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
-        let Self { phase, validity, ratios, coarse, .. } = self;
+        let Self { pixels: Pixels { phase, .. }, validity, ratios, coarse, .. } = self;
         self.propagation.run(frame.full.grid, phase, &validity.components, wrong_order, quality);
         if let Some(albedo) = &mut out.albedo {
             let known = Known { phase, valid: &validity.valid, ratios: *ratios, noise: coarse.noise };

@@ -13,6 +13,7 @@ use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
 use super::pyramid::Level;
 use super::scene::{PhaseMap, PixelRow, ScaledGrid, Scene};
+use crate::Reason;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
@@ -135,14 +136,25 @@ impl Motion {
 
     /// Removes from `valid` pixels that move too fast: where R and B have turned against each other by nearly a quarter of a fringe
     /// they show the same, and the velocity is ambiguous.
-    pub fn invalidate_fast(&self, scene: &Scene<'_>, [red, _, blue, _]: [f32; 4], valid: &mut [u8]) {
+    pub fn invalidate_fast(
+        &self,
+        scene: &Scene<'_>,
+        [red, _, blue, _]: [f32; 4],
+        valid: &mut [u8],
+        reasons: &mut [Reason],
+    ) {
         let grid = scene.grid;
         let most = TURN_MAX / (blue - red).abs().max(f32::MIN_POSITIVE);
-        valid.par_chunks_mut(grid.stride).enumerate().for_each_init(
+        let rows = valid.par_chunks_mut(grid.stride).zip(reasons.par_chunks_mut(grid.stride));
+        rows.enumerate().for_each_init(
             || self.slots.take(),
-            |slot, (y, valid)| {
+            |slot, (y, (valid, reasons))| {
                 let [velocity] = slot.rows.velocity.sample(grid, &self.velocity, 0, y);
-                valid.iter_mut().zip(velocity).for_each(|(valid, v)| *valid &= u8::from(v.abs() <= most));
+                for ((valid, reason), v) in valid.iter_mut().zip(reasons).zip(velocity) {
+                    if *valid != 0 && v.abs() > most {
+                        (*valid, *reason) = (0, Reason::Moved);
+                    }
+                }
             },
         );
     }

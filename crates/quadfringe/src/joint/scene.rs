@@ -2,6 +2,7 @@
 
 use super::cells::Grid;
 use super::params::pyramid::MOSAIC_REACH_PX;
+use crate::Reason;
 
 /// A grid of cells over one level of the image pyramid.
 #[derive(Clone, Copy)]
@@ -50,6 +51,23 @@ pub(super) struct Scene<'a> {
     pub period_px: f64,
     /// Number of camera pixels along a side of a pixel, which is a mean of camera pixels.
     pub factor: usize,
+}
+
+/// What is known about the pixels of a shot, in padded rows.
+#[derive(Debug, Default)]
+pub(super) struct Pixels {
+    /// Absolute phase in rad.
+    pub phase: Vec<f32>,
+    /// Modulation of R and B in linear light, 0 where there is no light.
+    pub modulation: Vec<f32>,
+    /// Why steps 1 and 6 exclude a pixel, else [`Reason::Returned`].
+    pub excluded: Vec<Reason>,
+}
+
+impl Pixels {
+    pub fn map(&self) -> PhaseMap<'_> {
+        PhaseMap { phase: &self.phase, modulation: &self.modulation }
+    }
 }
 
 /// The phase of an image and where it is known, in padded rows.

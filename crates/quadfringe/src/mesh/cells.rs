@@ -60,6 +60,27 @@ fn falls([a, b, c, d]: [Node; 4]) -> bool {
     falling
 }
 
+/// The nodes that triangles hold.
+pub(super) struct Vertices {
+    /// Node of each vertex, (row, column), in the order of the image.
+    pub pixels: Vec<[u32; 2]>,
+    /// Number of the vertex of each node that is one.
+    pub numbers: Vec<u32>,
+    /// Number of vertices in each row.
+    pub counts: Vec<usize>,
+}
+
+/// Divides `all` into parts of these lengths.
+pub(super) fn parts<'a, T>(all: &'a mut [T], counts: &[usize]) -> Vec<&'a mut [T]> {
+    let mut rest = all;
+    let next = |count: &usize| {
+        let part;
+        (part, rest) = std::mem::take(&mut rest).split_at_mut(*count);
+        part
+    };
+    counts.iter().map(next).collect()
+}
+
 /// The cells of a grid, row by row; there is one row and one column less than of nodes.
 pub(super) struct Cells {
     rows: usize,
@@ -88,20 +109,46 @@ impl Cells {
         Self { rows, columns, all }
     }
 
-    /// Nodes that a triangle holds, in the order of the image.
-    pub fn used(&self, nodes: &Nodes) -> Vec<u32> {
-        let mut used = vec![false; nodes.all.len()];
-        for (y, row) in self.all.chunks(self.columns.max(1)).enumerate() {
-            let (above, below) = used[y * nodes.columns..].split_at_mut(nodes.columns);
-            for (x, cell) in row.iter().enumerate() {
-                let [a, b, c, d] = cell.touches();
-                above[x] |= a;
-                above[x + 1] |= b;
-                below[x] |= c;
-                below[x + 1] |= d;
+    /// Numbers the nodes that a triangle holds, in the order of the image.
+    pub fn numbered(&self, nodes: &Nodes) -> Vertices {
+        let columns = nodes.columns;
+        let mut numbers = vec![0; nodes.all.len()];
+        let rows = numbers.par_chunks_mut(columns.max(1)).enumerate();
+        let counts: Vec<usize> = rows.map(|(y, row)| self.mark_used(y, row) as usize).collect();
+        let starts: Vec<u32> = counts
+            .iter()
+            .scan(0, |next, count| Some(std::mem::replace(next, *next + *count as u32)))
+            .collect();
+        let mut pixels = vec![[0; 2]; counts.iter().sum()];
+        let parts = parts(&mut pixels, &counts);
+        let rows = numbers.par_chunks_mut(columns.max(1)).zip(parts).zip(starts).enumerate();
+        rows.for_each(|(y, ((row, pixels), start))| {
+            let used = row.iter_mut().enumerate().filter(|(_, used)| **used != 0);
+            for ((number, (x, used)), pixel) in (start..).zip(used).zip(pixels) {
+                (*used, *pixel) = (number, [y as u32, x as u32]);
+            }
+        });
+        Vertices { pixels, numbers, counts }
+    }
+
+    /// Writes 1 for each node of row `y` that a triangle holds, and returns their number.
+    fn mark_used(&self, y: usize, used: &mut [u32]) -> u32 {
+        let row = |y: usize| &self.all[y * self.columns..][..self.columns];
+        if let Some(above) = y.checked_sub(1).filter(|_| self.rows > 0) {
+            for (x, cell) in row(above).iter().enumerate() {
+                let [_, _, left, right] = cell.touches();
+                used[x] |= u32::from(left);
+                used[x + 1] |= u32::from(right);
             }
         }
-        used.iter().zip(0..).filter(|(used, _)| **used).map(|(_, i)| i).collect()
+        if y < self.rows {
+            for (x, cell) in row(y).iter().enumerate() {
+                let [left, right, _, _] = cell.touches();
+                used[x] |= u32::from(left);
+                used[x + 1] |= u32::from(right);
+            }
+        }
+        used.iter().sum()
     }
 
     /// All triangles, of nodes numbered by `numbers`.
@@ -109,15 +156,8 @@ impl Cells {
         let rows = self.all.par_chunks(self.columns.max(1));
         let counts: Vec<usize> = rows.clone().map(|row| row.iter().map(|cell| cell.count()).sum()).collect();
         let mut faces = vec![[0; 3]; counts.iter().sum()];
-        let mut rest = faces.as_mut_slice();
-        let mut parts = Vec::with_capacity(counts.len());
-        for count in counts {
-            let part;
-            (part, rest) = rest.split_at_mut(count);
-            parts.push(part);
-        }
         let stride = self.columns + 1;
-        parts.into_par_iter().zip(rows).enumerate().for_each(|(y, (out, row))| {
+        parts(&mut faces, &counts).into_par_iter().zip(rows).enumerate().for_each(|(y, (out, row))| {
             let mut out = out.iter_mut();
             for (x, cell) in row.iter().enumerate() {
                 let i = y * stride + x;

@@ -11,14 +11,16 @@ mod holes;
 mod nodes;
 mod normals;
 mod params;
+mod row;
 mod vector;
 
-use cells::Cells;
+use cells::{Cells, Vertices, parts};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
 use nodes::{Grid, Links, Nodes};
-use normals::{Field, Normal};
+use normals::Field;
 use params::HOLE_MAX_PX;
 use rayon::prelude::*;
+use row::NormalRow;
 
 use crate::error::{Error, Result};
 
@@ -136,10 +138,10 @@ pub fn normals_from_points(points: &Points<'_>) -> Result<Normals> {
     let mut normals = Array3::zeros((rows, columns, 3));
     let mut uncertainty_rad = Array2::zeros((rows, columns));
     let outs = normals.axis_iter_mut(Axis(0)).into_par_iter().zip(uncertainty_rad.axis_iter_mut(Axis(0)));
-    outs.enumerate().for_each(|(y, (mut directions, mut uncertainties))| {
-        let row = directions.rows_mut().into_iter().zip(&mut uncertainties).enumerate();
-        row.for_each(|(x, (mut out, uncertainty_rad))| {
-            let normal = field.normal([y, x]);
+    outs.enumerate().for_each_init(NormalRow::default, |row, (y, (mut directions, mut uncertainties))| {
+        let mut next = directions.rows_mut().into_iter().zip(&mut uncertainties);
+        field.row(y, 0..columns, row, |normal| {
+            let (mut out, uncertainty_rad) = next.next().expect("one for each column");
             out.iter_mut().zip(normal.direction).for_each(|(out, c)| *out = c);
             *uncertainty_rad = normal.uncertainty_rad;
         });
@@ -166,20 +168,24 @@ fn check(points: &Points<'_>) -> Result<()> {
 /// The triangles of a grid, whose nodes are numbered in the order of the image.
 fn gathered(grid: &Grid, step: usize, is_filled: impl Fn([u32; 2]) -> bool + Sync) -> Mesh {
     let (nodes, cells) = (&grid.nodes, Cells::new(grid));
-    let places = cells.used(nodes);
-    let mut numbers = vec![0; nodes.all.len()];
-    places.iter().zip(0..).for_each(|(i, number)| numbers[*i as usize] = number);
-    let (columns, field) = (nodes.columns as u32, Field::new(grid, &cells));
-    let normals = places.par_iter().map(|i| {
-        let Normal { direction, uncertainty_rad } =
-            field.normal([i / columns, i % columns].map(|at| at as usize));
-        (direction, uncertainty_rad)
+    let Vertices { mut pixels, numbers, counts } = cells.numbered(nodes);
+    let (field, count) = (Field::new(grid, &cells), pixels.len());
+    let (mut points_mm, mut normals) = (vec![[0.0; 3]; count], vec![[0.0; 3]; count]);
+    let mut normal_uncertainty_rad = vec![0.0; count];
+    let out = parts(&mut normals, &counts).into_par_iter().zip(parts(&mut normal_uncertainty_rad, &counts));
+    let out = out.zip(parts(&mut points_mm, &counts)).zip(parts(&mut pixels, &counts));
+    out.enumerate().for_each_init(NormalRow::default, |row, (y, (((normals, angles), points), pixels))| {
+        let columns = pixels.iter().map(|[_, x]| *x as usize);
+        let mut next = normals.iter_mut().zip(angles);
+        field.row(y, columns.clone(), row, |found| {
+            let (normal, angle) = next.next().expect("one for each column");
+            (*normal, *angle) = (found.direction, found.uncertainty_rad);
+        });
+        points.iter_mut().zip(columns).for_each(|(point, x)| *point = nodes.all[y * nodes.columns + x].point);
+        pixels.iter_mut().flatten().for_each(|at| *at *= step as u32);
     });
-    let (normals, normal_uncertainty_rad) = normals.unzip();
-    let pixels: Vec<[u32; 2]> =
-        places.par_iter().map(|i| [i / columns, i % columns].map(|at| at * step as u32)).collect();
     Mesh {
-        points_mm: places.par_iter().map(|i| nodes.all[*i as usize].point).collect(),
+        points_mm,
         normals,
         normal_uncertainty_rad,
         filled: pixels.par_iter().map(|at| is_filled(*at)).collect(),

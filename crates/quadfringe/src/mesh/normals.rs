@@ -3,6 +3,7 @@
 use super::cells::Cells;
 use super::correlation::Shares;
 use super::nodes::{Grid, Node, Nodes};
+use super::row::NormalRow;
 use super::vector::{Vector, cross, difference, dot, length, scaled, sum, wide};
 
 /// Unit normal of a node towards the camera, and the root mean square angle in rad between it and the true one.
@@ -28,9 +29,24 @@ impl<'a> Field<'a> {
         Self { grid, cells, rows, columns }
     }
 
+    /// Gives the normals of the nodes at these columns of row `y` to `put`.
+    pub fn row(
+        &self,
+        y: usize,
+        columns: impl Iterator<Item = usize>,
+        row: &mut NormalRow,
+        mut put: impl FnMut(Normal),
+    ) {
+        row.fill(self.grid, y, self.rows, self.columns);
+        for x in columns {
+            let found = row.at(x);
+            put(if found.direction[2].is_nan() { self.normal([y, x]) } else { found });
+        }
+    }
+
     /// The normal of the node at (row, column), from its neighbours along row and column, else from the triangles that
     /// hold it.
-    pub fn normal(&self, [y, x]: [usize; 2]) -> Normal {
+    fn normal(&self, [y, x]: [usize; 2]) -> Normal {
         let Grid { nodes, links } = self.grid;
         let i = y * nodes.columns + x;
         let node = wide(nodes.all[i].point);

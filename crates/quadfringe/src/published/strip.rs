@@ -2,7 +2,6 @@
 
 use super::Unwrapping;
 use super::uncertainty::{ShotStatistics, two_step_sigma};
-use crate::Shot;
 use crate::condition::{Plan, Sample};
 use crate::decode::output::OutputRow;
 use crate::parallel::Aligned;
@@ -11,6 +10,7 @@ use crate::stages::{
     self, Background, BackgroundScratch, Blocks, Half, Interpolation, Judged, Limits, Phases, RowFilter,
     RowPair, RowScratch, coarsen, lesser, row_background, with_turns_of,
 };
+use crate::{Reason, Shot};
 use multiversion::multiversion;
 
 /// The published background: half the sum of the envelopes.
@@ -254,20 +254,26 @@ impl Strip {
         let Quadrature { red, blue } = &self.quadrature[i];
         let fringes = red.iter().zip(&*self.levels.red).zip(blue.iter().zip(&*self.levels.blue));
         let known = self.absolute.iter().zip(&*self.margin).zip(&*self.power);
-        let maps = out.phase.iter_mut().zip(out.quality.iter_mut());
+        let maps = out.phase.iter_mut().zip(out.quality.iter_mut()).zip(out.reason.iter_mut());
         let maps = maps.zip(out.modulation.iter_mut().zip(out.sigma.iter_mut()));
-        for ((fringes, known), ((phase, quality), (modulation, sigma))) in fringes.zip(known).zip(maps) {
+        for ((fringes, known), (((phase, quality), reason), (modulation, sigma))) in
+            fringes.zip(known).zip(maps)
+        {
             let (((red, red_level), (blue, blue_level)), ((absolute, margin), power)) = (fringes, known);
+            // A quarter period apart, fringes of the two are never dark together.
+            let light = red.max(*blue);
             let (red, blue) = (red - red_level, (blue - blue_level) * ratio);
             *sigma = two_step_sigma(red, blue, ratio, noise);
             *modulation = lesser(*power, red * red + blue * blue).sqrt();
             let judged = Judged::of(*margin, *modulation, limits);
             *phase = judged.phase(with_turns_of(*absolute, atan2(-blue, red)));
             *quality = judged.quality(*margin);
+            *reason = judged.reason(light, limits);
         }
         out.wrong.copy_from_slice(&self.wrong);
         for &x in &self.gaps[i] {
             [out.phase[x], out.quality[x], out.modulation[x]] = [f32::NAN; 3];
+            out.reason[x] = Reason::NoImage;
         }
     }
 }

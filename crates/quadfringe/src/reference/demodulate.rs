@@ -108,7 +108,7 @@ pub(super) struct SetRow {
     /// Variance of the phase in rad^2 for intensities of variance 1 and fringes of modulation 1.
     pub gain: Aligned<f32>,
     /// Brightest sample, fraction of full scale before the response.
-    peak: Aligned<f32>,
+    pub peak: Aligned<f32>,
 }
 
 impl SetRow {

@@ -6,6 +6,7 @@ use super::noise::NoiseSamples;
 use super::params::{SAMPLE_STRIDE, WRONG_MAX};
 use super::search::{Found, Phases, Search, Variances};
 use super::trust::Agreement;
+use crate::Reason;
 use crate::condition::Sample;
 use crate::decode::output::{OutputRow, hole_unless};
 use multiversion::multiversion;
@@ -134,8 +135,10 @@ impl Writer {
     /// Writes block `b` of a row.
     #[inline(always)]
     fn write(&self, modulation_min: f32, work: &Work, b: usize, out: &mut OutputRow<'_>) {
-        let mut least = [f32::MAX; BLOCK];
+        let (mut least, mut peaks) = ([f32::MAX; BLOCK], [0.0f32; BLOCK]);
         for row in &work.rows {
+            let brightest = peaks.iter_mut().zip(&row.peak.as_chunks::<BLOCK>().0[b]);
+            brightest.for_each(|(peak, seen)| *peak = peak.max(*seen));
             for (least, modulation) in least.iter_mut().zip(&row.modulation.as_chunks::<BLOCK>().0[b]) {
                 // Written so that NaN, of saturated pixels, stays.
                 *least = if *least < *modulation { *least } else { *modulation };
@@ -154,6 +157,12 @@ impl Writer {
             out.modulation[x] = least[i];
             out.quality[x] = 1.0 - (cost[i] / next[i]).sqrt() + unlit;
             out.wrong[x] = wrong + hole;
+            let lit = if wrong <= WRONG_MAX { Reason::Returned } else { Reason::DoubtfulOrder };
+            out.reason[x] = match least[i] {
+                unknown if unknown.is_nan() => Reason::Saturated,
+                least if least < modulation_min => Reason::without_fringes(peaks[i], modulation_min),
+                _ => lit,
+            };
             let excess = if cost[i] > self.usual { cost[i] / self.usual } else { 1.0 };
             out.sigma[x] = turn * (excess / precision[i]).sqrt() + hole;
         }

@@ -4,7 +4,7 @@
 //! decision between two orders may have the wrong one; its margin is low. Both become NaN.
 
 use super::Absolute;
-use crate::{Error, Result};
+use crate::{Error, Reason, Result};
 use ndarray::{Array2, ArrayView2, Zip};
 
 /// Limits below which a pixel has no data.
@@ -82,6 +82,14 @@ impl Judged {
     #[inline(always)]
     pub fn phase(self, phase: f32) -> f32 {
         if self.valid { phase } else { f32::NAN }
+    }
+
+    /// Why a pixel has no data, of which R and B have at most this `light`.
+    #[inline(always)]
+    pub fn reason(self, light: f32, limits: Limits) -> Reason {
+        let doubt = if self.lit { Reason::DoubtfulOrder } else { Reason::LowModulation };
+        let doubt = if light < limits.modulation_min { Reason::Shadow } else { doubt };
+        if self.valid { Reason::Returned } else { doubt }
     }
 
     #[inline(always)]

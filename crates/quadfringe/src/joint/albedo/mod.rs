@@ -57,6 +57,7 @@ impl Albedo {
                 let first = block * ROWS;
                 let rows = out.len() / (4 * width);
                 let Work { fringes, rows: all, .. } = &mut **work;
+                fringes.clear();
                 for (row, y) in all[..rows].iter_mut().zip(first..) {
                     row.predict(scene, y, energy.fringes(scene, y, fringes), known);
                 }

@@ -1,9 +1,10 @@
 //! The cells of a shot: means of a few pixels, which the tiles read, and the way back to the pixels.
 
 use super::tile::Tile;
+use crate::Reason;
 use crate::joint::cells::{blend, spread};
 use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, SPREAD_MAX_RAD, USABLE_MIN};
-use crate::joint::scene::{PhaseMap, Scene};
+use crate::joint::scene::{PhaseMap, Pixels, Scene};
 use crate::parallel::lanes::LANES;
 use rayon::prelude::*;
 
@@ -60,7 +61,16 @@ pub(in crate::joint) struct FringeRows {
     pub cells: [[Vec<f32>; 4]; 3],
     /// Pixels along a side of a cell.
     pub cell_px: usize,
+    /// Row of cells in the middle of `cells`; `None` before the first row of a shot.
+    middle: Option<usize>,
     rows: Rows,
+}
+
+impl FringeRows {
+    /// Forgets the rows of an earlier shot.
+    pub fn clear(&mut self) {
+        self.middle = None;
+    }
 }
 
 /// Working rows.
@@ -151,17 +161,20 @@ impl Cells {
     }
 
     /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, phase: &mut [f32], modulation: &mut [f32]) {
+    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
         let stride = scene.grid.stride;
-        let pixels = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride)).enumerate();
-        pixels.for_each_init(Rows::default, |rows, (y, (phase, modulation))| {
+        let Pixels { phase, modulation, excluded } = pixels;
+        let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
+        let rows = planes.zip(excluded.par_chunks_mut(stride)).enumerate();
+        rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
             self.interpolate(&self.phase, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);
-            for ((phase, modulation), (sum, weight)) in phase.iter_mut().zip(modulation).zip(found) {
+            let pixels = phase.iter_mut().zip(modulation).zip(reasons);
+            for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
                 let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
                 *phase += correction;
-                if correction.abs() > MOVED_MAX_RAD {
-                    *modulation = 0.0;
+                if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
+                    (*modulation, *reason) = (0.0, Reason::Misfit);
                 }
             }
         });
@@ -178,14 +191,16 @@ impl Cells {
 
     /// Albedo and contrast along row `y` of the scene.
     pub fn fringes(&self, scene: &Scene<'_>, y: usize, out: &mut FringeRows) {
-        let FringeRows { albedo, contrast, cells, cell_px, rows } = out;
+        let FringeRows { albedo, contrast, cells, cell_px, middle, rows } = out;
         *cell_px = self.factor;
-        let middle = (y / self.factor).min(self.height - 1);
-        let around = [middle.saturating_sub(1), middle, (middle + 1).min(self.height - 1)];
-        for (row, out) in around.into_iter().zip(cells) {
-            for (map, out) in self.light.iter().zip(out) {
-                let row = &map[row * self.stride..][..self.stride];
-                repeat(row, self.factor, scene.grid.stride, out);
+        let here = (y / self.factor).min(self.height - 1);
+        if middle.replace(here) != Some(here) {
+            let around = [here.saturating_sub(1), here, (here + 1).min(self.height - 1)];
+            for (row, out) in around.into_iter().zip(cells) {
+                for (map, out) in self.light.iter().zip(out) {
+                    let row = &map[row * self.stride..][..self.stride];
+                    repeat(row, self.factor, scene.grid.stride, out);
+                }
             }
         }
         self.between(&self.inside, scene, y, &mut rows.mix, &mut rows.weight);

@@ -20,7 +20,7 @@ mod tile;
 mod value;
 
 use super::params::energy::{CELL_MAX_PX, CELLS_PER_PERIOD_MIN, SMALL_CELLS_PER_PERIOD_MIN};
-use super::scene::{PhaseMap, Scene};
+use super::scene::{Pixels, Scene};
 use crate::parallel::slots::Slots;
 use cells::{CellFit, Cells};
 use layout::Axis;
@@ -48,10 +48,10 @@ pub(super) struct Prior {
 impl Energy {
     /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
     /// one of the two is wrong. The modulation becomes 0 there, so that step 8 treats such pixels and their neighbours as it treats
-    /// the border of a shadow.
-    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, phase: &mut [f32], modulation: &mut [f32]) {
+    /// the border of a shadow; their reason is a misfit.
+    pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
         let factor = cell_px(scene.period_px);
-        self.cells.average(scene, PhaseMap { phase, modulation }, factor);
+        self.cells.average(scene, pixels.map(), factor);
         let Self { cells, tiles, slots } = self;
         let [rows, columns] = [cells.height, cells.width].map(Axis::new);
         let across = columns.origins.len();
@@ -70,7 +70,7 @@ impl Energy {
         );
         let tiles = &*tiles;
         cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
-        cells.correct(scene, phase, modulation);
+        cells.correct(scene, pixels);
     }
 
     /// Albedo and contrast along row `y` of the scene.

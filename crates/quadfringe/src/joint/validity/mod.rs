@@ -13,6 +13,7 @@ use super::params::validity::{
     PIXEL_RESIDUAL_NOISES_MAX, RESIDUAL_NOISES_MAX, SEED_SIDE,
 };
 use super::scene::{PhaseMap, Scene};
+use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::parallel::slots::Slots;
 use components::{Components, SizeLimits};
@@ -55,6 +56,8 @@ pub(super) struct Limits {
 pub(super) struct Validity {
     /// 1 for valid pixels, 0 elsewhere.
     pub valid: Vec<u8>,
+    /// Why a pixel with fringes is not valid.
+    pub reasons: Vec<Reason>,
     discontinuities: Discontinuities,
     /// 1 for pixels at or next to an order jump.
     excluded: Vec<u8>,
@@ -102,12 +105,14 @@ impl Validity {
         let grid = scene.grid;
         self.components.resize(grid.pixels(), 0);
         self.consistent.resize(grid.pixels(), 0);
-        let Self { components, consistent, excluded, support, slots, .. } = self;
+        self.reasons.resize(grid.pixels(), Reason::Returned);
+        let Self { components, consistent, reasons, excluded, support, slots, .. } = self;
         let masks = components.par_chunks_mut(grid.stride).zip(consistent.par_chunks_mut(grid.stride));
+        let masks = masks.zip(reasons.par_chunks_mut(grid.stride));
         let rows = quality.par_chunks_mut(grid.width).zip(masks).enumerate();
         rows.for_each_init(
             || slots.take(),
-            |slot, (y, (quality, (passed, consistent)))| {
+            |slot, (y, (quality, ((passed, consistent), reasons)))| {
                 let Rows { maps, sums, lead } = &mut slot.rows;
                 lead.clear();
                 for node in orders.verdicts(scene, y / grid.step) {
@@ -122,7 +127,7 @@ impl Validity {
                     support: &support.row(grid, y, maps)[..grid.width],
                     excluded: &scene.row(excluded, y)[..grid.width],
                 };
-                let out = VerdictRow { quality, passed, consistent };
+                let out = VerdictRow { quality, passed, consistent, reasons };
                 check_row(&known, limits, sums, out);
             },
         );
@@ -147,6 +152,8 @@ struct VerdictRow<'a> {
     quality: &'a mut [f32],
     passed: &'a mut [u8],
     consistent: &'a mut [u8],
+    /// Why the pixel is not valid, if it is not.
+    reasons: &'a mut [Reason],
 }
 
 /// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
@@ -166,6 +173,7 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
     let (lead, support, excluded) = (&known.lead[..width], &known.support[..width], &known.excluded[..width]);
     let (quality, passed, consistent) =
         (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
+    let reasons = &mut out.reasons[..width];
     let floors = [RESIDUAL_NOISES_MAX, PIXEL_RESIDUAL_NOISES_MAX]
         .map(|most| (most * limits.noise) * (most * limits.noise));
     for x in 0..width {
@@ -178,7 +186,11 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
             && here[x] <= floors[1] + pixel_share * pixel_share;
         quality[x] = order_quality + hole_unless(lit);
         let certain = lit & (order_quality >= limits.quality_min);
-        passed[x] = u8::from(certain & agrees & (excluded[x] == 0));
+        let apart = excluded[x] != 0;
+        passed[x] = u8::from(certain & agrees & !apart);
+        let doubt = if certain { Reason::SmallPiece } else { Reason::DoubtfulOrder };
+        let doubt = if agrees { doubt } else { Reason::Misfit };
+        reasons[x] = if apart { Reason::Discontinuity } else { doubt };
         consistent[x] = u8::from(lit & (here[x] <= floors[0] + grown_share * grown_share));
     }
 }
@@ -201,6 +213,7 @@ mod tests {
         let (mut squared_residual, mut pixel_modulation) = ([0.0; 16], [0.4; 16]);
         (squared_residual[4], squared_residual[12], pixel_modulation[12]) = (0.01, 0.01, 0.1);
         let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [0; 16]);
+        let mut reasons = [Reason::Returned; 16];
         let known = CheckRow {
             squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
             modulation: &[0.4; 16],
@@ -209,10 +222,16 @@ mod tests {
             support: &[1.0; 16],
             excluded: &[0; 16],
         };
-        let out = VerdictRow { quality: &mut quality, passed: &mut passed, consistent: &mut consistent };
+        let out = VerdictRow {
+            quality: &mut quality,
+            passed: &mut passed,
+            consistent: &mut consistent,
+            reasons: &mut reasons,
+        };
         check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, &mut Vec::new(), out);
         for marks in [passed, consistent] {
             assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
         }
+        assert_eq!((reasons[12], reasons[0]), (Reason::Misfit, Reason::SmallPiece));
     }
 }
