@@ -85,7 +85,9 @@ class Series:
             raise InputError(f"{self.path}: shot {shot}: cannot be read: {error}") from error
         settings = self.config.model_dump(mode="json", exclude_none=True)
         columns = self._columns(maps["phase_rad"])
-        return Shape(**maps, column_px=columns, xyz_mm=xyz_mm, config=settings, calibration=self.calibration)
+        phase_rad, modulation, quality = (maps[name] for name in ("phase_rad", "modulation", "quality"))
+        known = Shape(phase_rad, columns, modulation, quality, xyz_mm=xyz_mm)
+        return known.with_settings(settings, self.calibration)
 
     def _columns(self, phase_rad: NDArray[np.float32]) -> NDArray[np.float32]:
         width_px = math.nan if self.calibration is None else self.calibration.projector.width_px
