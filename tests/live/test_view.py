@@ -50,7 +50,7 @@ def test_a_saved_face_is_seen(browser: Any, face: Shape, tmp_path: Path, shots: 
         (shots / f"view-{name}.png").write_bytes(page.screenshot())
         page.close()
     shown = image.min(axis=2) < 240  # the page is white, and the squares are light
-    assert shown[150:350, 300:500].mean() > 0.9, "the shape is not in the middle"
+    assert shown[150:350, 300:500].mean() > 0.7, "the shape is not in the middle"
     assert np.ptp(image[shown], axis=1).mean() > 15, "the squares have no colours"
     hosts = {url.split("/")[2].split(":")[0] for url in asked if url.startswith(("http", "ws"))}
     assert hosts == {"127.0.0.1"}
