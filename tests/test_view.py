@@ -269,7 +269,7 @@ def test_other_stores_are_refused(series: Path, tmp_path: Path) -> None:
 
 def test_the_slider_shows_shots_and_says_why_one_has_no_shape(series: Path) -> None:
     with SavedViewer([series], port=8550) as page:
-        for shot, words in ((1, "shot 1 has no shape"), (2, "shot 2 of 3")):
+        for shot, words in ((1, "shot 1 has no shape"), (2, "shot 2 (0 to 2)")):
             page._shot.value = shot
             page._update()
             assert words in page._words.content

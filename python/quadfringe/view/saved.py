@@ -122,7 +122,7 @@ class SavedViewer:
         surface = one_of(DRAWN, self._drawn.value, self._first_drawn) == "surface"
         self._scene.draw(self._item.body(colouring, step, surface=surface))
         missing = "" if asked == colouring else f" · **no {asked} in this file**"
-        which = f"shot {shot} of {file.count}: " if file.is_series else ""
+        which = f"shot {shot} (0 to {file.count - 1}): " if file.is_series else ""
         self._words.content = f"{_plain(file.path.name)} · {which}{self._item.words}{missing}"
 
     def _shot_of(self, file: Opened) -> int:
