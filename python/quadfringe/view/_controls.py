@@ -23,8 +23,8 @@ __all__ = [
 
 Drawn = Literal["surface", "points"]
 DRAWN: tuple[Drawn, ...] = get_args(Drawn)
-# Points are the default of the live page: a browser without a graphics card shows 1.3 surfaces and 1.9 pictures a second
-# in place of 3.2 clouds and 6.6 pictures, on a machine with other load (python benches/live.py --browser [--surface]).
+# Points are the default of the live page: a browser without a graphics card shows 1.3 surfaces and 1.9 pictures per
+# second, or 3.2 clouds and 6.6 pictures, on a machine with other load (python benches/live.py --browser [--surface]).
 CLOUDS_PER_S = 4.0  # the default: a browser without a graphics card keeps up with it
 CLOUD_RATES = (0.1, 100.0)
 STRIDES = ("1", "2", "4", "8", "16")
