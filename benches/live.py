@@ -1,14 +1,15 @@
 """Live view: point clouds per second to a websocket client and to a browser while decoding, and memory.
 
-    python benches/live.py [--seconds 30] [--browser [--screenshot FILE.png]] [--clouds 2] [--json FILE]
+    python benches/live.py [--seconds 30] [--browser [--screenshot FILE.png]] [--surface] [--clouds 2] [--json FILE]
 
 A camera of 30 shots a second repeats six shots of the moving hand, 1024 x 768; the published method decodes them and
 the viewer serves them. A client in another process receives full-resolution clouds without drawing them. The memory
 figure is the growth of the serving process from the second third of the time to the last. With --browser, Debian's
 chromium draws every 4th point of every 4th row in software, at the rate of `quadfringe live`; --clouds sets another
-rate: more clouds leave less time for pictures and figures. Clouds are counted at their upload to OpenGL, pictures and
-figures at changes of the page. Bars: 10 clouds/s to the client; 1 cloud/s, 5 pictures/s and 5 figures/s in the
-browser; the exit status is 1 below them.
+rate: more clouds leave less time for pictures and figures. With --surface, a cloud is a surface through these points.
+Clouds are counted at their upload to OpenGL, pictures and figures at changes of the page. Bars: 10 clouds/s to the
+client; 1 cloud/s, 5 pictures/s and 5 figures/s in the browser; the exit status is 1 below them. Surfaces, which are
+for graphics cards, have no bars.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from quadfringe.evaluation._page import Page
 from quadfringe.evaluation.machine import resident_bytes
 from quadfringe.files import figures_text
 from quadfringe.scanner.streaming import LiveStream
-from quadfringe.view.viewer import CLOUDS_PER_S, Viewer
+from quadfringe.view.viewer import CLOUDS_PER_S, Drawn, Viewer
 
 SHOTS, RATE_HZ = 6, 30.0
 WARM_UP_S = 8.0
@@ -70,14 +71,17 @@ def hand_shots() -> tuple[list[AnyShot], qf.Scanner]:
     return list(scanner.camera.stream(SHOTS, keep="all")), scanner
 
 
-def served(seconds: float, clouds_per_s: float, *, browser: bool, screenshot: Path | None = None) -> dict[str, float]:
+def served(
+    seconds: float, clouds_per_s: float, *, browser: bool, drawn: Drawn, screenshot: Path | None = None
+) -> dict[str, float]:
     shots, scanner = hand_shots()
     memory: list[float] = []
     command = [sys.executable, __file__, "--seconds", str(seconds), *(["--browser"] if browser else [])]
-    command += [*(["--screenshot", str(screenshot)] if screenshot else []), "--client"]
+    command += [*(["--screenshot", str(screenshot)] if screenshot else [])]
+    command += [*(["--surface"] if drawn == "surface" else []), "--client"]
     with (
         scanner,
-        Viewer(port=8400, stride=4 if browser else 1, clouds_per_s=clouds_per_s) as viewer,
+        Viewer(port=8400, stride=4 if browser else 1, clouds_per_s=clouds_per_s, drawn=drawn) as viewer,
         LiveStream(Carousel(shots, RATE_HZ), scanner.decode) as stream,  # type: ignore[arg-type]
     ):
         follower = threading.Thread(target=viewer.follow, args=(stream,))
@@ -121,10 +125,12 @@ def client(url: str, seconds: float) -> dict[str, float]:
     return {"clouds": asyncio.run(count())}
 
 
-def browser(url: str, seconds: float, screenshot: Path | None) -> dict[str, float]:
+def browser(url: str, seconds: float, screenshot: Path | None, *, surface: bool) -> dict[str, float]:
+    # A surface has several arrays of floats, and one of corners.
+    counters = COUNTERS.replace("Float32Array", "Uint32Array") if surface else COUNTERS
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder, closing(Page(folder)) as page:
         page.ask("Page.enable")
-        page.ask("Page.addScriptToEvaluateOnNewDocument", source=COUNTERS)
+        page.ask("Page.addScriptToEvaluateOnNewDocument", source=counters)
         page.ask("Page.navigate", url=url)
         time.sleep(2 * WARM_UP_S)
         before, begin = page.value("({...window.counts})"), time.monotonic()
@@ -140,21 +146,28 @@ def main() -> int:
     parser.add_argument("--seconds", type=float, default=30.0)
     parser.add_argument("--browser", action="store_true")
     parser.add_argument("--screenshot", type=Path, help="with --browser: the page at the end")
+    parser.add_argument("--surface", action="store_true", help="a shaded surface in place of points")
     parser.add_argument("--clouds", type=float, help="clouds a second that are asked for")
     parser.add_argument("--client", help=argparse.SUPPRESS)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
     if options.client:
         seconds, url = options.seconds, options.client
-        counted = browser(url, seconds, options.screenshot) if options.browser else client(url, seconds)
+        if options.browser:
+            counted = browser(url, seconds, options.screenshot, surface=options.surface)
+        else:
+            counted = client(url, seconds)
         print(json.dumps(counted))
         return 0
     clouds_per_s = options.clouds or (CLOUDS_PER_S if options.browser else SENT_PER_S)
-    figures = served(options.seconds, clouds_per_s, browser=options.browser, screenshot=options.screenshot)
+    drawn: Drawn = "surface" if options.surface else "points"
+    figures = served(options.seconds, clouds_per_s, browser=options.browser, drawn=drawn, screenshot=options.screenshot)
     for key, value in figures.items():
         print(f"{key:36}{value:10.4g}")
     if options.json:
         options.json.write_text(figures_text(figures))
+    if options.surface:
+        return 0
     place, bars = ("browser", BROWSER_BARS) if options.browser else ("client", BARS)
     return int(any(figures[f"live_{place}_{name}_per_s"] < bar for name, bar in bars.items()))
 

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 import viser
-from support.page_clients import VALUES, first_messages, opened, update
+from support.page_clients import CLICK, VALUES, first_messages, opened, update
 from websockets.exceptions import ConnectionClosedError, InvalidStatus
 
 import quadfringe as qf
@@ -69,7 +69,8 @@ def port_of(page: Viewer) -> int:
         ({"stride": 2.5}, "stride: expected a whole number"),
         ({"clouds_per_s": 0.0}, "clouds_per_s: expected 0.1 to 100, got 0.0"),
         ({"clouds_per_s": float("nan")}, "clouds_per_s: expected 0.1 to 100, got nan"),
-        ({"colouring": "red"}, "colouring: expected texture, height, quality, got 'red'"),
+        ({"colouring": "red"}, "colouring: expected texture, height, quality, uncertainty, got 'red'"),
+        ({"drawn": "lines"}, "drawn: expected surface, points, got 'lines'"),
     ],
 )
 def test_wrong_settings_are_named(settings: dict[str, Any], words: str) -> None:
@@ -126,16 +127,48 @@ def test_controls_stay_within_their_limits(measured: Measured) -> None:
 
     from quadfringe.view._controls import Controls
 
-    controls = Controls(Gui(), 2, 4.0, "height")
+    controls = Controls(Gui(), 2, 4.0, "height", "points")
     for value in VALUES:
-        for name in ("_colouring", "_stride", "_clouds_per_s", "_quality", "_still"):
+        for name in ("_drawn", "_colouring", "_stride", "_clouds_per_s", "_quality", "_still"):
             getattr(controls, name).value = value
-        assert controls.colouring in ("texture", "height", "quality")
+        assert controls.surface is (value == "surface")
+        assert controls.colouring in ("texture", "height", "quality", "uncertainty")
         assert controls.stride in (1, 2, 4, 8, 16)
         assert 0.1 <= controls.clouds_per_s <= 100
         assert 0 <= controls.quality <= 1
         assert controls.still is (value is True)
     assert measured.shape is not None
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"event_type": "rect-select"},
+        {"event_type": "rect-select", "ray_origin": None, "ray_direction": None, "screen_pos": [[0, 0], [1, 1]]},
+        {"event_type": ["click"]},
+        {"modifier": "shift"},
+        {"modifier": {}},
+        {"ray_origin": None},
+        {"ray_origin": [0.0, 0.0]},
+        {"ray_origin": [0.0, 0.0, 1e7]},
+        {"ray_origin": [0.0, 0.0, float("nan")]},
+        {"ray_origin": [0.0, 0.0, True]},
+        {"ray_direction": [0.0, 0.0, 2.0]},
+        {"ray_direction": [0.0, 0.0, float("inf")]},
+        {"ray_direction": "001"},
+        {"screen_pos": []},
+        {"screen_pos": [[0.5, 0.5], [0.5, 0.5]]},
+        {"screen_pos": [[0.5, 1e3]]},
+        {"screen_pos": [[0.5, [0.5]]]},
+        {"screen_pos": {"0": [0.5, 0.5]}},
+        {"owner": "1"},
+        {"type": "SceneNodeClickMessage"},
+    ],
+    ids=str,
+)
+def test_only_plain_clicks_are_accepted(change: dict[str, Any]) -> None:
+    assert acceptable(msgspec.msgpack.encode(CLICK))
+    assert not acceptable(msgspec.msgpack.encode(CLICK | change))
 
 
 def test_only_viewpoints_and_values_are_accepted() -> None:

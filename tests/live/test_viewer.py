@@ -6,15 +6,14 @@ import os
 import socket
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from PIL import Image
+from support.pages import painted, picture, shape_on, still_shape_on, until
 
 import quadfringe as qf
 from quadfringe.recording import Recorder, Recording
@@ -37,7 +36,6 @@ noise = 0.01
 [decode]
 method = "published"
 """
-PATIENCE_S = 120.0
 
 
 @pytest.fixture(scope="module")
@@ -60,43 +58,6 @@ def live(system: Path, **settings: Any) -> Iterator[tuple[Viewer, Recorder]]:
             finally:
                 stream.close()
                 follower.join()
-
-
-def until(what: Callable[[], Any], why: str) -> Any:
-    """Repeat a question until there is an answer; fail after a time limit."""
-    end = time.monotonic() + PATIENCE_S
-    while time.monotonic() < end:
-        if (answer := what()) is not None:
-            return answer
-        time.sleep(0.3)
-    return pytest.fail(f"{why} within {PATIENCE_S:g} s")
-
-
-def picture(page: Any) -> np.ndarray:
-    """The middle of the page, without the panel at the right and messages at the top."""
-    image = np.asarray(Image.open(BytesIO(page.screenshot())).convert("RGB")).astype(int)
-    return image[190:700, 60:860]
-
-
-def painted(image: np.ndarray) -> np.ndarray:
-    """Pixels that are neither the white of the page nor the grey of its grid."""
-    return (image.max(axis=2) < 200) | (np.ptp(image, axis=2) > 30)
-
-
-def shape_on(page: Any) -> np.ndarray | None:
-    """The picture once a shape is on it."""
-    image = picture(page)
-    return image if painted(image).mean() > 0.05 else None
-
-
-def still_shape_on(page: Any) -> np.ndarray | None:
-    """The picture of a shape that stands still, once the page has faded in."""
-    first = shape_on(page)
-    if first is None:
-        return None
-    time.sleep(1.0)
-    second = picture(page)
-    return second if np.abs(second - first)[painted(second)].mean() < 1 else None
 
 
 def figures(page: Any) -> dict[str, str]:
@@ -128,11 +89,41 @@ def test_the_page_shows_a_moving_shape(browser: Any, system: Path, tmp_path: Pat
         assert done.refused == 0
 
 
+def test_the_page_shows_a_shaded_surface(browser: Any, tmp_path: Path) -> None:
+    camera = qf.Device(width_px=320, height_px=240, focal_px=(806.0, 806.0), centre_px=(159.5, 119.5))
+    scene = qf.SceneConfig(surface="face", albedo=(0.92, 0.7, 0.58, 0.85))
+    with qf.open(qf.SystemConfig(camera=camera, scene=scene)) as scanner:
+        shot = scanner.grab()
+        shape = scanner.decode(shot)
+    relief = {}
+    for drawn in ("surface", "points"):
+        with Viewer(port=8245, stride=1, drawn=drawn) as viewer:  # type: ignore[arg-type]
+            page = browser.new_page(viewport={"width": 1280, "height": 800})
+            page.goto(viewer.url)
+            until(lambda viewer=viewer: viewer._server.get_clients() or None, "no page")
+            for _ in range(2):  # the second takes the place of the first
+                viewer.show_shape(shot, shape)
+            until(lambda page=page: (picture(page).min(axis=2) < 240).mean() > 0.2 or None, "no shape")
+            time.sleep(2.0)
+            image = picture(page)
+            (Path(os.environ.get("QUADFRINGE_SHOTS", tmp_path)) / f"live-{drawn}.png").write_bytes(page.screenshot())
+            relief[drawn] = brightness_steps(image)
+            page.close()
+    print(relief)
+    assert relief["surface"] > 1.5 * relief["points"], "light and shade show the relief"
+
+
+def brightness_steps(image: np.ndarray) -> float:
+    """How much the brightness of the middle of the shape varies, in grey levels."""
+    grey = image.mean(axis=2)[200:400, 300:500]
+    return float(grey[grey < 254].std())
+
+
 def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
     with qf.open(system) as scanner, scanner.stream(1) as stream:
         measured = next(iter(stream))
     seen = {}
-    for colouring in ("texture", "height", "quality"):
+    for colouring in ("texture", "height", "quality", "uncertainty"):
         with Viewer(port=8235, colouring=colouring) as viewer:  # type: ignore[arg-type]
             viewer.show(measured)  # before any page is open
             page = browser.new_page(viewport={"width": 1280, "height": 800})
@@ -143,6 +134,7 @@ def test_colours_follow_the_choice(browser: Any, system: Path) -> None:
             page.close()
     assert np.abs(seen["texture"] - seen["height"]).max() > 20
     assert np.abs(seen["height"] - seen["quality"]).max() > 20
+    assert np.abs(seen["quality"] - seen["uncertainty"]).max() > 20
 
 
 def test_only_this_machine_is_served_unless_asked() -> None:

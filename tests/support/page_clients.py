@@ -26,9 +26,18 @@ PROTOCOL: Any = f"viser-v{viser.__version__}"
 # Values that a control could be sent, of every type that a message can hold.
 VALUES: list[Any] = [
     *(0, -1, 1, 3, 2**63, -(2**63), 0.0, -0.0, 0.5, 1e-300, 1e300, float("nan"), float("inf"), -float("inf")),
-    *("", "0", "-1", "1e9", "nan", "texture", "x" * 64, "x" * 10_000, "\x1b[2J", "\x00"),
+    *("", "0", "-1", "1e9", "nan", "texture", "surface", "x" * 64, "x" * 10_000, "\x1b[2J", "\x00"),
     *(None, True, False, b"", b"\x00" * 100, [], [1], [[[[]]]], {}, {"value": 1}, {"a": {"b": []}}),
 ]
+# What a page sends for a click into the scene.
+CLICK: dict[str, Any] = {
+    "type": "ScenePointerMessage",
+    "event_type": "click",
+    "ray_origin": [0.0, 0.0, 0.0],
+    "ray_direction": [0.0, 0.0, 1.0],
+    "screen_pos": [[0.5, 0.5]],
+    "modifier": None,
+}
 
 
 def opened(address: str, host: str | None = None, receive_bytes: int | None = None, **options: Any) -> ClientConnection:
@@ -82,7 +91,9 @@ def read_slowly(address: str) -> None:
 def attack(address: str, seed: int = 1) -> None:
     """Connect, send nonsense and break off, again and again."""
     chance = random.Random(seed)
-    attacks: list[Callable[[str, random.Random], None]] = [send_values, flood, pretend, break_off, ask_for_files]
+    attacks: list[Callable[[str, random.Random], None]] = [
+        *(send_values, send_clicks, flood, pretend, break_off, ask_for_files)
+    ]
     while True:
         with suppress(OSError, TimeoutError, EOFError, WebSocketException):
             chance.choice(attacks)(address, chance)
@@ -95,6 +106,15 @@ def send_values(address: str, chance: random.Random) -> None:
         for _ in range(50):
             name = chance.choice(["value", "value", "removed", "sync_cb", "update_cb", "props", "uuid"])
             client.send(update(chance.choice(uuids), **{name: chance.choice(VALUES)}))
+
+
+def send_clicks(address: str, chance: random.Random) -> None:
+    """Click everywhere, and nowhere: with values of every type in place of the ray."""
+    with opened(address) as client:
+        first_messages(client)
+        for _ in range(50):
+            client.send(msgspec.msgpack.encode(CLICK | {"ray_direction": [chance.uniform(-1, 1) for _ in range(3)]}))
+            client.send(msgspec.msgpack.encode(CLICK | {chance.choice(list(CLICK)): chance.choice(VALUES)}))
 
 
 def flood(address: str, chance: random.Random) -> None:

@@ -16,16 +16,20 @@ if TYPE_CHECKING:
 
 __all__ = [
     "METHODS",
+    "AllowHostOption",
     "Bayer",
     "Bits",
     "BitsOption",
     "BoardPosesOption",
     "CalibrationOption",
+    "Colouring",
     "ColumnsOption",
     "FileSizeOption",
     "Fringes3",
+    "HostOption",
     "JsonOption",
     "OutFolder",
+    "PortOption",
     "PredeformedOption",
     "ShotsOption",
     "SystemFile",
@@ -53,6 +57,15 @@ class Bits(StrEnum):
     twelve = "12"
     fourteen = "14"
     sixteen = "16"
+
+
+class Colouring(StrEnum):
+    """What the colours of a page show: the surface itself, depth, quality, or uncertainty."""
+
+    texture = "texture"
+    height = "height"
+    quality = "quality"
+    uncertainty = "uncertainty"
 
 
 JsonOption = Annotated[
@@ -106,6 +119,20 @@ FileSizeOption = Annotated[
     typer.Option(
         "--file-gb", min=0.01, help="Start a new file when one reaches this size, GB; default: one file of any size."
     ),
+]
+HostOption = Annotated[
+    str,
+    typer.Option(
+        help="Address of this machine that the page is served on; 0.0.0.0 shows it to everybody in the network who has "
+        "the token."
+    ),
+]
+AllowHostOption = Annotated[
+    list[str] | None,
+    typer.Option(metavar="NAME", help="A further host name under which the page may be opened; may be repeated."),
+]
+PortOption = Annotated[
+    int, typer.Option(min=1, max=65535, help="Port of the page; when it is taken, the next free port is used.")
 ]
 METHODS = "joint|published"
 

@@ -28,6 +28,7 @@ from quadfringe.cli import (
     reproduce,
     simulate,
     target,
+    view,
 )
 from quadfringe.cli._options import in_words
 from quadfringe.cli._output import cautions, complain
@@ -94,6 +95,7 @@ app.command("simulate")(simulate.simulate)
 app.command("decode")(decode.decode)
 app.command("convert")(convert.convert)
 app.command("measure")(measure.measure)
+app.command("view")(view.view)
 app.command("live")(live.live)
 app.command("record")(record.record)
 app.command("recover")(record.recover)

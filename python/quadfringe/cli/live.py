@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from quadfringe.cli._options import FileSizeOption, ShotsOption, SystemFile
+from quadfringe.cli._options import (
+    AllowHostOption,
+    Colouring,
+    FileSizeOption,
+    HostOption,
+    PortOption,
+    ShotsOption,
+    SystemFile,
+)
 from quadfringe.cli._output import caution, say, stoppable
 from quadfringe.cli.record import require_all_recorded
 
@@ -21,39 +28,20 @@ if TYPE_CHECKING:
 __all__ = ["live"]
 
 
-class Colour(StrEnum):
-    """Colouring of the points: by brightness, by depth, or by quality."""
-
-    texture = "texture"
-    height = "height"
-    quality = "quality"
-
-
 RecordOption = Annotated[
     Path | None, typer.Option(metavar="FILE.h5", help="Also record every raw shot into this new file.")
-]
-HostOption = Annotated[
-    str,
-    typer.Option(
-        help="Address of this machine that the page is served on; 0.0.0.0 shows it to everybody in the network who has "
-        "the token."
-    ),
-]
-AllowHostOption = Annotated[
-    list[str] | None,
-    typer.Option(metavar="NAME", help="A further host name under which the page may be opened; may be repeated."),
-]
-PortOption = Annotated[
-    int, typer.Option(min=1, max=65535, help="Port of the page; when it is taken, the next free port is used.")
 ]
 StrideOption = Annotated[
     int, typer.Option(min=1, max=64, help="Show every n-th pixel of every n-th row; raise it for a slow browser.")
 ]
 CloudsOption = Annotated[
     float,
-    typer.Option(min=0.1, max=100.0, help="Largest number of point clouds per second; a graphics card manages 10."),
+    typer.Option(min=0.1, max=100.0, help="Largest number of shapes per second; a graphics card manages 10."),
 ]
-ColourOption = Annotated[Colour, typer.Option(help="Initial colouring of the points.")]
+ColourOption = Annotated[Colouring, typer.Option(help="Initial colouring.")]
+SurfaceOption = Annotated[
+    bool, typer.Option("--surface/--points", help="Show a shaded surface, which takes a faster browser, or points.")
+]
 
 
 def live(
@@ -63,7 +51,8 @@ def live(
     port: PortOption = 8080,
     view_stride: StrideOption = 2,
     clouds_per_s: CloudsOption = 4.0,
-    colour: ColourOption = Colour.texture,
+    colour: ColourOption = Colouring.texture,
+    surface: SurfaceOption = False,
     shots: ShotsOption = None,
     file_gb: FileSizeOption = None,
     allow_host: AllowHostOption = None,
@@ -81,15 +70,9 @@ def live(
 
     with ExitStack() as stack:
         # Before the scanner, so that a wrong address is reported before a camera is taken.
-        viewer = Viewer(
-            host,
-            port,
-            stride=view_stride,
-            colouring=colour.value,
-            clouds_per_s=clouds_per_s,
-            allow_hosts=allow_host or (),
-        )
-        stack.enter_context(viewer)
+        shown: dict[str, Any] = {"stride": view_stride, "colouring": colour.value, "clouds_per_s": clouds_per_s}
+        shown["drawn"] = "surface" if surface else "points"
+        viewer = stack.enter_context(Viewer(host, port, allow_hosts=allow_host or (), **shown))
         scanner = stack.enter_context(open_system(system))
         recorder = None
         if record is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from quadfringe.errors import require
 from quadfringe.files import atomic
+from quadfringe.io.glb import encoded, glb_bytes
 
 __all__ = ["Triangles", "grey", "srgb", "write_depth", "write_mesh", "write_npz", "write_ply"]
 
@@ -51,9 +52,7 @@ def _white(light: NDArray[np.float32]) -> float:
 @cache
 def _srgb_table() -> NDArray[np.uint8]:
     """Give the code of each of 4096 levels of light (IEC 61966-2-1)."""
-    share = np.linspace(0, 1, 4096)
-    coded = np.where(share <= 0.0031308, 12.92 * share, 1.055 * share ** (1 / 2.4) - 0.055)
-    return (coded * 255 + 0.5).astype(np.uint8)
+    return encoded(np.linspace(0, 1, 4096))
 
 
 def write_ply(
@@ -99,16 +98,15 @@ class Triangles:
 def write_mesh(path: Path, mesh: Triangles) -> None:
     """Write a mesh by suffix: .stl, .obj, .ply, or .glb.
 
-    glTF wants metres and y up, and allows neither NaN nor whole numbers of 32 bit: a GLB is turned and has no scalars.
+    glTF wants metres and y up: a GLB is turned and has no scalars.
     """
     require("trimesh", "export")
-    from trimesh.exchange import gltf, obj, ply, stl
+    from trimesh.exchange import obj, ply, stl
 
     suffix = path.suffix.lower()
     if suffix == ".glb":
-        points, normals = mesh.vertices_mm * GLB_FROM_MM, mesh.normals * np.sign(GLB_FROM_MM)
-        turned = replace(mesh, vertices_mm=points, normals=normals, scalars={})
-        content = gltf.export_glb(turned.to_trimesh().scene(), include_normals=True)
+        points, normals = mesh.vertices_mm * GLB_FROM_MM, np.nan_to_num(mesh.normals * np.sign(GLB_FROM_MM))
+        content = glb_bytes(points, mesh.faces, mesh.colour, normals)
     elif suffix == ".obj":
         content = obj.export_obj(mesh.to_trimesh(), include_normals=True).encode()
     elif suffix == ".ply":

@@ -1,7 +1,7 @@
-"""Pictures of shots and shapes: reports, movies, and the live page in the browser.
+"""Pictures of shots and shapes: reports, movies, and the pages of live and of saved shapes in the browser.
 
 The modules are imported when they are first used, because each needs another optional library: `report` needs
-matplotlib, `viewer` needs viser, `movie` and `colours` need OpenCV only.
+matplotlib, `viewer` and `saved` need viser, `movie` and `colours` need OpenCV only.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from quadfringe.view import colours, movie, report, viewer
+    from quadfringe.view import colours, measuring, movie, report, saved, viewer
 
-__all__ = ["colours", "movie", "report", "viewer"]
+__all__ = ["colours", "measuring", "movie", "report", "saved", "viewer"]
 
 
 def __getattr__(name: str) -> ModuleType:

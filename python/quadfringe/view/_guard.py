@@ -22,7 +22,7 @@ TOKEN = "token"
 UNKNOWN_NAME = "expected a name of this machine or one given with --allow-host"
 FOREIGN_PAGE = "the live page answers only to itself, not to other pages"
 NO_PARAMETERS = "the live page takes no parameter but token"
-NEEDS_TOKEN = "the live page needs its token: open the address that quadfringe live printed, which ends in ?token=..."
+NEEDS_TOKEN = "the live page needs its token: open the address that quadfringe printed, which ends in ?token=..."
 
 
 class Headers(Protocol):

@@ -1,7 +1,7 @@
-"""What pages may send: the viewpoint, and values of controls. Everything else is dropped.
+"""What pages may send: the viewpoint, values of controls, and clicks into the scene. Everything else is dropped.
 
-viser takes every message type from every page and sets any attribute that a message names. The live page sends two
-types only, so that nothing is lost by reading each message before viser does.
+viser takes every message type from every page and sets any attribute that a message names. The pages send three types
+only, so that nothing is lost by reading each message before viser does.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ __all__ = ["LARGEST_MESSAGE_BYTES", "acceptable"]
 LARGEST_MESSAGE_BYTES = 16_384  # a viewpoint has 300
 LONGEST_TEXT = 64
 LONGEST_VECTOR = 4
+FARTHEST_M = 1e6  # from the middle of the scene to the eye; the page draws to 1000 m
+CLICK = {"type", "event_type", "ray_origin", "ray_direction", "screen_pos", "modifier"}
 
 
 def acceptable(message: object) -> bool:
-    """Tell whether a message of a page is a viewpoint or the value of a control, made of finite numbers.
+    """Tell whether a message of a page is a viewpoint, the value of a control or a click, made of finite numbers.
 
     >>> acceptable(b"no message"), acceptable("text")
     (False, False)
@@ -31,7 +33,7 @@ def acceptable(message: object) -> bool:
         content = msgspec.msgpack.decode(message)
     except (msgspec.MsgspecError, RecursionError, ValueError):
         return False
-    return isinstance(content, dict) and (_is_value(content) or _is_viewpoint(content))
+    return isinstance(content, dict) and (_is_value(content) or _is_viewpoint(content) or _is_click(content))
 
 
 def _is_value(content: dict[Any, Any]) -> bool:
@@ -54,6 +56,23 @@ def _is_viewpoint(content: dict[Any, Any]) -> bool:
         and all(len(vector) <= LONGEST_VECTOR for vector in vectors)
         and all(_is_number(value) for value in (*numbers, *(part for vector in vectors for part in vector)))
     )
+
+
+def _is_click(content: dict[Any, Any]) -> bool:
+    """Tell whether this is a click without keys; viser would also take rectangles, and clicks that name objects."""
+    return (
+        content.keys() == CLICK
+        and (content["type"], content["event_type"], content["modifier"]) == ("ScenePointerMessage", "click", None)
+        and _is_vector(content["ray_origin"], 3, FARTHEST_M)
+        and _is_vector(content["ray_direction"], 3, 1.001)
+        and isinstance(content["screen_pos"], list)
+        and len(content["screen_pos"]) == 1
+        and _is_vector(content["screen_pos"][0], 2, 2.0)
+    )
+
+
+def _is_vector(value: object, length: int, most: float) -> bool:
+    return isinstance(value, list) and len(value) == length and all(_is_number(v) and abs(v) <= most for v in value)
 
 
 def _is_plain(value: object) -> bool:

@@ -3,17 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal, get_args
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
-from quadfringe.io.export import srgb
+from quadfringe.io.export import grey, srgb
 
-__all__ = ["Picture", "channels_picture", "coloured", "limits_of", "phase_picture", "texture"]
+__all__ = [
+    "COLOURINGS",
+    "Colouring",
+    "Picture",
+    "channels_picture",
+    "coloured",
+    "limits_for",
+    "limits_of",
+    "phase_picture",
+    "texture",
+]
 
+Colouring = Literal["texture", "height", "quality", "uncertainty"]
+COLOURINGS: tuple[Colouring, ...] = get_args(Colouring)
 Picture = NDArray[np.uint8]
 Map = NDArray[np.float32]
 NO_DATA = 90  # grey level of pixels without data: distinct from black and from every colour of the map
@@ -28,6 +40,14 @@ def limits_of(values: Map) -> tuple[float, float]:
     low, high = (float(v) for v in np.quantile(finite, (0.04, 0.96)))
     low, high = low - 0.1 * (high - low), high + 0.1 * (high - low)
     return (low, high if high > low else low + 1.0)
+
+
+def limits_for(colouring: Colouring, values: Map) -> tuple[float, float]:
+    """Return the range of values that the colours span: of quality 0 to 1, and of uncertainty from 0."""
+    if colouring == "quality":
+        return (0.0, 1.0)
+    low, high = limits_of(values)
+    return (0.0, max(high, 1e-6)) if colouring == "uncertainty" else (low, high)
 
 
 def coloured(values: Map, limits: tuple[float, float], colours: int = cv2.COLORMAP_TURBO) -> Picture:
@@ -68,11 +88,13 @@ def _tile(image: NDArray[Any], size: tuple[int, int], full_scale: float, planes:
 def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
     """Return the surface as it looks without fringes, every `stride`-th pixel of every `stride`-th row.
 
-    This is the albedo. Without one, the brightness is the modulation, and the colour comes from the mean light in the
-    neighbourhood.
+    This is the albedo, grey by the modulation where it is not known. Without one, the brightness is the modulation, and
+    the colour comes from the mean light in the neighbourhood.
     """
     if shape.albedo is not None:
-        return srgb(shape.albedo[::stride, ::stride])
+        albedo = shape.albedo[::stride, ::stride]
+        shades = grey(shape.modulation[::stride, ::stride])
+        return np.where(np.isfinite(albedo[:, :, :1]), srgb(albedo), shades)
     top = max(limits_of(shape.modulation)[1], 1e-6)
     modulation = np.nan_to_num(shape.modulation[::stride, ::stride])
     brightness = cv2.convertScaleAbs(modulation, alpha=255 / top)
