@@ -1,6 +1,9 @@
 //! Triangles of each cell of the grid, which are four neighbouring nodes.
 
-use super::nodes::{Connection, Grid, Node, Nodes, are_joined};
+use super::links::Grid;
+use super::node_rows::{NodeRow, node};
+use super::nodes::{Connection, Node, Nodes, are_joined};
+use multiversion::multiversion;
 use rayon::prelude::*;
 
 /// Nodes of a cell: upper left, upper right, lower left and lower right, as (row, column) from the upper left one.
@@ -9,55 +12,83 @@ const CORNERS: [[usize; 2]; 4] = [[0, 0], [0, 1], [1, 0], [1, 1]];
 /// The triangles of a cell. Its diagonal falls from the upper left to the lower right node, or rises from the lower left
 /// to the upper right one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Cell {
-    falls: bool,
-    holds: [bool; 2],
-}
-
-/// Which sides of a cell are joined.
-#[derive(Clone, Copy)]
-struct Sides {
-    top: bool,
-    bottom: bool,
-    left: bool,
-    right: bool,
-}
+pub(super) struct Cell(u8);
 
 impl Cell {
-    fn new(corners: [Node; 4], Sides { top, bottom, left, right }: Sides) -> Self {
+    /// The diagonal falls.
+    const FALLS: u8 = 1;
+    /// There is a first and a second triangle.
+    const HOLDS: [u8; 2] = [2, 4];
+
+    /// The triangles of a cell whose top, bottom, left and right are joined or not.
+    #[inline(always)]
+    pub fn new(corners: [Node; 4], [top, bottom, left, right]: [bool; 4]) -> Self {
         let [a, b, c, d] = corners;
         let falls = falls(corners);
-        let diagonal = if falls { are_joined(a, d) } else { are_joined(b, c) };
-        let holds = if falls { [left && bottom, top && right] } else { [left && top, right && bottom] };
-        Self { falls, holds: [holds[0] && diagonal, holds[1] && diagonal] }
+        let (falling, rising) = (are_joined(a, d), are_joined(b, c));
+        let first = if falls { left & bottom & falling } else { left & top & rising };
+        let second = if falls { top & right & falling } else { right & bottom & rising };
+        let mark = |is: bool, mark: u8| if is { mark } else { 0 };
+        Self(mark(falls, Self::FALLS) | mark(first, Self::HOLDS[0]) | mark(second, Self::HOLDS[1]))
+    }
+
+    fn is_falling(self) -> bool {
+        self.0 & Self::FALLS != 0
+    }
+
+    fn holds(self) -> [bool; 2] {
+        Self::HOLDS.map(|mark| self.0 & mark != 0)
     }
 
     /// The triangles, as corners of the cell, counter-clockwise as the camera sees them.
     fn triangles(self) -> impl Iterator<Item = [usize; 3]> {
-        let both = if self.falls { [[0, 2, 3], [0, 3, 1]] } else { [[0, 2, 1], [1, 2, 3]] };
-        both.into_iter().zip(self.holds).filter(|(_, holds)| *holds).map(|(corners, _)| corners)
+        let both = if self.is_falling() { [[0, 2, 3], [0, 3, 1]] } else { [[0, 2, 1], [1, 2, 3]] };
+        both.into_iter().zip(self.holds()).filter(|(_, holds)| *holds).map(|(corners, _)| corners)
     }
 
     fn count(self) -> usize {
-        usize::from(self.holds[0]) + usize::from(self.holds[1])
+        self.holds().map(usize::from).iter().sum()
     }
 
     /// Whether a triangle holds each of the corners.
     fn touches(self) -> [bool; 4] {
-        let [first, second] = self.holds;
+        let [first, second] = self.holds();
         let any = first | second;
-        if self.falls { [any, second, first, any] } else { [first, any, any, second] }
+        if self.is_falling() { [any, second, first, any] } else { [first, any, any, second] }
     }
 }
 
 /// Which diagonal divides a cell: of two, the one with the smaller step along the line of sight, so that an edge runs
 /// along it and not across it; the rising one where both are the same.
+#[inline(always)]
 fn falls([a, b, c, d]: [Node; 4]) -> bool {
-    let (falling, rising) = (a.is_some() && d.is_some(), b.is_some() && c.is_some());
-    if falling && rising {
-        return Connection::new(a, d).is_flatter_than(&Connection::new(b, c));
+    let (falling, rising) = (a.is_some() & d.is_some(), b.is_some() & c.is_some());
+    let flatter = Connection::new(a, d).is_flatter_than(&Connection::new(b, c));
+    falling & (flatter | !rising)
+}
+
+/// Which sides of the cells of a row are joined.
+struct SideRows<'a> {
+    top: &'a [bool],
+    bottom: &'a [bool],
+    left: &'a [bool],
+    right: &'a [bool],
+}
+
+/// Corners of the cells of a row: upper left, upper right, lower left and lower right.
+type Corners<'a> = [[&'a [f32]; 4]; 4];
+
+/// Divides the cells of a row into triangles.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn divide(corners: Corners, sides: &SideRows, out: &mut [Cell]) {
+    let n = out.len();
+    let corners = corners.map(|corner| corner.map(|values| &values[..n]));
+    let [top, bottom] = [&sides.top[..n], &sides.bottom[..n]];
+    let [left, right] = [&sides.left[..n], &sides.right[..n]];
+    for (i, out) in out.iter_mut().enumerate() {
+        let nodes = [node(corners[0], i), node(corners[1], i), node(corners[2], i), node(corners[3], i)];
+        *out = Cell::new(nodes, [top[i], bottom[i], left[i], right[i]]);
     }
-    falling
 }
 
 /// The nodes that triangles hold.
@@ -93,18 +124,16 @@ impl Cells {
         let (nodes, links, stride) = (&grid.nodes.all, &grid.links, grid.nodes.columns);
         let (rows, columns) = (grid.nodes.rows.saturating_sub(1), stride.saturating_sub(1));
         let mut all = vec![Cell::default(); rows * columns];
-        all.par_chunks_mut(columns.max(1)).enumerate().for_each(|(y, out)| {
-            for (x, out) in out.iter_mut().enumerate() {
-                let i = y * stride + x;
-                let corners = [nodes[i], nodes[i + 1], nodes[i + stride], nodes[i + stride + 1]];
-                let sides = Sides {
-                    top: links.right[i],
-                    bottom: links.right[i + stride],
-                    left: links.down[i],
-                    right: links.down[i + 1],
-                };
-                *out = Cell::new(corners, sides);
-            }
+        let rows_out = all.par_chunks_mut(columns.max(1)).enumerate();
+        rows_out.for_each_init(<[NodeRow; 2]>::default, |[above, below], (y, out)| {
+            let at = y * stride;
+            above.fill(&nodes[at..][..stride]);
+            below.fill(&nodes[at + stride..][..stride]);
+            let [top, bottom] = [at, at + stride].map(|from| &links.right[from..][..columns]);
+            let [left, right] = [at, at + 1].map(|from| &links.down[from..][..columns]);
+            let corners = [above.slices(0, columns), above.slices(1, columns), below.slices(0, columns)];
+            let [a, b, c] = corners;
+            divide([a, b, c, below.slices(1, columns)], &SideRows { top, bottom, left, right }, out);
         });
         Self { rows, columns, all }
     }
@@ -161,9 +190,10 @@ impl Cells {
             let mut out = out.iter_mut();
             for (x, cell) in row.iter().enumerate() {
                 let i = y * stride + x;
-                for corners in cell.triangles() {
-                    let number = |k: usize| numbers[i + CORNERS[k][0] * stride + CORNERS[k][1]];
-                    *out.next().expect("as many as counted") = corners.map(number);
+                let [a, b, c, d] = [i, i + 1, i + stride, i + stride + 1].map(|node| numbers[node]);
+                let both = if cell.is_falling() { [[a, c, d], [a, d, b]] } else { [[a, c, b], [b, c, d]] };
+                for (face, _) in both.into_iter().zip(cell.holds()).filter(|(_, holds)| *holds) {
+                    *out.next().expect("as many as counted") = face;
                 }
             }
         });

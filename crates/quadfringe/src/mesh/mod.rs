@@ -8,19 +8,22 @@
 mod cells;
 mod correlation;
 mod holes;
+mod links;
+mod node_rows;
 mod nodes;
+mod normal_rows;
 mod normals;
 mod params;
-mod row;
 mod vector;
 
 use cells::{Cells, Vertices, parts};
+use links::{Grid, Links, thinned};
 use ndarray::{Array2, Array3, ArrayView2, ArrayView3, Axis};
-use nodes::{Grid, Links, Nodes};
+use nodes::Nodes;
+use normal_rows::NormalRow;
 use normals::Field;
 use params::HOLE_MAX_PX;
 use rayon::prelude::*;
-use row::NormalRow;
 
 use crate::error::{Error, Result};
 
@@ -108,7 +111,7 @@ pub fn mesh_from_points(points: &Points<'_>, options: &MeshOptions) -> Result<Me
     let mut nodes = Nodes::new(points);
     let filled = holes::fill(&mut nodes, options.holes_px);
     let links = Links::new(&nodes);
-    let grid = nodes::thinned(nodes, links, options);
+    let grid = thinned(nodes, links, options);
     let width = points.xyz_mm.dim().1;
     Ok(gathered(&grid, options.step, |[y, x]| filled[y as usize * width + x as usize]))
 }
@@ -131,7 +134,7 @@ pub fn normals_from_points(points: &Points<'_>) -> Result<Normals> {
     check(points)?;
     let nodes = Nodes::new(points);
     let links = Links::new(&nodes);
-    let grid = nodes::thinned(nodes, links, &MeshOptions::default());
+    let grid = thinned(nodes, links, &MeshOptions::default());
     let cells = Cells::new(&grid);
     let field = Field::new(&grid, &cells);
     let (rows, columns, _) = points.xyz_mm.dim();

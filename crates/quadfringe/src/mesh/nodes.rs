@@ -1,8 +1,7 @@
-//! The points as nodes of a grid, and which neighbours are joined by one surface.
+//! The points as nodes of a grid, and when a surface may join two of them.
 
-use super::params::{COSINE2, COTANGENT, DEVIATIONS};
-use super::vector::{difference, dot, sum, wide};
-use super::{MeshOptions, Points};
+use super::Points;
+use super::params::{COTANGENT, DEVIATIONS};
 use ndarray::{ArrayView1, Axis};
 use rayon::prelude::*;
 
@@ -22,13 +21,6 @@ pub(super) struct Nodes {
     pub all: Vec<Node>,
 }
 
-/// For each node, whether a surface joins it with the next one to the right and with the next one below.
-#[derive(Debug)]
-pub(super) struct Links {
-    pub right: Vec<bool>,
-    pub down: Vec<bool>,
-}
-
 impl Node {
     pub const NONE: Self = Self { point: [f32::NAN; 3], deviation: 0.0 };
 
@@ -42,11 +34,12 @@ impl Node {
     }
 
     /// Squared distance by which one standard deviation moves the point along its ray, mm^2.
-    fn moved2(&self) -> f64 {
-        let (p, deviation) = (wide(self.point), f64::from(self.deviation));
-        deviation * deviation * dot(p, p)
+    #[inline(always)]
+    fn moved2(&self) -> f32 {
+        self.deviation * self.deviation * dot(self.point, self.point)
     }
 
+    #[inline(always)]
     pub fn is_some(&self) -> bool {
         self.point[2] > 0.0
     }
@@ -71,7 +64,7 @@ impl Nodes {
     }
 
     /// Every `step`-th node of every `step`-th row.
-    fn every(&self, step: usize) -> Self {
+    pub fn every(&self, step: usize) -> Self {
         let (rows, columns) = (self.rows.div_ceil(step), self.columns.div_ceil(step));
         let place = |i: usize| i / columns * step * self.columns + i % columns * step;
         let all = (0..rows * columns).map(|i| self.all[place(i)]).collect();
@@ -79,71 +72,33 @@ impl Nodes {
     }
 }
 
-impl Links {
-    /// Finds which neighbours are joined.
-    pub fn new(nodes: &Nodes) -> Self {
-        let (columns, all) = (nodes.columns, &nodes.all);
-        let mut right = vec![false; all.len()];
-        let mut down = vec![false; all.len()];
-        let rows = right.par_chunks_mut(columns.max(1)).zip(down.par_chunks_mut(columns.max(1)));
-        rows.enumerate().for_each(|(y, (right, down))| {
-            let here = &all[y * columns..][..columns];
-            right.iter_mut().zip(here.windows(2)).for_each(|(out, two)| *out = are_joined(two[0], two[1]));
-            if let Some(below) = all.get((y + 1) * columns..(y + 2) * columns) {
-                let pairs = here.iter().zip(below);
-                down.iter_mut().zip(pairs).for_each(|(out, (a, b))| *out = are_joined(*a, *b));
-            }
-        });
-        Self { right, down }
-    }
-
-    /// The grid of every `step`-th node. Two of its neighbours are joined if all pixels between them are.
-    pub fn every(&self, nodes: &Nodes, step: usize) -> Self {
-        let (rows, columns) = (nodes.rows.div_ceil(step), nodes.columns.div_ceil(step));
-        let whole = |links: &[bool], i: usize, stride: usize| {
-            let from = i / columns * step * nodes.columns + i % columns * step;
-            (0..step).all(|k| links.get(from + k * stride).copied().unwrap_or(false))
-        };
-        let collect = |links: &[bool], stride| (0..rows * columns).map(|i| whole(links, i, stride)).collect();
-        Self { right: collect(&self.right, 1), down: collect(&self.down, nodes.columns) }
-    }
+#[inline(always)]
+pub(super) fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
-/// The grid that the options ask for.
-pub(super) fn thinned(nodes: Nodes, links: Links, options: &MeshOptions) -> Grid {
-    if options.step == 1 {
-        return Grid { nodes, links };
-    }
-    let links = links.every(&nodes, options.step);
-    Grid { nodes: nodes.every(options.step), links }
-}
-
-/// Nodes and their links.
-#[derive(Debug)]
-pub(super) struct Grid {
-    pub nodes: Nodes,
-    pub links: Links,
-}
-
-/// The connection of two points as the camera sees it, from its middle.
+/// The connection of two points as the camera sees it, from its middle. Points so far away that single precision overflows
+/// have no length and are not joined.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Connection {
     /// Squared length, mm^2.
-    length2: f64,
+    length2: f32,
     /// Squared length along the line of sight, mm^2.
-    along2: f64,
+    along2: f32,
 }
 
 impl Connection {
-    #[inline]
+    #[inline(always)]
     pub fn new(a: Node, b: Node) -> Self {
-        let (a, b) = (wide(a.point), wide(b.point));
-        let (connection, middle) = (difference(b, a), sum(a, b));
+        // Without closures, which the compiler would not inline into vector code.
+        let ([ax, ay, az], [bx, by, bz]) = (a.point, b.point);
+        let (connection, middle) = ([bx - ax, by - ay, bz - az], [ax + bx, ay + by, az + bz]);
         let along = dot(connection, middle);
         Self { length2: dot(connection, connection), along2: along * along / dot(middle, middle) }
     }
 
     /// Whether this one goes less along the line of sight.
+    #[inline(always)]
     pub fn is_flatter_than(&self, other: &Self) -> bool {
         self.along2 < other.along2
     }
@@ -151,15 +106,13 @@ impl Connection {
 
 /// Whether a surface that the camera sees may hold both points: the angle between their connection and the line of sight
 /// is at least the limit, or noise explains the rest (T1). False where there is no point.
-#[inline]
+#[inline(always)]
 pub(super) fn are_joined(a: Node, b: Node) -> bool {
     let Connection { length2, along2 } = Connection::new(a, b);
-    // The cosine is smaller than that of the limit; this needs no root and is true nearly everywhere.
-    along2 <= COSINE2 * length2 || {
-        let across = (length2 - along2).max(0.0).sqrt();
-        let moved2 = a.moved2() + b.moved2();
-        along2.sqrt() <= across * COTANGENT + DEVIATIONS * moved2.sqrt()
-    }
+    let rest = length2 - along2;
+    let across = if rest > 0.0 { rest.sqrt() } else { 0.0 };
+    let moved2 = a.moved2() + b.moved2();
+    along2.sqrt() <= across * COTANGENT as f32 + DEVIATIONS as f32 * moved2.sqrt()
 }
 
 #[cfg(test)]

@@ -2,16 +2,10 @@
 
 use super::cells::Cells;
 use super::correlation::Shares;
-use super::nodes::{Grid, Node, Nodes};
-use super::row::NormalRow;
+use super::links::Grid;
+use super::nodes::{Node, Nodes};
+use super::normal_rows::{Normal, NormalRow};
 use super::vector::{Vector, cross, difference, dot, length, scaled, sum, wide};
-
-/// Unit normal of a node towards the camera, and the root mean square angle in rad between it and the true one.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Normal {
-    pub direction: [f32; 3],
-    pub uncertainty_rad: f32,
-}
 
 /// What the normals of a grid are made from.
 pub(super) struct Field<'a> {

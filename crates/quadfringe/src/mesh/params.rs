@@ -6,9 +6,6 @@
 /// degrees; no triangle crosses a step at either (`python evaluation/mesh.py --limits`).
 pub(super) const COTANGENT: f64 = 5.67;
 
-/// Squared cosine of the same angle. Follows from [`COTANGENT`].
-pub(super) const COSINE2: f64 = COTANGENT * COTANGENT / (1.0 + COTANGENT * COTANGENT);
-
 /// Number of standard deviations by which noise may move two neighbours apart along the line of sight. Fewer: noisy
 /// surfaces fall apart, on a face 0.05 % of the neighbours in place of 0.03 % with none. More: connections over steps stay
 /// where the noise is large (`python evaluation/mesh.py --limits`).

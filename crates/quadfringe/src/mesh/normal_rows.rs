@@ -2,9 +2,17 @@
 //! branches, so that the compiler makes vectors of it.
 
 use super::correlation::Shares;
-use super::nodes::{Grid, Node};
-use super::normals::Normal;
+use super::links::Grid;
+use super::node_rows::NodeRow;
+use super::nodes::dot;
 use multiversion::multiversion;
+
+/// Unit normal of a node towards the camera, and the root mean square angle in rad between it and the true one.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Normal {
+    pub direction: [f32; 3],
+    pub uncertainty_rad: f32,
+}
 
 /// Normals of one row; NaN where single precision or the neighbours do not suffice.
 #[derive(Debug, Default)]
@@ -14,27 +22,6 @@ pub(super) struct NormalRow {
     pub uncertainty_rad: Vec<f32>,
     /// Rows of nodes above, at and below.
     nodes: [NodeRow; 3],
-}
-
-/// Nodes of one row: x, y, z and the standard deviation of the depth as a share of the depth.
-#[derive(Debug, Default)]
-struct NodeRow([Vec<f32>; 4]);
-
-impl NodeRow {
-    fn fill(&mut self, nodes: &[Node]) {
-        let [x, y, z, deviation] = &mut self.0;
-        for values in [&mut *x, y, z, deviation] {
-            values.resize(nodes.len(), 0.0);
-        }
-        let out = x.iter_mut().zip(y).zip(z.iter_mut().zip(deviation));
-        for (((x, y), (z, deviation)), node) in out.zip(nodes) {
-            ([*x, *y, *z], *deviation) = (node.point, node.deviation);
-        }
-    }
-
-    fn slices(&self, from: usize, count: usize) -> [&[f32]; 4] {
-        self.0.each_ref().map(|values| &values[from..from + count])
-    }
 }
 
 /// Which neighbours of the nodes of a row are joined to them.
@@ -57,8 +44,8 @@ struct Around<'a> {
 impl NormalRow {
     /// The normal of the node at column `x`.
     pub fn at(&self, x: usize) -> Normal {
-        let direction = self.direction.each_ref().map(|values| values[x]);
-        Normal { direction, uncertainty_rad: self.uncertainty_rad[x] }
+        let [a, b, c] = &self.direction;
+        Normal { direction: [a[x], b[x], c[x]], uncertainty_rad: self.uncertainty_rad[x] }
     }
 
     /// Fills row `y`. The first and the last node of a row, and those of the first and the last row, stay NaN.
@@ -105,10 +92,8 @@ impl Tangent {
     #[inline(always)]
     fn new(before: [f32; 4], here: [f32; 4], after: [f32; 4], joined: [bool; 2], shares: [f32; 2]) -> Self {
         let [is_before, is_after] = joined;
-        let choose = |joined: bool, other: f32, here: f32| if joined { other } else { here };
-        let from: [f32; 4] = std::array::from_fn(|k| choose(is_before, before[k], here[k]));
-        let to: [f32; 4] = std::array::from_fn(|k| choose(is_after, after[k], here[k]));
-        let share = choose(is_before & is_after, shares[1], shares[0]);
+        let (from, to) = (either(is_before, before, here), either(is_after, after, here));
+        let share = if is_before & is_after { shares[1] } else { shares[0] };
         Self {
             vector: [to[0] - from[0], to[1] - from[1], to[2] - from[2]],
             deviation2: share * (from[3] * from[3] + to[3] * to[3]),
@@ -118,13 +103,32 @@ impl Tangent {
 }
 
 #[inline(always)]
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// Without closures, which the compiler would not inline into vector code.
+#[inline(always)]
+fn either(is_first: bool, first: [f32; 4], second: [f32; 4]) -> [f32; 4] {
+    let mut chosen = second;
+    for k in 0..4 {
+        chosen[k] = if is_first { first[k] } else { second[k] };
+    }
+    chosen
+}
+
+/// Square of `node x lever` across the normal. The part along the normal lengthens it and turns nothing.
+#[inline(always)]
+fn turned2(node: [f32; 3], lever: [f32; 3], direction: [f32; 3]) -> f32 {
+    let turn = cross(node, lever);
+    let along = dot(turn, direction);
+    let turned2 = dot(turn, turn) - along * along;
+    if turned2 > 0.0 { turned2 } else { 0.0 }
 }
 
 #[inline(always)]
-fn cross(a: [f32; 3], b: [f32; 3]) -> [f32; 3] {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+fn at(node: [&[f32]; 4], i: usize) -> [f32; 4] {
+    [node[0][i], node[1][i], node[2][i], node[3][i]]
 }
 
 /// Normals (T2) and their uncertainty (T3): x, y, z and rad. `shares` are those along rows and columns.
@@ -140,22 +144,16 @@ fn central(around: &Around, joined: &Joined, shares: [Shares; 2], out: [&mut [f3
     let [is_up, is_down] = [&joined.up[..n], &joined.down[..n]];
     let [along_row, along_column] = shares.map(|shares| [shares.next as f32, shares.central as f32]);
     for i in 0..n {
-        let at = |node: [&[f32]; 4]| [node[0][i], node[1][i], node[2][i], node[3][i]];
-        let middle = at(here);
-        let across = Tangent::new(at(left), middle, at(right), [is_left[i], is_right[i]], along_row);
-        let down = Tangent::new(at(above), middle, at(below), [is_up[i], is_down[i]], along_column);
+        let middle = at(here, i);
+        let across = Tangent::new(at(left, i), middle, at(right, i), [is_left[i], is_right[i]], along_row);
+        let down = Tangent::new(at(above, i), middle, at(below, i), [is_up[i], is_down[i]], along_column);
         let normal = cross(down.vector, across.vector);
         let size2 = dot(normal, normal);
         let inverse = 1.0 / size2.sqrt();
-        let direction = normal.map(|c| c * inverse);
+        let direction = [normal[0] * inverse, normal[1] * inverse, normal[2] * inverse];
         let node = [middle[0], middle[1], middle[2]];
-        let variance = |vector: [f32; 3], deviation2: f32| {
-            // The part along the normal lengthens it and turns nothing.
-            let (turn, along) = (cross(node, vector), dot(cross(node, vector), direction));
-            let turned2 = dot(turn, turn) - along * along;
-            deviation2 * if turned2 > 0.0 { turned2 } else { 0.0 }
-        };
-        let variance = variance(across.vector, down.deviation2) + variance(down.vector, across.deviation2);
+        let turned2 = [turned2(node, across.vector, direction), turned2(node, down.vector, direction)];
+        let variance = down.deviation2 * turned2[0] + across.deviation2 * turned2[1];
         let sound = across.known & down.known & (size2 > f32::MIN_POSITIVE) & (size2 < f32::MAX);
         let hole = if sound { 0.0 } else { f32::NAN };
         x_out[i] = direction[0] + hole;
