@@ -22,8 +22,9 @@ import quadfringe as qf
 from quadfringe.data import AnyShot, Shot, Stamp
 from quadfringe.errors import InputError, RecordingError, RecordingWarning
 from quadfringe.recording import Recorder, Recording
-from quadfringe.recording._results import locked
+from quadfringe.recording._results import locked, maps_of
 from quadfringe.recording.batch import decode_recordings, executor_for, prepare, run
+from quadfringe.recording.series import Series
 
 CAMERA = qf.Device(width_px=256, height_px=192, focal_px=(645.0, 645.0), centre_px=(127.5, 95.5))
 SYSTEM = qf.SystemConfig(
@@ -57,6 +58,12 @@ def whole(take: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+def test_the_joint_method_stores_the_albedo() -> None:
+    assert "albedo" in maps_of(qf.SystemConfig(), calibrated=True)
+    for decode in ({"albedo": False}, {"method": "published"}):
+        assert "albedo" not in maps_of(qf.SystemConfig.model_validate({"decode": decode}), calibrated=True)
+
+
 def digests(folder: Path) -> dict[str, str]:
     files = (path for path in sorted(folder.rglob("*")) if path.is_file())
     return {str(path.relative_to(folder)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files}
@@ -69,8 +76,10 @@ def test_results_are_those_of_decoding_by_hand(take: Path, whole: Path) -> None:
     assert np.isnan(group["xyz_mm"][BLACK]).all()
     with Recording(take) as recorded, qf.open(SYSTEM) as scanner:
         shape = scanner.decode(recorded[1])
-    for name, expected in (("xyz_mm", shape.xyz_mm), ("phase_rad", shape.phase_rad), ("quality", shape.quality)):
-        np.testing.assert_array_equal(group[name][1], expected)
+    stored = set(shape.maps) - {"column_px", "order"}
+    assert stored | {"id", "time_us", "status", "checksum"} == set(group)
+    for name in stored:
+        np.testing.assert_array_equal(group[name][1], shape.maps[name], name)
     settings = group.attrs["settings"]
     assert settings["config"]["decode"]["method"] == "published"
     assert settings["calibration"]["camera"]["width_px"] == CAMERA.width_px
@@ -211,6 +220,8 @@ def test_without_a_calibration_there_is_phase_but_no_ply(take: Path, tmp_path: P
         assert [outcome.error for outcome in run(jobs, executor)] == [None]
     group = zarr.open_group(jobs[0].store, mode="r")
     assert "xyz_mm" not in group
+    assert (group["reason"][0] == 0).mean() == np.isfinite(group["uncertainty_rad"][0]).mean()
+    assert Series.open(jobs[0].store).shape(0).reasons().keys() >= {qf.Reason.RETURNED}
     assert np.isfinite(group["phase_rad"][0]).mean() > 0.3
 
 

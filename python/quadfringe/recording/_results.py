@@ -23,11 +23,14 @@ from quadfringe.recording import Recording
 from quadfringe.recording._checksums import sha256_of
 from quadfringe.recording.reader import listed
 
-__all__ = ["DONE", "REFUSED", "Job", "locked", "open_results", "save"]
+__all__ = ["DONE", "REFUSED", "Job", "locked", "maps_of", "open_results", "save"]
 
 MAPS = ("phase_rad", "modulation", "quality")
+# Maps that a shape has or has not, and the last dimension of those that have three.
+MORE_MAPS = ("wrong_order_probability", "uncertainty_rad", "uncertainty_mm", "reason", "xyz_mm", "albedo")
+LAST = {"xyz_mm": ("axis", 3), "albedo": ("channel", 4)}
 DONE, REFUSED = 1, 2
-FORMAT = "quadfringe batch"
+FORMAT = "quadfringe batch 2"
 LOCK = ".quadfringe-batch.lock"
 
 
@@ -95,7 +98,7 @@ def open_results(job: Job, take: Recording, settings: dict[str, Any], *, calibra
         # Created in a temporary folder and renamed, so that an existing store is complete.
         with atomic_folder(job.store) as temporary:
             group = zarr.open_group(temporary, mode="w", attributes=attributes)
-            _fill(group, take, calibrated=calibrated)
+            _fill(group, take, maps_of(job.config, calibrated=calibrated))
             group.attrs["arrays_sha256"] = _arrays_sha256(temporary)
         return np.zeros(job.shots, bool)
     try:
@@ -117,6 +120,14 @@ def open_results(job: Job, take: Recording, settings: dict[str, Any], *, calibra
     return _finished(job, status, checksums)
 
 
+def maps_of(config: SystemConfig, *, calibrated: bool) -> tuple[str, ...]:
+    """Name the maps of the shapes that these settings give."""
+    without = {"uncertainty_rad"} if calibrated else {"uncertainty_mm", "xyz_mm"}
+    if config.decode.method == "published" or config.decode.albedo is False:
+        without.add("albedo")
+    return tuple(name for name in (*MAPS, *MORE_MAPS) if name not in without)
+
+
 def _finished(job: Job, status: NDArray[Any], checksums: NDArray[Any]) -> NDArray[np.bool_]:
     finished: NDArray[np.bool_] = status == DONE
     changed = [shot for shot in np.flatnonzero(finished).tolist() if _checksum(job, shot) != checksums[shot]]
@@ -132,12 +143,11 @@ def _finished(job: Job, status: NDArray[Any], checksums: NDArray[Any]) -> NDArra
 
 def save(job: Job, shot: int, shape: Shape, group: Any) -> None:
     """Write the results of a shot, then their checksum, then that they are done."""
-    for name in MAPS:
-        group[name][shot] = getattr(shape, name)
-    if shape.xyz_mm is not None:
-        group["xyz_mm"][shot] = shape.xyz_mm
-        if job.ply:
-            shape.save(_ply(job, shot))
+    for name in (*MAPS, *MORE_MAPS):
+        if (values := getattr(shape, name)) is not None:
+            group[name][shot] = values
+    if shape.xyz_mm is not None and job.ply:
+        shape.save(_ply(job, shot))
     group["checksum"][shot] = _checksum(job, shot)
     group["status"][shot] = DONE
 
@@ -149,7 +159,7 @@ def _ply(job: Job, shot: int) -> Path:
 def _checksum(job: Job, shot: int) -> int:
     """Return the CRC-32 of the files of a shot, with their names and sizes."""
     crc = 0
-    for name in (*MAPS, "xyz_mm"):
+    for name in (*MAPS, *MORE_MAPS):
         for path in sorted((job.store / name / "c" / str(shot)).rglob("*")):
             crc = _crc_of_file(path, path.relative_to(job.store), crc)
     return _crc_of_file(_ply(job, shot), _ply(job, shot).relative_to(job.out), crc) if job.ply else crc
@@ -177,21 +187,23 @@ def _sweep(job: Job) -> None:
         shutil.rmtree(leftover, ignore_errors=True)
 
 
-def _fill(group: Any, take: Recording, *, calibrated: bool) -> None:
+def _fill(group: Any, take: Recording, maps: tuple[str, ...]) -> None:
     from zarr.codecs import BloscCodec
 
-    size = (len(take), take.header.height_px, take.header.width_px)
-    more = {
-        "dtype": "f4",
-        "fill_value": float("nan"),
-        "compressors": [BloscCodec(cname="lz4", clevel=1, shuffle="shuffle", typesize=4)],
-    }
-    axes = ("shot", "y", "x")
-    for name in MAPS:
-        group.create_array(name, shape=size, chunks=(1, *size[1:]), dimension_names=axes, **more)
-    if calibrated:
-        chunks = (1, *size[1:], 3)
-        group.create_array("xyz_mm", shape=(*size, 3), chunks=chunks, dimension_names=(*axes, "xyz"), **more)
+    size = (take.header.height_px, take.header.width_px)
+    for name in maps:
+        dtype, empty = ("u1", 0) if name == "reason" else ("f4", float("nan"))
+        last = dict([LAST[name]] if name in LAST else [])
+        shape = (*size, *last.values())
+        group.create_array(
+            name,
+            shape=(len(take), *shape),
+            chunks=(1, *shape),
+            dimension_names=("shot", "row", "column", *last),
+            dtype=dtype,
+            fill_value=empty,
+            compressors=[BloscCodec(cname="lz4", clevel=1, shuffle="shuffle", typesize=np.dtype(dtype).itemsize)],
+        )
     for name, numbers in (("id", take.ids), ("time_us", take.times_us)):
         group.create_array(name, data=numbers, dimension_names=("shot",))
     for name, dtype in (("status", "u1"), ("checksum", "u4")):

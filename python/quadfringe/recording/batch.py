@@ -6,8 +6,8 @@ same files. The results belong to one recording, by its SHA-256, and a finished 
 files match their checksum. A damaged shot has no shape; if its stamp is damaged, its id and time_us are 0. A shot that
 cannot be read now, damaged or not, is reported, and the same command tries it again.
 
-    OUT/take.zarr        xyz_mm, phase_rad, modulation, quality (shot, y, x), id, time_us, status, checksum (shot); with
-                         the settings and the SHA-256 of the recording
+    OUT/take.zarr        the maps of `Shape` by their names, but for column_px and order, which follow from phase_rad
+                         (shot, row, column); id, time_us, status, checksum (shot); settings, SHA-256 of the recording
     OUT/take/shot_000000.ply ...
     OUT/take/errors.json     reason for each shot without a shape; only when there are such shots
 """

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from quadfringe.config import SystemConfig, checked
 from quadfringe.data import Calibration, Shape
+from quadfringe.data._checks import check_types
 from quadfringe.errors import InputError, require
 from quadfringe.io.declared import IMAGE_PX
-from quadfringe.recording._results import DONE, FORMAT, MAPS, REFUSED
+from quadfringe.recording._results import DONE, FORMAT, LAST, MAPS, MORE_MAPS, REFUSED
 
 __all__ = ["Series"]
 
@@ -54,7 +55,7 @@ class Series:
             if attributes.get("format") != FORMAT:
                 raise InputError(f"{path}: expected the result of a batch, got another zarr group")
             arrays = {name: group[name] for name in (*MAPS, "status", "time_us")}
-            arrays |= {"xyz_mm": group["xyz_mm"]} if "xyz_mm" in group else {}
+            arrays |= {name: group[name] for name in MORE_MAPS if name in group}
             _check(path, arrays)
             times_us, status = arrays["time_us"][:], arrays["status"][:]
         except InputError:
@@ -70,8 +71,7 @@ class Series:
     def shape(self, shot: int) -> Shape:
         """Read the shape of a shot, 0 to N - 1; raises `InputError` for one that is not decoded or has no shape.
 
-        The store keeps no fringe orders and uncertainties, so the shape has none of them, and no projector columns
-        without a calibration.
+        The store keeps no projector columns, which follow from the phase with a calibration and are NaN without one.
         """
         if not 0 <= shot < len(self):
             raise InputError(f"{self.path}: shot {shot}: expected 0 to {len(self) - 1}")
@@ -79,15 +79,16 @@ class Series:
             why = "has no shape; errors.json says why" if self.status[shot] == REFUSED else "is not decoded yet"
             raise InputError(f"{self.path}: shot {shot} {why}")
         try:
-            maps = {name: np.asarray(self._group[name][shot], np.float32) for name in MAPS}
-            xyz_mm = np.asarray(self._group["xyz_mm"][shot], np.float32) if "xyz_mm" in self._group else None
+            maps: dict[str, Any] = {name: self._map(name, shot) for name in (*MAPS, *MORE_MAPS) if name in self._group}
         except (KeyError, ValueError, OSError, RuntimeError) as error:
             raise InputError(f"{self.path}: shot {shot}: cannot be read: {error}") from error
         settings = self.config.model_dump(mode="json", exclude_none=True)
         columns = self._columns(maps["phase_rad"])
-        phase_rad, modulation, quality = (maps[name] for name in ("phase_rad", "modulation", "quality"))
-        known = Shape(phase_rad, columns, modulation, quality, xyz_mm=xyz_mm)
-        return known.with_settings(settings, self.calibration)
+        check_types(maps, self.path)
+        return Shape(column_px=columns, **maps).with_settings(settings, self.calibration)
+
+    def _map(self, name: str, shot: int) -> NDArray[Any]:
+        return np.asarray(self._group[name][shot], np.uint8 if name == "reason" else np.float32)
 
     def _columns(self, phase_rad: NDArray[np.float32]) -> NDArray[np.float32]:
         width_px = math.nan if self.calibration is None else self.calibration.projector.width_px
@@ -106,7 +107,8 @@ def _check(path: Path, arrays: dict[str, Any]) -> None:
     """Raise `InputError` unless the arrays fit each other and have the size of images."""
     shots, *size = arrays["phase_rad"].shape
     for name, array in arrays.items():
-        expected = {"status": (shots,), "time_us": (shots,), "xyz_mm": (shots, *size, 3)}.get(name, (shots, *size))
+        last = LAST[name][1:] if name in LAST else ()
+        expected = (shots,) if name in ("status", "time_us") else (shots, *size, *last)
         if array.shape != expected or len(size) != 2 or array.dtype.kind not in "fiu":
             raise InputError(f"{path}: {name}: expected numbers {expected}, got {array.dtype} {array.shape}")
     if math.prod(size) > IMAGE_PX or not shots:
