@@ -112,7 +112,7 @@ class Shape:
         if self.albedo is None:
             return grey(self.modulation)
         picture, dark = srgb(self.albedo), np.isnan(self.albedo[:, :, 0])
-        picture[dark] = grey(self.modulation)[dark]
+        picture[dark] = grey(self.modulation)[dark] if dark.any() else 0
         return picture
 
     @property

@@ -42,7 +42,7 @@ impl Cell {
 
     /// The triangles, as corners of the cell, counter-clockwise as the camera sees them.
     fn triangles(self) -> impl Iterator<Item = [usize; 3]> {
-        let both = if self.is_falling() { [[0, 2, 3], [0, 3, 1]] } else { [[0, 2, 1], [1, 2, 3]] };
+        let both = TRIANGLES[usize::from(self.is_falling())];
         both.into_iter().zip(self.holds()).filter(|(_, holds)| *holds).map(|(corners, _)| corners)
     }
 
@@ -50,13 +50,19 @@ impl Cell {
         self.holds().map(usize::from).iter().sum()
     }
 
-    /// Whether a triangle holds each of the corners.
-    fn touches(self) -> [bool; 4] {
-        let [first, second] = self.holds();
-        let any = first | second;
-        if self.is_falling() { [any, second, first, any] } else { [first, any, any, second] }
+    /// 1 if a triangle holds the corner at this place of [`CORNERS`], else 0.
+    #[inline(always)]
+    fn touches(self, corner: usize) -> u32 {
+        u32::from(TOUCHES[usize::from(self.0)] >> corner) & 1
     }
 }
+
+/// Corners of both triangles, counter-clockwise as the camera sees them, of a cell whose diagonal rises and of one whose
+/// diagonal falls.
+const TRIANGLES: [[[usize; 3]; 2]; 2] = [[[0, 2, 1], [1, 2, 3]], [[0, 2, 3], [0, 3, 1]]];
+
+/// For each value of a cell the corners that a triangle holds, one bit for each; see [`Cell::new`].
+const TOUCHES: [u8; 8] = [0, 0, 0b0111, 0b1101, 0b1110, 0b1011, 0b1111, 0b1111];
 
 /// Which diagonal divides a cell: of two, the one with the smaller step along the line of sight, so that an edge runs
 /// along it and not across it; the rising one where both are the same.
@@ -162,20 +168,17 @@ impl Cells {
 
     /// Writes 1 for each node of row `y` that a triangle holds, and returns their number.
     fn mark_used(&self, y: usize, used: &mut [u32]) -> u32 {
-        let row = |y: usize| &self.all[y * self.columns..][..self.columns];
-        if let Some(above) = y.checked_sub(1).filter(|_| self.rows > 0) {
-            for (x, cell) in row(above).iter().enumerate() {
-                let [_, _, left, right] = cell.touches();
-                used[x] |= u32::from(left);
-                used[x + 1] |= u32::from(right);
+        let mut mark = |row: usize, [left, right]: [usize; 2]| {
+            for (x, cell) in self.all[row * self.columns..][..self.columns].iter().enumerate() {
+                used[x] |= cell.touches(left);
+                used[x + 1] |= cell.touches(right);
             }
+        };
+        if y > 0 {
+            mark(y - 1, [2, 3]);
         }
         if y < self.rows {
-            for (x, cell) in row(y).iter().enumerate() {
-                let [left, right, _, _] = cell.touches();
-                used[x] |= u32::from(left);
-                used[x + 1] |= u32::from(right);
-            }
+            mark(y, [0, 1]);
         }
         used.iter().sum()
     }
@@ -187,13 +190,19 @@ impl Cells {
         let mut faces = vec![[0; 3]; counts.iter().sum()];
         let stride = self.columns + 1;
         parts(&mut faces, &counts).into_par_iter().zip(rows).enumerate().for_each(|(y, (out, row))| {
-            let mut out = out.iter_mut();
+            let mut rest = out;
             for (x, cell) in row.iter().enumerate() {
                 let i = y * stride + x;
-                let [a, b, c, d] = [i, i + 1, i + stride, i + stride + 1].map(|node| numbers[node]);
-                let both = if cell.is_falling() { [[a, c, d], [a, d, b]] } else { [[a, c, b], [b, c, d]] };
-                for (face, _) in both.into_iter().zip(cell.holds()).filter(|(_, holds)| *holds) {
-                    *out.next().expect("as many as counted") = face;
+                let corners = [numbers[i], numbers[i + 1], numbers[i + stride], numbers[i + stride + 1]];
+                let [first, second] = TRIANGLES[usize::from(cell.is_falling())];
+                let both = [first, second].map(|[a, b, c]| [corners[a], corners[b], corners[c]]);
+                let count = cell.count();
+                let here;
+                (here, rest) = std::mem::take(&mut rest).split_at_mut(count);
+                match here {
+                    [first, second] => (*first, *second) = (both[0], both[1]),
+                    [only] => *only = both[usize::from(!cell.holds()[0])],
+                    _ => {}
                 }
             }
         });
