@@ -106,6 +106,18 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_files(take: Path, whole: Pa
     assert digests(tmp_path) == digests(whole)
 
 
+def test_a_run_removes_nothing_but_what_runs_of_its_recording_left(take: Path, tmp_path: Path) -> None:
+    """A name of a recording may hold what a pattern of names is made of."""
+    others = [tmp_path / name for name in (".git-mine", ".take-notes", ".b-12345678.partial")]
+    left = [tmp_path / ".*-12345678.partial", tmp_path / ".take-12345678.partial"]
+    for folder in (*others, *left):
+        folder.mkdir()
+    for name in ("*.h5", "take.h5"):
+        shutil.copy(take, tmp_path / name)
+        prepare([tmp_path / name], tmp_path, ply=False)
+    assert [folder.exists() for folder in (*others, *left)] == [True, True, True, False, False]
+
+
 def another_take(take: Path, path: Path) -> Path:
     """Record the same shots a second later."""
     path.parent.mkdir()
