@@ -118,6 +118,16 @@ def test_a_run_removes_nothing_but_what_runs_of_its_recording_left(take: Path, t
     assert [folder.exists() for folder in (*others, *left)] == [True, True, True, False, False]
 
 
+def test_the_command_prints_its_result_and_nothing_else(take: Path, tmp_path: Path) -> None:
+    """Workers that were killed at the end left semaphores, of which Python warned."""
+    words = ["batch", str(take), "--out", str(tmp_path / "out"), "--no-ply", "--workers", "2"]
+    code = f"from quadfringe.cli import app; app({words})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+    assert done.stderr.startswith(f"error: 1 of {SHOTS} shots have no shape")
+    assert f"{SHOTS - 1} shots decoded" in done.stdout
+
+
 def another_take(take: Path, path: Path) -> Path:
     """Record the same shots a second later."""
     path.parent.mkdir()
