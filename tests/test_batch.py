@@ -128,6 +128,12 @@ def test_the_command_prints_its_result_and_nothing_else(take: Path, tmp_path: Pa
     assert f"{SHOTS - 1} shots decoded" in done.stdout
 
 
+@pytest.mark.parametrize("workers", [-1, 0, 100_000, 10**30])
+def test_a_number_of_workers_that_no_machine_serves_is_refused(workers: int) -> None:
+    with pytest.raises(InputError, match=rf"workers: expected 1 to \d+ processes on this machine, got {workers}"):
+        executor_for(workers).__enter__()
+
+
 def another_take(take: Path, path: Path) -> Path:
     """Record the same shots a second later."""
     path.parent.mkdir()

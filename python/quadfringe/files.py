@@ -73,7 +73,7 @@ def atomic(path: Path | str) -> Iterator[Path]:
 def atomic_folder(path: Path) -> Iterator[Path]:
     """Give an empty folder next to `path`; rename it to `path` when the block succeeds, else remove it.
 
-    Until then its name ends in .partial, so that those of killed processes are told from folders of others.
+    Until then its name ends in .partial, which tells those of killed processes from folders of others.
     """
     temporary = Path(tempfile.mkdtemp(prefix=f".{path.stem}-", suffix=PARTIAL, dir=path.parent))
     try:

@@ -44,6 +44,8 @@ from quadfringe.scanner import Scanner, open_system
 
 __all__ = ["Job", "Outcome", "decode_recordings", "executor_for", "prepare", "run"]
 
+# Most processes, the larger of the two: each takes some 200 MB, and more than the cores only wait for one another.
+WORKERS_MOST, WORKERS_PER_CORE = 64, 4
 END_S = 3.0  # in which idle workers end by themselves; they take a tenth of a second
 RESTARTS = 3  # new pools after a worker process died: a shot that kills each of them is not retried for ever
 
@@ -201,10 +203,11 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
     """Yield a process pool of this machine, by default one process per core, or the workers of a dask scheduler.
 
     Cluster workers need quadfringe, and the recordings and results under the same paths. Raises `InputError` when no
-    scheduler answers at the address.
+    scheduler answers at the address, and for more processes than this machine can serve.
     """
     if scheduler is None:
         # Spawned, because a process with threads (kernel, HDF5) must not be forked.
+        _check_workers(workers)
         spawned = multiprocessing.get_context("spawn")
         others = multiprocessing.active_children()
         pool = ProcessPoolExecutor(workers or usable_cores(), spawned, initializer=_end_with_parent)
@@ -224,6 +227,13 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
         raise InputError(f"{scheduler}: no dask scheduler answers: {error}; check the address") from error
     with client, client.get_executor(retries=RESTARTS, pure=False) as cluster:
         yield cluster
+
+
+def _check_workers(workers: int | None) -> None:
+    """Raise `InputError` for a number of processes that the machine cannot serve."""
+    most = max(WORKERS_MOST, WORKERS_PER_CORE * usable_cores())
+    if workers is not None and not 1 <= workers <= most:
+        raise InputError(f"workers: expected 1 to {most} processes on this machine, got {workers}")
 
 
 def _end(workers: Sequence[BaseProcess], patience_s: float) -> None:
