@@ -115,6 +115,34 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_files(take: Path, whole: Pa
     assert digests(tmp_path) == digests(whole)
 
 
+def test_a_run_removes_nothing_but_what_runs_of_its_recording_left(take: Path, tmp_path: Path) -> None:
+    """A name of a recording may hold what a pattern of names is made of."""
+    others = [tmp_path / name for name in (".git-mine", ".take-notes", ".b-12345678.partial")]
+    left = [tmp_path / ".*-12345678.partial", tmp_path / ".take-12345678.partial"]
+    for folder in (*others, *left):
+        folder.mkdir()
+    for name in ("*.h5", "take.h5"):
+        shutil.copy(take, tmp_path / name)
+        prepare([tmp_path / name], tmp_path, ply=False)
+    assert [folder.exists() for folder in (*others, *left)] == [True, True, True, False, False]
+
+
+def test_the_command_prints_its_result_and_nothing_else(take: Path, tmp_path: Path) -> None:
+    """Workers that were killed at the end left semaphores, of which Python warned."""
+    words = ["batch", str(take), "--out", str(tmp_path / "out"), "--no-ply", "--workers", "2"]
+    code = f"from quadfringe.cli import app; app({words})"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1), done.stderr
+    assert done.stderr.startswith(f"error: 1 of {SHOTS} shots have no shape")
+    assert f"{SHOTS - 1} shots decoded" in done.stdout
+
+
+@pytest.mark.parametrize("workers", [-1, 0, 100_000, 10**30])
+def test_a_number_of_workers_that_no_machine_serves_is_refused(workers: int) -> None:
+    with pytest.raises(InputError, match=rf"workers: expected 1 to \d+ processes on this machine, got {workers}"):
+        executor_for(workers).__enter__()
+
+
 def another_take(take: Path, path: Path) -> Path:
     """Record the same shots a second later."""
     path.parent.mkdir()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,9 +13,10 @@ from support.bars import hold
 
 import quadfringe as qf
 from quadfringe.config import ChannelResponse
+from quadfringe.data import Calibration
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder
-from quadfringe.decoding.black import below_black
+from quadfringe.decoding.black import below_black, too_dark
 from quadfringe.errors import DecodeWarning
 
 CAMERA = qf.Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
@@ -92,3 +94,23 @@ def test_noise_is_no_contradiction() -> None:
         shot = scanner.grab()
     dark = ChannelResponse(offset=0.01, exponent=0.9)
     assert below_black(shot, qf.Response(red=dark, green=dark, blue=dark, ir=dark)) < params.BELOW_SHARE
+
+
+@pytest.mark.parametrize("dark", [0.3, 0.5])
+def test_a_dark_level_above_the_light_is_told(dark: float, bright: qf.Shot) -> None:
+    device = qf.Device(width_px=912, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(455.5, 191.5))
+    devices = {"camera": CAMERA, "projector": device.model_copy(update={"translation_mm": (-250.0, 0.0, 0.0)})}
+    words = "darker than the dark level of the calibration"
+    for level, expected in ((AMBIENT, False), (dark, True)):
+        known = Calibration(**devices, dark=(level,) * 4)
+        cause = too_dark(bright, known)
+        assert (cause is not None and words in cause.found) == expected
+    assert too_dark(bright, Calibration(**devices)) is None
+
+
+def test_a_shape_says_that_the_dark_level_is_wrong(small_bench: Path) -> None:
+    """Most of the surface was missing without a word: dark fringes below the dark level have no phase."""
+    known = Calibration.load(small_bench / "calibration.json").model_copy(update={"dark": (0.5,) * 4})
+    with pytest.warns(DecodeWarning, match=r"% of the bright places .* darker than the dark level of the calibration"):
+        shape = qf.decode(qf.read_shot(small_bench), qf.Plan(912, calibration=known, response="linear"))
+    assert "dark level" in shape.warnings[0]

@@ -274,3 +274,12 @@ def test_info_tells_what_a_file_holds(small_bench: Path, tmp_path: Path) -> None
     refused(run("info", tmp_path / "other.json"), 2, "expected a calibration,", "got JSON with the keys findings")
     (tmp_path / "a.txt").touch()
     refused(run("info", tmp_path / "a.txt"), 2, "a.txt")
+
+
+def test_too_little_memory_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(*_: object) -> None:
+        raise MemoryError("Unable to allocate 9 GiB")
+
+    monkeypatch.setattr("quadfringe.recording.inspection.lines_about", refuse)
+    result = run("info", tmp_path)
+    assert (result.exit_code, result.output) == (1, "error: out of memory: Unable to allocate 9 GiB\n")

@@ -16,7 +16,7 @@ import pytest
 from support.takes import SHOTS, changed, recorded
 
 from quadfringe.data import Shot
-from quadfringe.errors import InputError, RecordingWarning
+from quadfringe.errors import InputError, RecordingError, RecordingWarning
 from quadfringe.evaluation._takes import numbered_shot
 from quadfringe.files import TEXT_BYTES
 from quadfringe.recording import Recorder, Recording
@@ -193,3 +193,63 @@ def test_a_pipe_is_no_missing_file(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "take.h5")
     with pytest.raises(InputError, match=r"take\.h5: is a pipe; name a file"):
         Recording(tmp_path / "take.h5")
+
+
+def hollow(file: h5py.File, height_px: int, width_px: int) -> None:
+    """Replace the images by larger ones that are holes."""
+    as_it_is = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+    as_it_is.set_chunk((1, height_px, width_px))
+    as_it_is.set_alloc_time(h5py.h5d.ALLOC_TIME_EARLY)
+    as_it_is.set_fill_time(h5py.h5d.FILL_TIME_NEVER)
+    space = h5py.h5s.create_simple((len(file["id"]), height_px, width_px))
+    for name in ("red", "green", "blue", "ir"):
+        del file[name]
+        h5py.h5d.create(file.id, name.encode(), h5py.h5t.STD_U8LE, space, as_it_is)
+
+
+@pytest.mark.parametrize(
+    ("size", "reason"),
+    [
+        ((8192, 8193), r"claims shots of 268 MB, and nearly all of the file are holes .*; expected at most 268 MB"),
+        ((16385, 16384), "expected images of at most 268,435,456 pixels, got 16384 x 16385"),
+        ((40_000, 40_000), "expected images of at most 268,435,456 pixels, got 40000 x 40000"),
+    ],
+)
+def test_huge_images_of_holes_are_refused(size: tuple[int, int], reason: str, hostile: Path) -> None:
+    """Some kB on the disk would be shots of gigabytes, which take half a minute and all memory."""
+    changed(hostile, lambda file: hollow(file, *size))
+    assert 512 * hostile.stat().st_blocks < 1 << 20
+    with pytest.raises(InputError, match=rf"hostile\.h5: .*{reason}"):
+        Recording(hostile)
+
+
+def test_images_of_holes_that_fit_are_read(hostile: Path) -> None:
+    changed(hostile, lambda file: hollow(file, 1024, 1024))
+    with pytest.warns(RecordingWarning, match="cannot be verified"):
+        recording = Recording(hostile)
+    with recording:
+        assert recording.read(0) is None  # its checksums are those of other images
+        assert recording.header.shot_bytes == 4 << 20
+
+
+def test_a_shot_that_does_not_fit_into_memory_is_not_called_damaged(
+    take: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise MemoryError("Unable to allocate 1.49 GiB")
+
+    with Recording(take) as recording:
+        monkeypatch.setattr("quadfringe.recording._source.np.empty", refuse)
+        with pytest.raises(RecordingError, match=r"shot 1 cannot be read: Unable to allocate 1\.49 GiB"):
+            recording.read(1)
+
+
+def test_no_image_is_recorded_that_cannot_be_read(tmp_path: Path) -> None:
+    row = np.zeros((1, 1), np.uint8)
+    images = [np.broadcast_to(row, (16385, 16384))] * 4
+    with (
+        pytest.raises(InputError, match="expected images of at most 268,435,456 pixels"),
+        Recorder(tmp_path / "new.h5") as recorder,
+    ):
+        recorder.write(Shot(*images))
+    assert not list(tmp_path.iterdir())

@@ -140,6 +140,8 @@ def test_colour_is_given_or_grey() -> None:
         ({"step": 1.5}, "step: expected a whole number of at least 1, got 1.5"),
         ({"fill_holes_px": -1}, "fill_holes_px: expected a whole number of at least 0, got -1"),
         ({"fill_holes_px": 10**6}, "fill_holes_px: expected at most 1000, got 1000000"),
+        ({"fill_holes_px": 10**30}, "fill_holes_px: expected at most 1000, got 10{30}"),
+        ({"step": 10**30}, "step: expected at most 65536, got 10{30}"),
         ({"colour": np.zeros((2, 2, 3), np.uint8)}, r"colour: expected a picture of uint8 \(12, 16, 3\)"),
         ({"colour": "red"}, "colour: expected a picture of uint8 .* got str"),
     ],

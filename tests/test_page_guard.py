@@ -121,6 +121,14 @@ def test_the_page_takes_no_content_from_elsewhere(viewer: Viewer) -> None:
     assert answer(viewer, "/?token=unasked").status == 200
 
 
+def test_many_parameters_and_odd_bytes_are_refused(viewer: Viewer, guarded: Viewer) -> None:
+    """Servers of other ports may set the cookie, to any bytes; the right one counts all the same."""
+    assert answer(viewer, f"/?{'a=1&' * 500}").status == 400
+    name, token = f"quadfringe-live-{port_of(guarded)}", guarded.url.partition("token=")[2]
+    assert answer(guarded, Cookie=f"{name}=\xff\xfe").status == 403
+    assert answer(guarded, Cookie=f"{name}=\xff\xfe; {name}={token}").status == 200
+
+
 def test_other_machines_need_the_token(guarded: Viewer) -> None:
     address, _, token = guarded.url.partition("/?token=")
     bare = f"http://127.0.0.1:{port_of(guarded)}"

@@ -18,6 +18,8 @@ from quadfringe.cli import app
 from quadfringe.config import memory
 from quadfringe.config.cameras import VirtualConfig
 from quadfringe.decoding._kernel import BYTES_PER_PX
+from quadfringe.devices.light import BYTES_PER_PX as IMAGES_BYTES_PER_PX
+from quadfringe.devices.light import Levels, light_images
 from quadfringe.devices.virtual._bench import BYTES_PER_PX as BENCH_BYTES_PER_PX
 from quadfringe.errors import ConfigError, InputError
 
@@ -58,6 +60,24 @@ def test_a_bench_that_does_not_fit_is_refused(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, ["measure", str(tmp_path / "system.toml"), "--out", str(tmp_path / "out.npz")])
     assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
     assert result.stderr.startswith("error: camera of the virtual bench:")
+
+
+@pytest.mark.usefixtures("small_machine")
+def test_images_that_do_not_fit_are_refused() -> None:
+    huge = 65536, 65536
+    with pytest.raises(InputError, match=r"pattern: 65536 x 65536 pixels need about 17 GB of memory, .* has 2 GB"):
+        qf.pattern("red", (36, 35, 30), *huge)
+    for light in (qf.Fringes(), Levels((1.0, 1.0, 1.0, 1.0))):
+        with pytest.raises(InputError, match="projector images: 65536 x 65536 pixels need about"):
+            light_images(light, huge)
+
+
+@pytest.mark.parametrize("height", [2**32, 10**30])
+def test_a_projector_of_impossible_size_is_refused(height: int, tmp_path: Path) -> None:
+    for side in ("--width", "--height"):
+        result = CliRunner().invoke(app, ["pattern", "--out", str(tmp_path), side, str(height)])
+        assert (result.exit_code, result.stderr.count("\n")) == (2, 1)
+        assert result.stderr == f"error: {side[2:]}: expected a number from 1 to 65536, got {height}\n"
 
 
 def test_a_machine_that_does_not_tell_refuses_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -107,13 +127,16 @@ from pathlib import Path
 import numpy as np
 import quadfringe as qf
 from quadfringe import _core
+from quadfringe.devices.light import projector_images
 
 def used():  # getrusage would also count what the parent used
     return int(re.search(r"VmHWM:\\s+(\\d+) kB", Path("/proc/self/status").read_text())[1]) * 1024
 
 work, rows, columns = sys.argv[1], 2000, 1824
 before = used()
-if work == "render":
+if work == "pattern":
+    projector_images((36.0, 35.0, 30.0), (columns, rows), "regular")
+elif work == "render":
     focal_px = 3000.0
     camera = {"width_px": columns, "height_px": rows, "focal_px": (focal_px,) * 2, "centre_px": (911.5, 999.5)}
     with qf.open(qf.SystemConfig(camera=camera)) as scanner:
@@ -129,8 +152,9 @@ print((used() - before) / (rows * columns))
 """
 
 
-@pytest.mark.parametrize("work", ["render", *BYTES_PER_PX])
+@pytest.mark.parametrize("work", ["render", "pattern", *BYTES_PER_PX])
 def test_the_estimates_of_memory_hold(work: str) -> None:
     done = subprocess.run([sys.executable, "-c", PEAK, work], capture_output=True, text=True, check=True)
-    estimate = (BYTES_PER_PX | {"render": BENCH_BYTES_PER_PX["camera"]})[work]
+    others = {"render": BENCH_BYTES_PER_PX["camera"], "pattern": IMAGES_BYTES_PER_PX}
+    estimate = (BYTES_PER_PX | others)[work]
     assert 0.5 * estimate < float(done.stdout) < 1.2 * estimate

@@ -22,6 +22,7 @@ from pathlib import Path
 from quadfringe.errors import InputError
 
 __all__ = [
+    "PARTIAL",
     "TEXT_BYTES",
     "atomic",
     "atomic_folder",
@@ -38,6 +39,7 @@ TEXT_BYTES = 8 << 20  # of settings and calibrations, which have up to some 100 
 # How many times larger than its room on the disk a file may be, and bytes that are free. Not measured: file systems
 # that compress seldom reach it with measured values. Larger numbers let files of some kB keep a reader busy for longer.
 COMPRESSION, HOLES_FREE_BYTES = 8, 1 << 20
+PARTIAL = ".partial"
 KINDS = {stat.S_IFDIR: "folder", stat.S_IFCHR: "device", stat.S_IFBLK: "device", stat.S_IFIFO: "pipe"}
 
 
@@ -69,8 +71,11 @@ def atomic(path: Path | str) -> Iterator[Path]:
 
 @contextmanager
 def atomic_folder(path: Path) -> Iterator[Path]:
-    """Give an empty folder next to `path`; rename it to `path` when the block succeeds, else remove it."""
-    temporary = Path(tempfile.mkdtemp(prefix=f".{path.stem}-", dir=path.parent))
+    """Give an empty folder next to `path`; rename it to `path` when the block succeeds, else remove it.
+
+    Until then its name ends in .partial, which tells those of killed processes from folders of others.
+    """
+    temporary = Path(tempfile.mkdtemp(prefix=f".{path.stem}-", suffix=PARTIAL, dir=path.parent))
     try:
         yield temporary
         temporary.chmod(0o777 & ~_umask())

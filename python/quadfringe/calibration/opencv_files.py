@@ -37,16 +37,15 @@ def write_opencv(path: Path, calibration: Calibration) -> None:
     """Write the devices of a calibration for OpenCV; the suffix selects the format."""
     import cv2
 
-    require_suffix(path, SUFFIXES)
+    suffix = require_suffix(path, SUFFIXES)
+    # In memory, here and in `_matrices_in`: OpenCV crashes on a path that is not valid UTF-8.
+    storage = cv2.FileStorage(suffix, cv2.FILE_STORAGE_WRITE | cv2.FILE_STORAGE_MEMORY)
+    for name in DEVICES:
+        device = getattr(calibration, name)
+        for key, matrix in ({} if device is None else _matrices(name, device)).items():
+            storage.write(key, matrix)
     with atomic(path) as temporary:
-        storage = cv2.FileStorage(str(temporary), cv2.FILE_STORAGE_WRITE)
-        try:
-            for name in DEVICES:
-                device = getattr(calibration, name)
-                for key, matrix in ({} if device is None else _matrices(name, device)).items():
-                    storage.write(key, matrix)
-        finally:
-            storage.release()
+        temporary.write_text(storage.releaseAndGetString())
 
 
 def _matrices(name: str, device: Device) -> dict[str, NDArray[np.float64]]:
@@ -76,22 +75,23 @@ def read_opencv(path: Path) -> Calibration:
 def read_opencv_by(helper: Helper, path: Path) -> Calibration:
     """Read as `read_opencv` does, with a helper process that reads several files."""
     require_suffix(path, SUFFIXES)
-    if found := _too_nested(read_bytes(path, FILE_BYTES)):
+    data = read_bytes(path, FILE_BYTES)
+    if found := _too_nested(data):
         raise InputError(f"{path}: expected at most {found}, got more")
     try:
-        matrices = helper.run(_matrices_in, path)
+        matrices = helper.run(_matrices_in, path, data.decode(errors="replace"))
     except BoundedError as error:
         words = f"{path}: expected an OpenCV FileStorage file; OpenCV {error} when it reads this one"
         raise InputError(words) from error
     return devices_from_opencv(matrices, str(path))
 
 
-def _matrices_in(path: Path) -> dict[str, NDArray[np.float64]]:
-    """Read every matrix of numbers in a file; runs in the helper process."""
+def _matrices_in(path: Path, text: str) -> dict[str, NDArray[np.float64]]:
+    """Read every matrix of numbers in the text of a file; runs in the helper process."""
     import cv2
 
     try:
-        storage = cv2.FileStorage(str(path), cv2.FILE_STORAGE_READ)
+        storage = cv2.FileStorage(text, cv2.FILE_STORAGE_READ | cv2.FILE_STORAGE_MEMORY)
         nodes = {key: storage.getNode(key).mat() for key in storage.root().keys()}  # noqa: SIM118 - no mapping
         storage.release()
     except (cv2.error, SystemError, UnicodeDecodeError) as error:

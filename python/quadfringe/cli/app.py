@@ -53,6 +53,9 @@ class Commands(TyperGroup):
         except (BatchError, DecodeError, CameraError, RecordingError) as error:
             complain(str(error))
             raise typer.Exit(FAILED) from error
+        except MemoryError as error:
+            complain(f"out of memory: {error or 'use smaller images or shapes'}")
+            raise typer.Exit(FAILED) from error
         except BrokenPipeError:
             raise  # the reader closed the pipe early, as `head` does; this is no error
         except (ValueError, OSError, MissingExtraError) as error:

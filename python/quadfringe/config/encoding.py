@@ -18,10 +18,12 @@ from numpy.typing import NDArray
 from quadfringe import _core
 from quadfringe.config._base import SIZE_MAX
 from quadfringe.config.decode import three_numbers
+from quadfringe.config.memory import require_memory
 from quadfringe.errors import InputError
 
-__all__ = ["check_code", "optimum", "pattern"]
+__all__ = ["check_code", "optimum", "pattern", "require_image"]
 
+PATTERN_BYTES_PER_PX = 4  # of one channel, float32
 CHANNELS = {"red": "R", "green": "G", "blue": "B", "ir": "IR"}
 
 
@@ -48,13 +50,23 @@ def pattern(
 ) -> NDArray[np.float32]:
     """Give the ideal image of a channel, (height, width) float32, linear light from 0 to 1.
 
-    `channel` is "red", "green", "blue" or "ir", or R, G, B or IR. ValueError for other names and wrong sizes.
+    `channel` is "red", "green", "blue" or "ir", or R, G, B or IR. ValueError for other names and wrong sizes, and for
+    images that do not fit into memory.
     """
     letters = CHANNELS.get(channel, channel)
     if letters not in CHANNELS.values():
         raise InputError(f"channel: expected one of {', '.join(CHANNELS)}, or R, G, B, IR, got {channel!r}")
-    size = _whole("width", width), _whole("height", height)
-    return _core.pattern(letters, three_numbers(fringe_numbers), *size, layout=layout)
+    require_image("pattern", (width, height), PATTERN_BYTES_PER_PX)
+    return _core.pattern(letters, three_numbers(fringe_numbers), index(width), index(height), layout=layout)
+
+
+def require_image(work: str, size_px: tuple[int, int], bytes_per_px: float) -> None:
+    """Raise `InputError` unless an image of this size (columns, rows) is possible, and `work` on it fits into memory.
+
+    >>> require_image("pattern", (912, 1140), 4)
+    """
+    width, height = _whole("width", size_px[0]), _whole("height", size_px[1])
+    require_memory(work, (height, width), bytes_per_px)
 
 
 def _whole(name: str, value: Any) -> int:

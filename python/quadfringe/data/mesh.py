@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.config import SIZE_MAX
 from quadfringe.data.points import xyz_mm_of
 from quadfringe.errors import InputError, require
 from quadfringe.files import require_suffix
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["SUFFIXES", "Mesh", "Normals", "mesh_of", "normals_of"]
 
 SUFFIXES = (".stl", ".obj", ".glb", ".ply")
+HOLES_MAX_PX = 1000  # that the kernel takes, too; larger numbers need not fit into its integers
 SCALARS = ("quality", "uncertainty_mm", "wrong_order_probability")
 
 Floats = NDArray[np.float32]
@@ -121,9 +123,11 @@ def mesh_of(shape: Shape, step: int, fill_holes_px: int, colour: NDArray[np.uint
     from quadfringe import _core
 
     xyz_mm = _points(shape)
-    for name, value, least in (("step", step, 1), ("fill_holes_px", fill_holes_px, 0)):
+    for name, value, least, most in (("step", step, 1, SIZE_MAX), ("fill_holes_px", fill_holes_px, 0, HOLES_MAX_PX)):
         if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
             raise InputError(f"{name}: expected a whole number of at least {least}, got {value!r}")
+        if value > most:
+            raise InputError(f"{name}: expected at most {most}, got {value!r}")
     colour = shape.colour if colour is None else _colour(colour, xyz_mm.shape)
     try:
         found = _core.mesh_from_points(xyz_mm, _deviations(shape), step=int(step), holes_px=int(fill_holes_px))

@@ -16,7 +16,7 @@ from quadfringe.data import AnyShot, Calibration
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
 
-__all__ = ["below_black", "too_black"]
+__all__ = ["below_black", "too_black", "too_dark"]
 
 Map = NDArray[np.float32]
 
@@ -32,6 +32,27 @@ def below_black(shot: AnyShot, response: Response | Literal["linear"], known: Ca
     black = np.array([offset for offset, *_ in response.rows], np.float32)
     if known is not None and known.dark is not None:
         black += np.array(known.dark, np.float32)
+    return _share_below(shot, black)
+
+
+def too_dark(shot: AnyShot, known: Calibration | None) -> Cause | None:
+    """Name a dark level of a calibration that the shot contradicts: light that is measured is not below it."""
+    if known is None or known.dark is None or not any(known.dark):
+        return None
+    share = _share_below(shot, np.array(known.dark, np.float32))
+    if share < params.BELOW_SHARE:
+        return None
+    words = (
+        f"{share:.0%} of the bright places have a channel that is darker than the dark level of the calibration, so "
+    )
+    words += "that its dark fringes are cut off"
+    return Cause(
+        "calibration dark level", words, "give dark as a fraction of full scale, or measure it again", fatal=False
+    )
+
+
+def _share_below(shot: AnyShot, black: Map) -> float:
+    """Give the share of the bright places of a shot where a channel is darker than this black of R, G, B, IR."""
     light = np.stack([_squares(image, shot) for image in shot.channels.values()])
     brightest = light.max(axis=0)
     bright = brightest > params.BRIGHT_SHARE * np.quantile(brightest[::4, ::4], params.BRIGHT_QUANTILE)

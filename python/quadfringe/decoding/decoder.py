@@ -8,7 +8,7 @@ from dataclasses import replace
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
-from quadfringe.decoding.black import below_black, too_black
+from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import wrong_bits
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
@@ -126,7 +126,7 @@ def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot, doubt: Cause | N
     doubts = implausible(shape)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
-    found = [cause for cause in (doubt, wrong_bits(shot)) if cause]
+    found = [cause for cause in (doubt, too_dark(shot, kernel.plan.calibration), wrong_bits(shot)) if cause]
     doubts = [*doubts, *found, *within_depths(shape, kernel.plan.decode.depth_range_mm)]
     if not doubts:
         return shape

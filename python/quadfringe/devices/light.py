@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config import Device, Fringes, Row4
+from quadfringe.config.encoding import require_image
 from quadfringe.data.optics import core_device
 from quadfringe.errors import InputError
 
@@ -26,6 +27,9 @@ __all__ = [
     "predeformation",
     "projector_images",
 ]
+
+# Peak memory of the images of both projectors, bytes per pixel (`pytest tests/test_size_limits.py` holds it).
+BYTES_PER_PX = 56
 
 
 @dataclass(frozen=True)
@@ -100,9 +104,10 @@ def projector_images(
 ) -> ProjectorImages:
     """Return the images of both projectors for these fringes; `size_px` is (W, H).
 
-    Raises ValueError when the ambiguity range of the fringe numbers does not cover the width, and when the projectors
-    of a pre-deformation have another size.
+    Raises ValueError when the ambiguity range of the fringe numbers does not cover the width, when the projectors of a
+    pre-deformation have another size, and for images that are impossible or do not fit into memory.
     """
+    require_image("projector images", size_px, BYTES_PER_PX)
     _core.check_code(fringes, size_px[0])
     red, green, blue, ir = (
         _core.pattern(channel, fringes, *size_px, layout=layout) for channel in ("R", "G", "B", "IR")
@@ -130,6 +135,7 @@ def light_images(light: Light, size_px: tuple[int, int], deformed: Predeformatio
     """
     if isinstance(light, Fringes):
         return projector_images(light.numbers, size_px, light.layout, deformed)
+    require_image("projector images", size_px, BYTES_PER_PX)
     shape = size_px[::-1]
     if isinstance(light, Levels):
         if not all(0 <= level <= 1 for level in light.levels):

@@ -76,10 +76,13 @@ def write_image(path: Path, image: NDArray[Any]) -> None:
     import cv2
 
     stored = image if image.ndim == 2 else image[:, :, ::-1]
+    # Encoded in memory: OpenCV crashes on a path that is not valid UTF-8, and Linux allows any bytes in one.
+    suffix = path.suffix if path.suffix.isascii() else ""
+    try:
+        done, data = cv2.imencode(suffix, np.ascontiguousarray(stored))
+    except cv2.error:
+        done = False
+    if not done:
+        raise InputError(f"{path}: cannot be written as an image; use .png, .tif or .bmp")
     with atomic(path) as temporary:
-        try:
-            done = cv2.imwrite(str(temporary), np.ascontiguousarray(stored))
-        except cv2.error:
-            done = False
-        if not done:
-            raise InputError(f"{path}: cannot be written as an image; use .png, .tif or .bmp")
+        temporary.write_bytes(data.tobytes())

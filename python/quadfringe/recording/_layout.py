@@ -31,6 +31,7 @@ from quadfringe import _core
 from quadfringe.config import BayerPattern, SystemConfig, checked
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Stamp
 from quadfringe.errors import ConfigError, InputError
+from quadfringe.io.declared import IMAGE_PX
 from quadfringe.io.texts import json_of
 from quadfringe.recording._checksums import sha256_of
 from quadfringe.recording._stored import Stored
@@ -78,6 +79,7 @@ class Header:
         if image.dtype.str not in PIXELS:
             raise InputError(f"recording: expected images of uint8, uint16 or float32, got {image.dtype.str}")
         height_px, width_px = image.shape
+        _require_size(height_px, width_px)
         return cls(
             tuple(shot.images),
             height_px,
@@ -204,12 +206,19 @@ def _bare_header(stored: Stored) -> Header:
     odd = [n for n, found in expected.items() if (stored.dtypes.get(n), stored.shapes.get(n, ())[1:]) != found]
     if odd or len(size) != 2 or 0 in size or dtype not in PIXELS:
         raise InputError(f"{', '.join(odd) or dtype}: not the type or size of a recording; copy the file again")
+    _require_size(*size)
     full_scale, bayer, device = (stored.attributes.get(name) for name in ("full_scale", "bayer", "device"))
     if not isinstance(full_scale, float) or not isinstance(device, str) or bayer not in (None, *get_args(BayerPattern)):
         raise InputError("full_scale, bayer or device: not the values of a recording; copy the file again")
     unverified = stored.attributes["schema_version"] == 1 or "origin" in stored.attributes
     origin = UNVERIFIED if unverified else ""
     return Header(images, *size, np.dtype(dtype), full_scale, bayer, device, stored.chips, origin=origin)
+
+
+def _require_size(height_px: int, width_px: int) -> None:
+    """Raise `InputError` for images of more pixels than those of files may have: some kB of holes can declare them."""
+    if height_px * width_px > IMAGE_PX:
+        raise InputError(f"recording: expected images of at most {IMAGE_PX:,} pixels, got {width_px} x {height_px}")
 
 
 def _model(text: str, name: str) -> Any:

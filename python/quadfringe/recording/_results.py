@@ -9,6 +9,7 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from glob import escape
 from pathlib import Path
 from typing import IO, Any
 
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from quadfringe.config import SystemConfig
 from quadfringe.data import Shape
 from quadfringe.errors import InputError, RecordingWarning
-from quadfringe.files import atomic_folder, folder_for
+from quadfringe.files import PARTIAL, atomic_folder, folder_for
 from quadfringe.recording import Recording
 from quadfringe.recording._checksums import sha256_of
 from quadfringe.recording.reader import listed
@@ -183,7 +184,7 @@ def _sweep(job: Job) -> None:
     """Remove the partial files of a killed run."""
     for leftover in (*job.store.rglob("*.partial"), *job.folder.glob(".shot_*"), *job.folder.glob(".errors-*")):
         leftover.unlink(missing_ok=True)
-    for leftover in job.out.glob(f".{job.recording.stem}-*"):
+    for leftover in job.out.glob(f".{escape(job.recording.stem)}-*{PARTIAL}"):
         shutil.rmtree(leftover, ignore_errors=True)
 
 

@@ -98,11 +98,11 @@ class Source:
     def _at(self, extent: Extent) -> NDArray[Any]:
         dtype = np.dtype(extent.dtype)
         if extent.begin + dtype.itemsize * int(np.prod(extent.shape)) <= self.file.size:
-            found = np.empty(extent.shape, dtype)
             try:
+                found = np.empty(extent.shape, dtype)
                 if self.file.read_into(found, extent.begin):
                     return found
-            except OSError as error:
+            except (OSError, MemoryError) as error:
                 raise UnreadableError(_first_line(error)) from error
         raise self._damage("an image ends beyond the end of the file")
 

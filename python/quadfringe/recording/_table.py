@@ -19,6 +19,8 @@ from quadfringe.recording._stored import Stored
 
 __all__ = ["FileSize", "Table", "read_table"]
 
+HOLES_BYTES = 1 << 28  # of a shot that may be holes, as in copies of black images; as many as those of image files
+
 
 @dataclass(frozen=True)
 class FileSize:
@@ -76,6 +78,12 @@ def read_table(source: Source, stored: Stored, header: StoredHeader, size: FileS
     most = min(size.tables_most // row_bytes, max(size.found, size.stated) // header.header.shot_bytes + 1)
     if length > most:
         raise InputError(f"claims {length} shots, but its size is that of {most}; copy it again")
+    room = max(HOLES_BYTES, size.tables_most)
+    if length and header.header.shot_bytes > room:
+        raise InputError(
+            f"claims shots of {header.header.shot_bytes / 1e6:.0f} MB, and nearly all of the file are holes that take "
+            f"no room on the disk; expected at most {room / 1e6:.0f} MB; copy it again"
+        )
     rows = min(length, *(stored.shapes[name][0] for name in names))
     found = {name: source.numbers(name, rows) for name in names}
     found.setdefault("chip_stamps", np.zeros((rows, 0, 3), np.int64))

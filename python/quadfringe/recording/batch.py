@@ -18,6 +18,7 @@ import json
 import multiprocessing
 import os
 import pickle
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, as_completed
@@ -25,6 +26,7 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from multiprocessing.process import BaseProcess
 from pathlib import Path
 from threading import Lock, Thread
 from typing import Any
@@ -42,6 +44,9 @@ from quadfringe.scanner import Scanner, open_system
 
 __all__ = ["Job", "Outcome", "decode_recordings", "executor_for", "prepare", "run"]
 
+# Most processes, the larger of the two: each takes some 200 MB, and more than the cores only wait for one another.
+WORKERS_MOST, WORKERS_PER_CORE = 64, 4
+END_S = 3.0  # in which idle workers end by themselves; they take a tenth of a second
 RESTARTS = 3  # new pools after a worker process died: a shot that kills each of them is not retried for ever
 
 
@@ -198,21 +203,22 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
     """Yield a process pool of this machine, by default one process per core, or the workers of a dask scheduler.
 
     Cluster workers need quadfringe, and the recordings and results under the same paths. Raises `InputError` when no
-    scheduler answers at the address.
+    scheduler answers at the address, and for more processes than this machine can serve.
     """
     if scheduler is None:
         # Spawned, because a process with threads (kernel, HDF5) must not be forked.
+        _check_workers(workers)
         spawned = multiprocessing.get_context("spawn")
         others = multiprocessing.active_children()
         pool = ProcessPoolExecutor(workers or usable_cores(), spawned, initializer=_end_with_parent)
+        patience_s = 0.0
         try:
             yield pool
+            patience_s = END_S
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-            # Not asked to end: a worker that was killed while it held the lock of the queue would keep others waiting.
-            for worker in multiprocessing.active_children():
-                if worker not in others:
-                    worker.kill()
+            started = [worker for worker in multiprocessing.active_children() if worker not in others]
+            _end(started, patience_s)
         return
     distributed = require("distributed", "batch")
     try:
@@ -221,6 +227,25 @@ def executor_for(workers: int | None = None, scheduler: str | None = None) -> It
         raise InputError(f"{scheduler}: no dask scheduler answers: {error}; check the address") from error
     with client, client.get_executor(retries=RESTARTS, pure=False) as cluster:
         yield cluster
+
+
+def _check_workers(workers: int | None) -> None:
+    """Raise `InputError` for a number of processes that the machine cannot serve."""
+    most = max(WORKERS_MOST, WORKERS_PER_CORE * usable_cores())
+    if workers is not None and not 1 <= workers <= most:
+        raise InputError(f"workers: expected 1 to {most} processes on this machine, got {workers}")
+
+
+def _end(workers: Sequence[BaseProcess], patience_s: float) -> None:
+    """Wait for idle workers to end, which then leave nothing behind, and kill those that do not.
+
+    One that was killed while it held the lock of the queue would keep the others waiting for ever.
+    """
+    end_s = time.monotonic() + patience_s
+    for worker in workers:
+        worker.join(max(0.0, end_s - time.monotonic()))
+        if worker.is_alive():
+            worker.kill()
 
 
 def _end_with_parent() -> None:

@@ -61,7 +61,7 @@ class Guard:
             return Refusal(HTTPStatus.FORBIDDEN, f"{UNKNOWN_NAME}, got {host[:80]!r}")
         if origins and _only(headers, "Origin").lower() not in (f"http://{host}", f"https://{host}"):
             return Refusal(HTTPStatus.FORBIDDEN, FOREIGN_PAGE)
-        query = parse_qsl(target.partition("?")[2], keep_blank_values=True, max_num_fields=8)
+        query = parse_qsl(target.partition("?")[2], keep_blank_values=True)
         # The page obeys other parameters: ?websocket=... lets it take its contents, scripts included, from elsewhere.
         if any(name != TOKEN for name, _ in query):
             return Refusal(HTTPStatus.BAD_REQUEST, NO_PARAMETERS)
@@ -87,7 +87,8 @@ class Guard:
         assert self.token is not None
         cookies = (part.strip().partition("=") for part in ";".join(headers.get_all("Cookie")).split(";"))
         given = [value for name, _, value in cookies if name == self.cookie] + [query.get(TOKEN, "")]
-        return any(compare_digest(value.encode(), self.token.encode()) for value in given)
+        # Headers may hold any bytes, and servers of other ports of this name may set the cookie.
+        return any(compare_digest(value.encode(errors="surrogateescape"), self.token.encode()) for value in given)
 
 
 def _only(headers: Headers, name: str) -> str:

@@ -58,11 +58,22 @@ def movie(path: Path, rate_hz: float) -> Iterator[Movie]:
     """Write an MP4 of the pictures that are added; the file is complete or does not exist."""
     require_suffix(path, (".mp4",))
     with atomic(path) as temporary:
+        if not _is_text(temporary):  # OpenCV would crash
+            raise InputError(f"{path}: a movie needs a path that is valid UTF-8; choose another one")
         writer = _Mp4(temporary, rate_hz)
         try:
             yield writer
         finally:
             writer.close()
+
+
+def _is_text(path: Path) -> bool:
+    """Say whether a path is text; Linux allows any bytes in it."""
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def solid_picture(
