@@ -22,7 +22,8 @@ SUFFIXES = (".stl", ".ply", ".obj", ".glb")  # formats that hold everything in o
 def triangles_in(path: Path) -> NDArray[np.float64]:
     """Read triangles, (N, 3, 3), mm; raises `InputError` for a file that holds no mesh or takes too long.
 
-    Files have mm along the axes of the camera frame, and .glb metres with y up, as `Shape.save` writes them. Materials and other files that it names are not opened.
+    Files have mm along the axes of the camera frame, and .glb metres with y up, as `Shape.save` writes them. Materials
+    and other files that it names are not opened.
     """
     require_suffix(path, SUFFIXES)
     if not path.exists():
