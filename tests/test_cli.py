@@ -14,6 +14,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from quadfringe.cli import app
+from quadfringe.data import Shape
 from quadfringe.io.images import read_image, write_image
 
 FRINGES = ["--fringes", "36", "35", "30", "--projector-width", "912"]
@@ -264,6 +265,10 @@ def test_info_tells_what_a_file_holds(small_bench: Path, tmp_path: Path) -> None
         result = run("info", path)
         assert result.exit_code == 0, result.output
         assert text in result.stdout
+    missing = [one for one in Shape.load(tmp_path / "a.npz").reasons() if one]
+    assert missing
+    for one in missing:
+        assert f"reason {one.name}, {one.words}: " in run("info", tmp_path / "a.npz").stdout
     refused(run("info", tmp_path / "no.npz"), 2, "no.npz")
     (tmp_path / "figures.json").write_text('{"figures": {"face_depth_rms_mm": 0.05}}')
     assert run("info", tmp_path / "figures.json").stdout.split("\n")[:2] == [

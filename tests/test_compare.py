@@ -136,6 +136,13 @@ def test_wrong_orders_are_named(plane: qf.Shape) -> None:
     assert found.right.rms == 0
 
 
+@pytest.mark.parametrize("other", ["face", "peaks"])
+def test_another_object_is_not_blamed_on_the_orders(stage: Stage, plane: qf.Shape, other: str) -> None:
+    found = qf.compare(stage.shape(stage.bench.cast(other), 1), plane)
+    assert "another surface" in [one.name for one in found.causes]
+    assert "wrong orders" not in [one.name for one in found.causes]
+
+
 # Other pairs
 
 

@@ -114,6 +114,29 @@ def test_what_cannot_be_compared_is_refused(seen: np.ndarray, tmp_path: Path) ->
         qf.compare(shape_of(seen[:2, :4]), far, align=True)
 
 
+@pytest.mark.parametrize("name", ["b.stl", "b.obj", "b.glb", "b.ply"])
+def test_a_shape_agrees_with_its_own_mesh(seen: np.ndarray, tmp_path: Path, name: str) -> None:
+    """Each file has the units and axes of its format; those of .glb are metres with y up."""
+    shape = shape_of(seen)
+    shape.mesh().save(tmp_path / name)
+    found = qf.compare(shape, tmp_path / name)
+    assert isinstance(found, MeshComparison)
+    assert found.matched_percent == 100
+    hold("compare.own_mesh_mm", np.abs(found.distance_mm).max())
+
+
+def test_triangles_beyond_the_reach_are_not_searched(bumps: trimesh.Trimesh) -> None:
+    """A mesh in metres lies far from all points, all triangles about equally near: a search among all takes minutes."""
+    surface = Surface(np.asarray(bumps.triangles))
+    points = np.add(bumps.triangles_center, (0, 0, 0.5))
+    points[::2, 2] += 500
+    found = surface.closest(points, 5.0)
+    np.testing.assert_array_equal(found.distances_mm[1::2], surface.closest(points[1::2]).distances_mm)
+    assert np.isinf(found.distances_mm[::2]).all()
+    for group in surface._groups:
+        assert np.isinf(group.nearest(points[::2], 6, 5.0 + group.radius_mm)[0]).all()
+
+
 # The command
 
 

@@ -55,6 +55,7 @@ def test_the_fields_of_a_shape() -> None:
     shape = decode_steps(levels(stacks((4, 4, 4), noise=0.01), 255), NUMBERS, WIDTH_PX)
     assert shape.config["decode"]["method"] == "reference"
     assert (shape.config["fringes"]["numbers"], shape.config["steps"]) == (list(NUMBERS), [4, 4, 4])
+    assert (shape.config["response"], shape.config["response_from"]) == (None, None), "no calibration states one"
     assert shape.wrong_order_probability is not None
     hold("reference.wrong_order_probability", shape.wrong_order_probability.max())
     assert np.all((shape.quality >= 0) & (shape.quality <= 1))

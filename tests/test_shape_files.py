@@ -168,6 +168,9 @@ def test_xarray_gets_every_map_with_its_unit(face: Shape) -> None:
     for name, values in face.maps.items():
         np.testing.assert_array_equal(found[name].values, values)
         assert found[name].attrs["units"] in name or found[name].attrs["units"] == "1"
+    flags = found["reason"].attrs
+    names = dict(zip(flags["flag_values"], flags["flag_meanings"].split(), strict=True))
+    assert names == {reason.value: reason.name.lower() for reason in qf.Reason}
     assert found["xyz_mm"].sel(row=200, column=250, axis="z").item() == face.xyz_mm[200, 250, 2]  # type: ignore[index]
     assert json.loads(found.attrs["config"]) == json.loads(json.dumps(dict(face.config)))
     assert "calibration" in found.attrs

@@ -18,7 +18,9 @@ __all__ = ["compare"]
 FirstArgument = Annotated[Path, typer.Argument(metavar="A", help="The shape that is judged, .npz.")]
 SecondArgument = Annotated[
     Path,
-    typer.Argument(metavar="B", help="What it is compared with: a shape, .npz, or a mesh in mm, .stl .ply .obj .glb."),
+    typer.Argument(
+        metavar="B", help="What it is compared with: a shape, .npz, or a mesh: .stl .ply .obj in mm, .glb in metres."
+    ),
 ]
 AlignOption = Annotated[bool, typer.Option("--align", help="Move A onto the surface of B first, by a rigid motion.")]
 CausesOption = Annotated[

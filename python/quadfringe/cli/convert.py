@@ -13,7 +13,7 @@ __all__ = ["convert"]
 
 
 def convert(
-    shape: Annotated[Path, typer.Argument(metavar="SHAPE.npz", help="Shape that decode, measure or batch saved.")],
+    shape: Annotated[Path, typer.Argument(metavar="SHAPE.npz", help="Shape that decode or measure saved.")],
     out: Annotated[
         Path,
         typer.Argument(

@@ -8,6 +8,7 @@ import numpy as np
 
 from quadfringe.data.mesh import normals_of
 from quadfringe.data.points import xyz_mm_of
+from quadfringe.data.reason import Reason
 from quadfringe.errors import require
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ UNITS = {
     "uncertainty_rad": ("rad", "standard deviation of the phase"),
     "uncertainty_mm": ("mm", "standard deviation of the depth"),
     "xyz_mm": ("mm", "point in the camera frame: x right, y down, z forward"),
-    "reason": ("1", "why there is no data: a value of quadfringe.Reason, 0 where there is"),
+    "reason": ("1", "why there is no data, 0 where there is some"),
     "albedo": ("1", "light without fringes, linear, fraction of full scale"),
 }
 LAST = {"xyz_mm": "axis", "albedo": "channel"}  # the third dimension of a map
@@ -61,5 +62,13 @@ def xarray_of(shape: Shape, texts: dict[str, str]) -> Any:
     for name, values in shape.maps.items():
         unit, meaning = UNITS[name]
         dimensions = ("row", "column", LAST.get(name, ""))[: values.ndim]
-        variables[name] = (dimensions, values, {"units": unit, "long_name": meaning})
+        variables[name] = (dimensions, values, {"units": unit, "long_name": meaning, **_flags(name)})
     return xarray.Dataset(variables, coordinates, texts)
+
+
+def _flags(name: str) -> dict[str, Any]:
+    """Name the values of a map of reasons, as the conventions of CF do."""
+    if name != "reason":
+        return {}
+    values = np.array([one.value for one in Reason], np.uint8)
+    return {"flag_values": values, "flag_meanings": " ".join(one.name.lower() for one in Reason)}

@@ -188,7 +188,8 @@ class Shape:
     def to_xarray(self) -> Any:
         """Give all `maps` as `xarray.Dataset` with dimensions row, column, and for points axis (x, y, z).
 
-        Each variable has the attributes `units` and `long_name`; the data set has `config` and `calibration` as JSON.
+        Each variable has the attributes `units` and `long_name`, and `reason` names its values (`flag_meanings`); the
+        data set has `config` and `calibration` as JSON.
         Raises `MissingExtraError` without xarray.
         """
         from quadfringe.data.conversions import xarray_of

@@ -93,13 +93,16 @@ def decode_steps(
         "fringes": {"numbers": numbers},
         "steps": steps,
         "channel": settings.channel,
-        **_described(choice, "calibration" if response == "auto" else "plan"),
+        **_described(choice, response, known),
         "decode": rounded(core.settings()),
     }
     return _trusted(Shape(**core.decode(images), config=described, calibration=known), settings)
 
 
-def _described(response: Response | Literal["linear"], source: str) -> dict[str, Any]:
+def _described(response: Response | Literal["linear"], asked: object, known: Calibration | None) -> dict[str, Any]:
+    """Describe the response that was corrected; "auto" without a calibration that states one corrects none."""
+    stated = known is not None and known.response is not None
+    source = ("calibration" if stated else None) if asked == "auto" else "plan"
     corrected = None if response == "linear" else response.model_dump(include=set(Response.model_fields))
     return {"quadfringe_version": _core.__version__, "response": corrected, "response_from": source}
 

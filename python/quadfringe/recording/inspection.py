@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from quadfringe.config import load_system
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.data.calibration import DIGEST
+from quadfringe.data.reason import Reason
 from quadfringe.errors import InputError
 from quadfringe.files import TEXT_BYTES, read_bytes
 from quadfringe.io.arrays import read_npy, read_npz
@@ -48,7 +49,19 @@ def lines_about(path: Path) -> list[str]:
 
 
 def _arrays(stored: dict[str, NDArray[Any]]) -> list[str]:
-    return [_array(name, array) for name, array in stored.items()]
+    return [line for name, array in stored.items() for line in (_array(name, array), *_reasons(name, array))]
+
+
+def _reasons(name: str, array: NDArray[Any]) -> list[str]:
+    """Give the share of each reason that occurs, in words, for the map of reasons of a shape."""
+    if name != "reason" or array.dtype != np.uint8 or not array.size:
+        return []
+    shares = {one: 100 * float((array == one).mean()) for one in Reason}
+    return [
+        f"reason {one.name}, {one.words}: {share:.2g} %"
+        for one, share in shares.items()
+        if share and one != Reason.RETURNED
+    ]
 
 
 def _array(name: str, array: NDArray[Any]) -> str:

@@ -89,13 +89,13 @@ def text_of(spots: list[Spot]) -> str:
     """Write the spots and their distance as tables in Markdown.
 
     >>> print(text_of([Spot((1.0, -2.0, 800.0), (10, 20), 0.05)]))
-    | | x, mm | y, mm | z, mm | row, column | noise of z, mm |
+    | | x, mm | y, mm | z, mm | row, column | ± z, mm |
     | --- | --- | --- | --- | --- | --- |
     | A | 1.000 | -2.000 | 800.000 | 10, 20 | 0.050 |
     """
     if not spots:
         return ""
-    lines = ["| | x, mm | y, mm | z, mm | row, column | noise of z, mm |", "| --- | --- | --- | --- | --- | --- |"]
+    lines = ["| | x, mm | y, mm | z, mm | row, column | ± z, mm |", "| --- | --- | --- | --- | --- | --- |"]
     for name, spot in zip(NAMES, spots, strict=False):
         place = " | ".join(f"{value:.3f}" for value in spot.place_mm)
         pixel = "-" if spot.pixel is None else f"{spot.pixel[0]}, {spot.pixel[1]}"
@@ -103,7 +103,7 @@ def text_of(spots: list[Spot]) -> str:
     if len(spots) == len(NAMES):
         found = distance(spots[0], spots[1])
         parts = " | ".join(f"{value:.3f}" for value in found.parts_mm)
-        lines.append(f"| B - A | {parts} | | |")
+        lines.append(f"| B\u00a0-\u00a0A | {parts} | | |")
         noise = "" if found.uncertainty_mm is None else f" ± {found.uncertainty_mm:.3f} mm (noise, one sigma)"
         lines += ["", f"**distance {found.length_mm:.3f} mm**{noise}"]
     return "\n".join(lines)

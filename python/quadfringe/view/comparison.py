@@ -56,12 +56,13 @@ def _range(found: Comparison) -> float:
 
 
 def _returned(found: ShapeComparison) -> Panel:
-    """Draw where both return (2), where their orders differ (3), and where only one does (1); 0 elsewhere."""
+    """Draw where both return (2), near edges (1), and where the orders differ (3)."""
     both = np.isfinite(found.difference_rad)
     image: NDArray[np.float64] = np.where(both, 2.0, np.nan)
     image[both & found.edge] = 1.0
     image[found.wrong_order] = 3.0
-    words = f"both return {found.both_percent:.2f} %; orders differ in {found.wrong_order_percent:.2g} % (dark)"
+    off = f"half a fringe off: {found.wrong_order_percent:.2g} %, dark"
+    words = f"both return {found.both_percent:.2f} %, light near edges\n{off}"
     return Panel(words, image, "", "Blues", (0.0, 3.0))
 
 
@@ -71,7 +72,7 @@ def _histogram(found: Comparison, range_: float) -> Graph:
     middles = (edges[1:] + edges[:-1]) / 2
     share = 100 * counts / max(1, values.size)
     inside = " / ".join(f"{percent:.1f}" for percent in found.overall.inside_percent)
-    name = f"inside 1 / 2 / 3 u: {inside} %"
+    name = f"inside 1 / 2 / 3 sigma: {inside} %"
     return Graph("distribution", f"difference, {found.overall.unit}", "% of the pixels", {name: (middles, share)})
 
 

@@ -35,6 +35,7 @@ def causes_of(pair: Pair, overall: Deviations) -> tuple[Explanation, ...]:
 
 
 def _wrong_orders(pair: Pair) -> Explanation | None:
+    """Name wrong orders, which displace by whole fringes, or surfaces that differ by anything else as much."""
     counted = pair.counted
     wrong = counted & pair.wrong_order
     count, whole = int(wrong.sum()), max(1, int(counted.sum()))
@@ -47,9 +48,11 @@ def _wrong_orders(pair: Pair) -> Explanation | None:
         return None
     fringes = difference[wrong[counted]] / pair.period_px
     usual = float(np.median(np.abs(fringes)))
-    words = (
-        f"{100 * count / whole:.2g} % of the pixels are off by half a fringe or more, by {usual:.3g} fringes (median)"
-    )
+    words = f"{100 * count / whole:.2g} % of the pixels are off by half a fringe or more"
+    if float(np.median(np.abs(fringes - np.round(fringes)))) > params.WHOLE_OFF:
+        fix = "the object was moved, or is another one; place it again, or align them"
+        return Explanation("another surface", f"{words}, but not by whole fringes: {fix}", share, count)
+    words += f", by {usual:.3g} fringes (median)"
     return Explanation("wrong orders", f"{words}: more light or contrast raises the margin of the order", share, count)
 
 

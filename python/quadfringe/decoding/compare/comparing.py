@@ -11,6 +11,7 @@ import numpy as np
 from quadfringe.config import brief
 from quadfringe.data import Shape, Truth, xyz_mm_of
 from quadfringe.decoding.compare import params
+from quadfringe.decoding.compare.mesh_files import SUFFIXES as MESHES
 from quadfringe.decoding.compare.pixels import Pair, compare_pixels, fringe_period_px_of, pair_of
 from quadfringe.decoding.compare.results import MeshComparison, ShapeComparison
 from quadfringe.errors import InputError
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from quadfringe.decoding.compare.surface import Surface
 
 __all__ = ["MESHES", "compare"]
-
-MESHES = (".stl", ".ply", ".obj", ".glb", ".off")
 
 
 @overload
@@ -54,12 +53,13 @@ def compare(
     """Compare two shapes of one camera, a shape with the truth of the bench, or with a mesh; say why they differ.
 
     `a` is a shape, or the path of one (.npz). `b` is a shape or its path, a `Truth`, a mesh of trimesh, or the path of
-    a mesh in mm (.stl, .ply, .obj, .glb, .off; extra `export`). Shape and truth are compared pixel by pixel, A less B,
-    as `ShapeComparison`; a mesh by the distance to its closest point, as `MeshComparison`. With `align`, the points of
-    A are moved onto B first by a rigid motion, and a shape B counts as a surface, so that its camera may be another.
+    a mesh (.stl, .ply, .obj in mm, .glb in metres with y up; extra `export`). Shape and truth are compared pixel by
+    pixel, A less B, as `ShapeComparison`; a mesh by the distance to its closest point, as `MeshComparison`. With
+    `align`, the points of A are moved onto B first by a rigid motion, and a shape B counts as a surface, so that its
+    camera may be another.
     `causes` names causes, which takes about 2 s: gamma and crosstalk, where one of the two comes from a single shot,
-    defocus and less light between two shapes, wrong orders, and calibration or pose. `fringe_period_px` is the width
-    of a fringe in columns of the projector, by default that of A.
+    defocus and less light between two shapes, wrong orders, calibration or pose, and another surface.
+    `fringe_period_px` is the width of a fringe in columns of the projector, by default that of A.
 
     Raises `InputError` for shapes of unequal size or without a common pixel, and for a mesh or `align` without
     millimetres.

@@ -12,6 +12,7 @@ from quadfringe.decoding.compare import params
 from quadfringe.errors import InputError
 from quadfringe.files import read_bytes, require_suffix
 from quadfringe.io.bounded import BoundedError, Helper, Limits
+from quadfringe.io.export import GLB_FROM_MM
 
 __all__ = ["SUFFIXES", "triangles_in"]
 
@@ -19,9 +20,10 @@ SUFFIXES = (".stl", ".ply", ".obj", ".glb")  # formats that hold everything in o
 
 
 def triangles_in(path: Path) -> NDArray[np.float64]:
-    """Read triangles, (N, 3, 3); raises `InputError` for a file that holds no mesh or takes too long.
+    """Read triangles, (N, 3, 3), mm; raises `InputError` for a file that holds no mesh or takes too long.
 
-    Materials and other files that it names are not opened.
+    Files have mm along the axes of the camera frame, and .glb metres with y up, as `Shape.save` writes them. Materials
+    and other files that it names are not opened.
     """
     require_suffix(path, SUFFIXES)
     if not path.exists():
@@ -32,9 +34,10 @@ def triangles_in(path: Path) -> NDArray[np.float64]:
     )
     try:
         with Helper(limits) as helper:
-            return helper.run(_triangles, path)
+            triangles = helper.run(_triangles, path)
     except BoundedError as error:
         raise InputError(f"{path}: cannot be read as a mesh: it {error}") from error
+    return triangles / GLB_FROM_MM if path.suffix.lower() == ".glb" else triangles
 
 
 def _triangles(path: Path) -> NDArray[np.float64]:

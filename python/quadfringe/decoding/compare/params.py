@@ -71,6 +71,10 @@ FORM_SIGMAS = 0.3
 # Share of the pixels with a wrong order, and their share of the mean square. Smaller ones name stray pixels.
 WRONG_PERCENT = 0.1
 WRONG_SHARE = 0.3
+# Median distance of the differences of such pixels from whole fringes, in fringes, above which they are no wrong
+# orders. Wrong orders have up to 0.09 (published method, 20 % noise), two scenes 0.19 or more, and even differences
+# would have 0.25. A larger one blames the decoding for a moved object, a smaller one hides orders that are noisy.
+WHOLE_OFF = 0.13
 
 # --- Meshes and alignment
 

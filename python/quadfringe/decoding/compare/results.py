@@ -21,7 +21,8 @@ class Explanation:
     """A cause of a difference: its name, the evidence in words, and its share of the mean squared difference, 0 to 1.
 
     `size` is how strong the fault is, in the unit that `evidence` names: a difference of exponents (gamma), a share of
-    the light of another channel (crosstalk), px (defocus), pixels (wrong orders), the RMS of the smooth part otherwise.
+    the light of another channel (crosstalk), px (defocus), pixels (wrong orders, another surface), the RMS of the
+    smooth part otherwise.
     """
 
     name: str

@@ -51,10 +51,11 @@ class _Group:
         self.faces, self.radius_mm = faces, radius_mm
         self._tree = cKDTree(centres)
 
-    def nearest(self, points: Points, count: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-        """Give how far the nearest centres are, and their triangles, both (N, count)."""
-        away, found = self._tree.query(points, k=list(range(1, count + 1)), workers=-1)
-        return away, self.faces[found]
+    def nearest(self, points: Points, count: int, most_mm: float) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+        """Give how far the nearest centres are, and their triangles, both (N, count); beyond `most_mm` infinity."""
+        ranks = list(range(1, count + 1))
+        away, found = self._tree.query(points, k=ranks, distance_upper_bound=most_mm, workers=-1)
+        return away, self.faces[np.minimum(found, len(self.faces) - 1)]
 
 
 class Surface:
@@ -86,7 +87,7 @@ class Surface:
         for group in self._groups:
             count, near = min(CANDIDATES, len(group.faces)), np.arange(len(points))
             while near.size:
-                away, faces = group.nearest(points[near], count)
+                away, faces = group.nearest(points[near], count, reach_mm + group.radius_mm)
                 bound = np.minimum(distance[near], reach_mm) + group.radius_mm
                 on, d, face = _nearest(points[near], self.triangles_mm, faces, away < bound[:, None])
                 closer = d < distance[near]
