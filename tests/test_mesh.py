@@ -118,6 +118,7 @@ def test_other_holes_stay(case: str) -> None:
 
 def test_every_second_pixel() -> None:
     mesh = shape_of(plane()).mesh(step=2)
+    assert (mesh.step, repr(mesh)[-8:]) == (2, " step 2)")
     assert (mesh.pixel % 2 == 0).all()
     assert len(mesh.vertices_mm) == (ROWS // 2) * (COLUMNS // 2)
     step = plane()

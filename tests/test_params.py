@@ -63,6 +63,7 @@ ALLOWED: dict[tuple[str, str], str] = {
             *(("joint", name) for name in ("A_R", "A_B", "P_R", "P_B", "A_G", "A_IR", "B_G", "B_IR", "WEAKEST")),
             *(("joint", name) for name in ("W", "C", "S", "CC", "CS", "LIGHT")),
             ("joint", "GROWN"),
+            ("mesh", "FALLS"),
         ],
         "place in an array, or mark of a state",
     ),

@@ -38,6 +38,7 @@ class Mesh:
     pixel: row and column (M, 2) uint32 of each vertex.
     colour: (M, 3) uint8.
     filled: True (M,) in holes that were filled, where nothing was measured and the values below are NaN.
+    step: every n-th pixel of every n-th row was taken.
     quality, uncertainty_mm, wrong_order_probability: those of the shape, (M,) float32; None when the shape has none.
     """
 
@@ -48,13 +49,15 @@ class Mesh:
     pixel: NDArray[np.uint32]
     colour: NDArray[np.uint8]
     filled: NDArray[np.bool_]
+    step: int = 1
     quality: Floats | None = None
     uncertainty_mm: Floats | None = None
     wrong_order_probability: Floats | None = None
 
     def __repr__(self) -> str:
-        filled = f", {int(self.filled.sum())} filled" if self.filled.any() else ""
-        return f"Mesh({len(self.vertices_mm)} vertices, {len(self.faces)} triangles{filled})"
+        marks = [f"{int(self.filled.sum())} filled"] if self.filled.any() else []
+        marks += [f"step {self.step}"] if self.step > 1 else []
+        return f"Mesh({', '.join([f'{len(self.vertices_mm)} vertices', f'{len(self.faces)} triangles', *marks])})"
 
     @property
     def scalars(self) -> dict[str, NDArray[Any]]:
@@ -148,6 +151,7 @@ def mesh_of(shape: Shape, step: int, fill_holes_px: int, colour: NDArray[np.uint
         pixel=found["pixels"],
         colour=colour.reshape(-1, 3).take(place, axis=0),
         filled=found["filled"],
+        step=int(step),
         **taken,
     )
 

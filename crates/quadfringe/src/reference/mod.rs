@@ -175,7 +175,11 @@ impl Reference {
         let strays = if self.search.freedom() > 0 { stray_share(&evidence.concat()) } else { 0.0 };
         let freedom = self.search.freedom();
         let usual = if freedom > 0 { chi_square(freedom, EXCESS_QUANTILE) as f32 } else { f32::MAX };
-        Writer { variances, strays, usual, number: self.code.sets[0].fringe_number as f32 }
+        let images: usize = self.code.sets.iter().map(|set| set.steps).sum();
+        // The largest of n normal values is expected at sqrt(2 ln n) standard deviations or less.
+        let noise_peak = noise * (2.0 * (images as f32).ln()).sqrt();
+        let number = self.code.sets[0].fringe_number as f32;
+        Writer { variances, strays, usual, number, noise_peak }
     }
 }
 

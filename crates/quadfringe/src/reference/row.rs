@@ -38,6 +38,8 @@ pub(super) struct Writer {
     pub usual: f32,
     /// The first fringe number.
     pub number: f32,
+    /// Expected peak of the noise over all images, fraction of full scale.
+    pub noise_peak: f32,
 }
 
 impl<'i, T: Sample> RowPlan<'_, 'i, T> {
@@ -160,7 +162,9 @@ impl Writer {
             let lit = if wrong <= WRONG_MAX { Reason::Returned } else { Reason::DoubtfulOrder };
             out.reason[x] = match least[i] {
                 unknown if unknown.is_nan() => Reason::Saturated,
-                least if least < modulation_min => Reason::without_fringes(peaks[i], modulation_min),
+                least if least < modulation_min => {
+                    Reason::without_fringes(peaks[i] - self.noise_peak, modulation_min)
+                }
                 _ => lit,
             };
             let excess = if cost[i] > self.usual { cost[i] / self.usual } else { 1.0 };

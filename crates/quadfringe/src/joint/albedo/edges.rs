@@ -31,12 +31,22 @@ pub(super) fn choose(
     }
 }
 
-/// Albedo of candidate `k` for the pixels from `at` on: 3 x 3 cells, row by row.
+/// Albedo in channel `c` of candidate `k`, one of 3 x 3 cells row by row, for the pixels from `at` on.
 #[inline(always)]
-fn candidate(fringes: &FringeRows, at: usize, k: usize) -> [Lanes; 4] {
+fn candidate(fringes: &FringeRows, at: usize, k: usize, c: usize) -> Lanes {
     let from = at + k % 3 * fringes.cell_px;
-    let rows = &fringes.cells[k / 3];
-    std::array::from_fn(|c| *rows[c][from..].first_chunk().expect("the row is longer than the image"))
+    *fringes.cells[k / 3][c][from..].first_chunk().expect("the row is longer than the image")
+}
+
+/// Squared distance of the light from that of an albedo.
+#[inline(always)]
+fn squared(light: Lanes, albedo: Lanes, waves: Lanes) -> Lanes {
+    let mut found = [0.0; LANES];
+    for x in 0..LANES {
+        let rest = light[x] - albedo[x] * waves[x];
+        found[x] = rest * rest;
+    }
+    found
 }
 
 /// Probabilities of the light with the albedo of each candidate, relative to the best one; 0 for cells that are not lit.
@@ -52,21 +62,21 @@ fn weights(
     let mut found = [[0.0; LANES]; CANDIDATES];
     let mut least = [f32::MAX; LANES];
     for (k, misfit) in found.iter_mut().enumerate() {
-        let albedo = candidate(fringes, at, k);
-        for c in 0..4 {
-            for x in 0..LANES {
-                let rest = light[c][x] - albedo[c][x] * waves[c][x];
-                misfit[x] += scale * rest * rest;
-            }
-        }
+        let red = candidate(fringes, at, k, 0);
+        let [a, b] =
+            [squared(light[0], red, waves[0]), squared(light[1], candidate(fringes, at, k, 1), waves[1])];
+        let c = squared(light[2], candidate(fringes, at, k, 2), waves[2]);
+        let d = squared(light[3], candidate(fringes, at, k, 3), waves[3]);
         for x in 0..LANES {
-            misfit[x] = if albedo[0][x] > 0.0 { misfit[x] } else { f32::MAX };
+            let sum = scale * (a[x] + b[x] + c[x] + d[x]);
+            misfit[x] = if red[x] > 0.0 { sum } else { f32::MAX };
             least[x] = if misfit[x] < least[x] { misfit[x] } else { least[x] };
         }
     }
     for misfit in &mut found {
         for x in 0..LANES {
-            let weight = exp((least[x] - misfit[x]).max(-EXPONENT_MAX));
+            let exponent = least[x] - misfit[x];
+            let weight = exp(if exponent > -EXPONENT_MAX { exponent } else { -EXPONENT_MAX });
             misfit[x] = if misfit[x] < f32::MAX { weight } else { 0.0 };
         }
     }
@@ -76,22 +86,25 @@ fn weights(
 /// Weighted mean of the candidates; 0 where none is lit.
 #[inline(always)]
 fn mean_of_candidates(fringes: &FringeRows, at: usize, weights: &[Lanes; CANDIDATES]) -> [Lanes; 4] {
-    let (mut sums, mut total) = ([[0.0; LANES]; 4], [1e-30; LANES]);
-    for (k, weight) in weights.iter().enumerate() {
-        let albedo = candidate(fringes, at, k);
+    let mut total = [1e-30; LANES];
+    for weight in weights {
         for x in 0..LANES {
             total[x] += weight[x];
         }
-        for c in 0..4 {
+    }
+    let mut means = [[0.0; LANES]; 4];
+    for (c, mean) in means.iter_mut().enumerate() {
+        // A sum of its own for each channel: over all of them at once, the compiler gathers single numbers.
+        let mut sum = [0.0; LANES];
+        for (k, weight) in weights.iter().enumerate() {
+            let albedo = candidate(fringes, at, k, c);
             for x in 0..LANES {
-                sums[c][x] += weight[x] * albedo[c][x];
+                sum[x] += weight[x] * albedo[x];
             }
         }
-    }
-    for sum in &mut sums {
         for x in 0..LANES {
-            sum[x] /= total[x];
+            mean[x] = sum[x] / total[x];
         }
     }
-    sums
+    means
 }
