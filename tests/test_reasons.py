@@ -137,10 +137,10 @@ def test_the_reference_names_saturation_and_darkness() -> None:
         for number in (9.0, 8.0, 6.0)
     ]
     for stack in stacks:
-        stack[:, 10:20, 50:90] = 255
         stack[:, 10:20, 150:190] = 2
         stack[:, 25:35, 50:90] = 130
         stack[:] = np.clip(stack + noise.normal(0, 5, stack.shape).round(), 0, 255)
+        stack[:, 10:20, 50:90] = 255
     shape = qf.decode_steps(stacks, (9.0, 8.0, 6.0), 300)
     assert shape.reason is not None
     np.testing.assert_array_equal(shape.reason == Reason.RETURNED, shape.returned)

@@ -94,7 +94,7 @@ fn mean_of_candidates(fringes: &FringeRows, at: usize, weights: &[Lanes; CANDIDA
     }
     let mut means = [[0.0; LANES]; 4];
     for (c, mean) in means.iter_mut().enumerate() {
-        // A sum of its own for each channel: over all of them at once, the compiler gathers single numbers.
+        // One channel after the other: with all of them at once, the compiler gathers single numbers.
         let mut sum = [0.0; LANES];
         for (k, weight) in weights.iter().enumerate() {
             let albedo = candidate(fringes, at, k, c);
