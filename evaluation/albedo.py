@@ -3,8 +3,8 @@
     python evaluation/albedo.py [--half tune|report] [--only WORD ...] [--json FILE]
 
 1024 x 768, 8 bit, 3 % noise; the mean over the two seeds of a half. For each scene: root mean square of the error
-relative to the mean albedo, and amplitude of what is left of the fringes, both in %. The photographs need
-scikit-image, which `make evaluation` installs.
+relative to the mean albedo, amplitude of what is left of the fringes, and noise of a pixel relative to the mean light,
+all in %. The photographs need scikit-image, which `make evaluation` installs.
 """
 
 from __future__ import annotations
@@ -38,13 +38,14 @@ def main() -> None:
     parser.add_argument("--json", type=Path, help="write the figures here")
     options = parser.parse_args()
     figures: dict[str, float] = {}
-    print(f"{'':20}{'error %':>10}{'fringes %':>11}")
+    print(f"{'':20}{'error %':>10}{'fringes %':>11}{'noise %':>9}")
     for name in SCENES:
         if options.only is None or any(word in name for word in options.only):
             found = [judged(name, seed) for seed in HALVES[options.half]]
             rms, fringes = fmean(one.rms_percent for one in found), fmean(one.fringe_percent for one in found)
+            noise = fmean(one.noise_percent for one in found)
             figures |= {f"{name}_albedo_rms_percent": rms, f"{name}_fringes_percent": fringes}
-            print(f"{name:20}{rms:10.2f}{fringes:11.3f}")
+            print(f"{name:20}{rms:10.2f}{fringes:11.3f}{noise:9.1f}")
     if options.json:
         options.json.write_text(figures_text(figures))
 

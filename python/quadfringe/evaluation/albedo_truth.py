@@ -23,10 +23,13 @@ class AlbedoFigures:
 
     rms_percent: root mean square of the error, relative to the mean albedo of the channel.
     fringe_percent: amplitude of what is left of the fringes, relative to the albedo.
+    noise_percent: noise of a pixel, relative to the mean light. Where the albedo changes from pixel to pixel,
+    an estimate from one exposure can have little less.
     """
 
     rms_percent: float
     fringe_percent: float
+    noise_percent: float
 
 
 def true_albedo(name: str, seed: int) -> Map:
@@ -56,7 +59,8 @@ def judge_albedo(albedo: NDArray[np.float32], taken: scenes.Take, truth: Map) ->
     phases = _phases(column_px, taken.fringe_numbers, scenes.WIDTH_PX)
     relative = (found - true) / true.mean(axis=0)
     fringes = 2 * np.abs(np.mean(relative * np.exp(1j * phases), axis=0))
-    return AlbedoFigures(100 * float(rms.mean()), 100 * float(fringes.mean()))
+    noise = scenes.NOISE / (LEVEL * true.mean(axis=0))
+    return AlbedoFigures(*(100 * float(share.mean()) for share in (rms, fringes, noise)))
 
 
 def _phases(column_px: Map, numbers: tuple[float, float, float], width_px: int) -> Map:
