@@ -10,7 +10,7 @@ use std::collections::BTreeSet;
 
 /// Rooms in the order of `lib.rs`. A file belongs to the longest name that its path begins with: what every method of
 /// decoding takes and gives stands above the methods, the decoder that chooses between them below.
-const ORDER: [&str; 18] = [
+const ORDER: [&str; 19] = [
     "error",
     "parallel",
     "encoding",
@@ -18,6 +18,7 @@ const ORDER: [&str; 18] = [
     "surface",
     "rig",
     "condition",
+    "decode/reason",
     "stages",
     "height",
     "mesh",
