@@ -69,7 +69,7 @@ use propagation::Propagation;
 use pyramid::{Levels, Pyramid, Upsampler};
 use rayon::prelude::*;
 use reasons::Reasons;
-use scene::{Frame, Pixels};
+use scene::{Frame, PhaseMap, Pixels};
 use uncertainty::PhaseNoise;
 use validity::{PixelFit, Validity};
 use window::Window;
@@ -129,7 +129,7 @@ impl Joint {
         out: &mut Decoded,
     ) {
         // 1. Linear light of the four channels (S1).
-        linear_light(plan, shot, self.shape, &mut self.pyramid.full, &mut self.pixels.excluded);
+        linear_light(plan, shot, self.shape, &mut self.pyramid.full, &mut self.pixels.reasons);
         // 2. The fringe period scales all windows, cells and the coarse level.
         let found = || fringe_period_px(&self.pyramid.full.light, self.shape);
         let period_px = options.period_px.unwrap_or_else(found);
@@ -243,14 +243,14 @@ impl Joint {
             squared_residual: out.wrong_order_probability.as_slice().expect("checked layout"),
             modulation: out.modulation.as_slice().expect("checked layout"),
         };
-        let map = self.pixels.map();
+        let Pixels { phase, modulation, reasons } = &mut self.pixels;
+        let map = PhaseMap { phase, modulation };
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
         let evidence = validity::Evidence { map, pixel, orders: &self.coarse.orders, limits };
-        self.validity.run(&scene, evidence, quality);
+        self.validity.run(&scene, evidence, quality, reasons);
         if let Some(instants) = instants {
-            let Validity { valid, reasons, .. } = &mut self.validity;
-            self.motion.invalidate_fast(&scene, instants, valid, reasons);
+            self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid, reasons);
         }
     }
 

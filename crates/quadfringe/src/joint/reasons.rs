@@ -1,5 +1,4 @@
-//! Step 8: the reason why a pixel has no data. Steps 1 and 6 mark pixels that they exclude; validity marks those that fail its
-//! checks; pixels without fringes remain.
+//! Step 8: the reason why a pixel has no data. Each step marks the pixels that it excludes; those without fringes remain.
 
 use super::cells::RowMaps;
 use super::illumination::LitMask;
@@ -22,12 +21,8 @@ pub(super) struct Reasons<'a> {
 impl Reasons<'_> {
     /// Writes the reasons of row `y`.
     pub fn write(&self, scene: &Scene<'_>, y: usize, maps: &mut RowMaps, out: &mut [Reason]) {
-        let row = Row {
-            early: scene.row(&self.pixels.excluded, y),
-            valid: scene.row(&self.validity.valid, y),
-            modulation: scene.row(&self.pixels.modulation, y),
-            checked: scene.row(&self.validity.reasons, y),
-        };
+        let row =
+            Row { found: scene.row(&self.pixels.reasons, y), valid: scene.row(&self.validity.valid, y) };
         if choose(&row, out) {
             self.without_fringes(scene, y, maps, &row, out);
         }
@@ -59,19 +54,15 @@ impl Reasons<'_> {
 
 /// One row of pixels.
 struct Row<'a> {
-    /// Why a step before validity excluded a pixel, else `Returned`.
-    early: &'a [Reason],
+    /// Why a pixel is not valid; `Returned` for pixels without fringes.
+    found: &'a [Reason],
     valid: &'a [u8],
-    /// 0 where there are no fringes.
-    modulation: &'a [f32],
-    /// Why a pixel with fringes is not valid.
-    checked: &'a [Reason],
 }
 
 impl Row<'_> {
     #[inline(always)]
     fn is_without_fringes(&self, x: usize) -> bool {
-        (self.valid[x] == 0) & (self.early[x] == Reason::Returned) & (self.modulation[x] <= 0.0)
+        (self.valid[x] == 0) & (self.found[x] == Reason::Returned)
     }
 }
 
@@ -79,14 +70,11 @@ impl Row<'_> {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn choose(row: &Row, out: &mut [Reason]) -> bool {
     let n = out.len();
-    let (early, valid) = (&row.early[..n], &row.valid[..n]);
-    let (modulation, checked) = (&row.modulation[..n], &row.checked[..n]);
+    let (found, valid) = (&row.found[..n], &row.valid[..n]);
     let mut any = 0u8;
     for x in 0..n {
-        let is_early = early[x] != Reason::Returned;
-        let failed = if is_early { early[x] } else { checked[x] };
-        out[x] = if valid[x] != 0 { Reason::Returned } else { failed };
-        any |= u8::from((valid[x] == 0) & !is_early & (modulation[x] <= 0.0));
+        out[x] = if valid[x] != 0 { Reason::Returned } else { found[x] };
+        any |= u8::from((valid[x] == 0) & (found[x] == Reason::Returned));
     }
     any != 0
 }

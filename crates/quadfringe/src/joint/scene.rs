@@ -60,8 +60,8 @@ pub(super) struct Pixels {
     pub phase: Vec<f32>,
     /// Modulation of R and B in linear light, 0 where there is no light.
     pub modulation: Vec<f32>,
-    /// Why steps 1 and 6 exclude a pixel, else [`Reason::Returned`].
-    pub excluded: Vec<Reason>,
+    /// Why steps 1, 6, 7 and 8 exclude a pixel, else [`Reason::Returned`].
+    pub reasons: Vec<Reason>,
 }
 
 impl Pixels {

@@ -163,9 +163,9 @@ impl Cells {
     /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
     pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
         let stride = scene.grid.stride;
-        let Pixels { phase, modulation, excluded } = pixels;
+        let Pixels { phase, modulation, reasons } = pixels;
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
-        let rows = planes.zip(excluded.par_chunks_mut(stride)).enumerate();
+        let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
         rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
             self.interpolate(&self.phase, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);

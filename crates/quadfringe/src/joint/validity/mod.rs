@@ -56,12 +56,8 @@ pub(super) struct Limits {
 pub(super) struct Validity {
     /// 1 for valid pixels, 0 elsewhere.
     pub valid: Vec<u8>,
-    /// Why a pixel with fringes is not valid.
-    pub reasons: Vec<Reason>,
     discontinuities: Discontinuities,
-    /// 1 for pixels at or next to an order jump.
-    excluded: Vec<u8>,
-    /// First 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`GROWN`] for those added.
+    /// First not 0 at or next to an order jump, then 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`GROWN`] for those added.
     pub components: Vec<u8>,
     /// 1 for pixels whose intensities agree with their order.
     consistent: Vec<u8>,
@@ -81,12 +77,18 @@ struct Rows {
 
 impl Validity {
     /// Find the valid pixels of an absolute phase; `quality`, without padding, receives the quality of the orders of lit pixels, NaN
-    /// elsewhere.
-    pub fn run(&mut self, scene: &Scene<'_>, evidence: Evidence<'_>, quality: &mut [f32]) {
+    /// elsewhere, and `reasons` why a pixel with fringes is not valid, unless it has a reason already.
+    pub fn run(
+        &mut self,
+        scene: &Scene<'_>,
+        evidence: Evidence<'_>,
+        quality: &mut [f32],
+        reasons: &mut [Reason],
+    ) {
         let (grid, map) = (scene.grid, evidence.map);
-        self.discontinuities.mark(grid, map, &mut self.excluded);
+        self.discontinuities.mark(grid, map, &mut self.components);
         self.support.measure(scene, evidence.orders);
-        self.check_pixels(scene, evidence, quality);
+        self.check_pixels(scene, evidence, quality, reasons);
         remove_narrow(grid, NEIGHBOURS_MIN, &self.components, &mut self.valid);
         let pixels = |side: f64| (side * scene.period_px).powi(2) as usize;
         let limits = SizeLimits { least: pixels(COMPONENT_SIDE), seed: pixels(SEED_SIDE) };
@@ -100,13 +102,17 @@ impl Validity {
     }
 
     /// Limits of every pixel by itself and with its eight neighbours.
-    fn check_pixels(&mut self, scene: &Scene<'_>, evidence: Evidence<'_>, quality: &mut [f32]) {
+    fn check_pixels(
+        &mut self,
+        scene: &Scene<'_>,
+        evidence: Evidence<'_>,
+        quality: &mut [f32],
+        reasons: &mut [Reason],
+    ) {
         let Evidence { map, pixel, orders, limits } = evidence;
         let grid = scene.grid;
-        self.components.resize(grid.pixels(), 0);
         self.consistent.resize(grid.pixels(), 0);
-        self.reasons.resize(grid.pixels(), Reason::Returned);
-        let Self { components, consistent, reasons, excluded, support, slots, .. } = self;
+        let Self { components, consistent, support, slots, .. } = self;
         let masks = components.par_chunks_mut(grid.stride).zip(consistent.par_chunks_mut(grid.stride));
         let masks = masks.zip(reasons.par_chunks_mut(grid.stride));
         let rows = quality.par_chunks_mut(grid.width).zip(masks).enumerate();
@@ -125,7 +131,6 @@ impl Validity {
                     pixel_modulation: &pixel.modulation[y * grid.width..][..grid.width],
                     lead: &lead[..grid.width],
                     support: &support.row(grid, y, maps)[..grid.width],
-                    excluded: &scene.row(excluded, y)[..grid.width],
                 };
                 let out = VerdictRow { quality, passed, consistent, reasons };
                 check_row(&known, limits, sums, out);
@@ -144,15 +149,15 @@ struct CheckRow<'a> {
     pixel_modulation: &'a [f32],
     lead: &'a [f32],
     support: &'a [f32],
-    excluded: &'a [u8],
 }
 
 /// Verdicts on the pixels of a row.
 struct VerdictRow<'a> {
     quality: &'a mut [f32],
+    /// First not 0 for pixels at or next to an order jump.
     passed: &'a mut [u8],
     consistent: &'a mut [u8],
-    /// Why the pixel is not valid, if it is not.
+    /// Why a pixel with fringes is not valid, if it is not; other reasons stay.
     reasons: &'a mut [Reason],
 }
 
@@ -170,7 +175,7 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
     let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
-    let (lead, support, excluded) = (&known.lead[..width], &known.support[..width], &known.excluded[..width]);
+    let (lead, support) = (&known.lead[..width], &known.support[..width]);
     let (quality, passed, consistent) =
         (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
     let reasons = &mut out.reasons[..width];
@@ -186,11 +191,13 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
             && here[x] <= floors[1] + pixel_share * pixel_share;
         quality[x] = order_quality + hole_unless(lit);
         let certain = lit & (order_quality >= limits.quality_min);
-        let apart = excluded[x] != 0;
+        let apart = passed[x] != 0;
         passed[x] = u8::from(certain & agrees & !apart);
         let doubt = if certain { Reason::SmallPiece } else { Reason::DoubtfulOrder };
         let doubt = if agrees { doubt } else { Reason::Misfit };
-        reasons[x] = if apart { Reason::Discontinuity } else { doubt };
+        let doubt = if apart { Reason::Discontinuity } else { doubt };
+        let open = lit & (reasons[x] == Reason::Returned);
+        reasons[x] = if open { doubt } else { reasons[x] };
         consistent[x] = u8::from(lit & (here[x] <= floors[0] + grown_share * grown_share));
     }
 }
@@ -220,7 +227,6 @@ mod tests {
             pixel_modulation: &pixel_modulation,
             lead: &[1.0; 16],
             support: &[1.0; 16],
-            excluded: &[0; 16],
         };
         let out = VerdictRow {
             quality: &mut quality,
