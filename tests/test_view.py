@@ -187,6 +187,13 @@ def test_controls_of_every_value_keep_the_page_whole(folder: Path, capfd: pytest
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_closed_page_draws_no_more(folder: Path) -> None:
+    page = SavedViewer([folder / "a.npz"], port=8535)
+    page.close()
+    page._update()
+
+
 def test_names_of_files_are_plain_text_on_the_page(folder: Path, tmp_path: Path) -> None:
     name = "<img src=x>[a](b)" + "x" * 100 + ".npz"
     shutil.copy(folder / "a.npz", tmp_path / name)

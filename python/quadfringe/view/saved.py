@@ -60,6 +60,7 @@ class SavedViewer:
         page = serve_page(host, port, allow_hosts)
         self._server, self.url = page.server, page.url
         self._lock = threading.Lock()
+        self._closed = False
         self._asked = 0
         self._item: Item | None = None
         self._place: tuple[int, int] | None = None
@@ -91,16 +92,16 @@ class SavedViewer:
         self._server.scene.on_click()(self._click)
 
     def _locked(self, act: Callable[[], None]) -> None:
+        """Act for a page, one after the other, and no more once the page is closed."""
         with self._lock:
-            act()
+            if not self._closed:
+                act()
 
     def _update(self) -> None:
         """Draw what the controls say; of many changes at once, only the last."""
         self._asked += 1
         mine = self._asked
-        with self._lock:
-            if mine == self._asked:
-                self._draw()
+        self._locked(lambda: self._draw() if mine == self._asked else None)
 
     def _draw(self) -> None:
         place = self._names.index(one_of(self._names, self._file.value, self._names[0]))
@@ -133,12 +134,13 @@ class SavedViewer:
 
     def _click(self, event: Any) -> None:
         ray = ray_of([part / M_PER_MM for part in event.ray_origin], event.ray_direction)
-        with self._lock:
-            if ray is not None and self._item is not None:
-                self._panel.click(self._item, ray)
+        if ray is not None:
+            self._locked(lambda: self._panel.click(self._item, ray) if self._item is not None else None)
 
     def close(self) -> None:
         """Stop serving; further calls do nothing."""
+        with self._lock:
+            self._closed = True
         self._scene.close()
         with redirect_stdout(StringIO()):
             self._server.stop()
