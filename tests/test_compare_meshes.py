@@ -209,7 +209,7 @@ def test_hostile_meshes_are_refused_with_one_line(name: str, content: bytes, rea
 
 
 def test_a_mesh_that_takes_too_long_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("quadfringe.decoding.compare.params.MESH_S", 0.001)
+    monkeypatch.setattr("quadfringe.io.mesh_files.TIME_S", 0.001)
     (tmp_path / "m.obj").write_text(CORNERS + "f 1 2 3\n")
     with pytest.raises(qf.InputError, match=r"m\.obj: cannot be read as a mesh: it does not end within"):
         surface_from(tmp_path / "m.obj")

@@ -101,7 +101,7 @@ def test_points_without_pixels_are_measured_and_have_no_section(tmp_path: Path) 
 
 
 WRONG = {
-    "a.txt": (b"text", "expected a saved shape, .npz, .zarr, .ply, .glb, .obj, .stl"),
+    "a.txt": (b"text", "expected a saved shape, .npz, .zarr, .stl, .ply, .obj, .glb"),
     "a.npz": (b"PK\x03\x04", "not a readable NPZ file"),
     "a.glb": (b"glTF\x02\x00\x00\x00", "cannot be read"),
     "a.ply": (b"ply\nformat ascii 1.0\nelement vertex 9\nend_header\n", "a.ply: "),
@@ -118,6 +118,13 @@ def test_wrong_files_are_named_in_one_line(tmp_path: Path, name: str) -> None:
     assert result.stderr.startswith(f"error: {tmp_path / name}: ")
     assert WRONG[name][1] in result.stderr
     assert len(result.stderr.splitlines()) == 1
+
+
+def test_a_mesh_that_takes_too_long_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("quadfringe.io.mesh_files.TIME_S", 0.001)
+    monkeypatch.setattr("quadfringe.io.mesh_files.BYTES_PER_S", 1e12)
+    with pytest.raises(InputError, match="cannot be read as a mesh: it does not end within"):
+        open_file(folder / "a.obj").item(0)
 
 
 @pytest.mark.parametrize("name", ["a.npz", "a.zarr", "a.glb"])

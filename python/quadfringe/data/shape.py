@@ -19,7 +19,7 @@ from quadfringe.data.reason import Reason
 from quadfringe.errors import InputError
 from quadfringe.files import require_suffix
 from quadfringe.io.arrays import read_npz
-from quadfringe.io.export import grey, srgb
+from quadfringe.io.export import grey, surface_picture
 from quadfringe.io.texts import json_of
 
 if TYPE_CHECKING:
@@ -111,9 +111,7 @@ class Shape:
         """
         if self.albedo is None:
             return grey(self.modulation)
-        picture, dark = srgb(self.albedo), np.isnan(self.albedo[:, :, 0])
-        picture[dark] = grey(self.modulation)[dark] if dark.any() else 0
-        return picture
+        return surface_picture(self.albedo, self.modulation)
 
     @property
     def warnings(self) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from quadfringe.errors import require
 from quadfringe.files import atomic
 from quadfringe.io.glb import encoded, glb_bytes
 
-__all__ = ["Triangles", "grey", "srgb", "write_depth", "write_mesh", "write_npz", "write_ply"]
+__all__ = ["Triangles", "grey", "srgb", "surface_picture", "write_depth", "write_mesh", "write_npz", "write_ply"]
 
 ROWS_AT_ONCE = 64  # as many as fit into a cache
 SAMPLES = 50_000  # pixels of a quantile: 500 lie above it
@@ -41,6 +41,13 @@ def srgb(albedo: NDArray[np.float32]) -> NDArray[np.uint8]:
         np.fmax(level, 0, out=level)
         np.fmin(level, last, out=level)
         picture[rows] = table.take(level.astype(np.uint16))[:, :, :3]
+    return picture
+
+
+def surface_picture(albedo: NDArray[np.float32], modulation: NDArray[np.float32]) -> NDArray[np.uint8]:
+    """Give the surface without fringes, (H, W, 3) sRGB; pixels without albedo are grey by their modulation."""
+    picture, unknown = srgb(albedo), np.isnan(albedo[:, :, 0])
+    picture[unknown] = grey(modulation)[unknown] if unknown.any() else 0
     return picture
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
-from quadfringe.io.export import grey, srgb
+from quadfringe.io.export import surface_picture
 
 __all__ = [
     "COLOURINGS",
@@ -92,9 +92,7 @@ def texture(shot: AnyShot, shape: Shape, stride: int = 1) -> Picture:
     the colour comes from the mean light in the neighbourhood.
     """
     if shape.albedo is not None:
-        albedo = shape.albedo[::stride, ::stride]
-        shades = grey(shape.modulation[::stride, ::stride])
-        return np.where(np.isfinite(albedo[:, :, :1]), srgb(albedo), shades)
+        return surface_picture(shape.albedo[::stride, ::stride], shape.modulation[::stride, ::stride])
     top = max(limits_of(shape.modulation)[1], 1e-6)
     modulation = np.nan_to_num(shape.modulation[::stride, ::stride])
     brightness = cv2.convertScaleAbs(modulation, alpha=255 / top)

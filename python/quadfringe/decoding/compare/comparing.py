@@ -11,10 +11,10 @@ import numpy as np
 from quadfringe.config import brief
 from quadfringe.data import Shape, Truth, xyz_mm_of
 from quadfringe.decoding.compare import params
-from quadfringe.decoding.compare.mesh_files import SUFFIXES as MESHES
 from quadfringe.decoding.compare.pixels import Pair, compare_pixels, fringe_period_px_of, pair_of
 from quadfringe.decoding.compare.results import MeshComparison, ShapeComparison
 from quadfringe.errors import InputError
+from quadfringe.io.mesh_files import SUFFIXES as MESHES
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

@@ -104,13 +104,3 @@ TRIM_SIGMAS = 3.0
 PERIOD_OFF = 0.005
 # Share of the points that an alignment must rest on, below which it is doubted. Not measured: a half.
 USED_MIN = 0.5
-
-# --- Mesh files
-
-# Time for reading any mesh file, s, and bytes that may take another second. A text of 8 MB, which holds a million
-# triangles, takes 4 s, and one of some kB imports trimesh in 0.5 s. Less time refuses large meshes on a busy machine,
-# more of it delays the error for a hostile file. `pytest tests/test_compare_meshes.py` reads hostile files.
-MESH_S, MESH_BYTES_PER_S = 4.0, 1e6
-# Memory for reading any mesh file, bytes, and for each of its bytes. Follows from a text of 14 bytes for a triangle,
-# which takes 72 bytes, and the copies of it. Less memory refuses large meshes.
-MESH_MEMORY_BYTES, MESH_MEMORY_RATIO = 1 << 30, 64

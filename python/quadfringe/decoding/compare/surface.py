@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.decoding.compare import params
-from quadfringe.decoding.compare.mesh_files import triangles_in
 from quadfringe.errors import InputError, require
+from quadfringe.io.mesh_files import read_mesh
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -141,7 +141,7 @@ def surface_from(mesh: Trimesh | Path | str) -> Surface:
     require("trimesh", "export")
     name = str(mesh) if isinstance(mesh, (str, Path)) else "mesh"
     if isinstance(mesh, (str, Path)):
-        triangles = triangles_in(Path(mesh))
+        triangles = read_mesh(Path(mesh)).triangles_mm
     else:
         triangles = np.asarray(getattr(mesh, "triangles", np.empty((0, 3, 3))), np.float64)
     if triangles.ndim != 3 or not len(triangles) or not np.isfinite(triangles).all():
