@@ -101,7 +101,7 @@ def test_a_killed_run_goes_on_and_ends_with_the_same_files(take: Path, whole: Pa
     command = [sys.executable, "-m", "quadfringe", "batch", str(take), "--out", str(tmp_path), "--workers", "1"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, start_new_session=True) as killed:
         end = time.monotonic() + 120
-        while not list(tmp_path.rglob("shot_*.ply")) and time.monotonic() < end:
+        while not list((tmp_path / "take").glob("shot_*.ply")) and time.monotonic() < end:
             time.sleep(0.02)
         import os
         import signal

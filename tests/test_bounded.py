@@ -131,7 +131,7 @@ def _without_descriptors() -> None:
 
 
 def test_memory_is_limited_over_all_calls(helper: Helper) -> None:
-    hold = "import builtins; builtins.held = [*getattr(builtins, 'held', []), bytearray(1 << 26)]"
+    hold = "import builtins; builtins.held = [*getattr(builtins, 'held', []), bytearray(80 << 20)]"
     helper.run(exec, hold)
     helper.run(exec, hold)
     helper.run(exec, hold)
