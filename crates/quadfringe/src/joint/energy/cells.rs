@@ -26,6 +26,8 @@ pub(super) struct Cells {
     usable: Vec<f32>,
     /// 1 for cells whose pixels are all lit and lie on one surface.
     inside: Vec<f32>,
+    /// 1 for cells whose pixels are all lit, but whose phases lie far apart.
+    torn: Vec<f32>,
 }
 
 /// What the fit has found for one cell.
@@ -88,22 +90,29 @@ impl Cells {
         (self.height, self.width, self.factor) = (grid.height / factor, grid.width / factor, factor);
         self.stride = (grid.stride / factor).next_multiple_of(LANES);
         let size = self.stride * self.height;
-        let Self { light: [red, green, blue, infrared], phase, usable, inside, stride, width, .. } = self;
-        let planes = [red, green, blue, infrared, phase, usable, inside].map(|plane| {
+        let Self { light: [red, green, blue, infrared], phase, usable, inside, torn, stride, width, .. } =
+            self;
+        let planes = [red, green, blue, infrared, phase, usable, inside, torn].map(|plane| {
             plane.resize(size, 0.0);
             plane.par_chunks_mut(*stride)
         });
-        let [red, green, blue, infrared, phase, usable, inside] = planes;
-        let rows = red.zip(green).zip(blue.zip(infrared)).zip(phase.zip(usable).zip(inside)).enumerate();
-        rows.for_each(|(y, (((red, green), (blue, infrared)), ((phase, usable), inside)))| {
+        let [red, green, blue, infrared, phase, usable, inside, torn] = planes;
+        let rows =
+            red.zip(green).zip(blue.zip(infrared)).zip(phase.zip(usable).zip(inside.zip(torn))).enumerate();
+        rows.for_each(|(y, (((red, green), (blue, infrared)), ((phase, usable), (inside, torn))))| {
             let light = [red, green, blue, infrared].into_iter().zip(scene.light);
             for (out, plane) in light.chain([(&mut *usable, scene.usable), (phase, map.phase)]) {
                 mean((0..factor).map(|i| scene.row(plane, y * factor + i)), factor, out);
             }
             inside.fill(0.0);
-            let (inside, usable) = (&mut inside[..*width], &mut usable[..*width]);
-            for (x, (inside, usable)) in inside.iter_mut().zip(usable).enumerate() {
-                *inside = if is_one_surface(scene, map, factor, [y, x]) { 1.0 } else { 0.0 };
+            torn.fill(0.0);
+            let cells = inside[..*width].iter_mut().zip(&mut torn[..*width]).zip(&mut usable[..*width]);
+            for (x, ((inside, torn), usable)) in cells.enumerate() {
+                match surfaces(scene, map, factor, [y, x]) {
+                    Surfaces::None => (),
+                    Surfaces::One => *inside = 1.0,
+                    Surfaces::More => *torn = 1.0,
+                }
                 *usable = if *usable >= USABLE_MIN { *inside } else { 0.0 };
             }
         });
@@ -111,7 +120,7 @@ impl Cells {
 
     /// Fills a tile whose first cell is `[top, left]`; gives whether it has any cell that can be used.
     pub fn load(&self, [top, left]: [usize; 2], tile: &mut Tile) -> bool {
-        let Self { height, width, stride, light, phase, usable, inside, .. } = self;
+        let Self { height, width, stride, light, phase, usable, inside, torn, .. } = self;
         let count = SIDE.min(width - left);
         let mut any = false;
         for y in 0..SIDE {
@@ -127,6 +136,7 @@ impl Cells {
                 (&mut tile.start, phase),
                 (&mut tile.usable, usable),
                 (&mut tile.inside, inside),
+                (&mut tile.torn, torn),
             ]);
             planes.for_each(|(to, from)| to.row_mut(y)[..count].copy_from_slice(&from[range.clone()]));
             any |= usable[range].iter().any(|&usable| usable > 0.0);
@@ -244,8 +254,17 @@ fn repeat(row: &[f32], factor: usize, length: usize, out: &mut Vec<f32>) {
     }
 }
 
-/// Whether all pixels of a cell are lit and their phases lie close together.
-fn is_one_surface(scene: &Scene<'_>, map: PhaseMap<'_>, factor: usize, [y, x]: [usize; 2]) -> bool {
+/// What the pixels of a cell show.
+enum Surfaces {
+    /// Some are not lit.
+    None,
+    /// Their phases lie close together.
+    One,
+    /// They do not.
+    More,
+}
+
+fn surfaces(scene: &Scene<'_>, map: PhaseMap<'_>, factor: usize, [y, x]: [usize; 2]) -> Surfaces {
     let (mut low, mut high, mut lit) = (f32::MAX, f32::MIN, true);
     for row in y * factor..(y + 1) * factor {
         let (phase, modulation) = (scene.row(map.phase, row), scene.row(map.modulation, row));
@@ -254,7 +273,11 @@ fn is_one_surface(scene: &Scene<'_>, map: PhaseMap<'_>, factor: usize, [y, x]: [
             lit &= modulation[at] > 0.0;
         }
     }
-    lit && high - low < SPREAD_MAX_RAD * factor as f32
+    match lit {
+        false => Surfaces::None,
+        true if high - low < SPREAD_MAX_RAD * factor as f32 => Surfaces::One,
+        true => Surfaces::More,
+    }
 }
 
 /// Means of the pixels of `factor` rows and `factor` columns.

@@ -110,7 +110,7 @@ fn bend_everywhere(weight: f32, weights: &mut Weights) {
 /// Moves the phase to the bridging surface around cells where it differs; returns whether there are any.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn take_step(tile: &mut Tile) -> bool {
-    let Tile { inside, unknown, step, product, .. } = tile;
+    let Tile { inside, torn, unknown, step, product, .. } = tile;
     let [around, spare, ..] = product.planes_mut();
     let mut cells = 0.0;
     for at in vectors() {
@@ -121,12 +121,40 @@ fn take_step(tile: &mut Tile) -> bool {
     filter(around, spare, FIVE);
     for at in vectors() {
         let (around, step, mut phase) = (around.get(at), step.phase.get(at), unknown.phase.get(at));
+        let torn = torn.get(at);
         for x in 0..LANES {
-            phase[x] += if around[x] > 0.5 { step[x] } else { 0.0 };
+            phase[x] += if around[x] + torn[x] > 0.5 { step[x] } else { 0.0 };
         }
         unknown.phase.set(at, phase);
     }
     cells > 0.0
+}
+
+/// Writes 1 for lit cells, and for torn ones without an unlit cell around them. A torn cell that no shadow borders may be torn by
+/// texture, and then the surface continues through it.
+pub(super) fn continue_through(
+    inside: &Plane,
+    torn: &Plane,
+    out: &mut Plane,
+    [near, spare]: [&mut Plane; 2],
+) {
+    for at in vectors() {
+        let (inside, torn) = (inside.get(at), torn.get(at));
+        let mut known = [0.0; LANES];
+        for x in 0..LANES {
+            known[x] = inside[x] + torn[x];
+        }
+        near.set(at, known);
+    }
+    filter(near, spare, THREE);
+    for at in vectors() {
+        let (inside, torn, near) = (inside.get(at), torn.get(at), near.get(at));
+        let mut cells = inside;
+        for x in 0..LANES {
+            cells[x] += if near[x] > 8.5 { torn[x] } else { 0.0 };
+        }
+        out.set(at, cells);
+    }
 }
 
 /// 1 for lit cells in which two phases differ.
@@ -143,8 +171,10 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
 /// energies are sums over the scales that either start has found, so that neither is preferred.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    let Tile { light, usable, inside, ratios, scales: found, unknown, first, product, .. } = tile;
-    let given = Given { light, usable, inside, ratios: *ratios };
+    let Tile { light, usable, inside, torn, ratios, scales: found, unknown, first, product, lit, .. } = tile;
+    let [_, near, spare, ..] = product.planes_mut();
+    continue_through(inside, torn, lit, [near, spare]);
+    let given = Given { light, usable, inside, continued: lit, ratios: *ratios };
     let [gain, around, spare, ..] = product.planes_mut();
     gain.clear();
     for scales in [scales, found] {

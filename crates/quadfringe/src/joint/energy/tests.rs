@@ -4,10 +4,12 @@ use super::cell_px;
 use super::plane::{Column, Derivatives, Fields, Plane, Weights, place, total, vectors};
 use super::preconditioner::{precondition, prepare};
 use super::priors::weigh;
+use super::restart::continue_through;
 use super::scales::variance_share;
 use super::solve::multiply;
 use super::start::{AlbedoOf, contrast_and_albedo};
 use super::tile::Tile;
+use super::value::{Given, add_energy};
 use crate::joint::params::energy::SIDE;
 
 const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
@@ -93,6 +95,40 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
     tile.minimise(noise);
     let (second, largest) = errors(&tile, &truth);
     assert!(first > 0.02 && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
+}
+
+/// What the bending of a surface costs more with an island three radians off than without it. The island is cut off by torn cells,
+/// to one of which a shadow is close if `shadow`; the light says nothing.
+fn cost_of_an_island(shadow: bool) -> f64 {
+    let (mut tile, truth) = tile(0.0);
+    let mut island = Fields { phase: truth.clone(), ..Fields::default() };
+    tile.usable.clear();
+    for y in 37..41 {
+        for x in 29..47 {
+            let inner = (38..40).contains(&y) && (30..46).contains(&x);
+            island.phase.row_mut(y)[x] += if inner { 3.0 } else { 0.0 };
+            if !inner {
+                (tile.inside.row_mut(y)[x], tile.torn.row_mut(y)[x]) = (0.0, 1.0);
+            }
+        }
+    }
+    for y in (36..42).filter(|_| shadow) {
+        (28..48).for_each(|x| tile.inside.row_mut(y)[x] = 0.0);
+    }
+    let smooth = Fields { phase: truth, ..Fields::default() };
+    let [mut continued, mut near, mut spare, mut cost] = [(); 4].map(|()| Plane::default());
+    let Tile { light, usable, inside, torn, ratios, scales, .. } = &tile;
+    continue_through(inside, torn, &mut continued, [&mut near, &mut spare]);
+    let given = Given { light, usable, inside, continued: &continued, ratios: *ratios };
+    add_energy(1.0, &given, &island, scales, &mut cost);
+    add_energy(-1.0, &given, &smooth, scales, &mut cost);
+    vectors().map(|at| total(cost.get(at))).sum()
+}
+
+#[test]
+fn a_surface_continues_through_torn_cells_but_not_into_a_shadow() {
+    let [open, shadow] = [false, true].map(cost_of_an_island);
+    assert!(open > 500.0 && shadow.abs() < 1.0, "{open} {shadow}");
 }
 
 #[test]

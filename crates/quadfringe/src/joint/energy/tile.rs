@@ -30,6 +30,8 @@ pub(super) struct Tile {
     pub usable: Plane,
     /// 1 for lit cells with a phase.
     pub inside: Plane,
+    /// 1 for cells all of whose pixels are lit, but whose phases lie far apart.
+    pub torn: Plane,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 3],
     pub scales: Scales,
@@ -51,7 +53,12 @@ pub(super) struct Tile {
 impl Tile {
     /// Empties a row.
     pub fn clear(&mut self, row: usize) {
-        let planes = self.light.iter_mut().chain([&mut self.start, &mut self.usable, &mut self.inside]);
+        let planes = self.light.iter_mut().chain([
+            &mut self.start,
+            &mut self.usable,
+            &mut self.inside,
+            &mut self.torn,
+        ]);
         planes.for_each(|plane| plane.row_mut(row).fill(0.0));
     }
 }

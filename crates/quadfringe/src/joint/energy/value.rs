@@ -1,4 +1,5 @@
-//! The energy of every cell (J16): the data, and the priors of the differences that begin at the cell.
+//! The energy of every cell (J16): the data, and the priors of the differences that begin at the cell. Second differences that
+//! reach a torn cell count by themselves.
 
 use super::data::{Cells, predict};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
@@ -14,6 +15,8 @@ pub(super) struct Given<'a> {
     pub light: &'a [Plane; 4],
     pub usable: &'a Plane,
     pub inside: &'a Plane,
+    /// 1 for lit cells, and for torn ones through which the surface may continue.
+    pub continued: &'a Plane,
     pub ratios: [f32; 3],
 }
 
@@ -29,10 +32,15 @@ pub(super) fn add_energy<'a>(
     let inside = given.inside;
     for at in vectors() {
         let here = Column::of(unknown, at);
-        let (data, bend) = (data(given, &here, scales, at), bending(inside, &unknown.phase, at));
+        let data = data(given, &here, scales, at);
+        let [bend, all] = [inside, given.continued].map(|cells| bending(cells, &unknown.phase, at));
         let mut sum = [0.0; LANES];
         for x in 0..LANES {
-            sum[x] = data[x] + student(BEND_FREEDOM, bend.count[x], bend.square[x] / scales.bend);
+            let (count, rest) = (all.count[x] - bend.count[x], all.square[x] - bend.square[x]);
+            let torn = if rest > 0.0 { rest } else { 0.0 };
+            sum[x] = data[x]
+                + student(BEND_FREEDOM, bend.count[x], bend.square[x] / scales.bend)
+                + student(BEND_FREEDOM, count, torn / scales.bend);
         }
         for there in [at + 1, at + STRIDE] {
             let lit = [inside.get(at), inside.get(there)];
