@@ -7,10 +7,11 @@ from contextlib import AbstractContextManager, closing, contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from support.folders import written_in_turn
 from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
 from quadfringe.config import Device, SystemConfig
-from quadfringe.config.cameras import ReplayConfig, VirtualConfig
+from quadfringe.config.cameras import FilesConfig, ReplayConfig, VirtualConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
 from quadfringe.devices.emulator import Emulator
@@ -70,9 +71,19 @@ def replay(folder: Path) -> Iterator[Camera]:
         yield camera
 
 
+@contextmanager
+def files(folder: Path) -> Iterator[Camera]:
+    captures = folder / "captures"
+    captures.mkdir()
+    config = SystemConfig(capture=FilesConfig(folder=captures, settle_s=0.02, infrared=False))
+    with written_in_turn(captures, (SIZE_PX[1], SIZE_PX[0]), 20.0), opened(config) as camera:
+        yield camera
+
+
 CAMERAS: dict[str, Callable[[Path], AbstractContextManager[Camera]]] = {
     "virtual": virtual,
     "replay": replay,
+    "files": files,
     "emulated": wired(),
     "emulated, software trigger": wired(trigger="software"),
     "emulated, 12 bit packed": wired(visible="BayerRG12Packed", infrared="Mono12Packed"),

@@ -11,6 +11,7 @@ import typer
 
 from quadfringe.cli._options import JsonOption
 from quadfringe.cli._output import complain, say, write_record
+from quadfringe.cli._system import system_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,8 +29,8 @@ CameraArgument = Annotated[
     str,
     typer.Argument(
         metavar="CAMERA",
-        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, virtual:, or a "
-        "system file .toml.",
+        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, files:FOLDER, "
+        "virtual:, or a system file .toml.",
     ),
 ]
 
@@ -51,12 +52,9 @@ ChipOption = Annotated[
 
 def _system(camera: str) -> SystemConfig:
     """Return the system of a word such as aravis:NAME, or of a system file."""
-    from quadfringe.config import SystemConfig, load_system
-    from quadfringe.config.cameras import capture_config
-
-    if camera.endswith(".toml"):
-        return load_system(Path(camera))
-    return SystemConfig(capture=capture_config(camera))
+    config = system_of(Path(camera), None) if camera.endswith(".toml") else system_of(None, camera)
+    assert config is not None  # one of them was given
+    return config
 
 
 def _opened(camera: str) -> Devices:

@@ -1,4 +1,4 @@
-"""Settings of cameras: the table `[capture]` of a system file, or one word such as "aravis:AD-080GE".
+"""Settings of cameras: the table `[capture]` of a system file, or one word such as "aravis:NAME" or "files:FOLDER".
 
 >>> from quadfringe.config.cameras import capture_config
 >>> capture_config("aravis:AD-080GE").device
@@ -14,8 +14,17 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from quadfringe.config._base import Model, NotNegative, Positive, checked
+from quadfringe.config.scene import BayerPattern
 
-__all__ = ["AnyCapture", "AravisConfig", "ChipConfig", "ReplayConfig", "VirtualConfig", "capture_config"]
+__all__ = [
+    "AnyCapture",
+    "AravisConfig",
+    "ChipConfig",
+    "FilesConfig",
+    "ReplayConfig",
+    "VirtualConfig",
+    "capture_config",
+]
 
 
 class VirtualConfig(Model):
@@ -36,6 +45,39 @@ class ReplayConfig(Model):
     file: Path = Field(description="Recording (.h5).")
     speed: Literal["original", "full"] = Field(
         default="original", description='"original" plays at the recorded pace, "full" as fast as shots are taken.'
+    )
+
+
+class FilesConfig(Model):
+    """A folder into which another program writes images: red, green and blue, or one colour image, and infrared."""
+
+    kind: Literal["files"] = Field(default="files", description="Kind of the camera.")
+    folder: Path = Field(description="Folder that is watched, with the folders in it.")
+    start: Literal["new", "all"] = Field(
+        default="new",
+        description='"new" takes images that arrive from now on, "all" first those that are there already.',
+    )
+    infrared: bool | None = Field(
+        default=None,
+        description="Whether every shot has an infrared image. Absent: a shot waits `infrared_wait_s` for one.",
+    )
+    bayer: BayerPattern | None = Field(
+        default=None, description="Filter colours of grey images that are raw mosaics. Absent: none are."
+    )
+    bits: Annotated[int, Field(ge=8, le=16)] | None = Field(
+        default=None, description="Bits in use of 16-bit files, such as 12. Absent: 16."
+    )
+    settle_s: NotNegative = Field(
+        default=0.2, description="Time in s for which a file must be unchanged: until then it is being written."
+    )
+    infrared_wait_s: NotNegative = Field(
+        default=1.0, description="Time in s for which a shot waits for an infrared image, if it need not have one."
+    )
+    incomplete_s: Positive = Field(
+        default=30.0, description="Time in s after which a shot is left out of which images are missing."
+    )
+    timeout_s: Positive = Field(
+        default=60.0, description="Longest time in s to wait for a single shot; a stream waits without a limit."
     )
 
 
@@ -119,7 +161,7 @@ class AravisConfig(Model):
 
 
 # The setting that the word after the colon gives, by kind; None: no word may follow.
-WORDS: dict[str, str | None] = {"virtual": None, "aravis": "device", "replay": "file"}
+WORDS: dict[str, str | None] = {"virtual": None, "aravis": "device", "replay": "file", "files": "folder"}
 
 
 def _from_word(value: Any) -> Any:
@@ -128,15 +170,18 @@ def _from_word(value: Any) -> Any:
         return value
     kind, colon, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
     if kind not in WORDS or not colon:
-        raise ValueError('expected "virtual:", "aravis:NAME" or "replay:FILE"')
+        raise ValueError('expected "virtual:", "aravis:NAME", "files:FOLDER" or "replay:FILE"')
     key = WORDS[kind]
+    if kind == "files" and not rest:
+        raise ValueError('expected "files:FOLDER" with the name of a folder behind the colon')
     if key is None and rest:
         raise ValueError(f'expected "{kind}:" with nothing behind the colon')
     return {"kind": kind} if key is None else {"kind": kind, key: rest}
 
 
 AnyCapture = Annotated[
-    Annotated[VirtualConfig | AravisConfig | ReplayConfig, Field(discriminator="kind")], BeforeValidator(_from_word)
+    Annotated[VirtualConfig | AravisConfig | FilesConfig | ReplayConfig, Field(discriminator="kind")],
+    BeforeValidator(_from_word),
 ]
 
 

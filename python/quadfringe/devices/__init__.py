@@ -34,6 +34,7 @@ Keep = Literal["latest", "all"]
 CAMERAS = {
     "virtual": "quadfringe.devices.virtual",
     "aravis": "quadfringe.devices.aravis",
+    "files": "quadfringe.devices.files",
     "replay": "quadfringe.recording.replay",
 }
 
@@ -92,7 +93,9 @@ class CameraStatistics:
 
 
 class Camera(Protocol):
-    """Takes four channels in one exposure: as four images, or as a raw mosaic and an infrared image.
+    """Takes all channels in one exposure: as four images, or as a raw mosaic and an infrared image.
+
+    The infrared image of a camera without an infrared chip is black.
 
     Raises `CameraError` for faults of the camera; the next call after one reconnects. Raises ValueError when closed.
     """
@@ -118,6 +121,9 @@ class Camera(Protocol):
         `keep="latest"` yields the newest shot; `keep="all"` yields them in order from a queue. Both drop and count the
         oldest shot when the shots are not taken in time.
         """
+
+    def interrupt(self) -> None:
+        """End a stream that waits for a shot in another thread; do nothing without a stream."""
 
     def statistics(self) -> CameraStatistics:
         """Return the counts since the camera was opened; safe to call from any thread."""
@@ -172,7 +178,9 @@ def open_devices(config: SystemConfig) -> Devices:
 
 
 def open_camera(word: str) -> Camera:
-    """Open a camera without a system file: "virtual:", "aravis:NAME", "aravis:" for the only camera, "replay:FILE".
+    """Open a camera without a system file: "virtual:", "aravis:NAME", "files:FOLDER", "replay:FILE".
+
+    "aravis:" is the only GenICam camera that answers.
 
     >>> from quadfringe.devices import open_camera
     >>> with open_camera("virtual:") as camera:

@@ -15,7 +15,7 @@ from quadfringe.calibration.detect import find_target
 from quadfringe.calibration.session.captures import FolderCaptures, light_of, pose_light
 from quadfringe.calibration.session.settings import FILE, STEP_NAMES, Session, step_named
 from quadfringe.config import SystemConfig
-from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig
+from quadfringe.config.cameras import AravisConfig, FilesConfig, ReplayConfig, VirtualConfig
 from quadfringe.data import AnyShot, BayerShot
 from quadfringe.data.shot_files import write_shot
 from quadfringe.decoding import stages
@@ -78,7 +78,12 @@ def exposed(config: SystemConfig, share: float) -> SystemConfig:
         changes["scene"] = config.scene.model_copy(update={"gain": gain})
         # A frame rate gives each shot new noise.
         changes["capture"] = capture.model_copy(update={"frame_rate_hz": capture.frame_rate_hz or 1.0})
-    elif share != 1:
+    elif share != 1 and isinstance(capture, FilesConfig):
+        raise ConfigError(
+            "capture: this step changes the exposure, and that of another program cannot be changed; name a camera "
+            "that this program drives, or leave the step out"
+        )
+    elif isinstance(capture, AravisConfig) and share != 1:
         changes["capture"] = _shorter(capture, share)
     return config.model_copy(update=changes)
 

@@ -43,7 +43,7 @@ class _Running(Generic[Item]):
         self.config = self._link.config
         self.name = self._link.name
         self._in_use = threading.Lock()
-        self._closed = False
+        self._closed = self._interrupted = False
         self._last_id = 0
         self._queue: DroppingQueue[Item] = DroppingQueue(1)
         self._earlier = (0, 0)  # delivered and dropped shots of earlier runs
@@ -51,14 +51,26 @@ class _Running(Generic[Item]):
 
     def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> Item:
         """Take one shot that is exposed after this call; raises a `CameraError` when none arrives in time."""
+        self._interrupted = False
         with self._run("all", borrow) as (link, queue):  # the first shot and no later one
-            return self._next(link, queue, timeout_s)
+            shot = self._next(link, queue, timeout_s)
+        if shot is None:
+            raise ShotTimeoutError(f"camera at {self.name}: interrupted before a shot came; call again")
+        return shot
 
     def stream(self, count: int | None = None, *, keep: Keep = "latest", borrow: bool = False) -> Iterator[Item]:
         """Yield `count` shots, or until the iterator is closed; raises `CameraError` when none arrives in time."""
+        self._interrupted = False
         with self._run(keep, borrow) as (link, queue):
             for _ in numbers() if count is None else range(count):
-                yield self._next(link, queue, None)
+                shot = self._next(link, queue, None)
+                if shot is None:
+                    return
+                yield shot
+
+    def interrupt(self) -> None:
+        """End a stream that waits for a shot in another thread; do nothing without a stream."""
+        self._interrupted = True
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name})"
@@ -102,7 +114,8 @@ class _Running(Generic[Item]):
             self._link.forget(lost=lost)
             self._link = None
 
-    def _next(self, link: Link, queue: DroppingQueue[Item], timeout_s: float | None) -> Item:
+    def _next(self, link: Link, queue: DroppingQueue[Item], timeout_s: float | None) -> Item | None:
+        """Wait for a shot; None after an interruption."""
         timeout_s = link.config.timeout_s if timeout_s is None else timeout_s
         before = self._chips()
         if link.config.trigger == "software":
@@ -113,6 +126,8 @@ class _Running(Generic[Item]):
             try:
                 shot = queue.get(min(max(left_s, 0.0), LOOK_S))
             except TimeoutError:
+                if self._interrupted:
+                    return None
                 if self._closed:
                     raise ValueError(f"camera at {self.name} was closed during a wait for a shot") from None
                 _check_connected(link, SILENT_S)
