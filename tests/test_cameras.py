@@ -118,7 +118,7 @@ def test_a_camera_in_one_word(word: str, kind: type[Any]) -> None:
 @pytest.mark.parametrize(
     ("capture", "reason"),
     [
-        ("camera", r'capture: .*expected "virtual:", "aravis:NAME", "files:FOLDER" or "replay:FILE"'),
+        ("camera", r'capture: .*expected "virtual:", "aravis:NAME", "uvc:NUMBER", "files:FOLDER" or "replay:FILE"'),
         ("virtual:x", "nothing behind the colon"),
         ({"kind": "aravis", "devise": "x"}, r"capture\.aravis\.devise: this key is not known"),
         ({"kind": "aravis", "visible": {"pixel_format": "RAW"}}, r"capture\.aravis\.visible\.pixel_format"),

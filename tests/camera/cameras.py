@@ -8,10 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from support.folders import written_in_turn
+from support.videos import write_video
 from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
 from quadfringe.config import Device, SystemConfig
-from quadfringe.config.cameras import FilesConfig, ReplayConfig, VirtualConfig
+from quadfringe.config.cameras import FilesConfig, ReplayConfig, UvcConfig, VirtualConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
 from quadfringe.devices.emulator import Emulator
@@ -80,10 +81,18 @@ def files(folder: Path) -> Iterator[Camera]:
         yield camera
 
 
+@contextmanager
+def uvc(folder: Path) -> Iterator[Camera]:
+    video = write_video(folder / "take.avi", (SIZE_PX[1], SIZE_PX[0]), 900)
+    with opened(SystemConfig(capture=UvcConfig(device=str(video)))) as camera:
+        yield camera
+
+
 CAMERAS: dict[str, Callable[[Path], AbstractContextManager[Camera]]] = {
     "virtual": virtual,
     "replay": replay,
     "files": files,
+    "uvc, a video file": uvc,
     "emulated": wired(),
     "emulated, software trigger": wired(trigger="software"),
     "emulated, 12 bit packed": wired(visible="BayerRG12Packed", infrared="Mono12Packed"),

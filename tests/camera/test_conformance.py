@@ -58,7 +58,7 @@ def test_an_interrupted_stream_ends(camera: Camera) -> None:
     stream = camera.stream(keep="all")
     next(stream)
     camera.interrupt()
-    assert len(list(stream)) <= 64, "shots that wait may still come"
+    assert not list(stream)
     camera.snap()
     stopper = threading.Timer(0.3, camera.interrupt)
     stopper.start()

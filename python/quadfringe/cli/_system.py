@@ -17,8 +17,8 @@ CameraOption = Annotated[
     typer.Option(
         "--camera",
         metavar="WORD",
-        help="Camera by one word: files:FOLDER (images that another program writes there), aravis:NAME, replay:FILE, "
-        "virtual:; it replaces that of the system file.",
+        help="Camera by one word: uvc:0 (a webcam by its number, or a video file), files:FOLDER (images that another "
+        "program writes there), aravis:NAME, replay:FILE, virtual:; it replaces that of the system file.",
     ),
 ]
 

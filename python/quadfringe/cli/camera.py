@@ -29,7 +29,7 @@ CameraArgument = Annotated[
     str,
     typer.Argument(
         metavar="CAMERA",
-        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, files:FOLDER, "
+        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, uvc:0, files:FOLDER, "
         "virtual:, or a system file .toml.",
     ),
 ]
@@ -76,13 +76,26 @@ def _one_chip(camera: str, chip: Chip) -> ChipCamera:
 
 @app.command("list")
 def list_cameras() -> None:
-    """List the devices that answer; a JAI 2CCD camera appears as two devices with one serial number."""
-    from quadfringe.devices.aravis import found
+    """List the devices that answer; a JAI 2CCD camera appears as two devices with one serial number.
 
-    devices = found()
+    GenICam cameras are found with the extra aravis alone, webcams on Linux alone.
+    """
+    from quadfringe.devices.aravis import found
+    from quadfringe.devices.uvc import found as webcams_found
+    from quadfringe.errors import MissingExtraError
+
+    webcams = webcams_found()
+    for webcam in webcams:
+        say(f"uvc:{webcam.where}  {webcam.name}")
+    try:
+        devices = found()
+    except MissingExtraError:
+        if not webcams:
+            raise
+        devices = []
     for device in devices:
         say(f"{device.where}  {device.vendor} {device.model}  serial number {device.serial}")
-    if not devices:
+    if not devices and not webcams:
         complain("no camera answers; check power and cable, and that this host has an address in the camera's subnet")
         raise typer.Exit(FAILED)
 

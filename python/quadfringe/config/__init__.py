@@ -9,6 +9,7 @@ from quadfringe.config.cameras import (
     ChipConfig,
     FilesConfig,
     ReplayConfig,
+    UvcConfig,
     VirtualConfig,
     capture_config,
 )
@@ -60,6 +61,7 @@ __all__ = [
     "Surface",
     "SystemConfig",
     "Triple",
+    "UvcConfig",
     "VirtualConfig",
     "brief",
     "capture_config",

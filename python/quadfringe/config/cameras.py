@@ -14,6 +14,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 
 from quadfringe.config._base import Model, NotNegative, Positive, checked
+from quadfringe.config.devices import Pixels
 from quadfringe.config.scene import BayerPattern
 
 __all__ = [
@@ -22,6 +23,7 @@ __all__ = [
     "ChipConfig",
     "FilesConfig",
     "ReplayConfig",
+    "UvcConfig",
     "VirtualConfig",
     "capture_config",
 ]
@@ -79,6 +81,38 @@ class FilesConfig(Model):
     timeout_s: Positive = Field(
         default=60.0, description="Longest time in s to wait for a single shot; a stream waits without a limit."
     )
+
+
+class UvcConfig(Model):
+    """A webcam or another colour camera that OpenCV opens, or a video file in its place.
+
+    Automatic exposure, white balance, focus, backlight compensation and sharpening are switched off. Every setting is
+    read back; one that is absent stays as it is in the device.
+    """
+
+    kind: Literal["uvc"] = Field(default="uvc", description="Kind of the camera.")
+    device: Annotated[str, Field(min_length=1)] = Field(
+        default="0", description="Number of the camera, its device file, or a video file."
+    )
+    pixel_format: Annotated[str, Field(pattern=r"^[ -~]{3,4}$")] | None = Field(
+        default=None,
+        description="Four letters of the format, such as YUYV. Absent: an uncompressed one if the camera has any.",
+    )
+    size_px: tuple[Pixels, Pixels] | None = Field(default=None, description="Width and height of the images.")
+    frame_rate_hz: Positive | None = Field(default=None, description="Frame rate in Hz.")
+    exposure_us: Positive | None = Field(default=None, description="Exposure in us.")
+    gain: NotNegative | None = Field(default=None, description="Gain, in the unit of the device.")
+    white_balance_k: Positive | None = Field(default=None, description="Colour temperature in K.")
+    gamma: Positive | None = Field(
+        default=None, description="Gamma, in the unit of the device; many have 100 for linear light."
+    )
+    bayer: BayerPattern | None = Field(
+        default=None, description="Filter colours of a camera that sends raw mosaics. Absent: it sends colours."
+    )
+    skip_frames: Annotated[int, Field(ge=0, le=100)] = Field(
+        default=2, description="Frames after a call that are left out, because their exposure may have begun before it."
+    )
+    timeout_s: Positive = Field(default=5.0, description="Longest time in s to wait for a shot.")
 
 
 PixelFormat = Literal[
@@ -161,7 +195,13 @@ class AravisConfig(Model):
 
 
 # The setting that the word after the colon gives, by kind; None: no word may follow.
-WORDS: dict[str, str | None] = {"virtual": None, "aravis": "device", "replay": "file", "files": "folder"}
+WORDS: dict[str, str | None] = {
+    "virtual": None,
+    "aravis": "device",
+    "replay": "file",
+    "files": "folder",
+    "uvc": "device",
+}
 
 
 def _from_word(value: Any) -> Any:
@@ -170,17 +210,19 @@ def _from_word(value: Any) -> Any:
         return value
     kind, colon, rest = value.partition(":") if isinstance(value, str) else ("", "", "")
     if kind not in WORDS or not colon:
-        raise ValueError('expected "virtual:", "aravis:NAME", "files:FOLDER" or "replay:FILE"')
+        raise ValueError('expected "virtual:", "aravis:NAME", "uvc:NUMBER", "files:FOLDER" or "replay:FILE"')
     key = WORDS[kind]
     if kind == "files" and not rest:
         raise ValueError('expected "files:FOLDER" with the name of a folder behind the colon')
+    if kind == "uvc" and not rest:
+        raise ValueError('expected "uvc:0" with the number of a camera, or the name of a video file')
     if key is None and rest:
         raise ValueError(f'expected "{kind}:" with nothing behind the colon')
     return {"kind": kind} if key is None else {"kind": kind, key: rest}
 
 
 AnyCapture = Annotated[
-    Annotated[VirtualConfig | AravisConfig | FilesConfig | ReplayConfig, Field(discriminator="kind")],
+    Annotated[VirtualConfig | AravisConfig | UvcConfig | FilesConfig | ReplayConfig, Field(discriminator="kind")],
     BeforeValidator(_from_word),
 ]
 

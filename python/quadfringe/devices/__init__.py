@@ -35,6 +35,7 @@ CAMERAS = {
     "virtual": "quadfringe.devices.virtual",
     "aravis": "quadfringe.devices.aravis",
     "files": "quadfringe.devices.files",
+    "uvc": "quadfringe.devices.uvc",
     "replay": "quadfringe.recording.replay",
 }
 
@@ -178,7 +179,7 @@ def open_devices(config: SystemConfig) -> Devices:
 
 
 def open_camera(word: str) -> Camera:
-    """Open a camera without a system file: "virtual:", "aravis:NAME", "files:FOLDER", "replay:FILE".
+    """Open a camera without a system file: "virtual:", "aravis:NAME", "uvc:0", "files:FOLDER", "replay:FILE".
 
     "aravis:" is the only GenICam camera that answers.
 

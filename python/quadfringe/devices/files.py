@@ -103,9 +103,13 @@ class FilesCamera:
         try:
             with HOST_CLOCK.held():
                 for _ in numbers() if count is None else range(count):
-                    while (shot := self._next(keep)) is None:
-                        if self._interrupted.wait(LOOK_S):
+                    shot = None
+                    while shot is None:
+                        if self._interrupted.is_set():
                             return
+                        shot = self._next(keep)
+                        if shot is None:
+                            self._interrupted.wait(LOOK_S)
                     yield shot
         finally:
             self._streaming = False

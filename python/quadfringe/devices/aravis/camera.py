@@ -63,7 +63,7 @@ class _Running(Generic[Item]):
         self._interrupted = False
         with self._run(keep, borrow) as (link, queue):
             for _ in numbers() if count is None else range(count):
-                shot = self._next(link, queue, None)
+                shot = None if self._interrupted else self._next(link, queue, None)
                 if shot is None:
                     return
                 yield shot
