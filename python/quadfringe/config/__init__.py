@@ -23,7 +23,7 @@ from quadfringe.config.decode import (
     Row4,
 )
 from quadfringe.config.devices import IDENTITY, Camera, Device, Pixels, Triple
-from quadfringe.config.projectors import FlashRoute, HdmiRoute, ProjectorConfig, ProjectorsConfig
+from quadfringe.config.projectors import FlashRoute, HdmiProjectorConfig, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.config.scene import Affine, BayerPattern, HeightMapConfig, Matrix4, SceneConfig, Surface
 from quadfringe.config.system import SystemConfig, check_system, load_system
 
@@ -43,6 +43,7 @@ __all__ = [
     "Finite",
     "FlashRoute",
     "Fringes",
+    "HdmiProjectorConfig",
     "HdmiRoute",
     "HeightMapConfig",
     "Matrix4",

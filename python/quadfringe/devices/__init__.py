@@ -11,6 +11,7 @@ from typing import Literal, Protocol, Self
 from quadfringe.config import Fringes, SystemConfig, check_system
 from quadfringe.config.cameras import capture_config
 from quadfringe.data import AnyShot, Calibration
+from quadfringe.devices._frames import warn_of_part_frames, with_whole_frames
 from quadfringe.devices.light import Light
 from quadfringe.errors import ConfigError
 
@@ -174,7 +175,9 @@ def open_devices(config: SystemConfig) -> Devices:
     Raises `ConfigError` for devices that cannot be combined, and OSError when one cannot be opened.
     """
     check_system(config)
+    config = with_whole_frames(config)
     devices: Devices = import_module(CAMERAS[config.capture.kind]).open_devices(config)
+    warn_of_part_frames(devices.config)
     return devices
 
 
@@ -201,9 +204,13 @@ def open_projector(config: SystemConfig) -> Projector:
     """
     check_system(config)
     if config.projectors is not None:
+        known = None if config.calibration is None else Calibration.load(config.calibration)
+        if config.projectors.lightcrafters is None:
+            from quadfringe.devices.hdmi import HdmiProjectors
+
+            return HdmiProjectors(config.projectors, known)
         from quadfringe.devices.lightcrafter import ProjectorPair
 
-        known = None if config.calibration is None else Calibration.load(config.calibration)
         return ProjectorPair(config.projectors, known)
     if config.capture.kind != "virtual":
         return ExternalLight()
