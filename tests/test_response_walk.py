@@ -40,6 +40,19 @@ def test_the_walk_through_measures_any_projector_with_any_camera(tmp_path: Path)
 
 
 @pytest.mark.usefixtures("capture")
+def test_light_from_elsewhere_is_no_part_of_the_response() -> None:
+    with HdmiProjectors(ProjectorsConfig(visible=screen())) as projector, UvcCamera() as camera:
+        taken = take_steps(projector, camera, WalkThrough())
+    limit = tolerance("response.steps_exponent_error")
+    with_black = estimate_from_steps(taken).calibration.green
+    assert with_black.exponent == pytest.approx(1 / GAMMA, abs=limit)
+    unaware = replace(taken, dark={name: np.zeros_like(image) for name, image in taken.dark.items()})
+    without = estimate_from_steps(unaware).calibration.green
+    print(f"exponent {without.exponent:.3f} without a black image, {with_black.exponent:.3f} with one")
+    assert abs(without.exponent - 1 / GAMMA) > limit
+
+
+@pytest.mark.usefixtures("capture")
 def test_a_lamp_that_follows_the_image_is_found(windows: list[FakeWindow]) -> None:
     with HdmiProjectors(ProjectorsConfig(visible=screen())) as projector, UvcCamera() as camera:
         windows[0].follows = 0.1

@@ -12,7 +12,7 @@ from support.videos import write_video
 from wire import SIZE_PX, TWO_STREAMS, emulated, shared_emulator, two_sources
 
 from quadfringe.config import Device, SystemConfig
-from quadfringe.config.cameras import FilesConfig, ReplayConfig, UvcConfig, VirtualConfig
+from quadfringe.config.cameras import AravisConfig, ChipConfig, FilesConfig, ReplayConfig, UvcConfig, VirtualConfig
 from quadfringe.data import Stamp
 from quadfringe.devices import Camera, open_devices
 from quadfringe.devices.emulator import Emulator
@@ -63,6 +63,19 @@ def aravis_fake(_: Path) -> Iterator[Camera]:
 
 
 @contextmanager
+def aravis_one_chip(_: Path) -> Iterator[Camera]:
+    with fake_twin(SIZE_PX, 30.0) as fakes:
+        capture = AravisConfig(
+            device=str(fakes.capture.visible.device),
+            visible=ChipConfig(pixel_format="BayerRG8"),
+            frame_rate_hz=30.0,
+            timeout_s=10.0,
+        )
+        with opened(SystemConfig(capture=capture)) as camera:
+            yield camera
+
+
+@contextmanager
 def replay(folder: Path) -> Iterator[Camera]:
     with opened(SystemConfig(camera=SMALL)) as source, Recorder(folder / "take.h5") as recorder:
         shot = source.snap()
@@ -98,4 +111,5 @@ CAMERAS: dict[str, Callable[[Path], AbstractContextManager[Camera]]] = {
     "emulated, 12 bit packed": wired(visible="BayerRG12Packed", infrared="Mono12Packed"),
     "two streams": two_streams,
     "fake of Aravis": aravis_fake,
+    "fake of Aravis, one chip": aravis_one_chip,
 }

@@ -121,7 +121,7 @@ def take_steps(
     >>> taken.stacks["green"].shape
     (4, 768, 1024)
     """
-    images = plan.steps * len(plan.beams) + 2  # one step again after white, and black
+    images = plan.steps * len(plan.beams) + 2  # and black, and one step again after white
     counter = count(1)
 
     def taken(light: Light) -> AnyShot:
@@ -129,16 +129,17 @@ def take_steps(
         say(f"image {next(counter)} of {images}")
         return camera.snap()
 
-    channels = [channel for beam in plan.beams for channel in BEAMS[beam]]
     black = taken(Levels((0.0,) * 4))
+    beams = [beam for beam in plan.beams if black.channels.keys() >= set(BEAMS[beam])]  # the camera may see no infrared
+    channels = [channel for beam in beams for channel in BEAMS[beam]]
     dark = {channel: _fraction(black, channel) for channel in channels}
     stacks: dict[str, list[NDArray[np.float32]]] = {channel: [] for channel in channels}
-    for beam in plan.beams:
+    for beam in beams:
         for n in range(plan.steps):
             shot = taken(Step(plan.number, 2 * np.pi * n / plan.steps, "columns", beam))
             for channel in BEAMS[beam]:
                 stacks[channel].append(_fraction(shot, channel))
-    first = plan.beams[0]
+    first = beams[0]
     projector.show(Levels((1.0,) * 4))
     again = taken(Step(plan.number, 0.0, "columns", first))
     steadiness = max(_difference(stacks[channel][0], _fraction(again, channel)) for channel in BEAMS[first])

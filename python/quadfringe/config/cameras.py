@@ -126,6 +126,21 @@ PixelFormat = Literal[
     "BayerRG10Packed",
     "BayerRG12",
     "BayerRG12Packed",
+    "BayerGR8",
+    "BayerGR10",
+    "BayerGR10Packed",
+    "BayerGR12",
+    "BayerGR12Packed",
+    "BayerGB8",
+    "BayerGB10",
+    "BayerGB10Packed",
+    "BayerGB12",
+    "BayerGB12Packed",
+    "BayerBG8",
+    "BayerBG10",
+    "BayerBG10Packed",
+    "BayerBG12",
+    "BayerBG12Packed",
     "RGB8",
 ]
 
@@ -149,11 +164,19 @@ class ChipConfig(Model):
 
 
 class AravisConfig(Model):
-    """A GenICam camera with a visible and an infrared chip, through Aravis."""
+    """A GenICam camera through Aravis: with a visible and an infrared chip, or with one colour chip.
+
+    Automatic exposure, gain and white balance, and the gamma of a camera with one chip are switched off.
+    """
 
     kind: Literal["aravis"] = Field(default="aravis", description="Kind of the camera.")
     device: str = Field(
         default="", description="Part of the name, serial number or IP address. Empty: the only camera that answers."
+    )
+    chips: Literal[1, 2] | None = Field(
+        default=None,
+        description="Number of chips. Absent: one for a device with one stream channel and no settings of an infrared "
+        "chip, otherwise two.",
     )
     profile: Literal["jai-ad-080ge", "generic"] | None = Field(
         default=None, description="How the two chips are distinguished. Absent: by the model name."
@@ -191,6 +214,12 @@ class AravisConfig(Model):
     def _one_exposure(self) -> AravisConfig:
         if self.exposure_us is not None and (self.visible.exposure_us or self.infrared.exposure_us):
             raise ValueError("give exposure_us once for both chips, or for each chip, not both")
+        return self
+
+    @model_validator(mode="after")
+    def _no_settings_of_an_absent_chip(self) -> AravisConfig:
+        if self.chips == 1 and self.infrared != ChipConfig():
+            raise ValueError("infrared: chips = 1 means that there is no infrared chip; leave one of the two out")
         return self
 
 

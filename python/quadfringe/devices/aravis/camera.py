@@ -36,10 +36,11 @@ class _Running(Generic[Item]):
 
     paced = True
 
-    def __init__(self, config: AravisConfig | None, chips: tuple[str, ...]) -> None:
+    def __init__(self, config: AravisConfig | None, chips: tuple[str, ...], *, shots: bool) -> None:
         self._asked_for = config or AravisConfig()
-        self._chip_names = chips
-        self._link: Link | None = Link(self._asked_for, chips, patience_s=FIRST_PATIENCE_S)
+        self._shots = shots
+        self._link: Link | None = Link(self._asked_for, chips, patience_s=FIRST_PATIENCE_S, shots=shots)
+        self._chip_names = self._link.chips
         self.config = self._link.config
         self.name = self._link.name
         self._in_use = threading.Lock()
@@ -47,7 +48,7 @@ class _Running(Generic[Item]):
         self._last_id = 0
         self._queue: DroppingQueue[Item] = DroppingQueue(1)
         self._earlier = (0, 0)  # delivered and dropped shots of earlier runs
-        self._before = {chip: ChipStatistics() for chip in chips}  # of lost connections
+        self._before = {chip: ChipStatistics() for chip in self._chip_names}  # of lost connections
 
     def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> Item:
         """Take one shot that is exposed after this call; raises a `CameraError` when none arrives in time."""
@@ -105,7 +106,7 @@ class _Running(Generic[Item]):
         if self._closed:
             raise ValueError(f"camera at {self.name} is closed")
         if self._link is None:
-            self._link = Link(self._asked_for, self._chip_names, patience_s=AGAIN_PATIENCE_S)
+            self._link = Link(self._asked_for, self._chip_names, patience_s=AGAIN_PATIENCE_S, shots=self._shots)
         return self._link
 
     def _disconnect(self, *, lost: bool = False) -> None:
@@ -202,7 +203,7 @@ class _Running(Generic[Item]):
 
 
 class AravisCamera(_Running[AnyShot]):
-    """A GenICam camera with two chips; close it, or use it in a `with` block.
+    """A GenICam camera with two chips, or with one colour chip; close it, or use it in a `with` block.
 
     Shots hold copies of the pixels. With `borrow` (of `snap` and `stream`), shots in unpacked formats are read-only
     views of the receive buffers; a buffer returns to the stream when its last array is dropped, so keeping many such
@@ -211,7 +212,8 @@ class AravisCamera(_Running[AnyShot]):
     """
 
     def __init__(self, config: AravisConfig | None = None) -> None:
-        super().__init__(config, CHIPS)
+        one = config is not None and config.chips == 1
+        super().__init__(config, CHIPS[:1] if one else CHIPS, shots=True)
 
     @property
     def calibration(self) -> Calibration | None:
@@ -233,7 +235,7 @@ class ChipCamera(_Running[ChipImage]):
     """
 
     def __init__(self, config: AravisConfig | None = None, chip: Literal["visible", "infrared"] = "visible") -> None:
-        super().__init__(config, (chip,))
+        super().__init__(config, (chip,), shots=False)
 
 
 def _check_connected(link: Link, silent_s: float) -> None:
