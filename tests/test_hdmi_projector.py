@@ -17,6 +17,7 @@ from quadfringe.config import (
     ChipConfig,
     Fringes,
     ProjectorsConfig,
+    ReplayConfig,
     SystemConfig,
     UvcConfig,
     load_system,
@@ -157,6 +158,17 @@ def test_fringes_cover_the_columns_of_the_screen(tmp_path: Path) -> None:
     with open_system(tmp_path) as scanner:
         assert scanner.projector_width_px == 1280
         assert scanner.grab().images["red"].shape == (180, 320)
+
+
+@pytest.mark.usefixtures("capture")
+def test_a_replay_knows_the_columns_of_the_screen(tmp_path: Path) -> None:
+    (tmp_path / "system.toml").write_text(SYSTEM)
+    take = tmp_path / "take.h5"
+    done = CliRunner().invoke(app, ["record", str(tmp_path / "system.toml"), "--out", str(take), "--shots", "2"])
+    assert done.exit_code == 0, done.output
+    with open_system(SystemConfig(capture=ReplayConfig(file=take))) as scanner:
+        assert scanner.projector_width_px == 1280
+        assert repr(scanner.projector) == "ExternalLight()"
 
 
 @pytest.mark.parametrize("command", ["status", "pause", "stop", "start"])

@@ -154,8 +154,10 @@ def open_devices(config: SystemConfig) -> Devices:
         raise ConfigError("projectors: a recording cannot use them; leave them out")
     recording = Recording(config.capture.file)
     recorded = recording.config or SystemConfig()
-    # The recorded paths of projectors and calibration file are void here; the recording contains the calibration.
-    elsewhere = {"calibration": None, "projectors": None}
+    # The recorded paths of projectors and calibration file are void here; the recording contains the calibration. The
+    # size of a projector that was a screen still says how many columns the fringes cover; nothing opens it.
+    screens = recorded.projectors if recorded.projectors is not None and not recorded.projectors.lightcrafters else None
+    elsewhere = {"calibration": None, "projectors": screens}
     said = {name: getattr(config, name) for name in config.model_fields_set}
     merged = recorded.model_copy(update={**elsewhere, **said, "capture": config.capture})
     return Devices(ReplayCamera(recording, config.capture.speed), ExternalLight(), merged)
