@@ -780,10 +780,12 @@ class PatternSequence:
 class PatternWindow:
     """A borderless window that covers an output of `size_px` (W, H); without a name, the only one of this size.
 
+    Without a size, that of a LightCrafter 4500, 912 x 1140.
+
     Raises ValueError when the output is absent, of another size or scaled; OSError without a display.
     """
 
-    def __new__(cls, output: str | None = None, size_px: tuple[int, int] = (912, 1140)) -> Self: ...
+    def __new__(cls, output: str | None = None, size_px: tuple[int, int] | None = None) -> Self: ...
     @property
     def output(self) -> str: ...
     @property
@@ -817,5 +819,8 @@ def pack_flash(patterns: Sequence[tuple[NDArray[np.uint8], int]]) -> tuple[list[
     Returns the files, and image, number and bit depth of each pattern.
     """
 
-def outputs(size_px: tuple[int, int] = (912, 1140)) -> list[tuple[str, int, int, float | None, str | None]]:
-    """Give name, width, height, frame rate in Hz, and why it cannot show this size (W, H), of every active output."""
+def outputs(size_px: tuple[int, int] | None = None) -> list[tuple[str, int, int, float | None, str | None]]:
+    """Give name, width, height, frame rate in Hz, and why it cannot show this size (W, H), of every active output.
+
+    Without a size, that of a LightCrafter 4500, 912 x 1140.
+    """

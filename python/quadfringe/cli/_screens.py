@@ -31,8 +31,8 @@ def say_outputs() -> bool:
 
 
 def say_picture_modes(projector: Projector, tell: Callable[[str], None] = say) -> None:
-    """Print what to check at a projector of kind hdmi, because no program can read it; nothing for others."""
+    """Print what to check with a projector of kind hdmi, because no program can read it; nothing for others."""
     from quadfringe.devices.hdmi import PICTURE_MODES, HdmiProjectors
 
     if isinstance(projector, HdmiProjectors):
-        tell("\n".join(["check at the projector:", *(f"  {words}" for words in PICTURE_MODES)]))
+        tell("\n".join(["check by hand:", *(f"  {words}" for words in PICTURE_MODES)]))

@@ -30,8 +30,9 @@ ROLES = {
 }
 BEFORE = re.compile(rf"({'|'.join(ROLES)})(?:[ _.-]+(.*))?", re.IGNORECASE)
 BEHIND = re.compile(rf"(.*?)[ _.-]+({'|'.join(ROLES)})", re.IGNORECASE)
-# A folder is looked at so seldom that looking takes at most this share of the time.
-LOOKING_SHARE = 0.1
+# A folder is looked at so seldom that looking takes at most this share of the time, but at least every second: a drive
+# that hangs once, or a computer that sleeps, must not delay later looks.
+LOOKING_SHARE, LOOK_AGAIN_S = 0.1, 1.0
 
 
 class Part(NamedTuple):
@@ -119,7 +120,7 @@ class WatchedFolder:
         for path in self._seen.keys() - present.keys():
             del self._seen[path]
             self._taken.pop(path, None)
-        self._next_s = now_s + (now_s - begin_s) / LOOKING_SHARE
+        self._next_s = now_s + min((now_s - begin_s) / LOOKING_SHARE, LOOK_AGAIN_S)
 
     def _present(self) -> dict[Path, State]:
         try:

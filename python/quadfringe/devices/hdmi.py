@@ -22,13 +22,15 @@ from quadfringe.errors import ConfigError
 
 __all__ = ["PICTURE_MODES", "HdmiProjectors"]
 
-# What projectors for films and slides do to an image, and what to do about it. No program can read these settings.
+# What projectors for films and slides do to an image, and the programs of cameras too. No program can read these
+# settings, so that commands list them.
 PICTURE_MODES = (
     "keystone correction, digital zoom and overscan off: they scale the image, which destroys fine fringes",
     "dynamic contrast, auto iris, eco and automatic lamp power off: they change the brightness with the image",
     "sharpness at its least, noise reduction, motion smoothing and colour enhancement off: they change the fringes",
     "picture mode sRGB, standard or user, not vivid or film; then leave it, because the response belongs to it",
     "screen saver and power saving of the computer off; no scaling of the desktop on this screen",
+    "camera: whole frames of the projector, such as 16.7 or 33.3 ms at 60 Hz; gain, white balance and focus fixed",
 )
 
 

@@ -20,8 +20,9 @@ pub struct PatternWindow {
 #[pymethods]
 impl PatternWindow {
     #[new]
-    #[pyo3(signature = (output = None, size_px = SIZE_PX))]
-    fn new(py: Python<'_>, output: Option<&str>, size_px: (u32, u32)) -> PyResult<Self> {
+    #[pyo3(signature = (output = None, size_px = None))]
+    fn new(py: Python<'_>, output: Option<&str>, size_px: Option<(u32, u32)>) -> PyResult<Self> {
+        let size_px = size_px.unwrap_or(SIZE_PX);
         let window = py
             .detach(|| lightcrafter::window::PatternWindow::open_sized(output, size_px))
             .map_err(device_error)?;
@@ -81,8 +82,9 @@ type Row = (String, u32, u32, Option<f64>, Option<String>);
 
 /// Name, width, height, frame rate in Hz, and why the output cannot show an image of this size, for every active output.
 #[pyfunction]
-#[pyo3(signature = (size_px = SIZE_PX))]
-pub fn outputs(py: Python<'_>, size_px: (u32, u32)) -> PyResult<Vec<Row>> {
+#[pyo3(signature = (size_px = None))]
+pub fn outputs(py: Python<'_>, size_px: Option<(u32, u32)>) -> PyResult<Vec<Row>> {
+    let size_px = size_px.unwrap_or(SIZE_PX);
     let outputs = py.detach(lightcrafter::window::outputs).map_err(device_error)?;
     let row = |output: lightcrafter::window::Output| {
         let unfit = output.unfit_for(size_px);
