@@ -118,7 +118,7 @@ def test_a_camera_in_one_word(word: str, kind: type[Any]) -> None:
 @pytest.mark.parametrize(
     ("capture", "reason"),
     [
-        ("camera", r'capture: .*expected "virtual:", "aravis:NAME" or "replay:FILE"'),
+        ("camera", r'capture: .*expected "virtual:", "aravis:NAME", "uvc:NUMBER", "files:FOLDER" or "replay:FILE"'),
         ("virtual:x", "nothing behind the colon"),
         ({"kind": "aravis", "devise": "x"}, r"capture\.aravis\.devise: this key is not known"),
         ({"kind": "aravis", "visible": {"pixel_format": "RAW"}}, r"capture\.aravis\.visible\.pixel_format"),
@@ -129,3 +129,33 @@ def test_a_camera_in_one_word(word: str, kind: type[Any]) -> None:
 def test_captures_at_fault_are_named(capture: object, reason: str) -> None:
     with pytest.raises(ConfigError, match=reason):
         checked(SystemConfig, {"capture": capture}, "s.toml")
+
+
+class Knobs:
+    """Features of a device: those in `stuck` keep their value."""
+
+    def __init__(self, stuck: str = "", **values: object) -> None:
+        self.values, self.stuck = values, stuck
+
+    def has(self, name: str) -> bool:
+        return name in self.values
+
+    def get(self, name: str) -> object:
+        return self.values[name]
+
+    def set(self, name: str, value: object) -> None:
+        if name == self.stuck:
+            raise CameraError("locked")
+        self.values[name] = value
+
+
+def test_automatic_functions_of_one_colour_chip_are_switched_off() -> None:
+    knobs = Knobs(ExposureAuto="Continuous", BalanceWhiteAuto="Continuous", GammaEnable=True, Gain=1)
+    assert profiles.fix_colours(knobs, {"BalanceWhiteAuto": "Once"}) == []  # type: ignore[arg-type]
+    assert knobs.values == {"ExposureAuto": "Off", "BalanceWhiteAuto": "Continuous", "GammaEnable": False, "Gain": 1}
+    assert profiles.fix_colours(Knobs("GainAuto", GainAuto="Once"), {}) == ["GainAuto"]  # type: ignore[arg-type]
+
+
+def test_a_camera_of_one_chip_has_no_settings_of_another() -> None:
+    with pytest.raises(ConfigError, match="chips = 1 means that there is no infrared chip"):
+        AravisConfig.model_validate({"chips": 1, "infrared": {"exposure_us": 5}})

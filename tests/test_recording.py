@@ -239,6 +239,9 @@ class Clock:
     def is_set(self) -> bool:
         return False
 
+    def clear(self) -> None:
+        pass
+
 
 def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -248,7 +251,7 @@ def test_replay_at_original_speed_keeps_the_pace_and_counts_what_is_late(
     monkeypatch.setattr("quadfringe.recording.replay.time", clock)
     for keep, ids, dropped in (("latest", [0, 3, 4, 5, 6, 7, 8, 9], 2), ("all", list(range(10)), 0)):
         camera = ReplayCamera(Recording(path))
-        camera._closed = clock  # type: ignore[assignment]
+        camera._interrupted = clock  # type: ignore[assignment]
         begin_s = clock.now_s
         stream = camera.stream(keep=keep)  # type: ignore[arg-type]
         came = [next(stream).id]

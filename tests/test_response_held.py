@@ -142,6 +142,9 @@ class Feed:
     def stream(self, count: int | None = None, *, keep: str = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
         yield from self._shots
 
+    def interrupt(self) -> None:
+        pass
+
     def statistics(self) -> CameraStatistics:
         return CameraStatistics()
 

@@ -46,6 +46,9 @@ class ScriptedCamera:
             count = None if count is None else count - 1
             yield Shot(BLANK, BLANK, BLANK, BLANK, stamp=Stamp(one, time.time_ns() // 1000, self.name))
 
+    def interrupt(self) -> None:
+        pass
+
     def statistics(self) -> CameraStatistics:
         return CameraStatistics()
 

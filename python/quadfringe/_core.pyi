@@ -778,16 +778,22 @@ class PatternSequence:
 
 @final
 class PatternWindow:
-    """A borderless window of 912 x 1140 that covers an output; without a name, the only one of this size.
+    """A borderless window that covers an output of `size_px` (W, H); without a name, the only one of this size.
+
+    Without a size, that of a LightCrafter 4500, 912 x 1140.
 
     Raises ValueError when the output is absent, of another size or scaled; OSError without a display.
     """
 
-    def __new__(cls, output: str | None = None) -> Self: ...
+    def __new__(cls, output: str | None = None, size_px: tuple[int, int] | None = None) -> Self: ...
     @property
     def output(self) -> str: ...
+    @property
+    def size_px(self) -> tuple[int, int]: ...
+    @property
+    def frame_rate_hz(self) -> float | None: ...
     def show(self, image: NDArray[np.uint8]) -> None:
-        """Show red, green, blue, (1140, 912, 3) uint8, until the next image."""
+        """Show red, green, blue, (H, W, 3) uint8, until the next image."""
 
     def close(self) -> None:
         """Close the window; closing twice is allowed."""
@@ -813,5 +819,8 @@ def pack_flash(patterns: Sequence[tuple[NDArray[np.uint8], int]]) -> tuple[list[
     Returns the files, and image, number and bit depth of each pattern.
     """
 
-def outputs() -> list[tuple[str, int, int, float | None, str | None]]:
-    """Give name, width, height, frame rate in Hz, and why it cannot carry a pattern, of every output that is on."""
+def outputs(size_px: tuple[int, int] | None = None) -> list[tuple[str, int, int, float | None, str | None]]:
+    """Give name, width, height, frame rate in Hz, and why it cannot show this size (W, H), of every active output.
+
+    Without a size, that of a LightCrafter 4500, 912 x 1140.
+    """

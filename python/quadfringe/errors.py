@@ -17,6 +17,7 @@ __all__ = [
     "CameraError",
     "CameraLostError",
     "CameraNotFoundError",
+    "CameraWarning",
     "ConfigError",
     "DecodeError",
     "DecodeWarning",
@@ -56,6 +57,10 @@ class DecodeWarning(UserWarning):
 
 class CameraError(OSError):
     """A camera failed; the message says what to check. Call the camera again: it reconnects."""
+
+
+class CameraWarning(UserWarning):
+    """A camera or projector works otherwise than it should, or images were left out; the message says what to do."""
 
 
 class CameraNotFoundError(CameraError):

@@ -9,6 +9,7 @@ from typing import Literal
 
 import numpy as np
 import pytest
+from support.shots import sees_no_infrared
 from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, pattern, two_sources
 
 from quadfringe.config.cameras import AravisConfig, ChipConfig
@@ -26,6 +27,9 @@ FORMATS = [
     ("BayerRG12", "Mono12Packed"),
     ("BayerRG12Packed", "Mono12"),
     ("RGB8", "Mono8"),
+    ("BayerGR8", "Mono8"),
+    ("BayerGB12Packed", "Mono12Packed"),
+    ("BayerBG10", "Mono10"),
 ]
 
 
@@ -109,6 +113,35 @@ def test_a_camera_of_one_chip() -> None:
         )
         with pytest.raises(CameraError, match=r"1 stream channel\(s\)(?s:.)*--chip visible"):
             AravisCamera(both)
+
+
+def test_a_camera_of_one_colour_chip_makes_shots() -> None:
+    with fake_twin(SIZE_PX, 30.0) as fakes:
+        device = str(fakes.capture.infrared.device)
+        config = AravisConfig(device=device, visible=ChipConfig(pixel_format="BayerBG8"), timeout_s=10.0)
+        with AravisCamera(config) as camera:
+            shots = [camera.snap(), *camera.stream(3, keep="all")]
+            assert camera.config.chips == 1
+            assert camera.config.infrared == ChipConfig()
+            assert list(camera.statistics().chips) == ["visible"]
+        whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+        for shot in shots:
+            assert isinstance(shot, BayerShot)
+            assert shot.bayer == "bggr"
+            np.testing.assert_array_equal(shot.raw, whole.frame(1, TestPattern.exposure(shot.raw), 8))
+            assert sees_no_infrared(shot)
+        with pytest.raises(CameraError, match="visible chip: expected a colour format, got Mono8; set a Bayer format"):
+            AravisCamera(config.model_copy(update={"visible": ChipConfig(pixel_format="Mono8")}))
+
+
+def test_the_visible_chip_of_two_makes_shots_alone(emulator: Emulator) -> None:
+    config = emulated(emulator, "RGB8").model_copy(update={"chips": 1, "infrared": ChipConfig()})
+    with AravisCamera(config) as camera:
+        shot = camera.snap()
+    assert isinstance(shot, Shot)
+    whole = pattern((SIZE_PX[1], SIZE_PX[0]))
+    np.testing.assert_array_equal(shot.red, whole.frame(0, TestPattern.exposure(shot.red), 8))
+    assert sees_no_infrared(shot)
 
 
 def test_a_camera_that_is_not_on_a_network() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Iterator
 from itertools import pairwise
@@ -51,6 +52,19 @@ def test_a_stream_that_is_left_leaves_the_camera_usable(camera: Camera) -> None:
     next(stream)
     stream.close()  # type: ignore[attr-defined]
     camera.snap()
+
+
+def test_an_interrupted_stream_ends(camera: Camera) -> None:
+    stream = camera.stream(keep="all")
+    next(stream)
+    camera.interrupt()
+    assert not list(stream)
+    camera.snap()
+    stopper = threading.Timer(0.3, camera.interrupt)
+    stopper.start()
+    for _ in camera.stream():
+        time.sleep(0.01)
+    stopper.join()
 
 
 def test_shots_are_the_callers_own(camera: Camera) -> None:

@@ -71,6 +71,22 @@ flash = { image = 2, fringes = {} }
 """
 
 
+HDMI = """
+[projectors.visible]
+kind = "hdmi"
+size_px = [912, 1140]
+settle_s = 0.0
+"""
+
+
+@pytest.fixture
+def hdmi_system(tmp_path: Path) -> Path:
+    """A system file: one projector that is a screen, without commands."""
+    file = tmp_path / "hdmi.toml"
+    file.write_text(HDMI)
+    return file
+
+
 @pytest.fixture
 def system(tmp_path: Path) -> Path:
     """A system file: the visible projector by HDMI, the infrared one from flash."""

@@ -26,9 +26,9 @@ def run(*arguments: object) -> Result:
     return CliRunner().invoke(app, ["projector", *(str(a) for a in arguments)])
 
 
-@pytest.fixture(params=["virtual", "system", "flash_system"])
+@pytest.fixture(params=["virtual", "system", "flash_system", "hdmi_system"])
 def projector(request: pytest.FixtureRequest) -> Iterator[Projector]:
-    """Every implementation of the protocol: virtual, HDMI with flash, flash alone."""
+    """Every implementation of the protocol: virtual, HDMI with flash, flash alone, a screen without commands."""
     virtual = request.param == "virtual"
     config = SystemConfig() if virtual else load_system(request.getfixturevalue(request.param))
     opened = open_projector(config)
@@ -46,6 +46,23 @@ def test_every_projector_keeps_the_contract(projector: Projector) -> None:
     projector.show(fringes)
     projector.close()
     projector.close()
+
+
+def test_any_projector_is_pixel_exact(screen: Screen, hdmi_system: Path) -> None:
+    config = load_system(hdmi_system)
+    projector = open_projector(config)
+    projector.show(config.fringes)
+    np.testing.assert_array_equal(screen.rgb(), projector_images(config.fringes.numbers, (912, 1140), "regular")[0])
+    projector.close()
+    hdmi_system.write_text(hdmi_system.read_text().replace("912, 1140", "1280, 720"))
+    with pytest.raises(ValueError, match="no active output is 1280 x 720 and unscaled"):
+        open_projector(load_system(hdmi_system))
+    done = run("screens")
+    assert done.exit_code == 0
+    assert re.search(r"912 x 1140.*, fit for patterns; fit for kind = .hdmi. with size_px = \[912, 1140\]", done.stdout)
+    done = run("show", "--system", hdmi_system)
+    assert done.exit_code == 2
+    assert "outputs: screen (912 x 1140 pixels)" in done.stderr
 
 
 def test_the_pair_shows_its_fringes(screen: Screen, system: Path) -> None:

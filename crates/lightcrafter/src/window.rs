@@ -1,4 +1,7 @@
-//! The HDMI route: a borderless window of exactly 912 x 1140 pixels on the output that feeds a projector.
+//! The HDMI route: a borderless window that covers the output that feeds a projector.
+//!
+//! The window has exactly the native pixels of the projector: 912 x 1140 for a LightCrafter 4500, which
+//! [`PatternWindow::open`] expects, or the size given to [`PatternWindow::open_sized`] for any other projector.
 //!
 //! Scaling destroys a pattern. Therefore an output that has another size, or is scaled, rotated or transformed, is an
 //! error that names the reason. [`PatternWindow::show`] checks the size again and returns once the display has
@@ -15,7 +18,10 @@ use crate::sequence::{HEIGHT_PX, WIDTH_PX};
 use events::{Order, ask};
 use std::fmt;
 
-/// Bytes of an image: rows of pixels of red, green, blue.
+/// Columns and rows of a LightCrafter 4500.
+pub const SIZE_PX: (u32, u32) = (WIDTH_PX as u32, HEIGHT_PX as u32);
+
+/// Bytes of an image for a LightCrafter 4500: rows of pixels of red, green, blue.
 pub const IMAGE_BYTES: usize = 3 * WIDTH_PX * HEIGHT_PX;
 
 /// An output of the computer, with a display or a projector behind it.
@@ -34,13 +40,17 @@ pub struct Output {
 }
 
 impl Output {
-    /// Why the output cannot show a pattern; `None` if it can.
+    /// Why the output cannot show a pattern of a LightCrafter 4500; `None` if it can.
     pub fn unfit(&self) -> Option<String> {
+        self.unfit_for(SIZE_PX)
+    }
+
+    /// Why the output cannot show an image of this size (width, height) one to one; `None` if it can.
+    pub fn unfit_for(&self, size_px: (u32, u32)) -> Option<String> {
         let (width, height) = self.size_px;
-        if (width as usize, height as usize) != (WIDTH_PX, HEIGHT_PX) {
-            return Some(format!(
-                "{width} x {height} pixels, not {WIDTH_PX} x {HEIGHT_PX}: set its mode, unscaled"
-            ));
+        if self.size_px != size_px {
+            let wanted = format!("{} x {}", size_px.0, size_px.1);
+            return Some(format!("{width} x {height} pixels, not {wanted}: set its mode, unscaled"));
         }
         self.scaling.clone()
     }
@@ -62,27 +72,28 @@ pub fn outputs() -> Result<Vec<Output>> {
     ask(Order::Outputs)
 }
 
-/// Choose the output of this name or, without a name, the only suitable one.
-fn choose(outputs: &[Output], name: Option<&str>) -> Result<usize> {
+/// Choose the output of this name or, without a name, the only one that suits an image of this size.
+fn choose(outputs: &[Output], name: Option<&str>, size_px: (u32, u32)) -> Result<usize> {
     let names: Vec<String> = outputs.iter().map(Output::to_string).collect();
     let present = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
     let refused = |wanted: &str, reason: String| {
         Err(Error::Output { wanted: wanted.to_owned(), reason, present: present.clone() })
     };
     let Some(name) = name else {
-        let fit: Vec<usize> = (0..outputs.len()).filter(|i| outputs[*i].unfit().is_none()).collect();
+        let fit: Vec<usize> =
+            (0..outputs.len()).filter(|i| outputs[*i].unfit_for(size_px).is_none()).collect();
         return match fit.as_slice() {
             [only] => Ok(*only),
             [] => refused(
                 "for the projector",
-                format!("no active output is {WIDTH_PX} x {HEIGHT_PX} and unscaled"),
+                format!("no active output is {} x {} and unscaled", size_px.0, size_px.1),
             ),
             _ => refused("for the projector", "several are suitable, so choose one by its name".to_owned()),
         };
     };
     match outputs.iter().position(|output| output.name == name) {
         None => refused(name, "no such output is active".to_owned()),
-        Some(i) => match outputs[i].unfit() {
+        Some(i) => match outputs[i].unfit_for(size_px) {
             None => Ok(i),
             Some(reason) => refused(name, reason),
         },
@@ -94,16 +105,31 @@ fn choose(outputs: &[Output], name: Option<&str>) -> Result<usize> {
 pub struct PatternWindow {
     number: u64,
     output: Output,
+    size_px: (u32, u32),
 }
 
 impl PatternWindow {
-    /// Cover the output of this name with black; without a name, the only suitable one.
+    /// Cover the output of this name, which feeds a LightCrafter 4500, with black; without a name, the only suitable one.
     pub fn open(output: Option<&str>) -> Result<Self> {
+        Self::open_sized(output, SIZE_PX)
+    }
+
+    /// Cover the output of this name, which has this size (width, height), with black; without a name, the only one.
+    pub fn open_sized(output: Option<&str>, size_px: (u32, u32)) -> Result<Self> {
         let name = output.map(str::to_owned);
-        let (number, output) = ask(|reply| Order::Open { name, reply })?;
-        let mut window = Self { number, output };
-        window.show(&vec![0; IMAGE_BYTES])?;
+        let (number, output) = ask(|reply| Order::Open { name, size_px, reply })?;
+        let mut window = Self { number, output, size_px };
+        window.show(&vec![0; window.image_bytes()])?;
         Ok(window)
+    }
+
+    /// Columns and rows of the images that it shows.
+    pub fn size_px(&self) -> (u32, u32) {
+        self.size_px
+    }
+
+    fn image_bytes(&self) -> usize {
+        3 * self.size_px.0 as usize * self.size_px.1 as usize
     }
 
     /// The covered output.
@@ -111,11 +137,12 @@ impl PatternWindow {
         &self.output
     }
 
-    /// Show 912 x 1140 pixels of red, green, blue, row by row, until the next call.
+    /// Show pixels of red, green, blue, row by row, as many as the window has, until the next call.
     pub fn show(&mut self, image: &[u8]) -> Result<()> {
-        if image.len() != IMAGE_BYTES {
-            let expected =
-                format!("{IMAGE_BYTES} bytes, {WIDTH_PX} x {HEIGHT_PX} pixels of red, green, blue");
+        let bytes = self.image_bytes();
+        if image.len() != bytes {
+            let (width, height) = self.size_px;
+            let expected = format!("{bytes} bytes, {width} x {height} pixels of red, green, blue");
             return Err(Error::value("image for the window", expected, image.len()));
         }
         let pixels =
@@ -145,9 +172,10 @@ mod tests {
         let desk = output("DP-1", (1920, 1080), None);
         let (one, two) = (output("HDMI-1", (912, 1140), None), output("HDMI-2", (912, 1140), None));
         let scaled = output("HDMI-3", (912, 1140), Some("transformed"));
-        assert_eq!(choose(&[desk.clone(), one.clone()], None).unwrap(), 1);
-        assert_eq!(choose(&[one.clone(), two.clone()], Some("HDMI-2")).unwrap(), 1);
-        let refused = |outputs: &[Output], name| choose(outputs, name).unwrap_err().to_string();
+        assert_eq!(choose(&[desk.clone(), one.clone()], None, SIZE_PX).unwrap(), 1);
+        assert_eq!(choose(&[one.clone(), two.clone()], Some("HDMI-2"), SIZE_PX).unwrap(), 1);
+        assert_eq!(choose(&[one.clone(), desk.clone()], None, (1920, 1080)).unwrap(), 1);
+        let refused = |outputs: &[Output], name| choose(outputs, name, SIZE_PX).unwrap_err().to_string();
         assert!(refused(&[one.clone(), two], None).contains("several are suitable"));
         assert!(refused(&[desk.clone(), scaled.clone()], None).contains("no active output is 912 x 1140"));
         assert!(refused(&[scaled], Some("HDMI-3")).contains("transformed"));

@@ -124,6 +124,7 @@ impl Drop for Server {
 fn under_xvfb() {
     Server::xvfb("912x1140").run("every_pixel_is_on_the_screen");
     Server::xvfb("1920x1140").run("another_size_is_refused");
+    Server::xvfb("1280x720").run("a_projector_of_any_size_gets_its_pixels");
     Server::two_outputs().run("each_of_two_outputs_gets_its_image");
     run_alone("no_display_is_an_error", |command| command.env_remove("DISPLAY"));
 }
@@ -134,19 +135,22 @@ fn screenshot() -> Vec<u8> {
         .unwrap();
     let word = |i: usize| u32::from_be_bytes(file[4 * i..4 * i + 4].try_into().unwrap()) as usize;
     let (header, width, height, bytes_per_line, colours) = (word(0), word(4), word(5), word(12), word(19));
-    assert_eq!((width, height), (912, 1140));
     let pixels = &file[header + 12 * colours..];
     let rows = (0..height).flat_map(|y| pixels[y * bytes_per_line..][..4 * width].chunks(4));
     rows.flat_map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
 }
 
 fn noise(seed: u32) -> Vec<u8> {
+    noise_of(IMAGE_BYTES, seed)
+}
+
+fn noise_of(bytes: usize, seed: u32) -> Vec<u8> {
     let mut state = seed;
     let mut next = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
         (state >> 24) as u8
     };
-    (0..IMAGE_BYTES).map(|_| next()).collect()
+    (0..bytes).map(|_| next()).collect()
 }
 
 #[test]
@@ -203,6 +207,20 @@ fn another_size_is_refused() {
     let name = outputs().unwrap()[0].name.clone();
     let error = PatternWindow::open(Some(&name)).unwrap_err();
     assert!(error.to_string().contains("1920 x 1140 pixels, not 912 x 1140"), "{error}");
+}
+
+#[test]
+#[ignore = "run by under_xvfb"]
+fn a_projector_of_any_size_gets_its_pixels() {
+    let mut window = PatternWindow::open_sized(None, (1280, 720)).unwrap();
+    assert_eq!(window.size_px(), (1280, 720));
+    let image = noise_of(3 * 1280 * 720, 5);
+    window.show(&image).unwrap();
+    assert!(screenshot() == image);
+    let error = window.show(&[0; IMAGE_BYTES]).unwrap_err().to_string();
+    assert!(error.contains("1280 x 720 pixels of red, green, blue"), "{error}");
+    let error = PatternWindow::open_sized(None, (1920, 1080)).unwrap_err().to_string();
+    assert!(error.contains("no active output is 1920 x 1080"), "{error}");
 }
 
 #[test]

@@ -46,8 +46,8 @@ def caution(message: str) -> None:
 
 @contextmanager
 def cautions() -> Iterator[None]:
-    """Print warnings of recordings in the form of `caution`, each once."""
-    from quadfringe.errors import RecordingWarning
+    """Print warnings of recordings and cameras in the form of `caution`, each once."""
+    from quadfringe.errors import CameraWarning, RecordingWarning
 
     seen: set[str] = set()
     with warnings.catch_warnings():
@@ -61,13 +61,14 @@ def cautions() -> Iterator[None]:
             file: TextIO | None = None,
             line: str | None = None,
         ) -> None:
-            if not issubclass(category, RecordingWarning):
+            if not issubclass(category, (CameraWarning, RecordingWarning)):
                 others(message, category, filename, lineno, file, line)
             elif str(message) not in seen:
                 seen.add(str(message))
                 caution(str(message))
 
-        warnings.simplefilter("always", RecordingWarning)
+        for kind in (CameraWarning, RecordingWarning):
+            warnings.simplefilter("always", kind)
         warnings.showwarning = show
         yield
 

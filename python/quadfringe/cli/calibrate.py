@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from quadfringe.cli._options import BoardPosesOption, JsonOption, VirtualSystemOption
-from quadfringe.cli._output import say, table, write_figures, write_record
+from quadfringe.cli._output import say, write_record
+from quadfringe.cli.response import response
 
 if TYPE_CHECKING:
     from quadfringe.calibration.session import Captures, Guided
@@ -37,16 +37,6 @@ PicturesOption = Annotated[
 HeightsOption = Annotated[
     Path | None, typer.Option(metavar="FILE", help="Write the height polynomial of every pixel, .npz.")
 ]
-
-
-class ChannelName(StrEnum):
-    """The channel that a stack of images shows."""
-
-    all = "all"
-    red = "red"
-    green = "green"
-    blue = "blue"
-    ir = "ir"
 
 
 @app.callback()
@@ -245,34 +235,4 @@ def import_opencv(
     say(str(out))
 
 
-@app.command()
-def response(
-    files: Annotated[
-        list[Path],
-        typer.Argument(
-            metavar="FILES...",
-            help="Images of one fringe pattern in the order of its phase shifts; several stacks may follow.",
-        ),
-    ],
-    steps: Annotated[int, typer.Option(min=4, max=64, help="Number of equal phase shifts per period.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="Response to write, .json.")],
-    channel: Annotated[
-        ChannelName, typer.Option(help="Channel that the images show; all gives every channel this response.")
-    ] = ChannelName.all,
-    base: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="Response file for the other channels, .json; default: linear.")
-    ] = None,
-    json: JsonOption = None,
-) -> None:
-    """Estimate the response (gamma) of a channel from the images of an N-step capture."""
-    from quadfringe.calibration.response import estimate_from_files
-    from quadfringe.data import ResponseCalibration
-    from quadfringe.files import require_suffix
-
-    require_suffix(out, (".json",))
-    known = None if base is None else ResponseCalibration.load(base)
-    names = None if channel is ChannelName.all else (channel.value,)
-    found = estimate_from_files(files, steps, names, known)
-    found.calibration.save(out)
-    table(f"{out}: linear = max(I / (1 - knee I^20) - offset, 0) ^ exponent", found.figures, json)
-    write_figures(found.figures, json)
+app.command()(response)

@@ -11,6 +11,7 @@ import typer
 
 from quadfringe.cli._options import JsonOption
 from quadfringe.cli._output import complain, say, write_record
+from quadfringe.cli._system import system_of
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -28,8 +29,8 @@ CameraArgument = Annotated[
     str,
     typer.Argument(
         metavar="CAMERA",
-        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, virtual:, or a "
-        "system file .toml.",
+        help="aravis:NAME (vendor, model, serial number or address), aravis: for the only camera, uvc:0, files:FOLDER, "
+        "virtual:, or a system file .toml.",
     ),
 ]
 
@@ -51,12 +52,9 @@ ChipOption = Annotated[
 
 def _system(camera: str) -> SystemConfig:
     """Return the system of a word such as aravis:NAME, or of a system file."""
-    from quadfringe.config import SystemConfig, load_system
-    from quadfringe.config.cameras import capture_config
-
-    if camera.endswith(".toml"):
-        return load_system(Path(camera))
-    return SystemConfig(capture=capture_config(camera))
+    config = system_of(Path(camera), None) if camera.endswith(".toml") else system_of(None, camera)
+    assert config is not None  # one of them was given
+    return config
 
 
 def _opened(camera: str) -> Devices:
@@ -78,13 +76,26 @@ def _one_chip(camera: str, chip: Chip) -> ChipCamera:
 
 @app.command("list")
 def list_cameras() -> None:
-    """List the devices that answer; a JAI 2CCD camera appears as two devices with one serial number."""
-    from quadfringe.devices.aravis import found
+    """List the devices that answer; a JAI 2CCD camera appears as two devices with one serial number.
 
-    devices = found()
+    GenICam cameras are found with the extra aravis alone, webcams on Linux alone.
+    """
+    from quadfringe.devices.aravis import found
+    from quadfringe.devices.uvc import found as webcams_found
+    from quadfringe.errors import MissingExtraError
+
+    webcams = webcams_found()
+    for webcam in webcams:
+        say(f"uvc:{webcam.where}  {webcam.name}")
+    try:
+        devices = found()
+    except MissingExtraError:
+        if not webcams:
+            raise
+        devices = []
     for device in devices:
         say(f"{device.where}  {device.vendor} {device.model}  serial number {device.serial}")
-    if not devices:
+    if not devices and not webcams:
         complain("no camera answers; check power and cable, and that this host has an address in the camera's subnet")
         raise typer.Exit(FAILED)
 

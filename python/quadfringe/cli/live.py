@@ -17,6 +17,7 @@ from quadfringe.cli._options import (
     SystemFile,
 )
 from quadfringe.cli._output import caution, say, stoppable
+from quadfringe.cli._system import CameraOption, system_of
 from quadfringe.cli.record import require_all_recorded
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ SurfaceOption = Annotated[
 
 def live(
     system: SystemFile = None,
+    camera: CameraOption = None,
     record: RecordOption = None,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
@@ -73,7 +75,7 @@ def live(
         shown: dict[str, Any] = {"stride": view_stride, "colouring": colour.value, "clouds_per_s": clouds_per_s}
         shown["drawn"] = "surface" if surface else "points"
         viewer = stack.enter_context(Viewer(host, port, allow_hosts=allow_host or (), **shown))
-        scanner = stack.enter_context(open_system(system))
+        scanner = stack.enter_context(open_system(system_of(system, camera)))
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))

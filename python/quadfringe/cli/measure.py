@@ -10,6 +10,7 @@ import typer
 from quadfringe.cli._options import SystemFile
 from quadfringe.cli._output import say
 from quadfringe.cli._steps import Beam, BeamOption
+from quadfringe.cli._system import CameraOption, system_of
 
 __all__ = ["measure"]
 
@@ -22,6 +23,7 @@ def measure(
         ),
     ],
     system: SystemFile = None,
+    camera: CameraOption = None,
     reference: Annotated[
         bool,
         typer.Option(
@@ -45,7 +47,7 @@ def measure(
     if not reference and (steps is not None or beam is not None):
         raise InputError("--steps and --beam belong to --reference; give it too")
     given = {} if steps is None else {"steps": steps}
-    with open_system(system) as scanner:
+    with open_system(system_of(system, camera)) as scanner:
         shape = scanner.measure(reference=reference, infrared=beam is Beam.infrared, **given)
     for path in out:
         shape.save(path)

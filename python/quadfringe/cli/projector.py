@@ -1,4 +1,4 @@
-"""`quadfringe projector`: control the LightCrafter 4500 projectors of a bench."""
+"""`quadfringe projector`: control the LightCrafter 4500 projectors of a bench, and show fringes on any projector."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from quadfringe.cli._output import complain, say
+from quadfringe.cli._screens import say_outputs, say_picture_modes
 from quadfringe.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +20,11 @@ if TYPE_CHECKING:
 
 __all__ = ["app"]
 
-app = typer.Typer(name="projector", help="The LightCrafter 4500 projectors of a bench.", no_args_is_help=True)
+app = typer.Typer(
+    name="projector",
+    help="The projectors of a bench: LightCrafter 4500, and screens of kind hdmi.",
+    no_args_is_help=True,
+)
 
 FAILED = 1
 PortOption = Annotated[
@@ -56,6 +61,17 @@ def _system(file: Path) -> SystemConfig:
     return config
 
 
+def _lightcrafters(config: SystemConfig, file: Path) -> tuple[ProjectorConfig, ProjectorConfig]:
+    assert config.projectors is not None
+    both = config.projectors.lightcrafters
+    if both is None:
+        raise InputError(
+            f"{file}: its projector is of kind hdmi, which takes no commands; its light is shown by "
+            f"quadfringe projector show --system {file}, which stays open"
+        )
+    return both
+
+
 def _chosen(which: ProjectorConfig | str | None) -> LightCrafter:
     from quadfringe.devices.lightcrafter import LightCrafter, open_device
 
@@ -68,9 +84,7 @@ def _selected(port: str | None, system: Path | None) -> Sequence[ProjectorConfig
         return [port]
     if port is not None:
         raise InputError("--port selects one projector and --system both; give one of them")
-    projectors = _system(system).projectors
-    assert projectors is not None
-    return [projectors.visible, projectors.infrared]
+    return _lightcrafters(_system(system), system)
 
 
 def _each(port: str | None, system: Path | None, act: Callable[[LightCrafter], object]) -> None:
@@ -99,6 +113,13 @@ def list_projectors() -> None:
         say(f"port {port}  address {address}  {name}")
     if not found:
         complain("no LightCrafter 4500 is connected; check the power and the USB cable")
+        raise typer.Exit(FAILED)
+
+
+@app.command()
+def screens() -> None:
+    """List the screens of the computer, and the projectors whose patterns they can carry."""
+    if not say_outputs():
         raise typer.Exit(FAILED)
 
 
@@ -162,6 +183,7 @@ def _show_fringes(config: SystemConfig, seconds: float | None) -> None:
 
     projector = open_projector(config)
     try:
+        say_picture_modes(projector)
         projector.show(config.fringes)
         say("showing; stop with Ctrl-C" if seconds is None else f"showing for {seconds:g} s")
         _rest(seconds)
@@ -206,9 +228,9 @@ def start(port: PortOption = None, system: SystemOption = None) -> None:
 def _start_from_flash(config: SystemConfig, file: Path) -> None:
     from quadfringe.devices.lightcrafter import ProjectorPair
 
-    assert config.projectors is not None
-    if any(one.hdmi is not None for one in (config.projectors.visible, config.projectors.infrared)):
+    if any(one.hdmi is not None for one in _lightcrafters(config, file)):
         raise InputError(f"{file}: HDMI needs a window that stays open; use quadfringe projector show --system {file}")
+    assert config.projectors is not None
     pair = ProjectorPair(config.projectors)
     try:
         pair.show(config.fringes)
@@ -253,7 +275,7 @@ def doctor() -> None:
         complain("no LightCrafter 4500 is connected; check the power and the USB cable")
     for port, _, _ in found:
         problems += _examine(port)
-    _examine_outputs()
+    say_outputs()
     if problems:
         raise typer.Exit(FAILED)
     say("all projectors answer")
@@ -273,17 +295,3 @@ def _examine(port: str) -> int:
     except OSError as error:
         complain(str(error))
     return 1
-
-
-def _examine_outputs() -> None:
-    """Print which video outputs can carry patterns; patterns in flash memory need none."""
-    from quadfringe.devices.lightcrafter import outputs
-
-    try:
-        rows = outputs()
-    except OSError as error:
-        say(f"outputs: {error}")
-        return
-    for name, width, height, rate_hz, unfit in rows:
-        rate = "" if rate_hz is None else f" at {rate_hz:.2f} Hz"
-        say(f"output {name}: {width} x {height}{rate}, {'fit for patterns' if unfit is None else unfit}")

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from time import monotonic
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from quadfringe.cli._options import FileSizeOption, JsonOption, ShotsOption, SystemFile
 from quadfringe.cli._output import caution, complain, progress, say, stop_requested, write_figures
+from quadfringe.cli._system import CameraOption, system_of
 
 if TYPE_CHECKING:
     from threading import Event
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 __all__ = ["record", "recover", "require_all_recorded"]
 
 SLOW = "the disk is slower than the camera; use a faster disk, a smaller image or a lower frame rate"
+WATCH_S = 0.05  # how often a recording looks whether it shall end while no shot comes
 CALM_S = 2.0  # so long no shot must be lost until recording counts as complete again
 
 SecondsOption = Annotated[float | None, typer.Option(min=0, help="Stop after this many seconds; default: no limit.")]
@@ -31,6 +34,7 @@ def record(
         Path, typer.Option(metavar="FILE.h5", help="Recording to create; an existing file is never overwritten.")
     ],
     system: SystemFile = None,
+    camera: CameraOption = None,
     shots: ShotsOption = None,
     seconds: SecondsOption = None,
     file_gb: FileSizeOption = None,
@@ -45,7 +49,7 @@ def record(
     from quadfringe.scanner import open_system
 
     with (
-        open_system(system) as scanner,
+        open_system(system_of(system, camera)) as scanner,
         Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
         stop_requested() as stop,
         progress(_shots(scanner, shots, seconds, stop), "recording", shots) as taken,
@@ -94,8 +98,6 @@ class _SlowDisk:
 
     def see(self, dropped: int) -> None:
         """Take the number of shots that were lost so far."""
-        from time import monotonic
-
         if dropped > self._dropped:
             self._dropped, self._since_s = dropped, monotonic()
             if not self._losing:
@@ -107,17 +109,31 @@ class _SlowDisk:
 
 
 def _shots(scanner: Scanner, shots: int | None, seconds: float | None, stop: Event) -> Iterator[AnyShot]:
-    """Yield shots of the camera until a limit is reached or a stop is requested."""
+    """Yield shots of the camera until a limit is reached or a stop is requested, also while none comes."""
     from contextlib import closing
-    from time import monotonic
+    from threading import Event, Thread
+
+    ended = Event()
+
+    def interrupt() -> None:
+        while not (stop.wait(WATCH_S) or ended.is_set() or (end_s is not None and monotonic() >= end_s)):
+            pass
+        while not ended.wait(WATCH_S):
+            scanner.camera.interrupt()
 
     scanner.projector.show(scanner.config.fringes)
     end_s = None if seconds is None else monotonic() + seconds
+    watch = Thread(target=interrupt, name="record", daemon=True)
     with closing(scanner.camera.stream(shots, keep="all")) as stream:  # type: ignore[type-var]
-        for shot in stream:
-            yield shot
-            if stop.is_set() or (end_s is not None and monotonic() >= end_s):
-                return
+        watch.start()
+        try:
+            for shot in stream:
+                yield shot
+                if stop.is_set() or (end_s is not None and monotonic() >= end_s):
+                    return
+        finally:
+            ended.set()
+            watch.join()
 
 
 def recover(

@@ -7,7 +7,9 @@ from quadfringe.config.cameras import (
     AnyCapture,
     AravisConfig,
     ChipConfig,
+    FilesConfig,
     ReplayConfig,
+    UvcConfig,
     VirtualConfig,
     capture_config,
 )
@@ -21,7 +23,7 @@ from quadfringe.config.decode import (
     Row4,
 )
 from quadfringe.config.devices import IDENTITY, Camera, Device, Pixels, Triple
-from quadfringe.config.projectors import FlashRoute, HdmiRoute, ProjectorConfig, ProjectorsConfig
+from quadfringe.config.projectors import FlashRoute, HdmiProjectorConfig, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.config.scene import Affine, BayerPattern, HeightMapConfig, Matrix4, SceneConfig, Surface
 from quadfringe.config.system import SystemConfig, check_system, load_system
 
@@ -37,9 +39,11 @@ __all__ = [
     "ChipConfig",
     "DecodeConfig",
     "Device",
+    "FilesConfig",
     "Finite",
     "FlashRoute",
     "Fringes",
+    "HdmiProjectorConfig",
     "HdmiRoute",
     "HeightMapConfig",
     "Matrix4",
@@ -58,6 +62,7 @@ __all__ = [
     "Surface",
     "SystemConfig",
     "Triple",
+    "UvcConfig",
     "VirtualConfig",
     "brief",
     "capture_config",

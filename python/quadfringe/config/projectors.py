@@ -7,14 +7,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
-from quadfringe.config._base import Model
+from quadfringe.config._base import Model, NotNegative
 from quadfringe.config.decode import Fringes
+from quadfringe.config.devices import Pixels
 
-__all__ = ["FlashRoute", "HdmiRoute", "ProjectorConfig", "ProjectorsConfig"]
+__all__ = ["AnyProjector", "FlashRoute", "HdmiProjectorConfig", "HdmiRoute", "ProjectorConfig", "ProjectorsConfig"]
 
 Byte = Annotated[int, Field(ge=0, le=255)]
 Drive = tuple[Byte, Byte, Byte]
@@ -41,6 +43,7 @@ class FlashRoute(Model):
 class ProjectorConfig(Model):
     """One LightCrafter 4500: where it is plugged in, and how patterns reach it (`hdmi` or `flash`)."""
 
+    kind: Literal["lightcrafter"] = Field(default="lightcrafter", description="Kind of the projector.")
     port: Annotated[str, Field(pattern=r"^\d{1,3}-\d{1,3}(\.\d{1,3})*$")] = Field(
         description="USB bus and port path, such as 1-2 (`quadfringe projector list`)."
     )
@@ -84,18 +87,81 @@ class ProjectorConfig(Model):
         return self
 
 
-class ProjectorsConfig(Model):
-    """The visible and the infrared projector. Their serial numbers are equal, so the ports tell them apart."""
+class HdmiProjectorConfig(Model):
+    """Any projector that is a screen of the computer. It takes no commands and needs no synchronisation."""
 
-    kind: Literal["lightcrafter"] = Field(default="lightcrafter", description="Kind of the projectors.")
-    visible: ProjectorConfig = Field(description="The projector of red, green and blue.")
-    infrared: ProjectorConfig = Field(description="The projector of infrared light.")
+    kind: Literal["hdmi"] = Field(default="hdmi", description="Kind of the projector.")
+    size_px: tuple[Pixels, Pixels] = Field(
+        description="Native resolution: columns and rows of its mirrors or liquid crystals, from its data sheet. The "
+        "screen must have it, because any other image is scaled."
+    )
+    output: str | None = Field(
+        default=None, description="Name of the screen, as `xrandr` lists it. Absent: the only one of that size."
+    )
+    frame_rate_hz: Annotated[float, Field(ge=1, le=240)] | None = Field(
+        default=None, description="Frame rate in Hz. Absent: that of the screen."
+    )
+    settle_s: NotNegative = Field(
+        default=0.2, description="Time in s after which a new image is on the surface: projectors lag by some frames."
+    )
+    match_exposure: bool = Field(
+        default=False,
+        description="Whether exposures of the camera are changed to the nearest whole number of frames of the "
+        "projector. Otherwise a warning names it.",
+    )
+
+
+def _kind_of(value: Any) -> str | None:
+    kind = value.get("kind", "lightcrafter") if isinstance(value, Mapping) else getattr(value, "kind", None)
+    return f"({kind})" if kind in ("lightcrafter", "hdmi") else None
+
+
+AnyProjector = Annotated[
+    Annotated[ProjectorConfig, Tag("(lightcrafter)")] | Annotated[HdmiProjectorConfig, Tag("(hdmi)")],
+    Discriminator(
+        _kind_of,
+        custom_error_type="projector",
+        custom_error_message='expected a table whose kind is "lightcrafter", the default, or "hdmi"',
+    ),
+]
+
+
+class ProjectorsConfig(Model):
+    """The visible and the infrared projector. LightCrafters have equal serial numbers; the ports tell them apart."""
+
+    kind: Literal["lightcrafter"] | None = Field(
+        default=None, description="Kind of both, as older files state it; now each projector has a kind."
+    )
+    visible: AnyProjector = Field(description="The projector of red, green and blue.")
+    infrared: AnyProjector | None = Field(
+        default=None, description="The projector of infrared light. Absent: there is none, which needs kind hdmi."
+    )
 
     @model_validator(mode="after")
-    def _two_projectors(self) -> ProjectorsConfig:
-        if self.visible.port == self.infrared.port:
-            raise ValueError(f"visible and infrared are both at port {self.visible.port}")
-        windows = [p.hdmi for p in (self.visible, self.infrared) if p.hdmi is not None]
-        if len(windows) == 2 and (windows[0].output is None or windows[0].output == windows[1].output):
+    def _projectors_fit(self) -> ProjectorsConfig:
+        visible, infrared = self.visible, self.infrared
+        if isinstance(visible, HdmiProjectorConfig):
+            if infrared is None:
+                return self
+            if not isinstance(infrared, HdmiProjectorConfig) or infrared.size_px != visible.size_px:
+                raise ValueError("visible is of kind hdmi: expected infrared of the same kind and size, or none")
+            windows = [visible.output, infrared.output]
+        else:
+            if not isinstance(infrared, ProjectorConfig):
+                raise ValueError(
+                    "visible is of kind lightcrafter: expected infrared of the same kind; one projector alone, also a "
+                    'LightCrafter in video mode, is of kind "hdmi"'
+                )
+            if visible.port == infrared.port:
+                raise ValueError(f"visible and infrared are both at port {visible.port}")
+            windows = [p.hdmi.output for p in (visible, infrared) if p.hdmi is not None]
+        if len(windows) == 2 and (windows[0] is None or windows[0] == windows[1]):
             raise ValueError("expected an output for each projector, and two of them")
         return self
+
+    @property
+    def lightcrafters(self) -> tuple[ProjectorConfig, ProjectorConfig] | None:
+        """The settings of both LightCrafters, visible and infrared; None for projectors of kind hdmi."""
+        if isinstance(self.visible, ProjectorConfig) and isinstance(self.infrared, ProjectorConfig):
+            return self.visible, self.infrared
+        return None

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from quadfringe.config._base import Model, checked
 from quadfringe.config._brief import brief
-from quadfringe.config.cameras import AnyCapture, ReplayConfig, VirtualConfig
+from quadfringe.config.cameras import AnyCapture, FilesConfig, ReplayConfig, UvcConfig, VirtualConfig
 from quadfringe.config.decode import DecodeConfig, Fringes
 from quadfringe.config.devices import Camera, Device
 from quadfringe.config.projectors import ProjectorsConfig
@@ -37,7 +37,8 @@ class SystemConfig(Model):
     schema_version: Literal[1] = Field(default=1, description="Version of this format.")
     capture: AnyCapture = Field(
         default=VirtualConfig(),
-        description='The camera: a table with its kind, or a word such as "aravis:NAME". Absent: the virtual bench.',
+        description='The camera: a table with its kind, or a word such as "aravis:NAME" or "uvc:0". Absent: the '
+        "virtual bench.",
     )
     camera: Camera | None = Field(
         default=None, description="Camera of the virtual bench. Absent: the published camera."
@@ -90,6 +91,10 @@ def _with_absolute_paths(config: SystemConfig, folder: Path) -> SystemConfig:
     capture, decode = config.capture, config.decode
     if isinstance(capture, ReplayConfig):
         capture = capture.model_copy(update={"file": folder / capture.file})
+    if isinstance(capture, FilesConfig):
+        capture = capture.model_copy(update={"folder": folder / capture.folder})
+    if isinstance(capture, UvcConfig) and not capture.device.isdigit():
+        capture = capture.model_copy(update={"device": str(folder / capture.device)})
     if isinstance(decode.response, Path):
         decode = decode.model_copy(update={"response": folder / decode.response})
     changed = {"scene": scene, "calibration": calibration, "capture": capture, "decode": decode}

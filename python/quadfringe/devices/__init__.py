@@ -11,6 +11,7 @@ from typing import Literal, Protocol, Self
 from quadfringe.config import Fringes, SystemConfig, check_system
 from quadfringe.config.cameras import capture_config
 from quadfringe.data import AnyShot, Calibration
+from quadfringe.devices._frames import warn_of_part_frames, with_whole_frames
 from quadfringe.devices.light import Light
 from quadfringe.errors import ConfigError
 
@@ -34,6 +35,8 @@ Keep = Literal["latest", "all"]
 CAMERAS = {
     "virtual": "quadfringe.devices.virtual",
     "aravis": "quadfringe.devices.aravis",
+    "files": "quadfringe.devices.files",
+    "uvc": "quadfringe.devices.uvc",
     "replay": "quadfringe.recording.replay",
 }
 
@@ -92,7 +95,9 @@ class CameraStatistics:
 
 
 class Camera(Protocol):
-    """Takes four channels in one exposure: as four images, or as a raw mosaic and an infrared image.
+    """Takes all channels in one exposure: as four images, or as a raw mosaic and an infrared image.
+
+    The infrared image of a camera without an infrared chip is black.
 
     Raises `CameraError` for faults of the camera; the next call after one reconnects. Raises ValueError when closed.
     """
@@ -118,6 +123,9 @@ class Camera(Protocol):
         `keep="latest"` yields the newest shot; `keep="all"` yields them in order from a queue. Both drop and count the
         oldest shot when the shots are not taken in time.
         """
+
+    def interrupt(self) -> None:
+        """End a stream that waits for a shot in another thread; do nothing without a stream."""
 
     def statistics(self) -> CameraStatistics:
         """Return the counts since the camera was opened; safe to call from any thread."""
@@ -167,12 +175,16 @@ def open_devices(config: SystemConfig) -> Devices:
     Raises `ConfigError` for devices that cannot be combined, and OSError when one cannot be opened.
     """
     check_system(config)
+    config = with_whole_frames(config)
     devices: Devices = import_module(CAMERAS[config.capture.kind]).open_devices(config)
+    warn_of_part_frames(devices.config)
     return devices
 
 
 def open_camera(word: str) -> Camera:
-    """Open a camera without a system file: "virtual:", "aravis:NAME", "aravis:" for the only camera, "replay:FILE".
+    """Open a camera without a system file: "virtual:", "aravis:NAME", "uvc:0", "files:FOLDER", "replay:FILE".
+
+    "aravis:" is the only GenICam camera that answers.
 
     >>> from quadfringe.devices import open_camera
     >>> with open_camera("virtual:") as camera:
@@ -192,9 +204,13 @@ def open_projector(config: SystemConfig) -> Projector:
     """
     check_system(config)
     if config.projectors is not None:
+        known = None if config.calibration is None else Calibration.load(config.calibration)
+        if config.projectors.lightcrafters is None:
+            from quadfringe.devices.hdmi import HdmiProjectors
+
+            return HdmiProjectors(config.projectors, known)
         from quadfringe.devices.lightcrafter import ProjectorPair
 
-        known = None if config.calibration is None else Calibration.load(config.calibration)
         return ProjectorPair(config.projectors, known)
     if config.capture.kind != "virtual":
         return ExternalLight()

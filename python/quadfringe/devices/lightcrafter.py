@@ -27,6 +27,7 @@ from quadfringe._core import (
 from quadfringe.config import Fringes, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.data import Calibration
 from quadfringe.devices.light import Light, light_images, predeformation
+from quadfringe.errors import ConfigError
 
 __all__ = [
     "SIZE_PX",
@@ -154,9 +155,12 @@ class ProjectorPair:
 
     def __init__(self, config: ProjectorsConfig, calibration: Calibration | None = None) -> None:
         self._calibration = calibration
+        both = config.lightcrafters
+        if both is None:
+            raise ConfigError("projectors: expected two LightCrafters, got the kind hdmi; open it with open_projector")
         with ExitStack() as opened:
-            self.visible = opened.enter_context(PatternProjector(config.visible, colour=True))
-            self.infrared = opened.enter_context(PatternProjector(config.infrared, colour=False))
+            self.visible = opened.enter_context(PatternProjector(both[0], colour=True))
+            self.infrared = opened.enter_context(PatternProjector(both[1], colour=False))
             self._opened = opened.pop_all()
 
     def __repr__(self) -> str:

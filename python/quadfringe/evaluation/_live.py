@@ -47,6 +47,9 @@ class Carousel:
             self.given += 1
             yield replace(shot, stamp=Stamp(self.given, HOST_CLOCK.now_ns() // 1000, self.name))
 
+    def interrupt(self) -> None:
+        """End nothing: no shot is waited for."""
+
     def statistics(self) -> CameraStatistics:
         """Count the shots that were given."""
         return CameraStatistics(shots=self.given)

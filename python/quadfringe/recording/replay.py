@@ -36,7 +36,7 @@ class ReplayCamera:
         self._recording = recording
         self._next = self._shots = self._dropped = self._damaged = 0
         self._streaming = False
-        self._closed = Event()
+        self._closed, self._interrupted = Event(), Event()
         self.paced = speed == "original"
 
     def __repr__(self) -> str:
@@ -69,13 +69,14 @@ class ReplayCamera:
     def _play(self, count: int | None, may_wait: int) -> Iterator[AnyShot]:
         self._check_free()
         self._streaming = True
+        self._interrupted.clear()
         end = len(self._recording) if count is None else min(len(self._recording), self._next + count)
         due_s = self._due_s()
         due_s += time.monotonic() - (due_s[self._next] if self._next < end else 0.0)
         try:
-            while self._next < end and not self._closed.is_set():
+            while self._next < end and not self._interrupted.is_set():
                 if self.paced and (wait_s := due_s[self._next] - time.monotonic()) > 0:
-                    self._closed.wait(min(wait_s, TIMEOUT_MAX))
+                    self._interrupted.wait(min(wait_s, TIMEOUT_MAX))
                     continue
                 if self.paced:
                     overdue = int(np.searchsorted(due_s[self._next : end], time.monotonic(), side="right"))
@@ -88,6 +89,10 @@ class ReplayCamera:
                     yield shot
         finally:
             self._streaming = False
+
+    def interrupt(self) -> None:
+        """End a stream that waits for the time of its next shot."""
+        self._interrupted.set()
 
     def _due_s(self) -> NDArray[np.float64]:
         """Return the time of every exposure, s; of a shot without a sound stamp, that between its neighbours."""
@@ -128,6 +133,7 @@ class ReplayCamera:
     def close(self) -> None:
         """Close the file; further calls do nothing."""
         self._closed.set()
+        self._interrupted.set()
         self._recording.close()
 
     def __enter__(self) -> Self:
@@ -148,8 +154,10 @@ def open_devices(config: SystemConfig) -> Devices:
         raise ConfigError("projectors: a recording cannot use them; leave them out")
     recording = Recording(config.capture.file)
     recorded = recording.config or SystemConfig()
-    # The recorded paths of projectors and calibration file are void here; the recording contains the calibration.
-    elsewhere = {"calibration": None, "projectors": None}
+    # The recorded paths of projectors and calibration file are void here; the recording contains the calibration. The
+    # size of a projector that was a screen still says how many columns the fringes cover; nothing opens it.
+    screens = recorded.projectors if recorded.projectors is not None and not recorded.projectors.lightcrafters else None
+    elsewhere = {"calibration": None, "projectors": screens}
     said = {name: getattr(config, name) for name in config.model_fields_set}
     merged = recorded.model_copy(update={**elsewhere, **said, "capture": config.capture})
     return Devices(ReplayCamera(recording, config.capture.speed), ExternalLight(), merged)

@@ -16,7 +16,16 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from quadfringe.config import DecodeConfig, ResponseChoice, SystemConfig, brief, check_system, load_system, shortened
+from quadfringe.config import (
+    DecodeConfig,
+    HdmiProjectorConfig,
+    ResponseChoice,
+    SystemConfig,
+    brief,
+    check_system,
+    load_system,
+    shortened,
+)
 from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.plan import calibration_of, stated_response
@@ -63,7 +72,10 @@ class Scanner:
     def projector_width_px(self) -> int:
         """Projector columns that the fringes cover: those of the calibration, else of the system file, else 912."""
         projector = self.config.projector if self.calibration is None else self.calibration.projector
-        return LIGHTCRAFTER_COLUMNS if projector is None else projector.width_px
+        if projector is not None:
+            return projector.width_px
+        visible = None if self.config.projectors is None else self.config.projectors.visible
+        return visible.size_px[0] if isinstance(visible, HdmiProjectorConfig) else LIGHTCRAFTER_COLUMNS
 
     @property
     def response(self) -> ResponseChoice:

@@ -28,7 +28,7 @@ Tap = Callable[[AnyShot], object]
 LENGTH = {"latest": 1, "all": 64}
 TAP_LENGTH = 64
 RATE_WINDOW_S = 2.0
-RETRY_S = 0.5
+RETRY_S, INTERRUPT_S = 0.5, 0.1  # pauses between attempts to reach a camera, and to end its wait for a shot
 FORKED = (
     "the stream measures in the process that opened it, not in this forked one; open the scanner here, in processes "
     'that multiprocessing starts with "spawn"'
@@ -115,8 +115,7 @@ class LiveStream:
     camera for longer, such as a recorder on a slow disk, loses the oldest of them, and `statistics().queues` counts
     those. An error of a tap ends the stream. A camera that makes shots on request (`paced` is False) waits for the
     others, so that no shot is lost. `decode` is called from `at_once` threads; results come in the order of the shots.
-    While `response()` is "auto", shots are decoded one after another, so that the estimate depends on their order
-    alone.
+    While `response()` is "auto", shots are decoded one after another, and their order decides the estimate.
     """
 
     def __init__(
@@ -282,8 +281,9 @@ class LiveStream:
         self._results.end(discard=True)
         self._shots.end(discard=True)
         for thread in self._threads:
-            if thread is not threading.current_thread():
-                thread.join()
+            while thread is not threading.current_thread() and thread.is_alive():
+                self._camera.interrupt()  # again and again: the thread may only now begin to wait for a shot
+                thread.join(INTERRUPT_S)
 
     def __enter__(self) -> Self:
         return self

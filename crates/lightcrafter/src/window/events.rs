@@ -2,7 +2,6 @@
 
 use super::{Output, choose, scaling};
 use crate::error::{Error, Result};
-use crate::sequence::{HEIGHT_PX, WIDTH_PX};
 use softbuffer::{Context, Surface};
 use std::collections::HashMap;
 use std::num::NonZeroU32;
@@ -22,14 +21,13 @@ use winit::window::{Fullscreen, Window, WindowId};
 
 /// Time limit of an order, because a compositor may never give a window its size.
 const PATIENCE: Duration = Duration::from_secs(5);
-const SIZE: PhysicalSize<u32> = PhysicalSize::new(WIDTH_PX as u32, HEIGHT_PX as u32);
 
 type Reply<T> = Sender<Result<T>>;
 
 /// An order to the thread.
 pub enum Order {
     Outputs(Reply<Vec<Output>>),
-    Open { name: Option<String>, reply: Reply<(u64, Output)> },
+    Open { name: Option<String>, size_px: (u32, u32), reply: Reply<(u64, Output)> },
     Show { number: u64, pixels: Vec<u32>, reply: Reply<()> },
     Close { number: u64, reply: Reply<()> },
 }
@@ -78,6 +76,7 @@ fn reason(error: impl std::fmt::Display) -> String {
 struct Pane {
     window: Rc<Window>,
     surface: Surface<OwnedDisplayHandle, Rc<Window>>,
+    size: PhysicalSize<u32>,
     pixels: Vec<u32>,
     waiting: Option<Reply<()>>,
     output: Output,
@@ -112,17 +111,23 @@ fn no_display(error: impl std::fmt::Display) -> Error {
 }
 
 impl Panes {
-    fn open(&mut self, events: &ActiveEventLoop, name: Option<&str>) -> Result<(u64, Output)> {
+    fn open(
+        &mut self,
+        events: &ActiveEventLoop,
+        name: Option<&str>,
+        size_px: (u32, u32),
+    ) -> Result<(u64, Output)> {
         let wayland = events.is_wayland();
         let mut monitors: Vec<MonitorHandle> = events.available_monitors().collect();
         let mut outputs: Vec<Output> = monitors.iter().map(|monitor| output(monitor, wayland)).collect();
-        let chosen = choose(&outputs, name)?;
+        let chosen = choose(&outputs, name, size_px)?;
         let (monitor, output) = (monitors.swap_remove(chosen), outputs.swap_remove(chosen));
+        let size = PhysicalSize::new(size_px.0, size_px.1);
         let mut attributes = Window::default_attributes()
             .with_title(format!("quadfringe pattern on {}", output.name))
             .with_decorations(false)
             .with_resizable(false)
-            .with_inner_size(SIZE)
+            .with_inner_size(size)
             .with_position(monitor.position())
             // On X11 this keeps the window manager from moving, scaling or covering the window.
             .with_override_redirect(true);
@@ -134,8 +139,8 @@ impl Panes {
         let context = Context::new(events.owned_display_handle()).map_err(no_display)?;
         let surface = Surface::new(&context, Rc::clone(&window)).map_err(no_display)?;
         self.last += 1;
-        let pane =
-            Pane { window, surface, pixels: Vec::new(), waiting: None, output: output.clone(), wayland };
+        let (pixels, waiting) = (Vec::new(), None);
+        let pane = Pane { window, surface, size, pixels, waiting, output: output.clone(), wayland };
         self.panes.insert(self.last, pane);
         Ok((self.last, output))
     }
@@ -162,7 +167,7 @@ impl Pane {
     fn paint(&mut self) {
         let size = self.window.inner_size();
         let scaled = self.wayland && self.window.scale_factor() != 1.0;
-        let result = match size == SIZE && !scaled {
+        let result = match size == self.size && !scaled {
             true => self.copy(),
             false if self.waiting.is_some() && self.wayland => return,
             false => Err(self.resized(size)),
@@ -179,7 +184,7 @@ impl Pane {
 
     fn copy(&mut self) -> Result<()> {
         let [width, height] =
-            [SIZE.width, SIZE.height].map(|n| NonZeroU32::new(n).unwrap_or(NonZeroU32::MIN));
+            [self.size.width, self.size.height].map(|n| NonZeroU32::new(n).unwrap_or(NonZeroU32::MIN));
         self.surface.resize(width, height).map_err(no_display)?;
         let mut buffer = self.surface.buffer_mut().map_err(no_display)?;
         buffer.copy_from_slice(&self.pixels);
@@ -202,7 +207,9 @@ impl ApplicationHandler<Order> for Panes {
                 let outputs = events.available_monitors().map(|monitor| output(&monitor, wayland)).collect();
                 drop(reply.send(Ok(outputs)));
             }
-            Order::Open { name, reply } => drop(reply.send(self.open(events, name.as_deref()))),
+            Order::Open { name, size_px, reply } => {
+                drop(reply.send(self.open(events, name.as_deref(), size_px)));
+            }
             Order::Show { number, pixels, reply } => self.show(number, pixels, reply),
             Order::Close { number, reply } => {
                 self.panes.remove(&number);
@@ -216,7 +223,7 @@ impl ApplicationHandler<Order> for Panes {
         match event {
             WindowEvent::CloseRequested | WindowEvent::Destroyed => drop(self.panes.remove(&number)),
             WindowEvent::ScaleFactorChanged { mut inner_size_writer, .. } if !pane.wayland => {
-                let _ = inner_size_writer.request_inner_size(SIZE);
+                let _ = inner_size_writer.request_inner_size(pane.size);
             }
             WindowEvent::Resized(_) | WindowEvent::RedrawRequested if !pane.pixels.is_empty() => pane.paint(),
             _ => {}

@@ -2,7 +2,7 @@
 
 use super::errors::device_error;
 use crate::arrays::expected;
-use lightcrafter::sequence::{HEIGHT_PX, WIDTH_PX};
+use lightcrafter::window::SIZE_PX;
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,15 +13,31 @@ use std::sync::{Mutex, PoisonError};
 pub struct PatternWindow {
     window: Mutex<Option<lightcrafter::window::PatternWindow>>,
     output: String,
+    size_px: (u32, u32),
+    frame_rate_hz: Option<f64>,
 }
 
 #[pymethods]
 impl PatternWindow {
     #[new]
-    #[pyo3(signature = (output = None))]
-    fn new(py: Python<'_>, output: Option<&str>) -> PyResult<Self> {
-        let window = py.detach(|| lightcrafter::window::PatternWindow::open(output)).map_err(device_error)?;
-        Ok(Self { output: window.output().name.clone(), window: Mutex::new(Some(window)) })
+    #[pyo3(signature = (output = None, size_px = None))]
+    fn new(py: Python<'_>, output: Option<&str>, size_px: Option<(u32, u32)>) -> PyResult<Self> {
+        let size_px = size_px.unwrap_or(SIZE_PX);
+        let window = py
+            .detach(|| lightcrafter::window::PatternWindow::open_sized(output, size_px))
+            .map_err(device_error)?;
+        let (name, frame_rate_hz) = (window.output().name.clone(), window.output().frame_rate_hz);
+        Ok(Self { output: name, size_px, frame_rate_hz, window: Mutex::new(Some(window)) })
+    }
+
+    #[getter]
+    fn size_px(&self) -> (u32, u32) {
+        self.size_px
+    }
+
+    #[getter]
+    fn frame_rate_hz(&self) -> Option<f64> {
+        self.frame_rate_hz
     }
 
     #[getter]
@@ -31,9 +47,9 @@ impl PatternWindow {
 
     fn show(&self, py: Python<'_>, image: &Bound<'_, PyAny>) -> PyResult<()> {
         let image = expected::<u8, 3>("image", image)?;
-        if image.shape() != [HEIGHT_PX, WIDTH_PX, 3] {
-            let message =
-                format!("image: expected shape ({HEIGHT_PX}, {WIDTH_PX}, 3), got {:?}", image.shape());
+        let (width, height) = self.size_px;
+        if image.shape() != [height as usize, width as usize, 3] {
+            let message = format!("image: expected shape ({height}, {width}, 3), got {:?}", image.shape());
             return Err(PyValueError::new_err(message));
         }
         let bytes =
@@ -64,12 +80,14 @@ impl PatternWindow {
 /// One output, in the order that `outputs` documents.
 type Row = (String, u32, u32, Option<f64>, Option<String>);
 
-/// Name, width, height, frame rate in Hz, and why the output cannot show a pattern, for every active output.
+/// Name, width, height, frame rate in Hz, and why the output cannot show an image of this size, for every active output.
 #[pyfunction]
-pub fn outputs(py: Python<'_>) -> PyResult<Vec<Row>> {
+#[pyo3(signature = (size_px = None))]
+pub fn outputs(py: Python<'_>, size_px: Option<(u32, u32)>) -> PyResult<Vec<Row>> {
+    let size_px = size_px.unwrap_or(SIZE_PX);
     let outputs = py.detach(lightcrafter::window::outputs).map_err(device_error)?;
     let row = |output: lightcrafter::window::Output| {
-        let unfit = output.unfit();
+        let unfit = output.unfit_for(size_px);
         (output.name, output.size_px.0, output.size_px.1, output.frame_rate_hz, unfit)
     };
     Ok(outputs.into_iter().map(row).collect())

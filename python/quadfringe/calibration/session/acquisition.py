@@ -15,7 +15,7 @@ from quadfringe.calibration.detect import find_target
 from quadfringe.calibration.session.captures import FolderCaptures, light_of, pose_light
 from quadfringe.calibration.session.settings import FILE, STEP_NAMES, Session, step_named
 from quadfringe.config import SystemConfig
-from quadfringe.config.cameras import AravisConfig, ReplayConfig, VirtualConfig
+from quadfringe.config.cameras import AravisConfig, FilesConfig, ReplayConfig, UvcConfig, VirtualConfig
 from quadfringe.data import AnyShot, BayerShot
 from quadfringe.data.shot_files import write_shot
 from quadfringe.decoding import stages
@@ -78,17 +78,25 @@ def exposed(config: SystemConfig, share: float) -> SystemConfig:
         changes["scene"] = config.scene.model_copy(update={"gain": gain})
         # A frame rate gives each shot new noise.
         changes["capture"] = capture.model_copy(update={"frame_rate_hz": capture.frame_rate_hz or 1.0})
+    elif isinstance(capture, FilesConfig):
+        if share != 1:
+            raise ConfigError(
+                "capture: this step changes the exposure, and that of another program cannot be changed; name a camera "
+                "that this program drives, or leave the step out"
+            )
     elif share != 1:
         changes["capture"] = _shorter(capture, share)
     return config.model_copy(update=changes)
 
 
-def _shorter(capture: AravisConfig, share: float) -> AravisConfig:
+def _shorter(capture: AravisConfig | UvcConfig, share: float) -> AravisConfig | UvcConfig:
     def times(exposure_us: float | None) -> float | None:
         return None if exposure_us is None else share * exposure_us
 
-    chips = {name: getattr(capture, name) for name in ("visible", "infrared")}
-    if capture.exposure_us is None and any(chip.exposure_us is None for chip in chips.values()):
+    names = ("visible", "infrared") if isinstance(capture, AravisConfig) else ()
+    chips = {name: getattr(capture, name) for name in names}
+    each = [chip.exposure_us for chip in chips.values()] or [None]
+    if capture.exposure_us is None and None in each:
         raise ConfigError(
             "capture.exposure_us: missing; set it, because a calibration takes some levels at a fraction of the "
             "exposure"

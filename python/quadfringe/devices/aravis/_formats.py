@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,17 +62,30 @@ def _unpacked(data: NDArray[np.uint8], bits: int) -> NDArray[np.uint16]:
     return out
 
 
+def _mosaics() -> Iterator[PixelFormat]:
+    """Give the Bayer formats; the codes of the four orders of the colours follow each other."""
+    orders: tuple[tuple[str, BayerPattern], ...] = (("GR", "grbg"), ("RG", "rggb"), ("GB", "gbrg"), ("BG", "bggr"))
+    depths = (
+        ("8", 0x01080008),
+        ("10", 0x0110000C),
+        ("10Packed", 0x010C0026),
+        ("12", 0x01100010),
+        ("12Packed", 0x010C002A),
+    )
+    for depth, first in depths:
+        packed = depth.endswith("Packed")
+        for number, (order, bayer) in enumerate(orders):
+            bits = int(depth.removesuffix("Packed"))
+            yield PixelFormat(f"Bayer{order}{depth}", first + number, bits, packed=packed, bayer=bayer)
+
+
 _KNOWN = (
     PixelFormat("Mono8", 0x01080001, 8),
     PixelFormat("Mono10", 0x01100003, 10),
     PixelFormat("Mono10Packed", 0x010C0004, 10, packed=True),
     PixelFormat("Mono12", 0x01100005, 12),
     PixelFormat("Mono12Packed", 0x010C0006, 12, packed=True),
-    PixelFormat("BayerRG8", 0x01080009, 8, bayer="rggb"),
-    PixelFormat("BayerRG10", 0x0110000D, 10, bayer="rggb"),
-    PixelFormat("BayerRG10Packed", 0x010C0027, 10, packed=True, bayer="rggb"),
-    PixelFormat("BayerRG12", 0x01100011, 12, bayer="rggb"),
-    PixelFormat("BayerRG12Packed", 0x010C002B, 12, packed=True, bayer="rggb"),
+    *_mosaics(),
     PixelFormat("RGB8", 0x02180014, 8, colours=3),
 )
 FORMATS = {known.name: known for known in _KNOWN}

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import threading
 import time
+import warnings
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
-from quadfringe.config.cameras import AravisConfig
-from quadfringe.data import AnyShot, BayerShot, ChipImage, FrameStamp, Shot, Stamp
+from quadfringe.config.cameras import AravisConfig, ChipConfig
+from quadfringe.data import AnyShot, ChipImage, FrameStamp, Stamp
 from quadfringe.data.host_clock import HOST_CLOCK
+from quadfringe.devices._shots import shot_of, split_colours
 from quadfringe.devices.aravis import _profiles as profiles
 from quadfringe.devices.aravis._device import Device, TooLarge, found
 from quadfringe.devices.aravis._formats import format_named
 from quadfringe.devices.aravis._frame_matching import FrameMatcher, SingleChip, Stamped
 from quadfringe.devices.aravis._profiles import CHIPS, Place
 from quadfringe.devices.aravis._reader import Agreed, ChipReader, Frame
-from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError
+from quadfringe.errors import CameraBusyError, CameraError, CameraLostError, CameraNotFoundError, CameraWarning
 
 __all__ = ["Link"]
 
@@ -31,11 +31,13 @@ class Link:
     """The connection to one or both chips of a camera; raises `CameraError`, and then closes what it opened.
 
     `patience_s` is how long a busy or missing camera is retried: after a loss, the camera may be booting, or holds the
-    previous connection until its heartbeat expires after 3 s.
+    previous connection until its heartbeat expires after 3 s. With `shots`, frames become shots, otherwise those of one
+    chip become images of it; a camera that turns out to have one chip then has that one in `chips`.
     """
 
-    def __init__(self, config: AravisConfig, chips: Sequence[str], *, patience_s: float) -> None:
+    def __init__(self, config: AravisConfig, chips: Sequence[str], *, patience_s: float, shots: bool = True) -> None:
         self.chips = chips
+        self._shots = shots
         self.readers: list[ChipReader] = []
         self._devices: dict[str, Device] = {}
         self._running = False
@@ -43,7 +45,7 @@ class Link:
             undo.callback(self.forget)
             self.places = _patiently(lambda: self._open_devices(config), patience_s)
             self.config = self._set_up(config)
-            both = len(chips) == len(CHIPS)
+            both = len(self.chips) == len(CHIPS)
             self.matcher: FrameMatcher[Frame] | SingleChip[Frame] = (
                 FrameMatcher(1000 * config.pair_tolerance_us) if both else SingleChip()
             )
@@ -64,7 +66,15 @@ class Link:
                     "killed "
                     "one after 3 s)"
                 )
+        if self._has_one_chip(config, found_at):
+            self.chips, found_at = CHIPS[:1], found_at[:1]
         return tuple(profiles.introduced(place, self._devices[place.where], config.profile) for place in found_at)
+
+    def _has_one_chip(self, config: AravisConfig, found_at: Sequence[Place]) -> bool:
+        """Say whether a camera of which two chips were looked for has one."""
+        if len(found_at) != len(CHIPS) or config.chips is not None or config.infrared != ChipConfig():
+            return False
+        return found_at[0].where == found_at[1].where and self._devices[found_at[0].where].channels() == 1
 
     def device(self, chip: int) -> Device:
         """Return the device of a chip."""
@@ -87,8 +97,9 @@ class Link:
             accepted[chip] = profiles.set_chip(self.device(n), place, settings[chip], config.exposure_us)
             agreed.append(_agreed(self.device(n)))
             accepted[chip]["pixel_format"] = agreed[n].format.name
-        if len(agreed) == len(CHIPS):
+        if self._shots:
             _check(*agreed)
+            self._fix_colours(config)
         for where, device in self._devices.items():
             profiles.set_trigger(device, next(place for place in self.places if place.where == where), config)
         exposures_us = [float(chip.get("exposure_us", 0.0)) for chip in accepted.values()]
@@ -98,13 +109,24 @@ class Link:
             if place.stream >= device.channels():
                 raise CameraError(
                     f"camera at {place.where} has {device.channels()} stream channel(s), but the {self.chips[n]} chip "
-                    f"needs number {place.stream}, counted from 0; for a camera with one chip use `ChipCamera` or "
-                    "quadfringe camera snap --chip visible"
+                    f"needs number {place.stream}, counted from 0; for a camera with one colour chip leave "
+                    "infrared out, for one chip alone use `ChipCamera` or quadfringe camera snap --chip visible"
                 )
             device.set_packets(place.stream, config.packet_size, config.packet_delay_ns)
             stream = device.stream(place.stream, agreed[n].payload, config.buffers, self.period_us)
             self.readers.append(ChipReader(stream, agreed[n]))
-        return profiles.resolved(config, accepted)
+        resolved = profiles.resolved(config, accepted)
+        return resolved.model_copy(update={"chips": 1}) if self._shots and len(agreed) == 1 else resolved
+
+    def _fix_colours(self, config: AravisConfig) -> None:
+        """Switch automatic functions of a camera with one chip off; warn of those that stay on."""
+        if len(self.chips) == len(CHIPS):
+            return
+        for name in profiles.fix_colours(self.device(0), config.features):
+            words = (
+                f"camera at {self.places[0].where}: {name} stays on, so that colours change or are bent; switch it off"
+            )
+            warnings.warn(f"{words} with the program of the camera", CameraWarning, stacklevel=2)
 
     def start(self, deliver: Callable[[Any], None], *, borrow: bool) -> None:
         """Start a run: the readers first, then the chips; the chip that triggers the other starts last."""
@@ -131,13 +153,12 @@ class Link:
         stamp = Stamp(first.number, time_us, self.name, stamps)
         kind = self.readers[0].agreed.format
         pixels = first.item.pixels
-        if len(frames) == 1:
+        if not self._shots:
             return ChipImage(pixels, kind.name, kind.full_scale, kind.bayer, stamp)
-        ir = frames[1].item.pixels
-        if kind.bayer is not None:
-            return BayerShot(pixels, kind.bayer, ir, kind.full_scale, stamp=stamp)
-        red, green, blue = (np.ascontiguousarray(pixels[:, :, n]) for n in range(3))
-        return Shot(red, green, blue, ir, kind.full_scale, stamp=stamp)
+        images = {"raw": pixels} if kind.bayer is not None else split_colours(pixels)
+        if len(frames) == len(CHIPS):
+            images["ir"] = frames[1].item.pixels
+        return shot_of(images, kind.full_scale, bayer=kind.bayer, stamp=stamp)
 
     @property
     def name(self) -> str:
@@ -213,11 +234,13 @@ def _agreed(device: Device) -> Agreed:
     return Agreed(format_named(device.get("PixelFormat")), int(device.get("Width")), int(device.get("Height")))
 
 
-def _check(visible: Agreed, infrared: Agreed) -> None:
+def _check(visible: Agreed, infrared: Agreed | None = None) -> None:
     if visible.format.bayer is None and visible.format.colours != 3:
         raise CameraError(
             f"visible chip: expected a colour format, got {visible.format.name}; set a Bayer format or RGB8"
         )
+    if infrared is None:
+        return
     if infrared.format.bayer is not None or infrared.format.colours != 1:
         raise CameraError(f"infrared chip: expected a monochrome format, got {infrared.format.name}; set a Mono format")
     if visible.format.bits != infrared.format.bits:

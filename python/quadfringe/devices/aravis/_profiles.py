@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +16,7 @@ __all__ = [
     "CHIPS",
     "Place",
     "exposure_steps",
+    "fix_colours",
     "introduced",
     "matching",
     "period_us",
@@ -33,6 +35,13 @@ JAI_EXPOSURES = ("JAIExposureTimeRaw", "ExposureTimeRaw")
 EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
 GAINS = ("Gain", "GainRaw")
 RATES = ("AcquisitionFrameRate", "AcquisitionFrameRateAbs")
+# What changes the colours of an ordinary colour camera by itself, or bends them, and its value when it is off.
+FIXED: dict[str, str | bool] = {
+    "ExposureAuto": "Off",
+    "GainAuto": "Off",
+    "BalanceWhiteAuto": "Off",
+    "GammaEnable": False,
+}
 SOFTWARE_TRIGGERS = ("SoftwareTrigger0", "TriggerSoftware")
 IP = re.compile(r"\d+\.\d+\.\d+\.\d+")
 
@@ -206,6 +215,19 @@ def set_chip(device: Device, place: Place, chip: ChipConfig, exposure_us: float 
     elif chip.gain is not None:
         raise CameraError(f"camera at {place.where} has none of {', '.join(GAINS)}; set the gain under `features`")
     return accepted
+
+
+def fix_colours(device: Device, features: Mapping[str, Any]) -> list[str]:
+    """Switch automatic functions and gamma off, except those that `features` states; name those that stay on."""
+    stay = []
+    for name, off in FIXED.items():
+        if name in features or not device.has(name) or device.get(name) == off:
+            continue
+        with suppress(CameraError):
+            device.set(name, off)
+        if device.get(name) != off:
+            stay.append(name)
+    return stay
 
 
 def set_trigger(device: Device, place: Place, config: AravisConfig) -> None:

@@ -36,29 +36,42 @@ class _Running(Generic[Item]):
 
     paced = True
 
-    def __init__(self, config: AravisConfig | None, chips: tuple[str, ...]) -> None:
+    def __init__(self, config: AravisConfig | None, chips: tuple[str, ...], *, shots: bool) -> None:
         self._asked_for = config or AravisConfig()
-        self._chip_names = chips
-        self._link: Link | None = Link(self._asked_for, chips, patience_s=FIRST_PATIENCE_S)
+        self._shots = shots
+        self._link: Link | None = Link(self._asked_for, chips, patience_s=FIRST_PATIENCE_S, shots=shots)
+        self._chip_names = self._link.chips
         self.config = self._link.config
         self.name = self._link.name
         self._in_use = threading.Lock()
-        self._closed = False
+        self._closed = self._interrupted = False
         self._last_id = 0
         self._queue: DroppingQueue[Item] = DroppingQueue(1)
         self._earlier = (0, 0)  # delivered and dropped shots of earlier runs
-        self._before = {chip: ChipStatistics() for chip in chips}  # of lost connections
+        self._before = {chip: ChipStatistics() for chip in self._chip_names}  # of lost connections
 
     def snap(self, timeout_s: float | None = None, *, borrow: bool = False) -> Item:
         """Take one shot that is exposed after this call; raises a `CameraError` when none arrives in time."""
+        self._interrupted = False
         with self._run("all", borrow) as (link, queue):  # the first shot and no later one
-            return self._next(link, queue, timeout_s)
+            shot = self._next(link, queue, timeout_s)
+        if shot is None:
+            raise ShotTimeoutError(f"camera at {self.name}: interrupted before a shot came; call again")
+        return shot
 
     def stream(self, count: int | None = None, *, keep: Keep = "latest", borrow: bool = False) -> Iterator[Item]:
         """Yield `count` shots, or until the iterator is closed; raises `CameraError` when none arrives in time."""
+        self._interrupted = False
         with self._run(keep, borrow) as (link, queue):
             for _ in numbers() if count is None else range(count):
-                yield self._next(link, queue, None)
+                shot = None if self._interrupted else self._next(link, queue, None)
+                if shot is None:
+                    return
+                yield shot
+
+    def interrupt(self) -> None:
+        """End a stream that waits for a shot in another thread; do nothing without a stream."""
+        self._interrupted = True
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.name})"
@@ -93,7 +106,7 @@ class _Running(Generic[Item]):
         if self._closed:
             raise ValueError(f"camera at {self.name} is closed")
         if self._link is None:
-            self._link = Link(self._asked_for, self._chip_names, patience_s=AGAIN_PATIENCE_S)
+            self._link = Link(self._asked_for, self._chip_names, patience_s=AGAIN_PATIENCE_S, shots=self._shots)
         return self._link
 
     def _disconnect(self, *, lost: bool = False) -> None:
@@ -102,7 +115,8 @@ class _Running(Generic[Item]):
             self._link.forget(lost=lost)
             self._link = None
 
-    def _next(self, link: Link, queue: DroppingQueue[Item], timeout_s: float | None) -> Item:
+    def _next(self, link: Link, queue: DroppingQueue[Item], timeout_s: float | None) -> Item | None:
+        """Wait for a shot; None after an interruption."""
         timeout_s = link.config.timeout_s if timeout_s is None else timeout_s
         before = self._chips()
         if link.config.trigger == "software":
@@ -113,6 +127,8 @@ class _Running(Generic[Item]):
             try:
                 shot = queue.get(min(max(left_s, 0.0), LOOK_S))
             except TimeoutError:
+                if self._interrupted:
+                    return None
                 if self._closed:
                     raise ValueError(f"camera at {self.name} was closed during a wait for a shot") from None
                 _check_connected(link, SILENT_S)
@@ -187,7 +203,7 @@ class _Running(Generic[Item]):
 
 
 class AravisCamera(_Running[AnyShot]):
-    """A GenICam camera with two chips; close it, or use it in a `with` block.
+    """A GenICam camera with two chips, or with one colour chip; close it, or use it in a `with` block.
 
     Shots hold copies of the pixels. With `borrow` (of `snap` and `stream`), shots in unpacked formats are read-only
     views of the receive buffers; a buffer returns to the stream when its last array is dropped, so keeping many such
@@ -196,7 +212,8 @@ class AravisCamera(_Running[AnyShot]):
     """
 
     def __init__(self, config: AravisConfig | None = None) -> None:
-        super().__init__(config, CHIPS)
+        one = config is not None and config.chips == 1
+        super().__init__(config, CHIPS[:1] if one else CHIPS, shots=True)
 
     @property
     def calibration(self) -> Calibration | None:
@@ -218,7 +235,7 @@ class ChipCamera(_Running[ChipImage]):
     """
 
     def __init__(self, config: AravisConfig | None = None, chip: Literal["visible", "infrared"] = "visible") -> None:
-        super().__init__(config, (chip,))
+        super().__init__(config, (chip,), shots=False)
 
 
 def _check_connected(link: Link, silent_s: float) -> None:

@@ -58,7 +58,7 @@ class VirtualCamera:
         self._bench = bench
         self._rate_hz = (settings or VirtualConfig()).frame_rate_hz
         self._exposures = 0
-        self._closed = False
+        self._closed = self._interrupted = False
 
     def __repr__(self) -> str:
         width, height = self._bench.camera_size_px
@@ -82,9 +82,16 @@ class VirtualCamera:
     def stream(self, count: int | None = None, *, keep: Keep = "latest") -> Iterator[AnyShot]:  # noqa: ARG002
         """Render one shot after the other."""
         self._check_open()
+        self._interrupted = False
         with HOST_CLOCK.held():
             for _ in numbers() if count is None else range(count):
+                if self._interrupted:
+                    return
                 yield self._expose()
+
+    def interrupt(self) -> None:
+        """End a stream before its next shot."""
+        self._interrupted = True
 
     def _expose(self) -> AnyShot:
         self._check_open()
