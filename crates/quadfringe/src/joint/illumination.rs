@@ -30,6 +30,8 @@ pub(super) struct LitMask {
     pub noise: f32,
     /// Least range of fringes, in linear light.
     pub range_min: f32,
+    /// Whether the infrared light comes from a projector that may light where the visible one does not.
+    visible_alone: bool,
 }
 
 /// Rows of one task.
@@ -50,6 +52,11 @@ struct LevelRows<'a> {
 }
 
 impl LitMask {
+    /// From now on, only R, G and B decide which pixels are lit.
+    pub fn see_visible_light_alone(&mut self) {
+        self.visible_alone = true;
+    }
+
     /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`.
     pub fn find(
         &mut self,
@@ -95,7 +102,12 @@ impl LitMask {
         for (y, out) in high.clone().zip(heights.chunks_exact_mut(stride)) {
             let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
             let light = light.map(|plane| &plane[y * stride..][..stride]);
-            self::heights(&LevelRows::new(maps), light, self.noise * self.noise, out);
+            let (levels, variance) = (LevelRows::new(maps), self.noise * self.noise);
+            if self.visible_alone {
+                self::heights::<3>(&levels, light, variance, out);
+            } else {
+                self::heights::<4>(&levels, light, variance, out);
+            }
         }
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {
@@ -225,16 +237,16 @@ fn add_light(inside: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
     }
 }
 
-/// Sum over the four channels of the squared height above the bottom, in units of the range, minus the variance of the
+/// Sum over the first channels of the squared height above the bottom, in units of the range, minus the variance of the
 /// noise.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn heights(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mut [f32]) {
+fn heights<const CHANNELS: usize>(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mut [f32]) {
     let (bottom, precision, light) =
         (levels.bottom.map(lanes), levels.precision.map(lanes), light.map(lanes));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
         let (bottom, precision, light) = (take(&bottom, i), take(&precision, i), take(&light, i));
         let mut sum = [0.0; LANES];
-        for c in 0..4 {
+        for c in 0..CHANNELS {
             for x in 0..LANES {
                 let height = light[c][x] - bottom[c][x];
                 sum[x] += (height * height - noise_variance) * precision[c][x];

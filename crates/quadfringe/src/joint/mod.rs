@@ -26,6 +26,7 @@ mod coarse;
 mod disjoint;
 mod energy;
 mod illumination;
+mod infrared;
 mod light;
 mod local_fit;
 mod memory;

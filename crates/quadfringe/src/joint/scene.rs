@@ -1,6 +1,7 @@
 //! Input of the steps of the joint method: four planes of light, the mask of usable pixels, and a grid of cells.
 
 use super::cells::Grid;
+use super::infrared::PairPhase;
 use super::params::pyramid::MOSAIC_REACH_PX;
 use crate::Reason;
 
@@ -51,6 +52,8 @@ pub(super) struct Scene<'a> {
     pub period_px: f64,
     /// Number of camera pixels along a side of a pixel, which is a mean of camera pixels.
     pub factor: usize,
+    /// The infrared phase of a calibrated pair; `None` for coaxial projectors.
+    pub pair: Option<&'a PairPhase>,
 }
 
 /// What is known about the pixels of a shot, in padded rows.

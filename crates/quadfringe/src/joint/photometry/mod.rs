@@ -14,6 +14,7 @@ mod solve;
 mod tests;
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
+use super::infrared::with_waves;
 use super::local_fit::LocalFit;
 use super::model::{CellFringes, FringeRows, contrast};
 use super::params::photometry::{CELL, NEIGHBOURHOOD, OTHER_TEXTURE_MIN, OTHER_TEXTURE_NOISES, WINDOW};
@@ -159,7 +160,9 @@ impl Photometry {
                 let [phase, modulation] = [phase, modulation].map(|plane| scene.row(plane, y));
                 let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
                 let limits = [4.0 * misfit_max * misfit_max, phase_trust];
-                add_projected(model, pixels, scene.rows(y), ratios, limits, sums);
+                with_waves!(scene, y, ratios, |waves| {
+                    add_projected(model, pixels, scene.rows(y), waves, limits, sums);
+                });
             },
             |row, sums, out| {
                 let before: [&[f32]; 8] = std::array::from_fn(|k| maps.line(row, k));

@@ -5,6 +5,7 @@
 
 use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
+use crate::joint::infrared::{Coaxial, Gathered, Waves};
 use crate::joint::model::{CellFringes, carriers};
 use crate::joint::neighbours::around;
 use crate::joint::params::phase::ALBEDO_MIN;
@@ -200,12 +201,14 @@ impl CoarseRow<'_> {
         for vector in 0..(side * side).div_ceil(LANES) {
             let (mut light, mut lit) = ([[0.0; LANES]; 4], [0.0; LANES]);
             let [mut place_x, mut place_y] = [[0.0; LANES]; 2];
+            let mut gathered = Gathered::default();
             for k in 0..LANES.min(side * side - vector * LANES) {
                 let i = vector * LANES + k;
                 let x = (first_x + i % side).saturating_sub(1).min(grid.width - 1);
                 let y = (first_y + i / side).saturating_sub(1).min(grid.height - 1);
                 let at = y * grid.stride + x;
                 lit[k] = mask[at];
+                fine.pair.into_iter().for_each(|pair| gathered.set(k, pair, at));
                 light.iter_mut().zip(fine.light).for_each(|(light, plane)| light[k] = plane[at]);
                 (place_x[k], place_y[k]) = (x as f32 - first_x as f32, y as f32 - first_y as f32);
             }
@@ -216,7 +219,13 @@ impl CoarseRow<'_> {
                 }
                 let pixels = Pixels { phase, lit, light: &light, modulation: surface.modulation };
                 let squared_residual = &mut around.squared_residuals[vector][k];
-                explain(&pixels, &fringes, ratios, squared_residual, &mut around.corrections[vector][k]);
+                let correction = &mut around.corrections[vector][k];
+                match fine.pair {
+                    None => explain(&pixels, &fringes, Coaxial { ratios }, squared_residual, correction),
+                    Some(_) => {
+                        explain(&pixels, &fringes, gathered.waves(ratios), squared_residual, correction)
+                    }
+                }
             }
         }
     }
@@ -252,16 +261,18 @@ struct Pixels<'a> {
 /// Fits the albedo and a small correction of the phase to the intensities of lit pixels; gives the squared residual and
 /// the correction.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn explain(
+fn explain<W: Waves>(
     pixels: &Pixels,
     fringes: &CellFringes,
-    ratios: [f32; 3],
+    waves: W,
     squared_residuals: &mut Lanes,
     corrections: &mut Lanes,
 ) {
     let most = SQUARED_MISFIT_MAX * pixels.modulation * pixels.modulation;
+    let (ratios, vector) = (waves.ratios(), waves.vector(0));
     for x in 0..LANES {
-        let carriers = carriers(pixels.phase[x], ratios, 0.0);
+        let infrared = waves.infrared(vector, x, pixels.phase[x]);
+        let carriers = carriers(pixels.phase[x], ratios, infrared, 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {
