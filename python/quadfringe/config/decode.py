@@ -159,8 +159,8 @@ class DecodeConfig(Model):
     )
     unwrapping: Literal["coaxial", "pair"] | None = Field(
         default=None,
-        description='"coaxial" (default) takes the infrared projector as coaxial with the visible one; "pair" knows the '
-        "infrared fringes along every camera ray from the calibration of both projectors, which may stand anywhere.",
+        description='"coaxial" (default) takes the infrared projector as coaxial with the visible one; "pair" knows '
+        "the infrared fringes along every camera ray from the calibration of both projectors, which may stand apart.",
     )
     depth_range_mm: tuple[Finite, Finite] | None = Field(
         default=None,

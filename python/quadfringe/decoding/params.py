@@ -152,3 +152,10 @@ MEDIAN_OF_NORMAL = 0.6745
 CONTRADICTED_SHARE = 0.5
 # Peak memory of a reference measurement beyond its images, bytes per pixel: its maps. Not measured with other inputs.
 STEP_BYTES_PER_PX = 60
+
+# --- A pair of projectors that stand apart
+
+# Ambiguity margin of the fringe numbers along a camera ray, rad, below which a pair is warned of. 36, 35, 30 of coaxial
+# projectors have 1.05; an infrared projector 50 mm farther from the camera than the visible one makes it 0.3, and 0.6 %
+# of steps get a wrong order, in place of 0.05 % with 24 infrared fringes (`python evaluation/pair.py --only steps`).
+PAIR_MARGIN_RAD = 0.6

@@ -60,7 +60,13 @@ impl Agreement {
                 // Offsets and amplitudes of the place of each pixel: those that it has chosen among many were chosen to agree.
                 let fringes = photometry.sample_in_place(scene, y, maps);
                 let pixels = scene.pixel_row(map, y);
-                with_waves!(scene, y, ratios, |waves| add_pairs(&fringes, &pixels, scene.rows(y), waves, sums));
+                with_waves!(scene, y, ratios, |waves| add_pairs(
+                    &fringes,
+                    &pixels,
+                    scene.rows(y),
+                    waves,
+                    sums
+                ));
             },
             |_, [numerator, information, other_numerator, other_information], out| {
                 let pair = Pair { numerator, information };

@@ -11,6 +11,7 @@ use super::photometry::{Photometry, PhotometryFit};
 use super::pyramid::Level;
 use super::residuals::Residuals;
 use super::scene::{PhaseMap, ScaledGrid, Scene, Scratch};
+use super::shadows::Shadows;
 use super::slopes::Slopes;
 use super::smooth::mark_discontinuities;
 use super::window::Window;
@@ -42,6 +43,7 @@ pub(super) struct CoarseLevel {
     pub photometry: Photometry,
     pub phase_fit: PhaseFit,
     pub residuals: Residuals,
+    pub shadows: Shadows,
 }
 
 impl CoarseLevel {
@@ -62,6 +64,7 @@ impl CoarseLevel {
             photometry: Photometry::new(),
             phase_fit: PhaseFit::default(),
             residuals: Residuals::default(),
+            shadows: Shadows::default(),
         }
     }
 

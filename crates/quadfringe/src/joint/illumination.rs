@@ -240,7 +240,12 @@ fn add_light(inside: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
 /// Sum over the first channels of the squared height above the bottom, in units of the range, minus the variance of the
 /// noise.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn heights<const CHANNELS: usize>(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mut [f32]) {
+fn heights<const CHANNELS: usize>(
+    levels: &LevelRows,
+    light: [&[f32]; 4],
+    noise_variance: f32,
+    out: &mut [f32],
+) {
     let (bottom, precision, light) =
         (levels.bottom.map(lanes), levels.precision.map(lanes), light.map(lanes));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {

@@ -119,7 +119,8 @@ impl PairPhase {
         let first = order.unwrap_or(0);
         for y in (first..rows).chain((0..first).rev()) {
             let terms = table.row(y).infrared;
-            let known: Vec<usize> = (0..columns).filter(|x| terms.iter().all(|line| line[*x].is_finite())).collect();
+            let known: Vec<usize> =
+                (0..columns).filter(|x| terms.iter().all(|line| line[*x].is_finite())).collect();
             for (plane, line) in planes.iter_mut().zip(terms) {
                 if known.is_empty() {
                     let from = if y > first { y - 1 } else { (y + 1).min(rows - 1) };
@@ -141,7 +142,10 @@ impl PairPhase {
 
     /// The waves of row `y`.
     pub fn row(&self, grid: &Grid, y: usize, ratios: [f32; 3]) -> Pair<'_> {
-        Pair { ratios, terms: self.planes.each_ref().map(|plane| lanes(&plane[y * grid.stride..][..grid.stride])) }
+        Pair {
+            ratios,
+            terms: self.planes.each_ref().map(|plane| lanes(&plane[y * grid.stride..][..grid.stride])),
+        }
     }
 
     /// Row `y` of the coefficients.

@@ -43,6 +43,7 @@ mod pyramid;
 mod reasons;
 mod residuals;
 mod scene;
+mod shadows;
 mod slopes;
 mod smooth;
 mod uncertainty;
@@ -56,7 +57,7 @@ use crate::decode::output::{Decoded, Finish};
 use crate::encoding::FourChannel;
 use crate::parallel::lanes::LANES;
 use agreement::Agreement;
-use albedo::{Albedo, Known};
+use albedo::Albedo;
 use cells::{Grid, RowMaps};
 use coarse::CoarseLevel;
 use energy::{Energy, Prior};
@@ -174,11 +175,14 @@ impl Joint {
         coarse.fit_fringes(&scene, &level.lit, options.modulation_min);
         // 4. Fringe orders (S4).
         coarse.choose_orders(&scene, *ratios);
+        self.leave_out_coarse_shadows(frame);
         // 5. and 6. Photometry and phase from all four channels, alternating.
-        coarse.refine(&scene, *ratios, moving, memory.scratch.lend());
-        pyramid.restore(frame);
+        let (scene, ratios) = (self.pyramid.coarse.scene(frame.coarse), self.ratios);
+        self.coarse.refine(&scene, ratios, moving, memory.scratch.lend());
+        self.pyramid.restore(frame);
         // 6. Phase at full resolution.
         self.upsample(frame, memory);
+        self.leave_out_shadows(frame);
         self.fit_phase(frame, memory);
     }
 
@@ -284,18 +288,5 @@ impl Joint {
                 finish.row(y, &mut row);
             },
         );
-    }
-
-    /// Steps 11 and 12, on the maps that step 10 has written.
-    fn complete(&mut self, frame: &Frame<'_>, out: &mut Decoded) {
-        let maps = [&mut out.wrong_order_probability, &mut out.quality];
-        let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
-        let Self { pixels: Pixels { phase, .. }, validity, ratios, coarse, .. } = self;
-        self.propagation.run(frame.full.grid, phase, &validity.components, wrong_order, quality);
-        if let Some(albedo) = &mut out.albedo {
-            let known = Known { phase, valid: &validity.valid, ratios: *ratios, noise: coarse.noise };
-            let (scene, out) = (self.pyramid.full.scene(frame.full), albedo.as_slice_mut());
-            self.albedo.write(&scene, &self.energy, known, out.expect("checked layout"));
-        }
     }
 }

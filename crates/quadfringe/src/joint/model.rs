@@ -59,7 +59,10 @@ pub(super) fn carriers(phase: f32, [_, second, third]: [f32; 3], infrared: Wave,
     let (s_ir, c_ir) = sin_cos(infrared.phase);
     let kept = [1.0, second * second, 1.0, third * third].map(|square| contrast(loss * square));
     let scale = |values: [f32; 4]| [0, 1, 2, 3].map(|k| kept[k] * values[k]);
-    Carriers { cosine: scale([c, c_g, -s, c_ir]), derivative: scale([-s, -second * s_g, -c, -infrared.slope * s_ir]) }
+    Carriers {
+        cosine: scale([c, c_g, -s, c_ir]),
+        derivative: scale([-s, -second * s_g, -c, -infrared.slope * s_ir]),
+    }
 }
 
 /// Share of the contrast that remains after averaging pixels (J1): the expansion to second order in `loss` for a mean over a

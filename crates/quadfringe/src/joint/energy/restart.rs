@@ -143,7 +143,9 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
 /// energies are sums over the scales that either start has found, so that neither is preferred.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    let Tile { light, usable, inside, ratios, pair, infrared, scales: found, unknown, first, product, .. } = tile;
+    let Tile {
+        light, usable, inside, ratios, pair, infrared, scales: found, unknown, first, product, ..
+    } = tile;
     let given = Given { light, usable, inside, ratios: *ratios, pair: *pair, infrared };
     let [gain, around, spare, ..] = product.planes_mut();
     gain.clear();

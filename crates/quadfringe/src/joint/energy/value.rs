@@ -29,13 +29,7 @@ pub(super) fn add_energy(sign: f32, given: &Given<'_>, unknown: &Fields, scales:
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn add<const PAIR: bool>(
-    sign: f32,
-    given: &Given<'_>,
-    unknown: &Fields,
-    scales: &Scales,
-    out: &mut Plane,
-) {
+fn add<const PAIR: bool>(sign: f32, given: &Given<'_>, unknown: &Fields, scales: &Scales, out: &mut Plane) {
     let inside = given.inside;
     for at in vectors() {
         let here = Column::of(unknown, at);

@@ -168,7 +168,8 @@ mod tests {
     #[test]
     fn the_jump_price_scales_with_the_period_between_its_bounds() {
         let grid = Grid::new([96, 256], 4.0);
-        let scene = |period_px| Scene { light: [&[]; 4], usable: &[], grid: &grid, period_px, factor: 1, pair: None };
+        let scene =
+            |period_px| Scene { light: [&[]; 4], usable: &[], grid: &grid, period_px, factor: 1, pair: None };
         let prices = [1.0, 16.0, 32.0, 1000.0].map(|period_px| jump_nodes(&scene(period_px)));
         assert_eq!(prices, [JUMP_NODES_MIN, 5.0, 10.0, JUMP_NODES_MAX]);
     }

@@ -1,0 +1,15 @@
+//! Step 6: pixels of a pair that the infrared projector does not light.
+
+/// Least share of the expected infrared fringes that a lit pixel and its neighbours show. Larger: prints that are dark in infrared
+/// alone become holes. Smaller: pixels at the border of a shadow keep a phase that the missing light has bent. `python
+/// evaluation/pair.py --only steps`
+pub const SHARE_MIN: f32 = 0.3;
+
+/// Least sum of the expected fringes over nine pixels that allows a verdict, in standard deviations of an intensity. Larger: less is
+/// seen of shadows on dark fringes. Smaller: noise makes holes. Lit pixels fail at seven tenths of it, a third of which is one
+/// standard deviation of the sum of nine.
+pub const FRINGE_NOISES: f32 = 20.0;
+
+/// Number of pixels around a pixel in shadow that are left out too. Larger: wider holes. Smaller: mixed light and dark fringes
+/// remain. `python evaluation/pair.py --only steps`
+pub const REACH_PX: usize = 2;
