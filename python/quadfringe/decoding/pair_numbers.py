@@ -60,9 +60,12 @@ def infrared_along_rays(calibration: Calibration, depth_mm: float) -> float:
 
 
 def order_margin_rad(numbers: tuple[float, float, float]) -> float:
-    """Give the least distance between the phases of two orders, rad, as the ambiguity margin of an encoding."""
+    """Give the least distance between the phases of two orders, rad, as the ambiguity margin of an encoding.
+
+    Orders that are more than half of the field apart lie at depths that no scene has side by side.
+    """
     first, second, third = numbers
-    orders = np.arange(1, int(np.ceil(first)))
+    orders = np.arange(1, max(2, int(first / 2)))
     turns = np.stack([orders * second / first, orders * third / first])
     return float(np.hypot(*(2 * np.pi * (turns - np.round(turns)))).min(initial=np.pi))
 

@@ -6,7 +6,7 @@ use super::cells::Grid;
 use super::model::Wave;
 use super::scene::Scene;
 use crate::height::PairTable;
-use crate::parallel::lanes::{LANES, Lanes, lanes};
+use crate::parallel::lanes::{LANES, Lanes, lanes, take};
 use rayon::prelude::*;
 
 /// Coefficients of the cubic.
@@ -81,8 +81,8 @@ impl Waves for Coaxial {
     }
 }
 
-impl<'a> Waves for Pair<'a> {
-    type Vector = [&'a Lanes; TERMS];
+impl Waves for Pair<'_> {
+    type Vector = [Lanes; TERMS];
 
     #[inline(always)]
     fn ratios(self) -> [f32; 3] {
@@ -91,12 +91,12 @@ impl<'a> Waves for Pair<'a> {
 
     #[inline(always)]
     fn vector(self, i: usize) -> Self::Vector {
-        self.terms.map(|row| &row[i])
+        take(&self.terms, i)
     }
 
     #[inline(always)]
-    fn infrared(self, terms: Self::Vector, x: usize, phase: f32) -> Wave {
-        wave(terms.map(|row| row[x]), phase)
+    fn infrared(self, [e0, e1, e2, e3]: Self::Vector, x: usize, phase: f32) -> Wave {
+        wave([e0[x], e1[x], e2[x], e3[x]], phase)
     }
 }
 

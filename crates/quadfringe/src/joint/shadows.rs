@@ -15,6 +15,14 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
+/// Where shadows are searched on a level.
+#[derive(Clone, Copy)]
+enum Where<'a> {
+    Everywhere,
+    /// Near pixels of the coarse level, planes of its grid, that are dark.
+    NearDark(&'a Grid, &'a [f32]),
+}
+
 /// The search for shadows, with its working planes.
 #[derive(Debug, Default)]
 pub(super) struct Shadows {
@@ -33,18 +41,44 @@ struct Rows {
     maps: RowMaps,
     spare: Vec<f32>,
     expected: Vec<f32>,
+    /// The vectors of pixels that are searched.
+    active: Vec<bool>,
+}
+
+impl Where<'_> {
+    /// Marks the vectors of row `y` that are searched; tells whether there are any.
+    fn choose(self, grid: &Grid, y: usize, active: &mut Vec<bool>) -> bool {
+        active.clear();
+        match self {
+            Self::Everywhere => active.resize(grid.stride / LANES, true),
+            Self::NearDark(coarse, modulation) => {
+                let factor = grid.stride / coarse.stride;
+                let rows = around((y / factor).min(coarse.height - 1), coarse.height);
+                let rows = rows.map(|y| &modulation[y * coarse.stride..][..coarse.width]);
+                let side = LANES / factor;
+                active.extend((0..grid.stride / LANES).map(|i| {
+                    let near = (i * side).saturating_sub(1).min(coarse.width)
+                        ..((i + 1) * side + 1).min(coarse.width);
+                    rows.iter().any(|row| row[near.clone()].contains(&0.0))
+                }));
+            }
+        }
+        active.contains(&true)
+    }
 }
 
 impl Shadows {
     /// Finds the shadows of the infrared projector at an absolute phase; `noise` is the standard deviation of the intensities.
-    pub fn find(
+    /// Tells whether there are any.
+    fn find(
         &mut self,
         scene: &Scene<'_>,
+        place: Where<'_>,
         ratios: [f32; 3],
         photometry: &Photometry,
         map: PhaseMap<'_>,
         noise: f32,
-    ) {
+    ) -> bool {
         let grid = scene.grid;
         let Self { expected, excess, lit, slots } = self;
         for plane in [&mut *expected, &mut *excess, &mut *lit] {
@@ -54,9 +88,17 @@ impl Shadows {
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (expected, excess))| {
-                let fringes = photometry.sample_in_place(scene, y, &mut slot.maps);
+                let Rows { maps, active, .. } = &mut **slot;
+                if !place.choose(grid, y, active) {
+                    expected.fill(0.0);
+                    excess.fill(0.0);
+                    return;
+                }
+                let fringes = photometry.sample_in_place(scene, y, maps);
                 let (pixels, out) = (scene.pixel_row(map, y), [expected, excess]);
-                with_waves!(scene, y, ratios, |waves| expect(&fringes, &pixels, scene.rows(y), waves, out));
+                with_waves!(scene, y, ratios, |waves| {
+                    expect(&fringes, &pixels, scene.rows(y), (waves, active), out);
+                });
             },
         );
         let (expected, excess, slots) = (&*expected, &*excess, &*slots);
@@ -74,6 +116,7 @@ impl Shadows {
                 }
             },
         );
+        lit.par_chunks(grid.stride).any(|row| row[..grid.width].contains(&0.0))
     }
 }
 
@@ -86,7 +129,11 @@ impl Joint {
         }
         let map = PhaseMap { phase: &coarse.phase, modulation: &coarse.modulation };
         let shadows = &mut coarse.shadows;
-        shadows.find(&pyramid.coarse.scene(frame.coarse), *ratios, &coarse.photometry, map, coarse.noise);
+        let scene = pyramid.coarse.scene(frame.coarse);
+        let found = shadows.find(&scene, Where::Everywhere, *ratios, &coarse.photometry, map, coarse.noise);
+        if !found {
+            return;
+        }
         coarse.lit_mask.erode(
             grid,
             REACH_PX.div_ceil(frame.coarse.factor),
@@ -97,15 +144,19 @@ impl Joint {
         darken(grid, &shadows.lit, &mut coarse.modulation, |_| ());
     }
 
-    /// The same at full resolution.
+    /// The same at full resolution, next to what is dark on the coarse level.
     pub(super) fn leave_out_shadows(&mut self, frame: &Frame<'_>) {
         let (Self { coarse, pyramid, pixels, ratios, .. }, grid) = (self, frame.full.grid);
-        if pyramid.full.pair.is_none() {
+        // Without a coarse level, all is found already.
+        if pyramid.full.pair.is_none() || frame.coarse.factor == 1 {
             return;
         }
         let shadows = &mut coarse.shadows;
         let scene = pyramid.full.scene(frame.full);
-        shadows.find(&scene, *ratios, &coarse.photometry, pixels.map(), coarse.noise);
+        let place = Where::NearDark(frame.coarse.grid, &coarse.modulation);
+        if !shadows.find(&scene, place, *ratios, &coarse.photometry, pixels.map(), coarse.noise) {
+            return;
+        }
         coarse.lit_mask.erode(grid, REACH_PX, &mut shadows.excess, &mut shadows.lit);
         pyramid.full.restrict(grid, &shadows.lit);
         let reasons = &mut pixels.reasons;
@@ -136,7 +187,7 @@ fn expect<W: Waves>(
     fringes: &FringeRows,
     pixels: &PixelRow,
     light: [&[f32]; 4],
-    waves: W,
+    (waves, active): (W, &[bool]),
     out: [&mut [f32]; 2],
 ) {
     let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -144,6 +195,10 @@ fn expect<W: Waves>(
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
     for i in 0..pixels[0].len() {
+        if !active[i] {
+            put(&mut out, i, &[[0.0; LANES]; 2]);
+            continue;
+        }
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
         let (ratios, vector) = (waves.ratios(), waves.vector(i));
