@@ -2,8 +2,8 @@
 
     python evaluation/pair.py [--half tune|report] [--method joint] [--only WORD ...] [--json FILE]
 
-The infrared projector is turned and moved against the visible one, or stands beside it, 50 mm away and aimed at the
-same place. Planes from 700 to 900 mm and scenes of quadfringe.evaluation.world are rendered at 1024 x 768 with 3 %
+The infrared projector is turned and moved against the visible one, or stands 50 mm away and is aimed at the same
+place. Planes from 700 to 900 mm and scenes of quadfringe.evaluation.world are rendered at 1024 x 768 with 3 %
 noise and 8 bit. Figures count pixels that both projectors light, at least 2 px from an edge. Of the pixels that one
 projector alone lights, at least 2 px from an edge, the script counts those that are returned, and those of them whose
 order is wrong. Tune on the half `tune`, and report the figures of the half `report`.

@@ -6,7 +6,7 @@
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork, kernel};
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, carriers};
+use super::model::FringeRows;
 use super::params::uncertainty::{
     PAIR_EXCESS_MAX_RAD2, PAIR_NEIGHBOURHOOD, PAIR_SAMPLED_ROWS, PAIR_SHARE_MIN, PAIR_WINDOW,
 };
@@ -125,10 +125,10 @@ fn add_pairs<W: Waves>(
     for (i, sums) in sums.iter_mut().enumerate() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
-        let (ratios, vector) = (waves.ratios(), waves.vector(i));
+        let vector = waves.vector(i);
         let mut terms = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, waves.infrared(vector, x, phase[x]), 0.0);
+            let carriers = waves.carriers(vector, x, phase[x], 0.0);
             let (mut mm, mut ms) = (1e-9f32, 0.0f32);
             let (mut ds, mut dd, mut dm) = ([0.0f32; 2], [0.0f32; 2], [0.0f32; 2]);
             for c in 0..4 {

@@ -3,7 +3,7 @@
 
 use super::Joint;
 use super::cells::Grid;
-use super::model::Wave;
+use super::model::{Carriers, Wave, carriers};
 use super::scene::Scene;
 use crate::height::PairTable;
 use crate::parallel::lanes::{LANES, Lanes, lanes, take};
@@ -32,6 +32,16 @@ pub(super) trait Waves: Copy {
 
     /// The infrared wave at pixel `x` of a vector.
     fn infrared(self, vector: Self::Vector, x: usize, phase: f32) -> Wave;
+
+    /// The order from which infrared cosines are counted, as a phase in rad: the middle one of a pair, whose cubic is not good far
+    /// outside the field.
+    fn origin_rad(self, middle_rad: f32) -> f32;
+
+    /// The carriers of all channels at pixel `x` of a vector; `loss` as in [`carriers`].
+    #[inline(always)]
+    fn carriers(self, vector: Self::Vector, x: usize, phase: f32, loss: f32) -> Carriers {
+        carriers(phase, self.ratios(), self.infrared(vector, x, phase), loss)
+    }
 }
 
 /// The waves of coaxial projectors.
@@ -79,6 +89,11 @@ impl Waves for Coaxial {
     fn infrared(self, (): (), _: usize, phase: f32) -> Wave {
         Wave::coaxial(phase, self.ratios[2])
     }
+
+    #[inline(always)]
+    fn origin_rad(self, _: f32) -> f32 {
+        0.0
+    }
 }
 
 impl Waves for Pair<'_> {
@@ -97,6 +112,11 @@ impl Waves for Pair<'_> {
     #[inline(always)]
     fn infrared(self, [e0, e1, e2, e3]: Self::Vector, x: usize, phase: f32) -> Wave {
         wave([e0[x], e1[x], e2[x], e3[x]], phase)
+    }
+
+    #[inline(always)]
+    fn origin_rad(self, middle_rad: f32) -> f32 {
+        middle_rad
     }
 }
 

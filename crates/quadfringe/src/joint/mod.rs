@@ -27,6 +27,7 @@ mod disjoint;
 mod energy;
 mod illumination;
 mod infrared;
+mod levels;
 mod light;
 mod local_fit;
 mod memory;

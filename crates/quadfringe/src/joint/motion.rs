@@ -9,7 +9,7 @@
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, carriers};
+use super::model::FringeRows;
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
 use super::pyramid::Level;
@@ -99,7 +99,7 @@ impl Motion {
                 let fringes = photometry.sample(scene, y, &mut rows.fringes);
                 let (pixels, instants) = (scene.pixel_row(map, y), timing.instants);
                 with_waves!(scene, y, timing.ratios, |waves| {
-                    add_motion(&fringes, &pixels, scene.rows(y), (waves, instants), sums);
+                    add_motion(&fringes, &pixels, scene.rows(y), waves, instants, sums);
                 });
             },
             |_, [numerator, information], out| {
@@ -135,7 +135,7 @@ impl Motion {
                 let moving = MovingRow { phase: scene.row(phase, y), velocity };
                 let (out, instants) = ([red, green, blue, infrared].map(|row| &mut row[..]), timing.instants);
                 with_waves!(scene, y, timing.ratios, |waves| {
-                    compensate_row(&fringes, &moving, scene.rows(y), (waves, instants), out);
+                    compensate_row(&fringes, &moving, scene.rows(y), waves, instants, out);
                 });
             },
         );
@@ -179,7 +179,8 @@ fn add_motion<W: Waves>(
     fringes: &FringeRows,
     pixels: &PixelRow,
     light: [&[f32]; 4],
-    (waves, instants): (W, [f32; 4]),
+    waves: W,
+    instants: [f32; 4],
     sums: &mut [[Lanes; 2]],
 ) {
     let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -188,11 +189,11 @@ fn add_motion<W: Waves>(
     for (i, sums) in sums.iter_mut().enumerate() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
-        let (ratios, vector) = (waves.ratios(), waves.vector(i));
+        let vector = waves.vector(i);
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
             let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
-            let carriers = carriers(phase[x], ratios, waves.infrared(vector, x, phase[x]), 0.0);
+            let carriers = waves.carriers(vector, x, phase[x], 0.0);
             for c in 0..4 {
                 let (a, b) = (offset[c][x], amplitude[c][x]);
                 (m[c], d[c]) = (a + b * carriers.cosine[c], b * carriers.derivative[c]);
@@ -242,20 +243,32 @@ fn motion_terms(m: [f32; 4], d: [f32; 4], light: [f32; 4], instants: [f32; 4], u
     MotionTerms { numerator: weight * numerator, information: weight * albedo * information }
 }
 
+/// The cosine of channel `c` at pixel `x` of a vector.
+#[inline(always)]
+fn cosine<W: Waves>(c: usize, waves: W, vector: W::Vector, x: usize, phase: f32) -> f32 {
+    let angle = match c {
+        1 => waves.ratios()[1] * phase,
+        3 => waves.infrared(vector, x, phase).phase,
+        _ => phase,
+    };
+    let (sine, cosine) = sin_cos(angle);
+    if c == 2 { -sine } else { cosine }
+}
+
 /// Light of a row less the change by motion.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn compensate_row<W: Waves>(
     fringes: &FringeRows,
     moving: &MovingRow,
     light: [&[f32]; 4],
-    (waves, instants): (W, [f32; 4]),
+    waves: W,
+    instants: [f32; 4],
     out: [&mut [f32]; 4],
 ) {
     let pixels = [moving.phase, moving.velocity].map(lanes);
     let (offset, amplitude, light) =
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
-    let [_, second, _] = waves.ratios();
     for i in 0..pixels[0].len() {
         let (offset, amplitude, mut found) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, velocity] = take(&pixels, i);
@@ -264,15 +277,7 @@ fn compensate_row<W: Waves>(
             let mut change = [0.0f32; 4];
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
             for c in 0..4 {
-                let fringe = |phase: f32| {
-                    let angle = match c {
-                        1 => second * phase,
-                        3 => waves.infrared(vector, x, phase).phase,
-                        _ => phase,
-                    };
-                    let (s, c_) = sin_cos(angle);
-                    if c == 2 { -s } else { c_ }
-                };
+                let fringe = |phase: f32| cosine(c, waves, vector, x, phase);
                 let moved = fringe(phase[x] + velocity[x] * instants[c]);
                 change[c] = amplitude[c][x] * (moved - fringe(phase[x]));
                 let model = offset[c][x] + amplitude[c][x] * moved;

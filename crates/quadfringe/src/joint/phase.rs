@@ -5,7 +5,7 @@
 
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, carriers};
+use super::model::FringeRows;
 use super::neighbours::{around, binomial};
 use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
@@ -204,11 +204,10 @@ fn predict<W: Waves>(
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     for i in 0..pixels[0].len() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
-        let [phase, loss, lit] = take(&pixels, i);
-        let (ratios, vector) = (waves.ratios(), waves.vector(i));
+        let ([phase, loss, lit], vector) = (take(&pixels, i), waves.vector(i));
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, waves.infrared(vector, x, phase[x]), loss[x]);
+            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
             let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {

@@ -4,7 +4,7 @@
 use super::Joint;
 use super::cells::{Grid, RowMaps};
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, carriers};
+use super::model::FringeRows;
 use super::neighbours::{around, sum_of_nine};
 use super::params::shadows::{FRINGE_NOISES, REACH_PX, SHARE_MIN};
 use super::photometry::Photometry;
@@ -80,27 +80,9 @@ impl Shadows {
         noise: f32,
     ) -> bool {
         let grid = scene.grid;
+        self.expect_fringes(scene, place, ratios, photometry, map);
         let Self { expected, excess, lit, slots } = self;
-        for plane in [&mut *expected, &mut *excess, &mut *lit] {
-            plane.resize(grid.pixels(), 0.0);
-        }
-        let rows = expected.par_chunks_mut(grid.stride).zip(excess.par_chunks_mut(grid.stride)).enumerate();
-        rows.for_each_init(
-            || slots.take(),
-            |slot, (y, (expected, excess))| {
-                let Rows { maps, active, .. } = &mut **slot;
-                if !place.choose(grid, y, active) {
-                    expected.fill(0.0);
-                    excess.fill(0.0);
-                    return;
-                }
-                let fringes = photometry.sample_in_place(scene, y, maps);
-                let (pixels, out) = (scene.pixel_row(map, y), [expected, excess]);
-                with_waves!(scene, y, ratios, |waves| {
-                    expect(&fringes, &pixels, scene.rows(y), (waves, active), out);
-                });
-            },
-        );
+        lit.resize(grid.pixels(), 0.0);
         let (expected, excess, slots) = (&*expected, &*excess, &*slots);
         lit.par_chunks_mut(grid.stride).enumerate().for_each_init(
             || slots.take(),
@@ -117,6 +99,39 @@ impl Shadows {
             },
         );
         lit.par_chunks(grid.stride).any(|row| row[..grid.width].contains(&0.0))
+    }
+
+    /// Computes what the model expects at every pixel that is searched, and what is seen of it.
+    fn expect_fringes(
+        &mut self,
+        scene: &Scene<'_>,
+        place: Where<'_>,
+        ratios: [f32; 3],
+        photometry: &Photometry,
+        map: PhaseMap<'_>,
+    ) {
+        let grid = scene.grid;
+        let Self { expected, excess, slots, .. } = self;
+        for plane in [&mut *expected, &mut *excess] {
+            plane.resize(grid.pixels(), 0.0);
+        }
+        let rows = expected.par_chunks_mut(grid.stride).zip(excess.par_chunks_mut(grid.stride)).enumerate();
+        rows.for_each_init(
+            || slots.take(),
+            |slot, (y, (expected, excess))| {
+                let Rows { maps, active, .. } = &mut **slot;
+                if !place.choose(grid, y, active) {
+                    expected.fill(0.0);
+                    excess.fill(0.0);
+                    return;
+                }
+                let fringes = photometry.sample_in_place(scene, y, maps);
+                let (pixels, out) = (scene.pixel_row(map, y), [expected, excess]);
+                with_waves!(scene, y, ratios, |waves| {
+                    expect(&fringes, &pixels, scene.rows(y), waves, active, out);
+                });
+            },
+        );
     }
 }
 
@@ -187,7 +202,8 @@ fn expect<W: Waves>(
     fringes: &FringeRows,
     pixels: &PixelRow,
     light: [&[f32]; 4],
-    (waves, active): (W, &[bool]),
+    waves: W,
+    active: &[bool],
     out: [&mut [f32]; 2],
 ) {
     let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -201,10 +217,10 @@ fn expect<W: Waves>(
         }
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
-        let (ratios, vector) = (waves.ratios(), waves.vector(i));
+        let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 2];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, waves.infrared(vector, x, phase[x]), 0.0);
+            let carriers = waves.carriers(vector, x, phase[x], 0.0);
             let (mut mm, mut ms) = (1e-9f32, 0.0f32);
             for c in [0, 2] {
                 let m = offset[c][x] + amplitude[c][x] * carriers.cosine[c];

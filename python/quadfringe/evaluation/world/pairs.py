@@ -1,4 +1,4 @@
-"""Benches whose infrared projector is turned and moved against the visible one, or stands beside it.
+"""Benches whose infrared projector is turned and moved against the visible one, or stands 50 mm away.
 
 A `PairBench` has the name of one of `PAIRS`. It draws scenes of the world, or planes, and decodes their shots.
 `judge_pair` compares a shape with the truth, on the pixels that both projectors light and on those that one alone does.
@@ -80,7 +80,7 @@ class PairBench:
 
     @classmethod
     def named(cls, name: str, infrared_number: float | None = None) -> PairBench:
-        """Give the bench with this name of `PAIRS`, with its own infrared fringe number or another."""
+        """Give the bench with this name of `PAIRS`; another infrared fringe number replaces that of its pose."""
         reference, pose = _core.Bench(), PAIRS[name]
         camera, visible = device_from_core(reference.camera), device_from_core(reference.visible)
         infrared = deviated(visible, pose.rotation_deg, pose.translation_mm)

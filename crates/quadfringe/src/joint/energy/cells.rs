@@ -3,7 +3,7 @@
 use super::tile::Tile;
 use crate::Reason;
 use crate::joint::cells::{blend, spread};
-use crate::joint::infrared::{PairPhase, wave};
+use crate::joint::infrared::wave;
 use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, SPREAD_MAX_RAD, USABLE_MIN};
 use crate::joint::scene::{PhaseMap, Pixels, Scene};
 use crate::parallel::lanes::LANES;
@@ -29,7 +29,6 @@ pub(super) struct Cells {
     inside: Vec<f32>,
     /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
     infrared: [Vec<f32>; 2],
-    pair: bool,
 }
 
 /// What the fit has found for one cell.
@@ -111,13 +110,12 @@ impl Cells {
                 *usable = if *usable >= USABLE_MIN { *inside } else { 0.0 };
             }
         });
-        self.pair = scene.pair.is_some();
-        scene.pair.into_iter().for_each(|pair| self.draw_tangents(scene, pair));
+        self.draw_tangents(scene);
     }
 
     /// The tangents of the infrared phase of a pair at the mean phases.
-    fn draw_tangents(&mut self, scene: &Scene<'_>, pair: &PairPhase) {
-        let Self { infrared, phase, stride, factor, .. } = self;
+    fn draw_tangents(&mut self, scene: &Scene<'_>) {
+        let (Self { infrared, phase, stride, factor, .. }, Some(pair)) = (self, scene.pair) else { return };
         let [offset, slope] = infrared.each_mut().map(|plane| {
             plane.resize(phase.len(), 0.0);
             plane.par_chunks_mut(*stride)
@@ -142,7 +140,7 @@ impl Cells {
         let Self { height, width, stride, light, phase, usable, inside, .. } = self;
         let count = SIDE.min(width - left);
         let mut any = false;
-        tile.pair = self.pair;
+        tile.pair = !self.infrared[0].is_empty();
         for y in 0..SIDE {
             tile.clear(y);
             if top + y >= *height {

@@ -117,6 +117,7 @@ impl Block {
         let node = cell.row * grid.columns + cell.column;
         let (phase, whole) = (nodes.phase[node], nodes.absolute(node));
         let fringes = wrapped.cell(scene, cell.row, cell.column);
+        let predicted = Predicted { scene, fringes: &fringes, ratios_g_ir: nodes.ratios_g_ir };
         self.costs.clear();
         for i in 0..side * side {
             let y = (cell.row * step + i / side).saturating_sub(1).min(grid.height - 1);
@@ -125,13 +126,8 @@ impl Block {
             let mut costs = [0.0; CANDIDATES];
             if wrapped.map.modulation[at] > 0.0 {
                 let wrapped_phase = wrapped.map.phase[at];
-                let pixel = Pixel {
-                    at,
-                    wrapped_phase,
-                    absolute_phase: whole + wrap(wrapped_phase - phase),
-                    light: scene.light.map(|plane| plane[at]),
-                };
-                let predicted = Predicted { scene, fringes: &fringes, ratios_g_ir: nodes.ratios_g_ir };
+                let absolute_phase = whole + wrap(wrapped_phase - phase);
+                let pixel = Pixel { at, wrapped_phase, absolute_phase };
                 add_costs(&pixel, &predicted, candidates.turns(), &mut costs);
             }
             self.costs.push(costs);
@@ -154,7 +150,6 @@ struct Pixel {
     at: usize,
     wrapped_phase: f32,
     absolute_phase: f32,
-    light: [f32; 4],
 }
 
 /// What predicts the light of the pixels of a cell.
@@ -167,7 +162,7 @@ struct Predicted<'a> {
 /// Adds for every candidate the squared differences between the observed and the predicted cosines of G and IR.
 fn add_costs(pixel: &Pixel, predicted: &Predicted<'_>, turns: &[f32], costs: &mut [f32]) {
     let Predicted { scene, fringes: CellFringes { offset, amplitude }, ratios_g_ir } = predicted;
-    let light = pixel.light;
+    let light = scene.light.map(|plane| plane[pixel.at]);
     let red_blue = |values: &[f32; 4]| [values[0], values[2]];
     let albedo = albedo(pixel.wrapped_phase, red_blue(&light), red_blue(offset), red_blue(amplitude));
     for (c, ratio) in [1, 3].into_iter().zip(*ratios_g_ir) {

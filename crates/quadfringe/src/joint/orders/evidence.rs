@@ -118,10 +118,9 @@ fn gather(
     for y in grid.samples(row, SAMPLED_ROWS) {
         let fringes = wrapped.fringes(scene, y, maps);
         let pixels = scene.pixel_row(wrapped.map, y);
-        // The cosines of order 0, or of the middle order for a pair, whose cubic is not good far outside the field.
-        let from = if scene.pair.is_some() { ratios.middle_rad } else { 0.0 };
         with_waves!(scene, y, ratios.ratios, |waves| {
-            add_cosines(node_phase, &pixels, scene.rows(y), &fringes, (waves, from), sums);
+            let origin_rad = waves.origin_rad(ratios.middle_rad);
+            add_cosines(node_phase, &pixels, scene.rows(y), &fringes, waves, origin_rad, sums);
         });
     }
     for (k, line) in cells.iter_mut().enumerate() {
@@ -136,7 +135,8 @@ fn add_cosines<W: Waves>(
     pixels: &PixelRow,
     light: [&[f32]; 4],
     fringes: &FringeRows,
-    (waves, from): (W, f32),
+    waves: W,
+    origin_rad: f32,
     sums: &mut [[Lanes; SUMS]],
 ) {
     let pixels = [node_phase, pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -156,7 +156,7 @@ fn add_cosines<W: Waves>(
             let unwrapped = node[x] + wrap(phase[x] - node[x]);
             let red_blue = |rows: &[Lanes; 4]| [rows[0][x], rows[2][x]];
             let albedo = albedo(phase[x], red_blue(&light), red_blue(&offset), red_blue(&amplitude));
-            let angles = [ratios[1] * unwrapped, waves.infrared(vector, x, unwrapped + from).phase];
+            let angles = [ratios[1] * unwrapped, waves.infrared(vector, x, unwrapped + origin_rad).phase];
             for beat in 0..2 {
                 let c = 2 * beat + 1;
                 let s = observed_cosine(light[c][x], albedo, offset[c][x], amplitude[c][x]);

@@ -6,8 +6,8 @@
 pub const SHARE_MIN: f32 = 0.3;
 
 /// Least sum of the expected fringes over nine pixels that allows a verdict, in standard deviations of an intensity. Larger: less is
-/// seen of shadows on dark fringes. Smaller: noise makes holes. Lit pixels fail at seven tenths of it, a third of which is one
-/// standard deviation of the sum of nine.
+/// seen of shadows on dark fringes. Smaller: noise makes holes. A lit pixel then fails by 4.7 standard deviations of the sum. `python
+/// evaluation/pair.py --only plane`
 pub const FRINGE_NOISES: f32 = 20.0;
 
 /// Number of pixels around a pixel in shadow that are left out too. Larger: wider holes. Smaller: mixed light and dark fringes

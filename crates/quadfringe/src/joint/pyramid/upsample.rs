@@ -6,7 +6,7 @@
 use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
 use crate::joint::infrared::{Coaxial, Gathered, Waves};
-use crate::joint::model::{CellFringes, carriers};
+use crate::joint::model::CellFringes;
 use crate::joint::neighbours::around;
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
@@ -218,13 +218,10 @@ impl CoarseRow<'_> {
                     phase[x] = surface.at(place_x[x], place_y[x]);
                 }
                 let pixels = Pixels { phase, lit, light: &light, modulation: surface.modulation };
-                let squared_residual = &mut around.squared_residuals[vector][k];
-                let correction = &mut around.corrections[vector][k];
+                let out = [&mut around.squared_residuals[vector][k], &mut around.corrections[vector][k]];
                 match fine.pair {
-                    None => explain(&pixels, &fringes, Coaxial { ratios }, squared_residual, correction),
-                    Some(_) => {
-                        explain(&pixels, &fringes, gathered.waves(ratios), squared_residual, correction)
-                    }
+                    None => explain(&pixels, &fringes, Coaxial { ratios }, out),
+                    Some(_) => explain(&pixels, &fringes, gathered.waves(ratios), out),
                 }
             }
         }
@@ -265,14 +262,12 @@ fn explain<W: Waves>(
     pixels: &Pixels,
     fringes: &CellFringes,
     waves: W,
-    squared_residuals: &mut Lanes,
-    corrections: &mut Lanes,
+    [squared_residuals, corrections]: [&mut Lanes; 2],
 ) {
     let most = SQUARED_MISFIT_MAX * pixels.modulation * pixels.modulation;
-    let (ratios, vector) = (waves.ratios(), waves.vector(0));
+    let vector = waves.vector(0);
     for x in 0..LANES {
-        let infrared = waves.infrared(vector, x, pixels.phase[x]);
-        let carriers = carriers(pixels.phase[x], ratios, infrared, 0.0);
+        let carriers = waves.carriers(vector, x, pixels.phase[x], 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {

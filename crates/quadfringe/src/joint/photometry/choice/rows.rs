@@ -2,7 +2,6 @@
 
 use crate::joint::cells::{CellMaps, Grid, RowMaps};
 use crate::joint::infrared::{Waves, with_waves};
-use crate::joint::model::carriers;
 use crate::joint::neighbours::binomial;
 use crate::joint::params::photometry::{PLACE_BETTER, PLACE_GAIN_MIN};
 use crate::joint::scene::Scene;
@@ -148,10 +147,10 @@ fn carry<W: Waves>(pixels: [&[f32]; 2], waves: W, out: [&mut [f32]; 8]) {
     let mut out = out.map(lanes_mut);
     for i in 0..pixels[0].len() {
         let [phase, loss] = take(&pixels, i);
-        let (ratios, vector) = (waves.ratios(), waves.vector(i));
+        let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, waves.infrared(vector, x, phase[x]), loss[x]);
+            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
             for c in 0..4 {
                 (found[c][x], found[4 + c][x]) = (carriers.cosine[c], carriers.derivative[c]);
             }
