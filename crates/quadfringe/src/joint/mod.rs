@@ -8,6 +8,7 @@
 //! 5  photometry: offset and amplitude of every channel                         photometry
 //! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample
 //!    minimum of the energy (J16)                                                energy
+//!    pair of projectors: infrared phase of a pixel (J32), its shadows (J33)     infrared, shadows
 //! 7  motion between the channels (optional)                                    motion
 //! 8  validity: doubtful pixels become no data                                  validity
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement
