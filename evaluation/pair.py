@@ -1,6 +1,6 @@
 """Measure pairs of projectors that are not coaxial with the joint method, against one projector for all channels.
 
-    python evaluation/pair.py [--half tune|report] [--method joint] [--only WORD ...] [--json FILE]
+    python evaluation/pair.py [--half tune|report] [--method joint] [--only WORD ...] [--infrared N] [--json FILE]
 
 The infrared projector is turned and moved against the visible one, or stands 50 mm away and is aimed at the same
 place. Planes from 700 to 900 mm and scenes of quadfringe.evaluation.world are rendered at 1024 x 768 with 3 %
@@ -66,6 +66,7 @@ def main() -> None:
     parser.add_argument("--half", choices=HALVES, default="report")
     parser.add_argument("--method", default="joint")
     parser.add_argument("--only", nargs="+", metavar="WORD", help="scenes whose name contains one of these words")
+    parser.add_argument("--infrared", type=float, metavar="N", help="infrared fringe number of all pairs but coaxial")
     parser.add_argument("--json", type=Path, help="write the figures here")
     options = parser.parse_args()
     names = [name for name in SCENES if options.only is None or any(word in name for word in options.only)]
@@ -74,7 +75,7 @@ def main() -> None:
     figures: dict[str, float] = {}
     first: dict[str, float] = {}
     for pair in PAIRS:
-        bench = PairBench.named(pair)
+        bench = PairBench.named(pair, None if pair == "coaxial" else options.infrared)
         for name in names:
             found = measured(bench, SCENES[name], HALVES[options.half], options.method)
             found["rms_ratio"] = found["rms_mm"] / first.setdefault(name, found["rms_mm"])
