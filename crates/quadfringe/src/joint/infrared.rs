@@ -1,10 +1,8 @@
 //! The phase of the infrared fringes as a function of that of R and B. Coaxial projectors have `k_ir Phi`. For a calibrated pair
 //! it is a cubic of `Phi` at every pixel (J32), because each depth on a camera ray is a column of both projectors.
 
-use super::Joint;
 use super::cells::Grid;
 use super::model::{Carriers, Wave, carriers};
-use super::scene::Scene;
 use crate::height::PairTable;
 use crate::parallel::lanes::{LANES, Lanes, lanes, take};
 use rayon::prelude::*;
@@ -132,7 +130,7 @@ pub(super) fn wave([e0, e1, e2, e3]: [f32; TERMS], phase: f32) -> Wave {
 impl PairPhase {
     /// The cubics of a table, in rows of `stride` pixels. A ray that the visible projector does not light within the range of
     /// depths takes the cubic of the nearest lit ray of its row, or of the row before: what lies there is out of range.
-    fn new(table: &PairTable, stride: usize) -> Self {
+    pub fn new(table: &PairTable, stride: usize) -> Self {
         let (rows, columns) = table.shape();
         let mut planes = [(); TERMS].map(|()| vec![0.0; rows * stride]);
         let order = (0..rows).find(|y| table.row(*y).infrared[0].iter().any(|term| term.is_finite()));
@@ -200,17 +198,6 @@ impl PairPhase {
     }
 }
 
-impl Scene<'_> {
-    /// The infrared phase at the pixel at `at`; `ratio` is that of coaxial projectors.
-    #[inline(always)]
-    pub fn infrared_phase(&self, at: usize, ratio: f32, phase: f32) -> f32 {
-        match self.pair {
-            None => ratio * phase,
-            Some(pair) => wave(pair.at(at), phase).phase,
-        }
-    }
-}
-
 /// Coefficients of some pixels that do not lie in a row, as one vector.
 #[derive(Debug, Default)]
 pub(super) struct Gathered([Lanes; TERMS]);
@@ -225,13 +212,5 @@ impl Gathered {
     /// The waves of the vector.
     pub fn waves(&self, ratios: [f32; 3]) -> Pair<'_> {
         Pair { ratios, terms: self.0.each_ref().map(std::slice::from_ref) }
-    }
-}
-
-impl Joint {
-    /// Makes all later shots take the infrared phase along the camera rays of a pair.
-    pub fn unwrap_along_rays(&mut self, table: &PairTable) {
-        self.pyramid.full.pair = Some(PairPhase::new(table, self.stride));
-        self.coarse.lit_mask.see_visible_light_alone();
     }
 }

@@ -1,37 +1,42 @@
 //! Step 6 for a pair: pixels that the visible projector lights and the infrared one does not. Their dark infrared light is no
 //! trough of a fringe (J33), and would bend the phase. They become no data, with the reason of a shadow.
 
-use super::Joint;
 use super::cells::{Grid, RowMaps};
 use super::infrared::{Waves, with_waves};
 use super::model::FringeRows;
 use super::neighbours::{around, sum_of_nine};
-use super::params::shadows::{FRINGE_NOISES, REACH_PX, SHARE_MIN};
+use super::params::shadows::{FIELD_RIM_COLUMNS, FRINGE_NOISES, SHARE_MIN};
 use super::photometry::Photometry;
-use super::scene::{Frame, PhaseMap, PixelRow, Scene};
-use crate::Reason;
+use super::scene::{PhaseMap, PixelRow, Scene};
+use crate::encoding::FourChannel;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// Stands for the expected fringes of a pixel outside the field of the infrared projector: more than nine pixels can show.
+const BEYOND: f32 = 1e3;
 
 /// Where shadows are searched on a level.
 #[derive(Clone, Copy)]
-enum Where<'a> {
+pub(super) enum Where<'a> {
     Everywhere,
     /// Near pixels of the coarse level, planes of its grid, that are dark.
     NearDark(&'a Grid, &'a [f32]),
 }
 
 /// The search for shadows, with its working planes.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Shadows {
+    /// Infrared phases at the ends of the field that count as lit, rad.
+    field_rad: [f32; 2],
     /// Infrared fringes that the model expects, in linear light above their trough.
     expected: Vec<f32>,
     /// Observed light above the trough, less the least share of the expected one.
-    excess: Vec<f32>,
+    pub excess: Vec<f32>,
     /// 0 for pixels in shadow, 1 for all others.
-    lit: Vec<f32>,
+    pub lit: Vec<f32>,
     slots: Slots<Rows>,
 }
 
@@ -68,9 +73,18 @@ impl Where<'_> {
 }
 
 impl Shadows {
+    pub fn new(code: &FourChannel) -> Self {
+        let per_column = TAU * code.infrared / code.projector_width as f64;
+        let last = code.projector_width as f64 - 1.0;
+        let field_rad =
+            [FIELD_RIM_COLUMNS, last - FIELD_RIM_COLUMNS].map(|column| (per_column * column) as f32);
+        let [expected, excess, lit] = [const { Vec::new() }; 3];
+        Self { field_rad, expected, excess, lit, slots: Slots::default() }
+    }
+
     /// Finds the shadows of the infrared projector at an absolute phase; `noise` is the standard deviation of the intensities.
     /// Tells whether there are any.
-    fn find(
+    pub fn find(
         &mut self,
         scene: &Scene<'_>,
         place: Where<'_>,
@@ -81,7 +95,7 @@ impl Shadows {
     ) -> bool {
         let grid = scene.grid;
         self.expect_fringes(scene, place, ratios, photometry, map);
-        let Self { expected, excess, lit, slots } = self;
+        let Self { expected, excess, lit, slots, .. } = self;
         lit.resize(grid.pixels(), 0.0);
         let (expected, excess, slots) = (&*expected, &*excess, &*slots);
         lit.par_chunks_mut(grid.stride).enumerate().for_each_init(
@@ -111,7 +125,8 @@ impl Shadows {
         map: PhaseMap<'_>,
     ) {
         let grid = scene.grid;
-        let Self { expected, excess, slots, .. } = self;
+        let Self { field_rad, expected, excess, slots, .. } = self;
+        let field_rad = *field_rad;
         for plane in [&mut *expected, &mut *excess] {
             plane.resize(grid.pixels(), 0.0);
         }
@@ -128,63 +143,15 @@ impl Shadows {
                 let fringes = photometry.sample_in_place(scene, y, maps);
                 let (pixels, out) = (scene.pixel_row(map, y), [expected, excess]);
                 with_waves!(scene, y, ratios, |waves| {
-                    expect(&fringes, &pixels, scene.rows(y), waves, active, out);
+                    expect(&fringes, &pixels, scene.rows(y), waves, active, field_rad, out);
                 });
             },
         );
     }
 }
 
-impl Joint {
-    /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.
-    pub(super) fn leave_out_coarse_shadows(&mut self, frame: &Frame<'_>) {
-        let (Self { coarse, pyramid, ratios, .. }, grid) = (self, frame.coarse.grid);
-        if pyramid.coarse.pair.is_none() {
-            return;
-        }
-        let map = PhaseMap { phase: &coarse.phase, modulation: &coarse.modulation };
-        let shadows = &mut coarse.shadows;
-        let scene = pyramid.coarse.scene(frame.coarse);
-        let found = shadows.find(&scene, Where::Everywhere, *ratios, &coarse.photometry, map, coarse.noise);
-        if !found {
-            return;
-        }
-        coarse.lit_mask.erode(
-            grid,
-            REACH_PX.div_ceil(frame.coarse.factor),
-            &mut shadows.excess,
-            &mut shadows.lit,
-        );
-        pyramid.coarse.restrict(grid, &shadows.lit);
-        darken(grid, &shadows.lit, &mut coarse.modulation, |_| ());
-    }
-
-    /// The same at full resolution, next to what is dark on the coarse level.
-    pub(super) fn leave_out_shadows(&mut self, frame: &Frame<'_>) {
-        let (Self { coarse, pyramid, pixels, ratios, .. }, grid) = (self, frame.full.grid);
-        // Without a coarse level, all is found already.
-        if pyramid.full.pair.is_none() || frame.coarse.factor == 1 {
-            return;
-        }
-        let shadows = &mut coarse.shadows;
-        let scene = pyramid.full.scene(frame.full);
-        let place = Where::NearDark(frame.coarse.grid, &coarse.modulation);
-        if !shadows.find(&scene, place, *ratios, &coarse.photometry, pixels.map(), coarse.noise) {
-            return;
-        }
-        coarse.lit_mask.erode(grid, REACH_PX, &mut shadows.excess, &mut shadows.lit);
-        pyramid.full.restrict(grid, &shadows.lit);
-        let reasons = &mut pixels.reasons;
-        darken(grid, &shadows.lit, &mut pixels.modulation, |at| {
-            if reasons[at] == Reason::Returned {
-                reasons[at] = Reason::Shadow;
-            }
-        });
-    }
-}
-
 /// Sets the modulation of pixels in shadow to 0, and tells which were not dark before.
-fn darken(grid: &Grid, lit: &[f32], modulation: &mut [f32], mut lost: impl FnMut(usize)) {
+pub(super) fn darken(grid: &Grid, lit: &[f32], modulation: &mut [f32], mut lost: impl FnMut(usize)) {
     for y in 0..grid.height {
         for at in y * grid.stride..y * grid.stride + grid.width {
             if lit[at] == 0.0 && modulation[at] > 0.0 {
@@ -204,6 +171,7 @@ fn expect<W: Waves>(
     light: [&[f32]; 4],
     waves: W,
     active: &[bool],
+    field_rad: [f32; 2],
     out: [&mut [f32]; 2],
 ) {
     let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -231,6 +199,9 @@ fn expect<W: Waves>(
             let expected = albedo * amplitude[3][x] * (1.0 + carriers.cosine[3]);
             let observed = light[3][x] - albedo * (offset[3][x] - amplitude[3][x]);
             let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
+            let infrared = waves.infrared(vector, x, phase[x]).phase;
+            let inside = (infrared > field_rad[0]) & (infrared < field_rad[1]);
+            let [expected, observed] = if inside { [expected, observed] } else { [BEYOND, 0.0] };
             found[0][x] = if on { expected } else { 0.0 };
             found[1][x] = if on { observed - SHARE_MIN * expected } else { 0.0 };
         }

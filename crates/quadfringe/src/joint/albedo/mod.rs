@@ -8,12 +8,10 @@
 mod edges;
 mod texture;
 
-use super::Joint;
 use super::energy::{Energy, FringeRows};
 use super::infrared::{Waves, with_waves};
 use super::params::albedo::ROWS;
-use super::scene::{Frame, Pixels as AllPixels, Scene};
-use crate::decode::output::Decoded;
+use super::scene::Scene;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
@@ -71,21 +69,6 @@ impl Albedo {
                 }
             },
         );
-    }
-}
-
-impl Joint {
-    /// Steps 11 and 12, on the maps that step 10 has written.
-    pub(in crate::joint) fn complete(&mut self, frame: &Frame<'_>, out: &mut Decoded) {
-        let maps = [&mut out.wrong_order_probability, &mut out.quality];
-        let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
-        let Self { pixels: AllPixels { phase, .. }, validity, ratios, coarse, .. } = self;
-        self.propagation.run(frame.full.grid, phase, &validity.components, wrong_order, quality);
-        if let Some(albedo) = &mut out.albedo {
-            let known = Known { phase, valid: &validity.valid, ratios: *ratios, noise: coarse.noise };
-            let (scene, out) = (self.pyramid.full.scene(frame.full), albedo.as_slice_mut());
-            self.albedo.write(&scene, &self.energy, known, out.expect("checked layout"));
-        }
     }
 }
 

@@ -14,3 +14,8 @@ pub const FRINGE_NOISES: f32 = 20.0;
 /// Number of pixels around a pixel in shadow that are left out too. Larger: wider holes. Smaller: mixed light and dark fringes
 /// remain. `python evaluation/pair.py --only steps`
 pub const REACH_PX: usize = 2;
+
+/// Width of the rim of the infrared projector's image that counts as unlit, in its columns. Larger: less of the field is measured.
+/// Smaller: the fit mixes pixels inside and outside of it (0: RMS of a plane at 850 mm x 2.2). `python evaluation/pair.py --only
+/// plane_850`
+pub const FIELD_RIM_COLUMNS: f64 = 3.0;
