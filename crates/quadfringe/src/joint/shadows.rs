@@ -15,9 +15,6 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Stands for the expected fringes of a pixel outside the field of the infrared projector: more than nine pixels can show.
-const BEYOND: f32 = 1e3;
-
 /// Where shadows are searched on a level.
 #[derive(Clone, Copy)]
 pub(super) enum Where<'a> {
@@ -189,19 +186,16 @@ fn expect<W: Waves>(
         let mut found = [[0.0; LANES]; 2];
         for x in 0..LANES {
             let carriers = waves.carriers(vector, x, phase[x], 0.0);
-            let (mut mm, mut ms) = (1e-9f32, 0.0f32);
-            for c in [0, 2] {
-                let m = offset[c][x] + amplitude[c][x] * carriers.cosine[c];
-                mm += m * m;
-                ms += m * light[c][x];
-            }
-            let albedo = ms / mm;
+            let red = offset[0][x] + amplitude[0][x] * carriers.cosine[0];
+            let blue = offset[2][x] + amplitude[2][x] * carriers.cosine[2];
+            let albedo = (red * light[0][x] + blue * light[2][x]) / (red * red + blue * blue + 1e-9);
             let expected = albedo * amplitude[3][x] * (1.0 + carriers.cosine[3]);
             let observed = light[3][x] - albedo * (offset[3][x] - amplitude[3][x]);
             let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
             let infrared = waves.infrared(vector, x, phase[x]).phase;
             let inside = (infrared > field_rad[0]) & (infrared < field_rad[1]);
-            let [expected, observed] = if inside { [expected, observed] } else { [BEYOND, 0.0] };
+            // Outside the image of the projector, as if more were expected than nine pixels can show.
+            let [expected, observed] = if inside { [expected, observed] } else { [1e3, 0.0] };
             found[0][x] = if on { expected } else { 0.0 };
             found[1][x] = if on { observed - SHARE_MIN * expected } else { 0.0 };
         }
