@@ -42,10 +42,6 @@ def test_a_channel_has_the_name_of_the_records_or_a_letter() -> None:
 
 
 def test_options_go_with_their_method() -> None:
-    for settings in ({"unwrapping": "pair"}, {"unwrapping": "pair", "method": "joint"}):
-        with pytest.raises(qf.ConfigError, match=r'unwrapping = "pair" needs .*"published", .* joint: change'):
-            qf.DecodeConfig(**settings)
-    assert qf.DecodeConfig(method="published", unwrapping="pair").unwrapping == "pair"
     with pytest.raises(qf.ConfigError, match='channel_instants_us needs method = "joint"'):
         qf.DecodeConfig(method="published", channel_instants_us=(0, 1, 2, 3))
     assert qf.DecodeConfig(channel_instants_us=(0, 1, 2, 3)).channel_instants_us == (0, 1, 2, 3)

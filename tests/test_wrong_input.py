@@ -203,11 +203,6 @@ DECODE = ("decode", "shot", "--out", "x.npz", "--projector-width", 912, "--fring
             "error: --depth-range-mm needs --calibration FILE: without a calibration there are no depths",
         ),
         (
-            (*DECODE, 30, "--unwrapping", "pair"),
-            "--unwrapping pair needs --method published, and the method is the default, joint: "
-            "change the method, or leave --unwrapping out",
-        ),
-        (
             (*DECODE, 30, "--method", "published", "--channel-instants-us", 0, 1, 2, 3),
             "--channel-instants-us needs --method joint, and the method is published: "
             "change the method, or leave --channel-instants-us out",

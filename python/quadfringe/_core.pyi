@@ -252,8 +252,8 @@ class Decoder:
     """Decodes shots of one size and one four-channel encoding; planned and checked when made.
 
     An argument that is absent takes the kernel's default. `method` is "joint" ("best" is read as "joint") or
-    "published". With `camera`, `projector` and `infrared` the published method searches fringe orders along the camera
-    rays, with the infrared image plain or pre-deformed, within a range of depths or at all of them;
+    "published". With `camera`, `projector` and `infrared` the infrared fringes are known along the camera rays, of an
+    image plain or pre-deformed, for a range of depths or all of them; the published method searches orders in it alone;
     `channel_instants_us` is an option of the joint method. Raises ValueError when the fringe numbers do not cover the
     projector, a setting is out of range, or an option is not one of the method.
     """

@@ -40,7 +40,7 @@ pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geomet
     if let (Some((camera, projector)), Some(infrared)) = (geometry.devices(), &geometry.infrared) {
         let pair = pair_of(projector, infrared, geometry.predeformed_z_mm)?;
         let table = PairTable::new(&camera.0, &pair, builder.encoding(), geometry.depth_range_mm)?;
-        method = method.with_along_rays(table)?;
+        method = method.with_along_rays(table);
     }
     let mut options = Options::default().with_method(method);
     options.modulation_min = choices.modulation_min.unwrap_or(options.modulation_min);

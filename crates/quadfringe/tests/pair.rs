@@ -7,7 +7,7 @@ use quadfringe::height::{PairTable, Triangulator};
 use quadfringe::optics::ProjectorPair;
 use quadfringe::rig::{Bench, Cast, Light, Projector, RenderOptions};
 use quadfringe::surface::{Plane, Surface, scene};
-use quadfringe::{Channel, Decoded, Decoder, DmdLayout, Options, PublishedOptions, Result};
+use quadfringe::{Channel, Decoded, Decoder, DmdLayout, Method, Options, PublishedOptions, Result};
 use std::f32::consts::PI;
 use std::sync::Arc;
 
@@ -39,6 +39,18 @@ fn decode(
     light: &RenderOptions,
     table: Option<PairTable>,
 ) -> Result<Decoded> {
+    let mut published = PublishedOptions::default();
+    published.along_rays = table.map(Arc::new);
+    decode_by(published.into(), bench, cast, ir, light)
+}
+
+fn decode_by(
+    method: Method,
+    bench: &Bench,
+    cast: &Cast,
+    ir: Option<Light<'_>>,
+    light: &RenderOptions,
+) -> Result<Decoded> {
     let code = code();
     let mut lights = Light::shot(&code).expect("four channels");
     if let Some(ir) = ir {
@@ -46,10 +58,8 @@ fn decode(
     }
     let planes = bench.render(cast, &lights, light)?;
     let (rows, columns) = planes.shape();
-    let mut published = PublishedOptions::default();
-    published.along_rays = table.map(Arc::new);
     let builder = Decoder::builder(&code, [rows, columns])
-        .options(Options::default().with_method(published))
+        .options(Options::default().with_method(method))
         .triangulator(Triangulator::new(&bench.camera, &bench.visible)?);
     decode_planes(&mut builder.build()?, &planes)
 }
@@ -141,6 +151,27 @@ fn steps_and_noise_are_no_harder_than_for_one_projector() {
     assert!(wrong <= 1.05 * wrong_alone && returned >= 0.97 * returned_alone, "{shares:?}");
 }
 
+/// The joint method has the infrared phase of the ray in its model, for plain and pre-deformed patterns.
+#[test]
+fn the_joint_method_needs_no_coaxial_pair_at_any_depth() {
+    let bench = apart(4, DmdLayout::Regular);
+    let image = bench.predeform(&Light::fringes(30.0, 0.0), 800.0).expect("a depth");
+    let plain = pair_of(&bench);
+    let light = RenderOptions { noise: 0.01, seed: 5, blur_px: 0.7, ..clean() };
+    let shots = [(plain.clone(), None), (plain.predeformed(800.0).expect("a depth"), Some(image.view()))];
+    for (pair, image) in shots {
+        let table = PairTable::new(&bench.camera, &pair, &code(), None).expect("valid pair");
+        let method = Method::joint().with_along_rays(table);
+        for z_mm in DEPTHS_MM {
+            let cast = bench.cast(&Plane::at_z(z_mm));
+            let found =
+                decode_by(method.clone(), &bench, &cast, image.map(Light::Image), &light).expect("a shot");
+            let (lit, returned, wrong) = counts(&found, &cast);
+            assert!(wrong == 0 && returned * 100 > lit * 97, "{z_mm}: {wrong} of {returned} of {lit}");
+        }
+    }
+}
+
 /// The published correction and the search can be combined, because the table includes the pre-deformation.
 #[test]
 fn a_predeformed_image_is_read_both_ways() {
@@ -169,11 +200,16 @@ fn bad_input_is_refused() {
     assert!(pair_of(&bench).predeformed(-800.0).is_err());
     let narrow = quadfringe::Encoding::optimum(16, 400).expect("a valid encoding");
     assert!(PairTable::new(&bench.camera, &pair_of(&bench), &narrow, None).is_err());
-    let plan = |shape| {
-        let published = PublishedOptions::default().with_along_rays(table(None).expect("valid pair"));
-        Decoder::builder(&code(), shape).options(Options::default().with_method(published)).build()
-    };
-    assert!(plan([48, 64]).is_ok());
-    let refused = plan([48, 60]).map(|_| ()).expect_err("another camera").to_string();
-    assert!(refused.contains("camera of the calibrated pair") && refused.contains("[48, 60]"), "{refused}");
+    for method in [Method::published(), Method::joint()] {
+        let method = method.with_along_rays(table(None).expect("valid pair"));
+        let plan = |shape| {
+            Decoder::builder(&code(), shape).options(Options::default().with_method(method.clone())).build()
+        };
+        assert!(plan([48, 64]).is_ok());
+        let refused = plan([48, 60]).map(|_| ()).expect_err("another camera").to_string();
+        assert!(
+            refused.contains("camera of the calibrated pair") && refused.contains("[48, 60]"),
+            "{refused}"
+        );
+    }
 }

@@ -159,13 +159,13 @@ class DecodeConfig(Model):
     )
     unwrapping: Literal["coaxial", "pair"] | None = Field(
         default=None,
-        description='"coaxial" (default) takes the infrared projector as coaxial with the visible one; "pair" searches '
-        "the fringe order along the camera ray with the calibration of both projectors (method published).",
+        description='"coaxial" (default) takes the infrared projector as coaxial with the visible one; "pair" knows '
+        "the infrared fringes along every camera ray from the calibration of both projectors, which may stand apart.",
     )
     depth_range_mm: tuple[Finite, Finite] | None = Field(
         default=None,
         description="Nearest and farthest depth in mm, for every method; points outside are no data, and "
-        'unwrapping = "pair" does not search there. Needs a calibration. Absent: all depths.',
+        'unwrapping = "pair" with method "published" does not search there. Needs a calibration. Absent: all depths.',
     )
     modulation_min: Finite | None = Field(
         default=None,
@@ -215,12 +215,6 @@ class DecodeConfig(Model):
 
     @model_validator(mode="after")
     def _method_has_the_options(self) -> DecodeConfig:
-        if self.unwrapping == "pair" and self.method != "published":
-            got = "the default, joint" if self.method is None else self.method
-            raise ValueError(
-                f'unwrapping = "pair" needs method = "published", and the method is {got}: '
-                "change the method, or leave unwrapping out"
-            )
         if self.albedo and self.method == "published":
             raise ValueError(
                 'albedo needs method = "joint", and the method is published: change the method, or leave albedo out'

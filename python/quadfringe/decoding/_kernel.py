@@ -22,6 +22,7 @@ Size = tuple[int, int]
 # Peak memory of a decoder with two shapes, bytes per pixel, at fringes of 24 px (`pytest tests/test_size_limits.py`
 # holds it). Finer fringes need more: the estimate is to refuse what cannot fit by far, not to promise what does.
 BYTES_PER_PX = {"joint": 150, "published": 75}
+PAIR_BYTES_PER_PX = 50  # of the rays of a pair of projectors, in addition
 
 
 class KernelDecoder:
@@ -158,7 +159,8 @@ def size_of(like: AnyShot | Size, full_scale: float | None) -> tuple[Size, float
 
 
 def _check_size(size: Size, plan: Plan) -> None:
-    require_memory("decoding", size, BYTES_PER_PX[plan.decode.method or "joint"])
+    rays = PAIR_BYTES_PER_PX if plan.decode.unwrapping == "pair" else 0
+    require_memory("decoding", size, BYTES_PER_PX[plan.decode.method or "joint"] + rays)
     period_px = plan.decode.period_px
     if period_px is not None and period_px > max(size):
         raise InputError(

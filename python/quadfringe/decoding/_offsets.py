@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.stages import linear_light
 
@@ -26,8 +27,12 @@ def channels_agree(shape: Shape, shot: AnyShot, plan: Plan) -> bool:
     """Tell whether G and IR show their fringes where the phase of the shape puts them; False with too few tiles."""
     light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
     first, second, third = plan.fringes.numbers
-    channels = ((light["green"], second / first), (light["ir"], third / first))
-    return all(_offset_rad(image, ratio * shape.phase_rad) <= OFFSET_MAX_RAD for image, ratio in channels)
+    per_px = 2 * np.pi * third / plan.projector_width_px
+    channels = (
+        (light["green"], second / first * shape.phase_rad),
+        (light["ir"], (per_px * infrared_column(shape, plan)).astype(np.float32)),
+    )
+    return all(_offset_rad(image, phase_rad) <= OFFSET_MAX_RAD for image, phase_rad in channels)
 
 
 def _offset_rad(image: NDArray[Any], phase_rad: NDArray[Any]) -> float:

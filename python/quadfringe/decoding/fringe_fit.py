@@ -18,7 +18,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.stages import CHANNELS, carrier, linear_light
 
-__all__ = ["Drift", "Fit", "fit_fringes", "infrared_drift", "pixels_of"]
+__all__ = ["Drift", "Fit", "fit_fringes", "infrared_column", "infrared_drift", "pixels_of"]
 
 Map = NDArray[np.float32]
 # Checked by pytest tests/test_doctor.py on shots with known defects.
@@ -184,8 +184,20 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
 
 
 def _phases(shape: Shape, plan: Plan, inside: NDArray[np.bool_]) -> tuple[NDArray[np.float64], ...]:
-    column = shape.column_px[inside].astype(float)
-    return tuple(2 * np.pi * number * column / plan.projector_width_px for number in plan.fringes.numbers)
+    column = shape.column_px.astype(float)
+    columns = (column, column, infrared_column(shape, plan))
+    numbers = zip(plan.fringes.numbers, columns, strict=True)
+    return tuple(2 * np.pi * number * seen[inside] / plan.projector_width_px for number, seen in numbers)
+
+
+def infrared_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:
+    """Give the column (H, W) of the plain infrared fringes at each point, as the decoder takes them to lie.
+
+    It is that of the visible projector, unless the shape was decoded with the calibration of both projectors.
+    """
+    if plan.decode.unwrapping == "pair" and plan.fringes.predeformed_z_mm is None:
+        return _expected_ir_column(shape, plan)
+    return shape.column_px.astype(float)
 
 
 def _expected_ir_column(shape: Shape, plan: Plan) -> NDArray[np.float64]:

@@ -152,3 +152,11 @@ MEDIAN_OF_NORMAL = 0.6745
 CONTRADICTED_SHARE = 0.5
 # Peak memory of a reference measurement beyond its images, bytes per pixel: its maps. Not measured with other inputs.
 STEP_BYTES_PER_PX = 60
+
+# --- A pair of projectors that stand apart
+
+# Ambiguity margin of the fringe numbers along a camera ray, rad, below which a pair is warned of. 36, 35, 30 of coaxial
+# projectors have 1.05. With an infrared projector 50 mm farther from the camera than the visible one it is 0.26, and
+# 0.6 % of steps get a wrong order, in place of 0.06 % with 24 infrared fringes and 1.1 rad; 50 mm nearer it is 0.8 and
+# 0.1 %, in place of none with 40 (`python evaluation/pair.py --half tune --only steps`, and with `--infrared 30`).
+PAIR_MARGIN_RAD = 0.6

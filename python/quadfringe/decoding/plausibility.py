@@ -18,6 +18,7 @@ from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.device_limits import impossible_devices
 from quadfringe.decoding.fringe_fit import pixels_of
+from quadfringe.decoding.pair_numbers import ambiguous_pair
 
 __all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "mirrored", "within_depths"]
 
@@ -118,7 +119,8 @@ def implausible(shape: Shape) -> list[Cause]:
     devices = impossible_devices(shape.calibration, coaxial=_coaxial(shape))
     if any(cause.fatal for cause in devices):
         return devices
-    return [*devices, *_contradicted(shape, shape.calibration)]
+    doubtful = ambiguous_pair(shape)
+    return [*devices, *_contradicted(shape, shape.calibration), *([] if doubtful is None else [doubtful])]
 
 
 def mirrored(shape: Shape) -> Cause | None:

@@ -65,10 +65,8 @@ def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[Kern
     found = _estimate(shot, first, as_captured.plan)
     if found == "linear":
         return linear, first
-    # The joint method also finds a response that is too strong for the published method to decode, but it cannot search
-    # along camera rays.
-    searched = as_captured.plan.decode.unwrapping == "pair"
-    finder = as_captured if searched else as_captured.with_method("joint")
+    # The joint method also finds a response that is too strong for the published method to decode.
+    finder = as_captured.with_method("joint")
     for _ in range(ROUNDS_MAX):
         before = found
         again = _estimate(shot, finder.with_response(before).shape(shot), as_captured.plan)

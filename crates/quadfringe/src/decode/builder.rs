@@ -81,7 +81,13 @@ impl DecoderBuilder {
         options.method.accepts(&encoding)?;
         let four = encoding.four_channel_view()?;
         let engine = match &options.method {
-            Method::Joint(_) => Engine::Joint(Box::new(Joint::new(&four, shape))),
+            Method::Joint(joint) => {
+                let mut engine = Joint::new(&four, shape);
+                if let Some(table) = &joint.along_rays {
+                    engine.unwrap_along_rays(table);
+                }
+                Engine::Joint(Box::new(engine))
+            }
             Method::Published(published) => {
                 let mut engine = Published::new(&four, shape);
                 if let Some(table) = &published.along_rays {

@@ -58,15 +58,12 @@ impl Method {
         }
     }
 
-    /// This method with a search of fringe orders along the camera rays of `table`; for callers that chose the method by
-    /// name.
-    ///
-    /// # Errors
-    /// [`Error::NotOfMethod`] for any method but the published one.
-    pub fn with_along_rays(self, table: PairTable) -> Result<Self> {
+    /// This method for a calibrated pair, with the camera rays of `table`; for callers that chose the method by name.
+    #[must_use]
+    pub fn with_along_rays(self, table: PairTable) -> Self {
         match self {
-            Self::Published(published) => Ok(published.with_along_rays(table).into()),
-            Self::Joint(_) => Err(self.lacks("the search along camera rays", "published")),
+            Self::Published(published) => published.with_along_rays(table).into(),
+            Self::Joint(joint) => joint.with_along_rays(table).into(),
         }
     }
 
@@ -85,7 +82,7 @@ impl Method {
     /// Checks the options of the method for images of `shape` (rows, columns).
     pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
         match self {
-            Self::Joint(joint) => joint.check(),
+            Self::Joint(joint) => joint.check(shape),
             Self::Published(published) => published.check(shape),
         }
     }
@@ -143,13 +140,16 @@ impl From<PublishedOptions> for Method {
 }
 
 /// Options of the joint method.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Clone, Default)]
 #[non_exhaustive]
 pub struct JointOptions {
     /// The middle of the exposure of R, G, B and IR in us, relative to the instant for which the shape is computed;
     /// `None` if all channels are exposed together. Set it if the surface moves and the projector shows its colours one
     /// after another.
     pub channel_instants_us: Option<[f32; 4]>,
+    /// The infrared phase along the camera rays, if both projectors are calibrated. With `None` the two projectors are assumed
+    /// to be coaxial.
+    pub along_rays: Option<Arc<PairTable>>,
 }
 
 impl JointOptions {
@@ -160,7 +160,15 @@ impl JointOptions {
         self
     }
 
-    fn check(&self) -> Result<()> {
+    /// These options for a calibrated pair, whose infrared phase is that of `table`.
+    #[must_use]
+    pub fn with_along_rays(mut self, table: PairTable) -> Self {
+        self.along_rays = Some(Arc::new(table));
+        self
+    }
+
+    fn check(&self, shape: [usize; 2]) -> Result<()> {
+        check_camera(self.along_rays.as_deref(), shape)?;
         let Some(instants) = self.channel_instants_us else { return Ok(()) };
         let expected = match instants {
             _ if instants.iter().any(|t| !t.is_finite()) => Limit::Finite,
@@ -190,13 +198,27 @@ impl PublishedOptions {
     }
 
     fn check(&self, shape: [usize; 2]) -> Result<()> {
-        match &self.along_rays {
-            Some(table) if <[usize; 2]>::from(table.shape()) != shape => {
-                let (rows, columns) = table.shape();
-                Err(Error::shape("camera of the calibrated pair", &shape, &[rows, columns]))
-            }
-            _ => Ok(()),
+        check_camera(self.along_rays.as_deref(), shape)
+    }
+}
+
+/// Checks that a table is for images of `shape` (rows, columns).
+fn check_camera(table: Option<&PairTable>, shape: [usize; 2]) -> Result<()> {
+    match table {
+        Some(table) if <[usize; 2]>::from(table.shape()) != shape => {
+            let (rows, columns) = table.shape();
+            Err(Error::shape("camera of the calibrated pair", &shape, &[rows, columns]))
         }
+        _ => Ok(()),
+    }
+}
+
+/// Leaves out the numbers of the table.
+impl fmt::Debug for JointOptions {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let size = self.along_rays.as_ref().map(|table| table.shape());
+        let mut fields = f.debug_struct("JointOptions");
+        fields.field("channel_instants_us", &self.channel_instants_us).field("along_rays", &size).finish()
     }
 }
 

@@ -5,7 +5,7 @@
 //! demodulate  R and B by two-step phase shifting                                        (S2)
 //!             G and IR: with R and B in one local fit (joint), by Fourier (published)   (S3)
 //! unwrap      fringe orders from neighbourhoods (joint) or pixel by pixel (published)   (S4)
-//!             or along the camera ray, when both projectors are calibrated (published)
+//!             or along the camera ray, when both projectors are calibrated and not coaxial
 //! height      camera ray and projector column -> X, Y, Z                                (S7)
 //! ```
 //!

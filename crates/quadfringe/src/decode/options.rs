@@ -93,10 +93,13 @@ impl Options {
         }
     }
 
-    /// Whether fringe orders are searched along the camera rays of a calibrated pair.
+    /// Whether the infrared phase is that of a calibrated pair along the camera rays.
     #[must_use]
     pub const fn searches_along_rays(&self) -> bool {
-        matches!(&self.method, Method::Published(published) if published.along_rays.is_some())
+        match &self.method {
+            Method::Joint(joint) => joint.along_rays.is_some(),
+            Method::Published(published) => published.along_rays.is_some(),
+        }
     }
 
     /// Checks the options for images of `shape` (rows, columns).

@@ -5,7 +5,8 @@
 //! their difference.
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork, kernel};
-use super::model::{FringeRows, carriers};
+use super::infrared::{Waves, with_waves};
+use super::model::FringeRows;
 use super::params::uncertainty::{
     PAIR_EXCESS_MAX_RAD2, PAIR_NEIGHBOURHOOD, PAIR_SAMPLED_ROWS, PAIR_SHARE_MIN, PAIR_WINDOW,
 };
@@ -58,7 +59,14 @@ impl Agreement {
             |maps, y, sums| {
                 // Offsets and amplitudes of the place of each pixel: those that it has chosen among many were chosen to agree.
                 let fringes = photometry.sample_in_place(scene, y, maps);
-                add_pairs(&fringes, &scene.pixel_row(map, y), scene.rows(y), ratios, sums);
+                let pixels = scene.pixel_row(map, y);
+                with_waves!(scene, y, ratios, |waves| add_pairs(
+                    &fringes,
+                    &pixels,
+                    scene.rows(y),
+                    waves,
+                    sums
+                ));
             },
             |_, [numerator, information, other_numerator, other_information], out| {
                 let pair = Pair { numerator, information };
@@ -104,11 +112,11 @@ struct Pair<'a> {
 
 /// Adds numerator and information of R with B and of G with IR, the albedo eliminated.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_pairs(
+fn add_pairs<W: Waves>(
     fringes: &FringeRows,
     pixels: &PixelRow,
     light: [&[f32]; 4],
-    ratios: [f32; 3],
+    waves: W,
     sums: &mut [[Lanes; 4]],
 ) {
     let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -117,9 +125,10 @@ fn add_pairs(
     for (i, sums) in sums.iter_mut().enumerate() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
+        let vector = waves.vector(i);
         let mut terms = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, 0.0);
+            let carriers = waves.carriers(vector, x, phase[x], 0.0);
             let (mut mm, mut ms) = (1e-9f32, 0.0f32);
             let (mut ds, mut dd, mut dm) = ([0.0f32; 2], [0.0f32; 2], [0.0f32; 2]);
             for c in 0..4 {

@@ -6,14 +6,17 @@ use super::local_fit::{LocalFit, PixelMaps};
 use super::noise::noise_of_phase;
 use super::orders::{Orders, Wrapped};
 use super::params::photometry as params;
+use super::params::shadows::REACH_PX;
 use super::phase::{FitRows, PhaseFit, PhaseModel};
 use super::photometry::{Photometry, PhotometryFit};
 use super::pyramid::Level;
 use super::residuals::Residuals;
-use super::scene::{PhaseMap, ScaledGrid, Scene, Scratch};
+use super::scene::{Frame, PhaseMap, Pixels, ScaledGrid, Scene, Scratch};
+use super::shadows::{Shadows, Where, darken};
 use super::slopes::Slopes;
 use super::smooth::mark_discontinuities;
 use super::window::Window;
+use crate::Reason;
 use crate::encoding::FourChannel;
 
 /// The steps on the coarse level, and their results.
@@ -42,6 +45,7 @@ pub(super) struct CoarseLevel {
     pub photometry: Photometry,
     pub phase_fit: PhaseFit,
     pub residuals: Residuals,
+    pub shadows: Shadows,
 }
 
 impl CoarseLevel {
@@ -62,6 +66,7 @@ impl CoarseLevel {
             photometry: Photometry::new(),
             phase_fit: PhaseFit::default(),
             residuals: Residuals::default(),
+            shadows: Shadows::new(code),
         }
     }
 
@@ -149,6 +154,47 @@ impl CoarseLevel {
         if moving || !self.textured {
             self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
         }
+    }
+
+    /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.
+    pub fn leave_out_shadows(&mut self, level: &mut Level, scaled: ScaledGrid<'_>, ratios: [f32; 3]) {
+        let Self { shadows, phase, modulation, photometry, lit_mask, noise, .. } = self;
+        let map = PhaseMap { phase, modulation };
+        let scene = level.scene(scaled);
+        if scene.pair.is_none() || !shadows.find(&scene, Where::Everywhere, ratios, photometry, map, *noise) {
+            return;
+        }
+        let reach = REACH_PX.div_ceil(scaled.factor);
+        lit_mask.erode(scaled.grid, reach, &mut shadows.excess, &mut shadows.lit);
+        level.restrict(scaled.grid, &shadows.lit);
+        darken(scaled.grid, &shadows.lit, modulation, |_| ());
+    }
+
+    /// The same at full resolution, next to what is dark on the coarse level. Without a coarse level, all is found already.
+    pub fn leave_out_fine_shadows(
+        &mut self,
+        level: &mut Level,
+        frame: &Frame<'_>,
+        ratios: [f32; 3],
+        pixels: &mut Pixels,
+    ) {
+        let Self { shadows, modulation, photometry, lit_mask, noise, .. } = self;
+        let (scene, grid) = (level.scene(frame.full), frame.full.grid);
+        let place = Where::NearDark(frame.coarse.grid, modulation);
+        if scene.pair.is_none()
+            || frame.coarse.factor == 1
+            || !shadows.find(&scene, place, ratios, photometry, pixels.map(), *noise)
+        {
+            return;
+        }
+        lit_mask.erode(grid, REACH_PX, &mut shadows.excess, &mut shadows.lit);
+        level.restrict(grid, &shadows.lit);
+        let Pixels { modulation, reasons, .. } = pixels;
+        darken(grid, &shadows.lit, modulation, |at| {
+            if reasons[at] == Reason::Returned {
+                reasons[at] = Reason::Shadow;
+            }
+        });
     }
 
     /// A fit of the photometry that does not trust the phase.

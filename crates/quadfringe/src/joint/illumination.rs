@@ -5,18 +5,16 @@
 //! from the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
+use super::levels::{LEVEL_MAPS, LevelRows, heights};
 use super::neighbours::{around, least_of_five, least_of_nine, sum_of_nine};
 use super::noise::noise_of_image;
 use super::params::illumination::{HEIGHT_MIN, REACH};
 use super::params::tasks::ROWS;
 use super::scene::ScaledGrid;
-use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, take};
+use crate::parallel::lanes::{Lanes, add, lanes, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
-
-/// Number of maps of cells: bottom and 1 / range^2 for each channel.
-const LEVEL_MAPS: usize = 8;
 
 /// The mask of lit pixels, with its working maps.
 #[derive(Debug, Default)]
@@ -30,6 +28,8 @@ pub(super) struct LitMask {
     pub noise: f32,
     /// Least range of fringes, in linear light.
     pub range_min: f32,
+    /// Whether the infrared light comes from a projector that may light where the visible one does not.
+    visible_alone: bool,
 }
 
 /// Rows of one task.
@@ -42,14 +42,12 @@ struct Rows {
     sums: Vec<f32>,
 }
 
-/// Bottom and range of the light along one row of pixels.
-struct LevelRows<'a> {
-    bottom: [&'a [f32]; 4],
-    /// 1 / range^2.
-    precision: [&'a [f32]; 4],
-}
-
 impl LitMask {
+    /// From now on, only R, G and B decide which pixels are lit.
+    pub fn see_visible_light_alone(&mut self) {
+        self.visible_alone = true;
+    }
+
     /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`.
     pub fn find(
         &mut self,
@@ -85,21 +83,26 @@ impl LitMask {
     /// Computes the mask of the rows from `first` on.
     fn find_rows(&self, grid: &Grid, light: [&[f32]; 4], first: usize, rows: &mut Rows, lit: &mut [f32]) {
         let stride = grid.stride;
-        let Rows { maps, spare, heights, sums } = rows;
+        let Rows { maps, spare, heights: above, sums } = rows;
         let last = first + lit.len() / stride - 1;
         // Beyond the border of the image the rows at the border are used again.
         let [high, mean] =
             [2, 1].map(|reach| first.saturating_sub(reach)..=(last + reach).min(grid.height - 1));
-        heights.resize((ROWS + 4) * stride, 0.0);
+        above.resize((ROWS + 4) * stride, 0.0);
         sums.resize((ROWS + 2) * stride, 0.0);
-        for (y, out) in high.clone().zip(heights.chunks_exact_mut(stride)) {
+        for (y, out) in high.clone().zip(above.chunks_exact_mut(stride)) {
             let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
             let light = light.map(|plane| &plane[y * stride..][..stride]);
-            self::heights(&LevelRows::new(maps), light, self.noise * self.noise, out);
+            let (levels, variance) = (LevelRows::new(maps), self.noise * self.noise);
+            if self.visible_alone {
+                heights::<3>(&levels, light, variance, out);
+            } else {
+                heights::<4>(&levels, light, variance, out);
+            }
         }
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {
-            let near = near(y, *high.start()).map(|at| &heights[at..at + stride]);
+            let near = near(y, *high.start()).map(|at| &above[at..at + stride]);
             sum_of_nine(near, grid.width, spare, out);
         }
         for (y, lit) in (first..=last).zip(lit.chunks_exact_mut(stride)) {
@@ -202,12 +205,6 @@ impl LitMask {
     }
 }
 
-impl<'a> LevelRows<'a> {
-    fn new(maps: [&'a [f32]; LEVEL_MAPS]) -> Self {
-        Self { bottom: [0, 2, 4, 6].map(|k| maps[k]), precision: [1, 3, 5, 7].map(|k| maps[k]) }
-    }
-}
-
 fn lower(from: &[f32], to: &mut [f32]) {
     to.iter_mut().zip(from).for_each(|(t, &f)| *t = if f < *t { f } else { *t });
 }
@@ -222,25 +219,6 @@ fn add_light(inside: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
     let rows = [lanes(inside), r, g, b, ir];
     for (i, sums) in sums.iter_mut().enumerate() {
         add(sums, &take(&rows, i));
-    }
-}
-
-/// Sum over the four channels of the squared height above the bottom, in units of the range, minus the variance of the
-/// noise.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn heights(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mut [f32]) {
-    let (bottom, precision, light) =
-        (levels.bottom.map(lanes), levels.precision.map(lanes), light.map(lanes));
-    for (i, out) in lanes_mut(out).iter_mut().enumerate() {
-        let (bottom, precision, light) = (take(&bottom, i), take(&precision, i), take(&light, i));
-        let mut sum = [0.0; LANES];
-        for c in 0..4 {
-            for x in 0..LANES {
-                let height = light[c][x] - bottom[c][x];
-                sum[x] += (height * height - noise_variance) * precision[c][x];
-            }
-        }
-        *out = sum;
     }
 }
 

@@ -21,7 +21,7 @@ pub(super) fn linear_light<T: Sample>(
 ) {
     let [height, width] = shape;
     let stride = level.lit.len() / height;
-    let Level { light, lit, usable } = level;
+    let Level { light, lit, usable, .. } = level;
     reasons.resize(lit.len(), Reason::Returned);
     let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
     let masks = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));

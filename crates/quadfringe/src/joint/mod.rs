@@ -7,7 +7,7 @@
 //! 4  fringe orders by semi-global matching                               (S4)  orders
 //! 5  photometry: offset and amplitude of every channel                         photometry
 //! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample
-//!    minimum of the energy (J16)                                                energy
+//!    minimum of the energy (J16); shadows of a pair of projectors (J33)         energy; infrared, shadows
 //! 7  motion between the channels (optional)                                    motion
 //! 8  validity: doubtful pixels become no data                                  validity
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement
@@ -26,6 +26,8 @@ mod coarse;
 mod disjoint;
 mod energy;
 mod illumination;
+mod infrared;
+mod levels;
 mod light;
 mod local_fit;
 mod memory;
@@ -41,7 +43,9 @@ mod propagation;
 mod pyramid;
 mod reasons;
 mod residuals;
+mod results;
 mod scene;
+mod shadows;
 mod slopes;
 mod smooth;
 mod uncertainty;
@@ -53,12 +57,14 @@ use crate::condition::{Plan, Sample};
 use crate::decode::options::Options;
 use crate::decode::output::{Decoded, Finish};
 use crate::encoding::FourChannel;
+use crate::height::PairTable;
 use crate::parallel::lanes::LANES;
 use agreement::Agreement;
 use albedo::{Albedo, Known};
-use cells::{Grid, RowMaps};
+use cells::Grid;
 use coarse::CoarseLevel;
 use energy::{Energy, Prior};
+use infrared::PairPhase;
 use light::{fringe_period_px, linear_light};
 use memory::OutputMemory;
 use motion::{Motion, Timing};
@@ -67,8 +73,7 @@ use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
 use phase::PhaseModel;
 use propagation::Propagation;
 use pyramid::{Levels, Pyramid, Upsampler};
-use rayon::prelude::*;
-use reasons::Reasons;
+use results::Results;
 use scene::{Frame, PhaseMap, Pixels};
 use uncertainty::PhaseNoise;
 use validity::{PixelFit, Validity};
@@ -120,6 +125,12 @@ impl Joint {
         }
     }
 
+    /// Makes all later shots take the infrared phase along the camera rays of a pair.
+    pub fn unwrap_along_rays(&mut self, table: &PairTable) {
+        self.pyramid.full.pair = Some(PairPhase::new(table, self.stride));
+        self.coarse.lit_mask.see_visible_light_alone();
+    }
+
     pub fn run<T: Sample>(
         &mut self,
         plan: &Plan,
@@ -147,9 +158,8 @@ impl Joint {
         }
         self.spare = spare;
         // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
-        let (ratios, noise) = (self.ratios, self.coarse.noise);
-        let scene = self.pyramid.full.scene(frame.full);
-        self.energy.minimise(&scene, Prior { ratios, noise }, &mut self.pixels);
+        let prior = Prior { ratios: self.ratios, noise: self.coarse.noise };
+        self.energy.minimise(&self.pyramid.full.scene(frame.full), prior, &mut self.pixels);
         // 8. Validity.
         self.validate(&frame, instants, options.quality_min, out);
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
@@ -173,11 +183,14 @@ impl Joint {
         coarse.fit_fringes(&scene, &level.lit, options.modulation_min);
         // 4. Fringe orders (S4).
         coarse.choose_orders(&scene, *ratios);
+        coarse.leave_out_shadows(level, frame.coarse, *ratios);
         // 5. and 6. Photometry and phase from all four channels, alternating.
+        let scene = level.scene(frame.coarse);
         coarse.refine(&scene, *ratios, moving, memory.scratch.lend());
         pyramid.restore(frame);
         // 6. Phase at full resolution.
         self.upsample(frame, memory);
+        self.coarse.leave_out_fine_shadows(&mut self.pyramid.full, frame, self.ratios, &mut self.pixels);
         self.fit_phase(frame, memory);
     }
 
@@ -266,23 +279,10 @@ impl Joint {
 
     /// Steps 9 and 10, row by row: the maps of the result.
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let scene = self.pyramid.full.scene(frame.full);
-        let grid = scene.grid;
-        let (pixels, validity) = (&self.pixels, &self.validity);
-        let reasons = Reasons { pixels, validity, lit_mask: &self.coarse.lit_mask };
-        out.rows().enumerate().for_each_init(
-            Default::default,
-            |(maps, rows): &mut (RowMaps, energy::Rows), (y, mut row)| {
-                let at = y * grid.stride..y * grid.stride + grid.width;
-                validity::copy_valid(&validity.valid[at.clone()], &pixels.phase[at], row.phase);
-                reasons.write(&scene, y, maps, row.reason);
-                let variance = self.energy.variance(&scene, y, rows);
-                noise.deviations(variance, self.agreement.row(&scene, y, maps), row.sigma);
-                let nodes = &self.wrong_order[y / grid.step * grid.columns..];
-                row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
-                finish.row(y, &mut row);
-            },
-        );
+        let Self { pixels, validity, energy, agreement, wrong_order, coarse, .. } = self;
+        let lit_mask = &coarse.lit_mask;
+        let found = Results { pixels, validity, lit_mask, energy, agreement, wrong_order };
+        found.write(&self.pyramid.full.scene(frame.full), noise, finish, out);
     }
 
     /// Steps 11 and 12, on the maps that step 10 has written.

@@ -35,16 +35,34 @@ pub(super) struct Carriers {
     pub derivative: [f32; 4],
 }
 
+/// The phase of a channel at a pixel, in rad, and its derivative with respect to that of R and B.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Wave {
+    pub phase: f32,
+    pub slope: f32,
+}
+
+impl Wave {
+    /// The wave of a channel with `ratio` fringes for each fringe of R and B, from the same projector or a coaxial one.
+    #[inline(always)]
+    pub fn coaxial(phase: f32, ratio: f32) -> Self {
+        Self { phase: ratio * phase, slope: ratio }
+    }
+}
+
 /// Carriers at an absolute phase in rad. `ratios` are the fringe numbers divided by the first; `loss` is the share of the
 /// contrast of R and B that was lost in averaging pixels.
 #[inline(always)]
-pub(super) fn carriers(phase: f32, [_, second, third]: [f32; 3], loss: f32) -> Carriers {
+pub(super) fn carriers(phase: f32, [_, second, third]: [f32; 3], infrared: Wave, loss: f32) -> Carriers {
     let (s, c) = sin_cos(phase);
     let (s_g, c_g) = sin_cos(second * phase);
-    let (s_ir, c_ir) = sin_cos(third * phase);
+    let (s_ir, c_ir) = sin_cos(infrared.phase);
     let kept = [1.0, second * second, 1.0, third * third].map(|square| contrast(loss * square));
     let scale = |values: [f32; 4]| [0, 1, 2, 3].map(|k| kept[k] * values[k]);
-    Carriers { cosine: scale([c, c_g, -s, c_ir]), derivative: scale([-s, -second * s_g, -c, -third * s_ir]) }
+    Carriers {
+        cosine: scale([c, c_g, -s, c_ir]),
+        derivative: scale([-s, -second * s_g, -c, -infrared.slope * s_ir]),
+    }
 }
 
 /// Share of the contrast that remains after averaging pixels (J1): the expansion to second order in `loss` for a mean over a

@@ -8,7 +8,8 @@
 //! 0 by the change that the model predicts.
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
-use super::model::{FringeRows, carriers};
+use super::infrared::{Waves, with_waves};
+use super::model::FringeRows;
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
 use super::pyramid::Level;
@@ -80,9 +81,9 @@ impl Motion {
         map: PhaseMap<'_>,
     ) {
         self.measure(&level.scene(scaled), timing, photometry, map);
-        let (Level { light, usable, .. }, ScaledGrid { grid, period_px, factor }) = (level, scaled);
+        let (Level { light, usable, pair, .. }, ScaledGrid { grid, period_px, factor }) = (level, scaled);
         let captured = self.captured.each_ref().map(Vec::as_slice);
-        let scene = Scene { light: captured, usable, grid, period_px, factor };
+        let scene = Scene { light: captured, usable, grid, period_px, factor, pair: pair.as_ref() };
         self.compensate(&scene, timing, photometry, map.phase, light.each_mut().map(Vec::as_mut_slice));
     }
 
@@ -96,7 +97,10 @@ impl Motion {
             &mut self.change,
             |rows, y, sums| {
                 let fringes = photometry.sample(scene, y, &mut rows.fringes);
-                add_motion(&fringes, &scene.pixel_row(map, y), scene.rows(y), timing, sums);
+                let (pixels, instants) = (scene.pixel_row(map, y), timing.instants);
+                with_waves!(scene, y, timing.ratios, |waves| {
+                    add_motion(&fringes, &pixels, scene.rows(y), waves, instants, sums);
+                });
             },
             |_, [numerator, information], out| {
                 let found = out.iter_mut().zip(numerator.iter().zip(information));
@@ -129,7 +133,10 @@ impl Motion {
                 let fringes = photometry.sample(scene, y, fringes);
                 let [velocity] = velocity.sample(grid, &self.velocity, 0, y);
                 let moving = MovingRow { phase: scene.row(phase, y), velocity };
-                compensate_row(&fringes, &moving, scene.rows(y), timing, [red, green, blue, infrared]);
+                let (out, instants) = ([red, green, blue, infrared].map(|row| &mut row[..]), timing.instants);
+                with_waves!(scene, y, timing.ratios, |waves| {
+                    compensate_row(&fringes, &moving, scene.rows(y), waves, instants, out);
+                });
             },
         );
     }
@@ -168,11 +175,12 @@ struct MovingRow<'a> {
 
 /// Adds numerator and information of a step of the velocity.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_motion(
+fn add_motion<W: Waves>(
     fringes: &FringeRows,
     pixels: &PixelRow,
     light: [&[f32]; 4],
-    timing: Timing,
+    waves: W,
+    instants: [f32; 4],
     sums: &mut [[Lanes; 2]],
 ) {
     let pixels = [pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -181,17 +189,18 @@ fn add_motion(
     for (i, sums) in sums.iter_mut().enumerate() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
+        let vector = waves.vector(i);
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
             let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
-            let carriers = carriers(phase[x], timing.ratios, 0.0);
+            let carriers = waves.carriers(vector, x, phase[x], 0.0);
             for c in 0..4 {
                 let (a, b) = (offset[c][x], amplitude[c][x]);
                 (m[c], d[c]) = (a + b * carriers.cosine[c], b * carriers.derivative[c]);
             }
             let seen = light.map(|light| light[x]);
             let weight = if modulation[x] > 0.0 { usable[x] } else { 0.0 };
-            let found = motion_terms(m, d, seen, timing.instants, weight);
+            let found = motion_terms(m, d, seen, instants, weight);
             (terms[0][x], terms[1][x]) = (found.numerator, found.information);
         }
         add(sums, &terms);
@@ -234,31 +243,41 @@ fn motion_terms(m: [f32; 4], d: [f32; 4], light: [f32; 4], instants: [f32; 4], u
     MotionTerms { numerator: weight * numerator, information: weight * albedo * information }
 }
 
+/// The cosine of channel `c` at pixel `x` of a vector.
+#[inline(always)]
+fn cosine<W: Waves>(c: usize, waves: W, vector: W::Vector, x: usize, phase: f32) -> f32 {
+    let angle = match c {
+        1 => waves.ratios()[1] * phase,
+        3 => waves.infrared(vector, x, phase).phase,
+        _ => phase,
+    };
+    let (sine, cosine) = sin_cos(angle);
+    if c == 2 { -sine } else { cosine }
+}
+
 /// Light of a row less the change by motion.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn compensate_row(
+fn compensate_row<W: Waves>(
     fringes: &FringeRows,
     moving: &MovingRow,
     light: [&[f32]; 4],
-    Timing { ratios: [_, second, third], instants }: Timing,
+    waves: W,
+    instants: [f32; 4],
     out: [&mut [f32]; 4],
 ) {
     let pixels = [moving.phase, moving.velocity].map(lanes);
     let (offset, amplitude, light) =
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
-    let factors = [1.0, second, 1.0, third];
     for i in 0..pixels[0].len() {
         let (offset, amplitude, mut found) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, velocity] = take(&pixels, i);
+        let vector = waves.vector(i);
         for x in 0..LANES {
             let mut change = [0.0f32; 4];
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
             for c in 0..4 {
-                let fringe = |phase: f32| {
-                    let (s, c_) = sin_cos(factors[c] * phase);
-                    if c == 2 { -s } else { c_ }
-                };
+                let fringe = |phase: f32| cosine(c, waves, vector, x, phase);
                 let moved = fringe(phase[x] + velocity[x] * instants[c]);
                 change[c] = amplitude[c][x] * (moved - fringe(phase[x]));
                 let model = offset[c][x] + amplitude[c][x] * moved;

@@ -4,7 +4,8 @@
 //! over a window that follows the surface.
 
 use super::cells::RowMaps;
-use super::model::{FringeRows, carriers};
+use super::infrared::{Waves, with_waves};
+use super::model::FringeRows;
 use super::neighbours::{around, binomial};
 use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
@@ -151,7 +152,8 @@ impl Rows {
         let fringes = photometry.sample(scene, y, &mut self.maps);
         let loss = window.loss(y, &mut self.losses);
         let pixels = PixelRows { phase: scene.row(phase, y), loss, modulation: window.modulation(y) };
-        predict(&fringes, pixels, scene.rows(y), ratios, &mut self.ring[at]);
+        let out = &mut self.ring[at];
+        with_waves!(scene, y, ratios, |waves| predict(&fringes, pixels, scene.rows(y), waves, out));
     }
 
     /// Computes the normal equations of row `y`, the row `i` of its block, and averages them along the row.
@@ -189,11 +191,11 @@ struct Lit<'a> {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn predict(
+fn predict<W: Waves>(
     fringes: &FringeRows,
     pixels: PixelRows,
     light: [&[f32]; 4],
-    ratios: [f32; 3],
+    waves: W,
     out: &mut ModelRow,
 ) {
     let mut out = out.rows_mut(pixels.phase.len()).map(lanes_mut);
@@ -202,10 +204,10 @@ fn predict(
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     for i in 0..pixels[0].len() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
-        let [phase, loss, lit] = take(&pixels, i);
+        let ([phase, loss, lit], vector) = (take(&pixels, i), waves.vector(i));
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, loss[x]);
+            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
             let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {

@@ -84,7 +84,8 @@ mod tests {
             }
         });
         let light = vec![0.5; grid.pixels()];
-        let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
+        let scene =
+            Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1, pair: None };
         let mut residuals = Residuals::default();
         residuals.measure(&scene, &square, &modulation);
         let mut maps = RowMaps::default();

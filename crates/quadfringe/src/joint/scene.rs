@@ -1,6 +1,7 @@
 //! Input of the steps of the joint method: four planes of light, the mask of usable pixels, and a grid of cells.
 
 use super::cells::Grid;
+use super::infrared::{PairPhase, wave};
 use super::params::pyramid::MOSAIC_REACH_PX;
 use crate::Reason;
 
@@ -51,6 +52,8 @@ pub(super) struct Scene<'a> {
     pub period_px: f64,
     /// Number of camera pixels along a side of a pixel, which is a mean of camera pixels.
     pub factor: usize,
+    /// The infrared phase of a calibrated pair; `None` for coaxial projectors.
+    pub pair: Option<&'a PairPhase>,
 }
 
 /// What is known about the pixels of a shot, in padded rows.
@@ -116,6 +119,15 @@ impl<'a> Scene<'a> {
             phase: self.row(map.phase, y),
             modulation: self.row(map.modulation, y),
             usable: self.row(self.usable, y),
+        }
+    }
+
+    /// The infrared phase at the pixel at `at`; `ratio` is that of coaxial projectors.
+    #[inline(always)]
+    pub fn infrared_phase(&self, at: usize, ratio: f32, phase: f32) -> f32 {
+        match self.pair {
+            None => ratio * phase,
+            Some(pair) => wave(pair.at(at), phase).phase,
         }
     }
 

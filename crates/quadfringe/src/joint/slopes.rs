@@ -191,7 +191,8 @@ mod tests {
         // Beyond column 160 the surface is not lit. Only the wide window reaches across this border.
         let lit: Vec<f32> = (0..grid.pixels()).map(|i| f32::from(u8::from(i % 256 < 160))).collect();
         let light = vec![0.5; grid.pixels()];
-        let scene = Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1 };
+        let scene =
+            Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1, pair: None };
         let mut slopes = Slopes::default();
         slopes.measure(&scene, PhaseMap { phase: &phase, modulation: &lit });
         let (before, beyond) = (slopes.maps.line(12, 0).to_vec(), slopes.at(12, 44));

@@ -9,6 +9,7 @@ mod edges;
 mod texture;
 
 use super::energy::{Energy, FringeRows};
+use super::infrared::{Waves, with_waves};
 use super::params::albedo::ROWS;
 use super::scene::Scene;
 use crate::parallel::angle::sin_cos;
@@ -97,12 +98,14 @@ impl Row {
                 .into_iter()
                 .for_each(|row| row.resize(scene.grid.stride, 0.0));
         }
-        let [first, green, infrared] = known.ratios;
         let contrast = fringes.contrast.each_ref().map(Vec::as_slice);
         let pixels =
             Pixels { phase: scene.row(known.phase, y), usable: scene.row(scene.usable, y), contrast };
         let waves = signal.each_mut().map(Vec::as_mut_slice);
-        modulate(&pixels, [first, green, first, infrared], waves);
+        let [red, green, blue, infrared] = waves;
+        let [first, second, _] = known.ratios;
+        modulate(&pixels, [first, second, first], [red, green, blue]);
+        with_waves!(scene, y, known.ratios, |waves| modulate_infrared(&pixels, waves, infrared));
         let waves = signal.each_ref().map(Vec::as_slice);
         choose(scene.rows(y), waves, fringes, known.noise * known.noise, albedo);
         for (c, light) in scene.rows(y).into_iter().enumerate() {
@@ -127,9 +130,9 @@ struct Pixels<'a> {
     contrast: [&'a [f32]; 4],
 }
 
-/// Writes the light of albedo 1 in four channels; the fringes of B are a quarter period ahead.
+/// Writes the light of albedo 1 in R, G and B; the fringes of B are a quarter period ahead.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn modulate(pixels: &Pixels, ratios: [f32; 4], out: [&mut [f32]; 4]) {
+fn modulate(pixels: &Pixels, ratios: [f32; 3], out: [&mut [f32]; 3]) {
     let Pixels { phase, contrast, .. } = pixels;
     for (c, out) in out.into_iter().enumerate() {
         let known = [lanes(phase), lanes(contrast[c])];
@@ -139,6 +142,20 @@ fn modulate(pixels: &Pixels, ratios: [f32; 4], out: [&mut [f32]; 4]) {
                 let (sine, cosine) = sin_cos(ratios[c] * phase[x]);
                 out[x] = 1.0 + contrast[x] * if c == 2 { -sine } else { cosine };
             }
+        }
+    }
+}
+
+/// The same in IR.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn modulate_infrared<W: Waves>(pixels: &Pixels, waves: W, out: &mut [f32]) {
+    let known = [lanes(pixels.phase), lanes(pixels.contrast[3])];
+    for (at, out) in lanes_mut(out).iter_mut().enumerate() {
+        let [phase, contrast] = take(&known, at);
+        let vector = waves.vector(at);
+        for x in 0..LANES {
+            let (_, cosine) = sin_cos(waves.infrared(vector, x, phase[x]).phase);
+            out[x] = 1.0 + contrast[x] * cosine;
         }
     }
 }

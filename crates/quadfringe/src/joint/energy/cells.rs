@@ -3,6 +3,7 @@
 use super::tile::Tile;
 use crate::Reason;
 use crate::joint::cells::{blend, spread};
+use crate::joint::infrared::wave;
 use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, SPREAD_MAX_RAD, USABLE_MIN};
 use crate::joint::scene::{PhaseMap, Pixels, Scene};
 use crate::parallel::lanes::LANES;
@@ -28,6 +29,8 @@ pub(super) struct Cells {
     inside: Vec<f32>,
     /// 1 for cells whose pixels are all lit, but whose phases lie far apart.
     torn: Vec<f32>,
+    /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
+    infrared: [Vec<f32>; 2],
 }
 
 /// What the fit has found for one cell.
@@ -116,6 +119,29 @@ impl Cells {
                 *usable = if *usable >= USABLE_MIN { *inside } else { 0.0 };
             }
         });
+        self.draw_tangents(scene);
+    }
+
+    /// The tangents of the infrared phase of a pair at the mean phases.
+    fn draw_tangents(&mut self, scene: &Scene<'_>) {
+        let (Self { infrared, phase, stride, factor, .. }, Some(pair)) = (self, scene.pair) else { return };
+        let [offset, slope] = infrared.each_mut().map(|plane| {
+            plane.resize(phase.len(), 0.0);
+            plane.par_chunks_mut(*stride)
+        });
+        let (middle, factor) = (*factor / 2, *factor);
+        let rows = offset.zip(slope).zip(phase.par_chunks(*stride)).enumerate();
+        rows.for_each(|(y, ((offset, slope), phase))| {
+            let terms = pair.terms(scene.grid, y * factor + middle);
+            let out = offset.iter_mut().zip(slope).zip(phase).enumerate();
+            for (x, ((offset, slope), phase)) in out.take(scene.grid.stride / factor) {
+                // The middle of a cell with an even side lies between two pixels.
+                let (here, before) = (x * factor + middle, x * factor + (factor - 1) / 2);
+                let mean = terms.map(|line| 0.5 * (line[here] + line[before]));
+                let found = wave(mean, *phase);
+                (*offset, *slope) = (found.phase - found.slope * phase, found.slope);
+            }
+        });
     }
 
     /// Fills a tile whose first cell is `[top, left]`; gives whether it has any cell that can be used.
@@ -123,6 +149,7 @@ impl Cells {
         let Self { height, width, stride, light, phase, usable, inside, torn, .. } = self;
         let count = SIDE.min(width - left);
         let mut any = false;
+        tile.pair = !self.infrared[0].is_empty();
         for y in 0..SIDE {
             tile.clear(y);
             if top + y >= *height {
@@ -139,6 +166,10 @@ impl Cells {
                 (&mut tile.torn, torn),
             ]);
             planes.for_each(|(to, from)| to.row_mut(y)[..count].copy_from_slice(&from[range.clone()]));
+            if tile.pair {
+                let planes = tile.infrared.iter_mut().zip(&self.infrared);
+                planes.for_each(|(to, from)| to.row_mut(y)[..count].copy_from_slice(&from[range.clone()]));
+            }
             any |= usable[range].iter().any(|&usable| usable > 0.0);
         }
         any

@@ -1,6 +1,6 @@
 //! The data term: residuals of the intensities and their derivatives with respect to the unknowns.
 
-use super::plane::{total, vectors};
+use super::plane::{Plane, total, vectors};
 use super::scales::DataSums;
 use super::tile::Tile;
 use crate::parallel::angle::sin_cos;
@@ -8,11 +8,16 @@ use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
+/// Linearises the intensities at the unknowns of a tile, as `linear`.
+pub(super) fn linearise(tile: &mut Tile) -> DataSums {
+    if tile.pair { linear::<true>(tile) } else { linear::<false>(tile) }
+}
+
 /// Linearises the intensities at the unknowns of a tile. Writes the derivatives, and the negative gradient of the data term into
 /// the residual fields. Returns the sums from which noise and contrasts are estimated.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn linearise(tile: &mut Tile) -> DataSums {
-    let Tile { light, usable, unknown, derivatives, residual, scales, ratios, .. } = tile;
+fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
+    let Tile { light, usable, unknown, derivatives, residual, scales, ratios, infrared, .. } = tile;
     let cut = 1.0 / (16.0 * scales.misfit);
     let mut sums = DataSums::default();
     for at in vectors() {
@@ -26,7 +31,12 @@ pub(super) fn linearise(tile: &mut Tile) -> DataSums {
             let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
             let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
             let cells = Cells { phase, modulation, usable, albedo, light };
-            let model = predict(&cells, c, ratio, scales.channel_contrast[c]);
+            let kept = scales.channel_contrast[c];
+            let model = if PAIR && c == 3 {
+                predicted::<_, false>(&cells, Line::at(infrared, at), kept)
+            } else {
+                predict(&cells, c, ratio, kept)
+            };
             let Gradient { whole, by_albedo, cross, power } = shared.add(&model, cut);
             derivatives.phase[c].set(at, model.slope);
             derivatives.albedo[c].set(at, whole);
@@ -101,20 +111,65 @@ pub(super) struct Model {
 /// Predicts the light of channel `c`. The fringes of B are a quarter period ahead.
 #[inline(always)]
 pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32) -> Model {
-    if c == 2 { predicted::<true>(cells, ratio, kept) } else { predicted::<false>(cells, ratio, kept) }
+    if c == 2 { predicted::<_, true>(cells, ratio, kept) } else { predicted::<_, false>(cells, ratio, kept) }
+}
+
+/// The phase of a channel in a vector of cells.
+pub(super) trait Turns: Copy {
+    fn angle(&self, x: usize, phase: f32) -> f32;
+    fn slope(&self, x: usize) -> f32;
+}
+
+/// A constant number of fringes for each fringe of R and B.
+impl Turns for f32 {
+    #[inline(always)]
+    fn angle(&self, _: usize, phase: f32) -> f32 {
+        self * phase
+    }
+
+    #[inline(always)]
+    fn slope(&self, _: usize) -> f32 {
+        *self
+    }
+}
+
+/// The infrared phase of a pair: the tangent of its cubic at the start.
+#[derive(Clone, Copy)]
+pub(super) struct Line {
+    offset: Lanes,
+    slope: Lanes,
+}
+
+impl Line {
+    #[inline(always)]
+    pub fn at([offset, slope]: &[Plane; 2], at: usize) -> Self {
+        Self { offset: offset.get(at), slope: slope.get(at) }
+    }
+}
+
+impl Turns for Line {
+    #[inline(always)]
+    fn angle(&self, x: usize, phase: f32) -> f32 {
+        self.offset[x] + self.slope[x] * phase
+    }
+
+    #[inline(always)]
+    fn slope(&self, x: usize) -> f32 {
+        self.slope[x]
+    }
 }
 
 #[inline(always)]
-fn predicted<const QUADRATURE: bool>(cells: &Cells, ratio: f32, kept: f32) -> Model {
+pub(super) fn predicted<T: Turns, const QUADRATURE: bool>(cells: &Cells, turns: T, kept: f32) -> Model {
     let Cells { phase, modulation, usable, albedo, light } = cells;
     let [mut offset, mut fringe, mut slope, mut rest] = [[0.0; LANES]; 4];
     for x in 0..LANES {
-        let (sine, cosine) = sin_cos(ratio * phase[x]);
+        let (sine, cosine) = sin_cos(turns.angle(x, phase[x]));
         let (sine, cosine) = if QUADRATURE { (cosine, -sine) } else { (sine, cosine) };
         offset[x] = usable[x] * exp(albedo[x]);
         let amplitude = offset[x] * modulation[x] * kept;
         fringe[x] = amplitude * cosine;
-        slope[x] = -ratio * amplitude * sine;
+        slope[x] = -turns.slope(x) * amplitude * sine;
         rest[x] = usable[x] * light[x] - offset[x] - fringe[x];
     }
     Model { offset, fringe, slope, rest }

@@ -171,10 +171,24 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
 /// energies are sums over the scales that either start has found, so that neither is preferred.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    let Tile { light, usable, inside, torn, ratios, scales: found, unknown, first, product, lit, .. } = tile;
+    let Tile {
+        light,
+        usable,
+        inside,
+        torn,
+        ratios,
+        pair,
+        infrared,
+        scales: found,
+        unknown,
+        first,
+        product,
+        lit,
+        ..
+    } = tile;
     let [_, near, spare, ..] = product.planes_mut();
     continue_through(inside, torn, lit, [near, spare]);
-    let given = Given { light, usable, inside, continued: lit, ratios: *ratios };
+    let given = Given { light, usable, inside, continued: lit, ratios: *ratios, pair: *pair, infrared };
     let [gain, around, spare, ..] = product.planes_mut();
     gain.clear();
     for scales in [scales, found] {

@@ -1,5 +1,6 @@
 //! The start: contrast and albedo that explain the light with the phase as it is.
 
+use super::data::{Line, Turns};
 use super::plane::{Plane, STRIDE, total, vectors};
 use super::tile::Tile;
 use crate::joint::params::energy::{ALBEDO_LIMITS, CONTRAST_START_LIMITS, START_ROUNDS};
@@ -22,7 +23,12 @@ pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
     tile.scales.channel_contrast = [1.0; 4];
     let mut contrast = [1.0; 4];
     for c in 0..4 {
-        carrier(tile, c);
+        if c == 3 && tile.pair {
+            carrier(tile, c, |tile, at| Line::at(&tile.infrared, at));
+        } else {
+            let ratio = [tile.ratios[0], tile.ratios[1], tile.ratios[0], tile.ratios[2]][c];
+            carrier(tile, c, |_, _| ratio);
+        }
         for round in 0..START_ROUNDS {
             contrast[c] = contrast_of(tile, c, round == 0);
             albedo(tile, c, contrast[c], of);
@@ -37,13 +43,12 @@ pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
 
 /// Writes the carrier of a channel into a working plane.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn carrier(tile: &mut Tile, channel: usize) {
-    let ratio = [tile.ratios[0], tile.ratios[1], tile.ratios[0], tile.ratios[2]][channel];
+fn carrier<T: Turns, F: Fn(&Tile, usize) -> T>(tile: &mut Tile, channel: usize, turns: F) {
     for at in vectors() {
-        let phase = tile.unknown.phase.get(at);
+        let (phase, turns) = (tile.unknown.phase.get(at), turns(tile, at));
         let mut out = [0.0; LANES];
         for x in 0..LANES {
-            let (sine, cosine) = sin_cos(ratio * phase[x]);
+            let (sine, cosine) = sin_cos(turns.angle(x, phase[x]));
             out[x] = if channel == 2 { -sine } else { cosine };
         }
         tile.product.phase.set(at, out);

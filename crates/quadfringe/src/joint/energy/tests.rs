@@ -117,9 +117,10 @@ fn cost_of_an_island(shadow: bool) -> f64 {
     }
     let smooth = Fields { phase: truth, ..Fields::default() };
     let [mut continued, mut near, mut spare, mut cost] = [(); 4].map(|()| Plane::default());
-    let Tile { light, usable, inside, torn, ratios, scales, .. } = &tile;
+    let Tile { light, usable, inside, torn, ratios, infrared, scales, .. } = &tile;
     continue_through(inside, torn, &mut continued, [&mut near, &mut spare]);
-    let given = Given { light, usable, inside, continued: &continued, ratios: *ratios };
+    let given =
+        Given { light, usable, inside, continued: &continued, ratios: *ratios, pair: false, infrared };
     add_energy(1.0, &given, &island, scales, &mut cost);
     add_energy(-1.0, &given, &smooth, scales, &mut cost);
     vectors().map(|at| total(cost.get(at))).sum()

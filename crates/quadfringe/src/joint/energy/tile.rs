@@ -34,6 +34,10 @@ pub(super) struct Tile {
     pub torn: Plane,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 3],
+    /// Whether the infrared phase is that of a calibrated pair; then its value and slope at a phase of 0, by the tangent of its
+    /// cubic at the start.
+    pub pair: bool,
+    pub infrared: [Plane; 2],
     pub scales: Scales,
     pub unknown: Fields,
     /// Unknowns from the first start, and the lit cells, while there is a second start.
@@ -59,6 +63,8 @@ impl Tile {
             &mut self.inside,
             &mut self.torn,
         ]);
+        let pair = if self.pair { &mut self.infrared[..] } else { &mut [] };
+        let planes = planes.chain(pair);
         planes.for_each(|plane| plane.row_mut(row).fill(0.0));
     }
 }

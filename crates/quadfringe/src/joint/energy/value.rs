@@ -1,7 +1,7 @@
 //! The energy of every cell (J16): the data, and the priors of the differences that begin at the cell. Second differences that
 //! reach a torn cell count by themselves.
 
-use super::data::{Cells, predict};
+use super::data::{Cells, Line, predict, predicted};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
 use super::priors::{COUNT, FREEDOM, bending, squares};
 use super::scales::Scales;
@@ -18,21 +18,25 @@ pub(super) struct Given<'a> {
     /// 1 for lit cells, and for torn ones through which the surface may continue.
     pub continued: &'a Plane,
     pub ratios: [f32; 3],
+    pub pair: bool,
+    pub infrared: &'a [Plane; 2],
 }
 
 /// Adds `sign` times the energy of the cells for these unknowns and scales.
+pub(super) fn add_energy(sign: f32, given: &Given<'_>, unknown: &Fields, scales: &Scales, out: &mut Plane) {
+    if given.pair {
+        add::<true>(sign, given, unknown, scales, out);
+    } else {
+        add::<false>(sign, given, unknown, scales, out);
+    }
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn add_energy<'a>(
-    sign: f32,
-    given: &Given<'a>,
-    unknown: &Fields,
-    scales: &Scales,
-    out: &mut Plane,
-) {
+fn add<const PAIR: bool>(sign: f32, given: &Given<'_>, unknown: &Fields, scales: &Scales, out: &mut Plane) {
     let inside = given.inside;
     for at in vectors() {
         let here = Column::of(unknown, at);
-        let data = data(given, &here, scales, at);
+        let data = data::<PAIR>(given, &here, scales, at);
         let [bend, all] = [inside, given.continued].map(|cells| bending(cells, &unknown.phase, at));
         let mut sum = [0.0; LANES];
         for x in 0..LANES {
@@ -56,7 +60,7 @@ pub(super) fn add_energy<'a>(
 
 /// Half the squared residuals over the variance of the noise.
 #[inline(always)]
-fn data(given: &Given<'_>, here: &Column, scales: &Scales, at: usize) -> Lanes {
+fn data<const PAIR: bool>(given: &Given<'_>, here: &Column, scales: &Scales, at: usize) -> Lanes {
     let (usable, half, ratios) = (given.usable.get(at), 0.5 / scales.noise, given.ratios);
     let (mut out, mut modulation) = ([0.0; LANES], [0.0; LANES]);
     for x in 0..LANES {
@@ -66,7 +70,13 @@ fn data(given: &Given<'_>, here: &Column, scales: &Scales, at: usize) -> Lanes {
         let (albedo, light) = (here.albedo[c], given.light[c].get(at));
         let cells = Cells { phase: here.phase, modulation, usable, albedo, light };
         let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
-        let rest = predict(&cells, c, ratio, scales.channel_contrast[c]).rest;
+        let kept = scales.channel_contrast[c];
+        let model = if PAIR && c == 3 {
+            predicted::<_, false>(&cells, Line::at(given.infrared, at), kept)
+        } else {
+            predict(&cells, c, ratio, kept)
+        };
+        let rest = model.rest;
         for x in 0..LANES {
             out[x] += half * rest[x] * rest[x];
         }

@@ -117,6 +117,7 @@ impl Block {
         let node = cell.row * grid.columns + cell.column;
         let (phase, whole) = (nodes.phase[node], nodes.absolute(node));
         let fringes = wrapped.cell(scene, cell.row, cell.column);
+        let predicted = Predicted { scene, fringes: &fringes, ratios_g_ir: nodes.ratios_g_ir };
         self.costs.clear();
         for i in 0..side * side {
             let y = (cell.row * step + i / side).saturating_sub(1).min(grid.height - 1);
@@ -125,12 +126,9 @@ impl Block {
             let mut costs = [0.0; CANDIDATES];
             if wrapped.map.modulation[at] > 0.0 {
                 let wrapped_phase = wrapped.map.phase[at];
-                let pixel = Pixel {
-                    wrapped_phase,
-                    absolute_phase: whole + wrap(wrapped_phase - phase),
-                    light: scene.light.map(|plane| plane[at]),
-                };
-                add_costs(&pixel, &fringes, nodes.ratios_g_ir, candidates.turns(), &mut costs);
+                let absolute_phase = whole + wrap(wrapped_phase - phase);
+                let pixel = Pixel { at, wrapped_phase, absolute_phase };
+                add_costs(&pixel, &predicted, candidates.turns(), &mut costs);
             }
             self.costs.push(costs);
         }
@@ -148,21 +146,31 @@ impl Block {
 
 /// One pixel, with its absolute phase by the order of its cell.
 struct Pixel {
+    /// Index into the planes of the scene.
+    at: usize,
     wrapped_phase: f32,
     absolute_phase: f32,
-    light: [f32; 4],
+}
+
+/// What predicts the light of the pixels of a cell.
+struct Predicted<'a> {
+    scene: &'a Scene<'a>,
+    fringes: &'a CellFringes,
+    ratios_g_ir: [f32; 2],
 }
 
 /// Adds for every candidate the squared differences between the observed and the predicted cosines of G and IR.
-fn add_costs(pixel: &Pixel, fringes: &CellFringes, ratios_g_ir: [f32; 2], turns: &[f32], costs: &mut [f32]) {
-    let CellFringes { offset, amplitude } = fringes;
-    let light = pixel.light;
+fn add_costs(pixel: &Pixel, predicted: &Predicted<'_>, turns: &[f32], costs: &mut [f32]) {
+    let Predicted { scene, fringes: CellFringes { offset, amplitude }, ratios_g_ir } = predicted;
+    let light = scene.light.map(|plane| plane[pixel.at]);
     let red_blue = |values: &[f32; 4]| [values[0], values[2]];
     let albedo = albedo(pixel.wrapped_phase, red_blue(&light), red_blue(offset), red_blue(amplitude));
-    for (c, ratio) in [1, 3].into_iter().zip(ratios_g_ir) {
+    for (c, ratio) in [1, 3].into_iter().zip(*ratios_g_ir) {
         let seen = observed_cosine(light[c], albedo, offset[c], amplitude[c]);
         for (cost, turns) in costs.iter_mut().zip(turns) {
-            let (_, predicted) = sin_cos(ratio * (pixel.absolute_phase + TAU * turns));
+            let phase = pixel.absolute_phase + TAU * turns;
+            let angle = if c == 3 { scene.infrared_phase(pixel.at, ratio, phase) } else { ratio * phase };
+            let (_, predicted) = sin_cos(angle);
             *cost += (seen - predicted).powi(2).min(PIXEL_COST_MAX);
         }
     }

@@ -4,6 +4,7 @@
 use super::matching::{CosineSums, NodeEvidence};
 use super::wrapped::Wrapped;
 use crate::joint::cells::RowMaps;
+use crate::joint::infrared::{Waves, with_waves};
 use crate::joint::local_fit::Beats;
 use crate::joint::model::FringeRows;
 use crate::joint::params::orders::{LIT_WEIGHT, OBSERVED_COSINE_MAX, SAMPLED_ROWS};
@@ -15,6 +16,15 @@ use multiversion::multiversion;
 /// Number of sums over the pixels of a node: the number of pixels, then s^2, s cos f, s sin f, cos 2f, sin 2f for G and
 /// for IR.
 const SUMS: usize = 11;
+
+/// The fringe numbers of an encoding.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ratios {
+    /// Fringe numbers divided by the first.
+    pub ratios: [f32; 3],
+    /// Phase of the middle order at a wrapped phase of 0.
+    pub middle_rad: f32,
+}
 
 /// Working rows of one task.
 #[derive(Debug, Default)]
@@ -73,15 +83,20 @@ pub(super) fn node_phases(scene: &Scene<'_>, wrapped: &Wrapped<'_>, row: usize, 
 pub(super) fn row_evidence(
     scene: &Scene<'_>,
     wrapped: &Wrapped<'_>,
-    ratios_g_ir: [f32; 2],
+    ratios: Ratios,
     row: usize,
     nodes: &[f32],
     rows: &mut EvidenceRows,
     out: &mut Vec<NodeEvidence>,
 ) {
-    gather(scene, wrapped, ratios_g_ir, row, nodes, rows);
+    gather(scene, wrapped, ratios, row, nodes, rows);
     let beats = wrapped.fit.beats(row);
-    out.extend((0..nodes.len()).map(|x| evidence(nodes[x], &beats, &rows.cells, x)));
+    let (grid, half) = (scene.grid, scene.grid.step / 2);
+    let middle = (row * grid.step + half).min(grid.height - 1) * grid.stride + half;
+    out.extend((0..nodes.len()).map(|x| {
+        let infrared = scene.pair.map(|pair| pair.at(middle + x * grid.step));
+        NodeEvidence { infrared, ..evidence(nodes[x], &beats, &rows.cells, x) }
+    }));
 }
 
 /// Computes the sums over the pixels of each node of a row into `rows.cells`. The first sum is the number of usable lit
@@ -89,7 +104,7 @@ pub(super) fn row_evidence(
 fn gather(
     scene: &Scene<'_>,
     wrapped: &Wrapped<'_>,
-    ratios_g_ir: [f32; 2],
+    ratios: Ratios,
     row: usize,
     nodes: &[f32],
     rows: &mut EvidenceRows,
@@ -103,7 +118,10 @@ fn gather(
     for y in grid.samples(row, SAMPLED_ROWS) {
         let fringes = wrapped.fringes(scene, y, maps);
         let pixels = scene.pixel_row(wrapped.map, y);
-        add_cosines(node_phase, &pixels, scene.rows(y), &fringes, ratios_g_ir, sums);
+        with_waves!(scene, y, ratios.ratios, |waves| {
+            let origin_rad = waves.origin_rad(ratios.middle_rad);
+            add_cosines(node_phase, &pixels, scene.rows(y), &fringes, waves, origin_rad, sums);
+        });
     }
     for (k, line) in cells.iter_mut().enumerate() {
         line.resize(grid.columns, 0.0);
@@ -112,12 +130,13 @@ fn gather(
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_cosines(
+fn add_cosines<W: Waves>(
     node_phase: &[f32],
     pixels: &PixelRow,
     light: [&[f32]; 4],
     fringes: &FringeRows,
-    ratios_g_ir: [f32; 2],
+    waves: W,
+    origin_rad: f32,
     sums: &mut [[Lanes; SUMS]],
 ) {
     let pixels = [node_phase, pixels.phase, pixels.modulation, pixels.usable].map(lanes);
@@ -126,6 +145,7 @@ fn add_cosines(
     for (i, sums) in sums.iter_mut().enumerate() {
         let [node, phase, modulation, usable] = take(&pixels, i);
         let (light, offset, amplitude) = (take(&light, i), take(&offset, i), take(&amplitude, i));
+        let (ratios, vector) = (waves.ratios(), waves.vector(i));
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
@@ -136,10 +156,11 @@ fn add_cosines(
             let unwrapped = node[x] + wrap(phase[x] - node[x]);
             let red_blue = |rows: &[Lanes; 4]| [rows[0][x], rows[2][x]];
             let albedo = albedo(phase[x], red_blue(&light), red_blue(&offset), red_blue(&amplitude));
+            let angles = [ratios[1] * unwrapped, waves.infrared(vector, x, unwrapped + origin_rad).phase];
             for beat in 0..2 {
                 let c = 2 * beat + 1;
                 let s = observed_cosine(light[c][x], albedo, offset[c][x], amplitude[c][x]);
-                let (sine, cos) = sin_cos(ratios_g_ir[beat] * unwrapped);
+                let (sine, cos) = sin_cos(angles[beat]);
                 let values = [s * s, s * cos, s * sine, cos * cos - sine * sine, 2.0 * sine * cos];
                 for k in 0..5 {
                     terms[1 + 5 * beat + k][x] = weight * values[k];
@@ -164,5 +185,6 @@ fn evidence(phase: f32, beats: &Beats<'_>, cells: &[Vec<f32>; SUMS], x: usize) -
         cosines: [cosines(1), cosines(6)],
         pixels: cells[0][x].floor(),
         lit: cells[0][x] > 0.0,
+        infrared: None,
     }
 }

@@ -19,7 +19,7 @@ use crate::encoding::FourChannel;
 use crate::parallel::angle::wrap;
 use crate::parallel::slots::Slots;
 use candidates::{Block, Candidates, Cell, Nodes};
-use evidence::{EvidenceRows, node_phases, row_evidence};
+use evidence::{EvidenceRows, Ratios, node_phases, row_evidence};
 use matching::Matching;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
@@ -58,10 +58,12 @@ impl Orders {
             .par_chunks_mut(grid.columns)
             .enumerate()
             .for_each(|(row, phase)| node_phases(scene, wrapped, row, phase));
-        let (phase, ratios_g_ir, slots) = (&self.phase, self.ratios_g_ir, &self.slots);
+        let (phase, slots) = (&self.phase, &self.slots);
+        let [green, infrared] = self.ratios_g_ir;
+        let ratios = Ratios { ratios: [1.0, green, infrared], middle_rad: self.matching.middle_rad() };
         self.matching.choose([grid.rows, grid.columns], jump_nodes(scene), |row, out| {
             let nodes = &phase[row * grid.columns..][..grid.columns];
-            row_evidence(scene, wrapped, ratios_g_ir, row, nodes, &mut slots.take(), out);
+            row_evidence(scene, wrapped, ratios, row, nodes, &mut slots.take(), out);
         });
         self.settle_surfaces(scene, wrapped.slopes);
         let this = &*self;
@@ -166,7 +168,8 @@ mod tests {
     #[test]
     fn the_jump_price_scales_with_the_period_between_its_bounds() {
         let grid = Grid::new([96, 256], 4.0);
-        let scene = |period_px| Scene { light: [&[]; 4], usable: &[], grid: &grid, period_px, factor: 1 };
+        let scene =
+            |period_px| Scene { light: [&[]; 4], usable: &[], grid: &grid, period_px, factor: 1, pair: None };
         let prices = [1.0, 16.0, 32.0, 1000.0].map(|period_px| jump_nodes(&scene(period_px)));
         assert_eq!(prices, [JUMP_NODES_MIN, 5.0, 10.0, JUMP_NODES_MAX]);
     }

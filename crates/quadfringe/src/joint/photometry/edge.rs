@@ -1,7 +1,7 @@
 //! For tests: an edge between two textures, and the cells that a fit in windows would give.
 
 use crate::joint::cells::{CellMaps, Grid};
-use crate::joint::model::carriers;
+use crate::joint::model::{Wave, carriers};
 use crate::joint::scene::Scene;
 use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::{Pcg64Mcg, rand_core::SeedableRng};
@@ -32,7 +32,8 @@ impl Edge {
         let light = std::array::from_fn(|c| {
             let clean = |i: usize| {
                 let [a, b] = [2 * c, 2 * c + 1].map(|k| textures[usize::from(i % 256 >= EDGE)][k]);
-                ALBEDO * (a + b * carriers(phase[i], RATIOS, 0.0).cosine[c])
+                ALBEDO
+                    * (a + b * carriers(phase[i], RATIOS, Wave::coaxial(phase[i], RATIOS[2]), 0.0).cosine[c])
             };
             let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
             (0..grid.pixels()).map(|i| clean(i) + noise * draw()).collect()
@@ -51,7 +52,7 @@ impl Edge {
 
     pub fn scene<'a>(&'a self, usable: &'a [f32]) -> Scene<'a> {
         let light = self.light.each_ref().map(Vec::as_slice);
-        Scene { light, usable, grid: &self.grid, period_px: f64::from(PERIOD_PX), factor: 1 }
+        Scene { light, usable, grid: &self.grid, period_px: f64::from(PERIOD_PX), factor: 1, pair: None }
     }
 
     /// A plane that has the same value everywhere.

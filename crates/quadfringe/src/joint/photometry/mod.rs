@@ -14,6 +14,7 @@ mod solve;
 mod tests;
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
+use super::infrared::with_waves;
 use super::local_fit::LocalFit;
 use super::model::{CellFringes, FringeRows, contrast};
 use super::params::photometry::{CELL, NEIGHBOURHOOD, OTHER_TEXTURE_MIN, OTHER_TEXTURE_NOISES, WINDOW};
@@ -147,19 +148,13 @@ impl Photometry {
             |rows, y, sums| {
                 let Rows { maps: model, losses, usable } = rows;
                 let model = model.sample::<8>(grid, maps, 0, y);
-                usable.clear();
-                usable.extend_from_slice(scene.row(scene.usable, y));
-                choice.leave_out(y, usable);
-                if lit_share_min > 0.0 {
-                    let shares = slopes.lit(scene, y, losses).iter();
-                    usable.iter_mut().zip(shares).for_each(|(usable, &lit)| {
-                        *usable = if lit >= lit_share_min { *usable } else { 0.0 };
-                    });
-                }
+                take_part(scene, choice, slopes, lit_share_min, y, losses, usable);
                 let [phase, modulation] = [phase, modulation].map(|plane| scene.row(plane, y));
                 let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
                 let limits = [4.0 * misfit_max * misfit_max, phase_trust];
-                add_projected(model, pixels, scene.rows(y), ratios, limits, sums);
+                with_waves!(scene, y, ratios, |waves| {
+                    add_projected(model, pixels, scene.rows(y), waves, limits, sums);
+                });
             },
             |row, sums, out| {
                 let before: [&[f32]; 8] = std::array::from_fn(|k| maps.line(row, k));
@@ -182,6 +177,27 @@ impl Photometry {
             |row, k| Some(fitted.line(row, k)),
             |row, wide, out| blend(threshold, std::array::from_fn(|k| fitted.line(row, k)), wide, out),
         );
+    }
+}
+
+/// Writes which pixels of row `y` take part in a fit.
+fn take_part(
+    scene: &Scene<'_>,
+    choice: &Choice,
+    slopes: &Slopes,
+    lit_share_min: f32,
+    y: usize,
+    maps: &mut RowMaps,
+    usable: &mut Vec<f32>,
+) {
+    usable.clear();
+    usable.extend_from_slice(scene.row(scene.usable, y));
+    choice.leave_out(y, usable);
+    if lit_share_min > 0.0 {
+        let shares = slopes.lit(scene, y, maps).iter();
+        usable.iter_mut().zip(shares).for_each(|(usable, &lit)| {
+            *usable = if lit >= lit_share_min { *usable } else { 0.0 };
+        });
     }
 }
 

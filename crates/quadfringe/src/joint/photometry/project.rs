@@ -1,16 +1,17 @@
 //! Terms of the pixels in the normal equations, without the directions of albedo and phase.
 
 use super::solve::{MATRIX, SUMS};
-use crate::joint::model::carriers;
+use crate::joint::infrared::Waves;
+use crate::joint::model::{Wave, carriers};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn add_projected(
+pub(super) fn add_projected<W: Waves>(
     model: [&[f32]; 8],
     pixels: [&[f32]; 4],
     light: [&[f32]; 4],
-    ratios: [f32; 3],
+    waves: W,
     limits: [f32; 2],
     sums: &mut [[Lanes; SUMS]],
 ) {
@@ -18,12 +19,14 @@ pub(super) fn add_projected(
     for (i, sums) in sums.iter_mut().enumerate() {
         let (model, light) = (take(&model, i), take(&light, i));
         let [phase, modulation, usable, loss] = take(&pixels, i);
+        let (ratios, vector) = (waves.ratios(), waves.vector(i));
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
             let pixel = [phase[x], modulation[x], usable[x], loss[x]];
-            let pixel_terms = project(model, pixel, seen, ratios, limits);
+            let infrared = waves.infrared(vector, x, phase[x]);
+            let pixel_terms = project(model, pixel, seen, (ratios, infrared), limits);
             for k in 0..SUMS {
                 terms[k][x] = pixel_terms[k];
             }
@@ -39,10 +42,10 @@ fn project(
     model: [f32; 8],
     [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
-    ratios: [f32; 3],
+    (ratios, infrared): ([f32; 3], Wave),
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
-    let carriers = carriers(phase, ratios, loss);
+    let carriers = carriers(phase, ratios, infrared, loss);
     let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
     let (mut mm, mut md, mut dd, mut ms) = (1e-9f32, 0.0f32, 1e-9f32, 0.0f32);
     for c in 0..4 {

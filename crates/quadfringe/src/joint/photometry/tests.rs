@@ -1,6 +1,6 @@
 use super::edge::{EDGE, Edge, RATIOS};
 use super::*;
-use crate::joint::model::carriers;
+use crate::joint::model::{Wave, carriers};
 use std::f32::consts::TAU;
 
 fn free_fit(misfit_max: f32) -> PhotometryFit {
@@ -42,11 +42,16 @@ fn offsets_and_amplitudes_are_found_under_texture_and_an_error_of_the_phase() {
     let fringes = [[0.5, 0.4], [0.45, 0.38], [0.55, 0.42], [0.4, 0.37]];
     let planes: [Vec<f32>; 4] = std::array::from_fn(|c| {
         let [a, b] = fringes[c];
-        (0..grid.pixels()).map(|i| texture(i) * (a + b * carriers(truth[i], RATIOS, 0.0).cosine[c])).collect()
+        (0..grid.pixels())
+            .map(|i| {
+                texture(i)
+                    * (a + b * carriers(truth[i], RATIOS, Wave::coaxial(truth[i], RATIOS[2]), 0.0).cosine[c])
+            })
+            .collect()
     });
     let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
     let light = planes.each_ref().map(Vec::as_slice);
-    let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+    let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
     let (mut fit, mut found, slopes) = (LocalFit::default(), Photometry::new(), Slopes::flat(&grid));
     let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
     let maps = crate::joint::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };

@@ -5,6 +5,7 @@ mod upsample;
 pub(in crate::joint) use upsample::{Levels, Upsampler};
 
 use crate::joint::cells::Grid;
+use crate::joint::infrared::PairPhase;
 use crate::joint::params::pyramid::{COARSE_PERIOD_MIN_PX, FACTOR_MAX};
 use crate::joint::scene::{Frame, ScaledGrid, Scene};
 use crate::parallel::lanes::{LANES, lanes, lanes_mut};
@@ -64,6 +65,8 @@ pub(in crate::joint) struct Level {
     pub lit: Vec<f32>,
     /// 1 for pixels that may take part in a fit: not saturated, seen by both chips.
     pub usable: Vec<f32>,
+    /// The infrared phase of a calibrated pair; `None` for coaxial projectors.
+    pub pair: Option<PairPhase>,
 }
 
 impl Level {
@@ -75,7 +78,7 @@ impl Level {
     /// The level as a scene with a grid of cells.
     pub fn scene<'a>(&'a self, ScaledGrid { grid, period_px, factor }: ScaledGrid<'a>) -> Scene<'a> {
         let light = self.light.each_ref().map(Vec::as_slice);
-        Scene { light, usable: &self.usable, grid, period_px, factor }
+        Scene { light, usable: &self.usable, grid, period_px, factor, pair: self.pair.as_ref() }
     }
 
     /// Removes the pixels where the mask `illuminated` is 0.
@@ -94,6 +97,9 @@ impl Level {
     /// light comes from the last row repeated, or from the existing columns. `grid` is the grid of this level.
     pub fn shrink(&mut self, fine: &Self, grid: &Grid, fine_grid: &Grid, factor: usize) {
         self.resize(grid.pixels());
+        if let Some(pair) = &fine.pair {
+            self.pair.get_or_insert_default().shrink(pair, grid, fine_grid);
+        }
         let planes = self.light.each_mut().map(|plane| plane.par_chunks_mut(grid.stride));
         let [red, green, blue, infrared] = planes;
         let masks = self.lit.par_chunks_mut(grid.stride).zip(self.usable.par_chunks_mut(grid.stride));

@@ -5,7 +5,8 @@
 
 use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
-use crate::joint::model::{CellFringes, carriers};
+use crate::joint::infrared::{Coaxial, Gathered, Waves};
+use crate::joint::model::CellFringes;
 use crate::joint::neighbours::around;
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
@@ -200,12 +201,14 @@ impl CoarseRow<'_> {
         for vector in 0..(side * side).div_ceil(LANES) {
             let (mut light, mut lit) = ([[0.0; LANES]; 4], [0.0; LANES]);
             let [mut place_x, mut place_y] = [[0.0; LANES]; 2];
+            let mut gathered = Gathered::default();
             for k in 0..LANES.min(side * side - vector * LANES) {
                 let i = vector * LANES + k;
                 let x = (first_x + i % side).saturating_sub(1).min(grid.width - 1);
                 let y = (first_y + i / side).saturating_sub(1).min(grid.height - 1);
                 let at = y * grid.stride + x;
                 lit[k] = mask[at];
+                fine.pair.into_iter().for_each(|pair| gathered.set(k, pair, at));
                 light.iter_mut().zip(fine.light).for_each(|(light, plane)| light[k] = plane[at]);
                 (place_x[k], place_y[k]) = (x as f32 - first_x as f32, y as f32 - first_y as f32);
             }
@@ -215,8 +218,11 @@ impl CoarseRow<'_> {
                     phase[x] = surface.at(place_x[x], place_y[x]);
                 }
                 let pixels = Pixels { phase, lit, light: &light, modulation: surface.modulation };
-                let squared_residual = &mut around.squared_residuals[vector][k];
-                explain(&pixels, &fringes, ratios, squared_residual, &mut around.corrections[vector][k]);
+                let out = [&mut around.squared_residuals[vector][k], &mut around.corrections[vector][k]];
+                match fine.pair {
+                    None => explain(&pixels, &fringes, Coaxial { ratios }, out),
+                    Some(_) => explain(&pixels, &fringes, gathered.waves(ratios), out),
+                }
             }
         }
     }
@@ -252,16 +258,16 @@ struct Pixels<'a> {
 /// Fits the albedo and a small correction of the phase to the intensities of lit pixels; gives the squared residual and
 /// the correction.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn explain(
+fn explain<W: Waves>(
     pixels: &Pixels,
     fringes: &CellFringes,
-    ratios: [f32; 3],
-    squared_residuals: &mut Lanes,
-    corrections: &mut Lanes,
+    waves: W,
+    [squared_residuals, corrections]: [&mut Lanes; 2],
 ) {
     let most = SQUARED_MISFIT_MAX * pixels.modulation * pixels.modulation;
+    let vector = waves.vector(0);
     for x in 0..LANES {
-        let carriers = carriers(pixels.phase[x], ratios, 0.0);
+        let carriers = waves.carriers(vector, x, pixels.phase[x], 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {

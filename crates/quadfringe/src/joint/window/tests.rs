@@ -33,7 +33,8 @@ fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
     let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + ripple(i)).collect();
     let light = vec![0.5; grid.pixels()];
     let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
-    let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+    let scene =
+        Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
     let mut slopes = Slopes::default();
     slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
     let mut residuals = Residuals::default();
@@ -70,7 +71,8 @@ fn noise_goes_edges_and_curvature_stay() {
     let seen: Vec<f32> = (0..grid.pixels()).map(|i| truth(i) + 0.02 * uniform()).collect();
     let light = vec![0.5; grid.pixels()];
     let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.4; grid.pixels()]);
-    let scene = Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1 };
+    let scene =
+        Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
     let mut slopes = Slopes::default();
     slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
     let window = Window::new(

@@ -50,7 +50,7 @@ fn options(input: &mut Input<'_>, encoding: &Encoding, shape: [usize; 2]) -> Opt
     if input.byte() < 64
         && let Some(table) = pair_table(input, encoding, shape)
     {
-        method = refused_clearly(method.clone().with_along_rays(table)).unwrap_or(method);
+        method = method.with_along_rays(table);
     }
     let mut options = Options::default().with_method(method);
     if input.flag() {

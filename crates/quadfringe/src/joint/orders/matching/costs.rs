@@ -3,7 +3,9 @@
 use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
 use crate::encoding::FourChannel;
+use crate::joint::infrared::{TERMS, wave};
 use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
+use crate::parallel::angle::{round, sin_cos};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
 
@@ -16,6 +18,8 @@ pub(super) struct CostTable {
     beats: [Vec<u16>; 2],
     /// Phase difference of G and IR between every label and order 0.
     rotations: [Rotations; 2],
+    /// The middle order.
+    middle: usize,
     /// Greatest wrapped phase, in turns, that the last order may have.
     last_turn: f64,
     /// Least wrapped phase, in turns, that the order before the first may have.
@@ -25,12 +29,50 @@ pub(super) struct CostTable {
 }
 
 /// Cosine and sine of an angle and of twice the angle, for every label.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 struct Rotations {
     cos: Vec<f32>,
     sin: Vec<f32>,
     cos_twice: Vec<f32>,
     sin_twice: Vec<f32>,
+}
+
+/// The same for IR at one node of a calibrated pair.
+#[derive(Debug, Default)]
+pub(super) struct Infrared {
+    beats: Vec<u16>,
+    /// Phase difference between every label and the middle order.
+    rotations: Rotations,
+}
+
+impl Infrared {
+    /// Predicts every label at a wrapped phase in rad.
+    fn predict(&mut self, terms: [f32; TERMS], phase: f32, middle_rad: f32, count: usize) {
+        let Self { beats, rotations: Rotations { cos, sin, cos_twice, sin_twice } } = self;
+        beats.resize(count, 0);
+        for line in [&mut *cos, &mut *sin, &mut *cos_twice, &mut *sin_twice] {
+            line.resize(count, 0.0);
+        }
+        predict(terms, [phase, middle_rad], beats, [cos, sin, cos_twice, sin_twice]);
+    }
+}
+
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn predict(terms: [f32; TERMS], [wrapped, middle]: [f32; 2], beats: &mut [u16], rotations: [&mut [f32]; 4]) {
+    let (middle, unit) = (wave(terms, wrapped + middle).phase, 65536.0 / std::f32::consts::TAU);
+    let beats = beats.as_chunks_mut::<LANES>().0;
+    let [cos, sin, cos_twice, sin_twice] = rotations.map(|line| line.as_chunks_mut::<LANES>().0);
+    for (b, beats) in beats.iter_mut().enumerate() {
+        for k in 0..LANES {
+            // Label 1 is order 0.
+            let phase = wrapped + std::f32::consts::TAU * ((b * LANES + k) as f32 - 1.0);
+            let infrared = wave(terms, phase).phase;
+            beats[k] = round((infrared - phase) * unit) as i32 as u16;
+            let (s, c) = sin_cos(infrared - middle);
+            (cos[b][k], sin[b][k]) = (c, s);
+            (cos_twice[b][k], sin_twice[b][k]) = (c * c - s * s, 2.0 * s * c);
+        }
+    }
 }
 
 impl CostTable {
@@ -56,6 +98,7 @@ impl CostTable {
             beat_ratios,
             beats,
             rotations,
+            middle: (0.5 * n[0]) as usize,
             last_turn: end - end.floor(),
             first_turn: 1.0 - 1.5 * per_column,
             last_label: end.floor() as usize + 1,
@@ -68,8 +111,13 @@ impl CostTable {
         self.count
     }
 
-    /// Cost of every label of a node: the mean of the cost by beats and the cost by cosines.
-    pub fn costs(&self, node: &NodeEvidence, out: &mut [i16]) {
+    /// Phase of the middle order at a wrapped phase of 0, rad.
+    pub fn middle_rad(&self) -> f32 {
+        self.middle as f32 * std::f32::consts::TAU
+    }
+
+    /// Cost of every label of a node: the mean of the cost by beats and the cost by cosines. `infrared` is working memory.
+    pub fn costs(&self, node: &NodeEvidence, infrared: &mut Infrared, out: &mut [i16]) {
         if !node.lit {
             out.fill(0);
             return;
@@ -80,7 +128,16 @@ impl CostTable {
         // Without usable pixels, the cost by cosines is 0 for all labels.
         let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
-        costs(beats, cosines, self, out);
+        let [green_beats, infrared_beats] = &self.beats;
+        let [green_rotations, infrared_rotations] = &self.rotations;
+        if let Some(terms) = node.infrared {
+            let wrapped = node.phase as f32 * (std::f32::consts::TAU / 65536.0);
+            infrared.predict(terms, wrapped, self.middle_rad(), self.count);
+            let rows = [green_rotations, &infrared.rotations];
+            costs([beats[0], node.beats[1]], cosines, [green_beats, &infrared.beats], rows, out);
+        } else {
+            costs(beats, cosines, [green_beats, infrared_beats], [green_rotations, infrared_rotations], out);
+        }
         let turn = phase / 65536.0;
         if turn < self.first_turn {
             out[0] = IMPOSSIBLE;
@@ -102,10 +159,16 @@ struct Cosines<'a> {
 
 /// Computes the costs of all labels. `beats` are the observed beats minus the beats predicted for order 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) {
+fn costs(
+    beats: [u16; 2],
+    cosines: Cosines,
+    predicted: [&Vec<u16>; 2],
+    rotations: [&Rotations; 2],
+    out: &mut [i16],
+) {
     let blocks = out.len() / LANES;
-    let offsets = table.beats.each_ref().map(|map| &map.as_chunks::<LANES>().0[..blocks]);
-    let rotations = table.rotations.each_ref().map(|Rotations { cos, sin, cos_twice, sin_twice }| {
+    let offsets = predicted.map(|map| &map.as_chunks::<LANES>().0[..blocks]);
+    let rotations = rotations.map(|Rotations { cos, sin, cos_twice, sin_twice }| {
         [cos, sin, cos_twice, sin_twice].map(|map| &map.as_chunks::<LANES>().0[..blocks])
     });
     for (b, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {

@@ -1,6 +1,7 @@
 //! The evidence of one node, without the costs of its neighbours.
 
 use super::sweep::Node;
+use crate::joint::infrared::TERMS;
 
 /// Evidence of one node. The unit of angles is 1/65536 turn.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -16,9 +17,12 @@ pub(in crate::joint) struct NodeEvidence {
     pub pixels: f32,
     /// Whether the node is lit.
     pub lit: bool,
+    /// Coefficients of the infrared phase of a calibrated pair; `None` for coaxial projectors.
+    pub infrared: Option<[f32; TERMS]>,
 }
 
-/// Sums over the pixels of a node: `s` is the cosine observed in one channel, `f` the phase that order 0 predicts for it.
+/// Sums over the pixels of a node: `s` is the cosine observed in one channel, `f` the phase that order 0 predicts for it;
+/// for IR of a calibrated pair, the phase of the middle order.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::joint) struct CosineSums {
     /// Sum of s^2.

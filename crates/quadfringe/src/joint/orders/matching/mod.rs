@@ -15,7 +15,7 @@ pub(super) use evidence::{CosineSums, NodeEvidence};
 use crate::encoding::FourChannel;
 use crate::joint::params::orders::COST_MAX;
 use crate::joint::params::tasks::SWEEP_COLUMNS;
-use costs::CostTable;
+use costs::{CostTable, Infrared};
 use multiversion::multiversion;
 use rayon::prelude::*;
 use sweep::{LANES, Node, Path, across, sweep_back, sweep_on};
@@ -51,6 +51,11 @@ impl Matching {
         }
     }
 
+    /// Phase of the middle order at a wrapped phase of 0, rad.
+    pub fn middle_rad(&self) -> f32 {
+        self.table.middle_rad()
+    }
+
     /// Whether a node is lit.
     pub fn is_lit(&self, node: usize) -> bool {
         self.nodes[node].lit
@@ -75,15 +80,15 @@ impl Matching {
         let rows = rows.zip(self.nodes.par_chunks_mut(columns)).enumerate();
         let table = &self.table;
         rows.for_each_init(
-            || (Path::new(labels, jump), Vec::new()),
-            |(path, known), (row, ((costs, sums), nodes))| {
+            || (Path::new(labels, jump), Vec::new(), Infrared::default()),
+            |(path, known, infrared), (row, ((costs, sums), nodes))| {
                 known.clear();
                 evidence(row, known);
                 for ((node, known), costs) in
                     nodes.iter_mut().zip(&*known).zip(costs.chunks_exact_mut(labels))
                 {
                     *node = known.node();
-                    table.costs(known, costs);
+                    table.costs(known, infrared, costs);
                 }
                 path.restart();
                 sweep_on(path, nodes, costs, sums);
@@ -197,6 +202,7 @@ mod tests {
             cosines: [seen(n2), seen(n3)],
             pixels: 1.0,
             lit: true,
+            infrared: None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! Comparison of places for some rows of pixels: squared residuals with the offsets and amplitudes of each place.
 
 use crate::joint::cells::{CellMaps, Grid, RowMaps};
-use crate::joint::model::carriers;
+use crate::joint::infrared::{Waves, with_waves};
 use crate::joint::neighbours::binomial;
 use crate::joint::params::photometry::{PLACE_BETTER, PLACE_GAIN_MIN};
 use crate::joint::scene::Scene;
@@ -40,11 +40,9 @@ impl Rows {
         carriers.resize_with(lines.len(), Default::default);
         for (rows, &y) in carriers.iter_mut().zip(lines) {
             rows.iter_mut().for_each(|row| row.resize(stride, 0.0));
-            carry(
-                [scene.row(phase, y), slopes.loss(scene, y, maps)],
-                ratios,
-                rows.each_mut().map(Vec::as_mut_slice),
-            );
+            let pixels = [scene.row(phase, y), slopes.loss(scene, y, maps)];
+            let out = rows.each_mut().map(Vec::as_mut_slice);
+            with_waves!(scene, y, ratios, |waves| carry(pixels, waves, out));
         }
         best.resize_with(lines.len(), Vec::new);
         best.iter_mut().for_each(|row| row.resize(stride, 0.0));
@@ -144,14 +142,15 @@ fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn carry(pixels: [&[f32]; 2], ratios: [f32; 3], out: [&mut [f32]; 8]) {
+fn carry<W: Waves>(pixels: [&[f32]; 2], waves: W, out: [&mut [f32]; 8]) {
     let pixels = pixels.map(lanes);
     let mut out = out.map(lanes_mut);
     for i in 0..pixels[0].len() {
         let [phase, loss] = take(&pixels, i);
+        let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let carriers = carriers(phase[x], ratios, loss[x]);
+            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
             for c in 0..4 {
                 (found[c][x], found[4 + c][x]) = (carriers.cosine[c], carriers.derivative[c]);
             }
