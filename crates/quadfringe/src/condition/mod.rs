@@ -138,6 +138,29 @@ impl Conditioner {
         Ok(inverse.map(|row| row.map(|v| v as f32)))
     }
 
+    /// This conditioner for shots without infrared: its infrared channel is left as it is and mixes with no other. What is
+    /// known of R, G and B stays.
+    ///
+    /// ```
+    /// use quadfringe::Conditioner;
+    /// let mut mix = Conditioner::default().crosstalk;
+    /// (mix[0][1], mix[0][3]) = (0.1, 0.2);
+    /// let colours = Conditioner::default().with_crosstalk(mix).without_infrared();
+    /// assert_eq!(colours.crosstalk[0], [1.0, 0.1, 0.0, 0.0]);
+    /// ```
+    #[must_use]
+    pub fn without_infrared(mut self) -> Self {
+        let neutral = Self::default();
+        let infrared = Channel::Ir.index();
+        self.dark[infrared] = neutral.dark[infrared];
+        self.response[infrared] = neutral.response[infrared];
+        self.projector_response[infrared] = neutral.projector_response[infrared];
+        self.ir_registration = neutral.ir_registration;
+        self.crosstalk[infrared] = neutral.crosstalk[infrared];
+        self.crosstalk[..infrared].iter_mut().for_each(|row| row[infrared] = 0.0);
+        self
+    }
+
     pub(crate) fn plan(&self) -> Result<Plan> {
         self.check()?;
         Plan::new(self)
@@ -145,7 +168,7 @@ impl Conditioner {
 }
 
 /// R, G, B and IR as linear light at every pixel, `(rows, columns)`, fractions of full scale (S1). IR is NaN where the
-/// infrared chip does not see the point.
+/// infrared chip does not see the point, and 0 for a shot without infrared.
 ///
 /// # Errors
 /// As [`Conditioner::check`]; [`Error::Value`] also when an intensity is more than 10 000 times full scale.
@@ -159,7 +182,10 @@ impl Conditioner {
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
 pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
-    let mut plan = conditioner.plan()?;
+    let mut plan = match shot.has_infrared() {
+        true => conditioner.plan()?,
+        false => conditioner.clone().without_infrared().plan()?,
+    };
     shot.check_light()?;
     plan.prepare(shot);
     let mut planes = [(); 4].map(|()| Array2::zeros(shot.shape()));

@@ -1,7 +1,7 @@
-//! Step 2: the mask of pixels that both projectors light, and the noise of the intensities.
+//! Step 2: the mask of pixels that all projectors light, and the noise of the intensities.
 //!
 //! R and B are a quarter period apart, so on a lit surface they are never both at the bottom of their range: at least one
-//! lies 0.146 of its range or more above it. In a shadow all four channels lie at the bottom. Bottom and range are taken
+//! lies 0.146 of its range or more above it. In a shadow all channels lie at the bottom. Bottom and range are taken
 //! from the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
@@ -19,7 +19,7 @@ use rayon::prelude::*;
 const LEVEL_MAPS: usize = 8;
 
 /// The mask of lit pixels, with its working maps.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct LitMask {
     means: CellMaps,
     extremes: CellMaps,
@@ -30,6 +30,8 @@ pub(super) struct LitMask {
     pub noise: f32,
     /// Least range of fringes, in linear light.
     pub range_min: f32,
+    /// Whether there is an infrared channel; without it the plane of its light is 0.
+    pub infrared: bool,
 }
 
 /// Rows of one task.
@@ -50,6 +52,19 @@ struct LevelRows<'a> {
 }
 
 impl LitMask {
+    pub fn new(infrared: bool) -> Self {
+        Self {
+            means: CellMaps::default(),
+            extremes: CellMaps::default(),
+            levels: CellMaps::default(),
+            sums: CellMaps::default(),
+            slots: Slots::default(),
+            noise: 0.0,
+            range_min: 0.0,
+            infrared,
+        }
+    }
+
     /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`.
     pub fn find(
         &mut self,
@@ -95,7 +110,9 @@ impl LitMask {
         for (y, out) in high.clone().zip(heights.chunks_exact_mut(stride)) {
             let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
             let light = light.map(|plane| &plane[y * stride..][..stride]);
-            self::heights(&LevelRows::new(maps), light, self.noise * self.noise, out);
+            let noise = self.noise * self.noise;
+            let noise_variance = [noise, noise, noise, if self.infrared { noise } else { 0.0 }];
+            self::heights(&LevelRows::new(maps), light, noise_variance, out);
         }
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {
@@ -226,9 +243,9 @@ fn add_light(inside: &[f32], light: [&[f32]; 4], sums: &mut [[Lanes; 5]]) {
 }
 
 /// Sum over the four channels of the squared height above the bottom, in units of the range, minus the variance of the
-/// noise.
+/// noise of each.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn heights(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mut [f32]) {
+fn heights(levels: &LevelRows, light: [&[f32]; 4], noise_variance: [f32; 4], out: &mut [f32]) {
     let (bottom, precision, light) =
         (levels.bottom.map(lanes), levels.precision.map(lanes), light.map(lanes));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
@@ -237,7 +254,7 @@ fn heights(levels: &LevelRows, light: [&[f32]; 4], noise_variance: f32, out: &mu
         for c in 0..4 {
             for x in 0..LANES {
                 let height = light[c][x] - bottom[c][x];
-                sum[x] += (height * height - noise_variance) * precision[c][x];
+                sum[x] += (height * height - noise_variance[c]) * precision[c][x];
             }
         }
         *out = sum;
@@ -254,7 +271,7 @@ mod tests {
         let grid = Grid::new([20, 32], 4.0);
         let mut lit = vec![1.0; grid.pixels()];
         lit[9 * grid.stride + 12] = 0.0;
-        LitMask::default().erode(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
+        LitMask::new(true).erode(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
         let dark = |y: usize| (0..grid.width).filter(|x| lit[y * grid.stride + x] == 0.0).collect::<Vec<_>>();
         assert_eq!((7..=11).map(dark).map(|row| row.len()).collect::<Vec<_>>(), [3, 5, 5, 5, 3]);
         assert_eq!((dark(6), dark(7), dark(9)), (vec![], vec![11, 12, 13], vec![10, 11, 12, 13, 14]));
@@ -278,7 +295,7 @@ mod tests {
             let mut lit = vec![0.0; grid.pixels()];
             let light = planes.each_ref().map(Vec::as_slice);
             let scaled = ScaledGrid { grid: &grid, period_px: 25.3, factor: 1 };
-            LitMask::default().find(scaled, light, 0.04, &mut lit);
+            LitMask::new(true).find(scaled, light, 0.04, &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {

@@ -45,8 +45,9 @@ pub(super) struct Block {
     pub contrast: Lanes,
 }
 
+/// The block of a vector of cells; `share` is that of one channel in the mean of all.
 #[inline(always)]
-pub(super) fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> Block {
+pub(super) fn block(derivatives: &Derivatives, weights: &Weights, share: f32, at: usize) -> Block {
     let bright = difference_diagonal(&weights.brightness, at);
     let colour = difference_diagonal(&weights.colour, at);
     let [mut phase, mut mixed, mut contrast] = [[0.0; LANES]; 3];
@@ -55,7 +56,7 @@ pub(super) fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> 
         let (by_phase, by_albedo) = (derivatives.phase[c].get(at), derivatives.albedo[c].get(at));
         let by_contrast = derivatives.contrast[c].get(at);
         for x in 0..LANES {
-            let prior = 0.75 * colour[x] + 0.25 * bright[x] + RIDGE;
+            let prior = (1.0 - share) * colour[x] + share * bright[x] + RIDGE;
             albedo[c][x] = 1.0 / (by_albedo[x] * by_albedo[x] + prior);
             // What remains once the albedo follows.
             let kept = prior * albedo[c][x];
@@ -69,15 +70,15 @@ pub(super) fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> 
 
 /// Mean information of the usable cells.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn information(derivatives: &Derivatives, weights: &Weights) -> Information {
+pub(super) fn information(derivatives: &Derivatives, weights: &Weights, share: f32) -> Information {
     let [mut phase, mut albedo, mut contrast, mut cells] = [0.0f64; 4];
     for at in vectors() {
-        let block = block(derivatives, weights, at);
+        let block = block(derivatives, weights, share, at);
         let (mut squares, mut fringes, mut count) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for c in 0..4 {
             let (by_albedo, by_contrast) = (derivatives.albedo[c].get(at), derivatives.contrast[c].get(at));
             for x in 0..LANES {
-                squares[x] += 0.25 * by_albedo[x] * by_albedo[x];
+                squares[x] += share * by_albedo[x] * by_albedo[x];
                 fringes[x] += by_contrast[x] * by_contrast[x];
                 count[x] = if squares[x] > 0.0 { 1.0 } else { 0.0 };
             }
@@ -93,8 +94,13 @@ pub(super) fn information(derivatives: &Derivatives, weights: &Weights) -> Infor
 
 /// Information of a cell about its phase once albedo and contrast follow.
 #[inline(always)]
-pub(super) fn phase_information(derivatives: &Derivatives, weights: &Weights, at: usize) -> Lanes {
-    let Block { phase, mixed, contrast, .. } = block(derivatives, weights, at);
+pub(super) fn phase_information(
+    derivatives: &Derivatives,
+    weights: &Weights,
+    share: f32,
+    at: usize,
+) -> Lanes {
+    let Block { phase, mixed, contrast, .. } = block(derivatives, weights, share, at);
     let prior = difference_diagonal(&weights.contrast, at);
     let mut out = [0.0; LANES];
     for x in 0..LANES {

@@ -3,6 +3,7 @@
 use super::plane::{total, vectors};
 use super::scales::DataSums;
 use super::tile::Tile;
+use crate::joint::model::weights;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
@@ -14,6 +15,7 @@ use multiversion::multiversion;
 pub(super) fn linearise(tile: &mut Tile) -> DataSums {
     let Tile { light, usable, unknown, derivatives, residual, scales, ratios, .. } = tile;
     let cut = 1.0 / (16.0 * scales.misfit);
+    let present = weights(*ratios);
     let mut sums = DataSums::default();
     for at in vectors() {
         let (phase, contrast, usable) = (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
@@ -26,7 +28,7 @@ pub(super) fn linearise(tile: &mut Tile) -> DataSums {
             let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
             let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
             let cells = Cells { phase, modulation, usable, albedo, light };
-            let model = predict(&cells, c, ratio, scales.channel_contrast[c]);
+            let model = predict(&cells, c, ratio, scales.channel_contrast[c], present[c]);
             let Gradient { whole, by_albedo, cross, power } = shared.add(&model, cut);
             derivatives.phase[c].set(at, model.slope);
             derivatives.albedo[c].set(at, whole);
@@ -98,24 +100,35 @@ pub(super) struct Model {
     pub rest: Lanes,
 }
 
-/// Predicts the light of channel `c`. The fringes of B are a quarter period ahead.
+/// Predicts the light of channel `c`. The fringes of B are a quarter period ahead. A channel that is not `present` has the weight 0,
+/// the others 1.
 #[inline(always)]
-pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32) -> Model {
-    if c == 2 { predicted::<true>(cells, ratio, kept) } else { predicted::<false>(cells, ratio, kept) }
+pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32, present: f32) -> Model {
+    match c {
+        2 => predicted::<true, false>(cells, ratio, kept, present),
+        3 => predicted::<false, true>(cells, ratio, kept, present),
+        _ => predicted::<false, false>(cells, ratio, kept, present),
+    }
 }
 
 #[inline(always)]
-fn predicted<const QUADRATURE: bool>(cells: &Cells, ratio: f32, kept: f32) -> Model {
+fn predicted<const QUADRATURE: bool, const OPTIONAL: bool>(
+    cells: &Cells,
+    ratio: f32,
+    kept: f32,
+    present: f32,
+) -> Model {
     let Cells { phase, modulation, usable, albedo, light } = cells;
     let [mut offset, mut fringe, mut slope, mut rest] = [[0.0; LANES]; 4];
     for x in 0..LANES {
         let (sine, cosine) = sin_cos(ratio * phase[x]);
         let (sine, cosine) = if QUADRATURE { (cosine, -sine) } else { (sine, cosine) };
-        offset[x] = usable[x] * exp(albedo[x]);
+        let usable = if OPTIONAL { usable[x] * present } else { usable[x] };
+        offset[x] = usable * exp(albedo[x]);
         let amplitude = offset[x] * modulation[x] * kept;
         fringe[x] = amplitude * cosine;
         slope[x] = -ratio * amplitude * sine;
-        rest[x] = usable[x] * light[x] - offset[x] - fringe[x];
+        rest[x] = usable * light[x] - offset[x] - fringe[x];
     }
     Model { offset, fringe, slope, rest }
 }

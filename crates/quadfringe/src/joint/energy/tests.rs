@@ -143,7 +143,7 @@ fn the_preconditioner_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.03);
     tile.minimise(1e-6);
     let Tile { derivatives, weights, preconditioner, .. } = &mut tile;
-    prepare(preconditioner, derivatives, weights);
+    prepare(preconditioner, derivatives, weights, 0.25);
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
     let own = precondition(preconditioner, &first, &mut one);
@@ -167,10 +167,10 @@ fn the_preconditioner_inverts_columns_that_stand_alone() {
     let [red, _, _, infrared] = albedo;
     let unknown = phase[1..].iter_mut().chain(&mut contrast[..3]).chain([red, infrared]);
     unknown.for_each(Plane::clear);
-    prepare(preconditioner, derivatives, weights);
+    prepare(preconditioner, derivatives, weights, 0.25);
     let expected = random_fields(3);
     let [mut product, mut found] = [Fields::default(), Fields::default()];
-    multiply::<true>(derivatives, weights, inside, &expected, &mut product);
+    multiply::<true>(derivatives, weights, (inside, RATIOS), &expected, &mut product);
     precondition(preconditioner, &product, &mut found);
     for n in [0, 2, 3, 5] {
         let (found, expected) = (found.planes()[n], expected.planes()[n]);
@@ -190,9 +190,9 @@ fn the_matrix_is_symmetric_and_positive() {
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
     let Tile { derivatives, weights, inside, .. } = &tile;
-    let own = multiply::<true>(derivatives, weights, inside, &first, &mut one);
+    let own = multiply::<true>(derivatives, weights, (inside, RATIOS), &first, &mut one);
     assert!(own > 0.0);
-    multiply::<true>(derivatives, weights, inside, &second, &mut two);
+    multiply::<true>(derivatives, weights, (inside, RATIOS), &second, &mut two);
     let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
     assert!((forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
 }

@@ -30,7 +30,8 @@ pub(super) struct Tile {
     pub usable: Plane,
     /// 1 for lit cells with a phase.
     pub inside: Plane,
-    /// Fringe numbers divided by the first.
+    /// Fringe numbers divided by the first. Without an infrared channel the last is 0; its light and its logarithm of the albedo are
+    /// then 0, and it takes no part.
     pub ratios: [f32; 3],
     pub scales: Scales,
     pub unknown: Fields,

@@ -2,8 +2,9 @@
 
 use super::data::{Cells, predict};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
-use super::priors::{COUNT, FREEDOM, bending, squares};
+use super::priors::{FREEDOM, bending, squares, unknowns};
 use super::scales::Scales;
+use crate::joint::model::{count, weights};
 use crate::joint::params::energy::BEND_FREEDOM;
 use crate::parallel::exp::{exp, ln_1p};
 use crate::parallel::lanes::{LANES, Lanes};
@@ -26,7 +27,7 @@ pub(super) fn add_energy<'a>(
     scales: &Scales,
     out: &mut Plane,
 ) {
-    let inside = given.inside;
+    let (inside, channels) = (given.inside, count(given.ratios));
     for at in vectors() {
         let here = Column::of(unknown, at);
         let (data, bend) = (data(given, &here, scales, at), bending(inside, &unknown.phase, at));
@@ -36,7 +37,8 @@ pub(super) fn add_energy<'a>(
         }
         for there in [at + 1, at + STRIDE] {
             let lit = [inside.get(at), inside.get(there)];
-            differences(lit, squares(&here, &Column::of(unknown, there)), scales, &mut sum);
+            let squares = squares(&here, &Column::of(unknown, there), 1.0 / channels);
+            differences(lit, squares, unknowns(channels), scales, &mut sum);
         }
         let mut all = out.get(at);
         for x in 0..LANES {
@@ -50,6 +52,7 @@ pub(super) fn add_energy<'a>(
 #[inline(always)]
 fn data(given: &Given<'_>, here: &Column, scales: &Scales, at: usize) -> Lanes {
     let (usable, half, ratios) = (given.usable.get(at), 0.5 / scales.noise, given.ratios);
+    let present = weights(ratios);
     let (mut out, mut modulation) = ([0.0; LANES], [0.0; LANES]);
     for x in 0..LANES {
         modulation[x] = exp(here.contrast[x]);
@@ -58,7 +61,7 @@ fn data(given: &Given<'_>, here: &Column, scales: &Scales, at: usize) -> Lanes {
         let (albedo, light) = (here.albedo[c], given.light[c].get(at));
         let cells = Cells { phase: here.phase, modulation, usable, albedo, light };
         let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
-        let rest = predict(&cells, c, ratio, scales.channel_contrast[c]).rest;
+        let rest = predict(&cells, c, ratio, scales.channel_contrast[c], present[c]).rest;
         for x in 0..LANES {
             out[x] += half * rest[x] * rest[x];
         }
@@ -74,11 +77,11 @@ fn student(freedom: f32, count: f32, square: f32) -> f32 {
 
 /// Adds the priors of the differences between two neighbours.
 #[inline(always)]
-fn differences(lit: [Lanes; 2], squares: [Lanes; 3], scales: &Scales, out: &mut Lanes) {
+fn differences(lit: [Lanes; 2], squares: [Lanes; 3], unknowns: [f32; 3], scales: &Scales, out: &mut Lanes) {
     let inverse = [1.0 / scales.brightness, 1.0 / scales.colour, 1.0 / scales.contrast];
     for n in 0..3 {
         for x in 0..LANES {
-            out[x] += lit[0][x] * lit[1][x] * student(FREEDOM[n], COUNT[n], squares[n][x] * inverse[n]);
+            out[x] += lit[0][x] * lit[1][x] * student(FREEDOM[n], unknowns[n], squares[n][x] * inverse[n]);
         }
     }
 }

@@ -15,7 +15,7 @@ mod tests;
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::local_fit::LocalFit;
-use super::model::{CellFringes, FringeRows, contrast};
+use super::model::{CellFringes, FringeRows, contrast, count};
 use super::params::photometry::{CELL, NEIGHBOURHOOD, OTHER_TEXTURE_MIN, OTHER_TEXTURE_NOISES, WINDOW};
 use super::scene::{PhaseMap, Scene};
 use super::slopes::Slopes;
@@ -158,7 +158,7 @@ impl Photometry {
                 }
                 let [phase, modulation] = [phase, modulation].map(|plane| scene.row(plane, y));
                 let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
-                let limits = [4.0 * misfit_max * misfit_max, phase_trust];
+                let limits = [count(ratios) * misfit_max * misfit_max, phase_trust];
                 add_projected(model, pixels, scene.rows(y), ratios, limits, sums);
             },
             |row, sums, out| {

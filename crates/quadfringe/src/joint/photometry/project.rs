@@ -1,7 +1,7 @@
 //! Terms of the pixels in the normal equations, without the directions of albedo and phase.
 
 use super::solve::{MATRIX, SUMS};
-use crate::joint::model::carriers;
+use crate::joint::model::{carriers, weights};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
 
@@ -15,6 +15,7 @@ pub(super) fn add_projected(
     sums: &mut [[Lanes; SUMS]],
 ) {
     let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
+    let weights = weights(ratios);
     for (i, sums) in sums.iter_mut().enumerate() {
         let (model, light) = (take(&model, i), take(&light, i));
         let [phase, modulation, usable, loss] = take(&pixels, i);
@@ -23,7 +24,7 @@ pub(super) fn add_projected(
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
             let pixel = [phase[x], modulation[x], usable[x], loss[x]];
-            let pixel_terms = project(model, pixel, seen, ratios, limits);
+            let pixel_terms = project(model, pixel, seen, (ratios, weights), limits);
             for k in 0..SUMS {
                 terms[k][x] = pixel_terms[k];
             }
@@ -39,7 +40,7 @@ fn project(
     model: [f32; 8],
     [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
-    ratios: [f32; 3],
+    (ratios, weights): ([f32; 3], [f32; 4]),
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
     let carriers = carriers(phase, ratios, loss);
@@ -63,7 +64,7 @@ fn project(
     for c in 0..4 {
         let (along_m, along_d) = (dd * m[c] - md * d[c], mm * d[c] - md * m[c]);
         for k in 0..4 {
-            let identity = if c == k { 1.0 } else { 0.0 };
+            let identity = if c == k { weights[c] } else { 0.0 };
             projector[c][k] = identity - (along_m * m[k] + along_d * d[k]) * inverse;
             rest[c] += projector[c][k] * seen[k];
         }

@@ -5,7 +5,7 @@
 
 use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
-use crate::joint::model::{CellFringes, carriers};
+use crate::joint::model::{CellFringes, carriers, count};
 use crate::joint::neighbours::around;
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
@@ -259,7 +259,7 @@ fn explain(
     squared_residuals: &mut Lanes,
     corrections: &mut Lanes,
 ) {
-    let most = SQUARED_MISFIT_MAX * pixels.modulation * pixels.modulation;
+    let most = SQUARED_MISFIT_MAX * (0.25 * count(ratios)) * pixels.modulation * pixels.modulation;
     for x in 0..LANES {
         let carriers = carriers(pixels.phase[x], ratios, 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);

@@ -12,6 +12,8 @@ use std::f64::consts::TAU;
 pub(super) struct CostTable {
     /// Turns of the beats of G and IR in one turn of the first phase.
     beat_ratios: [f64; 2],
+    /// Whether there is an infrared channel; without it only G counts.
+    infrared: bool,
     /// Beats of G and IR for every label at a wrapped phase of 0.
     beats: [Vec<u16>; 2],
     /// Phase difference of G and IR between every label and order 0.
@@ -20,6 +22,7 @@ pub(super) struct CostTable {
     last_turn: f64,
     /// Least wrapped phase, in turns, that the order before the first may have.
     first_turn: f64,
+    first_label: usize,
     last_label: usize,
     count: usize,
 }
@@ -39,7 +42,10 @@ impl CostTable {
         let beat_ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
         let count = (code.orders() + 2).div_ceil(LANES) * LANES;
         let per_column = n[0] / code.projector_width as f64;
-        let end = n[0] + 0.5 * per_column;
+        let [first_px, last_px] = code.columns_px;
+        let (from, to) = (first_px * per_column, n[0] - (code.projector_width as f64 - last_px) * per_column);
+        let (begin, end) = (from - 1.5 * per_column, to + 0.5 * per_column);
+        let before = begin.floor().max(-1.0);
         let labels = || (0..count).map(|label| label as f64 - 1.0);
         let beats =
             beat_ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
@@ -54,10 +60,12 @@ impl CostTable {
         });
         Self {
             beat_ratios,
+            infrared: code.has_infrared(),
             beats,
             rotations,
             last_turn: end - end.floor(),
-            first_turn: 1.0 - 1.5 * per_column,
+            first_turn: begin - before,
+            first_label: (before + 1.0) as usize,
             last_label: end.floor() as usize + 1,
             count,
         }
@@ -80,11 +88,14 @@ impl CostTable {
         // Without usable pixels, the cost by cosines is 0 for all labels.
         let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
-        costs(beats, cosines, self, out);
-        let turn = phase / 65536.0;
-        if turn < self.first_turn {
-            out[0] = IMPOSSIBLE;
+        if self.infrared {
+            costs::<2>(beats, cosines, self, out);
+        } else {
+            costs::<1>(beats, cosines, self, out);
         }
+        let turn = phase / 65536.0;
+        let start = self.first_label + usize::from(turn < self.first_turn);
+        out[..start].fill(IMPOSSIBLE);
         let end = self.last_label + usize::from(turn <= self.last_turn);
         if let Some(beyond) = out.get_mut(end..) {
             beyond.fill(IMPOSSIBLE);
@@ -100,9 +111,10 @@ struct Cosines<'a> {
     scale: f32,
 }
 
-/// Computes the costs of all labels. `beats` are the observed beats minus the beats predicted for order 0.
+/// Computes the costs of all labels by `CHANNELS` of G and IR. `beats` are the observed beats minus the beats predicted for order 0.
+/// Costs are those of two channels: a single channel counts twice, so that costs are truncated at the same error.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) {
+fn costs<const CHANNELS: usize>(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) {
     let blocks = out.len() / LANES;
     let offsets = table.beats.each_ref().map(|map| &map.as_chunks::<LANES>().0[..blocks]);
     let rotations = table.rotations.each_ref().map(|Rotations { cos, sin, cos_twice, sin_twice }| {
@@ -110,7 +122,7 @@ fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) 
     });
     for (b, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
         let mut square = [0.0f32; LANES];
-        for (sums, [c, s, c2, s2]) in cosines.sums.iter().zip(&rotations) {
+        for (sums, [c, s, c2, s2]) in cosines.sums.iter().zip(&rotations).take(CHANNELS) {
             let still = sums.square + 0.5 * cosines.pixels;
             for k in 0..LANES {
                 let first = sums.first[0] * c[b][k] - sums.first[1] * s[b][k];
@@ -119,11 +131,12 @@ fn costs(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) 
             }
         }
         for k in 0..LANES {
-            let scaled = cosines.scale * square[k];
+            let scaled = cosines.scale * (2 / CHANNELS) as f32 * square[k];
             let by_cosines =
                 (if scaled < f32::from(COST_MAX) { scaled } else { f32::from(COST_MAX) }) as i32 as i16;
+            let last = CHANNELS - 1;
             let by_beats =
-                (beat_cost(beats[0], offsets[0][b][k]) + beat_cost(beats[1], offsets[1][b][k])) >> 4;
+                (beat_cost(beats[0], offsets[0][b][k]) + beat_cost(beats[last], offsets[last][b][k])) >> 4;
             let by_beats = if by_beats < COST_MAX { by_beats } else { COST_MAX };
             out[k] = (by_beats + by_cosines) >> 1;
         }
