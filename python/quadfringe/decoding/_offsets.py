@@ -25,8 +25,8 @@ QUANTILE = 0.75
 def channels_agree(shape: Shape, shot: AnyShot, plan: Plan) -> bool:
     """Tell whether G and IR show their fringes where the phase of the shape puts them; False with too few tiles."""
     light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
-    first, second, third = plan.fringes.numbers
-    channels = ((light["green"], second / first), (light["ir"], third / first))
+    first, second, *third = plan.fringes.numbers
+    channels = [(light["green"], second / first), *((light["ir"], number / first) for number in third)]
     return all(_offset_rad(image, ratio * shape.phase_rad) <= OFFSET_MAX_RAD for image, ratio in channels)
 
 

@@ -48,7 +48,7 @@ from quadfringe._core import (
     wrong_order_probability,
 )
 from quadfringe.config import ChannelResponse, Response, ResponseChoice, brief
-from quadfringe.config.decode import three_numbers
+from quadfringe.config.decode import fringe_numbers as numbers_of
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
@@ -81,7 +81,7 @@ __all__ = [
 ]
 
 Map = NDArray[np.float32]
-FringeNumbers = tuple[float, float, float]
+FringeNumbers = tuple[float, ...]  # of red and blue, of green, of infrared if there is any
 CHANNELS = ("red", "green", "blue", "ir")
 
 
@@ -101,7 +101,7 @@ class Wrapped(NamedTuple):
     green_rad: Map
     """Phase of the block means of G, (B, W), rad, up to whole turns (S3)."""
     infrared_rad: Map
-    """Phase of the block means of IR, (B, W), rad, up to whole turns (S3)."""
+    """Phase of the block means of IR, (B, W), rad, up to whole turns (S3); 0 without infrared."""
     rows: int
     """Rows of a block."""
 
@@ -128,8 +128,9 @@ def linear_light(
     - a `Response`, the path of its file, or "linear", which replace the response of the calibration;
     - "auto", as in a `Plan`: the response that the calibration states. Where a `Plan` would estimate it, `InputError`.
 
-    IR is NaN where its chip does not see the point. The colours of a raw mosaic are interpolated at every pixel from
-    linear samples. Raises `InputError` for arguments that are no shot, calibration or response, or cannot be read.
+    IR is NaN where its chip does not see the point, and left out for a shot without infrared. The colours of a raw
+    mosaic are interpolated at every pixel from linear samples. Raises `InputError` for arguments that are no shot,
+    calibration or response, or cannot be read.
     """
     check_shot(shot)
     calibration = calibration_of(calibration)
@@ -154,7 +155,7 @@ def response_of_shot(
     """
     light = linear_light(shot, calibration)
     found = _core.estimate_response_of_shot(
-        light["red"], light["green"], light["blue"], light["ir"], phase_rad, fringe_numbers, projector_width_px
+        light["red"], light["green"], light["blue"], light.get("ir"), phase_rad, fringe_numbers, projector_width_px
     )
     numbers = ChannelResponse.model_fields
     channels = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
@@ -175,14 +176,18 @@ def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
 def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     """Give the phases and the modulation of linear light by name, each (H, W) float32 (S2, S3).
 
+    Two fringe numbers are those of light without infrared.
+
     The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes, or
     less than one, cross the rows.
     """
-    first, second, third = three_numbers(fringe_numbers)
-    _check_light(light)
+    first, second, *third = numbers_of(fringe_numbers)
+    _check_light(light, infrared=bool(third))
     red, blue = light["red"], light["blue"]
+    # Without infrared its rows are dark, and any period will do.
+    ir, infrared_number = (light["ir"], third[0]) if third else (np.zeros_like(red), second)
     period_px = row_period(red)
-    green_px, infrared_px = period_px * first / second, period_px * first / third
+    green_px, infrared_px = period_px * first / second, period_px * first / infrared_number
     if not np.isfinite(carrier(red)[0]) or max(green_px, infrared_px) > red.shape[1]:
         raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
     rows, columns = block_size(green_px, infrared_px, red.shape[1])
@@ -190,7 +195,7 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     blue_means, blue_level = _fringes(blue, rows, 1, period_px)
     ratio = modulation_ratio(red_means, blue_means)[:, np.newaxis]
     green_means, _ = _fringes(light["green"], rows, columns, green_px)
-    infrared_means, _ = _fringes(fill_gaps(light["ir"]), rows, columns, infrared_px)
+    infrared_means, _ = _fringes(fill_gaps(ir), rows, columns, infrared_px)
     periods = (green_px / columns, infrared_px / columns)
     found = fourier_pair(green_means, infrared_means, periods, columns, red.shape[1])
     (green, green_modulation), (infrared, infrared_modulation) = found
@@ -201,14 +206,15 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     red_fringes = red - pixels(red_level)
     blue_fringes = (blue - pixels(blue_level)) * pixels(ratio)
     modulation = np.sqrt(red_fringes * red_fringes + blue_fringes * blue_fringes)
-    least = np.fmin(modulation, np.fmin(pixels(green_modulation), pixels(infrared_modulation)))
-    least[np.isnan(light["ir"])] = np.nan
+    others = (green_modulation, infrared_modulation) if third else (green_modulation,)
+    least = np.fmin(modulation, np.fmin.reduce([pixels(other) for other in others]))
+    least[np.isnan(ir)] = np.nan
     return Wrapped(
         phase_rad=two_step(red_fringes, blue_fringes),
         modulation=least,
         red_blue_rad=two_step(red_means, blue_means * ratio, coarse=True),
         green_rad=green,
-        infrared_rad=infrared,
+        infrared_rad=infrared if third else np.zeros_like(infrared),
         rows=rows,
     )
 
@@ -230,21 +236,22 @@ def order(
     return nearest_turn(wrapped.phase_rad, wrapped.repeated(means_rad)), wrapped.repeated(margin)
 
 
-def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tuple[Map, Map, Map]:
+def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tuple[Map, ...]:
     """Give the wrapped phases in rad, (H, W): red and blue by two steps (S2), green and infrared by Fourier (S3).
 
-    Raises `DecodeError` when no fringes cross the rows.
+    With two fringe numbers there is no infrared, and two phases. Raises `DecodeError` when no fringes cross the rows.
     """
     wrapped = demodulate(light, fringe_numbers)
-    green_rad, infrared_rad = (_wrap(wrapped.repeated(phase)) for phase in (wrapped.green_rad, wrapped.infrared_rad))
-    return wrapped.phase_rad, green_rad, infrared_rad
+    others = (wrapped.green_rad, wrapped.infrared_rad)[: len(fringe_numbers) - 1]
+    return wrapped.phase_rad, *(_wrap(wrapped.repeated(phase)) for phase in others)
 
 
-def _check_light(light: object) -> None:
-    if not isinstance(light, Mapping) or not set(CHANNELS) <= set(light):
+def _check_light(light: object, *, infrared: bool) -> None:
+    channels = CHANNELS if infrared else CHANNELS[:3]
+    if not isinstance(light, Mapping) or not set(channels) <= set(light):
         got = f"only {', '.join(map(str, light))}" if isinstance(light, Mapping) and light else brief(light)
-        raise InputError(f"light: expected {', '.join(CHANNELS)} by name, as stages.linear_light gives them, got {got}")
-    check_maps({name: light[name] for name in CHANNELS})
+        raise InputError(f"light: expected {', '.join(channels)} by name, as stages.linear_light gives them, got {got}")
+    check_maps({name: light[name] for name in channels})
 
 
 def _wrap(phase_rad: Map) -> Map:

@@ -120,8 +120,8 @@ def _collapsed(margin: float) -> Cause:
     return Cause(
         ORDERS,
         f"the order margin has collapsed: below {margin:.2f} of 1 for half of the lit pixels; no test names the cause",
-        "check that the channels are red, green, blue and ir in this order, and that the fringe numbers, the projector "
-        "width and the response are those of this shot",
+        "check that the channels are red, green, blue (and ir) in this order, and that the fringe numbers, the "
+        "projector width and the response are those of this shot",
     )
 
 
@@ -246,8 +246,8 @@ def rows_of(shot: AnyShot, first: int, count: int) -> AnyShot:
     """Give a shot of some rows only."""
     images = {name: image[first : first + count] for name, image in shot.images.items()}
     if isinstance(shot, BayerShot):
-        return BayerShot(images["raw"], shot.bayer, images["ir"], shot.full_scale)
-    return Shot(images["red"], images["green"], images["blue"], images["ir"], shot.full_scale)
+        return BayerShot(images["raw"], shot.bayer, images.get("ir"), shot.full_scale)
+    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
 
 
 def _suspects(shot: AnyShot) -> dict[str, AnyShot]:
@@ -262,4 +262,4 @@ def _suspects(shot: AnyShot) -> dict[str, AnyShot]:
 def _exchanged(shot: Shot, first: str, second: str) -> Shot:
     images = shot.channels
     images[first], images[second] = images[second], images[first]
-    return Shot(images["red"], images["green"], images["blue"], images["ir"], shot.full_scale)
+    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)

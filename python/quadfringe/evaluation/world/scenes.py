@@ -74,7 +74,7 @@ def take(name: str, seed: int, noise: float = NOISE) -> Take:
 
 def expose(bench: _core.Bench, world: World, seed: int, noise: float = NOISE) -> Take:
     """Take a shot of a scene; light spreads in the material before the sensor adds noise."""
-    options = {"albedo": world.albedo} if world.albedo is not None else {}
+    options: dict[str, Any] = {} if world.albedo is None else {"albedo": world.albedo}
     options |= world.options or {}
     if world.spread_px is None:
         images = bench.render(world.cast, world.fringe_numbers, noise=noise, seed=seed, **options)

@@ -49,7 +49,7 @@ impl Tile {
             let sums = weigh(self);
             if outer > 0 {
                 let channels = count(self.ratios);
-                let information = information(&self.derivatives, &self.weights, 1.0 / channels);
+                let information = information(&self.derivatives, &self.weights, self.ratios);
                 determined = self.scales.estimate_priors(&sums, information, channels);
                 weigh(self);
             }
@@ -64,10 +64,9 @@ impl Tile {
     /// Writes the correction of the phase, its variance, and the albedo and contrast of every channel.
     pub fn write(&mut self, found: &mut Found) {
         let Self { start, inside, unknown, scales, derivatives, weights, product, ratios, .. } = self;
-        let share = 1.0 / count(*ratios);
         let Fields { phase: information, contrast: spare, .. } = product;
         for at in vectors() {
-            information.set(at, phase_information(derivatives, weights, share, at));
+            information.set(at, phase_information(derivatives, weights, *ratios, at));
         }
         // A saturated cell has no information by itself; its neighbours determine it.
         smooth(information, spare);

@@ -2,6 +2,7 @@
 
 use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
 use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, place, total};
+use crate::joint::model::count;
 use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -28,14 +29,20 @@ pub(super) struct Preconditioner {
     coupling: Plane,
 }
 
-/// Factors the matrices of the columns of a tile; `share` is that of one channel in the mean of all.
+/// Factors the matrices of the columns of a tile.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn prepare(lines: &mut Preconditioner, derivatives: &Derivatives, weights: &Weights, share: f32) {
+pub(super) fn prepare(
+    lines: &mut Preconditioner,
+    derivatives: &Derivatives,
+    weights: &Weights,
+    ratios: [f32; 3],
+) {
+    let share = 1.0 / count(ratios);
     for x in (0..SIDE).step_by(LANES) {
         let mut above = Pivots::default();
         for y in 0..SIDE {
             let at = place(x, y);
-            let local = block(derivatives, weights, share, at);
+            let local = block(derivatives, weights, ratios, at);
             lines.follow(derivatives, &local, at);
             lines.albedos(weights, share, &local.albedo, at);
             let coupled = lines.contrast(weights, &local, at);

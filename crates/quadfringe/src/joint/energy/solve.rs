@@ -29,7 +29,7 @@ pub(super) fn solve(tile: &mut Tile, steps: usize) {
     // The gradient of the priors.
     multiply::<false>(derivatives, weights, (inside, ratios), unknown, product);
     subtract(product, residual);
-    prepare(preconditioner, derivatives, weights, 1.0 / count(ratios));
+    prepare(preconditioner, derivatives, weights, ratios);
     step.planes_mut().into_iter().chain(direction.planes_mut()).for_each(Plane::clear);
     let cells: f64 = vectors().map(|at| total(inside.get(at))).sum();
     let negligible = NEGLIGIBLE * f64::from(scales.noise) * cells;

@@ -143,7 +143,7 @@ fn the_preconditioner_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.03);
     tile.minimise(1e-6);
     let Tile { derivatives, weights, preconditioner, .. } = &mut tile;
-    prepare(preconditioner, derivatives, weights, 0.25);
+    prepare(preconditioner, derivatives, weights, RATIOS);
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
     let own = precondition(preconditioner, &first, &mut one);
@@ -167,7 +167,7 @@ fn the_preconditioner_inverts_columns_that_stand_alone() {
     let [red, _, _, infrared] = albedo;
     let unknown = phase[1..].iter_mut().chain(&mut contrast[..3]).chain([red, infrared]);
     unknown.for_each(Plane::clear);
-    prepare(preconditioner, derivatives, weights, 0.25);
+    prepare(preconditioner, derivatives, weights, RATIOS);
     let expected = random_fields(3);
     let [mut product, mut found] = [Fields::default(), Fields::default()];
     multiply::<true>(derivatives, weights, (inside, RATIOS), &expected, &mut product);
