@@ -146,20 +146,24 @@ def response_of_shot(
     fringe_numbers: FringeNumbers,
     projector_width_px: int,
     calibration: Calibration | Path | str | None = None,
+    *,
+    columns_px: tuple[float, float] | None = None,
 ) -> Response | Literal["linear"]:
     """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; "linear" if it shows none.
 
     Without the right response the phase is wrong too, so decode again with the result and repeat, as
-    `quadfringe.estimate_response` does. A channel without fringes stays linear. Dark level and registration come from
-    the `calibration`. ValueError when the sizes differ.
+    `quadfringe.estimate_response` does. `columns_px` are those of the fringes that can light the scene. A channel
+    without fringes stays linear. Dark level and registration come from the `calibration`. ValueError when the sizes
+    differ.
     """
     light = linear_light(shot, calibration)
+    channels = (light["red"], light["green"], light["blue"], light.get("ir"))
     found = _core.estimate_response_of_shot(
-        light["red"], light["green"], light["blue"], light.get("ir"), phase_rad, fringe_numbers, projector_width_px
+        *channels, phase_rad, fringe_numbers, projector_width_px, columns_px=columns_px
     )
     numbers = ChannelResponse.model_fields
-    channels = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
-    return Response(**channels) if channels else "linear"
+    responses = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
+    return Response(**responses) if responses else "linear"
 
 
 def _known(response: object, calibration: Calibration | None) -> ResponseChoice:

@@ -3,7 +3,7 @@
 use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
 use crate::encoding::FourChannel;
-use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
+use crate::joint::params::orders::{COSINE_UNIT, COSINE_UNIT_WITHOUT_INFRARED, COST_MAX};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
 
@@ -86,7 +86,8 @@ impl CostTable {
         let predicted = self.beat_ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
         let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
         // Without usable pixels, the cost by cosines is 0 for all labels.
-        let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
+        let unit = if self.infrared { COSINE_UNIT } else { COSINE_UNIT_WITHOUT_INFRARED };
+        let scale = if node.pixels > 0.0 { unit / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
         if self.infrared {
             costs::<2>(beats, cosines, self, out);
@@ -112,7 +113,6 @@ struct Cosines<'a> {
 }
 
 /// Computes the costs of all labels by `CHANNELS` of G and IR. `beats` are the observed beats minus the beats predicted for order 0.
-/// Costs are those of two channels: a single channel counts twice, so that costs are truncated at the same error.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn costs<const CHANNELS: usize>(beats: [u16; 2], cosines: Cosines, table: &CostTable, out: &mut [i16]) {
     let blocks = out.len() / LANES;
@@ -131,12 +131,14 @@ fn costs<const CHANNELS: usize>(beats: [u16; 2], cosines: Cosines, table: &CostT
             }
         }
         for k in 0..LANES {
-            let scaled = cosines.scale * (2 / CHANNELS) as f32 * square[k];
+            let scaled = cosines.scale * square[k];
             let by_cosines =
                 (if scaled < f32::from(COST_MAX) { scaled } else { f32::from(COST_MAX) }) as i32 as i16;
-            let last = CHANNELS - 1;
-            let by_beats =
-                (beat_cost(beats[0], offsets[0][b][k]) + beat_cost(beats[last], offsets[last][b][k])) >> 4;
+            let mut by_beats = 0;
+            for c in 0..CHANNELS {
+                by_beats += beat_cost(beats[c], offsets[c][b][k]);
+            }
+            let by_beats = by_beats >> 4;
             let by_beats = if by_beats < COST_MAX { by_beats } else { COST_MAX };
             out[k] = (by_beats + by_cosines) >> 1;
         }
