@@ -168,8 +168,8 @@ def decode(
     words = step_words(sources, numbers, steps, order, beam, bits)
     images = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
     settings = _settings(method, unwrapping, depth_range_mm, period_px, channel_instants_us)
-    code: dict[str, Any] = {"fringes": fringes, "encoding": encoding, "columns": columns}
-    code |= {"predeformed_z_mm": predeformed_z_mm, "bayer": bayer}
+    code: dict[str, Any] = {"fringes": fringes, "encoding": encoding, "columns": columns, "bayer": bayer}
+    code["predeformed_z_mm"] = predeformed_z_mm
     if words.given:
         shape = from_steps(words, projector_width, calibration, _response(response, linear), code | images | settings)
         return _save(shape, _Results(out, report), json)

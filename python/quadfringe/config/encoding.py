@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config._base import SIZE_MAX
-from quadfringe.config.decode import fringe_numbers as numbers_of
+from quadfringe.config.fringes import fringe_numbers as numbers_of
 from quadfringe.config.memory import require_memory
 from quadfringe.errors import InputError
 

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from quadfringe.config._base import Model
-from quadfringe.config.decode import Fringes
+from quadfringe.config.fringes import Fringes
 
 __all__ = ["FlashRoute", "HdmiRoute", "ProjectorConfig", "ProjectorsConfig"]
 

@@ -48,7 +48,7 @@ from quadfringe._core import (
     wrong_order_probability,
 )
 from quadfringe.config import ChannelResponse, Response, ResponseChoice, brief
-from quadfringe.config.decode import fringe_numbers as numbers_of
+from quadfringe.config.fringes import fringe_numbers as numbers_of
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
@@ -188,12 +188,8 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     first, second, *third = numbers_of(fringe_numbers)
     _check_light(light, infrared=bool(third))
     red, blue = light["red"], light["blue"]
-    # Without infrared its rows are dark, and any period will do.
-    ir, infrared_number = (light["ir"], third[0]) if third else (np.zeros_like(red), second)
-    period_px = row_period(red)
-    green_px, infrared_px = period_px * first / second, period_px * first / infrared_number
-    if not np.isfinite(carrier(red)[0]) or max(green_px, infrared_px) > red.shape[1]:
-        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
+    ir = light["ir"] if third else np.zeros_like(red)
+    period_px, green_px, infrared_px = _periods_px(red, (first, second, *(third or [second])))
     rows, columns = block_size(green_px, infrared_px, red.shape[1])
     red_means, red_level = _fringes(red, rows, 1, period_px)
     blue_means, blue_level = _fringes(blue, rows, 1, period_px)
@@ -210,8 +206,8 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     red_fringes = red - pixels(red_level)
     blue_fringes = (blue - pixels(blue_level)) * pixels(ratio)
     modulation = np.sqrt(red_fringes * red_fringes + blue_fringes * blue_fringes)
-    others = (green_modulation, infrared_modulation) if third else (green_modulation,)
-    least = np.fmin(modulation, np.fmin.reduce([pixels(other) for other in others]))
+    least = np.fmin(modulation, pixels(green_modulation))
+    least = np.fmin(least, pixels(infrared_modulation)) if third else least
     least[np.isnan(ir)] = np.nan
     return Wrapped(
         phase_rad=two_step(red_fringes, blue_fringes),
@@ -221,6 +217,15 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
         infrared_rad=infrared if third else np.zeros_like(infrared),
         rows=rows,
     )
+
+
+def _periods_px(red: Map, numbers: FringeNumbers) -> list[float]:
+    """Give the fringe periods of these numbers along the rows; raise `DecodeError` when no fringes cross them."""
+    period_px = row_period(red)
+    others_px = [period_px * numbers[0] / number for number in numbers[1:]]
+    if not np.isfinite(carrier(red)[0]) or max(others_px) > red.shape[1]:
+        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
+    return [period_px, *others_px]
 
 
 def order(

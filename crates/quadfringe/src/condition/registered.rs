@@ -206,7 +206,6 @@ fn interpolate(rows: [&[f32]; 4], start: [f32; 2], step: [f32; 2], out: &mut [f3
 #[cfg(test)]
 mod tests {
     use super::super::{Conditioner, Shot, linearise};
-    use super::*;
     use ndarray::Array2;
     use std::f64::consts::TAU;
 

@@ -19,7 +19,7 @@ use rayon::prelude::*;
 const LEVEL_MAPS: usize = 8;
 
 /// The mask of lit pixels, with its working maps.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct LitMask {
     means: CellMaps,
     extremes: CellMaps,
@@ -53,16 +53,7 @@ struct LevelRows<'a> {
 
 impl LitMask {
     pub fn new(infrared: bool) -> Self {
-        Self {
-            means: CellMaps::default(),
-            extremes: CellMaps::default(),
-            levels: CellMaps::default(),
-            sums: CellMaps::default(),
-            slots: Slots::default(),
-            noise: 0.0,
-            range_min: 0.0,
-            infrared,
-        }
+        Self { infrared, ..Self::default() }
     }
 
     /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`.
@@ -111,8 +102,8 @@ impl LitMask {
             let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
             let light = light.map(|plane| &plane[y * stride..][..stride]);
             let noise = self.noise * self.noise;
-            let noise_variance = [noise, noise, noise, if self.infrared { noise } else { 0.0 }];
-            self::heights(&LevelRows::new(maps), light, noise_variance, out);
+            let infrared = if self.infrared { noise } else { 0.0 };
+            self::heights(&LevelRows::new(maps), light, [noise, noise, noise, infrared], out);
         }
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {

@@ -167,7 +167,7 @@ impl Rows {
         binomial(near.map(|row| row.albedo_weight.as_slice()), grid.width, spare, &mut smooth.weight);
         let lit = Lit { modulation: model.window.modulation(y), usable: scene.row(scene.usable, y) };
         let share = 1.0 / count(model.ratios);
-        let measure = |normal: NormalRows<'_>| linearise(near[1], smooth, (lit, share), normal, found);
+        let measure = |normal: NormalRows<'_>| linearise(near[1], smooth, lit, share, normal, found);
         model.window.along(y, window, scene.row(before, y), measure, out);
     }
 }
@@ -237,7 +237,8 @@ fn predict(
 fn linearise(
     model: &ModelRow,
     albedo: &SmoothAlbedo,
-    (lit, share): (Lit, f32),
+    lit: Lit,
+    share: f32,
     normal: NormalRows,
     found: &mut FoundRows,
 ) {

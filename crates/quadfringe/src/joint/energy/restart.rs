@@ -31,7 +31,7 @@ impl Tile {
         {
             to.copy(from);
         }
-        hold_by_phase((inside, *ratios), first, scales.noise, derivatives);
+        hold_by_phase(inside, *ratios, first, scales.noise, derivatives);
         bend_everywhere(scales.noise / scales.bend, weights);
         residual.planes_mut().into_iter().for_each(Plane::clear);
         // The surface continues through cells without light.
@@ -85,7 +85,8 @@ fn has_texture(tile: &Tile) -> bool {
 /// Sets the derivatives as if the phase were measured in every cell, the less certainly the more texture there is.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn hold_by_phase(
-    (inside, ratios): (&Plane, [f32; 3]),
+    inside: &Plane,
+    ratios: [f32; 3],
     first: &Fields,
     noise: f32,
     derivatives: &mut Derivatives,

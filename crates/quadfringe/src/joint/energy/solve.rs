@@ -25,14 +25,13 @@ pub(super) fn solve(tile: &mut Tile, steps: usize) {
         ratios,
         ..
     } = tile;
-    let ratios = *ratios;
     // The gradient of the priors.
-    multiply::<false>(derivatives, weights, (inside, ratios), unknown, product);
+    multiply::<false>(derivatives, weights, inside, *ratios, unknown, product);
     subtract(product, residual);
-    prepare(preconditioner, derivatives, weights, ratios);
+    prepare(preconditioner, derivatives, weights, *ratios);
     step.planes_mut().into_iter().chain(direction.planes_mut()).for_each(Plane::clear);
-    let cells: f64 = vectors().map(|at| total(inside.get(at))).sum();
-    let negligible = NEGLIGIBLE * f64::from(scales.noise) * cells;
+    let negligible =
+        NEGLIGIBLE * f64::from(scales.noise) * vectors().map(|at| total(inside.get(at))).sum::<f64>();
     let (mut before, mut enough) = (0.0, 0.0);
     for n in 0..steps {
         let size = precondition(preconditioner, residual, preconditioned);
@@ -43,7 +42,7 @@ pub(super) fn solve(tile: &mut Tile, steps: usize) {
             break;
         }
         turn(preconditioned, if n == 0 { 0.0 } else { (size / before) as f32 }, direction);
-        let curvature = multiply::<true>(derivatives, weights, (inside, ratios), direction, product);
+        let curvature = multiply::<true>(derivatives, weights, inside, *ratios, direction, product);
         if curvature <= 0.0 {
             break;
         }
@@ -106,7 +105,8 @@ fn advance(length: f32, direction: &Fields, product: &Fields, step: &mut Fields,
 pub(super) fn multiply<const DATA: bool>(
     derivatives: &Derivatives,
     weights: &Weights,
-    (inside, ratios): (&Plane, [f32; 3]),
+    inside: &Plane,
+    ratios: [f32; 3],
     from: &Fields,
     to: &mut Fields,
 ) -> f64 {

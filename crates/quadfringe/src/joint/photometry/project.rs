@@ -24,7 +24,7 @@ pub(super) fn add_projected(
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
             let pixel = [phase[x], modulation[x], usable[x], loss[x]];
-            let pixel_terms = project(model, pixel, seen, (ratios, weights), limits);
+            let pixel_terms = project(model, pixel, seen, ratios, weights, limits);
             for k in 0..SUMS {
                 terms[k][x] = pixel_terms[k];
             }
@@ -40,7 +40,8 @@ fn project(
     model: [f32; 8],
     [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
-    (ratios, weights): ([f32; 3], [f32; 4]),
+    ratios: [f32; 3],
+    weights: [f32; 4],
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
     let carriers = carriers(phase, ratios, loss);
