@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration.levels import row4
 from quadfringe.calibration.projector import AXES, ProjectorMap, projector_map
 from quadfringe.calibration.session.settings import FILE, Session
 from quadfringe.data import AnyShot
@@ -112,8 +113,7 @@ def light_of(session: Session, step: str, name: str) -> Exposure:
     if step == "levels":
         plan = session.level_plan
         row = plan.names.index(name)
-        red, green, blue, ir = plan.levels[row].tolist()
-        return Exposure(Levels((red, green, blue, ir)), float(plan.exposure[row]))
+        return Exposure(Levels(row4(plan.levels[row])), float(plan.exposure[row]))
     if step in ("dark", "flat"):
         return Exposure(Levels((FLAT_LEVEL if step == "flat" else 0.0,) * 4), 1.0)
     return Exposure(session.fringes, 1.0)

@@ -35,9 +35,7 @@ pub(super) fn solve(tile: &mut Tile, steps: usize) {
     let (mut before, mut enough) = (0.0, 0.0);
     for n in 0..steps {
         let size = precondition(preconditioner, residual, preconditioned);
-        if n == 0 {
-            enough = negligible.max(RESIDUAL_LEFT * size);
-        }
+        enough = if n == 0 { negligible.max(RESIDUAL_LEFT * size) } else { enough };
         if size <= enough {
             break;
         }
