@@ -211,13 +211,13 @@ mod tests {
 
     #[test]
     fn lists_of_two_and_of_five_channels_are_refused() {
-        let encoding = Encoding::optimum(36, 912).expect("valid");
+        let encoding = Encoding::rgb([16.0, 15.0], 912).expect("valid");
         let count = |channels: Vec<ChannelCode>| match Encoding::new(channels, 912) {
             Ok(encoding) => encoding.four_channel_view(),
             Err(error) => Err(error),
         };
         let two = count(encoding.channels()[..2].to_vec());
-        let five = count([encoding.channels(), &encoding.channels()[..1]].concat());
+        let five = count([encoding.channels(), &encoding.channels()[..2]].concat());
         for (found, expected) in [(two, 2), (five, 5)] {
             assert!(
                 matches!(found, Err(Error::NotFourChannel { fault: FourChannelFault::Count(n) }) if n == expected)
