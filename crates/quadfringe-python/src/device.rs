@@ -150,7 +150,6 @@ pub fn check_code(
 /// Ideal image of a channel, (height, width) float32.
 #[pyfunction]
 #[pyo3(signature = (channel, fringe_numbers, width, height, *, layout = "regular", columns_px = None))]
-#[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn pattern<'py>(
     py: Python<'py>,
     channel: &str,

@@ -53,7 +53,7 @@ fn surfaces_come_back() {
         let found = score(&decoded, &cast, &rgb(), FRINGE_PX);
         println!("{name}: {found:?}");
         assert!(found.phase_rms_rad < phase_max, "{name}: {found:?}");
-        assert!(found.wrong_share() <= 2e-5 && found.returned_share() > 0.95, "{name}: {found:?}");
+        assert!(found.wrong_share() < 1e-4 && found.returned_share() > 0.95, "{name}: {found:?}");
         let albedo = decoded.albedo.as_ref().expect("the joint method gives it");
         assert!(albedo.slice(s![.., .., 3]).iter().all(|ir| ir.is_nan()));
         let seen =

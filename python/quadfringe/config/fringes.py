@@ -94,9 +94,9 @@ class Fringes(Model):
             if self.columns_px is None:
                 _core.check_code(self.numbers, SIZE_MAX)
         except ValueError:
-            example = NUMBERS[encoding]
             raise ValueError(
-                f"expected fringe numbers whose joint range covers the projector, such as {tuple(map(int, example))}"
+                "numbers: expected fringe numbers whose joint range covers the projector, such as "
+                f"{_listed(NUMBERS[encoding])}, got {_listed(self.numbers)}"
             ) from None
         return self
 
@@ -115,6 +115,10 @@ class Fringes(Model):
         """The fringe number of each of the channels."""
         first, second, *third = self.numbers
         return (first, second, first, *third)
+
+
+def _listed(numbers: FringeNumbers) -> str:
+    return f"({', '.join(f'{number:g}' for number in numbers)})"
 
 
 def _other_count(count: int, encoding: Encoding) -> str:
