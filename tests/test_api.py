@@ -135,7 +135,9 @@ def test_read_shot_names_an_empty_folder(tmp_path: Path) -> None:
         qf.read_shot(tmp_path)
     data.write_shot(tmp_path, qf.Shot(*np.zeros((4, 6, 8), np.uint8)))
     (tmp_path / "ir.png").unlink()
-    with pytest.raises(qf.InputError, match=rf"{tmp_path}: no image for ir, the infrared channel: add ir.png"):
+    assert qf.read_shot(tmp_path).ir is None
+    (tmp_path / "blue.png").unlink()
+    with pytest.raises(qf.InputError, match=rf"{tmp_path}: no image for blue: add blue.png, or one colour image"):
         qf.read_shot(tmp_path)
     (tmp_path / "file.png").write_bytes(b"")
     with pytest.raises(qf.InputError, match="a file, not a folder"):
@@ -172,7 +174,7 @@ def test_a_plan_takes_what_a_person_types(shot_folder: Path, tmp_path: Path) -> 
         ({"response": "linear", "decode": {"response": {"red": {"exponent": 2.0}}}}, "give it once"),
         ({"decode": {"methd": "x"}}, "methd: this key is not known"),
         ({"response": "liner"}, "^response: 1 problem"),
-        ({"fringes": (36, 35)}, "expected three fringe numbers"),
+        ({"fringes": (36, 35)}, r"joint range covers the projector, such as \(16, 15\), got \(36, 35\)"),
         ({"fringes": 36}, "expected three fringe numbers, .* got 36"),
         ({"projector_width_px": -1}, "projector_width_px: .* from 2 to 65536, got -1"),
         ({"projector_width_px": 10**9}, "projector_width_px: .* got 1000000000"),

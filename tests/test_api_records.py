@@ -97,7 +97,7 @@ GREY = np.zeros((6, 8), np.uint8)
 @pytest.mark.parametrize(
     ("images", "reason"),
     [
-        ((GREY, GREY, GREY, None), "ir: expected one grey image .* got None"),
+        ((GREY, None, GREY, GREY), "green: expected one grey image .* got None"),
         ((GREY, GREY, GREY, [[1, 2]]), "ir: expected one grey image .* got list"),
         ((GREY, GREY, GREY, GREY[1:]), "expected one size .* ir 8 x 5"),
         ((GREY, GREY, GREY, GREY.astype(np.uint16)), "expected one type .* ir uint16"),

@@ -133,7 +133,7 @@ def test_camera_and_projector_are_told_apart(found: tuple[VirtualBench, Channels
 def test_captures_at_fault_are_explained() -> None:
     bench, plan = bench_of(), level_plan(4)
     seen = seen_of(bench, plan)
-    with pytest.raises(InputError, match="expected 23 captures of four channels"):
+    with pytest.raises(InputError, match="expected 23 captures of 4 channels"):
         fit_channels(plan, seen[:-1])
     with pytest.raises(InputError, match="red is saturated in all but 0 captures"):
         fit_channels(plan, np.ones_like(seen))

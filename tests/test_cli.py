@@ -126,7 +126,7 @@ def test_a_folder_is_given_alone(small_bench: Path, tmp_path: Path) -> None:
         run("decode", tmp_path, *FRINGES, *out), 2, "no image of a shot in it; expected red.png, green.png, blue.png"
     )
     write_image(tmp_path / "red.png", read_image(small_bench / "red.png"))
-    refused(run("decode", tmp_path, *FRINGES, *out), 2, "no image for ir, the infrared channel: add ir.png")
+    refused(run("decode", tmp_path, *FRINGES, *out), 2, "no image for green, blue: add green.png, blue.png")
 
 
 def test_a_colour_file_is_as_good_as_three(small_bench: Path, tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ def test_not_a_number_is_refused(small_bench: Path, tmp_path: Path) -> None:
 
 def test_files_at_fault_are_named(small_bench: Path, tmp_path: Path) -> None:
     shot, out = files_of(small_bench), ["--out", tmp_path / "x.npz"]
-    refused(run("decode", *shot[:6], *FRINGES, *out), 2, "no image for ir")
+    refused(run("decode", *shot[:6], *FRINGES, *out), 2, "the shot has red, green, blue", "--encoding")
     refused(run("decode", *shot[:7], tmp_path / "no.png", *FRINGES, *out), 2, "no.png")
     (tmp_path / "bad.png").write_bytes(b"bad")
     refused(run("decode", *shot[:7], tmp_path / "bad.png", *FRINGES, *out), 2, "bad.png", "not a readable image")

@@ -101,7 +101,6 @@ def test_mixed_depths_become_fractions(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("names", "reason"),
     [
-        (("rgb",), "give ir"),
         (("red", "ir"), "give green, blue"),
         (("rgb", "red", "ir"), "leave out red"),
     ],

@@ -91,7 +91,7 @@ ALLOWED: dict[tuple[str, str], str] = {
         [
             ("joint", "MEDIAN_OF_NORMAL"),
             ("stages", "MEDIAN_OF_NORMAL"),
-            ("joint", "RESIDUAL_BY_NOISE"),
+            ("joint", "UNKNOWNS"),
             ("stages", "STEPS_MIN"),
         ],
         "follows from statistics or algebra, as its comment derives",

@@ -72,6 +72,7 @@ _Vector2 = tuple[float, float]
 _Vector3 = tuple[float, float, float]
 _Vector4 = tuple[float, float, float, float]
 _Vector5 = tuple[float, float, float, float, float]
+_Numbers = Sequence[float]  # of R with B, of G, and of IR if there is any
 _Matrix3 = tuple[_Vector3, _Vector3, _Vector3]
 _Bytes3 = tuple[int, int, int]
 
@@ -201,14 +202,16 @@ class Bench:
     def render(
         self,
         cast: Cast,
-        fringe_numbers: _Vector3,
+        fringe_numbers: _Numbers,
         *,
+        columns_px: _Vector2 | None = None,
         infrared_image: NDArray[np.float32] | None = None,
         **options: Any,
     ) -> dict[str, NDArray[Any]]:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
-        The infrared projector shows its fringes, or `infrared_image` (rows, columns), linear light from 0 to 1.
+        The infrared projector shows its fringes, or `infrared_image` (rows, columns), linear light from 0 to 1. With
+        two fringe numbers it is dark. `columns_px` are the first and the last column that can light the scene.
         Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An unknown
         option raises TypeError.
         """
@@ -249,8 +252,10 @@ class Cast:
 
 @final
 class Decoder:
-    """Decodes shots of one size and one four-channel encoding; planned and checked when made.
+    """Decodes shots of one size and one encoding; planned and checked when made.
 
+    Three fringe numbers are those of R with B, of G and of IR, two those of an encoding without infrared. With
+    `columns_px`, the first and the last column that can light the scene, only these must differ in their phases.
     An argument that is absent takes the kernel's default. `method` is "joint" ("best" is read as "joint") or
     "published". With `camera`, `projector` and `infrared` the infrared fringes are known along the camera rays, of an
     image plain or pre-deformed, for a range of depths or all of them; the published method searches orders in it alone;
@@ -261,9 +266,10 @@ class Decoder:
     def __new__(
         cls,
         shape: tuple[int, int],
-        fringe_numbers: _Vector3,
+        fringe_numbers: _Numbers,
         projector_width: int,
         *,
+        columns_px: _Vector2 | None = None,
         full_scale: float | None = None,
         method: str | None = None,
         modulation_min: float | None = None,
@@ -290,20 +296,22 @@ class Decoder:
         """
 
     def decode(
-        self, red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], ir: NDArray[Any]
+        self, red: NDArray[Any], green: NDArray[Any], blue: NDArray[Any], ir: NDArray[Any] | None = None
     ) -> dict[str, NDArray[Any]]:
         """Give maps (H, W) by name, float32 but for reason (uint8).
 
         phase_rad, column_px, modulation, quality, wrong_order_probability and uncertainty_rad (of the phase);
         when devices are known uncertainty_mm (of the depth) in place of the last, and xyz_mm (H, W, 3); with method
-        joint, unless `albedo` is False, albedo (H, W, 4), the light of R, G, B, IR without fringes; and reason, why
+        joint, unless `albedo` is False, albedo (H, W, 4), the light of R, G, B, IR without fringes, where IR is NaN
+        without that channel; and reason, why
         there is no data, a value of `quadfringe.Reason`.
 
         The images are (H, W) uint8, uint16 or float32, all of one type; strided views are welcome, nothing is
-        copied. Raises TypeError for another type, ValueError for another size or values that are not finite.
+        copied. Raises TypeError for another type, ValueError for another size, values that are not finite, and
+        channels that are not those of the encoding.
         """
 
-    def decode_bayer(self, raw: NDArray[Any], bayer: str, ir: NDArray[Any]) -> dict[str, NDArray[Any]]:
+    def decode_bayer(self, raw: NDArray[Any], bayer: str, ir: NDArray[Any] | None = None) -> dict[str, NDArray[Any]]:
         """Give the same maps from the raw mosaic of a Bayer chip (rggb, grbg, gbrg or bggr) and an infrared image.
 
         Images and errors as those of `decode`; ValueError for another pattern.
@@ -347,11 +355,17 @@ class StepDecoder:
 def optimum(n: int, projector_width: int) -> _Vector3:
     """Give the fringe numbers N, N - 1, N - sqrt(N); ValueError unless N is a perfect square that fits."""
 
-def check_code(fringe_numbers: _Vector3, projector_width: int) -> float:
-    """Give the ambiguity margin in rad; ValueError when the joint range does not cover the projector."""
+def check_code(fringe_numbers: _Numbers, projector_width: int, *, columns_px: _Vector2 | None = None) -> float:
+    """Give the ambiguity margin in rad; ValueError when the joint range does not cover the columns that light."""
 
 def pattern(
-    channel: str, fringe_numbers: _Vector3, width: int, height: int, *, layout: str = "regular"
+    channel: str,
+    fringe_numbers: _Numbers,
+    width: int,
+    height: int,
+    *,
+    layout: str = "regular",
+    columns_px: _Vector2 | None = None,
 ) -> NDArray[np.float32]:
     """Give the ideal image of channel R, G, B or IR, (height, width), linear light from 0 to 1."""
 
@@ -377,7 +391,7 @@ class PairTable:
         camera: Device,
         visible: Device,
         infrared: Device,
-        fringe_numbers: _Vector3,
+        fringe_numbers: _Numbers,
         *,
         predeformed_z_mm: float | None = None,
         depth_range_mm: _Vector2 | None = None,
@@ -429,7 +443,7 @@ def linear_light(
     red: NDArray[Any],
     green: NDArray[Any],
     blue: NDArray[Any],
-    ir: NDArray[Any],
+    ir: NDArray[Any] | None = None,
     *,
     full_scale: float | None = None,
     dark: Sequence[float] | None = None,
@@ -440,13 +454,14 @@ def linear_light(
 ) -> dict[str, NDArray[np.float32]]:
     """Give red, green, blue, ir as linear light, fractions of full scale; NaN where the infrared chip sees nothing.
 
+    Without `ir` there are three.
     Images and errors as those of `Decoder.decode`.
     """
 
 def linear_light_bayer(
     raw: NDArray[Any],
     bayer: str,
-    ir: NDArray[Any],
+    ir: NDArray[Any] | None = None,
     *,
     full_scale: float | None = None,
     dark: Sequence[float] | None = None,
@@ -526,7 +541,7 @@ def discard_invalid(
     """Give phase and quality: NaN where the modulation is too low, the phase also where the margin is too low."""
 
 def columns_from_phase(
-    phase_rad: NDArray[np.float32], fringe_numbers: _Vector3, projector_width: int
+    phase_rad: NDArray[np.float32], fringe_numbers: _Numbers, projector_width: int
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Give absolute phase in rad and projector column, both NaN where no column of the projector lights the pixel."""
 
@@ -547,10 +562,13 @@ def unwrap(
     first: NDArray[np.float32],
     second: NDArray[np.float32],
     third: NDArray[np.float32],
-    fringe_numbers: _Vector3,
+    fringe_numbers: _Numbers,
     projector_width: int,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Give absolute phase in rad and order margin in [0, 1] from three wrapped phases, point by point (S4)."""
+    """Give absolute phase in rad and order margin in [0, 1] from three wrapped phases, point by point (S4).
+
+    With two fringe numbers the third phase is not read.
+    """
 
 def estimate_response(stacks: Sequence[NDArray[np.float32]]) -> dict[str, float]:
     """Give offset, exponent, knee, two_step_rms_before_rad, two_step_rms_after_rad and pixels of N-step stacks.
@@ -563,10 +581,12 @@ def estimate_response_of_shot(
     red: NDArray[np.float32],
     green: NDArray[np.float32],
     blue: NDArray[np.float32],
-    ir: NDArray[np.float32],
+    ir: NDArray[np.float32] | None,
     phase_rad: NDArray[np.float32],
-    fringe_numbers: tuple[float, float, float],
+    fringe_numbers: _Numbers,
     projector_width: int,
+    *,
+    columns_px: _Vector2 | None = None,
 ) -> dict[str, dict[str, float]]:
     """Give the figures of `estimate_response` by channel, from one captured shot and its decoded phase.
 

@@ -8,8 +8,14 @@ use pyo3::prelude::*;
 /// The images of a shot, in the kernel's order.
 pub const CHANNELS: [&str; 4] = ["red", "green", "blue", "ir"];
 
+/// The images of a shot without infrared.
+pub const COLOURS: [&str; 3] = ["red", "green", "blue"];
+
 /// The images of a shot of a Bayer chip.
 pub const BAYER_IMAGES: [&str; 2] = ["raw", "ir"];
+
+/// The image of a shot of a Bayer chip without infrared.
+pub const RAW: [&str; 1] = ["raw"];
 
 /// Every error of the kernel is a ValueError, because it concerns a value from the caller.
 pub fn value_error(error: quadfringe::Error) -> PyErr {

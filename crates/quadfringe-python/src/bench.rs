@@ -1,14 +1,14 @@
 //! The virtual bench: `Bench` casts a scene once and renders it as often as needed; `Cast` holds the true geometry.
 
 use crate::arrays::{BAYER_IMAGES, CHANNELS, expected, value_error};
-use crate::device::{Device, axis_named, layout_named, unknown};
+use crate::device::{Device, FringeNumbers, axis_named, layout_named, unknown};
 use crate::render::render_options;
 use crate::workers::detached;
 use ndarray::Array2;
 use numpy::{Element, IntoPyArray, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use quadfringe::encoding::{Channel, Encoding};
+use quadfringe::encoding::Channel;
 use quadfringe::optics::Pose;
 use quadfringe::rig::{self, Light, Planes, Print, Projector};
 use quadfringe::surface::{HeightMap, Interpolation, Peaks, Plane, Posed, Surface, scene};
@@ -127,16 +127,17 @@ impl Bench {
     }
 
     /// The images of a shot by name: four channels, or the raw mosaic and infrared of a Bayer chip.
-    #[pyo3(signature = (cast, fringe_numbers, *, infrared_image = None, **options))]
+    #[pyo3(signature = (cast, fringe_numbers, *, columns_px = None, infrared_image = None, **options))]
     fn render<'py>(
         &self,
         py: Python<'py>,
         cast: &Cast,
-        fringe_numbers: [f64; 3],
+        fringe_numbers: FringeNumbers,
+        columns_px: Option<[f64; 2]>,
         infrared_image: Option<&Bound<'py, PyAny>>,
         options: Option<&Bound<'py, PyDict>>,
     ) -> PyResult<Bound<'py, PyDict>> {
-        let encoding = Encoding::four_channel(fringe_numbers, self.0.visible.width).map_err(value_error)?;
+        let encoding = fringe_numbers.encoding(self.0.visible.width, columns_px).map_err(value_error)?;
         let image = infrared_image.map(|image| expected::<f32, 2>("infrared_image", image)).transpose()?;
         let mut lights = Light::shot(&encoding).map_err(value_error)?;
         if let Some(image) = &image {

@@ -1,8 +1,8 @@
 //! `Decoder`: one call from four images to a shape.
 
-use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, value_error, views};
+use crate::arrays::{BAYER_IMAGES, CHANNELS, COLOURS, Images, RAW, value_error, views};
 use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
-use crate::device::Device;
+use crate::device::{Device, FringeNumbers};
 use crate::memory::{Memory, Optional};
 use crate::plan::{Choices, Geometry, planned};
 use crate::workers::{Workers, detached, interruptible};
@@ -11,7 +11,7 @@ use numpy::{Element, PyReadonlyArray};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::Sample;
-use quadfringe::{BayerPattern, Decoded, Encoding, Method, Shot};
+use quadfringe::{BayerPattern, Decoded, Method, Shot};
 use rayon::ThreadPool;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -47,7 +47,7 @@ struct Inner {
 #[pymethods]
 impl Decoder {
     #[new]
-    #[pyo3(signature = (shape, fringe_numbers, projector_width, *, full_scale = None, method = None,
+    #[pyo3(signature = (shape, fringe_numbers, projector_width, *, columns_px = None, full_scale = None, method = None,
         modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, albedo = None, threads = None, dark = None, response = None,
         crosstalk = None, projector_response = None, ir_registration = None, camera = None, projector = None, infrared = None,
         predeformed_z_mm = None, depth_range_mm = None))]
@@ -55,8 +55,9 @@ impl Decoder {
     fn new(
         py: Python<'_>,
         shape: [usize; 2],
-        fringe_numbers: [f64; 3],
+        fringe_numbers: FringeNumbers,
         projector_width: usize,
+        columns_px: Option<[f64; 2]>,
         full_scale: Option<f32>,
         method: Option<&str>,
         modulation_min: Option<f32>,
@@ -80,7 +81,7 @@ impl Decoder {
         let choices = Choices { method, modulation_min, quality_min, period_px, channel_instants_us, albedo };
         let geometry = Geometry { camera, projector, infrared, predeformed_z_mm, depth_range_mm };
         let plan = || {
-            let encoding = Encoding::four_channel(fringe_numbers, projector_width)?;
+            let encoding = fringe_numbers.encoding(projector_width, columns_px)?;
             let builder = quadfringe::Decoder::builder(&encoding, shape).conditioner(conditioner);
             planned(builder, &choices, &geometry)
         };
@@ -108,14 +109,23 @@ impl Decoder {
     }
 
     /// Decode a shot into maps by name, float32.
+    #[pyo3(signature = (red, green, blue, ir = None))]
     fn decode<'py>(
         &self,
         py: Python<'py>,
         red: &Bound<'py, PyAny>,
         green: &Bound<'py, PyAny>,
         blue: &Bound<'py, PyAny>,
-        ir: &Bound<'py, PyAny>,
+        ir: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
+        let Some(ir) = ir else {
+            let decoded = match &Images::borrow(COLOURS, [red, green, blue])? {
+                Images::U8(three) => self.run(py, three, |three| Shot::rgb(three)),
+                Images::U16(three) => self.run(py, three, |three| Shot::rgb(three)),
+                Images::F32(three) => self.run(py, three, |three| Shot::rgb(three)),
+            }?;
+            return self.0.memory.named(py, decoded);
+        };
         let decoded = match &Images::borrow(CHANNELS, [red, green, blue, ir])? {
             Images::U8(four) => self.run(py, four, |four| Shot::new(four)),
             Images::U16(four) => self.run(py, four, |four| Shot::new(four)),
@@ -124,15 +134,24 @@ impl Decoder {
         self.0.memory.named(py, decoded)
     }
 
-    /// Decode the raw mosaic of a Bayer chip and an infrared image into maps by name.
+    /// Decode the raw mosaic of a Bayer chip, and an infrared image if there is one, into maps by name.
+    #[pyo3(signature = (raw, bayer, ir = None))]
     fn decode_bayer<'py>(
         &self,
         py: Python<'py>,
         raw: &Bound<'py, PyAny>,
         bayer: &str,
-        ir: &Bound<'py, PyAny>,
+        ir: Option<&Bound<'py, PyAny>>,
     ) -> PyResult<Bound<'py, PyDict>> {
         let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
+        let Some(ir) = ir else {
+            let decoded = match &Images::borrow(RAW, [raw])? {
+                Images::U8(one) => self.run(py, one, move |[raw]| Shot::bayer_rgb(raw, pattern)),
+                Images::U16(one) => self.run(py, one, move |[raw]| Shot::bayer_rgb(raw, pattern)),
+                Images::F32(one) => self.run(py, one, move |[raw]| Shot::bayer_rgb(raw, pattern)),
+            }?;
+            return self.0.memory.named(py, decoded);
+        };
         let decoded = match &Images::borrow(BAYER_IMAGES, [raw, ir])? {
             Images::U8(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),
             Images::U16(two) => self.run(py, two, move |[raw, ir]| Shot::bayer(raw, pattern, ir)),

@@ -89,6 +89,45 @@ impl Device {
     }
 }
 
+/// Fringe numbers of an encoding: of R with B, of G, and of IR if there is an infrared projector.
+#[derive(Clone, Copy)]
+pub enum FringeNumbers {
+    Colours([f64; 2]),
+    Four([f64; 3]),
+}
+
+impl<'a, 'py> FromPyObject<'a, 'py> for FringeNumbers {
+    type Error = PyErr;
+
+    fn extract(numbers: Borrowed<'a, 'py, PyAny>) -> PyResult<Self> {
+        let numbers: Vec<f64> = numbers.extract()?;
+        match numbers[..] {
+            [quadrature, green] => Ok(Self::Colours([quadrature, green])),
+            [quadrature, green, infrared] => Ok(Self::Four([quadrature, green, infrared])),
+            _ => {
+                let expected = "three (R with B, G, IR), or two without infrared";
+                let message = format!("fringe numbers: expected {expected}, got {}", numbers.len());
+                Err(PyValueError::new_err(message))
+            }
+        }
+    }
+}
+
+impl FringeNumbers {
+    /// The encoding over a projector of this width, of which a range of columns lights the scene.
+    pub fn encoding(
+        self,
+        projector_width: usize,
+        columns_px: Option<[f64; 2]>,
+    ) -> quadfringe::Result<Encoding> {
+        let columns = columns_px.unwrap_or([0.0, projector_width as f64]);
+        match self {
+            Self::Colours(numbers) => Encoding::rgb_within(numbers, projector_width, columns),
+            Self::Four(numbers) => Encoding::four_channel_within(numbers, projector_width, columns),
+        }
+    }
+}
+
 /// Fringe numbers N, N - 1, N - sqrt(N).
 #[pyfunction]
 pub fn optimum(n: u32, projector_width: usize) -> PyResult<[f64; 3]> {
@@ -98,25 +137,33 @@ pub fn optimum(n: u32, projector_width: usize) -> PyResult<[f64; 3]> {
 
 /// The ambiguity margin in rad of fringe numbers over a projector.
 #[pyfunction]
-pub fn check_code(fringe_numbers: [f64; 3], projector_width: usize) -> PyResult<f64> {
-    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
+#[pyo3(signature = (fringe_numbers, projector_width, *, columns_px = None))]
+pub fn check_code(
+    fringe_numbers: FringeNumbers,
+    projector_width: usize,
+    columns_px: Option<[f64; 2]>,
+) -> PyResult<f64> {
+    let encoding = fringe_numbers.encoding(projector_width, columns_px).map_err(value_error)?;
     Ok(encoding.ambiguity_margin_rad())
 }
 
 /// Ideal image of a channel, (height, width) float32.
 #[pyfunction]
-#[pyo3(signature = (channel, fringe_numbers, width, height, *, layout = "regular"))]
+#[pyo3(signature = (channel, fringe_numbers, width, height, *, layout = "regular", columns_px = None))]
 pub fn pattern<'py>(
     py: Python<'py>,
     channel: &str,
-    fringe_numbers: [f64; 3],
+    fringe_numbers: FringeNumbers,
     width: usize,
     height: usize,
     layout: &str,
+    columns_px: Option<[f64; 2]>,
 ) -> PyResult<Bound<'py, PyArray2<f32>>> {
-    let encoding = Encoding::four_channel(fringe_numbers, width).map_err(value_error)?;
-    let (channel, layout) = (channel_named(channel)?, layout_named(layout)?);
-    let channel = encoding.channels()[channel.index()];
+    let encoding = fringe_numbers.encoding(width, columns_px).map_err(value_error)?;
+    let (name, layout) = (channel, layout_named(layout)?);
+    let known = encoding.channels().get(channel_named(name)?.index());
+    let channel =
+        *known.ok_or_else(|| unknown("channel of an encoding without infrared", name, "R, G or B"))?;
     let image = detached(py, || encoding::pattern(&channel, [width, height], layout))?;
     Ok(image.into_pyarray(py))
 }

@@ -1,10 +1,10 @@
 //! Further stages of the published decoder. The basic ones are in `stages`.
 
 use crate::arrays::{expected, value_error};
+use crate::device::FringeNumbers;
 use crate::workers::detached;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray2};
 use pyo3::prelude::*;
-use quadfringe::Encoding;
 use quadfringe::stages::{self, Absolute, Blocks, Fringes, Limits};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
@@ -119,10 +119,10 @@ fn discard_invalid<'py>(
 fn columns_from_phase<'py>(
     py: Python<'py>,
     phase_rad: &Bound<'py, PyAny>,
-    fringe_numbers: [f64; 3],
+    fringe_numbers: FringeNumbers,
     projector_width: usize,
 ) -> PyResult<(Map<'py>, Map<'py>)> {
-    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
+    let encoding = fringe_numbers.encoding(projector_width, None).map_err(value_error)?;
     let phase = map("phase_rad", phase_rad)?;
     let view = phase.as_array();
     let found = detached(py, || stages::columns_from_phase(&encoding, view))?;

@@ -1,8 +1,8 @@
 //! The stages one by one, for teaching and debugging. All images are (H, W) float32.
 
-use crate::arrays::{BAYER_IMAGES, CHANNELS, Images, expected, value_error, views};
+use crate::arrays::{BAYER_IMAGES, CHANNELS, COLOURS, Images, RAW, expected, value_error, views};
 use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
-use crate::device::unknown;
+use crate::device::{FringeNumbers, unknown};
 use crate::workers::detached;
 use ndarray::Array2;
 use numpy::{IntoPyArray, PyArray2, PyReadonlyArray2, PyReadonlyArray3};
@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use quadfringe::condition::{self, ResponseEstimate, Sample};
 use quadfringe::stages::{self, Background, Band, Phases};
-use quadfringe::{BayerPattern, Conditioner, Encoding, Shot};
+use quadfringe::{BayerPattern, Conditioner, Shot};
 
 type Map<'py> = Bound<'py, PyArray2<f32>>;
 
@@ -18,9 +18,9 @@ fn map<'py>(name: &str, object: &Bound<'py, PyAny>) -> PyResult<PyReadonlyArray2
     expected::<f32, 2>(name, object)
 }
 
-/// The four channels as linear light, by name.
+/// The channels as linear light, by name.
 #[pyfunction]
-#[pyo3(signature = (red, green, blue, ir, *, full_scale = None, dark = None, response = None, crosstalk = None,
+#[pyo3(signature = (red, green, blue, ir = None, *, full_scale = None, dark = None, response = None, crosstalk = None,
     projector_response = None, ir_registration = None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn linear_light<'py>(
@@ -28,7 +28,7 @@ pub fn linear_light<'py>(
     red: &Bound<'py, PyAny>,
     green: &Bound<'py, PyAny>,
     blue: &Bound<'py, PyAny>,
-    ir: &Bound<'py, PyAny>,
+    ir: Option<&Bound<'py, PyAny>>,
     full_scale: Option<f32>,
     dark: Option<[f32; 4]>,
     response: Option<[ResponseNumbers; 4]>,
@@ -37,24 +37,32 @@ pub fn linear_light<'py>(
     ir_registration: Option<[[f64; 3]; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let known = (full_scale, conditioner_of(dark, response, crosstalk, projector_response, ir_registration));
+    let Some(ir) = ir else {
+        let planes = match &Images::borrow(COLOURS, [red, green, blue])? {
+            Images::U8(three) => linearise(py, views(three), Shot::rgb, &known),
+            Images::U16(three) => linearise(py, views(three), Shot::rgb, &known),
+            Images::F32(three) => linearise(py, views(three), Shot::rgb, &known),
+        }?;
+        return light_by_name(py, &COLOURS, planes);
+    };
     let planes = match &Images::borrow(CHANNELS, [red, green, blue, ir])? {
         Images::U8(four) => linearise(py, views(four), Shot::new, &known),
         Images::U16(four) => linearise(py, views(four), Shot::new, &known),
         Images::F32(four) => linearise(py, views(four), Shot::new, &known),
     }?;
-    light_by_name(py, planes)
+    light_by_name(py, &CHANNELS, planes)
 }
 
 /// The four channels at every pixel as linear light, by name, from a raw mosaic and an infrared image.
 #[pyfunction]
-#[pyo3(signature = (raw, bayer, ir, *, full_scale = None, dark = None, response = None, crosstalk = None,
+#[pyo3(signature = (raw, bayer, ir = None, *, full_scale = None, dark = None, response = None, crosstalk = None,
     projector_response = None, ir_registration = None))]
 #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
 pub fn linear_light_bayer<'py>(
     py: Python<'py>,
     raw: &Bound<'py, PyAny>,
     bayer: &str,
-    ir: &Bound<'py, PyAny>,
+    ir: Option<&Bound<'py, PyAny>>,
     full_scale: Option<f32>,
     dark: Option<[f32; 4]>,
     response: Option<[ResponseNumbers; 4]>,
@@ -64,12 +72,20 @@ pub fn linear_light_bayer<'py>(
 ) -> PyResult<Bound<'py, PyDict>> {
     let pattern = BayerPattern::from_name(bayer).map_err(value_error)?;
     let known = (full_scale, conditioner_of(dark, response, crosstalk, projector_response, ir_registration));
+    let Some(ir) = ir else {
+        let planes = match &Images::borrow(RAW, [raw])? {
+            Images::U8(one) => linearise(py, views(one), |[raw]| Shot::bayer_rgb(raw, pattern), &known),
+            Images::U16(one) => linearise(py, views(one), |[raw]| Shot::bayer_rgb(raw, pattern), &known),
+            Images::F32(one) => linearise(py, views(one), |[raw]| Shot::bayer_rgb(raw, pattern), &known),
+        }?;
+        return light_by_name(py, &COLOURS, planes);
+    };
     let planes = match &Images::borrow(BAYER_IMAGES, [raw, ir])? {
         Images::U8(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
         Images::U16(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
         Images::F32(two) => linearise(py, views(two), |[raw, ir]| Shot::bayer(raw, pattern, ir), &known),
     }?;
-    light_by_name(py, planes)
+    light_by_name(py, &CHANNELS, planes)
 }
 
 fn linearise<'a, T: Sample, I: Send>(
@@ -82,9 +98,14 @@ fn linearise<'a, T: Sample, I: Send>(
     detached(py, work)?.map_err(value_error)
 }
 
-fn light_by_name(py: Python<'_>, planes: [Array2<f32>; 4]) -> PyResult<Bound<'_, PyDict>> {
+/// The planes of these channels by name.
+fn light_by_name<'py>(
+    py: Python<'py>,
+    channels: &[&str],
+    planes: [Array2<f32>; 4],
+) -> PyResult<Bound<'py, PyDict>> {
     let named = PyDict::new(py);
-    for (name, plane) in CHANNELS.into_iter().zip(planes) {
+    for (name, plane) in channels.iter().zip(planes) {
         named.set_item(name, plane.into_pyarray(py))?;
     }
     Ok(named)
@@ -153,10 +174,10 @@ pub fn unwrap<'py>(
     first: &Bound<'py, PyAny>,
     second: &Bound<'py, PyAny>,
     third: &Bound<'py, PyAny>,
-    fringe_numbers: [f64; 3],
+    fringe_numbers: FringeNumbers,
     projector_width: usize,
 ) -> PyResult<(Map<'py>, Map<'py>)> {
-    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
+    let encoding = fringe_numbers.encoding(projector_width, None).map_err(value_error)?;
     let maps = [map("first", first)?, map("second", second)?, map("third", third)?];
     let views = Phases::from_array(maps.each_ref().map(PyReadonlyArray2::as_array));
     let found = detached(py, || stages::unwrap(&encoding, views))?.map_err(value_error)?;
@@ -189,19 +210,22 @@ pub fn estimate_response<'py>(
 
 /// Response of each channel from one shot and its phase, by name. A channel for which none was found is left out.
 #[pyfunction]
+#[pyo3(signature = (red, green, blue, ir, phase_rad, fringe_numbers, projector_width, *, columns_px = None))]
 #[expect(clippy::too_many_arguments, reason = "four channels, their phase and their fringes")]
 pub fn estimate_response_of_shot<'py>(
     py: Python<'py>,
     red: &Bound<'py, PyAny>,
     green: &Bound<'py, PyAny>,
     blue: &Bound<'py, PyAny>,
-    ir: &Bound<'py, PyAny>,
+    ir: Option<&Bound<'py, PyAny>>,
     phase_rad: &Bound<'py, PyAny>,
-    fringe_numbers: [f64; 3],
+    fringe_numbers: FringeNumbers,
     projector_width: usize,
+    columns_px: Option<[f64; 2]>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let encoding = Encoding::four_channel(fringe_numbers, projector_width).map_err(value_error)?;
-    let light = [map("red", red)?, map("green", green)?, map("blue", blue)?, map("ir", ir)?];
+    let encoding = fringe_numbers.encoding(projector_width, columns_px).map_err(value_error)?;
+    // Without infrared its plane is not read.
+    let light = [map("red", red)?, map("green", green)?, map("blue", blue)?, map("ir", ir.unwrap_or(green))?];
     let phase = map("phase_rad", phase_rad)?;
     let (views, phase) = (light.each_ref().map(PyReadonlyArray2::as_array), phase.as_array());
     let work = || condition::estimate_response_of_shot(views, phase, &encoding);

@@ -50,7 +50,7 @@ pub enum Error {
         /// The actual value.
         actual: Given,
     },
-    /// fringe numbers {fringe_numbers:?} cannot number the fringes of {width_px} columns: columns {first_px:.1} and {second_px:.1} look alike (phases {margin_rad:.3} rad apart, {needed_rad} needed); choose numbers whose joint range covers the field, such as 36, 35, 30
+    /// fringe numbers {fringe_numbers:?} cannot number the fringes of {width_px} columns: columns {first_px:.1} and {second_px:.1} look alike (phases {margin_rad:.3} rad apart, {needed_rad} needed); choose numbers whose joint range covers the field, such as 36, 35, 30, or 16, 15 without infrared, or name the columns that light the scene
     JointRange {
         /// Fringe numbers of the phases that the encoding measures.
         fringe_numbers: Vec<f64>,
@@ -65,7 +65,7 @@ pub enum Error {
         /// The least distance that is accepted.
         needed_rad: f64,
     },
-    /// expected the four-channel encoding (R, G and B from the visible projector, IR from the infrared one, R and B of one fringe number, B shifted by pi/2 and the others by 0), got {fault}; make it with Encoding::four_channel or Encoding::optimum
+    /// expected the encoding of a single shot (R, G and B from the visible projector and none or IR from the infrared one, R and B of one fringe number, B shifted by pi/2 and the others by 0), got {fault}; make it with Encoding::four_channel, Encoding::optimum or Encoding::rgb
     NotFourChannel {
         /// The first difference.
         fault: FourChannelFault,

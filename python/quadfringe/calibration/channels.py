@@ -1,4 +1,4 @@
-"""Responses of camera and projectors, and crosstalk of the four channels, from evenly lit captures.
+"""Responses of camera and projectors, and crosstalk of the channels, from evenly lit captures.
 
 The camera sees levels l (R, G, B, IR, shares of full light) at a relative exposure e as
 
@@ -6,7 +6,8 @@ The camera sees levels l (R, G, B, IR, shares of full light) at a relative expos
 
 where M_ij is the light of projected channel j in captured channel i. The virtual bench renders by this model, and the
 decoder inverts it before (S1) holds: dark level, camera response, crosstalk, projector response. The crosstalk matrix
-is M with its columns scaled to 1 on the diagonal.
+is M with its columns scaled to 1 on the diagonal. Without infrared there are three channels; the row and the column of
+infrared are then those of the identity.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ Array = NDArray[np.float64]
 class Channels:
     """Fitted responses and crosstalk, one standard deviation of each number, and the errors before and after.
 
-    Errors are shares of the full light of the channel, (K, 4), NaN for captures that were not used. `level_before` and
-    `level_after` compare the captured with the projected level; `stray_before` and `stray_after` are the light of the
-    other channels while the channel itself is projected black.
+    Errors are shares of the full light of the channel, (K, 4), or (K, 3) without infrared, NaN for captures that were
+    not used. `level_before` and `level_after` compare the captured with the projected level; `stray_before` and
+    `stray_after` are the light of the other channels while the channel itself is projected black.
     """
 
     dark: Row4
@@ -77,33 +78,37 @@ class Channels:
 def fit_channels(plan: LevelPlan, captured: Array, dark: Sequence[float] = (0.0,) * 4) -> Channels:
     """Fit responses and crosstalk to the mean captured levels (K, 4), shares of full scale, NaN where saturated.
 
+    A plan without infrared has levels (K, 3).
+
     `dark` is the measured dark level, from which the fit starts. Raises `InputError` when captures of the plan are
     missing, when a camera channel does not see its projected channel, or when too few captures are unsaturated.
     """
     captured = np.asarray(captured, float)
     if captured.shape != plan.levels.shape:
         raise InputError(
-            f"levels: expected {len(plan.levels)} captures of four channels, got an array of shape {captured.shape}; "
+            f"levels: expected {len(plan.levels)} captures of {plan.channels} channels, got an array of shape "
+            f"{captured.shape}; "
             "capture every level of the plan"
         )
     seen = np.where(captured < CLIPPED, captured, np.nan)
-    _check_ramps(plan, seen - np.asarray(dark, float))
-    found, deviations = _solve(plan, seen, np.asarray(dark, float))
+    black = np.asarray(dark, float)[: plan.channels]
+    _check_ramps(plan, seen - black)
+    found, deviations = _solve(plan, seen, black)
     lit = seen - found.dark
     full_light = np.diag(found.mixing)
     crosstalk = found.mixing / full_light
     offset = np.linalg.solve(crosstalk, found.ambient).clip(0.0, AMBIENT_MAX)
     known: dict[str, Any] = {
         "dark": row4(found.dark),
-        "response": Response.from_powers(np.zeros(4), found.camera),
+        "response": Response.from_powers(np.zeros(4), row4(found.camera, 1.0)),
         "crosstalk": _matrix(crosstalk),
-        "projector_response": Response.from_powers(offset, 1 / found.projector),
+        "projector_response": Response.from_powers(row4(offset), row4(1 / found.projector, 1.0)),
     }
     return Channels(
         **known,
         camera_exponent_sd=row4(deviations.camera),
         projector_exponent_sd=row4(deviations.projector),
-        crosstalk_sd=_matrix(deviations.mixing / full_light),
+        crosstalk_sd=_matrix(deviations.mixing / full_light, 0.0),
         **_errors(plan, lit, captured, known),
     )
 
@@ -120,7 +125,9 @@ class _Model:
 
     @classmethod
     def of(cls, numbers: Array) -> _Model:
-        return cls(numbers[:4], numbers[4:8], numbers[8:24].reshape(4, 4), numbers[24:28], numbers[28:])
+        n = round((numbers.size + 4) ** 0.5) - 2  # channels: there are n^2 + 4 n numbers
+        camera, projector, mixing, ambient, dark = np.split(numbers, np.cumsum([n, n, n * n, n]))
+        return cls(camera, projector, mixing.reshape(n, n), ambient, dark)
 
     def numbers(self) -> Array:
         return np.concatenate([self.camera, self.projector, self.mixing.ravel(), self.ambient, self.dark])
@@ -142,8 +149,9 @@ def _solve(plan: LevelPlan, seen: Array, dark: Array) -> tuple[_Model, _Model]:
         return np.concatenate([(model.captured(plan) - seen)[counts], *priors])
 
     start = _first_guess(plan, seen - dark, dark).numbers()
-    low = np.concatenate([np.full(8, 0.2), np.full(20, -0.2), np.zeros(4)])
-    high = np.concatenate([np.full(8, 5.0), np.full(20, 3.0), np.full(4, 0.5)])
+    n = plan.channels
+    low = np.concatenate([np.full(2 * n, 0.2), np.full(n * n + n, -0.2), np.zeros(n)])
+    high = np.concatenate([np.full(2 * n, 5.0), np.full(n * n + n, 3.0), np.full(n, 0.5)])
     start = start.clip(low + 1e-9, high - 1e-9)
     found = least_squares(
         misses, start, bounds=(low, high), x_scale="jac", xtol=1e-12, loss="soft_l1", f_scale=ROBUST, max_nfev=300
@@ -156,8 +164,8 @@ def _solve(plan: LevelPlan, seen: Array, dark: Array) -> tuple[_Model, _Model]:
 def _first_guess(plan: LevelPlan, lit: Array, dark: Array) -> _Model:
     """Start from a linear camera: the power law of each ramp, and its brightest unsaturated level as its light."""
     black = np.nan_to_num(lit[_black(plan)].mean(axis=0))
-    mixing, projector = np.eye(4), np.ones(4)
-    for channel in range(4):
+    mixing, projector = np.eye(plan.channels), np.ones(plan.channels)
+    for channel in range(plan.channels):
         rows = _ramp(plan, channel)
         light = np.where(np.isfinite(lit[rows]), lit[rows] - black, np.nan)
         level, seen = plan.levels[rows, channel], light[:, channel]
@@ -167,7 +175,7 @@ def _first_guess(plan: LevelPlan, lit: Array, dark: Array) -> _Model:
         top = int(np.flatnonzero(np.isfinite(seen))[-1])
         mixing[:, channel] = np.nan_to_num(light[top]) / level[top] ** slope
         mixing[channel, channel] = np.exp(height)
-    return _Model(np.ones(4), projector, mixing, black, dark)
+    return _Model(np.ones(plan.channels), projector, mixing, black, dark)
 
 
 def _black(plan: LevelPlan) -> NDArray[np.intp]:
@@ -185,7 +193,7 @@ def _check_ramps(plan: LevelPlan, lit: Array) -> None:
     black = _black(plan)
     if not black.size:
         raise InputError("levels: no capture is black; add one with all projectors showing black")
-    for channel, name in enumerate(CHANNELS):
+    for channel, name in enumerate(CHANNELS[: plan.channels]):
         ramp = lit[_ramp(plan, channel)]
         usable = np.isfinite(ramp[:, channel]).sum()
         if usable < USABLE_LEVELS_MIN or np.isnan(lit[black, channel]).all():
@@ -223,17 +231,17 @@ def _errors(plan: LevelPlan, lit: Array, captured: Array, known: dict[str, Any])
 
 
 def _conditioned(captured: Array, known: dict[str, Any]) -> Array:
-    """Condition mean intensities (K, 4) as the decoder conditions pixels; returns linear light (K, 4)."""
+    """Condition mean intensities (K, channels) as the decoder conditions pixels; returns linear light of that shape."""
     images = [np.ascontiguousarray(column[None], np.float32) for column in np.nan_to_num(captured).T]
     rows: dict[str, Any] = {name: value.rows if isinstance(value, Response) else value for name, value in known.items()}
-    light = _core.linear_light(images[0], images[1], images[2], images[3], **rows)
-    return np.stack([light[name][0] for name in CHANNELS], axis=1).astype(float)
+    light = _core.linear_light(*images, **rows)
+    return np.stack([values[0] for values in light.values()], axis=1).astype(float)
 
 
 def _full_light(plan: LevelPlan, seen: Array) -> Array:
-    """Extrapolate the brightest unsaturated capture of each ramp to the full light of the channel, (4,)."""
+    """Extrapolate the brightest unsaturated capture of each ramp to the full light of the channel, (channels,)."""
     tops = []
-    for channel in range(4):
+    for channel in range(plan.channels):
         rows = _ramp(plan, channel)
         usable = rows[np.isfinite(seen[rows, channel])]
         tops.append(seen[usable[-1], channel] / plan.levels[usable[-1], channel])
@@ -248,13 +256,14 @@ def _level_error(plan: LevelPlan, seen: Array) -> Array:
     """Return the error of lit captures against a line through zero, shares of full light; NaN for unlit channels."""
     lit = np.isfinite(seen) & (plan.levels > 0)
     found = np.full(seen.shape, np.nan)
-    for channel in range(4):
+    for channel in range(plan.channels):
         rows = lit[:, channel]
         level, value = plan.levels[rows, channel], seen[rows, channel]
         found[rows, channel] = value / (value @ level / (level @ level)) - level
     return found
 
 
-def _matrix(values: Array) -> Matrix4:
-    red, green, blue, ir = (row4(row) for row in values)
+def _matrix(values: Array, absent: float = 1.0) -> Matrix4:
+    """Convert to rows of four; without infrared its row and column are 0, but for `absent` on the diagonal."""
+    red, green, blue, ir = (*(row4(row) for row in values), (0.0, 0.0, 0.0, absent))[:4]
     return red, green, blue, ir

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.calibration._params import DEFECT, FLAT_LIGHT, FLAT_SHOTS_MIN, SLOW_PX
-from quadfringe.calibration.levels import CHANNELS, row4, stacked
+from quadfringe.calibration.levels import row4, stacked
 from quadfringe.config import Row4
 from quadfringe.data import AnyShot
 from quadfringe.errors import InputError
@@ -25,9 +25,10 @@ __all__ = ["FlatField", "flat_field"]
 class FlatField:
     """Gain map (4, H, W) float32, NaN at defective pixels, and figures of R, G, B, IR in per cent.
 
-    `vignetting` compares the darkest with the brightest region. `pixels` is the standard deviation of the pixel gain
-    from its surroundings, temporal noise excluded. `uneven` is the standard deviation over the image before and after
-    applying the gain, in shots that the gain was not computed from.
+    Without infrared the map is (3, H, W), and its figures are 0. `vignetting` compares the darkest with the brightest
+    region. `pixels` is the standard deviation of the pixel gain from its surroundings, temporal noise excluded.
+    `uneven` is the standard deviation over the image before and after applying the gain, in shots that the gain was not
+    computed from.
     """
 
     gain: NDArray[np.float32]
@@ -54,7 +55,8 @@ def flat_field(shots: Sequence[AnyShot], dark: Sequence[float] = (0.0,) * 4) -> 
         raise InputError(
             f"flat field: expected {FLAT_SHOTS_MIN} shots or more of an evenly lit surface, got {len(shots)}"
         )
-    found = [_channel(stacked(shots, name) - level, name) for name, level in zip(CHANNELS, dark, strict=True)]
+    levels = zip(shots[0].channels, dark, strict=False)  # the dark level of infrared is left over without it
+    found = [_channel(stacked(shots, name) - level, name) for name, level in levels]
     return FlatField(
         gain=np.stack([channel.gain for channel in found]),
         vignetting_percent=row4([channel.vignetting_percent for channel in found]),

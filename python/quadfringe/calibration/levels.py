@@ -21,21 +21,31 @@ CHANNELS = ("red", "green", "blue", "ir")
 
 @dataclass(frozen=True)
 class LevelPlan:
-    """The captures to take: `levels` (K, 4) of R, G, B, IR from 0 to 1, and the relative `exposure` (K,)."""
+    """The captures to take: `levels` (K, 4) of R, G, B, IR from 0 to 1, and the relative `exposure` (K,).
+
+    Without infrared `levels` are (K, 3).
+    """
 
     levels: Array
     exposure: Array
 
     @property
+    def channels(self) -> int:
+        """Number of channels: 4, or 3 without infrared."""
+        return int(self.levels.shape[1])
+
+    @property
     def names(self) -> tuple[str, ...]:
         """Name of each capture, as in r100_g000_b000_ir050_e100; the numbers are per cent."""
-        words = ("r", "g", "b", "ir", "e")
+        words = (*("r", "g", "b", "ir")[: self.channels], "e")
         rows = np.column_stack([self.levels, self.exposure])
         return tuple("_".join(f"{w}{round(100 * v):03d}" for w, v in zip(words, row, strict=True)) for row in rows)
 
 
-def level_plan(steps: int = LEVEL_STEPS) -> LevelPlan:
-    """Return the captures that `fit_channels` needs: black, a ramp of each channel, and a ramp of all four together.
+def level_plan(steps: int = LEVEL_STEPS, channels: int = 4) -> LevelPlan:
+    """Return the captures that `fit_channels` needs: black, a ramp of each channel, and a ramp of all of them together.
+
+    There are 4 `channels`, or 3 without infrared.
 
     The last two captures repeat the brightest level at shorter exposures, which separates the camera response from the
     projector response.
@@ -45,10 +55,10 @@ def level_plan(steps: int = LEVEL_STEPS) -> LevelPlan:
     ('r000_g000_b000_ir000_e100', 'r025_g000_b000_ir000_e100')
     """
     ramp = np.round(np.arange(1, steps + 1) / steps, 2)
-    single = [level * np.eye(4)[channel] for channel in range(4) for level in ramp]
-    together = [np.full(4, level) for level in ramp]
-    bright = [np.full(4, ramp[-1])] * 2
-    levels = np.array([np.zeros(4), *single, *together, *bright])
+    single = [level * np.eye(channels)[channel] for channel in range(channels) for level in ramp]
+    together = [np.full(channels, level) for level in ramp]
+    bright = [np.full(channels, ramp[-1])] * 2
+    levels = np.array([np.zeros(channels), *single, *together, *bright])
     exposure = np.ones(len(levels))
     exposure[-2:] = (0.25, 0.5)
     return LevelPlan(levels, exposure)
@@ -72,7 +82,7 @@ def dark_level(shots: Sequence[AnyShot]) -> DarkLevel:
     """
     if len(shots) < 2:
         raise InputError(f"dark level: expected two shots or more with the lens covered, got {len(shots)}")
-    stacks = [stacked(shots, name) for name in CHANNELS]
+    stacks = [stacked(shots, name) for name in shots[0].channels]
     levels = [float(np.median(stack.mean(axis=0))) for stack in stacks]
     if max(levels) > DARK_LEVEL_MAX:
         worst = CHANNELS[int(np.argmax(levels))]
@@ -92,7 +102,8 @@ def dark_level(shots: Sequence[AnyShot]) -> DarkLevel:
 def mean_levels(shot: AnyShot, share: float = 0.25) -> Array:
     """Return the mean intensity of each channel, (4,), share of full scale, over the middle `share` of each axis.
 
-    A channel is NaN when more than one pixel in a thousand is saturated there, because its mean is then biased.
+    Without infrared it is (3,). A channel is NaN when more than one pixel in a thousand is saturated there, because its
+    mean is then biased.
     """
     found = []
     for image in shot.channels.values():
@@ -102,9 +113,9 @@ def mean_levels(shot: AnyShot, share: float = 0.25) -> Array:
     return np.array(found)
 
 
-def row4(values: Sequence[float] | Array) -> Row4:
-    """Convert four numbers to a tuple of R, G, B, IR."""
-    red, green, blue, ir = (float(v) for v in values)
+def row4(values: Sequence[float] | Array, absent: float = 0.0) -> Row4:
+    """Convert four numbers to a tuple of R, G, B, IR; without infrared there are three, and it is `absent`."""
+    red, green, blue, ir = (*(float(v) for v in values), absent)[:4]
     return red, green, blue, ir
 
 

@@ -104,6 +104,7 @@ def _planes(shot: AnyShot) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
         return np.mean([light[name] for name in ("red", "green", "blue")], axis=0, dtype=np.float32), light["ir"]
     scale = np.float32(1 / shot.full_scale_value)
     grey = (shot.red.astype(np.float32) + shot.green + shot.blue) * (scale / 3)
+    assert shot.ir is not None, "the bench of a rehearsal has infrared"
     return grey.astype(np.float32), shot.ir.astype(np.float32) * scale
 
 

@@ -12,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from quadfringe.config import DecodeConfig
+    from quadfringe.config import DecodeConfig, Fringes
 
 __all__ = [
     "METHODS",
@@ -22,10 +22,13 @@ __all__ = [
     "BitsOption",
     "BoardPosesOption",
     "CalibrationOption",
+    "ChannelsOfCode",
     "Colouring",
+    "ColumnRangeOption",
     "ColumnsOption",
+    "EncodingOption",
     "FileSizeOption",
-    "Fringes3",
+    "FringesOption",
     "HostOption",
     "JsonOption",
     "OutFolder",
@@ -35,7 +38,9 @@ __all__ = [
     "SystemFile",
     "VirtualSystemOption",
     "decode_settings",
+    "fringes_from",
     "in_words",
+    "joined_fringes",
     "method_named",
 ]
 
@@ -85,12 +90,70 @@ VirtualSystemOption = Annotated[
         "--system", metavar="FILE", help="System file of the virtual bench, .toml; default: the built-in one."
     ),
 ]
-Fringes3 = Annotated[
-    tuple[float, float, float],
+
+
+class ChannelsOfCode(StrEnum):
+    """The channels of a shot: three colours and infrared, or three colours of one projector."""
+
+    rgb_ir = "rgb-ir"
+    rgb = "rgb"
+
+
+class FringeNumbers(tuple[float, ...]):
+    """Two or three fringe numbers of one option."""
+
+
+def _fringe_numbers(words: str) -> FringeNumbers:
+    """Read the numbers of one option; their count is checked with the encoding."""
+    try:
+        return FringeNumbers(float(word) for word in words.split())
+    except ValueError:
+        raise typer.BadParameter(f"expected numbers, such as 36 35 30, got {words!r}") from None
+
+
+def joined_fringes(words: list[str]) -> list[str]:
+    """Join the numbers after --fringes, of which there are two or three, to one word; an option takes one."""
+    if "--fringes" not in words:
+        return words
+    first = words.index("--fringes") + 1
+    count = 0
+    while count < len(FRINGES_3) and first + count < len(words) and _is_number(words[first + count]):
+        count += 1
+    return [*words[:first], " ".join(words[first : first + count]), *words[first + count :]] if count else words
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
+
+
+FRINGES_3 = (36.0, 35.0, 30.0)
+FringesOption = Annotated[
+    FringeNumbers | None,
     typer.Option(
         "--fringes",
-        metavar="N N N",
-        help="Number of fringes over the projector width: of red and blue, of green, of infrared.",
+        metavar="N N [N]",
+        parser=_fringe_numbers,
+        help="Number of fringes over the projector width: of red and blue, of green, of infrared; two with --encoding "
+        "rgb. Default: 36 35 30, or 16 15.",
+    ),
+]
+EncodingOption = Annotated[
+    ChannelsOfCode | None,
+    typer.Option(
+        "--encoding", help="rgb-ir (default) has infrared of a second projector; rgb is for one projector without."
+    ),
+]
+ColumnRangeOption = Annotated[
+    tuple[float, float] | None,
+    typer.Option(
+        "--columns",
+        metavar="PX PX",
+        help="First and last projector column that can light the scene; fewer columns permit more fringes. Default: "
+        "all.",
     ),
 ]
 ColumnsOption = Annotated[
@@ -142,6 +205,19 @@ def method_named(name: str) -> str:
     if name not in (*METHODS.split("|"), "best"):
         raise typer.BadParameter(f"expected {METHODS.replace('|', ' or ')}, got {name!r}")
     return "joint" if name == "best" else name
+
+
+def fringes_from(
+    encoding: ChannelsOfCode | None,
+    numbers: tuple[float, ...] | None,
+    columns_px: tuple[float, float] | None,
+    **others: Any,
+) -> Fringes:
+    """Make the fringes of the options that were given; an error names the option."""
+    from quadfringe.config import Fringes, checked
+
+    values = {"encoding": encoding and encoding.value, "numbers": numbers, "columns_px": columns_px} | others
+    return checked(Fringes, {name: value for name, value in values.items() if value is not None}, "--fringes")
 
 
 def in_words(error: typer.BadParameter) -> str:

@@ -30,7 +30,7 @@ from quadfringe.cli import (
     target,
     view,
 )
-from quadfringe.cli._options import in_words
+from quadfringe.cli._options import in_words, joined_fringes
 from quadfringe.cli._output import cautions, complain
 from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
@@ -41,6 +41,10 @@ USAGE, FAILED = 2, 1
 
 class Commands(TyperGroup):
     """Exit with 2 for bad input and with 1 for a failed run; both print one message and no traceback."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Take two or three numbers after --fringes."""
+        return super().parse_args(ctx, joined_fringes(args))
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command and turn its errors into exit statuses."""

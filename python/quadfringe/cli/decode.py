@@ -17,10 +17,14 @@ from quadfringe.cli._options import (
     Bits,
     BitsOption,
     CalibrationOption,
+    ColumnRangeOption,
     ColumnsOption,
+    EncodingOption,
+    FringesOption,
     JsonOption,
     PredeformedOption,
     decode_settings,
+    fringes_from,
     method_named,
 )
 from quadfringe.cli._output import caution, say, write_figures
@@ -57,15 +61,8 @@ SourcesArgument = Annotated[
     typer.Argument(
         metavar="[FOLDER | FILES...]",
         help="Folder with red.png, green.png, blue.png and ir.png (or rgb.png and ir.png; with --bayer raw.png and "
-        "ir.png), in place of the options of single images. With --steps, the images of the steps or their folder, "
-        "sorted by name.",
-    ),
-]
-FringesOption = Annotated[
-    tuple[float, float, float] | None,
-    typer.Option(
-        metavar="N N N",
-        help="Number of fringes over the projector width of a single shot: of red and blue, of green, of infrared.",
+        "ir.png; with --encoding rgb no ir.png), in place of the options of single images. With --steps, the images of "
+        "the steps or their folder, sorted by name.",
     ),
 ]
 ImageOption = Annotated[
@@ -140,6 +137,8 @@ def decode(
     out: ResultOption,
     sources: SourcesArgument = None,
     fringes: FringesOption = None,
+    encoding: EncodingOption = None,
+    columns: ColumnRangeOption = None,
     steps: StepsOption = None,
     numbers: NumbersOption = None,
     order: OrderOption = None,
@@ -169,7 +168,8 @@ def decode(
     words = step_words(sources, numbers, steps, order, beam, bits)
     images = {"red": red, "green": green, "blue": blue, "ir": ir, "rgb": rgb, "raw": raw}
     settings = _settings(method, unwrapping, depth_range_mm, period_px, channel_instants_us)
-    code = {"fringes": fringes, "predeformed_z_mm": predeformed_z_mm, "bayer": bayer}
+    code: dict[str, Any] = {"fringes": fringes, "encoding": encoding, "columns": columns, "bayer": bayer}
+    code["predeformed_z_mm"] = predeformed_z_mm
     if words.given:
         shape = from_steps(words, projector_width, calibration, _response(response, linear), code | images | settings)
         return _save(shape, _Results(out, report), json)
@@ -198,13 +198,16 @@ def _plan(
     settings: Mapping[str, Any],
 ) -> Plan:
     from quadfringe import decoding
-    from quadfringe.config import Fringes, checked
     from quadfringe.errors import InputError
 
-    if fringes["fringes"] is None:
-        raise InputError("a single shot needs --fringes N N N, step images --steps N and --numbers N...; give one")
-    named = {"numbers": fringes["fringes"], "predeformed_z_mm": fringes["predeformed_z_mm"]}
-    found = checked(Fringes, named, "--fringes")
+    numbers, encoding = fringes["fringes"], fringes["encoding"]
+    if numbers is None:
+        raise InputError(
+            "a single shot needs --fringes N N N, or --encoding rgb --fringes N N without infrared, step images "
+            "--steps N and --numbers N...; give one"
+        )
+    others = {"predeformed_z_mm": fringes["predeformed_z_mm"]}
+    found = fringes_from(encoding, numbers, fringes["columns"], **others)
     return decoding.Plan(projector_width, found, calibration, response, decode_settings(settings))
 
 

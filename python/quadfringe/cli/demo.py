@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._options import JsonOption
+from quadfringe.cli._options import EncodingOption, JsonOption, fringes_from
 from quadfringe.cli._output import progress, say, table, write_figures
 
 __all__ = ["demo"]
@@ -17,6 +17,7 @@ def demo(
     out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the PLY files, reports and figures.")] = Path(
         "out/demo"
     ),
+    encoding: EncodingOption = None,
     json: JsonOption = None,
 ) -> None:
     """Measure two scenes, steps and a face, on the virtual bench; write PLY files, PNG reports and figures.json."""
@@ -24,11 +25,12 @@ def demo(
     from quadfringe.files import folder_for
 
     folder_for(out)
+    fringes = fringes_from(encoding, None, None)
     figures: dict[str, float] = {}
     decode_ms = []
     with progress(SCENES, "virtual bench") as scenes:
         for scene in scenes:
-            result = run_scene(scene, out)
+            result = run_scene(scene, out, fringes)
             figures |= result.figures
             decode_ms.append(result.decode_ms)
     figures["decode_ms"] = min(decode_ms)

@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
-from quadfringe.cli._options import Bayer, Bits, BitsOption, ColumnsOption, JsonOption
+from quadfringe.cli._options import (
+    Bayer,
+    Bits,
+    BitsOption,
+    ColumnRangeOption,
+    ColumnsOption,
+    EncodingOption,
+    FringesOption,
+    JsonOption,
+    fringes_from,
+)
 from quadfringe.cli._output import say, write_record
 
 if TYPE_CHECKING:
@@ -29,10 +39,6 @@ PathsArgument = Annotated[
         help="A folder with a shot (red, green, blue and ir, or raw and ir, .png), a calibration .json, or both; "
         "with --board or --plane several folders and a calibration; without a path, the installation is examined.",
     ),
-]
-FringesOption = Annotated[
-    tuple[float, float, float],
-    typer.Option(metavar="N N N", help="Fringe numbers of the shot: of red and blue, of green, of infrared."),
 ]
 BayerOption = Annotated[
     Bayer | None, typer.Option(help="Filter colours of the first 2 x 2 pixels of raw.png; needed for a raw mosaic.")
@@ -53,7 +59,9 @@ PlaneOption = Annotated[
 
 def doctor(
     files: PathsArgument = None,
-    fringes: FringesOption = (36.0, 35.0, 30.0),
+    fringes: FringesOption = None,
+    encoding: EncodingOption = None,
+    columns: ColumnRangeOption = None,
     projector_width: ColumnsOption = 912,
     bayer: BayerOption = None,
     bits: BitsOption = None,
@@ -67,7 +75,6 @@ def doctor(
     With --board or --plane, tell a fault of the calibration from one of the decoding. The exit status is 1 when a fault
     is found.
     """
-    from quadfringe.config import Fringes, checked
     from quadfringe.data import Calibration
     from quadfringe.decoding import Plan
     from quadfringe.doctor import examine_calibration, examine_digest, examine_installation
@@ -78,7 +85,7 @@ def doctor(
     found: list[Finding] = [] if files else examine_installation()
     if calibration is not None and given.calibration is not None:
         found += [examine_digest(given.calibration), *examine_calibration(calibration)]
-    plan = Plan(projector_width, checked(Fringes, {"numbers": fringes}, "--fringes"), calibration)
+    plan = Plan(projector_width, fringes_from(encoding, fringes, columns), calibration)
     for folder in given.shots:
         one = _examined(_shot_in(folder, bayer, bits), plan, surface)
         found += [replace(each, name=f"{folder.name} {each.name}") for each in one] if len(given.shots) > 1 else one

@@ -8,7 +8,14 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._options import Fringes3, OutFolder, PredeformedOption
+from quadfringe.cli._options import (
+    ColumnRangeOption,
+    EncodingOption,
+    FringesOption,
+    OutFolder,
+    PredeformedOption,
+    fringes_from,
+)
 from quadfringe.cli._output import say
 
 __all__ = ["pattern"]
@@ -23,7 +30,9 @@ class Layout(StrEnum):
 
 def pattern(
     out: OutFolder,
-    fringes: Fringes3 = (36.0, 35.0, 30.0),
+    fringes: FringesOption = None,
+    encoding: EncodingOption = None,
+    columns: ColumnRangeOption = None,
     width: Annotated[int, typer.Option(min=2, help="Columns of the projector, px.")] = 912,
     height: Annotated[int, typer.Option(min=1, help="Rows of the projector, px.")] = 1140,
     layout: Annotated[
@@ -35,12 +44,11 @@ def pattern(
     ] = None,
     predeformed_z_mm: PredeformedOption = None,
 ) -> None:
-    """Write the two images to project: visible.png (red, green, blue) and infrared.png, 8 bit.
+    """Write the images to project: visible.png (red, green, blue), and infrared.png unless --encoding rgb; 8 bit.
 
     With --calibration and --predeformed-z-mm, the infrared image is pre-deformed for an infrared projector that is not
     aligned with the visible one. The correction is exact on the plane at that depth.
     """
-    from quadfringe.config import Fringes, checked
     from quadfringe.data import Calibration
     from quadfringe.devices.light import predeformation
     from quadfringe.devices.pattern_files import write_patterns
@@ -51,7 +59,7 @@ def pattern(
             "--calibration has no effect without --predeformed-z-mm, the depth of the reference plane; add it"
         )
     known = None if calibration is None else Calibration.load(calibration)
-    values = {"numbers": fringes, "layout": layout.value, "predeformed_z_mm": predeformed_z_mm}
-    wanted = checked(Fringes, values, "--fringes")
-    for path in write_patterns(out, wanted.numbers, (width, height), layout.value, predeformation(wanted, known)):
+    others = {"layout": layout.value, "predeformed_z_mm": predeformed_z_mm}
+    wanted = fringes_from(encoding, fringes, columns, **others)
+    for path in write_patterns(out, wanted, (width, height), predeformation(wanted, known)):
         say(str(path))

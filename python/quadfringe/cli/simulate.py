@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._options import Bayer, OutFolder, SystemFile
+from quadfringe.cli._options import Bayer, EncodingOption, FringesOption, OutFolder, SystemFile, fringes_from
 from quadfringe.cli._output import say
 
 __all__ = ["simulate"]
@@ -32,12 +32,15 @@ def simulate(
         Bayer | None,
         typer.Option(help="Simulate a Bayer chip with these filter colours: write raw.png in place of three images."),
     ] = None,
+    fringes: FringesOption = None,
+    encoding: EncodingOption = None,
 ) -> None:
     """Render one shot of the virtual bench: write its images, calibration.json and truth.npz."""
     from quadfringe.evaluation.simulate import virtual_bench_config, write_simulation
 
+    shown = None if fringes is None and encoding is None else fringes_from(encoding, fringes, None)
     config = virtual_bench_config(
-        system, surface=surface, noise=noise, seed=seed, bayer=None if bayer is None else bayer.value
+        system, shown, surface=surface, noise=noise, seed=seed, bayer=None if bayer is None else bayer.value
     )
     for path in write_simulation(out, config):
         say(str(path))

@@ -16,13 +16,13 @@ from quadfringe.config.cameras import (
 from quadfringe.config.decode import (
     ChannelResponse,
     DecodeConfig,
-    Fringes,
     Response,
     ResponseChoice,
     ResponseSetting,
     Row4,
 )
 from quadfringe.config.devices import IDENTITY, Camera, Device, Pixels, Triple
+from quadfringe.config.fringes import Fringes
 from quadfringe.config.projectors import FlashRoute, HdmiProjectorConfig, HdmiRoute, ProjectorConfig, ProjectorsConfig
 from quadfringe.config.scene import Affine, BayerPattern, HeightMapConfig, Matrix4, SceneConfig, Surface
 from quadfringe.config.system import SystemConfig, check_system, load_system

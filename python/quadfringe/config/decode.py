@@ -1,4 +1,4 @@
-"""Settings of decoding: the table `[decode]` of a system file, fringes, and the response of the channels.
+"""Settings of decoding: the table `[decode]` of a system file, and the response of the channels.
 
 >>> from quadfringe.config import DecodeConfig
 >>> DecodeConfig(method="published", response="linear")
@@ -14,20 +14,17 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationInfo, field_validator, model_validator
 
 from quadfringe import _core
-from quadfringe.config._base import SIZE_MAX, Finite, Model, NotNegative, Positive, checked, kernel_takes
+from quadfringe.config._base import SIZE_MAX, Finite, Model, NotNegative, Positive, kernel_takes
 
 __all__ = [
     "ChannelResponse",
     "DecodeConfig",
-    "Fringes",
     "Response",
     "ResponseChoice",
     "ResponseSetting",
     "Row4",
-    "three_numbers",
 ]
 
-FringeNumbers = tuple[float, float, float]
 Row4 = tuple[Finite, Finite, Finite, Finite]
 SMALLEST = 16, 16  # rows and columns of the smallest image that the kernel decodes
 PERIOD_MIN_PX = 3.0  # the least that the kernel takes; the most is the longer side of the image
@@ -90,57 +87,6 @@ ResponseSetting = Annotated[
 
 
 ResponseChoice = Response | Literal["auto", "linear"]  # a setting whose file has been read
-
-
-def _three(numbers: Any) -> Any:
-    if isinstance(numbers, (str, bytes)) or not isinstance(numbers, Iterable):
-        raise ValueError("expected three fringe numbers, such as (36, 35, 30)")
-    found = tuple(numbers)
-    if len(found) != 3:
-        raise ValueError("expected three fringe numbers, such as (36, 35, 30)")
-    return found
-
-
-Numbers = Annotated[tuple[Positive, Positive, Positive], BeforeValidator(_three)]
-
-
-class Fringes(Model):
-    """The fringes that the projectors show; the fringe numbers must distinguish all columns of a projector."""
-
-    numbers: Numbers = Field(
-        default=(36.0, 35.0, 30.0),
-        description="Fringes over the full projector width: of red and blue, of green, of infrared.",
-    )
-    layout: Literal["regular", "diamond"] = Field(
-        default="regular",
-        description="Mirrors of the projectors: a regular grid, or the diamond array of a LightCrafter 4500.",
-    )
-    predeformed_z_mm: Positive | None = Field(
-        default=None,
-        description="Depth in mm of the plane for which the infrared image is pre-deformed (S11), from the calibration "
-        "of both projectors. Absent: the image is plain. For projectors that are not quite coaxial.",
-    )
-
-    @field_validator("numbers")
-    @classmethod
-    def _distinguish_columns(cls, numbers: FringeNumbers) -> FringeNumbers:
-        # A wider projector forbids no further numbers, so that numbers that fail here fail for every projector.
-        try:
-            _core.check_code(numbers, SIZE_MAX)
-        except ValueError:
-            raise ValueError(
-                "expected fringe numbers whose joint range covers the projector, such as (36, 35, 30)"
-            ) from None
-        return numbers
-
-
-class _ThreeNumbers(Model):
-    numbers: Numbers = Field(description="Fringe numbers, which need not distinguish all columns.")
-
-
-def three_numbers(given: Any) -> FringeNumbers:
-    """Give three fringe numbers for one stage alone; raises `ConfigError` for anything else."""
-    return checked(_ThreeNumbers, {"numbers": given}, "fringe numbers").numbers
 
 
 class DecodeConfig(Model):

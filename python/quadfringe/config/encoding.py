@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.config._base import SIZE_MAX
-from quadfringe.config.decode import three_numbers
+from quadfringe.config.fringes import fringe_numbers as numbers_of
 from quadfringe.config.memory import require_memory
 from quadfringe.errors import InputError
 
@@ -35,9 +35,15 @@ def optimum(n: int, projector_width: int) -> list[float]:
     return list(_core.optimum(_whole("n", n), _whole("projector_width", projector_width)))
 
 
-def check_code(fringe_numbers: Sequence[float], projector_width: int) -> float:
-    """Give the ambiguity margin in rad; ValueError when the joint range does not cover the projector."""
-    return _core.check_code(three_numbers(fringe_numbers), _whole("projector_width", projector_width))
+def check_code(
+    fringe_numbers: Sequence[float], projector_width: int, *, columns_px: tuple[float, float] | None = None
+) -> float:
+    """Give the ambiguity margin in rad; ValueError when the joint range does not cover the projector.
+
+    With `columns_px`, the first and the last column that can light the scene, only these must be distinguished.
+    """
+    width = _whole("projector_width", projector_width)
+    return _core.check_code(numbers_of(fringe_numbers), width, columns_px=columns_px)
 
 
 def pattern(
@@ -51,13 +57,13 @@ def pattern(
     """Give the ideal image of a channel, (height, width) float32, linear light from 0 to 1.
 
     `channel` is "red", "green", "blue" or "ir", or R, G, B or IR. ValueError for other names and wrong sizes, and for
-    images that do not fit into memory.
+    images that do not fit into memory. Two fringe numbers are those of an encoding without infrared.
     """
     letters = CHANNELS.get(channel, channel)
     if letters not in CHANNELS.values():
         raise InputError(f"channel: expected one of {', '.join(CHANNELS)}, or R, G, B, IR, got {channel!r}")
     require_image("pattern", (width, height), PATTERN_BYTES_PER_PX)
-    return _core.pattern(letters, three_numbers(fringe_numbers), index(width), index(height), layout=layout)
+    return _core.pattern(letters, numbers_of(fringe_numbers), index(width), index(height), layout=layout)
 
 
 def require_image(work: str, size_px: tuple[int, int], bytes_per_px: float) -> None:

@@ -13,8 +13,8 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from quadfringe.config._base import Model, NotNegative
-from quadfringe.config.decode import Fringes
 from quadfringe.config.devices import Pixels
+from quadfringe.config.fringes import Fringes
 
 __all__ = ["AnyProjector", "FlashRoute", "HdmiProjectorConfig", "HdmiRoute", "ProjectorConfig", "ProjectorsConfig"]
 

@@ -18,8 +18,9 @@ from pydantic import Field
 from quadfringe.config._base import Model, checked
 from quadfringe.config._brief import brief
 from quadfringe.config.cameras import AnyCapture, FilesConfig, ReplayConfig, UvcConfig, VirtualConfig
-from quadfringe.config.decode import DecodeConfig, Fringes
+from quadfringe.config.decode import DecodeConfig
 from quadfringe.config.devices import Camera, Device
+from quadfringe.config.fringes import Fringes
 from quadfringe.config.projectors import ProjectorsConfig
 from quadfringe.config.scene import SceneConfig
 from quadfringe.errors import InputError

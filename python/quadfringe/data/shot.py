@@ -101,7 +101,7 @@ class Stamped:
 class _Exposure(Stamped, ABC):
     """The checks and the full scale that both kinds of shots share."""
 
-    ir: NDArray[Any]
+    ir: NDArray[Any] | None
     full_scale: float | None
 
     def __post_init__(self) -> None:
@@ -116,29 +116,39 @@ class _Exposure(Stamped, ABC):
     @property
     def full_scale_value(self) -> float:
         """The intensity of a saturated pixel: as given, else 255, 65535 or 1.0 by dtype."""
-        return float(full_scale(self.ir)) if self.full_scale is None else self.full_scale
+        return float(full_scale(self.first)) if self.full_scale is None else self.full_scale
+
+    @property
+    def first(self) -> NDArray[Any]:
+        """The first of the images, whose size and dtype are those of all."""
+        return next(iter(self.images.values()))
+
+    def _with_infrared(self, images: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        """Add the infrared image, if there is one."""
+        return images if self.ir is None else images | {"ir": self.ir}
 
 
 def _described(record: Any, image: NDArray[Any], kind: str = "") -> str:
     """Name a record with size, type, full scale and number."""
     number = "" if record.id is None else f", id {record.id}"
     size = f"{image.shape[1]} x {image.shape[0]} {image.dtype}"
-    return f"{type(record).__name__}({kind}{size} up to {record.full_scale_value:g}{number})"
+    without = ", without infrared" if isinstance(record, _Exposure) and record.ir is None else ""
+    return f"{type(record).__name__}({kind}{size} up to {record.full_scale_value:g}{number}{without})"
 
 
 @dataclass(frozen=True, repr=False)
 class Shot(_Exposure):
     """One exposure: four images (H, W) of one size and one dtype (uint8, uint16 or float32), and their full scale.
 
-    `full_scale` is the intensity of a saturated pixel; None stands for 255, 65535 or 1.0 by dtype. `truth` comes
-    from the virtual bench, `stamp` says when and by which camera the shot was taken. Raises `InputError` for anything
-    else.
+    `ir` is None for a camera without infrared, whose three images the encoding "rgb" decodes. `full_scale` is the
+    intensity of a saturated pixel; None stands for 255, 65535 or 1.0 by dtype. `truth` comes from the virtual bench,
+    `stamp` says when and by which camera the shot was taken. Raises `InputError` for anything else.
     """
 
     red: NDArray[Any]
     green: NDArray[Any]
     blue: NDArray[Any]
-    ir: NDArray[Any]
+    ir: NDArray[Any] | None = None
     full_scale: float | None = None
     truth: Truth | None = None
     stamp: Stamp | None = None
@@ -146,14 +156,29 @@ class Shot(_Exposure):
     def __repr__(self) -> str:
         return _described(self, self.red)
 
+    @classmethod
+    def from_rgb(
+        cls, rgb: NDArray[Any], full_scale: float | None = None, truth: Truth | None = None, stamp: Stamp | None = None
+    ) -> Shot:
+        """Make a shot without infrared from a colour image (H, W, 3) in R, G, B order; raises `InputError` for others.
+
+        >>> Shot.from_rgb(np.zeros((480, 640, 3), np.uint8))
+        Shot(640 x 480 uint8 up to 255, without infrared)
+        """
+        if not isinstance(rgb, np.ndarray) or rgb.ndim != 3 or rgb.shape[2] != 3:
+            got = f"an array of shape {rgb.shape}" if isinstance(rgb, np.ndarray) else type(rgb).__name__
+            raise InputError(f"rgb: expected a colour image (H, W, 3), got {got}")
+        red, green, blue = (np.ascontiguousarray(rgb[:, :, channel]) for channel in range(3))
+        return cls(red, green, blue, None, full_scale, truth, stamp)
+
     @property
     def channels(self) -> dict[str, NDArray[Any]]:
-        """The images by name, in the order R, G, B, IR."""
-        return {"red": self.red, "green": self.green, "blue": self.blue, "ir": self.ir}
+        """The images by name, in the order R, G, B, and IR if there is one."""
+        return self._with_infrared({"red": self.red, "green": self.green, "blue": self.blue})
 
     @property
     def images(self) -> dict[str, NDArray[Any]]:
-        """The captured images by name: the four channels."""
+        """The captured images by name: the channels."""
         return self.channels
 
 
@@ -161,13 +186,14 @@ class Shot(_Exposure):
 class BayerShot(_Exposure):
     """One exposure of a Bayer chip and an infrared chip: the raw mosaic and the infrared image, (H, W) of one dtype.
 
+    `ir` is None for a camera without infrared.
     `bayer` names the colours of the first two pixels of the first row and of the second row (rggb, grbg, gbrg or
     bggr). Decoding interpolates the colours, after it has corrected dark level and response. The rest is as for `Shot`.
     """
 
     raw: NDArray[Any]
     bayer: BayerPattern
-    ir: NDArray[Any]
+    ir: NDArray[Any] | None = None
     full_scale: float | None = None
     truth: Truth | None = None
     stamp: Stamp | None = None
@@ -183,8 +209,8 @@ class BayerShot(_Exposure):
 
     @property
     def images(self) -> dict[str, NDArray[Any]]:
-        """The captured images by name: `raw` and `ir`."""
-        return {"raw": self.raw, "ir": self.ir}
+        """The captured images by name: `raw`, and `ir` if there is one."""
+        return self._with_infrared({"raw": self.raw})
 
     @property
     def channels(self) -> dict[str, NDArray[Any]]:
@@ -194,7 +220,7 @@ class BayerShot(_Exposure):
         """
         row, column = divmod(self.bayer.index("r"), 2)
         red, green = self.raw[row::2, column::2], self.raw[row::2, 1 - column :: 2]
-        return {"red": red, "green": green, "blue": self.raw[1 - row :: 2, 1 - column :: 2], "ir": self.ir}
+        return self._with_infrared({"red": red, "green": green, "blue": self.raw[1 - row :: 2, 1 - column :: 2]})
 
 
 AnyShot = Shot | BayerShot

@@ -1,4 +1,4 @@
-"""Shots to image files and back: four grey files, or an infrared file and one of all colours, plain or raw mosaic."""
+"""Shots to image files and back: grey files, or one of all colours, plain or raw mosaic, and infrared if any."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ __all__ = ["SUFFIXES", "read_shot", "write_shot"]
 COLOURS = ("red", "green", "blue")
 NAMES = ("rgb", *COLOURS, "raw", "ir")
 SUFFIXES = (".png", ".tif", ".tiff", ".bmp")
-IN_FOLDER = "red.png, green.png, blue.png and ir.png, or rgb.png and ir.png, or raw.png and ir.png"
+IN_FOLDER = (
+    "red.png, green.png, blue.png and ir.png, or rgb.png and ir.png, or raw.png and ir.png (no ir without infrared)"
+)
 Source = Mapping[str, Path | str | None] | Path | str
 
 
@@ -34,9 +36,10 @@ def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | 
     """Read a shot from image files: a folder, or a mapping of names to paths.
 
     The names are `ir`, and `rgb` or all of `red`, `green`, `blue`; with `bayer` (rggb, grbg, gbrg or bggr) they are
-    `raw`, the mosaic of a Bayer chip, and `ir`. In a folder they are followed by .png, .tif, .tiff or .bmp. `bits` is
-    the number of bits in use in 16-bit files, 10 or 12 for example; other files have none to choose. Files of different
-    depth become float32 fractions of full scale. Raises `InputError` that names the file or argument at fault.
+    `raw`, the mosaic of a Bayer chip, and `ir`. Without `ir` the shot has no infrared image. In a folder they are
+    followed by .png, .tif, .tiff or .bmp. `bits` is the number of bits in use in 16-bit files, 10 or 12 for example;
+    other files have none to choose. Files of different depth become float32 fractions of full scale. Raises
+    `InputError` that names the file or argument at fault.
 
     >>> import tempfile
     >>> import numpy as np
@@ -52,14 +55,15 @@ def read_shot(source: Source, bits: int | None = None, *, bayer: BayerPattern | 
     except InputError as error:
         raise error if isinstance(source, Mapping) else InputError(f"{source}: {error}") from None
     images = _read(given)
-    _check_bits(bits, images, given["ir"])
+    _check_bits(bits, images, next(iter(given.values())))
     full_scales = {name: _full_scale(image, bits, given.get(name)) for name, image in images.items()}
     if len({image.dtype for image in images.values()}) > 1:
         images = {name: (image / full_scales[name]).astype(np.float32) for name, image in images.items()}
-        full_scales = {"ir": 1.0}
+        full_scales = dict.fromkeys(images, 1.0)
+    full, infrared = next(iter(full_scales.values())), images.get("ir")
     if bayer is not None:
-        return BayerShot(images["raw"], bayer, images["ir"], full_scales["ir"])
-    return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scales["ir"])
+        return BayerShot(images["raw"], bayer, infrared, full)
+    return Shot(images["red"], images["green"], images["blue"], infrared, full)
 
 
 def _files_of(source: Any, bayer: BayerPattern | None) -> dict[str, Path]:
@@ -97,8 +101,6 @@ def _check_names(given: Mapping[str, Path], bayer: BayerPattern | None, *, folde
         raise InputError("raw is the mosaic of a Bayer chip: say its pattern too, bayer = rggb, grbg, gbrg or bggr")
     if bayer is not None and "raw" not in given:
         raise InputError("bayer needs the image raw, the mosaic of the Bayer chip, in place of the colours")
-    if "ir" not in given:
-        raise InputError(f"no image for ir, the infrared channel: {_advice('ir', folder)}")
     if "raw" in given and colours:
         raise InputError(f"raw already holds red, green and blue; leave out {', '.join(colours)}")
     if "rgb" in given and len(colours) > 1:
@@ -127,7 +129,9 @@ def _check_bits(bits: int | None, images: Mapping[str, NDArray[Any]], path: Path
     if not isinstance(bits, (int, np.integer)) or not 1 <= bits <= 16:
         raise InputError(f"bits: expected the number of bits in use, from 1 to 16, such as 12, got {bits!r}")
     if all(image.dtype != np.uint16 for image in images.values()):
-        raise InputError(f"{path}: expected uint16 pixels for bits = {bits}, got {images['ir'].dtype}; leave bits out")
+        raise InputError(
+            f"{path}: expected uint16 pixels for bits = {bits}, got {next(iter(images.values())).dtype}; leave bits out"
+        )
 
 
 def _full_scale(image: NDArray[Any], bits: int | None, path: Path | None) -> float:
@@ -142,6 +146,7 @@ def _full_scale(image: NDArray[Any], bits: int | None, path: Path | None) -> flo
 def write_shot(folder: Path | str, shot: AnyShot) -> dict[str, Path]:
     """Write red.png, green.png, blue.png, ir.png of a shot, or raw.png and ir.png of a mosaic; gives the paths.
 
+    A shot without infrared has no ir.png.
     A missing folder is made. Raises `InputError` when a file cannot be written.
     """
     paths = {name: folder_for(Path(folder)) / f"{name}.png" for name in shot.images}

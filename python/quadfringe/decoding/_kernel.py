@@ -16,7 +16,7 @@ from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, Shot, condit
 from quadfringe.decoding.plan import Plan
 from quadfringe.errors import InputError
 
-__all__ = ["KernelDecoder", "Size", "check_shot", "rounded", "size_of"]
+__all__ = ["KernelDecoder", "Size", "check_channels", "check_shot", "rounded", "size_of"]
 
 Size = tuple[int, int]
 # Peak memory of a decoder with two shapes, bytes per pixel, at fringes of 24 px (`pytest tests/test_size_limits.py`
@@ -73,7 +73,7 @@ class KernelDecoder:
         decode = self.plan.decode.model_copy(update={"method": method})
         return self.with_plan(replace(self.plan, decode=decode))
 
-    def with_numbers(self, numbers: tuple[float, float, float]) -> KernelDecoder:
+    def with_numbers(self, numbers: tuple[float, ...]) -> KernelDecoder:
         """Give a decoder of the same plan for other fringe numbers."""
         fringes = self.plan.fringes.model_copy(update={"numbers": numbers})
         return KernelDecoder(self._size, self._full_scale, replace(self.plan, fringes=fringes))
@@ -85,7 +85,8 @@ class KernelDecoder:
         return KernelDecoder((count, self._size[1]), self._full_scale, replace(self.plan, calibration=known))
 
     def shape(self, shot: AnyShot) -> Shape:
-        """Give the shape of a shot of this size."""
+        """Give the shape of a shot of this size; raises `InputError` for one with other channels."""
+        check_channels(shot, self.plan)
         try:
             core = self._idle.pop()
         except IndexError:
@@ -109,6 +110,7 @@ class KernelDecoder:
                 self._size,
                 plan.fringes.numbers,
                 plan.projector_width_px,
+                columns_px=plan.fringes.columns_px,
                 full_scale=self._full_scale,
                 **conditioning(plan.calibration, plan.response),
                 **_geometry(plan),
@@ -143,10 +145,23 @@ def check_shot(shot: object) -> None:
         raise InputError(f"expected a shot, got {brief(shot)}; make one with qf.read_shot, qf.Shot or Scanner.grab")
 
 
+def check_channels(shot: AnyShot, plan: Plan) -> None:
+    """Raise `InputError` unless the shot has the channels of the encoding, and say which to give."""
+    if (shot.ir is not None) == plan.fringes.infrared:
+        return
+    expected, got = ", ".join(plan.fringes.channels), ", ".join(shot.images)
+    if plan.fringes.infrared:
+        advice = 'give the infrared image ir, or, if none was projected, fringes with encoding = "rgb" and two numbers'
+    else:
+        advice = 'leave ir out, or give fringes with encoding = "rgb-ir" and three numbers'
+    words = f'the fringes have encoding = "{plan.fringes.encoding}", of {expected}, and the shot has {got}: {advice}'
+    raise InputError(f"{words} (--encoding and --fringes on the command line)")
+
+
 def size_of(like: AnyShot | Size, full_scale: float | None) -> tuple[Size, float | None]:
     """Give rows and columns, and the full scale if it is known."""
     if isinstance(like, (Shot, BayerShot)):
-        rows, columns = like.ir.shape
+        rows, columns = like.first.shape
         return (rows, columns), like.full_scale_value if full_scale is None else full_scale
     try:
         rows, columns = (int(length) for length in like)

@@ -26,12 +26,11 @@ QUANTILE = 0.75
 def channels_agree(shape: Shape, shot: AnyShot, plan: Plan) -> bool:
     """Tell whether G and IR show their fringes where the phase of the shape puts them; False with too few tiles."""
     light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
-    first, second, third = plan.fringes.numbers
-    per_px = 2 * np.pi * third / plan.projector_width_px
-    channels = (
-        (light["green"], second / first * shape.phase_rad),
-        (light["ir"], (per_px * infrared_column(shape, plan)).astype(np.float32)),
-    )
+    first, second, *third = plan.fringes.numbers
+    channels = [(light["green"], second / first * shape.phase_rad)]
+    for number in third:
+        per_px = 2 * np.pi * number / plan.projector_width_px
+        channels.append((light["ir"], (per_px * infrared_column(shape, plan)).astype(np.float32)))
     return all(_offset_rad(image, phase_rad) <= OFFSET_MAX_RAD for image, phase_rad in channels)
 
 

@@ -29,9 +29,10 @@ __all__ = [
     "wrong_numbers",
 ]
 
-FringeNumbers = tuple[float, float, float]
+FringeNumbers = tuple[float, ...]
 NUMBERS_FIX = "give the numbers that were projected (--fringes), or project these"
 SMALLEST_ROOT, LARGEST_ROOT = 4, 12  # 16, 15, 12 and 144, 143, 132: coarser or finer fringes measure nothing
+SMALLEST_PAIR, LARGEST_PAIR = 6, 20  # N, N - 1 without infrared: finer fringes look alike after one of them
 
 
 def before_order(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
@@ -66,7 +67,7 @@ def wrong_bits(shot: AnyShot) -> Cause | None:
 
 def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
     """Find an infrared image that is shifted from the visible one, and the shift that mends it."""
-    if closure is None or not channels_fit(closure):
+    if closure is None or not plan.fringes.infrared or not channels_fit(closure):
         return None
     turned = abs(closure.angle.rad) > params.CLOSURE_RAD and closure.angle.steady > params.STEADY_MIN
     columns = closure.shift_px if turned else 0.0
@@ -102,16 +103,27 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
         return None
     if not params.RATIO_OFF < _off(closure) < params.RATIO_STRANGE:
         return None
-    first, second, third = plan.fringes.numbers
+    first, second, *others = plan.fringes.numbers
     words = f"the fringe numbers {listed(plan.fringes.numbers)} are not those of this shot: for {first:g} fringes of "
-    words += f"red and blue it has {closure.green * second:.2f} of green and {closure.infrared * third:.2f} of infrared"
+    words += f"red and blue it has {closure.green * second:.2f} of green"
+    words += "".join(f" and {closure.infrared * third:.2f} of infrared" for third in others)
+    if not others:
+        return Cause("fringe numbers", words, NUMBERS_FIX)
     root = _root(plan, closure)
     fits = f", which fits {listed(_family(round(root)))}" if abs(root - round(root)) < 0.25 else ""
     return Cause("fringe numbers", words + fits, NUMBERS_FIX)
 
 
 def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
-    """Give the numbers n, n - 1, n - k of k^2 = n next to the ratio of infrared to red, without those of the plan."""
+    """Give the numbers n, n - 1, n - k of k^2 = n next to the ratio of infrared to red, without those of the plan.
+
+    Without infrared, give n, n - 1 next to the ratio of green to red.
+    """
+    if not plan.fringes.infrared:
+        first, second = plan.fringes.numbers
+        whole = round(1 / max(1 - closure.green * second / first, 1e-3))
+        pairs = [(float(n), float(n - 1)) for n in (whole - 1, whole, whole + 1) if SMALLEST_PAIR <= n <= LARGEST_PAIR]
+        return [numbers for numbers in pairs if numbers != plan.fringes.numbers and _covers(numbers, plan)]
     root = _root(plan, closure)
     families = [_family(whole) for whole in {int(root), int(root) + 1} if SMALLEST_ROOT <= whole <= LARGEST_ROOT]
     return [numbers for numbers in families if numbers != plan.fringes.numbers and _covers(numbers, plan)]
@@ -129,14 +141,14 @@ def _family(root: int) -> FringeNumbers:
 def _covers(numbers: FringeNumbers, plan: Plan) -> bool:
     """Say whether these numbers distinguish the columns of the projector."""
     try:
-        _core.check_code(numbers, plan.projector_width_px)
+        _core.check_code(numbers, plan.projector_width_px, columns_px=plan.fringes.columns_px)
     except ValueError:
         return False
     return True
 
 
 def listed(numbers: FringeNumbers) -> str:
-    """Write three fringe numbers."""
+    """Write fringe numbers."""
     return ", ".join(f"{number:g}" for number in numbers)
 
 
@@ -145,7 +157,12 @@ def _off(closure: Closure) -> float:
 
 
 def blur(shot: AnyShot, fit: Fit, plan: Plan, closure: Closure | None) -> Cause | None:
-    """Find blur: weak fringes, weaker the finer they are, in images without sharp detail."""
+    """Find blur: weak fringes, weaker the finer they are, in images without sharp detail.
+
+    Without infrared all fringes are about equally fine, and nothing is found.
+    """
+    if not plan.fringes.infrared:
+        return None
     red, _, blue, ir = (float(value) for value in fit.contrast)
     visible = float(np.sqrt(red * blue))
     if closure is None or visible > params.BLURRED_CONTRAST or symptoms.sharpness(shot) > params.SHARP_MIN:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
-from quadfringe.decoding._kernel import KernelDecoder, Size, check_shot, size_of
+from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, check_shot, size_of
 from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import wrong_bits
@@ -107,12 +107,13 @@ class Decoder:
 
     def _check(self, shot: AnyShot) -> None:
         check_shot(shot)
-        planned = self._size, self._full_scale or float(full_scale(shot.ir))
-        if (shot.ir.shape, shot.full_scale_value) != planned:
+        check_channels(shot, self.plan)
+        planned, size = (self._size, self._full_scale or float(full_scale(shot.first))), shot.first.shape
+        if (size, shot.full_scale_value) != planned:
             (rows, columns), full = planned
             raise InputError(
-                f"this decoder is for {columns} x {rows} pixels up to {full:g}, the shot has {shot.ir.shape[1]} x "
-                f"{shot.ir.shape[0]} up to {shot.full_scale_value:g}; make a Decoder from a shot like it"
+                f"this decoder is for {columns} x {rows} pixels up to {full:g}, the shot has {size[1]} x "
+                f"{size[0]} up to {shot.full_scale_value:g}; make a Decoder from a shot like it"
             )
 
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from quadfringe.config import Device
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding.plan import Plan
-from quadfringe.decoding.stages import CHANNELS, carrier, linear_light
+from quadfringe.decoding.stages import carrier, linear_light
 
 __all__ = ["Drift", "Fit", "fit_fringes", "infrared_column", "infrared_drift", "pixels_of"]
 
@@ -45,8 +45,8 @@ class Stray(NamedTuple):
 class Fit:
     """Fringe amplitude of each channel, share of full scale, and the ratio of its second harmonic to the first.
 
-    `contrast` is the amplitude over the mean light: 1 for full fringes, 0 without any.
-    `crosstalk` (4, 4) is the amplitude of the fringes of each channel (columns) in each captured channel (rows),
+    `contrast` is the amplitude over the mean light: 1 for full fringes, 0 without any. `crosstalk` (4, 4), or (3, 3)
+    without infrared, is the amplitude of the fringes of each channel (columns) in each captured channel (rows),
     relative to the fringes of the captured channel itself.
     """
 
@@ -82,29 +82,32 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
     if inside.sum() < PIXELS_MIN:
         return None
     phases = _phases(shape, plan, inside)
-    first, second, third = phases
+    first, second, *third = phases
     quadrature = -np.sin(first)  # blue, a quarter period before red
-    shown = np.stack([np.cos(first), np.cos(second), quadrature, np.cos(third)], axis=1)
-    amplitude, harmonic, crosstalk, contrast = np.zeros(4), np.zeros(4), np.zeros((4, 4)), np.zeros(4)
-    for i, name in enumerate(CHANNELS):
-        phase = (first, second, first, third)[i]
+    shown = np.stack([np.cos(first), np.cos(second), quadrature, *map(np.cos, third)], axis=1)
+    names, count = plan.fringes.channels, len(plan.fringes.channels)
+    amplitude, harmonic, crosstalk, contrast = np.zeros(count), np.zeros(count), np.zeros((count,) * 2), np.zeros(count)
+    for i, name in enumerate(names):
+        phase = (first, second, first, *third)[i]
         twice = np.stack([np.cos(2 * phase), np.sin(2 * phase), np.ones_like(phase)], axis=1)
         wave = light[name][inside] / backgrounds[name][inside] - 1
         found = np.linalg.lstsq(np.hstack([shown, twice]), wave, rcond=None)[0]
-        crosstalk[i] = found[:4] / found[i]
-        harmonic[i] = float(np.hypot(found[4], found[5]) / abs(found[i]))
+        crosstalk[i] = found[:count] / found[i]
+        harmonic[i] = float(np.hypot(found[count], found[count + 1]) / abs(found[i]))
         contrast[i] = abs(found[i])
         amplitude[i] = contrast[i] * float(np.median(backgrounds[name][inside]))
-    return Fit(CHANNELS, amplitude, harmonic, crosstalk, contrast)
+    return Fit(names, amplitude, harmonic, crosstalk, contrast)
 
 
 def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
-    """Compare infrared fringes with the position that the calibration predicts; None with too few tiles.
+    """Compare infrared fringes with the position that the calibration predicts; None without, or with too few tiles.
 
     Without an infrared projector in the calibration, both projectors count as coaxial. A large misalignment shifts
     every order by the same number of fringes, and the shape still looks plausible; the green fringes, which come from
     the projector of red and blue, then give that number, because their tile mean is good to a hundredth of a fringe.
     """
+    if not plan.fringes.infrared:
+        return None
     light, backgrounds, inside = _waves(shot, shape, plan)
     width = plan.projector_width_px
     periods = [width / number for number in plan.fringes.numbers]

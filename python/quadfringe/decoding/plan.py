@@ -23,7 +23,8 @@ class Plan:
     `projector_width_px` is the number of projector columns that the fringes cover. `calibration` is a `Calibration` or
     the path of its file; without one, shapes hold phase only. `response` is "auto", "linear", a `Response`, or the
     path of a response file, with the meaning of `DecodeConfig.response`; it may be given here or in `decode`,
-    and is kept here. `fringes` may be given as three numbers, `decode` as a mapping of its keys.
+    and is kept here. `fringes` may be given as three numbers, or two without infrared, `decode` as a mapping of its
+    keys.
 
     Raises `InputError` (`ConfigError` for settings) that names the argument at fault.
 
@@ -70,7 +71,9 @@ class Plan:
         return {
             "quadfringe_version": _core.__version__,
             "projector_width_px": self.projector_width_px,
-            "fringes": self.fringes.model_dump(mode="json"),
+            "fringes": self.fringes.model_dump(
+                mode="json", exclude={"columns_px"} if self.fringes.columns_px is None else None
+            ),
         }
 
 
@@ -99,12 +102,19 @@ def _columns(width: Any) -> int:
 
 
 def _fringes(fringes: Fringes | Sequence[float], columns: int) -> Fringes:
-    found = fringes if isinstance(fringes, Fringes) else checked(Fringes, {"numbers": fringes}, "fringes")
+    found = fringes if isinstance(fringes, Fringes) else fringes_of(fringes)
     try:
-        _core.check_code(found.numbers, columns)
+        _core.check_code(found.numbers, columns, columns_px=found.columns_px)
     except ValueError as error:
         raise InputError(str(error)) from None
     return found
+
+
+def fringes_of(numbers: Any) -> Fringes:
+    """Give the fringes of three numbers, or of two without infrared; raises `ConfigError` for anything else."""
+    colours = isinstance(numbers, Sequence) and not isinstance(numbers, str) and len(numbers) == 2
+    values = {"numbers": numbers, "encoding": "rgb" if colours else "rgb-ir"}
+    return checked(Fringes, values, "fringes")
 
 
 def calibration_of(calibration: Any) -> Calibration | None:

@@ -88,7 +88,9 @@ def response_in_place_of(stated: KernelDecoder, shot: AnyShot) -> KernelDecoder:
 
 
 def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | Literal["linear"]:
-    return response_of_shot(shot, shape.phase_rad, plan.fringes.numbers, plan.projector_width_px, plan.calibration)
+    fringes = plan.fringes
+    given = (shot, shape.phase_rad, fringes.numbers, plan.projector_width_px, plan.calibration)
+    return response_of_shot(*given, columns_px=fringes.columns_px)
 
 
 def _settled(one: Response, other: Response) -> bool:

@@ -48,7 +48,7 @@ from quadfringe._core import (
     wrong_order_probability,
 )
 from quadfringe.config import ChannelResponse, Response, ResponseChoice, brief
-from quadfringe.config.decode import three_numbers
+from quadfringe.config.fringes import fringe_numbers as numbers_of
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
@@ -81,7 +81,7 @@ __all__ = [
 ]
 
 Map = NDArray[np.float32]
-FringeNumbers = tuple[float, float, float]
+FringeNumbers = tuple[float, ...]  # of red and blue, of green, of infrared if there is any
 CHANNELS = ("red", "green", "blue", "ir")
 
 
@@ -101,7 +101,7 @@ class Wrapped(NamedTuple):
     green_rad: Map
     """Phase of the block means of G, (B, W), rad, up to whole turns (S3)."""
     infrared_rad: Map
-    """Phase of the block means of IR, (B, W), rad, up to whole turns (S3)."""
+    """Phase of the block means of IR, (B, W), rad, up to whole turns (S3); 0 without infrared."""
     rows: int
     """Rows of a block."""
 
@@ -128,8 +128,9 @@ def linear_light(
     - a `Response`, the path of its file, or "linear", which replace the response of the calibration;
     - "auto", as in a `Plan`: the response that the calibration states. Where a `Plan` would estimate it, `InputError`.
 
-    IR is NaN where its chip does not see the point. The colours of a raw mosaic are interpolated at every pixel from
-    linear samples. Raises `InputError` for arguments that are no shot, calibration or response, or cannot be read.
+    IR is NaN where its chip does not see the point, and left out for a shot without infrared. The colours of a raw
+    mosaic are interpolated at every pixel from linear samples. Raises `InputError` for arguments that are no shot,
+    calibration or response, or cannot be read.
     """
     check_shot(shot)
     calibration = calibration_of(calibration)
@@ -145,20 +146,24 @@ def response_of_shot(
     fringe_numbers: FringeNumbers,
     projector_width_px: int,
     calibration: Calibration | Path | str | None = None,
+    *,
+    columns_px: tuple[float, float] | None = None,
 ) -> Response | Literal["linear"]:
     """Give the response (gamma) that a shot shows with its phase, (H, W) float32 in rad; "linear" if it shows none.
 
     Without the right response the phase is wrong too, so decode again with the result and repeat, as
-    `quadfringe.estimate_response` does. A channel without fringes stays linear. Dark level and registration come from
-    the `calibration`. ValueError when the sizes differ.
+    `quadfringe.estimate_response` does. `columns_px` are those of the fringes that can light the scene. A channel
+    without fringes stays linear. Dark level and registration come from the `calibration`. ValueError when the sizes
+    differ.
     """
     light = linear_light(shot, calibration)
+    channels = (light["red"], light["green"], light["blue"], light.get("ir"))
     found = _core.estimate_response_of_shot(
-        light["red"], light["green"], light["blue"], light["ir"], phase_rad, fringe_numbers, projector_width_px
+        *channels, phase_rad, fringe_numbers, projector_width_px, columns_px=columns_px
     )
     numbers = ChannelResponse.model_fields
-    channels = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
-    return Response(**channels) if channels else "linear"
+    responses = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
+    return Response(**responses) if responses else "linear"
 
 
 def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
@@ -175,22 +180,22 @@ def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
 def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     """Give the phases and the modulation of linear light by name, each (H, W) float32 (S2, S3).
 
+    Two fringe numbers are those of light without infrared.
+
     The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes, or
     less than one, cross the rows.
     """
-    first, second, third = three_numbers(fringe_numbers)
-    _check_light(light)
+    first, second, *third = numbers_of(fringe_numbers)
+    _check_light(light, infrared=bool(third))
     red, blue = light["red"], light["blue"]
-    period_px = row_period(red)
-    green_px, infrared_px = period_px * first / second, period_px * first / third
-    if not np.isfinite(carrier(red)[0]) or max(green_px, infrared_px) > red.shape[1]:
-        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
+    ir = light["ir"] if third else np.zeros_like(red)
+    period_px, green_px, infrared_px = _periods_px(red, (first, second, *(third or [second])))
     rows, columns = block_size(green_px, infrared_px, red.shape[1])
     red_means, red_level = _fringes(red, rows, 1, period_px)
     blue_means, blue_level = _fringes(blue, rows, 1, period_px)
     ratio = modulation_ratio(red_means, blue_means)[:, np.newaxis]
     green_means, _ = _fringes(light["green"], rows, columns, green_px)
-    infrared_means, _ = _fringes(fill_gaps(light["ir"]), rows, columns, infrared_px)
+    infrared_means, _ = _fringes(fill_gaps(ir), rows, columns, infrared_px)
     periods = (green_px / columns, infrared_px / columns)
     found = fourier_pair(green_means, infrared_means, periods, columns, red.shape[1])
     (green, green_modulation), (infrared, infrared_modulation) = found
@@ -201,16 +206,26 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     red_fringes = red - pixels(red_level)
     blue_fringes = (blue - pixels(blue_level)) * pixels(ratio)
     modulation = np.sqrt(red_fringes * red_fringes + blue_fringes * blue_fringes)
-    least = np.fmin(modulation, np.fmin(pixels(green_modulation), pixels(infrared_modulation)))
-    least[np.isnan(light["ir"])] = np.nan
+    least = np.fmin(modulation, pixels(green_modulation))
+    least = np.fmin(least, pixels(infrared_modulation)) if third else least
+    least[np.isnan(ir)] = np.nan
     return Wrapped(
         phase_rad=two_step(red_fringes, blue_fringes),
         modulation=least,
         red_blue_rad=two_step(red_means, blue_means * ratio, coarse=True),
         green_rad=green,
-        infrared_rad=infrared,
+        infrared_rad=infrared if third else np.zeros_like(infrared),
         rows=rows,
     )
+
+
+def _periods_px(red: Map, numbers: FringeNumbers) -> list[float]:
+    """Give the fringe periods of these numbers along the rows; raise `DecodeError` when no fringes cross them."""
+    period_px = row_period(red)
+    others_px = [period_px * numbers[0] / number for number in numbers[1:]]
+    if not np.isfinite(carrier(red)[0]) or max(others_px) > red.shape[1]:
+        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
+    return [period_px, *others_px]
 
 
 def order(
@@ -230,21 +245,22 @@ def order(
     return nearest_turn(wrapped.phase_rad, wrapped.repeated(means_rad)), wrapped.repeated(margin)
 
 
-def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tuple[Map, Map, Map]:
+def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tuple[Map, ...]:
     """Give the wrapped phases in rad, (H, W): red and blue by two steps (S2), green and infrared by Fourier (S3).
 
-    Raises `DecodeError` when no fringes cross the rows.
+    With two fringe numbers there is no infrared, and two phases. Raises `DecodeError` when no fringes cross the rows.
     """
     wrapped = demodulate(light, fringe_numbers)
-    green_rad, infrared_rad = (_wrap(wrapped.repeated(phase)) for phase in (wrapped.green_rad, wrapped.infrared_rad))
-    return wrapped.phase_rad, green_rad, infrared_rad
+    others = (wrapped.green_rad, wrapped.infrared_rad)[: len(fringe_numbers) - 1]
+    return wrapped.phase_rad, *(_wrap(wrapped.repeated(phase)) for phase in others)
 
 
-def _check_light(light: object) -> None:
-    if not isinstance(light, Mapping) or not set(CHANNELS) <= set(light):
+def _check_light(light: object, *, infrared: bool) -> None:
+    channels = CHANNELS if infrared else CHANNELS[:3]
+    if not isinstance(light, Mapping) or not set(channels) <= set(light):
         got = f"only {', '.join(map(str, light))}" if isinstance(light, Mapping) and light else brief(light)
-        raise InputError(f"light: expected {', '.join(CHANNELS)} by name, as stages.linear_light gives them, got {got}")
-    check_maps({name: light[name] for name in CHANNELS})
+        raise InputError(f"light: expected {', '.join(channels)} by name, as stages.linear_light gives them, got {got}")
+    check_maps({name: light[name] for name in channels})
 
 
 def _wrap(phase_rad: Map) -> Map:

@@ -42,7 +42,7 @@ class Closure:
     """How the phases of red and blue, green and infrared fit together.
 
     `green` and `infrared` are local frequencies over what the fringe numbers say, 1 if they agree, negative where red
-    and blue run backwards. `infrared_px` is the period of the infrared fringes.
+    and blue run backwards. `infrared_px` is the period of the infrared fringes, NaN without infrared.
     """
 
     green: float
@@ -67,7 +67,7 @@ class RowsMatch:
 
 def bits_in_use(shot: AnyShot) -> int | None:
     """Give the bits of the camera when 16-bit data have fewer and count as 16; None when nothing is wrong."""
-    if shot.ir.dtype != np.uint16 or shot.full_scale_value < np.iinfo(np.uint16).max:
+    if shot.first.dtype != np.uint16 or shot.full_scale_value < np.iinfo(np.uint16).max:
         return None
     top = max(int(image.max()) for image in shot.images.values())
     clipped = 14 if top == 2**14 - 1 and sum(int((image == top).sum()) for image in shot.images.values()) > 1 else None
@@ -98,11 +98,14 @@ def sharpness(shot: AnyShot) -> float:
 
 
 def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
-    """Measure how the three phases close; None when no fringes cross the rows."""
+    """Measure how the three phases close; None when no fringes cross the rows.
+
+    Two phases close for every surface; without infrared only the frequency of green tells anything.
+    """
     light = _light(shot, plan)
-    first, second, third = plan.fringes.numbers
+    first, second, *others = plan.fringes.numbers
     try:
-        phases = wrapped_phases(light, (first, second, third))
+        phases = wrapped_phases(light, plan.fringes.numbers)
     except DecodeError:
         return None
     waves = [np.where(np.isfinite(p), np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]
@@ -110,7 +113,10 @@ def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
     known = np.abs(rates[0]) > 0.1 / params.LAG_PX
     if not known.any():
         return None
-    green, infrared = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])
+    green, *infrareds = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])
+    if not others:
+        return Closure(green * first / second, 1.0, Angle(0.0, 1.0, 0.0), float("nan"))
+    third, infrared = others[0], infrareds[0]
     angle = _closed(waves, (first, second, third))
     period = 2 * np.pi / max(float(np.median(np.abs(rates[2][known]))), 1e-6)
     return Closure(green * first / second, infrared * first / third, angle, period)

@@ -97,21 +97,24 @@ def predeformation(fringes: Fringes, calibration: Calibration | None) -> Predefo
 
 
 def projector_images(
-    fringes: tuple[float, float, float],
+    fringes: tuple[float, ...],
     size_px: tuple[int, int],
     layout: str,
     deformed: Predeformation | None = None,
+    columns_px: tuple[float, float] | None = None,
 ) -> ProjectorImages:
     """Return the images of both projectors for these fringes; `size_px` is (W, H).
+
+    With two fringe numbers the infrared image is black. `columns_px` are those that can light the scene.
 
     Raises ValueError when the ambiguity range of the fringe numbers does not cover the width, when the projectors of a
     pre-deformation have another size, and for images that are impossible or do not fit into memory.
     """
     require_image("projector images", size_px, BYTES_PER_PX)
-    _core.check_code(fringes, size_px[0])
-    red, green, blue, ir = (
-        _core.pattern(channel, fringes, *size_px, layout=layout) for channel in ("R", "G", "B", "IR")
-    )
+    _core.check_code(fringes, size_px[0], columns_px=columns_px)
+    letters = ("R", "G", "B", "IR")[: len(fringes) + 1]
+    images = [_core.pattern(letter, fringes, *size_px, layout=layout, columns_px=columns_px) for letter in letters]
+    red, green, blue, ir = (*images, np.zeros_like(images[0]))[:4]
     if deformed is not None:
         for device in (deformed.visible, deformed.infrared):
             if (device.width_px, device.height_px) != size_px:
@@ -134,7 +137,7 @@ def light_images(light: Light, size_px: tuple[int, int], deformed: Predeformatio
     ([255, 0, 0], 128)
     """
     if isinstance(light, Fringes):
-        return projector_images(light.numbers, size_px, light.layout, deformed)
+        return projector_images(light.numbers, size_px, light.layout, deformed, light.columns_px)
     require_image("projector images", size_px, BYTES_PER_PX)
     shape = size_px[::-1]
     if isinstance(light, Levels):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from quadfringe.devices.light import Predeformation, projector_images
+from quadfringe.config import Fringes
+from quadfringe.devices.light import Predeformation, light_images
 from quadfringe.files import folder_for
 from quadfringe.io.images import write_image
 
@@ -13,15 +14,17 @@ __all__ = ["write_patterns"]
 
 def write_patterns(
     folder: Path,
-    fringes: tuple[float, float, float],
+    fringes: Fringes,
     size_px: tuple[int, int],
-    layout: str,
     deformed: Predeformation | None = None,
 ) -> list[Path]:
-    """Write visible.png and infrared.png into `folder` and return their paths; `deformed` pre-deforms the latter."""
-    visible, infrared = projector_images(fringes, size_px, layout, deformed)
+    """Write visible.png and infrared.png into `folder` and return their paths; `deformed` pre-deforms the latter.
+
+    Fringes without infrared have no infrared.png.
+    """
+    visible, infrared = light_images(fringes, size_px, deformed)
     folder_for(folder)
-    paths = [folder / "visible.png", folder / "infrared.png"]
-    for path, image in zip(paths, (visible, infrared), strict=True):
+    images = {folder / "visible.png": visible} | ({folder / "infrared.png": infrared} if fringes.infrared else {})
+    for path, image in images.items():
         write_image(path, image)
-    return paths
+    return list(images)

@@ -86,8 +86,7 @@ def board_image(shot: AnyShot, shape: Shape, plan: Plan) -> NDArray[np.float32]:
     column = _smooth_column(shape)
     light = linear_light(shot, plan.calibration)
     ratio, weight = np.zeros(column.shape), np.zeros(column.shape)
-    red, green, infrared = plan.fringes.numbers
-    for name, number in zip(light, (red, green, red, infrared), strict=True):
+    for name, number in zip(light, plan.fringes.channel_numbers, strict=True):
         turns = 2 * np.pi * number * column / plan.projector_width_px
         place = 2 * column / plan.projector_width_px - 1
         terms = [np.ones_like(turns), place, place**2]

@@ -81,7 +81,7 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
         *_amplitudes(fit, brightness(shot)),
         _linearity(fit, plan),
         _crosstalk(fit, plan),
-        _drift(shot, shape, plan),
+        *([_drift(shot, shape, plan)] if plan.fringes.infrared else []),
     ]
 
 

@@ -114,11 +114,11 @@ def plan_of(
     **settings: Any,
 ) -> tuple[Shot, Plan]:
     """Give the shot of a scene and its plan; `settings` are those of `DecodeConfig`."""
-    from quadfringe import DecodeConfig, Fringes, Plan, Shot
+    from quadfringe import DecodeConfig, Plan, Shot
 
     plan = Plan(
         projector_width_px=scene.projector_width,
-        fringes=Fringes(numbers=scene.fringe_numbers),
+        fringes=scene.fringe_numbers,
         calibration=calibration,
         response=response,
         decode=DecodeConfig(**settings),

@@ -63,7 +63,7 @@ def judge_albedo(albedo: NDArray[np.float32], taken: scenes.Take, truth: Map) ->
     return AlbedoFigures(*(100 * float(share.mean()) for share in (rms, fringes, noise)))
 
 
-def _phases(column_px: Map, numbers: tuple[float, float, float], width_px: int) -> Map:
+def _phases(column_px: Map, numbers: tuple[float, ...], width_px: int) -> Map:
     """Give the phases of R, G, B, IR at these columns, rad."""
     first, second, third = numbers
     turns = column_px[..., None] / width_px * np.array([first, second, first, third])

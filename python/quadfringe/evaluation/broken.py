@@ -153,7 +153,7 @@ def sound(scenes: Mapping[str, tuple[int, ...]] = MappingProxyType(GOOD)) -> Ite
 
 def calibrated(case: Case, calibration: Calibration) -> Calibration:
     """Give the calibration of the bench for the size of the images of a case."""
-    half = case.shot.ir.shape == (HALF.height_px, HALF.width_px)
+    half = case.shot.first.shape == (HALF.height_px, HALF.width_px)
     return calibration.model_copy(update={"camera": HALF}) if half else calibration
 
 
@@ -166,4 +166,4 @@ def _exposed(scene: str, seed: int, fault: Fault) -> Shot:
     if fault.change is None:
         return shot
     images = fault.change(shot.channels)
-    return Shot(images["red"], images["green"], images["blue"], images["ir"])
+    return Shot(images["red"], images["green"], images["blue"], images.get("ir"))

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
 
-from quadfringe.config import SceneConfig, SystemConfig
+from quadfringe.config import Fringes, SceneConfig, SystemConfig
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding.compare import compare
 from quadfringe.decoding.stages import linear_light, wrapped_phases
@@ -28,9 +28,9 @@ class SceneResult:
     decode_ms: float
 
 
-def run_scene(surface: str, out: Path) -> SceneResult:
+def run_scene(surface: str, out: Path, fringes: Fringes = Fringes()) -> SceneResult:
     """Measure one scene and write <surface>.ply and <surface>.png to the folder `out`."""
-    config = SystemConfig(scene=SceneConfig(surface=surface, noise=NOISE))
+    config = SystemConfig(scene=SceneConfig(surface=surface, noise=NOISE), fringes=fringes)
     with open_system(config) as scanner:
         shot = scanner.grab()
         shape, decode_ms = _timed_decode(scanner, shot)

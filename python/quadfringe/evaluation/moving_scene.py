@@ -104,6 +104,7 @@ def _render(config: SystemConfig, shots: int, folder: Path) -> _Stage:
         with Recorder(stage.recording, scanner.config, scanner.calibration) as recorder:
             for shot in scanner.camera.stream(shots, keep="all"):
                 assert isinstance(shot, BayerShot), "the hand is seen by a Bayer chip"
+                assert shot.ir is not None, "and by an infrared chip"
                 assert shot.truth is not None, "the virtual bench knows the truth"
                 visible.append(shot.raw)
                 infrared.append(shot.ir)

@@ -24,14 +24,14 @@ Kind = Literal["absolute", "relative", "wrapped"]
 
 @dataclass(frozen=True)
 class Scene:
-    """One shot (four (H, W) images of one dtype), its fringes, and the known truth."""
+    """One shot (four (H, W) images of one dtype, or three without infrared), its fringes, and the known truth."""
 
     name: str
     red: Image
     green: Image
     blue: Image
-    ir: Image
-    fringe_numbers: tuple[float, float, float]
+    ir: Image | None
+    fringe_numbers: tuple[float, ...]
     projector_width: int
     phase_rad: Map  # truth, absolute, first fringe number
     scored: Mask  # pixels that count
@@ -40,8 +40,9 @@ class Scene:
 
     @property
     def channels(self) -> dict[str, Image]:
-        """The four images by name."""
-        return {"red": self.red, "green": self.green, "blue": self.blue, "ir": self.ir}
+        """The images by name."""
+        images = {"red": self.red, "green": self.green, "blue": self.blue}
+        return images if self.ir is None else images | {"ir": self.ir}
 
 
 def inside(mask: Mask, margin_px: int) -> Mask:

@@ -6,7 +6,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from quadfringe.config import SystemConfig, checked, load_system
+from quadfringe.config import Fringes, SystemConfig, checked, load_system
 from quadfringe.data import Truth
 from quadfringe.data.shot_files import write_shot
 from quadfringe.files import folder_for
@@ -16,11 +16,15 @@ from quadfringe.scanner import open_system
 __all__ = ["virtual_bench_config", "write_simulation"]
 
 
-def virtual_bench_config(system: Path | None, **scene: Any) -> SystemConfig:
-    """Return the config of a system file, or of the built-in virtual bench, with the given scene settings replaced."""
+def virtual_bench_config(system: Path | None, fringes: Fringes | None = None, **scene: Any) -> SystemConfig:
+    """Return the config of a system file, or of the built-in virtual bench, with the given scene settings replaced.
+
+    `fringes` replace those of the system.
+    """
     config = SystemConfig() if system is None else load_system(system)
     given = {name: value for name, value in scene.items() if value is not None}
-    return checked(SystemConfig, config.model_dump() | {"scene": config.scene.model_dump() | given}, "scene")
+    found = checked(SystemConfig, config.model_dump() | {"scene": config.scene.model_dump() | given}, "scene")
+    return found if fringes is None else found.model_copy(update={"fringes": fringes})
 
 
 def write_simulation(folder: Path, config: SystemConfig) -> list[Path]:

@@ -5,7 +5,7 @@
                     of version 1, whose stamps, settings and calibration nobody verified
     /config         the resolved system, JSON; "null" when there is none
     /calibration    the calibration, JSON; "null" when there is none
-    /red /green /blue /ir, or /raw /ir      (N, H, W), one uncompressed chunk per shot
+    /red /green /blue /ir, or /raw /ir      (N, H, W), one uncompressed chunk per shot; no /ir without infrared
     /id             (N,) uint64, number of the exposure
     /time_us        (N,) int64, start of the exposure, us since 1970 UTC
     /chip_stamps    (N, chips, 3) int64: id, device_ns, arrival_ns of the frame of each chip; for camera shots
@@ -40,7 +40,8 @@ __all__ = ["Header", "StoredHeader", "frames_of", "make_datasets"]
 
 FORMAT = "quadfringe recording"
 SCHEMA_VERSION = 2
-IMAGES = (("red", "green", "blue", "ir"), ("raw", "ir"))
+# A recording has the first of these whose images are all there.
+IMAGES = (("red", "green", "blue", "ir"), ("raw", "ir"), ("red", "green", "blue"), ("raw",))
 PIXELS = tuple(np.dtype(kind).str for kind in ("u1", "u2", "f4"))  # in the order of bytes of this machine
 TEXTS: dict[str, type[SystemConfig] | type[Calibration]] = {"config": SystemConfig, "calibration": Calibration}
 UNVERIFIED = "version 1"
@@ -69,12 +70,12 @@ class Header:
     @classmethod
     def of(cls, shot: AnyShot, config: SystemConfig | None, calibration: Calibration | None) -> Self:
         """Return the header of a recording for shots like this one; raises `InputError` for images that differ."""
-        image = shot.ir
+        image = shot.first
         odd = [n for n, i in shot.images.items() if i.shape != image.shape or i.dtype != image.dtype or i.ndim != 2]
         if odd:
             raise InputError(
-                f"recording: expected images (H, W) of one size and type; {', '.join(odd)} differ from ir with "
-                f"{image.dtype} {image.shape}"
+                f"recording: expected images (H, W) of one size and type; {', '.join(odd)} differ from "
+                f"{next(iter(shot.images))} with {image.dtype} {image.shape}"
             )
         if image.dtype.str not in PIXELS:
             raise InputError(f"recording: expected images of uint8, uint16 or float32, got {image.dtype.str}")
@@ -116,9 +117,9 @@ class Header:
     def shot(self, images: Mapping[str, NDArray[Any]], stamp: Stamp) -> AnyShot:
         """Make a shot from its images and its stamp."""
         if self.bayer is not None:
-            return BayerShot(images["raw"], self.bayer, images["ir"], self.full_scale, stamp=stamp)
-        red, green, blue, ir = (images[name] for name in ("red", "green", "blue", "ir"))
-        return Shot(red, green, blue, ir, self.full_scale, stamp=stamp)
+            return BayerShot(images["raw"], self.bayer, images.get("ir"), self.full_scale, stamp=stamp)
+        red, green, blue = (images[name] for name in ("red", "green", "blue"))
+        return Shot(red, green, blue, images.get("ir"), self.full_scale, stamp=stamp)
 
     def write(self, file: h5py.File) -> str:
         """Write the header to a new file; return its SHA-256."""

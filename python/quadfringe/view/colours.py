@@ -67,14 +67,13 @@ def phase_picture(shape: Shape, columns: int, max_px: int = 480) -> Picture:
 
 
 def channels_picture(shot: AnyShot, max_px: int = 640) -> Picture:
-    """Arrange red and green above blue and infrared, each tinted with its colour."""
+    """Arrange red and green above blue and infrared, each tinted with its colour; black without infrared."""
     tints = {"red": (0,), "green": (1,), "blue": (2,), "ir": (0, 1, 2)}
     height, width = shot.channels["red"].shape
     step = math.ceil(2 * max(height, width) / max_px)
     size = (max(1, width // step), max(1, height // step))
-    red, green, blue, ir = (
-        _tile(image, size, shot.full_scale_value, tints[name]) for name, image in shot.channels.items()
-    )
+    tiles = [_tile(image, size, shot.full_scale_value, tints[name]) for name, image in shot.channels.items()]
+    red, green, blue, ir = (*tiles, np.zeros_like(tiles[0]))[:4]
     return np.vstack([np.hstack([red, green]), np.hstack([blue, ir])])
 
 

@@ -7,6 +7,7 @@
 
 mod estimate;
 mod linear;
+mod matrix;
 mod mosaic;
 mod params;
 mod plan;
@@ -25,6 +26,7 @@ pub(crate) use {plan::Plan, shot::checked_full_scale};
 
 use crate::error::Limit;
 use crate::{Channel, Error, Result};
+use matrix::invert_4x4;
 use ndarray::Array2;
 
 /// Calibration of the intensities of the four channels.
@@ -138,6 +140,29 @@ impl Conditioner {
         Ok(inverse.map(|row| row.map(|v| v as f32)))
     }
 
+    /// This conditioner for shots without infrared: its infrared channel is left as it is and mixes with no other. What is
+    /// known of R, G and B stays.
+    ///
+    /// ```
+    /// use quadfringe::Conditioner;
+    /// let mut mix = Conditioner::default().crosstalk;
+    /// (mix[0][1], mix[0][3]) = (0.1, 0.2);
+    /// let colours = Conditioner::default().with_crosstalk(mix).without_infrared();
+    /// assert_eq!(colours.crosstalk[0], [1.0, 0.1, 0.0, 0.0]);
+    /// ```
+    #[must_use]
+    pub fn without_infrared(mut self) -> Self {
+        let neutral = Self::default();
+        let infrared = Channel::Ir.index();
+        self.dark[infrared] = neutral.dark[infrared];
+        self.response[infrared] = neutral.response[infrared];
+        self.projector_response[infrared] = neutral.projector_response[infrared];
+        self.ir_registration = neutral.ir_registration;
+        self.crosstalk[infrared] = neutral.crosstalk[infrared];
+        self.crosstalk[..infrared].iter_mut().for_each(|row| row[infrared] = 0.0);
+        self
+    }
+
     pub(crate) fn plan(&self) -> Result<Plan> {
         self.check()?;
         Plan::new(self)
@@ -145,7 +170,7 @@ impl Conditioner {
 }
 
 /// R, G, B and IR as linear light at every pixel, `(rows, columns)`, fractions of full scale (S1). IR is NaN where the
-/// infrared chip does not see the point.
+/// infrared chip does not see the point, and 0 for a shot without infrared.
 ///
 /// # Errors
 /// As [`Conditioner::check`]; [`Error::Value`] also when an intensity is more than 10 000 times full scale.
@@ -159,7 +184,8 @@ impl Conditioner {
 /// # Ok::<(), quadfringe::Error>(())
 /// ```
 pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Result<[Array2<f32>; 4]> {
-    let mut plan = conditioner.plan()?;
+    let without = || conditioner.clone().without_infrared().plan();
+    let mut plan = if shot.has_infrared() { conditioner.plan() } else { without() }?;
     shot.check_light()?;
     plan.prepare(shot);
     let mut planes = [(); 4].map(|()| Array2::zeros(shot.shape()));
@@ -168,32 +194,6 @@ pub fn linearise<T: Sample>(shot: &Shot<'_, T>, conditioner: &Conditioner) -> Re
         plan.row(shot, y, &mut rows);
     }
     Ok(planes)
-}
-
-/// Inverse by Gauss-Jordan elimination with row pivoting; `None` for a singular or badly conditioned matrix.
-fn invert_4x4(matrix: &[[f64; 4]; 4]) -> Option<[[f64; 4]; 4]> {
-    let mut a = [[0.0; 8]; 4];
-    for i in 0..4 {
-        a[i][..4].copy_from_slice(&matrix[i]);
-        a[i][4 + i] = 1.0;
-    }
-    for column in 0..4 {
-        let pivot = (column..4).max_by(|&p, &q| a[p][column].abs().total_cmp(&a[q][column].abs()))?;
-        a.swap(column, pivot);
-        let head = a[column][column];
-        if !head.is_finite() || head.abs() < 1e-6 {
-            return None;
-        }
-        a[column].iter_mut().for_each(|v| *v /= head);
-        let lead = a[column];
-        for (row, values) in a.iter_mut().enumerate() {
-            if row != column {
-                let factor = values[column];
-                values.iter_mut().zip(lead).for_each(|(v, l)| *v -= factor * l);
-            }
-        }
-    }
-    Some(std::array::from_fn(|i| std::array::from_fn(|j| a[i][4 + j])))
 }
 
 #[cfg(test)]

@@ -38,26 +38,27 @@ impl Plan {
         if let Some((raw, pattern)) = shot.mosaic() {
             self.mosaic.fill(&raw, pattern, &self.linear);
         }
-        if let Some(registered) = &mut self.registered {
-            registered.fill(shot.infrared(), &self.linear);
+        if let (Some(registered), Some(infrared)) = (&mut self.registered, shot.infrared()) {
+            registered.fill(infrared, &self.linear);
         }
     }
 
-    /// Converts one row of the shot to four rows of linear light.
+    /// Converts one row of the shot to four rows of linear light. IR is 0 without an infrared image.
     #[inline(always)]
     pub fn row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [&mut [f32]; 4]) {
         let [red, green, blue, infrared] = out;
         match &shot.images {
-            Images::Planes(planes) => {
+            Images::Planes { colours, .. } => {
                 for (c, out) in [red, green, blue].into_iter().enumerate() {
-                    self.linear.row(c, &row_of(&planes[c], y), out);
+                    self.linear.row(c, &row_of(&colours[c], y), out);
                 }
             }
             Images::Bayer { .. } => self.mosaic.row(y, [red, green, blue]),
         }
-        match &self.registered {
-            Some(registered) => registered.row(y, infrared),
-            None => self.linear.row(3, &row_of(shot.infrared(), y), infrared),
+        match (&self.registered, shot.infrared()) {
+            (_, None) => infrared.fill(0.0),
+            (Some(registered), _) => registered.row(y, infrared),
+            (None, Some(image)) => self.linear.row(3, &row_of(image, y), infrared),
         }
         if let Some(unmix) = &self.unmix {
             unmix.row(out);
@@ -84,7 +85,7 @@ impl Plan {
     ) {
         let limit = CLIPPED * shot.full_scale();
         match &shot.images {
-            Images::Planes([red, green, blue, _]) => {
+            Images::Planes { colours: [red, green, blue], .. } => {
                 let rows = [red, green, blue].map(|plane| row_of(plane, y));
                 let [red, green, blue] = rows.each_ref().map(|row| &row[..unsaturated.len()]);
                 for x in 0..unsaturated.len() {
@@ -95,10 +96,11 @@ impl Plan {
             }
             Images::Bayer { .. } => mosaic::saturation_row(shot, y, limit, unsaturated, glare),
         }
-        match &self.registered {
-            Some(registered) => registered.saturation_row(shot, y, limit, unsaturated),
-            None => {
-                let row = row_of(shot.infrared(), y);
+        match (&self.registered, shot.infrared()) {
+            (_, None) => {}
+            (Some(registered), Some(image)) => registered.saturation_row(image, y, limit, unsaturated),
+            (None, Some(image)) => {
+                let row = row_of(image, y);
                 for (unsaturated, raw) in unsaturated.iter_mut().zip(row.iter()) {
                     *unsaturated &= raw.intensity() < limit;
                 }

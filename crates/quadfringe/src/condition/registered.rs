@@ -1,7 +1,7 @@
 //! Registration: interpolation of the infrared image at the visible pixels.
 
+use super::Sample;
 use super::linear::{Linear, extend, row_of};
-use super::{Sample, Shot};
 use multiversion::multiversion;
 use ndarray::ArrayView2;
 use rayon::prelude::*;
@@ -142,12 +142,11 @@ impl Registered {
     /// Clears the mark of pixels whose position is next to a saturated infrared pixel.
     pub fn saturation_row<T: Sample>(
         &self,
-        shot: &Shot<'_, T>,
+        infrared: &ArrayView2<'_, T>,
         y: usize,
         limit: f32,
         unsaturated: &mut [bool],
     ) {
-        let infrared = shot.infrared();
         let seen = self.seen(y, unsaturated.len());
         let mut x = seen.start;
         while x < seen.end {
@@ -206,8 +205,7 @@ fn interpolate(rows: [&[f32]; 4], start: [f32; 2], step: [f32; 2], out: &mut [f3
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Conditioner, linearise};
-    use super::*;
+    use super::super::{Conditioner, Shot, linearise};
     use ndarray::Array2;
     use std::f64::consts::TAU;
 

@@ -80,6 +80,7 @@ impl DecoderBuilder {
         }
         options.method.accepts(&encoding)?;
         let four = encoding.four_channel_view()?;
+        let conditioner = if four.has_infrared() { conditioner } else { conditioner.without_infrared() };
         let engine = match &options.method {
             Method::Joint(joint) => {
                 let mut engine = Joint::new(&four, shape);

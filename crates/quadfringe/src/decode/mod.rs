@@ -107,12 +107,14 @@ impl Decoder {
     /// ```
     ///
     /// # Errors
-    /// [`Error::Shape`] when the shot does not have the size that the decoder was planned for; [`Error::Value`] when an
-    /// intensity is more than 10 000 times full scale.
+    /// [`Error::Shape`] when the shot does not have the size that the decoder was planned for; [`Error::Value`] when it has
+    /// no infrared image although the encoding has that channel, or the reverse, and when an intensity is more than 10 000
+    /// times full scale.
     pub fn decode_into<T: Sample>(&mut self, shot: &Shot<'_, T>, out: &mut Decoded) -> Result<()> {
         if shot.shape() != self.shape {
             return Err(Error::shape("shot", &self.shape, &shot.shape()));
         }
+        shot.check_channels(&self.four)?;
         shot.check_light()?;
         out.fit(
             self.shape,
@@ -121,7 +123,7 @@ impl Decoder {
         self.plan.prepare(shot);
         let finish = Finish {
             period_px: self.four.period_px(),
-            projector_width: self.four.projector_width,
+            columns_px: self.four.columns_px,
             triangulator: self.triangulator.as_ref(),
         };
         let Self { plan, options, engine, .. } = self;

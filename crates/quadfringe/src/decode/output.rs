@@ -37,7 +37,7 @@ pub struct Decoded {
     /// Points in the camera frame in mm, `(rows, columns, 3)`. Only from a decoder with triangulator.
     pub xyz_mm: Option<Array3<f32>>,
     /// Light of R, G, B, IR without fringes, linear, as a fraction of full scale, `(rows, columns, 4)`: the albedo of the surface
-    /// times the light on it. Only from the joint method, if [`Options::albedo`](crate::Options::albedo) is set.
+    /// times the light on it. IR is NaN without an infrared channel. Only from the joint method, if [`Options::albedo`](crate::Options::albedo) is set.
     pub albedo: Option<Array3<f32>>,
     /// Why a pixel has no data.
     pub reason: Array2<Reason>,
@@ -167,7 +167,8 @@ pub(crate) struct OutputRow<'a> {
 pub(crate) struct Finish<'a> {
     /// Projector columns in one turn of the absolute phase.
     pub period_px: f64,
-    pub projector_width: usize,
+    /// First and last of the columns that light the scene.
+    pub columns_px: [f64; 2],
     pub triangulator: Option<&'a Triangulator>,
 }
 
@@ -176,9 +177,9 @@ impl Finish<'_> {
     /// be known.
     pub fn row(&self, y: usize, row: &mut OutputRow<'_>) {
         let columns_per_rad = self.period_px as f32 / TAU;
-        let end = self.projector_width as f32 + 0.5;
+        let [begin, end] = [self.columns_px[0] as f32 - 1.5, self.columns_px[1] as f32 + 0.5];
         let sigma_unit = if self.triangulator.is_some() { columns_per_rad } else { 1.0 };
-        fill_columns(Projection { columns_per_rad, end, sigma_unit }, row);
+        fill_columns(Projection { columns_per_rad, begin, end, sigma_unit }, row);
         if let (Some(triangulator), Some(xyz)) = (self.triangulator, &mut row.xyz) {
             triangulator.finish_row(y, row.column, xyz, row.sigma);
             mark_out_of_range(xyz.iter().skip(2).step_by(3), row.reason);
@@ -199,7 +200,8 @@ pub(crate) fn hole_unless(known: bool) -> f32 {
 #[derive(Clone, Copy)]
 struct Projection {
     columns_per_rad: f32,
-    /// End of the projector image in columns, with a tolerance of one column for noise.
+    /// Begin and end of the projector image in columns, with a tolerance of one column for noise.
+    begin: f32,
     end: f32,
     /// Factor that converts the standard deviation from rad to its new unit.
     sigma_unit: f32,
@@ -208,11 +210,11 @@ struct Projection {
 /// Fills the columns of a row. Outside the projector image there is no light. A phase there becomes no data, and so do its
 /// uncertainty and its wrong-order probability.
 #[multiversion(targets("x86_64+avx2"))]
-fn fill_columns(Projection { columns_per_rad, end, sigma_unit }: Projection, row: &mut OutputRow) {
+fn fill_columns(Projection { columns_per_rad, begin, end, sigma_unit }: Projection, row: &mut OutputRow) {
     let found = row.phase.iter_mut().zip(&mut *row.column);
     for ((phase, column), (wrong, sigma)) in found.zip(row.wrong.iter_mut().zip(&mut *row.sigma)) {
         let found = *phase * columns_per_rad;
-        let hole = hole_unless((found >= -1.5) & (found < end));
+        let hole = hole_unless((found >= begin) & (found < end));
         *phase += hole;
         *column = found + hole;
         *wrong += hole;

@@ -11,18 +11,18 @@ pub(super) struct Closest {
     pub distance_px: f64,
 }
 
-/// Among the pairs of columns with the same first phase, the pair that is closest in all other phases. Two columns have
-/// the same first phase if a whole number of its periods lies between them. If there is no such pair, the margin is the
-/// greatest distance that phases can have.
-pub(super) fn closest_columns(fringe_numbers: &[f64], projector_width: usize) -> Closest {
+/// Among the pairs of columns with the same first phase that lie less than `reach_px` apart, the pair that is closest in
+/// all other phases. Two columns have the same first phase if a whole number of its periods lies between them. If there
+/// is no such pair, the margin is the greatest distance that phases can have.
+pub(super) fn closest_columns(fringe_numbers: &[f64], projector_width: usize, reach_px: f64) -> Closest {
     let [first, others @ ..] = fringe_numbers else { unreachable!("an encoding has channels") };
     let width = projector_width as f64;
     let period_px = width / first;
     let greatest = PI * (others.len().max(1) as f64).sqrt();
-    let mut closest = Closest { margin_rad: greatest, distance_px: width };
+    let mut closest = Closest { margin_rad: greatest, distance_px: reach_px };
     for periods in 1.. {
         let distance_px = f64::from(periods) * period_px;
-        if distance_px >= width * (1.0 - 1e-12) {
+        if distance_px >= reach_px * (1.0 - 1e-12) {
             break;
         }
         let apart = |number: &f64| wrapped(TAU * number * distance_px / width);
@@ -75,6 +75,23 @@ mod tests {
         assert!((captured.ambiguity_margin_rad() - 0.42).abs() < 0.05);
         assert!(Encoding::optimum(35, 912).is_err());
         assert!(Encoding::optimum(0, 912).is_err());
+    }
+
+    #[test]
+    fn a_range_of_columns_limits_the_pairs_that_count() {
+        // The beat of the captures' numbers repeats after 15 fringes of 42 columns.
+        let numbers = [1920.0 / 42.0, 1920.0 / 45.0];
+        assert!(matches!(Encoding::rgb(numbers, 1920), Err(Error::JointRange { .. })));
+        let within = |columns| Encoding::rgb_within(numbers, 1920, columns);
+        let found = within([700.0, 1300.0]).expect("630 columns");
+        assert!((found.ambiguity_margin_rad() - TAU / 15.0).abs() < 1e-9);
+        assert!(matches!(within([640.0, 1300.0]), Err(Error::JointRange { .. })));
+        for range in [[-1.0, 300.0], [700.0, 1921.0], [500.0, 500.0], [500.0, 400.0], [f64::NAN, 300.0]] {
+            assert!(matches!(within(range), Err(Error::Value { .. })), "{range:?}");
+        }
+        let whole = Encoding::rgb([16.0, 15.0], 912).expect("one beat over the field");
+        assert!((whole.ambiguity_margin_rad() - TAU / 16.0).abs() < 1e-9);
+        assert_eq!(whole.columns_px(), [0.0, 912.0]);
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The four-channel encoding of the paper: R and B in quadrature, G and IR alone.
+//! The encodings that decode a single shot: R and B in quadrature, G alone, and IR alone if there is an infrared
+//! projector, as in the paper.
 
 use super::Encoding;
 use super::channel::{ChannelCode, Projector, phase_at};
@@ -63,8 +64,9 @@ impl Channel {
     }
 }
 
-/// The four-channel encoding as decoders see it: three fringe numbers over the projector width.
-/// [`Encoding::four_channel_view`] makes it, which guarantees valid numbers.
+/// The encoding of a single shot as decoders see it: three fringe numbers over the projector width. Without an infrared
+/// projector the third number is 0, and the channel has no weight. [`Encoding::four_channel_view`] makes it, which
+/// guarantees valid numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct FourChannel {
@@ -72,15 +74,23 @@ pub struct FourChannel {
     pub quadrature: f64,
     /// Fringe number of G.
     pub green: f64,
-    /// Fringe number of IR.
+    /// Fringe number of IR; 0 if there is no infrared channel.
     pub infrared: f64,
     /// Number of projector columns that the fringe numbers refer to.
     pub projector_width: usize,
+    /// [`Encoding::columns_px`] of the encoding.
+    pub columns_px: [f64; 2],
     /// [`Encoding::ambiguity_margin_rad`] of the encoding.
     pub ambiguity_margin_rad: f64,
 }
 
 impl FourChannel {
+    /// Whether there is an infrared channel.
+    #[must_use]
+    pub fn has_infrared(&self) -> bool {
+        self.infrared > 0.0
+    }
+
     /// Fringe number of a channel.
     #[must_use]
     pub const fn fringe_number(&self, channel: Channel) -> f64 {
@@ -117,7 +127,8 @@ impl FourChannel {
 }
 
 impl Encoding {
-    /// The encoding as the four channels of the paper. The decoders of this crate take only these.
+    /// The encoding as the four channels of the paper, or as the first three of them. The decoders of this crate take only
+    /// these.
     ///
     /// ```
     /// use quadfringe::Encoding;
@@ -127,7 +138,7 @@ impl Encoding {
     ///
     /// let three_colours = [36.0, 35.0, 30.0].map(|number| ChannelCode::new(number, 0.0, Projector::Visible));
     /// let refused = Encoding::new(three_colours, 912)?.four_channel_view().unwrap_err();
-    /// assert!(refused.to_string().contains("got 3 channels"));
+    /// assert!(refused.to_string().contains("got channel B shifted by 0 rad"));
     /// # Ok::<(), quadfringe::Error>(())
     /// ```
     ///
@@ -135,9 +146,12 @@ impl Encoding {
     /// [`Error::NotFourChannel`], which names the first difference.
     pub fn four_channel_view(&self) -> Result<FourChannel> {
         let fault = |fault| Err(Error::NotFourChannel { fault });
-        let [red, green, blue, infrared] = self.channels() else {
+        let [red, green, blue, infrared @ ..] = self.channels() else {
             return fault(FourChannelFault::Count(self.channels().len()));
         };
+        if infrared.len() > 1 {
+            return fault(FourChannelFault::Count(self.channels().len()));
+        }
         for (channel, code) in Channel::ALL.into_iter().zip(self.channels()) {
             let ChannelCode { shift_rad, projector, .. } = *code;
             if projector != channel.projector() {
@@ -154,8 +168,9 @@ impl Encoding {
         Ok(FourChannel {
             quadrature: red.fringe_number,
             green: green.fringe_number,
-            infrared: infrared.fringe_number,
+            infrared: infrared.first().map_or(0.0, |channel| channel.fringe_number),
             projector_width: self.projector_width(),
+            columns_px: self.columns_px(),
             ambiguity_margin_rad: self.ambiguity_margin_rad(),
         })
     }
@@ -192,6 +207,22 @@ mod tests {
         let found = fault_of(|channels| channels[2].fringe_number = 37.0);
         assert_eq!(found, FourChannelFault::Quadrature { red: 36.0, blue: 37.0 });
         assert_eq!(found.to_string(), "36 fringes in R and 37 in B");
+    }
+
+    #[test]
+    fn lists_of_two_and_of_five_channels_are_refused() {
+        let encoding = Encoding::rgb([16.0, 15.0], 912).expect("valid");
+        let count = |channels: Vec<ChannelCode>| match Encoding::new(channels, 912) {
+            Ok(encoding) => encoding.four_channel_view(),
+            Err(error) => Err(error),
+        };
+        let two = count(encoding.channels()[..2].to_vec());
+        let five = count([encoding.channels(), &encoding.channels()[..2]].concat());
+        for (found, expected) in [(two, 2), (five, 5)] {
+            assert!(
+                matches!(found, Err(Error::NotFourChannel { fault: FourChannelFault::Count(n) }) if n == expected)
+            );
+        }
     }
 
     #[test]

@@ -51,6 +51,7 @@ use std::f64::consts::FRAC_PI_2;
 pub struct Encoding {
     channels: Vec<ChannelCode>,
     projector_width: usize,
+    columns_px: [f64; 2],
 }
 
 impl Encoding {
@@ -61,15 +62,28 @@ impl Encoding {
     /// 0.001 or not below half the width (a fringe needs more than two columns), and a shift that is not finite;
     /// [`Error::JointRange`] when two columns of the projector have nearly the same phases.
     pub fn new(channels: impl Into<Vec<ChannelCode>>, projector_width: usize) -> Result<Self> {
-        let encoding = Self { channels: channels.into(), projector_width };
+        Self::within(channels, projector_width, [0.0, projector_width as f64])
+    }
+
+    /// As [`Self::new`], for scenes that only the columns from `columns_px[0]` to `columns_px[1]` light. Only these need to
+    /// be distinguished, so that more fringe numbers are possible, and decoding gives no other columns.
+    ///
+    /// # Errors
+    /// As [`Self::new`]; [`Error::Value`] also for a range that is empty or leaves the projector.
+    pub fn within(
+        channels: impl Into<Vec<ChannelCode>>,
+        projector_width: usize,
+        columns_px: [f64; 2],
+    ) -> Result<Self> {
+        let encoding = Self { channels: channels.into(), projector_width, columns_px };
         encoding.check_values()?;
         let closest = encoding.closest_columns();
         if closest.margin_rad < MARGIN_NEEDED_RAD {
             return Err(Error::JointRange {
                 fringe_numbers: encoding.measured_numbers(),
                 width_px: projector_width,
-                first_px: 0.0,
-                second_px: closest.distance_px,
+                first_px: columns_px[0],
+                second_px: columns_px[0] + closest.distance_px,
                 margin_rad: closest.margin_rad,
                 needed_rad: MARGIN_NEEDED_RAD,
             });
@@ -82,7 +96,19 @@ impl Encoding {
     ///
     /// # Errors
     /// As [`Self::new`].
-    pub fn four_channel([quadrature, green, infrared]: [f64; 3], projector_width: usize) -> Result<Self> {
+    pub fn four_channel(numbers: [f64; 3], projector_width: usize) -> Result<Self> {
+        Self::four_channel_within(numbers, projector_width, [0.0, projector_width as f64])
+    }
+
+    /// As [`Self::four_channel`], for scenes that only a range of columns lights, as [`Self::within`].
+    ///
+    /// # Errors
+    /// As [`Self::within`].
+    pub fn four_channel_within(
+        [quadrature, green, infrared]: [f64; 3],
+        projector_width: usize,
+        columns_px: [f64; 2],
+    ) -> Result<Self> {
         let visible = |number, shift_rad| ChannelCode::new(number, shift_rad, Projector::Visible);
         let channels = [
             visible(quadrature, 0.0),
@@ -90,7 +116,37 @@ impl Encoding {
             visible(quadrature, FRAC_PI_2),
             ChannelCode::new(infrared, 0.0, Projector::Infrared),
         ];
-        Self::new(channels, projector_width)
+        Self::within(channels, projector_width, columns_px)
+    }
+
+    /// Makes three channels for a projector without infrared, from two fringe numbers: for R and B, which are in quadrature,
+    /// and for G. The beat of the two numbers `N` and `N - 1` has one fringe over the projector.
+    ///
+    /// ```
+    /// use quadfringe::Encoding;
+    /// let view = Encoding::rgb([16.0, 15.0], 912)?.four_channel_view()?;
+    /// assert_eq!((view.quadrature, view.green, view.has_infrared()), (16.0, 15.0, false));
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn rgb(numbers: [f64; 2], projector_width: usize) -> Result<Self> {
+        Self::rgb_within(numbers, projector_width, [0.0, projector_width as f64])
+    }
+
+    /// As [`Self::rgb`], for scenes that only a range of columns lights, as [`Self::within`].
+    ///
+    /// # Errors
+    /// As [`Self::within`].
+    pub fn rgb_within(
+        [quadrature, green]: [f64; 2],
+        projector_width: usize,
+        columns_px: [f64; 2],
+    ) -> Result<Self> {
+        let visible = |number, shift_rad| ChannelCode::new(number, shift_rad, Projector::Visible);
+        let channels = [visible(quadrature, 0.0), visible(green, 0.0), visible(quadrature, FRAC_PI_2)];
+        Self::within(channels, projector_width, columns_px)
     }
 
     /// Makes the four channels of the paper with the optimum fringe numbers `N`, `N - 1` and `N - sqrt(N)` (S4): the
@@ -118,6 +174,12 @@ impl Encoding {
     #[must_use]
     pub const fn projector_width(&self) -> usize {
         self.projector_width
+    }
+
+    /// First and last of the columns that light the scene; the whole projector unless [`Self::within`] was given fewer.
+    #[must_use]
+    pub const fn columns_px(&self) -> [f64; 2] {
+        self.columns_px
     }
 
     /// Number of projector columns in one turn of the absolute phase, which is the phase of the first channel.
@@ -169,7 +231,12 @@ impl Encoding {
             let expected = Limit::Range { from: 2.0, to: PROJECTOR_WIDTH_MAX as f64 };
             return Err(Error::value("projector_width", expected, self.projector_width));
         }
-        let limit = self.projector_width as f64 / 2.0;
+        let ([from, to], width) = (self.columns_px, self.projector_width as f64);
+        if !(from >= 0.0 && to > from && to <= width) {
+            let expected = format!("two growing numbers from 0 to {width}, the columns of the projector");
+            return Err(Error::value("columns that light the scene", expected, format!("{from} and {to}")));
+        }
+        let limit = width / 2.0;
         for channel in &self.channels {
             let number = channel.fringe_number;
             if !(FRINGE_NUMBER_MIN..limit).contains(&number) {
@@ -197,6 +264,7 @@ impl Encoding {
     }
 
     fn closest_columns(&self) -> Closest {
-        ambiguity::closest_columns(&self.measured_numbers(), self.projector_width)
+        let [from, to] = self.columns_px;
+        ambiguity::closest_columns(&self.measured_numbers(), self.projector_width, to - from)
     }
 }

@@ -52,8 +52,8 @@ impl PairTable {
     ///
     /// # Errors
     /// [`Error::Value`] when [`Triangulator`] cannot use the devices, when the encoding does not have the width of the
-    /// visible projector, or when the range is not two increasing depths of at least 0; [`Error::NotFourChannel`] for
-    /// another encoding.
+    /// visible projector or has no infrared channel, or when the range is not two increasing depths of at least 0;
+    /// [`Error::NotFourChannel`] for another encoding.
     pub fn new(
         camera: &Device,
         pair: &ProjectorPair,
@@ -70,6 +70,10 @@ impl PairTable {
         if four.projector_width != width_px {
             let expected = format!("{width_px}, the columns of the visible projector");
             return Err(Error::value("columns of the fringes", expected, four.projector_width));
+        }
+        if !four.has_infrared() {
+            let expected = "an encoding with an infrared channel, for a pair of projectors";
+            return Err(Error::value("channels of the encoding", expected, "R, G and B"));
         }
         let (first, third) = (four.quadrature * TAU, four.infrared * TAU);
         let triangulator = Triangulator::new(camera, pair.visible())?;

@@ -1,7 +1,7 @@
-//! Step 2: the mask of pixels that both projectors light, and the noise of the intensities.
+//! Step 2: the mask of pixels that all projectors light, and the noise of the intensities.
 //!
 //! R and B are a quarter period apart, so on a lit surface they are never both at the bottom of their range: at least one
-//! lies 0.146 of its range or more above it. In a shadow all four channels lie at the bottom. Bottom and range are taken
+//! lies 0.146 of its range or more above it. In a shadow all channels lie at the bottom. Bottom and range are taken
 //! from the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
@@ -28,6 +28,8 @@ pub(super) struct LitMask {
     pub noise: f32,
     /// Least range of fringes, in linear light.
     pub range_min: f32,
+    /// Whether there is an infrared channel; without it the plane of its light is 0.
+    pub infrared: bool,
     /// Whether the infrared light comes from a projector that may light where the visible one does not.
     visible_alone: bool,
 }
@@ -43,6 +45,10 @@ struct Rows {
 }
 
 impl LitMask {
+    pub fn new(infrared: bool) -> Self {
+        Self { infrared, ..Self::default() }
+    }
+
     /// From now on, only R, G and B decide which pixels are lit.
     pub fn see_visible_light_alone(&mut self) {
         self.visible_alone = true;
@@ -94,7 +100,7 @@ impl LitMask {
             let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
             let light = light.map(|plane| &plane[y * stride..][..stride]);
             let (levels, variance) = (LevelRows::new(maps), self.noise * self.noise);
-            if self.visible_alone {
+            if self.visible_alone || !self.infrared {
                 heights::<3>(&levels, light, variance, out);
             } else {
                 heights::<4>(&levels, light, variance, out);
@@ -232,7 +238,7 @@ mod tests {
         let grid = Grid::new([20, 32], 4.0);
         let mut lit = vec![1.0; grid.pixels()];
         lit[9 * grid.stride + 12] = 0.0;
-        LitMask::default().erode(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
+        LitMask::new(true).erode(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
         let dark = |y: usize| (0..grid.width).filter(|x| lit[y * grid.stride + x] == 0.0).collect::<Vec<_>>();
         assert_eq!((7..=11).map(dark).map(|row| row.len()).collect::<Vec<_>>(), [3, 5, 5, 5, 3]);
         assert_eq!((dark(6), dark(7), dark(9)), (vec![], vec![11, 12, 13], vec![10, 11, 12, 13, 14]));
@@ -256,7 +262,7 @@ mod tests {
             let mut lit = vec![0.0; grid.pixels()];
             let light = planes.each_ref().map(Vec::as_slice);
             let scaled = ScaledGrid { grid: &grid, period_px: 25.3, factor: 1 };
-            LitMask::default().find(scaled, light, 0.04, &mut lit);
+            LitMask::new(true).find(scaled, light, 0.04, &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {

@@ -2,8 +2,23 @@
 //!
 //! Channel c has the offset `A_c`, the amplitude `B_c` and `k_c = N_c / N_1` fringes for each fringe of R and B. `Phi` is the
 //! absolute phase of R and B, `rho` the albedo of the pixel. The shift `delta_c` is pi/2 for B and 0 for the others.
+//!
+//! Without an infrared projector `k_IR` is 0. This channel is then dark, with `A` and `B` of 0, so that it adds nothing to any sum
+//! over the channels. What counts channels or has a term for each of them takes their weights from here.
 
 use crate::parallel::angle::sin_cos;
+
+/// Weights of R, G, B, IR for these fringe numbers over the first: 1, and 0 for the infrared channel if there is none.
+#[inline(always)]
+pub(super) fn weights([_, _, infrared]: [f32; 3]) -> [f32; 4] {
+    [1.0, 1.0, 1.0, if infrared > 0.0 { 1.0 } else { 0.0 }]
+}
+
+/// Number of channels: 4, or 3 without infrared.
+#[inline(always)]
+pub(super) fn count(ratios: [f32; 3]) -> f32 {
+    if ratios[2] > 0.0 { 4.0 } else { 3.0 }
+}
 
 /// Offset and amplitude of R, G, B, IR along one row of pixels, in linear light for an albedo of 1.
 #[derive(Clone, Copy)]

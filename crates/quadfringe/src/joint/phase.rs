@@ -5,7 +5,7 @@
 
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
-use super::model::FringeRows;
+use super::model::{FringeRows, count};
 use super::neighbours::{around, binomial};
 use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
@@ -25,7 +25,7 @@ pub(super) struct PhaseFit {
 
 /// Output of the fit other than the phase, as rows of the image. Rows of length 0 are not written.
 pub(super) struct FitRows<'a> {
-    /// Mean of the squared residuals of the four channels, in linear light squared.
+    /// Mean of the squared residuals of the channels, in linear light squared.
     pub squared_residual: Vec<&'a mut [f32]>,
     /// Modulation of R and B in linear light.
     pub modulation: Vec<&'a mut [f32]>,
@@ -168,7 +168,8 @@ impl Rows {
         binomial(near.map(|row| row.weighted_albedo.as_slice()), grid.width, spare, &mut smooth.weighted);
         binomial(near.map(|row| row.albedo_weight.as_slice()), grid.width, spare, &mut smooth.weight);
         let lit = Lit { modulation: model.window.modulation(y), usable: scene.row(scene.usable, y) };
-        let measure = |normal: NormalRows<'_>| linearise(near[1], smooth, lit, normal, found);
+        let share = 1.0 / count(model.ratios);
+        let measure = |normal: NormalRows<'_>| linearise(near[1], smooth, lit, share, normal, found);
         model.window.along(y, window, scene.row(before, y), measure, out);
     }
 }
@@ -232,9 +233,17 @@ fn predict<W: Waves>(
     }
 }
 
-/// Gauss-Newton terms of every pixel with the albedo eliminated, and the residuals of the four channels.
+/// Gauss-Newton terms of every pixel with the albedo eliminated, and the mean squared residual of the channels, of which each has
+/// this `share`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn linearise(model: &ModelRow, albedo: &SmoothAlbedo, lit: Lit, normal: NormalRows, found: &mut FoundRows) {
+fn linearise(
+    model: &ModelRow,
+    albedo: &SmoothAlbedo,
+    lit: Lit,
+    share: f32,
+    normal: NormalRows,
+    found: &mut FoundRows,
+) {
     let sums = [&model.mm, &model.md, &model.dd, &model.ms, &model.ds, &model.ss, &model.amplitude];
     let sums = sums.map(|row| lanes(row));
     let (albedo, lit) =
@@ -254,7 +263,7 @@ fn linearise(model: &ModelRow, albedo: &SmoothAlbedo, lit: Lit, normal: NormalRo
             let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
             found[0][x] = if on { numerator } else { 0.0 };
             found[1][x] = if on { denominator } else { 0.0 };
-            found[2][x] = if square > 0.0 { 0.25 * square } else { 0.0 };
+            found[2][x] = if square > 0.0 { share * square } else { 0.0 };
             // Where light differs from any fringes, the fitted amplitude can be negative.
             let lit = (modulation[x] > 0.0) & (amplitude[x] > 0.0);
             found[3][x] = if lit { albedo * amplitude[x] } else { 0.0 };

@@ -84,6 +84,8 @@
 //! # Ok::<(), quadfringe::Error>(())
 //! ```
 //!
+//! Without an infrared channel (`Encoding::rgb`) there is no second beat: the one of R and B with G finds the order by itself.
+//!
 //! The decoder takes the same steps strip by strip (`strip.rs`); a strip has the rows of one block.
 
 mod statistics;
@@ -121,6 +123,8 @@ pub(crate) struct Published {
     spectrum: LineSpectrum,
     slots: Slots<Strip>,
     numbers: Phases<f64>,
+    /// Whether there is an infrared channel.
+    infrared: bool,
     /// Rows and columns of the images.
     shape: [usize; 2],
 }
@@ -140,7 +144,12 @@ impl Published {
             filters: Blocks::all_columns().map(filter).collect(),
             spectrum: LineSpectrum::new(shape[1]),
             slots: Slots::default(),
-            numbers: Phases::from_array(code.numbers()),
+            // The row of a channel that is absent is dark, and any period will do.
+            numbers: Phases {
+                infrared: if code.has_infrared() { code.infrared } else { code.green },
+                ..Phases::from_array(code.numbers())
+            },
+            infrared: code.has_infrared(),
             shape,
         }
     }
@@ -200,6 +209,7 @@ impl Published {
             conditioning,
             unwrapping: &self.unwrapping,
             filter,
+            infrared: self.infrared,
             weights: FourierPair { green: weights(periods_px.green), infrared: weights(periods_px.infrared) },
             blocks,
             periods_px,

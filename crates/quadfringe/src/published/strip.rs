@@ -22,6 +22,8 @@ pub(super) struct StripPlan<'a> {
     pub unwrapping: &'a Unwrapping,
     /// Fourier filter for rows of block means.
     pub filter: &'a RowFilter,
+    /// Whether there is an infrared channel.
+    pub infrared: bool,
     /// Weights of the filter for G and IR.
     pub weights: FourierPair<Vec<f32>>,
     /// A strip has the rows of one block.
@@ -81,7 +83,7 @@ pub(super) struct Strip {
     fringes: FourierPair<Row>,
     /// Phases of the block means at every pixel: wrapped for R and B, up to whole turns for G and IR.
     phases: Phases<Row>,
-    /// The smaller of the squared modulations of G and IR.
+    /// The smaller of the squared modulations of G and IR; that of G without infrared.
     power: Row,
     /// Absolute phase of the means.
     absolute: Row,
@@ -228,7 +230,7 @@ impl Strip {
             (Half::Real, &plan.weights.green, &mut self.phases.green),
             (Half::Imaginary, &plan.weights.infrared, &mut self.phases.infrared),
         ];
-        for (half, weights, phase) in channels {
+        for (half, weights, phase) in channels.into_iter().take(if plan.infrared { 2 } else { 1 }) {
             let signal = plan.filter.analytic(half, weights, &mut self.fourier);
             self.interpolation.run_for(pixels, signal, phase, &mut self.power);
         }

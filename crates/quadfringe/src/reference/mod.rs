@@ -134,7 +134,7 @@ impl Reference {
         let number = self.code.sets[0].fringe_number;
         let finish = Finish {
             period_px: self.code.projector_width as f64 / number,
-            projector_width: self.code.projector_width,
+            columns_px: [0.0, self.code.projector_width as f64],
             triangulator: self.triangulator.as_ref(),
         };
         out.rows().enumerate().for_each_init(

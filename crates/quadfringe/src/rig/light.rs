@@ -43,13 +43,16 @@ impl Light<'_> {
         Self::Fringes { number, shift_rad, axis: Axis::Columns }
     }
 
-    /// The four channels of a shot: R, G, B, IR.
+    /// The four channels of a shot: R, G, B, IR. Without an infrared channel that projector is dark.
     ///
     /// # Errors
     /// [`Error::NotFourChannel`] for another encoding, because the camera of the bench has these four channels.
     pub fn shot(encoding: &Encoding) -> Result<[Self; 4]> {
         let four = encoding.four_channel_view()?;
-        Ok(Channel::ALL.map(|channel| Self::fringes(four.fringe_number(channel), channel.shift_rad())))
+        Ok(Channel::ALL.map(|channel| match channel {
+            Channel::Ir if !four.has_infrared() => Self::Uniform(0.0),
+            _ => Self::fringes(four.fringe_number(channel), channel.shift_rad()),
+        }))
     }
 
     /// The same fringes in all four channels: one step of an N-step capture. If `projector` is given, the other

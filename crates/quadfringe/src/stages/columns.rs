@@ -32,7 +32,7 @@ pub struct Columns {
 #[must_use]
 pub fn columns_from_phase(encoding: &Encoding, phase_rad: ArrayView2<'_, f32>) -> Columns {
     let per_rad = encoding.period_px() as f32 / TAU;
-    let edges = ProjectorEdges::of(encoding.projector_width());
+    let edges = ProjectorEdges::of(encoding.columns_px());
     let mut found =
         Columns { phase_rad: phase_rad.to_owned(), column_px: phase_rad.mapv(|phase| phase * per_rad) };
     for (phase, column) in found.phase_rad.iter_mut().zip(&mut found.column_px) {
@@ -43,7 +43,7 @@ pub fn columns_from_phase(encoding: &Encoding, phase_rad: ArrayView2<'_, f32>) -
     found
 }
 
-/// First and last column of the projector image, with a tolerance of one column for noise on each side.
+/// First and last of the columns that light the scene, with a tolerance of one column for noise on each side.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ProjectorEdges {
     first_px: f32,
@@ -51,8 +51,8 @@ pub(crate) struct ProjectorEdges {
 }
 
 impl ProjectorEdges {
-    pub fn of(projector_width: usize) -> Self {
-        Self { first_px: -1.5, end_px: projector_width as f32 + 0.5 }
+    pub fn of([first_px, last_px]: [f64; 2]) -> Self {
+        Self { first_px: first_px as f32 - 1.5, end_px: last_px as f32 + 0.5 }
     }
 
     #[inline(always)]

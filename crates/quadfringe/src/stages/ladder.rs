@@ -17,7 +17,8 @@ const BLOCK: usize = 64;
 
 /// Fringe orders of one pixel at a time (S4).
 ///
-/// If no beat of the fringe numbers has at most one fringe, there is no ladder, and every order is tried in turn.
+/// If no beat of the fringe numbers has at most one fringe, or if there is no infrared phase, there is no ladder, and every order is
+/// tried in turn.
 #[derive(Debug, Clone)]
 pub struct Ladder {
     numbers: Phases<f32>,
@@ -26,7 +27,8 @@ pub struct Ladder {
     /// Number of orders after which all three phases repeat, if the whole field is one such cycle.
     cycle: Option<f32>,
     climbs: bool,
-    orders: usize,
+    /// The orders that are tried.
+    orders: std::ops::Range<usize>,
 }
 
 /// Absolute phase of one pixel.
@@ -60,8 +62,12 @@ impl Ladder {
             columns_per_turn: (code.projector_width as f64 / numbers.quadrature) as f32,
             width: code.projector_width as f32,
             cycle: (whole && beat == 1.0).then_some(numbers.quadrature as f32),
-            climbs: beat > 0.0 && beat <= 1.0 && numbers.infrared != numbers.quadrature,
-            orders: code.orders(),
+            climbs: code.has_infrared()
+                && beat > 0.0
+                && beat <= 1.0
+                && numbers.infrared != numbers.quadrature,
+            orders: (code.columns_px[0] / code.period_px()) as usize
+                ..(code.columns_px[1] / code.period_px()).ceil() as usize,
         }
     }
 
@@ -133,22 +139,33 @@ impl Ladder {
         let out = phase.chunks_mut(BLOCK).zip(margin.chunks_mut(BLOCK));
         let blocks = rows.quadrature.zip(rows.green).zip(rows.infrared);
         for (((quadrature, green), infrared), (phase, margin)) in blocks.zip(out) {
-            self.search_block(Phases { quadrature, green, infrared }, phase, margin);
+            let wrapped = Phases { quadrature, green, infrared };
+            if self.numbers.infrared > 0.0 {
+                self.search_block::<true>(wrapped, phase, margin);
+            } else {
+                self.search_block::<false>(wrapped, phase, margin);
+            }
         }
     }
 
-    /// Tries every order for a block of pixels. The best order has the least squared error of the other two phasors;
-    /// the margin follows from the second best order.
-    fn search_block(&self, wrapped: Phases<&[f32]>, phase: &mut [f32], margin: &mut [f32]) {
+    /// Tries every order for a block of pixels. The best order has the least squared error of the other phasors, of which
+    /// `INFRARED` is one; the margin follows from the second best order.
+    fn search_block<const INFRARED: bool>(
+        &self,
+        wrapped: Phases<&[f32]>,
+        phase: &mut [f32],
+        margin: &mut [f32],
+    ) {
         let Phases { quadrature: first, green: second, infrared: third } = wrapped;
         let to_second = self.numbers.green / self.numbers.quadrature;
         let to_third = self.numbers.infrared / self.numbers.quadrature;
         let (mut least, mut next) = ([f32::INFINITY; BLOCK], [f32::INFINITY; BLOCK]);
-        for order in 0..self.orders {
+        for order in self.orders.clone() {
             for i in 0..first.len() {
                 let guess = wrap_positive(first[i]) + TAU * order as f32;
                 let error = |ratio: f32, seen: f32| 1.0 - sin_cos(guess * ratio - seen).1;
-                let cost = error(to_second, second[i]) + error(to_third, third[i]);
+                let by_second = error(to_second, second[i]);
+                let cost = if INFRARED { by_second + error(to_third, third[i]) } else { by_second };
                 let better = cost < least[i];
                 let behind = if better { least[i] } else { cost };
                 next[i] = if behind < next[i] { behind } else { next[i] };
@@ -159,7 +176,8 @@ impl Ladder {
         for i in 0..first.len() {
             let known = least[i].is_finite() && next[i] > 0.0;
             margin[i] = if known { 1.0 - (least[i].max(0.0) / next[i]).sqrt() } else { 0.0 };
-            let seen = (first[i] + second[i] + third[i]).is_finite();
+            let all = first[i] + second[i] + if INFRARED { third[i] } else { 0.0 };
+            let seen = all.is_finite();
             (phase[i], margin[i]) = if seen { (phase[i], margin[i]) } else { (f32::NAN, f32::NAN) };
         }
     }
@@ -182,7 +200,7 @@ impl Nearest {
 
 /// Absolute phase and margin, both `(rows, columns)`, from wrapped phases in rad by the ladder of beats (S4).
 ///
-/// NaN in, NaN out.
+/// NaN in, NaN out. Without an infrared channel the third map is not read.
 ///
 /// # Errors
 /// [`Error::Shape`] when the maps differ in size; [`Error::NotFourChannel`] for another encoding.
@@ -242,6 +260,8 @@ mod tests {
             FourChannel::of(Encoding::optimum(64, 1280)),
             FourChannel::of(Encoding::four_channel([1920.0 / 42.0, 1920.0 / 45.0, 40.0], 1920)),
             FourChannel::of(Encoding::four_channel([30.0, 31.0, 36.0], 912)),
+            FourChannel::of(Encoding::rgb([16.0, 15.0], 912)),
+            FourChannel::of(Encoding::rgb([15.0, 16.0], 912)),
         ];
         for code in codes {
             let ladder = Ladder::new(&code);

@@ -155,7 +155,7 @@ def _check_shot(session: Session, shot: AnyShot) -> None:
     """Raise `InputError` for a shot that the settings of the session would misread."""
     pattern = shot.bayer if isinstance(shot, BayerShot) else None
     bits = round(np.log2(shot.full_scale_value + 1))
-    meant = session.bits or (16 if shot.images["ir"].dtype == np.uint16 else bits)
+    meant = session.bits or (16 if shot.first.dtype == np.uint16 else bits)
     if (pattern, bits) != (session.bayer, meant):
         raise InputError(
             f"{FILE}: bits is {session.bits or 'absent'} and bayer {session.bayer or 'absent'}, but the camera "

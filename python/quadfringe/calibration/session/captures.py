@@ -9,6 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe.calibration.levels import row4
 from quadfringe.calibration.projector import AXES, ProjectorMap, projector_map
 from quadfringe.calibration.session.settings import FILE, Session
 from quadfringe.data import AnyShot
@@ -74,6 +75,7 @@ class FolderCaptures:
     def shot(self, step: str, name: str) -> AnyShot:
         """Read one shot."""
         shot = read_shot(self.folder / step / name, self.session.bits, bayer=self.session.bayer)
+        self._check_channels(shot, f"{step}/{name}")
         self._check_size(next(iter(shot.images.values())), f"{step}/{name}")
         return shot
 
@@ -90,6 +92,13 @@ class FolderCaptures:
         self._check_size(grey, str(path))
         top = 2**self.session.bits - 1 if self.session.bits and grey.dtype == np.uint16 else full_scale(grey)
         return (grey / np.float32(top)).astype(np.float32)
+
+    def _check_channels(self, shot: AnyShot, name: str) -> None:
+        infrared = self.session.fringes.infrared
+        if infrared and shot.ir is None:
+            raise InputError(f"{name}: no image for ir, the infrared channel: add ir.png")
+        if shot.ir is not None and not infrared:
+            raise InputError(f"{name}: an image for ir, and the session is without infrared: leave it out")
 
     def _check_size(self, image: NDArray[Any], name: str) -> None:
         self._size = self._size or image.shape
@@ -112,8 +121,7 @@ def light_of(session: Session, step: str, name: str) -> Exposure:
     if step == "levels":
         plan = session.level_plan
         row = plan.names.index(name)
-        red, green, blue, ir = plan.levels[row].tolist()
-        return Exposure(Levels((red, green, blue, ir)), float(plan.exposure[row]))
+        return Exposure(Levels(row4(plan.levels[row])), float(plan.exposure[row]))
     if step in ("dark", "flat"):
         return Exposure(Levels((FLAT_LEVEL if step == "flat" else 0.0,) * 4), 1.0)
     return Exposure(session.fringes, 1.0)

@@ -100,7 +100,7 @@ class _Walk:
         for name in self.captures.session.captures("poses"):
             maps[name] = self.captures.pose(name)
             self.say(f"  pose {name}: read")
-        registered = geometry.registration(self.captures, maps) if self.captures.session.infrared else None
+        registered = geometry.registration(self.captures, maps) if len(self.captures.session.beams) > 1 else None
         found = None if registered is None else registered.details["registration"]
         rest = [geometry.poses(self.captures, maps, found)]
         return rest if registered is None else [registered, *rest]

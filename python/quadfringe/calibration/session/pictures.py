@@ -60,6 +60,8 @@ def _levels(figure: Any, outcome: Outcome) -> None:
     left, right = figure.subplots(1, 2)
     for axes, error, title in ((left, found.level_before, "before"), (right, found.level_after, "after")):
         for channel, (name, colour) in enumerate(zip(CHANNELS, COLOURS, strict=True)):
+            if channel >= plan.channels:
+                continue
             axes.plot(100 * plan.levels[:, channel], 100 * error[:, channel], "o", color=colour, label=name, ms=4)
         axes.axhline(0, color="k", lw=0.5)
         axes.set(xlabel="projected level, %", ylabel="error of the level, % of full scale", title=title)
@@ -68,7 +70,7 @@ def _levels(figure: Any, outcome: Outcome) -> None:
 
 def _flat(figure: Any, outcome: Outcome) -> None:
     found = outcome.details["flat"]
-    for axes, name, gain in zip(figure.subplots(1, 4), CHANNELS, found.gain, strict=True):
+    for axes, name, gain in zip(figure.subplots(1, len(found.gain)), CHANNELS, found.gain, strict=False):
         drawn = axes.imshow(gain, cmap="viridis", vmin=np.nanquantile(gain, 0.01), vmax=np.nanquantile(gain, 0.99))
         axes.set_title(f"gain of {name}", fontsize=10)
         figure.colorbar(drawn, ax=axes, shrink=0.6)

@@ -118,17 +118,18 @@ class Session(Stored):
     @property
     def level_plan(self) -> LevelPlan:
         """The captures under uniform light."""
-        return level_plan(self.level_steps)
+        return level_plan(self.level_steps, len(self.fringes.channels))
 
     @property
     def step_plan(self) -> StepPlan:
-        """The fringes of a pose."""
-        return StepPlan(self.fringes, self.phase_steps, self.projector_size_px)
+        """The fringes of a pose: those of the shots, or three numbers of one projector if these have no infrared."""
+        fringes = self.fringes if self.fringes.infrared else Fringes(layout=self.fringes.layout)
+        return StepPlan(fringes, self.phase_steps, self.projector_size_px)
 
     @property
     def beams(self) -> tuple[str, ...]:
         """The projectors to calibrate."""
-        return BEAMS if self.infrared else BEAMS[:1]
+        return BEAMS if self.infrared and self.fringes.infrared else BEAMS[:1]
 
     def captures(self, step: str) -> tuple[str, ...]:
         """Return the names of the captures of a step in the order of taking them; a pose is one capture."""
@@ -144,7 +145,7 @@ class Session(Stored):
 
     def pose_images(self) -> tuple[str, ...]:
         """Return the names of the images of one pose, such as visible/columns_36_0."""
-        numbers = self.fringes.numbers
+        numbers = self.step_plan.fringes.numbers
         return tuple(
             f"{beam}/{axis}_{number:g}_{step}"
             for beam in self.beams

@@ -158,7 +158,9 @@ def quantities_of(pair: Pair) -> dict[str, tuple[str, Map]]:
         "image row": ("px", y),
     }
     if pair.a.albedo is not None:
-        found["albedo"] = ("share of full scale", pair.a.albedo.mean(axis=2, dtype=np.float64))
+        # Without an infrared channel its albedo is NaN everywhere.
+        count = 3 if np.isnan(pair.a.albedo[..., 3]).all() else 4
+        found["albedo"] = ("share of full scale", pair.a.albedo[..., :count].mean(axis=2, dtype=np.float64))
     points = pair.b.xyz_mm if pair.b.xyz_mm is not None else pair.a.xyz_mm
     if points is not None:
         found["surface angle"] = ("degrees from the line of sight", surface_angle_deg(points))

@@ -65,8 +65,10 @@ class Maker:
 
     def columns_off_px(self, faults: Faults) -> Map:
         """Give the columns that the faults add, (H, W) px, NaN where one of the two shots has none."""
-        bent = self._light ** faults.exponents.astype(np.float32)
-        mixed = (bent + bent @ faults.strays.T.astype(np.float32)) / (1 + faults.strays.sum(axis=1)).clip(0.1)
+        count = self._light.shape[-1]
+        exponents, strays = faults.exponents[:count], faults.strays[:count, :count]
+        bent = self._light ** exponents.astype(np.float32)
+        mixed = (bent + bent @ strays.T.astype(np.float32)) / (1 + strays.sum(axis=1)).clip(0.1)
         return self._decoded(mixed.astype(np.float32)) - self._base
 
     def patterns(self, name: str, members: tuple[Member, ...]) -> Map:
@@ -92,10 +94,11 @@ def recipe_of(shape: Shape) -> Plan | None:
 
 
 def _light(column_px: Map, plan: Plan) -> Map:
-    """Give the light of the channels, (H, W, 4), 0 to 1; 0 where there is no surface."""
-    first, second, third = plan.fringes.numbers
+    """Give the light of the channels, (H, W, 4), or 3 without infrared, 0 to 1; 0 where there is no surface."""
+    first, second, *third = plan.fringes.numbers
     turns = 2 * np.pi * np.nan_to_num(column_px) / plan.projector_width_px
-    waves = [np.cos(first * turns), np.cos(second * turns), -np.sin(first * turns), np.cos(third * turns)]
+    waves = [np.cos(first * turns), np.cos(second * turns), -np.sin(first * turns)]
+    waves += [np.cos(number * turns) for number in third]
     lit = np.isfinite(column_px)
     return np.where(lit[..., None], 0.5 + 0.5 * np.stack(waves, axis=-1), 0.0)
 
@@ -103,5 +106,5 @@ def _light(column_px: Map, plan: Plan) -> Map:
 def _shot(light: Map) -> Shot:
     noise = params.SYNTHETIC_NOISE * np.random.default_rng(0).standard_normal(light.shape, np.float32)
     images = np.round(FULL * np.clip(light + noise, 0, 1)).astype(np.uint16)
-    red, green, blue, ir = (np.ascontiguousarray(images[..., channel]) for channel in range(4))
-    return Shot(red, green, blue, ir)
+    red, green, blue, *others = (np.ascontiguousarray(images[..., channel]) for channel in range(light.shape[-1]))
+    return Shot(red, green, blue, others[0] if others else None)

@@ -71,6 +71,7 @@ class VirtualBench:
         self._scene_cast: tuple[float, _core.Cast] | None = None  # time in s, and the ray cast at that time
         self._placed: _Placed | None = None
         self._exposures = 0
+        self._infrared = config.fringes.infrared  # a bench for three colours has no infrared chip
         self.projected: Light | None = None
         self.capped = False  # whether the lens is covered
         self._infrared_image: NDArray[np.float32] | None = None
@@ -104,16 +105,16 @@ class VirtualBench:
         return Calibration(
             camera=device_from_core(self._bench.camera),
             projector=device_from_core(self._bench.visible),
-            infrared=device_from_core(self._bench.infrared),
+            infrared=device_from_core(self._bench.infrared) if self._infrared else None,
             response=Response.from_powers(offsets, combined),
             crosstalk=scene.crosstalk,
             projector_response=Response.from_powers((0.0,) * 4, [1 / sent for sent in projector]) if separate else None,
-            ir_registration=scene.infrared_from_visible,
+            ir_registration=scene.infrared_from_visible if self._infrared else None,
         )
 
     def project(self, fringes: Fringes, calibration: Calibration | None = None) -> None:
         """Project these fringes; a pre-deformation uses `calibration`, or the exact one when it is None."""
-        _core.check_code(fringes.numbers, self._bench.visible.width)
+        _core.check_code(fringes.numbers, self._bench.visible.width, columns_px=fringes.columns_px)
         deformed = predeformation(fringes, calibration or self.calibration())
         self._infrared_image = None
         if deformed is not None:
@@ -179,7 +180,7 @@ class VirtualBench:
             raise DecodeError("the projector shows nothing; call projector.show(fringes) before camera.snap()")
         cast, light = self._cast_at(after_s), self._light(seed, 0.0 if capped or self.capped else exposure)
         if isinstance(self.projected, Fringes):
-            light["infrared_image"] = self._infrared_image
+            light |= {"infrared_image": self._infrared_image, "columns_px": self.projected.columns_px}
             return self._shot(self._bench.render(cast, self.projected.numbers, **light), self._truth(cast))
         if isinstance(self.projected, Levels):
             return self._shot(self._bench.render_levels(cast, self.projected.levels, **light), None)
@@ -197,10 +198,10 @@ class VirtualBench:
         return self._scene_cast[1]
 
     def _shot(self, images: dict[str, NDArray[Any]], truth: Truth | None) -> AnyShot:
-        full_scale = float(2**self._scene.bit_depth - 1)
+        full_scale, infrared = float(2**self._scene.bit_depth - 1), images["ir"] if self._infrared else None
         if "raw" in images and self._scene.bayer is not None:
-            return BayerShot(images["raw"], self._scene.bayer, images["ir"], full_scale, truth)
-        return Shot(images["red"], images["green"], images["blue"], images["ir"], full_scale, truth)
+            return BayerShot(images["raw"], self._scene.bayer, infrared, full_scale, truth)
+        return Shot(images["red"], images["green"], images["blue"], infrared, full_scale, truth)
 
     def _light(self, seed: int | None, exposure: float = 1.0) -> dict[str, Any]:
         """Return the light and camera settings that are present, by the names of the kernel."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import cv2
@@ -39,7 +39,7 @@ class Take:
     """A shot and its truth, maps (H, W): phase in rad, depth in mm, NaN where nothing is seen."""
 
     shot: Shot
-    fringe_numbers: tuple[float, float, float]
+    fringe_numbers: tuple[float, ...]
     phase_rad: Map
     depth_mm: Map
     lit: Mask
@@ -57,7 +57,7 @@ class World:
 
     cast: _core.Cast
     albedo: NDArray[np.float32] | None = None
-    fringe_numbers: tuple[float, float, float] = FRINGES
+    fringe_numbers: tuple[float, ...] = FRINGES
     options: dict[str, Any] | None = None
     spread_px: tuple[float, float, float, float] | None = None
 
@@ -65,16 +65,19 @@ class World:
 Draw = Callable[[_core.Bench, np.random.Generator], World]
 
 
-def take(name: str, seed: int, noise: float = NOISE) -> Take:
-    """Draw the scene with this name from a seed and expose it, 1024 x 768, 8 bit."""
+def take(name: str, seed: int, noise: float = NOISE, numbers: tuple[float, ...] | None = None) -> Take:
+    """Draw the scene with this name from a seed and expose it, 1024 x 768, 8 bit.
+
+    `numbers` replace the fringe numbers of the scene; with two there is no infrared.
+    """
     bench = _core.Bench()
     world = SCENES[name](bench, np.random.default_rng([seed, 77]))
-    return expose(bench, world, seed, noise)
+    return expose(bench, world if numbers is None else replace(world, fringe_numbers=numbers), seed, noise)
 
 
 def expose(bench: _core.Bench, world: World, seed: int, noise: float = NOISE) -> Take:
     """Take a shot of a scene; light spreads in the material before the sensor adds noise."""
-    options = {"albedo": world.albedo} if world.albedo is not None else {}
+    options: dict[str, Any] = {} if world.albedo is None else {"albedo": world.albedo}
     options |= world.options or {}
     if world.spread_px is None:
         images = bench.render(world.cast, world.fringe_numbers, noise=noise, seed=seed, **options)
@@ -87,9 +90,10 @@ def expose(bench: _core.Bench, world: World, seed: int, noise: float = NOISE) ->
             for c, (image, sigma) in enumerate(spread)
         ]
     red, green, blue, ir = channels
+    infrared = ir if len(world.fringe_numbers) == 3 else None
     column_px = world.cast.column_px().astype(np.float64)
     return Take(
-        shot=Shot(red, green, blue, ir),
+        shot=Shot(red, green, blue, infrared),
         fringe_numbers=world.fringe_numbers,
         phase_rad=2 * np.pi * world.fringe_numbers[0] / bench.visible.width * column_px,
         depth_mm=world.cast.xyz_mm()[..., 2].astype(np.float64),

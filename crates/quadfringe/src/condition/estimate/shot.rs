@@ -18,7 +18,8 @@ use ndarray::{Array2, ArrayView1, ArrayView2, s};
 use rayon::prelude::*;
 use std::f32::consts::TAU;
 
-/// Inverse responses of R, G, B and IR from one shot. `light` is the captured light in fractions of full scale, `phase`
+/// Inverse responses of R, G, B and IR from one shot; without an infrared channel the plane of IR is not read, and its
+/// response is `None`. `light` is the captured light in fractions of full scale, `phase`
 /// the decoded phase of the first fringe number in rad, NaN for no data; all `(rows, columns)`.
 ///
 /// A channel without a measurable nonlinearity (a gamma between about 0.9 and 1.1) has `None`. So has every channel if
@@ -55,14 +56,15 @@ pub fn estimate_response_of_shot(
     let four = encoding.four_channel_view()?;
     let Some(slope) = median_slope(phase_rad) else { return Ok([None; 4]) };
     let mut means = [(); 4].map(|()| Array2::zeros([0, PHASE_STEPS]));
-    means.par_iter_mut().zip(Channel::ALL).for_each(|(means, channel)| {
+    let channels = if four.has_infrared() { 4 } else { 3 };
+    means[..channels].par_iter_mut().zip(Channel::ALL).for_each(|(means, channel)| {
         let scale = (four.fringe_number(channel) / four.quadrature) as f32;
         let side = ((TILE_FRINGES * TAU / (slope * scale)).ceil() as usize).max(TILE_SIDE_MIN_PX);
         *means = tiles(light[channel.index()], phase_rad, scale, side);
     });
     let traces = means.each_ref().map(traces_of);
     let together: Vec<Trace<'_>> = traces.iter().flatten().copied().collect();
-    if together.len() < TILES_MIN {
+    if 4 * together.len() < channels * TILES_MIN {
         return Ok([None; 4]);
     }
     let all = Samples::new(&together);

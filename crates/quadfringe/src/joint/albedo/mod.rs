@@ -10,8 +10,10 @@ mod texture;
 
 use super::energy::{Energy, FringeRows};
 use super::infrared::{Waves, with_waves};
+use super::model::weights;
 use super::params::albedo::ROWS;
 use super::scene::Scene;
+use crate::decode::output::hole_unless;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
@@ -49,7 +51,8 @@ struct Work {
 }
 
 impl Albedo {
-    /// Writes the albedo of the pixels, four channels side by side; NaN where there is no phase, or no cell of the energy.
+    /// Writes the albedo of the pixels, four channels side by side; NaN where there is no phase, or no cell of the energy, and for an
+    /// infrared channel that is absent.
     pub fn write(&self, scene: &Scene<'_>, energy: &Energy, known: Known<'_>, out: &mut [f32]) {
         let width = scene.grid.width;
         out.par_chunks_mut(4 * width * ROWS).enumerate().for_each_init(
@@ -65,7 +68,7 @@ impl Albedo {
                 work.refine(rows, known.noise * known.noise);
                 for (y, out) in out.chunks_exact_mut(4 * width).enumerate() {
                     let valid = scene.row(known.valid, first + y);
-                    work.rows[y].write(valid, out);
+                    work.rows[y].write(valid, hole_unless(weights(known.ratios)[3] > 0.0), out);
                 }
             },
         );
@@ -113,11 +116,12 @@ impl Row {
         }
     }
 
-    fn write(&self, valid: &[u8], out: &mut [f32]) {
+    /// `hole` is added to the infrared albedo: 0, or NaN without this channel.
+    fn write(&self, valid: &[u8], hole: f32, out: &mut [f32]) {
         let [red, green, blue, infrared] = &self.albedo;
         for (x, out) in out.chunks_exact_mut(4).enumerate() {
             let known = valid[x] != 0 && red[x] > 0.0;
-            let pixel = [red[x], green[x], blue[x], infrared[x]];
+            let pixel = [red[x], green[x], blue[x], infrared[x] + hole];
             out.copy_from_slice(&if known { pixel } else { [f32::NAN; 4] });
         }
     }

@@ -2,6 +2,7 @@
 
 use super::plane::{Derivatives, Plane, STRIDE, Weights, total, vectors};
 use super::scales::Information;
+use crate::joint::model::{count, weights as channel_weights};
 use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -45,8 +46,10 @@ pub(super) struct Block {
     pub contrast: Lanes,
 }
 
+/// The block of a vector of cells.
 #[inline(always)]
-pub(super) fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> Block {
+pub(super) fn block(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 3], at: usize) -> Block {
+    let (share, present) = (1.0 / count(ratios), channel_weights(ratios));
     let bright = difference_diagonal(&weights.brightness, at);
     let colour = difference_diagonal(&weights.colour, at);
     let [mut phase, mut mixed, mut contrast] = [[0.0; LANES]; 3];
@@ -55,8 +58,9 @@ pub(super) fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> 
         let (by_phase, by_albedo) = (derivatives.phase[c].get(at), derivatives.albedo[c].get(at));
         let by_contrast = derivatives.contrast[c].get(at);
         for x in 0..LANES {
-            let prior = 0.75 * colour[x] + 0.25 * bright[x] + RIDGE;
-            albedo[c][x] = 1.0 / (by_albedo[x] * by_albedo[x] + prior);
+            let prior = (1.0 - share) * colour[x] + share * bright[x] + RIDGE;
+            // Without data the priors alone do not determine an albedo.
+            albedo[c][x] = present[c] / (by_albedo[x] * by_albedo[x] + prior);
             // What remains once the albedo follows.
             let kept = prior * albedo[c][x];
             phase[x] += by_phase[x] * by_phase[x] * kept;
@@ -69,15 +73,16 @@ pub(super) fn block(derivatives: &Derivatives, weights: &Weights, at: usize) -> 
 
 /// Mean information of the usable cells.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn information(derivatives: &Derivatives, weights: &Weights) -> Information {
+pub(super) fn information(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 3]) -> Information {
+    let share = 1.0 / count(ratios);
     let [mut phase, mut albedo, mut contrast, mut cells] = [0.0f64; 4];
     for at in vectors() {
-        let block = block(derivatives, weights, at);
+        let block = block(derivatives, weights, ratios, at);
         let (mut squares, mut fringes, mut count) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
         for c in 0..4 {
             let (by_albedo, by_contrast) = (derivatives.albedo[c].get(at), derivatives.contrast[c].get(at));
             for x in 0..LANES {
-                squares[x] += 0.25 * by_albedo[x] * by_albedo[x];
+                squares[x] += share * by_albedo[x] * by_albedo[x];
                 fringes[x] += by_contrast[x] * by_contrast[x];
                 count[x] = if squares[x] > 0.0 { 1.0 } else { 0.0 };
             }
@@ -93,8 +98,13 @@ pub(super) fn information(derivatives: &Derivatives, weights: &Weights) -> Infor
 
 /// Information of a cell about its phase once albedo and contrast follow.
 #[inline(always)]
-pub(super) fn phase_information(derivatives: &Derivatives, weights: &Weights, at: usize) -> Lanes {
-    let Block { phase, mixed, contrast, .. } = block(derivatives, weights, at);
+pub(super) fn phase_information(
+    derivatives: &Derivatives,
+    weights: &Weights,
+    ratios: [f32; 3],
+    at: usize,
+) -> Lanes {
+    let Block { phase, mixed, contrast, .. } = block(derivatives, weights, ratios, at);
     let prior = difference_diagonal(&weights.contrast, at);
     let mut out = [0.0; LANES];
     for x in 0..LANES {

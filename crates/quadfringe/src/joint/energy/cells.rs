@@ -1,10 +1,11 @@
 //! The cells of a shot: means of a few pixels, which the tiles read, and the way back to the pixels.
 
+use super::average::{Surfaces, mean, surfaces};
 use super::tile::Tile;
 use crate::Reason;
 use crate::joint::cells::{blend, spread};
 use crate::joint::infrared::wave;
-use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, SPREAD_MAX_RAD, USABLE_MIN};
+use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, USABLE_MIN};
 use crate::joint::scene::{PhaseMap, Pixels, Scene};
 use crate::parallel::lanes::LANES;
 use rayon::prelude::*;
@@ -282,42 +283,5 @@ fn repeat(row: &[f32], factor: usize, length: usize, out: &mut Vec<f32>) {
     out.resize(length + 2 * factor, 0.0);
     for (pixels, value) in out[factor..factor + length].chunks_mut(factor).zip(row) {
         pixels.fill(*value);
-    }
-}
-
-/// What the pixels of a cell show.
-enum Surfaces {
-    /// Some are not lit.
-    None,
-    /// Their phases lie close together.
-    One,
-    /// They do not.
-    More,
-}
-
-fn surfaces(scene: &Scene<'_>, map: PhaseMap<'_>, factor: usize, [y, x]: [usize; 2]) -> Surfaces {
-    let (mut low, mut high, mut lit) = (f32::MAX, f32::MIN, true);
-    for row in y * factor..(y + 1) * factor {
-        let (phase, modulation) = (scene.row(map.phase, row), scene.row(map.modulation, row));
-        for at in x * factor..(x + 1) * factor {
-            (low, high) = (low.min(phase[at]), high.max(phase[at]));
-            lit &= modulation[at] > 0.0;
-        }
-    }
-    match lit {
-        false => Surfaces::None,
-        true if high - low < SPREAD_MAX_RAD * factor as f32 => Surfaces::One,
-        true => Surfaces::More,
-    }
-}
-
-/// Means of the pixels of `factor` rows and `factor` columns.
-fn mean<'a>(rows: impl Iterator<Item = &'a [f32]>, factor: usize, out: &mut [f32]) {
-    out.fill(0.0);
-    let share = 1.0 / (factor * factor) as f32;
-    for row in rows {
-        for (out, pixels) in out.iter_mut().zip(row.chunks_exact(factor)) {
-            *out += share * pixels.iter().sum::<f32>();
-        }
     }
 }

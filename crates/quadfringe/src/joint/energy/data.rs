@@ -3,6 +3,7 @@
 use super::plane::{Plane, total, vectors};
 use super::scales::DataSums;
 use super::tile::Tile;
+use crate::joint::model::weights;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
@@ -19,6 +20,7 @@ pub(super) fn linearise(tile: &mut Tile) -> DataSums {
 fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
     let Tile { light, usable, unknown, derivatives, residual, scales, ratios, infrared, .. } = tile;
     let cut = 1.0 / (16.0 * scales.misfit);
+    let present = weights(*ratios);
     let mut sums = DataSums::default();
     for at in vectors() {
         let (phase, contrast, usable) = (unknown.phase.get(at), unknown.contrast.get(at), usable.get(at));
@@ -33,9 +35,9 @@ fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
             let cells = Cells { phase, modulation, usable, albedo, light };
             let kept = scales.channel_contrast[c];
             let model = if PAIR && c == 3 {
-                predicted::<_, false>(&cells, Line::at(infrared, at), kept)
+                predicted::<_, false, false>(&cells, Line::at(infrared, at), kept, 1.0)
             } else {
-                predict(&cells, c, ratio, kept)
+                predict(&cells, c, ratio, kept, present[c])
             };
             let Gradient { whole, by_albedo, cross, power } = shared.add(&model, cut);
             derivatives.phase[c].set(at, model.slope);
@@ -108,10 +110,15 @@ pub(super) struct Model {
     pub rest: Lanes,
 }
 
-/// Predicts the light of channel `c`. The fringes of B are a quarter period ahead.
+/// Predicts the light of channel `c`. The fringes of B are a quarter period ahead. A channel that is not `present` has the weight 0,
+/// the others 1.
 #[inline(always)]
-pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32) -> Model {
-    if c == 2 { predicted::<_, true>(cells, ratio, kept) } else { predicted::<_, false>(cells, ratio, kept) }
+pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32, present: f32) -> Model {
+    match c {
+        2 => predicted::<_, true, false>(cells, ratio, kept, present),
+        3 => predicted::<_, false, true>(cells, ratio, kept, present),
+        _ => predicted::<_, false, false>(cells, ratio, kept, present),
+    }
 }
 
 /// The phase of a channel in a vector of cells.
@@ -160,17 +167,23 @@ impl Turns for Line {
 }
 
 #[inline(always)]
-pub(super) fn predicted<T: Turns, const QUADRATURE: bool>(cells: &Cells, turns: T, kept: f32) -> Model {
+pub(super) fn predicted<T: Turns, const QUADRATURE: bool, const OPTIONAL: bool>(
+    cells: &Cells,
+    turns: T,
+    kept: f32,
+    present: f32,
+) -> Model {
     let Cells { phase, modulation, usable, albedo, light } = cells;
     let [mut offset, mut fringe, mut slope, mut rest] = [[0.0; LANES]; 4];
     for x in 0..LANES {
         let (sine, cosine) = sin_cos(turns.angle(x, phase[x]));
         let (sine, cosine) = if QUADRATURE { (cosine, -sine) } else { (sine, cosine) };
-        offset[x] = usable[x] * exp(albedo[x]);
+        let usable = if OPTIONAL { usable[x] * present } else { usable[x] };
+        offset[x] = usable * exp(albedo[x]);
         let amplitude = offset[x] * modulation[x] * kept;
         fringe[x] = amplitude * cosine;
         slope[x] = -turns.slope(x) * amplitude * sine;
-        rest[x] = usable[x] * light[x] - offset[x] - fringe[x];
+        rest[x] = usable * light[x] - offset[x] - fringe[x];
     }
     Model { offset, fringe, slope, rest }
 }

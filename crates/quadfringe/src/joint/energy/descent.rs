@@ -8,6 +8,7 @@ use super::scales::{Determined, Scales, variance_share};
 use super::solve::solve;
 use super::start::{self, AlbedoOf, smooth};
 use super::tile::{Found, Tile};
+use crate::joint::model::{count, weights as channel_weights};
 use crate::joint::params::energy::{
     ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
 };
@@ -44,11 +45,12 @@ impl Tile {
         let mut determined = Determined::default();
         for outer in 0..OUTER_STEPS {
             let sums = linearise(self);
-            self.scales.estimate_noise(&sums, determined, noise);
+            self.scales.estimate_noise(&sums, determined, self.ratios, noise);
             let sums = weigh(self);
             if outer > 0 {
-                let information = information(&self.derivatives, &self.weights);
-                determined = self.scales.estimate_priors(&sums, information);
+                let channels = count(self.ratios);
+                let information = information(&self.derivatives, &self.weights, self.ratios);
+                determined = self.scales.estimate_priors(&sums, information, channels);
                 weigh(self);
             }
             solve(self, INNER_STEPS);
@@ -61,10 +63,10 @@ impl Tile {
 
     /// Writes the correction of the phase, its variance, and the albedo and contrast of every channel.
     pub fn write(&mut self, found: &mut Found) {
-        let Self { start, inside, unknown, scales, derivatives, weights, product, .. } = self;
+        let Self { start, inside, unknown, scales, derivatives, weights, product, ratios, .. } = self;
         let Fields { phase: information, contrast: spare, .. } = product;
         for at in vectors() {
-            information.set(at, phase_information(derivatives, weights, at));
+            information.set(at, phase_information(derivatives, weights, *ratios, at));
         }
         // A saturated cell has no information by itself; its neighbours determine it.
         smooth(information, spare);
@@ -80,6 +82,10 @@ impl Tile {
             found.variance.set(at, variance);
             found.inside.set(at, inside.get(at));
             write_light(&Column::of(unknown, at), inside.get(at), at, found);
+        }
+        if channel_weights(*ratios)[3] == 0.0 {
+            // The channel has no albedo; its logarithm was 0.
+            found.albedo[3].clear();
         }
         found.channel_contrast = scales.channel_contrast;
     }

@@ -4,6 +4,7 @@
 //! differ in surface, brightness, colour and contrast. How much that is, and how large the noise is, is estimated from the shot
 //! itself, tile by tile. Tiles overlap and are independent of each other, so the result does not depend on the threads.
 
+mod average;
 mod blocks;
 mod cells;
 mod data;

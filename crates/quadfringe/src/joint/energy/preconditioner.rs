@@ -2,6 +2,7 @@
 
 use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
 use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, place, total};
+use crate::joint::model::count;
 use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -30,14 +31,20 @@ pub(super) struct Preconditioner {
 
 /// Factors the matrices of the columns of a tile.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn prepare(lines: &mut Preconditioner, derivatives: &Derivatives, weights: &Weights) {
+pub(super) fn prepare(
+    lines: &mut Preconditioner,
+    derivatives: &Derivatives,
+    weights: &Weights,
+    ratios: [f32; 3],
+) {
+    let share = 1.0 / count(ratios);
     for x in (0..SIDE).step_by(LANES) {
         let mut above = Pivots::default();
         for y in 0..SIDE {
             let at = place(x, y);
-            let local = block(derivatives, weights, at);
+            let local = block(derivatives, weights, ratios, at);
             lines.follow(derivatives, &local, at);
-            lines.albedos(weights, &local.albedo, at);
+            lines.albedos(weights, share, &local.albedo, at);
             let coupled = lines.contrast(weights, &local, at);
             lines.bend(weights, &local.phase, coupled, at, &mut above);
         }
@@ -72,12 +79,12 @@ impl Preconditioner {
 
     /// Pivots of the albedos.
     #[inline(always)]
-    fn albedos(&mut self, weights: &Weights, local: &[Lanes; 4], at: usize) {
+    fn albedos(&mut self, weights: &Weights, share: f32, local: &[Lanes; 4], at: usize) {
         let (bright, colour) = (weights.brightness[1].get(at), weights.colour[1].get(at));
         let above = self.coupling.get(at - STRIDE);
         let mut coupling = [0.0; LANES];
         for x in 0..LANES {
-            coupling[x] = -(0.75 * colour[x] + 0.25 * bright[x]);
+            coupling[x] = -((1.0 - share) * colour[x] + share * bright[x]);
         }
         self.coupling.set(at, coupling);
         for c in 0..4 {

@@ -1,8 +1,9 @@
 //! The priors: how much neighbouring cells differ in surface, brightness, colour and contrast.
 
 use super::plane::{Column, Plane, STRIDE, total, vectors};
-use super::scales::PriorSums;
+use super::scales::{PriorSums, unknowns};
 use super::tile::Tile;
+use crate::joint::model::count;
 use crate::joint::params::energy::{BEND_FREEDOM, BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -82,12 +83,11 @@ fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
 
 /// Degrees of freedom of the differences in brightness, colour and contrast.
 pub(super) const FREEDOM: [f32; 3] = [BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM];
-/// Number of unknowns for each of them.
-pub(super) const COUNT: [f32; 3] = [0.5, 1.5, 0.5];
 
-/// Squared differences of a vector of cells and their neighbours in brightness, colour and contrast.
+/// Squared differences of a vector of cells and their neighbours in brightness, colour and contrast. `share` is that of one channel
+/// in the mean of all.
 #[inline(always)]
-pub(super) fn squares(here: &Column, there: &Column) -> [Lanes; 3] {
+pub(super) fn squares(here: &Column, there: &Column, share: f32) -> [Lanes; 3] {
     let mut out = [[0.0; LANES]; 3];
     for x in 0..LANES {
         let (mut sum, mut squares) = (0.0, 0.0);
@@ -97,7 +97,7 @@ pub(super) fn squares(here: &Column, there: &Column) -> [Lanes; 3] {
             squares += difference * difference;
         }
         let turn = there.contrast[x] - here.contrast[x];
-        let brightness = 0.25 * sum * sum;
+        let brightness = share * sum * sum;
         let colour = squares - brightness;
         (out[0][x], out[1][x]) = (brightness, if colour > 0.0 { colour } else { 0.0 });
         out[2][x] = turn * turn;
@@ -108,9 +108,11 @@ pub(super) fn squares(here: &Column, there: &Column) -> [Lanes; 3] {
 /// Weights of the differences between the cells of a vector and those `step` places further on, in direction `k`.
 #[inline(always)]
 fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut PriorSums) {
-    let Tile { inside, unknown, weights, scales, .. } = tile;
+    let Tile { inside, unknown, weights, scales, ratios, .. } = tile;
     let (lit, next_lit) = (inside.get(at), inside.get(at + step));
-    let squares = squares(&Column::of(unknown, at), &Column::of(unknown, at + step));
+    let channels = count(*ratios);
+    let (share, unknowns) = (1.0 / channels, unknowns(channels));
+    let squares = squares(&Column::of(unknown, at), &Column::of(unknown, at + step), share);
     let noise = scales.noise;
     let inverse = [1.0 / scales.brightness, 1.0 / scales.colour, 1.0 / scales.contrast];
     let (mut out, mut energy, mut mean) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3], [[0.0; LANES]; 3]);
@@ -118,7 +120,7 @@ fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut Pri
     for x in 0..LANES {
         both[x] = lit[x] * next_lit[x];
         for n in 0..3 {
-            let student = both[x] * student(FREEDOM[n], COUNT[n], squares[n][x] * inverse[n]);
+            let student = both[x] * student(FREEDOM[n], unknowns[n], squares[n][x] * inverse[n]);
             energy[n][x] = student * squares[n][x];
             mean[n][x] = student;
             out[n][x] = student * inverse[n] * noise;

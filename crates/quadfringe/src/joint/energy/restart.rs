@@ -10,6 +10,7 @@ use super::solve::solve;
 use super::start::{self, AlbedoOf, filter};
 use super::tile::Tile;
 use super::value::{Given, add_energy};
+use crate::joint::model::count;
 use crate::joint::params::energy::{BRIDGE_STEPS, GAIN_MIN, SAME_RAD, SIDE, TEXTURE_MIN, TEXTURE_RAD};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -25,12 +26,12 @@ impl Tile {
             return;
         }
         let scales = self.scales;
-        let Self { inside, lit, unknown, first, derivatives, weights, residual, .. } = self;
+        let Self { inside, lit, unknown, first, derivatives, weights, residual, ratios, .. } = self;
         for (to, from) in first.planes_mut().into_iter().zip(unknown.planes()).chain([(&mut *lit, &*inside)])
         {
             to.copy(from);
         }
-        hold_by_phase(inside, first, scales.noise, derivatives);
+        hold_by_phase(inside, *ratios, first, scales.noise, derivatives);
         bend_everywhere(scales.noise / scales.bend, weights);
         residual.planes_mut().into_iter().for_each(Plane::clear);
         // The surface continues through cells without light.
@@ -50,9 +51,9 @@ impl Tile {
 }
 
 /// Squared difference of the logarithms of the albedo between a cell and its neighbours: the largest of the four, each the mean of
-/// the channels.
+/// the channels, of which each has this `share`.
 #[inline(always)]
-fn texture(inside: &Plane, albedo: &[Plane; 4], at: usize) -> Lanes {
+fn texture(inside: &Plane, albedo: &[Plane; 4], share: f32, at: usize) -> Lanes {
     let lit = inside.get(at);
     let mut most = [0.0; LANES];
     for there in [at - 1, at + 1, at - STRIDE, at + STRIDE] {
@@ -61,7 +62,7 @@ fn texture(inside: &Plane, albedo: &[Plane; 4], at: usize) -> Lanes {
         for plane in albedo {
             let (here, next) = (plane.get(at), plane.get(there));
             for x in 0..LANES {
-                sum[x] += 0.25 * lit[x] * also[x] * (next[x] - here[x]).powi(2);
+                sum[x] += share * lit[x] * also[x] * (next[x] - here[x]).powi(2);
             }
         }
         for x in 0..LANES {
@@ -73,18 +74,28 @@ fn texture(inside: &Plane, albedo: &[Plane; 4], at: usize) -> Lanes {
 
 /// Whether there is an edge of the albedo that may have spoilt the phase at the start.
 fn has_texture(tile: &Tile) -> bool {
+    let share = 1.0 / count(tile.ratios);
     vectors().any(|at| {
-        texture(&tile.inside, &tile.unknown.albedo, at).iter().any(|&found| found > TEXTURE_MIN * TEXTURE_MIN)
+        texture(&tile.inside, &tile.unknown.albedo, share, at)
+            .iter()
+            .any(|&found| found > TEXTURE_MIN * TEXTURE_MIN)
     })
 }
 
 /// Sets the derivatives as if the phase were measured in every cell, the less certainly the more texture there is.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn hold_by_phase(inside: &Plane, first: &Fields, noise: f32, derivatives: &mut Derivatives) {
+fn hold_by_phase(
+    inside: &Plane,
+    ratios: [f32; 3],
+    first: &Fields,
+    noise: f32,
+    derivatives: &mut Derivatives,
+) {
+    let share = 1.0 / count(ratios);
     let Derivatives { phase, albedo, contrast } = derivatives;
     phase.iter_mut().chain(albedo).chain(contrast).for_each(Plane::clear);
     for at in vectors() {
-        let (lit, texture) = (inside.get(at), texture(inside, &first.albedo, at));
+        let (lit, texture) = (inside.get(at), texture(inside, &first.albedo, share, at));
         let mut out = [0.0; LANES];
         for x in 0..LANES {
             out[x] = lit[x] * (noise / (SAME_RAD * SAME_RAD + TEXTURE_RAD * TEXTURE_RAD * texture[x])).sqrt();

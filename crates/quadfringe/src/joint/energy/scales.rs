@@ -5,6 +5,7 @@
 //! Computation 4, 415 (1992)). For a field with the information `g` in each cell and a prior of the weight `w`, the share that the
 //! data determine at the spatial frequency k is `g / (g + w |D(k)|^2)`; its mean over all frequencies is the share of the tile.
 
+use crate::joint::model::{count, weights};
 use crate::joint::params::energy::{
     BEND_LIMITS, BRIGHTNESS_LIMITS, COLOUR_LIMITS, CONTRAST_LIMITS, DETERMINED_MIN, MODEL_SHARE, PRIOR_CELLS,
     START,
@@ -41,7 +42,7 @@ pub(super) struct DataSums {
     pub cells: f64,
     /// Squared residuals; large ones count less.
     pub squares: f64,
-    /// Squared offsets of four channels.
+    /// Squared offsets of the channels.
     pub brightness: f64,
     /// Fringes times residuals, and squared fringes, of each channel.
     pub cross: [f64; 4],
@@ -68,6 +69,12 @@ pub(super) struct PriorSums {
     pub contrast: Sums,
 }
 
+/// Half the number of unknowns for each of them, for a number of channels.
+#[inline(always)]
+pub(super) fn unknowns(channels: f32) -> [f32; 3] {
+    [0.5, 0.5 * (channels - 1.0), 0.5]
+}
+
 /// Mean information of a cell about its unknowns, in linear light squared.
 #[derive(Debug, Default, Clone, Copy)]
 pub(super) struct Information {
@@ -87,23 +94,32 @@ pub(super) struct Determined {
 
 impl Scales {
     /// Estimates the variance of the noise from the residuals, and the contrasts of the channels.
-    pub fn estimate_noise(&mut self, sums: &DataSums, determined: Determined, least: f32) {
-        let used = determined.phase + determined.brightness + 3.0 * determined.colour + determined.contrast;
-        let free = sums.cells * f64::from((4.0 - used).max(0.5));
+    pub fn estimate_noise(&mut self, sums: &DataSums, determined: Determined, ratios: [f32; 3], least: f32) {
+        let channels = count(ratios);
+        let Determined { phase, brightness, colour, contrast } = determined;
+        let used = phase + brightness + (channels - 1.0) * colour + contrast;
+        let free = sums.cells * f64::from((channels - used).max(0.5));
         self.misfit = ((sums.squares / free.max(1e-9)) as f32).max(least);
-        let mean = sums.brightness / (4.0 * sums.cells).max(1e-9);
+        let mean = sums.brightness / (f64::from(channels) * sums.cells).max(1e-9);
         self.noise = self.misfit + MODEL_SHARE * MODEL_SHARE * mean as f32;
         let mut change = [1.0; 4];
         for c in 0..4 {
             let ridge = 1e-3 * sums.power[c] + 1e-9;
             change[c] = (1.0 + sums.cross[c] / (sums.power[c] + ridge)) as f32 * self.channel_contrast[c];
         }
-        let mean = 0.25 * change.iter().sum::<f32>();
+        let present = weights(ratios);
+        let sum: f32 = change.iter().zip(present).map(|(value, present)| value * present).sum();
+        let mean = sum / channels;
         self.channel_contrast = change.map(|value| (value / mean.max(1e-6)).clamp(0.5, 1.5));
     }
 
     /// Estimates the variances of the priors, and gives the numbers of unknowns that the data determine.
-    pub fn estimate_priors(&mut self, sums: &PriorSums, information: Information) -> Determined {
+    pub fn estimate_priors(
+        &mut self,
+        sums: &PriorSums,
+        information: Information,
+        channels: f32,
+    ) -> Determined {
         let Information { phase, albedo, contrast } = information;
         let noise = self.noise;
         let weight =
@@ -121,9 +137,11 @@ impl Scales {
             (variance as f32).clamp(limits[0] * limits[0], limits[1] * limits[1])
         };
         self.bend = update(&sums.bend, 1.0, determined.phase, START[0], BEND_LIMITS);
-        self.brightness = update(&sums.brightness, 0.5, determined.brightness, START[1], BRIGHTNESS_LIMITS);
-        self.colour = update(&sums.colour, 1.5, determined.colour, START[2], COLOUR_LIMITS);
-        self.contrast = update(&sums.contrast, 0.5, determined.contrast, START[3], CONTRAST_LIMITS);
+        let [bright, colour, slow] = unknowns(channels).map(f64::from);
+        self.brightness =
+            update(&sums.brightness, bright, determined.brightness, START[1], BRIGHTNESS_LIMITS);
+        self.colour = update(&sums.colour, colour, determined.colour, START[2], COLOUR_LIMITS);
+        self.contrast = update(&sums.contrast, slow, determined.contrast, START[3], CONTRAST_LIMITS);
         determined
     }
 }

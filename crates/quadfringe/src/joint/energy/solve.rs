@@ -3,6 +3,7 @@
 use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, total, vectors};
 use super::preconditioner::{precondition, prepare};
 use super::tile::Tile;
+use crate::joint::model::{count, weights as channel_weights};
 use crate::joint::params::energy::{CONTRAST_RIDGE, NEGLIGIBLE, RESIDUAL_LEFT, RIDGE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -21,26 +22,25 @@ pub(super) fn solve(tile: &mut Tile, steps: usize) {
         step,
         inside,
         scales,
+        ratios,
         ..
     } = tile;
     // The gradient of the priors.
-    multiply::<false>(derivatives, weights, inside, unknown, product);
+    multiply::<false>(derivatives, weights, inside, *ratios, unknown, product);
     subtract(product, residual);
-    prepare(preconditioner, derivatives, weights);
+    prepare(preconditioner, derivatives, weights, *ratios);
     step.planes_mut().into_iter().chain(direction.planes_mut()).for_each(Plane::clear);
-    let cells: f64 = vectors().map(|at| total(inside.get(at))).sum();
-    let negligible = NEGLIGIBLE * f64::from(scales.noise) * cells;
+    let negligible =
+        NEGLIGIBLE * f64::from(scales.noise) * vectors().map(|at| total(inside.get(at))).sum::<f64>();
     let (mut before, mut enough) = (0.0, 0.0);
     for n in 0..steps {
         let size = precondition(preconditioner, residual, preconditioned);
-        if n == 0 {
-            enough = negligible.max(RESIDUAL_LEFT * size);
-        }
+        enough = if n == 0 { negligible.max(RESIDUAL_LEFT * size) } else { enough };
         if size <= enough {
             break;
         }
         turn(preconditioned, if n == 0 { 0.0 } else { (size / before) as f32 }, direction);
-        let curvature = multiply::<true>(derivatives, weights, inside, direction, product);
+        let curvature = multiply::<true>(derivatives, weights, inside, *ratios, direction, product);
         if curvature <= 0.0 {
             break;
         }
@@ -104,9 +104,11 @@ pub(super) fn multiply<const DATA: bool>(
     derivatives: &Derivatives,
     weights: &Weights,
     inside: &Plane,
+    ratios: [f32; 3],
     from: &Fields,
     to: &mut Fields,
 ) -> f64 {
+    let (share, present) = (1.0 / count(ratios), channel_weights(ratios)[3]);
     let mut product = 0.0;
     for at in vectors() {
         let given = Column::of(from, at);
@@ -119,7 +121,8 @@ pub(super) fn multiply<const DATA: bool>(
             [(0, at, at + 1), (0, at - 1, at - 1), (1, at, at + STRIDE), (1, at - STRIDE, at - STRIDE)]
         {
             let (bright, colour) = (weights.brightness[k].get(edge), weights.colour[k].get(edge));
-            colours(bright, colour, &given.albedo, &four(&from.albedo, there), &mut found.albedo);
+            let between = Between { bright, colour, share, present };
+            colours(&between, &given.albedo, &four(&from.albedo, there), &mut found.albedo);
         }
         if DATA {
             add_data(derivatives, inside.get(at), at, &given, &mut found);
@@ -198,16 +201,27 @@ fn difference(weights: &[Plane; 2], field: &Plane, at: usize) -> Lanes {
     out
 }
 
+/// The weights of the differences in brightness and colour over one edge of the cells.
+struct Between {
+    bright: Lanes,
+    colour: Lanes,
+    /// Share of one channel in the mean of all.
+    share: f32,
+    /// 1, or 0 without an infrared channel.
+    present: f32,
+}
+
 /// Adds the gradients of the differences in brightness and colour over one edge of the cells.
 #[inline(always)]
-fn colours(bright: Lanes, colour: Lanes, here: &[Lanes; 4], there: &[Lanes; 4], out: &mut [Lanes; 4]) {
+fn colours(between: &Between, here: &[Lanes; 4], there: &[Lanes; 4], out: &mut [Lanes; 4]) {
+    let Between { bright, colour, share, present } = between;
     for x in 0..LANES {
         let (a, b) = (here[0][x] - there[0][x], here[1][x] - there[1][x]);
         let (c, d) = (here[2][x] - there[2][x], here[3][x] - there[3][x]);
-        let shared = 0.25 * (bright[x] - colour[x]) * (a + b + c + d);
+        let shared = share * (bright[x] - colour[x]) * (a + b + c + d);
         out[0][x] += colour[x] * a + shared;
         out[1][x] += colour[x] * b + shared;
         out[2][x] += colour[x] * c + shared;
-        out[3][x] += colour[x] * d + shared;
+        out[3][x] += colour[x] * d + present * shared;
     }
 }

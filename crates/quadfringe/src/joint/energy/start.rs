@@ -3,6 +3,7 @@
 use super::data::{Line, Turns};
 use super::plane::{Plane, STRIDE, total, vectors};
 use super::tile::Tile;
+use crate::joint::model::{count, weights};
 use crate::joint::params::energy::{ALBEDO_LIMITS, CONTRAST_START_LIMITS, START_ROUNDS};
 use crate::parallel::angle::sin_cos;
 use crate::parallel::exp::exp;
@@ -22,7 +23,12 @@ pub(super) enum AlbedoOf {
 pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
     tile.scales.channel_contrast = [1.0; 4];
     let mut contrast = [1.0; 4];
+    let present = weights(tile.ratios);
     for c in 0..4 {
+        if present[c] == 0.0 {
+            tile.unknown.albedo[c].clear();
+            continue;
+        }
         if c == 3 && tile.pair {
             carrier(tile, c, |tile, at| Line::at(&tile.infrared, at));
         } else {
@@ -34,7 +40,8 @@ pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
             albedo(tile, c, contrast[c], of);
         }
     }
-    let mean = (contrast.iter().map(|value| value.ln()).sum::<f32>() / 4.0).exp();
+    // The logarithm of the contrast of a channel that is absent is 0.
+    let mean = (contrast.iter().map(|value| value.ln()).sum::<f32>() / count(tile.ratios)).exp();
     tile.scales.channel_contrast = contrast.map(|value| value / mean);
     for at in vectors() {
         tile.unknown.contrast.set(at, tile.inside.get(at).map(|inside| inside * mean.ln()));

@@ -180,7 +180,7 @@ fn the_preconditioner_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.03);
     tile.minimise(1e-6);
     let Tile { derivatives, weights, preconditioner, .. } = &mut tile;
-    prepare(preconditioner, derivatives, weights);
+    prepare(preconditioner, derivatives, weights, RATIOS);
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
     let own = precondition(preconditioner, &first, &mut one);
@@ -204,10 +204,10 @@ fn the_preconditioner_inverts_columns_that_stand_alone() {
     let [red, _, _, infrared] = albedo;
     let unknown = phase[1..].iter_mut().chain(&mut contrast[..3]).chain([red, infrared]);
     unknown.for_each(Plane::clear);
-    prepare(preconditioner, derivatives, weights);
+    prepare(preconditioner, derivatives, weights, RATIOS);
     let expected = random_fields(3);
     let [mut product, mut found] = [Fields::default(), Fields::default()];
-    multiply::<true>(derivatives, weights, inside, &expected, &mut product);
+    multiply::<true>(derivatives, weights, inside, RATIOS, &expected, &mut product);
     precondition(preconditioner, &product, &mut found);
     for n in [0, 2, 3, 5] {
         let (found, expected) = (found.planes()[n], expected.planes()[n]);
@@ -227,9 +227,9 @@ fn the_matrix_is_symmetric_and_positive() {
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
     let Tile { derivatives, weights, inside, .. } = &tile;
-    let own = multiply::<true>(derivatives, weights, inside, &first, &mut one);
+    let own = multiply::<true>(derivatives, weights, inside, RATIOS, &first, &mut one);
     assert!(own > 0.0);
-    multiply::<true>(derivatives, weights, inside, &second, &mut two);
+    multiply::<true>(derivatives, weights, inside, RATIOS, &second, &mut two);
     let (forth, back) = (scalar(&second, &one), scalar(&first, &two));
     assert!((forth - back).abs() < 1e-4 * own, "{forth} {back} {own}");
 }
@@ -251,4 +251,19 @@ fn the_variance_is_that_of_the_mean_squared_gain() {
         let share = f64::from(variance_share(2.0, 2.0 * relative as f32)) * 2.0;
         assert!((0.75..1.35).contains(&(share / exact(relative))), "{relative} {share} {}", exact(relative));
     }
+}
+
+#[test]
+fn an_absent_channel_takes_no_part() {
+    let (mut tile, truth) = tile(0.0);
+    tile.ratios[2] = 0.0;
+    tile.light[3].clear();
+    tile.minimise(1e-8);
+    let (rms, largest) = errors(&tile, &truth);
+    assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
+    assert!(tile.unknown.albedo[3].row(20).iter().all(|&log| log == 0.0));
+    let mut found = super::tile::Found::default();
+    tile.write(&mut found);
+    assert!(found.albedo[3].row(20).iter().all(|&albedo| albedo == 0.0));
+    assert!((found.albedo[0].row(20)[12] - 0.5).abs() < 0.01, "{}", found.albedo[0].row(20)[12]);
 }

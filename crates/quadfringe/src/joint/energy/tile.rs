@@ -32,7 +32,8 @@ pub(super) struct Tile {
     pub inside: Plane,
     /// 1 for cells all of whose pixels are lit, but whose phases lie far apart.
     pub torn: Plane,
-    /// Fringe numbers divided by the first.
+    /// Fringe numbers divided by the first. Without an infrared channel the last is 0; its light and its logarithm of the albedo are
+    /// then 0, and it takes no part.
     pub ratios: [f32; 3],
     /// Whether the infrared phase is that of a calibrated pair; then its value and slope at a phase of 0, by the tangent of its
     /// cubic at the start.

@@ -3,8 +3,9 @@
 
 use super::data::{Cells, Line, predict, predicted};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
-use super::priors::{COUNT, FREEDOM, bending, squares};
-use super::scales::Scales;
+use super::priors::{FREEDOM, bending, squares};
+use super::scales::{Scales, unknowns};
+use crate::joint::model::{count, weights};
 use crate::joint::params::energy::BEND_FREEDOM;
 use crate::parallel::exp::{exp, ln_1p};
 use crate::parallel::lanes::{LANES, Lanes};
@@ -33,7 +34,7 @@ pub(super) fn add_energy(sign: f32, given: &Given<'_>, unknown: &Fields, scales:
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add<const PAIR: bool>(sign: f32, given: &Given<'_>, unknown: &Fields, scales: &Scales, out: &mut Plane) {
-    let inside = given.inside;
+    let (inside, channels) = (given.inside, count(given.ratios));
     for at in vectors() {
         let here = Column::of(unknown, at);
         let data = data::<PAIR>(given, &here, scales, at);
@@ -48,7 +49,8 @@ fn add<const PAIR: bool>(sign: f32, given: &Given<'_>, unknown: &Fields, scales:
         }
         for there in [at + 1, at + STRIDE] {
             let lit = [inside.get(at), inside.get(there)];
-            differences(lit, squares(&here, &Column::of(unknown, there)), scales, &mut sum);
+            let squares = squares(&here, &Column::of(unknown, there), 1.0 / channels);
+            differences(lit, squares, unknowns(channels), scales, &mut sum);
         }
         let mut all = out.get(at);
         for x in 0..LANES {
@@ -62,6 +64,7 @@ fn add<const PAIR: bool>(sign: f32, given: &Given<'_>, unknown: &Fields, scales:
 #[inline(always)]
 fn data<const PAIR: bool>(given: &Given<'_>, here: &Column, scales: &Scales, at: usize) -> Lanes {
     let (usable, half, ratios) = (given.usable.get(at), 0.5 / scales.noise, given.ratios);
+    let present = weights(ratios);
     let (mut out, mut modulation) = ([0.0; LANES], [0.0; LANES]);
     for x in 0..LANES {
         modulation[x] = exp(here.contrast[x]);
@@ -72,9 +75,9 @@ fn data<const PAIR: bool>(given: &Given<'_>, here: &Column, scales: &Scales, at:
         let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
         let kept = scales.channel_contrast[c];
         let model = if PAIR && c == 3 {
-            predicted::<_, false>(&cells, Line::at(given.infrared, at), kept)
+            predicted::<_, false, false>(&cells, Line::at(given.infrared, at), kept, 1.0)
         } else {
-            predict(&cells, c, ratio, kept)
+            predict(&cells, c, ratio, kept, present[c])
         };
         let rest = model.rest;
         for x in 0..LANES {
@@ -92,11 +95,11 @@ fn student(freedom: f32, count: f32, square: f32) -> f32 {
 
 /// Adds the priors of the differences between two neighbours.
 #[inline(always)]
-fn differences(lit: [Lanes; 2], squares: [Lanes; 3], scales: &Scales, out: &mut Lanes) {
+fn differences(lit: [Lanes; 2], squares: [Lanes; 3], unknowns: [f32; 3], scales: &Scales, out: &mut Lanes) {
     let inverse = [1.0 / scales.brightness, 1.0 / scales.colour, 1.0 / scales.contrast];
     for n in 0..3 {
         for x in 0..LANES {
-            out[x] += lit[0][x] * lit[1][x] * student(FREEDOM[n], COUNT[n], squares[n][x] * inverse[n]);
+            out[x] += lit[0][x] * lit[1][x] * student(FREEDOM[n], unknowns[n], squares[n][x] * inverse[n]);
         }
     }
 }

@@ -22,6 +22,8 @@ use rows::{
 /// Results of the fit on the cells, and its working maps.
 #[derive(Debug)]
 pub(super) struct LocalFit {
+    /// Whether there is an infrared channel; without it its offset, amplitude and beat are 0.
+    infrared: bool,
     start: CellMaps,
     maps: CellMaps,
     sums: CellMaps,
@@ -33,17 +35,6 @@ pub(super) struct LocalFit {
 pub(super) struct PixelMaps<'a> {
     pub phase: &'a mut [f32],
     pub modulation: &'a mut [f32],
-}
-
-impl Default for LocalFit {
-    fn default() -> Self {
-        Self {
-            start: CellMaps::new(4),
-            maps: CellMaps::new(map::COUNT),
-            sums: CellMaps::default(),
-            slots: Slots::default(),
-        }
-    }
 }
 
 /// Rows of one task.
@@ -64,6 +55,16 @@ pub(super) struct Beats<'a> {
 }
 
 impl LocalFit {
+    pub fn new(infrared: bool) -> Self {
+        Self {
+            infrared,
+            start: CellMaps::new(4),
+            maps: CellMaps::new(map::COUNT),
+            sums: CellMaps::default(),
+            slots: Slots::default(),
+        }
+    }
+
     /// Fit a scene with fringes in any direction. `lit` is 1 where light of the projector falls; `least` is the least
     /// modulation that counts.
     pub fn run(&mut self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
@@ -119,7 +120,7 @@ impl LocalFit {
 
     /// Normal equations of every cell for `a`, `p`, `q` of the four channels.
     fn solve(&mut self, scene: &Scene<'_>) {
-        let start = &self.start;
+        let (start, infrared) = (&self.start, self.infrared);
         scene.grid.window_sums::<{ sum::COUNT }, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
@@ -133,7 +134,7 @@ impl LocalFit {
                 two_step(&red_blue, None, scene.rows(y), cos, sin);
                 add_products(scene.row(scene.usable, y), [cos, sin], scene.rows(y), sums);
             },
-            |_, sums, out| solve_row(sums, out),
+            |_, sums, out| solve_row(sums, infrared, out),
         );
     }
 

@@ -37,7 +37,7 @@ pub(super) struct ChannelRows<'a> {
 
 /// What decides the modulation of the pixels of a row, and whether there is enough of it.
 pub(super) struct StrengthRows<'a> {
-    /// Least amplitude of the four channels.
+    /// Least amplitude of the channels.
     pub weakest: &'a [f32],
     /// Mean amplitude of R and B.
     pub mean: &'a [f32],
@@ -129,9 +129,10 @@ pub(super) fn add_products(
     }
 }
 
-/// Everything that follows from the sums of a row of cells, cell by cell.
+/// Everything that follows from the sums of a row of cells, cell by cell. Without `infrared` the least amplitude is that of the
+/// other channels.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], out: &mut [f32]) {
+pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], infrared: bool, out: &mut [f32]) {
     let columns = sums[0].len();
     let mut maps = out.chunks_exact_mut(columns);
     let mut maps: [&mut [f32]; map::COUNT] =
@@ -140,7 +141,8 @@ pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], out: &mut [f32]) {
         let CellSolution { channels: [r, g, b, ir], spread } = solve_cell(sums, i);
         let strength = |[a, _, _, b]: [f32; 4]| if b > CONTRAST_MIN * a { b } else { 0.0 };
         let seen = if spread > SPREAD_MIN * sums[sum::W][i] { 1.0 } else { 0.0 };
-        let weakest = strength(r).min(strength(b)).min(strength(g)).min(strength(ir));
+        let weakest = strength(r).min(strength(b)).min(strength(g));
+        let weakest = weakest.min(if infrared { strength(ir) } else { f32::INFINITY });
         let pairs = [
             [r[0], r[3]],
             [b[0], b[3]],

@@ -22,6 +22,12 @@ pub const COST_MAX: i16 = 333;
 /// no effect on orders; the promised wrong orders of the textured face move by a third.
 pub const COSINE_UNIT: f32 = 2048.0;
 
+/// The same without infrared, where the cosines of G decide alone. Larger: where coloured patches meet, the wrong albedo that R and B
+/// give speaks for a wrong order as loudly as the beat against it. Smaller: the sharpness of the cosines is lost. Varied, with 16
+/// and 15 fringes: wrong orders of patches of 20 mm on peaks 0 -> 677 (x1.4) and 3100 ppm (x2); of white steps and faces none
+/// (`python evaluation/rgb.py`).
+pub const COSINE_UNIT_WITHOUT_INFRARED: f32 = 1024.0;
+
 /// Number of pixel rows from which the cosines of a node are taken. More: less noise of the costs, more time. Varied (3
 /// and 6): no effect.
 pub const SAMPLED_ROWS: usize = 4;

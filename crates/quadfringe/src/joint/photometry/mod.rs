@@ -16,7 +16,7 @@ mod tests;
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::infrared::with_waves;
 use super::local_fit::LocalFit;
-use super::model::{CellFringes, FringeRows, contrast};
+use super::model::{CellFringes, FringeRows, contrast, count};
 use super::params::photometry::{CELL, NEIGHBOURHOOD, OTHER_TEXTURE_MIN, OTHER_TEXTURE_NOISES, WINDOW};
 use super::scene::{PhaseMap, Scene};
 use super::slopes::Slopes;
@@ -151,7 +151,7 @@ impl Photometry {
                 take_part(scene, choice, slopes, lit_share_min, y, losses, usable);
                 let [phase, modulation] = [phase, modulation].map(|plane| scene.row(plane, y));
                 let pixels = [phase, modulation, usable, slopes.loss(scene, y, losses)];
-                let limits = [4.0 * misfit_max * misfit_max, phase_trust];
+                let limits = [count(ratios) * misfit_max * misfit_max, phase_trust];
                 with_waves!(scene, y, ratios, |waves| {
                     add_projected(model, pixels, scene.rows(y), waves, limits, sums);
                 });

@@ -2,7 +2,7 @@
 
 use super::solve::{MATRIX, SUMS};
 use crate::joint::infrared::Waves;
-use crate::joint::model::{Wave, carriers};
+use crate::joint::model::{Wave, carriers, weights};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
 
@@ -45,7 +45,7 @@ fn project(
     (ratios, infrared): ([f32; 3], Wave),
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
-    let carriers = carriers(phase, ratios, infrared, loss);
+    let (carriers, weights) = (carriers(phase, ratios, infrared, loss), weights(ratios));
     let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
     let (mut mm, mut md, mut dd, mut ms) = (1e-9f32, 0.0f32, 1e-9f32, 0.0f32);
     for c in 0..4 {
@@ -66,7 +66,7 @@ fn project(
     for c in 0..4 {
         let (along_m, along_d) = (dd * m[c] - md * d[c], mm * d[c] - md * m[c]);
         for k in 0..4 {
-            let identity = if c == k { 1.0 } else { 0.0 };
+            let identity = if c == k { weights[c] } else { 0.0 };
             projector[c][k] = identity - (along_m * m[k] + along_d * d[k]) * inverse;
             rest[c] += projector[c][k] * seen[k];
         }

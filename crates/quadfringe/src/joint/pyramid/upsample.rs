@@ -6,7 +6,7 @@
 use crate::joint::cells::{blend, spread};
 use crate::joint::coarse::CoarseLevel;
 use crate::joint::infrared::{Coaxial, Gathered, Waves};
-use crate::joint::model::CellFringes;
+use crate::joint::model::{CellFringes, count};
 use crate::joint::neighbours::around;
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
@@ -264,7 +264,7 @@ fn explain<W: Waves>(
     waves: W,
     [squared_residuals, corrections]: [&mut Lanes; 2],
 ) {
-    let most = SQUARED_MISFIT_MAX * pixels.modulation * pixels.modulation;
+    let most = SQUARED_MISFIT_MAX * (0.25 * count(waves.ratios())) * pixels.modulation * pixels.modulation;
     let vector = waves.vector(0);
     for x in 0..LANES {
         let carriers = waves.carriers(vector, x, pixels.phase[x], 0.0);

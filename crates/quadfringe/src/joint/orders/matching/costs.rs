@@ -4,7 +4,7 @@ use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
 use crate::encoding::FourChannel;
 use crate::joint::infrared::{TERMS, wave};
-use crate::joint::params::orders::{COSINE_UNIT, COST_MAX};
+use crate::joint::params::orders::{COSINE_UNIT, COSINE_UNIT_WITHOUT_INFRARED, COST_MAX};
 use crate::parallel::angle::{round, sin_cos};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
@@ -14,6 +14,8 @@ use std::f64::consts::TAU;
 pub(super) struct CostTable {
     /// Turns of the beats of G and IR in one turn of the first phase.
     beat_ratios: [f64; 2],
+    /// Whether there is an infrared channel; without it only G counts.
+    infrared: bool,
     /// Beats of G and IR for every label at a wrapped phase of 0.
     beats: [Vec<u16>; 2],
     /// Phase difference of G and IR between every label and order 0.
@@ -24,6 +26,7 @@ pub(super) struct CostTable {
     last_turn: f64,
     /// Least wrapped phase, in turns, that the order before the first may have.
     first_turn: f64,
+    first_label: usize,
     last_label: usize,
     count: usize,
 }
@@ -81,7 +84,10 @@ impl CostTable {
         let beat_ratios = [n[1] / n[0] - 1.0, n[2] / n[0] - 1.0];
         let count = (code.orders() + 2).div_ceil(LANES) * LANES;
         let per_column = n[0] / code.projector_width as f64;
-        let end = n[0] + 0.5 * per_column;
+        let [first_px, last_px] = code.columns_px;
+        let (from, to) = (first_px * per_column, n[0] - (code.projector_width as f64 - last_px) * per_column);
+        let (begin, end) = (from - 1.5 * per_column, to + 0.5 * per_column);
+        let before = begin.floor().max(-1.0);
         let labels = || (0..count).map(|label| label as f64 - 1.0);
         let beats =
             beat_ratios.map(|ratio| labels().map(|k| (ratio * k * 65536.0).round() as i64 as u16).collect());
@@ -96,11 +102,13 @@ impl CostTable {
         });
         Self {
             beat_ratios,
+            infrared: code.has_infrared(),
             beats,
             rotations,
             middle: (0.5 * n[0]) as usize,
             last_turn: end - end.floor(),
-            first_turn: 1.0 - 1.5 * per_column,
+            first_turn: begin - before,
+            first_label: (before + 1.0) as usize,
             last_label: end.floor() as usize + 1,
             count,
         }
@@ -126,22 +134,25 @@ impl CostTable {
         let predicted = self.beat_ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
         let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
         // Without usable pixels, the cost by cosines is 0 for all labels.
-        let scale = if node.pixels > 0.0 { COSINE_UNIT / node.pixels } else { 0.0 };
+        let unit = if self.infrared { COSINE_UNIT } else { COSINE_UNIT_WITHOUT_INFRARED };
+        let scale = if node.pixels > 0.0 { unit / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
         let [green_beats, infrared_beats] = &self.beats;
         let [green_rotations, infrared_rotations] = &self.rotations;
+        let coaxial = ([green_beats, infrared_beats], [green_rotations, infrared_rotations]);
         if let Some(terms) = node.infrared {
             let wrapped = node.phase as f32 * (std::f32::consts::TAU / 65536.0);
             infrared.predict(terms, wrapped, self.middle_rad(), self.count);
             let rows = [green_rotations, &infrared.rotations];
-            costs([beats[0], node.beats[1]], cosines, [green_beats, &infrared.beats], rows, out);
+            costs::<2>([beats[0], node.beats[1]], cosines, [green_beats, &infrared.beats], rows, out);
+        } else if self.infrared {
+            costs::<2>(beats, cosines, coaxial.0, coaxial.1, out);
         } else {
-            costs(beats, cosines, [green_beats, infrared_beats], [green_rotations, infrared_rotations], out);
+            costs::<1>(beats, cosines, coaxial.0, coaxial.1, out);
         }
         let turn = phase / 65536.0;
-        if turn < self.first_turn {
-            out[0] = IMPOSSIBLE;
-        }
+        let start = self.first_label + usize::from(turn < self.first_turn);
+        out[..start].fill(IMPOSSIBLE);
         let end = self.last_label + usize::from(turn <= self.last_turn);
         if let Some(beyond) = out.get_mut(end..) {
             beyond.fill(IMPOSSIBLE);
@@ -157,9 +168,9 @@ struct Cosines<'a> {
     scale: f32,
 }
 
-/// Computes the costs of all labels. `beats` are the observed beats minus the beats predicted for order 0.
+/// Computes the costs of all labels by `CHANNELS` of G and IR. `beats` are the observed beats minus the beats predicted for order 0.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn costs(
+fn costs<const CHANNELS: usize>(
     beats: [u16; 2],
     cosines: Cosines,
     predicted: [&Vec<u16>; 2],
@@ -173,7 +184,7 @@ fn costs(
     });
     for (b, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
         let mut square = [0.0f32; LANES];
-        for (sums, [c, s, c2, s2]) in cosines.sums.iter().zip(&rotations) {
+        for (sums, [c, s, c2, s2]) in cosines.sums.iter().zip(&rotations).take(CHANNELS) {
             let still = sums.square + 0.5 * cosines.pixels;
             for k in 0..LANES {
                 let first = sums.first[0] * c[b][k] - sums.first[1] * s[b][k];
@@ -185,8 +196,11 @@ fn costs(
             let scaled = cosines.scale * square[k];
             let by_cosines =
                 (if scaled < f32::from(COST_MAX) { scaled } else { f32::from(COST_MAX) }) as i32 as i16;
-            let by_beats =
-                (beat_cost(beats[0], offsets[0][b][k]) + beat_cost(beats[1], offsets[1][b][k])) >> 4;
+            let mut by_beats = 0;
+            for c in 0..CHANNELS {
+                by_beats += beat_cost(beats[c], offsets[c][b][k]);
+            }
+            let by_beats = by_beats >> 4;
             let by_beats = if by_beats < COST_MAX { by_beats } else { COST_MAX };
             out[k] = (by_beats + by_cosines) >> 1;
         }

@@ -8,6 +8,7 @@ mod rows;
 mod tests;
 
 use crate::joint::cells::{CellMaps, Grid};
+use crate::joint::model::count as intensities;
 use crate::joint::params::photometry::{PLACE_DISTANCE, PLACE_NOISES};
 use crate::joint::params::tasks::PLACE_ROWS;
 use crate::joint::scene::Scene;
@@ -39,9 +40,9 @@ const PLACES: [[isize; 2]; 17] = [
     [2, 0],
     [2, 2],
 ];
-/// Expectation of the squared residual in units of the variance of the noise: four intensities minus the two unknowns
-/// albedo and phase.
-const RESIDUAL_BY_NOISE: f32 = 2.0;
+/// Number of unknowns of a pixel, albedo and phase. The squared residual of its intensities has the expectation of their number
+/// less this, in units of the variance of the noise.
+const UNKNOWNS: f32 = 2.0;
 
 /// The place that every pixel takes offsets and amplitudes from.
 #[derive(Debug, Default)]
@@ -70,7 +71,7 @@ impl Choice {
         }
     }
 
-    /// Chooses a place for every pixel, by how well the four intensities fit with the best albedo and, to first order, the best
+    /// Chooses a place for every pixel, by how well the intensities fit with the best albedo and, to first order, the best
     /// phase. Returns the share of the lit pixels that take another place.
     pub fn make(
         &mut self,
@@ -86,7 +87,7 @@ impl Choice {
         let aside = *aside as isize;
         places.clear();
         places.resize(grid.pixels(), 0);
-        let least = PLACE_NOISES * RESIDUAL_BY_NOISE * noise * noise;
+        let least = PLACE_NOISES * (intensities(how.0) - UNKNOWNS) * noise * noise;
         places.par_chunks_mut(PLACE_ROWS * *stride).enumerate().for_each_init(
             || slots.take(),
             |rows, (block, places)| {
