@@ -30,22 +30,12 @@ def shot_of(
 ) -> AnyShot:
     """Make a shot of the images of one exposure, (H, W) each: `red`, `green`, `blue`, or with `bayer` `raw`.
 
-    `ir` may be absent: see `_without_infrared`. Raises `InputError` for images of unequal size or type.
+    Without `ir` the shot is one of three colours. Raises `InputError` for images of unequal size or type.
     """
     ir = images.get("ir")
-    if ir is None:
-        ir = _without_infrared(next(iter(images.values())))
     if bayer is not None:
         return BayerShot(images["raw"], bayer, ir, full_scale, stamp=stamp)
     return Shot(images["red"], images["green"], images["blue"], ir, full_scale, stamp=stamp)
-
-
-def _without_infrared(image: NDArray[Any]) -> NDArray[Any]:
-    """Give the infrared image of a camera that has no infrared chip: a black one, which an encoding of four refuses.
-
-    An encoding of three channels, which reads no infrared image, changes this function alone.
-    """
-    return np.zeros_like(image)
 
 
 def split_colours(image: NDArray[Any]) -> dict[str, NDArray[Any]]:
