@@ -199,7 +199,7 @@ def test_the_command_line_simulates_and_decodes_mosaics(tmp_path: Path) -> None:
     [
         (["--raw", "r.png", "--ir", "i.png"], ["raw is the mosaic", "bayer = rggb"]),
         (["--bayer", "rggb", "--ir", "i.png"], ["bayer needs the image raw"]),
-        (["--raw", "r.png", "--bayer", "rggb"], ["give ir"]),
+        (["--raw", "r.png", "--bayer", "rggb"], ["r.png: No such file"]),
         (["--raw", "r.png", "--bayer", "rggb", "--ir", "i.png", "--red", "r.png"], ["leave out red"]),
         (["--raw", "r.png", "--bayer", "rgbg", "--ir", "i.png"], [*PATTERNS, "rgbg"]),
         (["--raw", "r.png", "--bayer", "rggb", "--ir", "i.png"], ["r.png: No such file"]),

@@ -160,9 +160,15 @@ class Every(config.Model):
         ({"pair": (1, 2, 3)}, "pair: expected at most 2 entries, got (1, 2, 3)"),
         ({"table": 5}, "table: expected a table, got 5"),
         ({"fringes": 5}, "fringes: expected a table of the keys of Fringes, got 5"),
-        ({"capture": 5}, 'capture: expected "virtual:", "aravis:NAME" or "replay:FILE", got 5'),
+        (
+            {"capture": 5},
+            'capture: expected "virtual:", "aravis:NAME", "uvc:NUMBER", "files:FOLDER" or "replay:FILE", got 5',
+        ),
         ({"capture": {}}, "capture: expected a table with the key 'kind', got {}"),
-        ({"capture": {"kind": "x"}}, "capture: expected one of 'virtual', 'aravis', 'replay' as 'kind'"),
+        (
+            {"capture": {"kind": "x"}},
+            "capture: expected one of 'virtual', 'aravis', 'uvc', 'files', 'replay' as 'kind'",
+        ),
         ({"nmber": 1}, "nmber: this key is not known; did you mean number?"),
     ],
 )

@@ -20,7 +20,8 @@ pub(super) struct Cells {
     stride: usize,
     /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
-    /// After the fit the contrast times `inside`.
+    /// After the fit the contrast times `inside`. Before it, the first is 1 for torn cells, whose pixels are all lit, but whose phases
+    /// lie far apart.
     contrast: [Vec<f32>; 4],
     /// Mean phase in rad; after the fit the correction times `inside`.
     phase: Vec<f32>,
@@ -28,8 +29,6 @@ pub(super) struct Cells {
     usable: Vec<f32>,
     /// 1 for cells whose pixels are all lit and lie on one surface.
     inside: Vec<f32>,
-    /// 1 for cells whose pixels are all lit, but whose phases lie far apart.
-    torn: Vec<f32>,
     /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
     infrared: [Vec<f32>; 2],
 }
@@ -94,8 +93,8 @@ impl Cells {
         (self.height, self.width, self.factor) = (grid.height / factor, grid.width / factor, factor);
         self.stride = (grid.stride / factor).next_multiple_of(LANES);
         let size = self.stride * self.height;
-        let Self { light: [red, green, blue, infrared], phase, usable, inside, torn, stride, width, .. } =
-            self;
+        let Self { light: [red, green, blue, infrared], phase, usable, inside, stride, width, .. } = self;
+        let torn = &mut self.contrast[0];
         let planes = [red, green, blue, infrared, phase, usable, inside, torn].map(|plane| {
             plane.resize(size, 0.0);
             plane.par_chunks_mut(*stride)
@@ -147,7 +146,7 @@ impl Cells {
 
     /// Fills a tile whose first cell is `[top, left]`; gives whether it has any cell that can be used.
     pub fn load(&self, [top, left]: [usize; 2], tile: &mut Tile) -> bool {
-        let Self { height, width, stride, light, phase, usable, inside, torn, .. } = self;
+        let Self { height, width, stride, light, phase, usable, inside, .. } = self;
         let count = SIDE.min(width - left);
         let mut any = false;
         tile.pair = !self.infrared[0].is_empty();
@@ -164,7 +163,7 @@ impl Cells {
                 (&mut tile.start, phase),
                 (&mut tile.usable, usable),
                 (&mut tile.inside, inside),
-                (&mut tile.torn, torn),
+                (&mut tile.torn, &self.contrast[0]),
             ]);
             planes.for_each(|(to, from)| to.row_mut(y)[..count].copy_from_slice(&from[range.clone()]));
             if tile.pair {

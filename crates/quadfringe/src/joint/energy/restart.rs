@@ -178,34 +178,12 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
     out
 }
 
-/// Goes back to the first unknowns in all cells but those around which the second ones differ and have the lower energy. The
-/// energies are sums over the scales that either start has found, so that neither is preferred.
+/// Goes back to the first unknowns in all cells but those around which the second ones differ and have the lower energy.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    let Tile {
-        light,
-        usable,
-        inside,
-        torn,
-        ratios,
-        pair,
-        infrared,
-        scales: found,
-        unknown,
-        first,
-        product,
-        lit,
-        ..
-    } = tile;
-    let [_, near, spare, ..] = product.planes_mut();
-    continue_through(inside, torn, lit, [near, spare]);
-    let given = Given { light, usable, inside, continued: lit, ratios: *ratios, pair: *pair, infrared };
+    compare(tile, scales);
+    let Tile { inside, unknown, first, product, .. } = tile;
     let [gain, around, spare, ..] = product.planes_mut();
-    gain.clear();
-    for scales in [scales, found] {
-        add_energy(1.0, &given, first, scales, gain);
-        add_energy(-1.0, &given, unknown, scales, gain);
-    }
     for at in vectors() {
         around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
     }
@@ -226,5 +204,20 @@ fn keep_lower(tile: &mut Tile, scales: &Scales) {
             }
             unknown.set(at, out);
         }
+    }
+}
+
+/// Writes the energy of the first unknowns less that of the second ones into the first plane of the product. The energies are sums
+/// over the scales that either start has found, so that neither is preferred.
+fn compare(tile: &mut Tile, scales: &Scales) {
+    let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
+    let [gain, near, spare, ..] = tile.product.planes_mut();
+    continue_through(inside, torn, &mut tile.lit, [near, spare]);
+    let (ratios, pair) = (tile.ratios, *pair);
+    let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
+    gain.clear();
+    for scales in [scales, &tile.scales] {
+        add_energy(1.0, &given, &tile.first, scales, gain);
+        add_energy(-1.0, &given, &tile.unknown, scales, gain);
     }
 }
