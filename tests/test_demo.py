@@ -47,6 +47,14 @@ def test_demo_names_its_figures(demo: Figures, folder: Path) -> None:
     assert json.loads((folder / "figures.json").read_text())["figures"] == demo
 
 
+def test_demo_needs_no_infrared(tmp_path: Path) -> None:
+    found = figures_of("demo", "--encoding", "rgb", "--out", str(tmp_path))
+    for scene in SCENES:
+        hold("demo.returned_percent", found[f"{scene}_returned_percent"])
+        hold("demo.wrong_order_percent", found[f"{scene}_wrong_order_percent"])
+        assert (tmp_path / f"{scene}.png").exists()
+
+
 @pytest.mark.parametrize("scene", SCENES)
 def test_demo_is_metric(demo: Figures, folder: Path, scene: str) -> None:
     for figure in ("depth_rms_mm", "wrong_order_percent", "returned_percent"):

@@ -141,7 +141,7 @@ def write_report(
     found: ShapeComparison,
 ) -> None:
     """Write the report of a calibrated shape and of its comparison with the truth to a PNG."""
-    names = ("red and blue, two-step", "green, Fourier", "infrared, Fourier")
+    names = ("red and blue, two-step", "green, Fourier", "infrared, Fourier")[: len(wrapped)]
     turn = (-np.pi, np.pi)
     rms_mm = found.overall.rms
     error_mm = 4 * rms_mm if np.isfinite(rms_mm) else 1.0
