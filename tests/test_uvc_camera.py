@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 import pytest
 from support.shots import sees_no_infrared
-from support.videos import FakeCapture, write_video
+from support.videos import FakeCapture, let_opencv_open, write_video
 from typer.testing import CliRunner
 
 from quadfringe.calibration.session.acquisition import exposed
@@ -36,13 +36,7 @@ SHAPE = (24, 32)
 def capture(monkeypatch: pytest.MonkeyPatch) -> FakeCapture:
     """The camera that OpenCV opens, whichever is named."""
     fake = FakeCapture()
-
-    def opened(*_: object) -> FakeCapture:
-        fake.released = False
-        return fake
-
-    monkeypatch.setattr(cv2, "VideoCapture", opened)
-    monkeypatch.setattr(_source, "_check_present", lambda *_: None)
+    let_opencv_open(fake, monkeypatch)
     return fake
 
 

@@ -8,8 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from quadfringe.config import HdmiProjectorConfig
-from quadfringe.devices.uvc import _source
-from support.videos import FakeCapture
+from support.videos import FakeCapture, let_opencv_open
 
 SIZE_PX = (1280, 720)
 GAMMA = 2.2
@@ -81,11 +80,5 @@ def capture(monkeypatch: pytest.MonkeyPatch, windows: list[FakeWindow]) -> FakeC
 
     fake = Looking(("YUYV",))
     fake.controls[cv2.CAP_PROP_EXPOSURE] = 167  # a frame
-
-    def opened(*_: object) -> FakeCapture:
-        fake.released = False
-        return fake
-
-    monkeypatch.setattr(cv2, "VideoCapture", opened)
-    monkeypatch.setattr(_source, "_check_present", lambda *_: None)
+    let_opencv_open(fake, monkeypatch)
     return fake

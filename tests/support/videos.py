@@ -8,6 +8,9 @@ from typing import Any
 
 import cv2
 import numpy as np
+import pytest
+
+from quadfringe.devices.uvc import _source
 
 
 def write_video(path: Path, shape: tuple[int, int], frames: int, codec: str = "FFV1", rate_hz: float = 30.0) -> Path:
@@ -20,6 +23,17 @@ def write_video(path: Path, shape: tuple[int, int], frames: int, codec: str = "F
         writer.write(frame)
     writer.release()
     return path
+
+
+def let_opencv_open(fake: FakeCapture, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let OpenCV open this camera, whichever is named."""
+
+    def opened(*_: object) -> FakeCapture:
+        fake.released = False
+        return fake
+
+    monkeypatch.setattr(cv2, "VideoCapture", opened)
+    monkeypatch.setattr(_source, "_check_present", lambda *_: None)
 
 
 class FakeCapture:

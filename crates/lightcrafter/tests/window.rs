@@ -130,11 +130,13 @@ fn under_xvfb() {
 }
 
 /// Red, green and blue of the screen. The header of an xwd file is big-endian; its pixels are 32 bit little-endian.
-fn screenshot() -> Vec<u8> {
+/// What the screen shows, which must have this width and height.
+fn screenshot(size_px: (usize, usize)) -> Vec<u8> {
     let file = fs::read(std::env::var_os(SCREEN).map(PathBuf::from).unwrap_or_else(|| Path::new("").into()))
         .unwrap();
     let word = |i: usize| u32::from_be_bytes(file[4 * i..4 * i + 4].try_into().unwrap()) as usize;
     let (header, width, height, bytes_per_line, colours) = (word(0), word(4), word(5), word(12), word(19));
+    assert_eq!((width, height), size_px);
     let pixels = &file[header + 12 * colours..];
     let rows = (0..height).flat_map(|y| pixels[y * bytes_per_line..][..4 * width].chunks(4));
     rows.flat_map(|pixel| [pixel[2], pixel[1], pixel[0]]).collect()
@@ -161,11 +163,11 @@ fn every_pixel_is_on_the_screen() {
     assert!(found[0].unfit().is_none(), "{found:?}");
     let mut window = PatternWindow::open(Some(&found[0].name)).unwrap();
     assert_eq!(window.output(), &found[0]);
-    assert!(screenshot().iter().all(|value| *value == 0), "black when opened");
+    assert!(screenshot((912, 1140)).iter().all(|value| *value == 0), "black when opened");
     for seed in 1..4 {
         let image = noise(seed);
         window.show(&image).unwrap();
-        assert!(screenshot() == image, "image {seed} differs");
+        assert!(screenshot((912, 1140)) == image, "image {seed} differs");
     }
     let error = window.show(&[0; 3]).unwrap_err();
     assert!(error.to_string().contains("912 x 1140 pixels of red, green, blue"), "{error}");
@@ -216,7 +218,7 @@ fn a_projector_of_any_size_gets_its_pixels() {
     assert_eq!(window.size_px(), (1280, 720));
     let image = noise_of(3 * 1280 * 720, 5);
     window.show(&image).unwrap();
-    assert!(screenshot() == image);
+    assert!(screenshot((1280, 720)) == image);
     let error = window.show(&[0; IMAGE_BYTES]).unwrap_err().to_string();
     assert!(error.contains("1280 x 720 pixels of red, green, blue"), "{error}");
     let error = PatternWindow::open_sized(None, (1920, 1080)).unwrap_err().to_string();

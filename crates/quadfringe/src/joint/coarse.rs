@@ -12,7 +12,7 @@ use super::photometry::{Photometry, PhotometryFit};
 use super::pyramid::Level;
 use super::residuals::Residuals;
 use super::scene::{Frame, PhaseMap, Pixels, ScaledGrid, Scene, Scratch};
-use super::shadows::{Shadows, Where, darken};
+use super::shadows::{Search, Shadows, Where, darken};
 use super::slopes::Slopes;
 use super::smooth::mark_discontinuities;
 use super::window::Window;
@@ -159,9 +159,10 @@ impl CoarseLevel {
     /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.
     pub fn leave_out_shadows(&mut self, level: &mut Level, scaled: ScaledGrid<'_>, ratios: [f32; 3]) {
         let Self { shadows, phase, modulation, photometry, lit_mask, noise, .. } = self;
-        let map = PhaseMap { phase, modulation };
+        let (place, map, noise) = (Where::Everywhere, PhaseMap { phase, modulation }, *noise);
         let scene = level.scene(scaled);
-        if scene.pair.is_none() || !shadows.find(&scene, Where::Everywhere, ratios, photometry, map, *noise) {
+        let search = Search { place, ratios, photometry, map, noise };
+        if scene.pair.is_none() || !shadows.find(&scene, search) {
             return;
         }
         let reach = REACH_PX.div_ceil(scaled.factor);
@@ -180,11 +181,9 @@ impl CoarseLevel {
     ) {
         let Self { shadows, modulation, photometry, lit_mask, noise, .. } = self;
         let (scene, grid) = (level.scene(frame.full), frame.full.grid);
-        let place = Where::NearDark(frame.coarse.grid, modulation);
-        if scene.pair.is_none()
-            || frame.coarse.factor == 1
-            || !shadows.find(&scene, place, ratios, photometry, pixels.map(), *noise)
-        {
+        let (place, noise) = (Where::NearDark(frame.coarse.grid, modulation), *noise);
+        let search = Search { place, ratios, photometry, map: pixels.map(), noise };
+        if scene.pair.is_none() || frame.coarse.factor == 1 || !shadows.find(&scene, search) {
             return;
         }
         lit_mask.erode(grid, REACH_PX, &mut shadows.excess, &mut shadows.lit);

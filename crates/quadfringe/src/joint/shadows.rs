@@ -23,6 +23,18 @@ pub(super) enum Where<'a> {
     NearDark(&'a Grid, &'a [f32]),
 }
 
+/// What the search goes by.
+#[derive(Clone, Copy)]
+pub(super) struct Search<'a> {
+    pub place: Where<'a>,
+    /// Fringe numbers divided by the first.
+    pub ratios: [f32; 3],
+    pub photometry: &'a Photometry,
+    pub map: PhaseMap<'a>,
+    /// Standard deviation of the intensities, in linear light.
+    pub noise: f32,
+}
+
 /// The search for shadows, with its working planes.
 #[derive(Debug)]
 pub(super) struct Shadows {
@@ -79,19 +91,10 @@ impl Shadows {
         Self { field_rad, expected, excess, lit, slots: Slots::default() }
     }
 
-    /// Finds the shadows of the infrared projector at an absolute phase; `noise` is the standard deviation of the intensities.
-    /// Tells whether there are any.
-    pub fn find(
-        &mut self,
-        scene: &Scene<'_>,
-        place: Where<'_>,
-        ratios: [f32; 3],
-        photometry: &Photometry,
-        map: PhaseMap<'_>,
-        noise: f32,
-    ) -> bool {
-        let grid = scene.grid;
-        self.expect_fringes(scene, place, ratios, photometry, map);
+    /// Finds the shadows of the infrared projector at an absolute phase. Tells whether there are any.
+    pub fn find(&mut self, scene: &Scene<'_>, search: Search<'_>) -> bool {
+        let (grid, noise) = (scene.grid, search.noise);
+        self.expect_fringes(scene, search);
         let Self { expected, excess, lit, slots, .. } = self;
         lit.resize(grid.pixels(), 0.0);
         let (expected, excess, slots) = (&*expected, &*excess, &*slots);
@@ -113,14 +116,8 @@ impl Shadows {
     }
 
     /// Computes what the model expects at every pixel that is searched, and what is seen of it.
-    fn expect_fringes(
-        &mut self,
-        scene: &Scene<'_>,
-        place: Where<'_>,
-        ratios: [f32; 3],
-        photometry: &Photometry,
-        map: PhaseMap<'_>,
-    ) {
+    fn expect_fringes(&mut self, scene: &Scene<'_>, search: Search<'_>) {
+        let Search { place, ratios, photometry, map, .. } = search;
         let grid = scene.grid;
         let Self { field_rad, expected, excess, slots, .. } = self;
         let field_rad = *field_rad;

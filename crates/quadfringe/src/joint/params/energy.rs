@@ -120,7 +120,7 @@ pub const CONTRAST_RIDGE: f32 = 1e-4;
 
 /// Greatest correction of the phase of a valid pixel, in rad. Larger: pixels in a wrong minimum stay (with 0.5 rad the painted face
 /// has an RMS of 0.14 instead of 0.12 mm, and rods have 0.15 instead of 0.14 mm). Smaller: right pixels are lost (with 0.3 rad 0.3 %
-/// of the bottle and 1.5 % of photographs).
+/// of the bottle and 0.7 % of photographs).
 /// `python evaluation/world.py --half tune`, `python evaluation/captures_report.py`.
 pub const MOVED_MAX_RAD: f32 = 0.35;
 
