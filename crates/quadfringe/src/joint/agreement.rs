@@ -42,7 +42,7 @@ impl Agreement {
     pub fn measure(
         &mut self,
         scene: &Scene<'_>,
-        ratios: [f32; 3],
+        ratios: [f32; 4],
         noise: f32,
         photometry: &Photometry,
         map: PhaseMap<'_>,

@@ -23,7 +23,7 @@ pub(super) trait Waves: Copy {
     type Vector: Copy;
 
     /// Fringe numbers divided by the first.
-    fn ratios(self) -> [f32; 3];
+    fn ratios(self) -> [f32; 4];
 
     /// Vector `i` of the row.
     fn vector(self, i: usize) -> Self::Vector;
@@ -45,13 +45,13 @@ pub(super) trait Waves: Copy {
 /// The waves of coaxial projectors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coaxial {
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
 }
 
 /// The waves of a calibrated pair.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair<'a> {
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub terms: [&'a [Lanes]; TERMS],
 }
 
@@ -76,7 +76,7 @@ impl Waves for Coaxial {
     type Vector = ();
 
     #[inline(always)]
-    fn ratios(self) -> [f32; 3] {
+    fn ratios(self) -> [f32; 4] {
         self.ratios
     }
 
@@ -85,7 +85,7 @@ impl Waves for Coaxial {
 
     #[inline(always)]
     fn infrared(self, (): (), _: usize, phase: f32) -> Wave {
-        Wave::coaxial(phase, self.ratios[2])
+        Wave::coaxial(phase, self.ratios[3])
     }
 
     #[inline(always)]
@@ -98,7 +98,7 @@ impl Waves for Pair<'_> {
     type Vector = [Lanes; TERMS];
 
     #[inline(always)]
-    fn ratios(self) -> [f32; 3] {
+    fn ratios(self) -> [f32; 4] {
         self.ratios
     }
 
@@ -159,7 +159,7 @@ impl PairPhase {
     }
 
     /// The waves of row `y`.
-    pub fn row(&self, grid: &Grid, y: usize, ratios: [f32; 3]) -> Pair<'_> {
+    pub fn row(&self, grid: &Grid, y: usize, ratios: [f32; 4]) -> Pair<'_> {
         Pair {
             ratios,
             terms: self.planes.each_ref().map(|plane| lanes(&plane[y * grid.stride..][..grid.stride])),
@@ -210,7 +210,7 @@ impl Gathered {
     }
 
     /// The waves of the vector.
-    pub fn waves(&self, ratios: [f32; 3]) -> Pair<'_> {
+    pub fn waves(&self, ratios: [f32; 4]) -> Pair<'_> {
         Pair { ratios, terms: self.0.each_ref().map(std::slice::from_ref) }
     }
 }

@@ -9,7 +9,7 @@
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::infrared::{Waves, with_waves};
-use super::model::FringeRows;
+use super::model::{FringeRows, has_quadrature};
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
 use super::pyramid::Level;
@@ -27,7 +27,13 @@ pub(super) struct Timing {
     /// Instants of R, G, B, IR in any unit of time; 0 is the instant of the result.
     pub instants: [f32; 4],
     /// Fringe numbers over the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
+}
+
+/// Instants of R, G, B, IR, given in us, in seconds; B alone has the place of IR.
+pub(super) fn in_places(instants_us: [f32; 4], ratios: [f32; 4]) -> [f32; 4] {
+    let [red, green, blue, infrared] = instants_us.map(|t| 1e-6 * t);
+    [red, green, blue, if has_quadrature(ratios) { infrared } else { blue }]
 }
 
 /// Rows of one task.

@@ -5,7 +5,7 @@
 
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, count};
+use super::model::{FringeRows, count, has_quadrature};
 use super::neighbours::{around, binomial};
 use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
@@ -48,7 +48,7 @@ pub(super) struct PhaseModel<'a> {
     pub scene: &'a Scene<'a>,
     pub photometry: &'a Photometry,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub window: Window<'a>,
 }
 
@@ -62,7 +62,7 @@ struct ModelRow {
     ms: Vec<f32>,
     ds: Vec<f32>,
     ss: Vec<f32>,
-    /// Mean amplitude of R and B for an albedo of 1.
+    /// Mean amplitude of R and B for an albedo of 1; that of R if there is no B.
     amplitude: Vec<f32>,
     /// The best-fitting albedo times `albedo_weight`.
     weighted_albedo: Vec<f32>,
@@ -199,6 +199,7 @@ fn predict<W: Waves>(
     waves: W,
     out: &mut ModelRow,
 ) {
+    let half = if has_quadrature(waves.ratios()) { 0.5 } else { 1.0 };
     let mut out = out.rows_mut(pixels.phase.len()).map(lanes_mut);
     let pixels = [pixels.phase, pixels.loss, pixels.modulation].map(lanes);
     let (offset, amplitude, light) =
@@ -225,7 +226,7 @@ fn predict<W: Waves>(
             let albedo = ms / mm;
             let albedo = if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
             let weight = if lit[x] > 0.0 { 1.0 } else { UNLIT_WEIGHT };
-            let mean = 0.5 * (amplitude[0][x] + amplitude[2][x]);
+            let mean = half * (amplitude[0][x] + amplitude[2][x]);
             let values = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];
             (0..9).for_each(|row| found[row][x] = values[row]);
         }

@@ -28,7 +28,7 @@ pub(super) enum Where<'a> {
 pub(super) struct Search<'a> {
     pub place: Where<'a>,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub photometry: &'a Photometry,
     pub map: PhaseMap<'a>,
     /// Standard deviation of the intensities, in linear light.

@@ -42,7 +42,7 @@ fn project(
     model: [f32; 8],
     [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
-    (ratios, infrared): ([f32; 3], Wave),
+    (ratios, infrared): ([f32; 4], Wave),
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
     let (carriers, weights) = (carriers(phase, ratios, infrared, loss), weights(ratios));

@@ -65,7 +65,7 @@ pub(in crate::joint) struct Levels<'a> {
     /// Phase, discontinuities, slopes and photometry of the coarse level.
     pub found: &'a CoarseLevel,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     /// 1 for lit pixels of the fine level.
     pub lit: &'a [f32],
 }

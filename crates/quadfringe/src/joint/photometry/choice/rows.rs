@@ -33,7 +33,7 @@ impl Rows {
         scene: &Scene<'_>,
         lines: &[usize],
         phase: &[f32],
-        (ratios, slopes): ([f32; 3], &Slopes),
+        (ratios, slopes): ([f32; 4], &Slopes),
     ) {
         let stride = scene.grid.stride;
         let Self { maps, carriers, best, active, smooth, .. } = self;
