@@ -35,7 +35,7 @@ def run_scene(surface: str, out: Path, fringes: Fringes = Fringes()) -> SceneRes
         shot = scanner.grab()
         shape, decode_ms = _timed_decode(scanner, shot)
     assert shot.truth is not None, "the virtual bench knows the truth"
-    numbers = config.fringes.numbers
+    numbers = config.fringes.code
     found = compare(shape, shot.truth, causes=False)
     shape.save(out / f"{surface}.ply")
     wrapped = wrapped_phases(linear_light(shot, scanner.calibration), numbers)

@@ -18,7 +18,7 @@ pub enum Channel {
     R,
     /// Green, visible projector, shift 0.
     G,
-    /// Blue, visible projector, shift `pi/2`: in quadrature with R. Alone, with a fringe number of its own: shift 0.
+    /// Blue, visible projector, shift `pi/2`: in quadrature with R. Alone, with another fringe number than R: shift 0.
     B,
     /// Infrared, infrared projector, shift 0.
     Ir,
@@ -45,7 +45,7 @@ impl Channel {
         }
     }
 
-    /// Phase shift in rad of a channel beside infrared: `pi/2` for B, else 0. [`FourChannel::shift_rad`] is that of an encoding.
+    /// Phase shift in rad of a channel with infrared: `pi/2` for B, else 0. [`FourChannel::shift_rad`] is that of an encoding.
     #[must_use]
     pub const fn shift_rad(self) -> f64 {
         match self {
@@ -129,7 +129,7 @@ impl FourChannel {
     }
 
     /// The fringe numbers, over the first, of R, G, B and IR as the steps of the joint method have them; 0 for a channel that is
-    /// absent. B alone has the place of IR, because both are a phase beside that of R, and nothing is then in quadrature with R.
+    /// absent. B alone has the place of IR, because both are a phase other than that of R, and nothing is then in quadrature with R.
     pub(crate) fn ratios(&self) -> [f32; 4] {
         let [first, second, third] = self.numbers().map(|number| (number / self.quadrature) as f32);
         [first, second, if self.has_quadrature() { first } else { 0.0 }, third]

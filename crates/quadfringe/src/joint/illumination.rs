@@ -17,9 +17,6 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use rayon::prelude::*;
 
-/// The place of B, which is absent where each of three colours has its own fringe number.
-const BLUE: usize = 2;
-
 /// The mask of lit pixels, with its working maps.
 #[derive(Debug, Default)]
 pub(super) struct LitMask {
@@ -114,7 +111,7 @@ impl LitMask {
                 }
             }
         }
-        let least = if self.absent == Some(BLUE) { HEIGHT_MIN_ALONE } else { HEIGHT_MIN };
+        let least = if self.absent == Some(2) { HEIGHT_MIN_ALONE } else { HEIGHT_MIN };
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {
             let near = near(y, *high.start()).map(|at| &above[at..at + stride]);

@@ -22,6 +22,12 @@ pub(super) fn has_quadrature(ratios: [f32; 4]) -> bool {
     ratios[2] > 0.0
 }
 
+/// Share of R in the mean of R and B.
+#[inline(always)]
+pub(super) fn red_share(ratios: [f32; 4]) -> f32 {
+    if has_quadrature(ratios) { 0.5 } else { 1.0 }
+}
+
 /// The place that is dark; none of four channels.
 pub(super) fn absent(ratios: [f32; 4]) -> Option<usize> {
     ratios.iter().position(|&ratio| ratio == 0.0)

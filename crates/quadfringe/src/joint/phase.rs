@@ -5,7 +5,7 @@
 
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, count, has_quadrature};
+use super::model::{FringeRows, count, red_share};
 use super::neighbours::{around, binomial};
 use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
@@ -199,7 +199,6 @@ fn predict<W: Waves>(
     waves: W,
     out: &mut ModelRow,
 ) {
-    let half = if has_quadrature(waves.ratios()) { 0.5 } else { 1.0 };
     let mut out = out.rows_mut(pixels.phase.len()).map(lanes_mut);
     let pixels = [pixels.phase, pixels.loss, pixels.modulation].map(lanes);
     let (offset, amplitude, light) =
@@ -226,7 +225,7 @@ fn predict<W: Waves>(
             let albedo = ms / mm;
             let albedo = if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
             let weight = if lit[x] > 0.0 { 1.0 } else { UNLIT_WEIGHT };
-            let mean = half * (amplitude[0][x] + amplitude[2][x]);
+            let mean = red_share(waves.ratios()) * (amplitude[0][x] + amplitude[2][x]);
             let values = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];
             (0..9).for_each(|row| found[row][x] = values[row]);
         }

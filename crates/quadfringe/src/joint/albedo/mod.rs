@@ -115,7 +115,7 @@ impl Row {
         }
     }
 
-    /// Without four channels, the infrared albedo is NaN: its own place is `absent`, or that of B, which is alone and has the place
+    /// Without four channels, the infrared albedo is NaN: its place is `absent`, or that of B, which is alone and has the place
     /// of infrared.
     fn write(&self, valid: &[u8], absent: Option<usize>, out: &mut [f32]) {
         let [red, green, blue, infrared] = &self.albedo;

@@ -5,12 +5,9 @@
 
 use super::rows::{add_products, map, solve_row, sum, turn};
 use super::{CellMaps, CellWindow, RowMaps, Rows, Scene, TaskWork};
-use crate::joint::params::local_fit::{CARRIER_FITS, CARRIER_WINDOWS, SAMPLED_ROWS};
+use crate::joint::params::local_fit::{CARRIER_FITS, CARRIER_WINDOWS, DIRECTION_STRIDE_PX, SAMPLED_ROWS};
 use crate::parallel::slots::Slots;
 use std::f32::consts::TAU;
-
-/// Distance between two rows, and between two pixels of a row, from which the direction of the fringes is measured.
-const STRIDE_PX: usize = 3;
 
 /// The phasor of R along the rows of a scene.
 #[derive(Debug)]
@@ -83,12 +80,12 @@ fn direction(scene: &Scene<'_>) -> [f32; 2] {
     let grid = scene.grid;
     let [red, green, ..] = scene.light;
     let step = ((scene.period_px / 8.0).round() as usize).max(1);
-    let mean = |plane: &[f32]| plane.iter().step_by(STRIDE_PX).sum::<f32>();
+    let mean = |plane: &[f32]| plane.iter().step_by(DIRECTION_STRIDE_PX).sum::<f32>();
     let gain = mean(red) / mean(green).max(f32::MIN_POSITIVE);
     let at = |i: usize| red[i] - gain * green[i];
     let [mut xx, mut xy, mut yy] = [0.0f64; 3];
-    for y in (step..grid.height.saturating_sub(step)).step_by(STRIDE_PX) {
-        for x in (step..grid.width.saturating_sub(step)).step_by(STRIDE_PX) {
+    for y in (step..grid.height.saturating_sub(step)).step_by(DIRECTION_STRIDE_PX) {
+        for x in (step..grid.width.saturating_sub(step)).step_by(DIRECTION_STRIDE_PX) {
             let i = y * grid.stride + x;
             let across = f64::from(at(i + step) - at(i - step));
             let down = f64::from(at(i + step * grid.stride) - at(i - step * grid.stride));

@@ -71,7 +71,7 @@ impl LocalFit {
         }
     }
 
-    /// Whether the phase of a pixel comes from its own light: from R and B in quadrature, not from a window.
+    /// Whether the phase of a pixel comes from the light of that pixel: from R and B in quadrature, not from a window.
     pub fn is_of_pixels(&self) -> bool {
         has_quadrature(self.ratios)
     }

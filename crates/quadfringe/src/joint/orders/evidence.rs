@@ -155,17 +155,16 @@ fn add_cosines<W: Waves>(
         let [node, phase, modulation, usable] = take(&pixels, i);
         let (light, offset, amplitude) = (take(&light, i), take(&offset, i), take(&amplitude, i));
         let (ratios, vector) = (waves.ratios(), waves.vector(i));
-        let known = albedo_known(ratios);
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
             let weight = if lit { usable[x] } else { 0.0 };
-            // A saturated lit pixel has a small weight, so that a node with only such pixels counts as lit but has no
-            // evidence.
+            // Saturated lit pixels have a small weight: a node with only such pixels counts as lit without evidence.
             terms[0][x] = if lit { weight + LIT_WEIGHT } else { 0.0 };
             let unwrapped = node[x] + wrap(phase[x] - node[x]);
-            let red_blue = |rows: &[Lanes; 4]| [rows[0][x], rows[2][x]];
-            let albedo = albedo(phase[x], red_blue(&light), red_blue(&offset), red_blue(&amplitude), known);
+            let [light_rb, offset_rb, amplitude_rb] =
+                [&light, &offset, &amplitude].map(|rows| [rows[0][x], rows[2][x]]);
+            let albedo = albedo(phase[x], light_rb, offset_rb, amplitude_rb, albedo_known(ratios));
             let angles = [ratios[1] * unwrapped, waves.infrared(vector, x, unwrapped + origin_rad).phase];
             for beat in 0..2 {
                 let c = 2 * beat + 1;

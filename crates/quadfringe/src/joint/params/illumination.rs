@@ -21,5 +21,5 @@ pub const NOISE_STRIDE: usize = 13;
 
 /// The same for three colours of different fringe numbers, which come closer to their bottoms together: 36, 35 and 30 fringes have a
 /// mean of 0.013 where red and blue are alike and green is 60 degrees off. Varied: 0.02 loses 1.1 % of a plane, in strips
-/// (`evaluation/rgb.py --only plane`).
+/// (`python evaluation/rgb.py --only plane`).
 pub const HEIGHT_MIN_ALONE: f32 = 0.008;
