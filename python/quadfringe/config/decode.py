@@ -115,7 +115,8 @@ class DecodeConfig(Model):
     )
     modulation_min: Finite | None = Field(
         default=None,
-        description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels.",
+        description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels. "
+        "Absent: with method joint the noise of each shot decides; with method published 0.02.",
     )
     quality_min: Finite | None = Field(
         default=None,
