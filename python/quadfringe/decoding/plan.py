@@ -51,10 +51,12 @@ class Plan:
         settings = decode if isinstance(decode, DecodeConfig) else checked(DecodeConfig, decode, "decode")
         columns = _columns(projector_width_px)
         known, undone = calibration_of(calibration), response_of(response, settings.response)
+        shown = _fringes(fringes, columns)
         _check_undone_once(undone, known)
+        _check_instants(settings.channel_instants_us, shown)
         fields = {
             "projector_width_px": columns,
-            "fringes": _fringes(fringes, columns),
+            "fringes": shown,
             "calibration": known,
             "response": undone,
             "decode": settings.model_copy(update={"response": "auto"}),
@@ -149,6 +151,15 @@ def _check_undone_once(response: ResponseChoice, known: Calibration | None) -> N
         raise InputError(
             "response: a response file undoes camera and projector together, and this calibration holds a response of "
             "the projector too; leave the response out"
+        )
+
+
+def _check_instants(instants: tuple[float, ...] | None, fringes: Fringes) -> None:
+    """Raise `InputError` unless there is one time for each channel of the encoding."""
+    if instants is not None and len(instants) != len(fringes.channels):
+        raise InputError(
+            f"channel_instants_us: expected {len(fringes.channels)} times, of {', '.join(fringes.channels)}, got "
+            f"{len(instants)}: {brief(instants)}"
         )
 
 
