@@ -117,6 +117,7 @@ def test_rates_and_exposures_that_do_not_fit(monkeypatch: pytest.MonkeyPatch) ->
     found = faults(system(frame_rate_hz=None))
     assert found["exposure in frames"].fix.startswith("set 60000, or match_exposure")
     assert found["exposures of a calibration"].fix.startswith("set 80000.0 us (4 frames)")
+    assert "exposure in frames" not in faults(system(frame_rate_hz=None, match_exposure=True))
 
 
 def test_webcams_at_fault(webcam: Webcam) -> None:

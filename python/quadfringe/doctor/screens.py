@@ -8,7 +8,7 @@ from quadfringe import _core
 from quadfringe.calibration.session.exposures import check_exposures
 from quadfringe.calibration.session.settings import Session
 from quadfringe.config import HdmiProjectorConfig, SystemConfig
-from quadfringe.devices import part_frames
+from quadfringe.devices import part_frames, with_whole_frames
 from quadfringe.doctor._params import RATE_SHARE
 from quadfringe.doctor.finding import Finding
 from quadfringe.errors import ConfigError
@@ -77,7 +77,7 @@ def _fit(name: str, screen: HdmiProjectorConfig, row: Row) -> Iterator[Finding]:
 
 def _exposures(config: SystemConfig) -> Iterator[Finding]:
     """Check exposures against the frames of the screen: that of a shot, and its shares in a calibration."""
-    parts = list(part_frames(config))
+    parts = list(part_frames(with_whole_frames(config)))  # as the devices are opened
     for part in parts:
         yield Finding(
             "exposure in frames",
