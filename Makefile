@@ -35,6 +35,7 @@ rust: $(STAMPS)/tools
 	cargo fmt --all --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --all-features -- -D warnings
 	cargo clippy --package lightcrafter --all-targets --no-default-features --features emulator -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --package quadfringe-python --no-default-features -- -D warnings
 	cargo test $(CARGO_ALL) -- $(TESTBEDS:%=--skip %)
 	for example in crates/*/examples/*.rs; do $(BUILT)/examples/"$$(basename "$$example" .rs)"; done
 	RUSTDOCFLAGS="-D warnings" cargo doc $(CARGO_ALL) --no-deps --quiet
@@ -96,14 +97,14 @@ msrv:
 	rustup toolchain install $(MSRV) --profile minimal
 	cargo +$(MSRV) check --workspace --all-features --all-targets
 
-# The tests with the oldest Python packages that pyproject.toml permits.
+# The tests with the oldest Python packages that pyproject.toml permits; these warn of each other's age.
 LOWEST_TESTS ?= tests
-lowest: wheel
+lowest: $(STAMPS)/wheel
 	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(VENV)/lowest
 	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct \
 		-r pyproject.toml --extra test --extra e57
-	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --no-deps dist/quadfringe-*.whl
-	$(VENV)/lowest/bin/python -m pytest -p no:cacheprovider $(LOWEST_TESTS)
+	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --no-deps $(VENV)/editable/quadfringe-*.whl
+	$(VENV)/lowest/bin/python -m pytest -p no:cacheprovider -W ignore::DeprecationWarning $(LOWEST_TESTS)
 
 # Changes of the crates' interfaces since the last version, which need a higher number.
 SEMVER_BASE ?= $(shell git describe --tags --abbrev=0 2>/dev/null)
