@@ -55,7 +55,7 @@ OLDEST := --zig --compatibility $(BASELINE)
 endif
 WHEEL_TOOLS := "abi3audit>=0.0.26" "auditwheel>=6.4" "uv>=0.9"
 define build-wheel
-rm -rf dist
+rm -f dist/*.whl
 PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet $(OLDEST) --out dist
 endef
 
@@ -89,7 +89,7 @@ cross: $(STAMPS)/tools
 # Both crates as they would be published, compiled from their packages, and the source distribution of the package.
 publish-check: $(STAMPS)/tools
 	cargo publish --dry-run --package lightcrafter --package quadfringe
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin sdist --quiet --out dist/sdist
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin sdist --out dist/sdist
 
 # The oldest Rust that Cargo.toml promises compiles everything.
 MSRV := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
