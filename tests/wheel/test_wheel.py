@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import subprocess
+import sys
+from pathlib import Path
 
 import cv2
 import pytest
@@ -11,6 +14,8 @@ from environments import TOOLS, Environment
 from support.bars import hold
 
 from quadfringe.evaluation.demo import SCENES
+
+CHECK = Path(__file__).resolve().parents[2] / "scripts" / "check_wheel.py"
 
 # Programs, which do something when they are imported. `make test-camera` runs the one that needs Aravis.
 PROGRAMS = ("quadfringe.__main__", "quadfringe.devices.emulator.__main__", "quadfringe.evaluation._aravis_fake")
@@ -86,3 +91,11 @@ def test_files_are_decoded(bare: Environment) -> None:
 
 def test_the_installation_is_examined(bare: Environment) -> None:
     assert "compiled with optimisation" in bare.quadfringe("doctor")
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="auditwheel examines wheels for Linux")
+@pytest.mark.parametrize("policy", ["manylinux_2_12", "musllinux_1_2"])
+def test_a_wheel_for_newer_or_other_systems_is_refused(wheel: Path, policy: str) -> None:
+    done = subprocess.run([sys.executable, str(CHECK), str(wheel), policy], capture_output=True, text=True)
+    assert done.returncode == 1
+    assert f"expected {policy} or older" in done.stderr
