@@ -104,7 +104,8 @@ lowest: $(STAMPS)/wheel
 	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct \
 		-r pyproject.toml --extra test --extra e57
 	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --no-deps $(VENV)/editable/quadfringe-*.whl
-	$(VENV)/lowest/bin/python -m pytest -p no:cacheprovider -W ignore::DeprecationWarning $(LOWEST_TESTS)
+	PYTHONWARNINGS=ignore::DeprecationWarning \
+		$(VENV)/lowest/bin/python -m pytest -p no:cacheprovider -W ignore::DeprecationWarning $(LOWEST_TESTS)
 
 # Changes of the crates' interfaces since the last version, which need a higher number.
 SEMVER_BASE ?= $(shell git describe --tags --abbrev=0 2>/dev/null)
