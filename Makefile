@@ -74,7 +74,8 @@ EXTRAS ?= light
 wheel-test: wheel
 	QUADFRINGE_WHEEL=$(EXTRAS) $(BIN)/pytest tests/wheel --numprocesses 2 --dist loadfile --durations 5
 
-# The wheel for another machine, by Zig, with the oldest system that it must run on; it cannot be tried here.
+# The wheel for another machine, by Zig, with the oldest system that it must run on; it cannot be tried here. One at a time:
+# maturin puts the modules of all targets into one folder.
 #   make cross TARGET=aarch64-unknown-linux-gnu
 #   make cross TARGET=x86_64-unknown-linux-musl OLDEST_THERE=musllinux_1_2
 TARGET ?= aarch64-unknown-linux-gnu

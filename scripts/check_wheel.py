@@ -45,7 +45,10 @@ def check_contents(wheel: Path) -> None:
 def check_linux(wheel: Path, policy: str) -> str:
     """Check that the wheel needs no newer system than the policy states; return what it needs."""
     command = [sys.executable, "-m", "auditwheel", "show", "--json", str(wheel)]
-    report = json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout)
+    done = subprocess.run(command, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{wheel.name}: auditwheel cannot read it:\n{done.stderr}")
+    report = json.loads(done.stdout)
     needed = report["overall_tag"]
     (kind, age), (kind_wanted, age_wanted) = _split(needed), _split(policy)
     if kind != kind_wanted or age > age_wanted or report["unsupported_isa"] or report["external_libs"]:
