@@ -22,6 +22,7 @@ CONTENTS = (
     r"quadfringe/py\.typed",
     r"quadfringe/view/page/page\.(css|html|js)",
     r"quadfringe-[^/]*\.dist-info/licenses/LICENSE(-APACHE|-MIT)?",
+    r"quadfringe-[^/]*\.dist-info/licenses/licenses/libusb-LGPL-2\.1\.txt",
     r"quadfringe-[^/]*\.dist-info/sboms/quadfringe-python\.cyclonedx\.json",
 )
 BYTES_MAX = 8_000_000  # of the wheel, which has 4.7 MB; test data or debug information would exceed it
