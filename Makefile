@@ -12,7 +12,8 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
-.PHONY: demo test test-usb test-camera test-live wheel audit release fuzz miri hostile coverage figures evaluation bench rust python stubs format bench peers clean
+.PHONY: demo test test-usb test-camera test-live wheel wheel-test cross publish-check msrv lowest semver workflows audit \
+	release fuzz miri hostile coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
@@ -20,7 +21,7 @@ demo: $(STAMPS)/built
 # The kernel's tests and the wheel are compiled at the same time: each leaves a core idle now and then.
 test:
 	$(MAKE) --jobs 2 rust $(STAMPS)/built
-	$(MAKE) wheel python test-usb test-camera test-live
+	$(MAKE) wheel-test python test-usb test-camera test-live
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
 # only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
@@ -34,6 +35,7 @@ rust: $(STAMPS)/tools
 	cargo fmt --all --check
 	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --workspace --all-targets --all-features -- -D warnings
 	cargo clippy --package lightcrafter --all-targets --no-default-features --features emulator -- -D warnings
+	PYO3_PYTHON=$(CURDIR)/$(BIN)/python cargo clippy --package quadfringe-python --no-default-features -- -D warnings
 	cargo test $(CARGO_ALL) -- $(TESTBEDS:%=--skip %)
 	for example in crates/*/examples/*.rs; do $(BUILT)/examples/"$$(basename "$$example" .rs)"; done
 	RUSTDOCFLAGS="-D warnings" cargo doc $(CARGO_ALL) --no-deps --quiet
@@ -45,20 +47,88 @@ python: $(STAMPS)/built stubs
 	$(BIN)/lint-imports
 	$(BIN)/pytest --numprocesses 2 --dist loadfile
 
-# The wheel for this machine, with the list of all crates in it.
-wheel: $(STAMPS)/built
-	rm -rf dist
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --out dist
-	$(BIN)/python -m zipfile --list dist/quadfringe-*.whl | grep --quiet sboms/quadfringe-python.cyclonedx.json
+# The wheel for this machine, with the list of all crates in it. On Linux, Zig links it against glibc 2.17, the oldest that
+# Rust supports, and $(BASELINE) is checked (docs/decisions/0042-*.md); elsewhere the linker of the system is used.
+BASELINE := manylinux_2_17
+ifeq ($(shell uname -s),Linux)
+OLDEST := --zig --compatibility $(BASELINE)
+endif
+WHEEL_TOOLS := "abi3audit>=0.0.26" "auditwheel>=6.4" "uv>=0.9"
+define build-wheel
+rm -f dist/*.whl
+PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet $(OLDEST) --out dist
+endef
+
+# Cargo has nothing to do here after `built`; the Python files may be newer.
+wheel: $(STAMPS)/wheel
+	$(build-wheel)
+	$(BIN)/python scripts/check_wheel.py dist/quadfringe-*.whl $(if $(OLDEST),$(BASELINE))
+
+$(STAMPS)/wheel: $(STAMPS)/built
+	$(BIN)/pip install --quiet --disable-pip-version-check $(WHEEL_TOOLS)
+	touch $@
+
+# The wheel in new environments outside the checkout, with no compiler: every module, the demonstration, files, each extra
+# alone. EXTRAS=all tries also those that are too large for every run.
+EXTRAS ?= light
+wheel-test: wheel
+	QUADFRINGE_WHEEL=$(EXTRAS) $(BIN)/pytest tests/wheel --numprocesses 2 --dist loadfile --durations 5
+
+# The wheel for another machine, by Zig, with the oldest system that it must run on; it cannot be tried here. One at a time:
+# maturin puts the modules of all targets into one folder.
+#   make cross TARGET=aarch64-unknown-linux-gnu
+#   make cross TARGET=x86_64-unknown-linux-musl OLDEST_THERE=musllinux_1_2
+TARGET ?= aarch64-unknown-linux-gnu
+OLDEST_THERE ?= $(BASELINE)
+cross: $(STAMPS)/tools
+	rustup target add $(TARGET)
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin build --release --quiet --zig --compatibility $(OLDEST_THERE) \
+		--target $(TARGET) --out dist/$(TARGET)
+	$(BIN)/pip install --quiet --disable-pip-version-check $(WHEEL_TOOLS)
+	$(BIN)/python scripts/check_wheel.py dist/$(TARGET)/quadfringe-*.whl $(OLDEST_THERE)
+
+# Both crates as they would be published, compiled from their packages, and the source distribution of the package.
+publish-check: $(STAMPS)/tools
+	cargo publish --dry-run --package lightcrafter --package quadfringe
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/maturin sdist --out dist/sdist
+
+# The oldest Rust that Cargo.toml promises compiles everything.
+MSRV := $(shell sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
+msrv:
+	rustup toolchain install $(MSRV) --profile minimal
+	cargo +$(MSRV) check --workspace --all-features --all-targets
+
+# The tests with the oldest Python packages that pyproject.toml permits; these warn of each other's age.
+LOWEST_TESTS ?= tests
+lowest: $(STAMPS)/wheel
+	$(BIN)/uv venv --quiet --clear --python $(BIN)/python $(VENV)/lowest
+	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --resolution lowest-direct \
+		-r pyproject.toml --extra test --extra e57
+	$(BIN)/uv pip install --quiet --python $(VENV)/lowest --no-deps $(VENV)/editable/quadfringe-*.whl
+	PYTHONWARNINGS=ignore::DeprecationWarning \
+		$(VENV)/lowest/bin/python -m pytest -p no:cacheprovider -W ignore::DeprecationWarning $(LOWEST_TESTS)
+
+# Changes of the crates' interfaces since the last version, which need a higher number.
+SEMVER_BASE ?= $(shell git describe --tags --abbrev=0 2>/dev/null)
+semver:
+	cargo install --quiet --locked cargo-semver-checks
+	cargo semver-checks --package lightcrafter --package quadfringe --baseline-rev $(or $(SEMVER_BASE),HEAD)
+
+# The workflows of .github against their schema and for unsafe steps; CI runs actionlint too, which no registry has.
+workflows: $(STAMPS)/tools
+	$(BIN)/pip install --quiet --disable-pip-version-check "check-jsonschema>=0.33" "zizmor>=1.16"
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/zizmor --offline --config .github/zizmor.yml .github/workflows
 
 # Licences and sources of all crates, and known faults of them and of the Python packages in .venv, which are those of all
 # extras, from two databases on the network; dist/python.cdx.json lists the packages.
 audit: $(STAMPS)/audit wheel
 	for crate in . $(FUZZ_CRATES); do cargo deny --manifest-path $$crate/Cargo.toml --config .cargo/deny.toml check; done
-	$(BIN)/pip freeze --exclude-editable > dist/python.txt
+	$(BIN)/pip freeze --exclude quadfringe > dist/python.txt
 	$(BIN)/pip-audit --strict --no-deps --disable-pip --requirement dist/python.txt \
 		--format cyclonedx-json --output dist/python.cdx.json
 
+release: export EXTRAS = all
 release: test audit
 
 $(STAMPS)/audit: $(STAMPS)/built
@@ -185,10 +255,12 @@ $(STAMPS)/tools: pyproject.toml scripts/set-up
 	mkdir -p $(STAMPS)
 	touch $@
 
-# An editable install: Python changes take effect at once, Rust changes rebuild here, always optimised.
+# An editable install of the wheel: Python changes take effect at once, Rust changes rebuild here, always optimised.
 $(STAMPS)/built: $(STAMPS)/tools $(KERNEL)
 	@echo "building the kernel and installing the package (some minutes the first time)"
-	PIP_QUIET=1 PATH="$(CURDIR)/$(BIN):$$PATH" VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release --quiet --extras test
+	$(build-wheel)
+	$(BIN)/pip install --quiet --disable-pip-version-check \
+		"$$($(BIN)/python scripts/editable.py dist/quadfringe-*.whl $(VENV)/editable)[test]"
 	touch $@
 
 clean:

@@ -87,12 +87,38 @@ def test_every_format_to_the_bit(name: str) -> None:
     np.testing.assert_array_equal(pixels if chosen_format.colours == 1 else pixels[:, :, 1], expected)
 
 
+@pytest.mark.parametrize("name", ["Mono10p", "BayerGB12p", "Mono12Packed", "BayerBG10Packed"])
+@pytest.mark.parametrize("size_px", [(3, 5), (7, 3), (2, 1), (5, 2)])
+def test_a_frame_may_end_within_a_group_of_pixels(name: str, size_px: tuple[int, int]) -> None:
+    kind, (width, height) = FORMATS[name], size_px
+    pixels = np.random.default_rng(1).integers(0, 1 << kind.bits, (height, width), dtype=np.uint16)
+    if kind.packing == "p":
+        bits = "".join(f"{value:0{kind.bits}b}"[::-1] for value in pixels.ravel())
+        data = [int(bits[n : n + 8][::-1], 2) for n in range(0, len(bits), 8)]
+    else:
+        low, data = kind.bits - 8, []
+        for first, *second in (pixels.ravel()[n : n + 2].tolist() for n in range(0, pixels.size, 2)):
+            mask = (1 << low) - 1
+            data += [first >> low, first & mask | sum(value & mask for value in second) << 4]
+            data += [value >> low for value in second]
+    assert len(data) == kind.payload(width, height)
+    np.testing.assert_array_equal(kind.pixels(np.array(data, np.uint8), width, height), pixels)
+
+
 def test_packing_as_the_standard_has_it() -> None:
-    """Two pixels 0x123, 0x564 of 12 bits, and 0x123, 0x2AB of 10 bits, packed by hand."""
+    """Pixels 0x123 and 0x564 of 12 bits, 0x123 and 0x2AB of 10 bits and so on, packed by hand."""
     twelve = FORMATS["BayerRG12Packed"].pixels(np.array([0x12, 0x43, 0x56], np.uint8), 2, 1)
     ten = FORMATS["Mono10Packed"].pixels(np.array([0x48, 0x33, 0xAA], np.uint8), 2, 1)
     assert twelve.tolist() == [[0x123, 0x564]]
     assert ten.tolist() == [[0x123, 0x2AB]]
+    streams = {
+        "Mono12p": ([0x23, 0x41, 0x56], [[0x123, 0x564]]),
+        "BayerRG12p": ([0xFF, 0x0F, 0x80], [[0xFFF, 0x800]]),
+        "Mono10p": ([0x23, 0xAD, 0xFA, 0x4F, 0xC0], [[0x123, 0x2AB, 0x0FF, 0x301]]),
+        "BayerRG10p": ([0xFF, 0x03, 0xF0, 0x3F, 0x00], [[0x3FF, 0x000, 0x3FF, 0x000]]),
+    }
+    for name, (data, pixels) in streams.items():
+        assert FORMATS[name].pixels(np.array(data, np.uint8), len(pixels[0]), 1).tolist() == pixels, name
     with pytest.raises(CameraError, match="YUV422_8 is not supported; set pixel_format to one of Mono8"):
         format_named("YUV422_8")
 

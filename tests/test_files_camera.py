@@ -15,7 +15,6 @@ from support.folders import written_in_turn
 from support.shots import first_values
 from typer.testing import CliRunner
 
-from quadfringe.calibration.session.acquisition import exposed
 from quadfringe.cli.app import app
 from quadfringe.config import FilesConfig, SystemConfig, load_system
 from quadfringe.data import BayerShot
@@ -271,10 +270,3 @@ def test_a_recording_of_seconds_ends_although_no_image_comes(tmp_path: Path) -> 
     done = CliRunner().invoke(app, [*take, "--seconds", "0.5"])
     assert done.exit_code == 0, done.output
     assert "0 shots" in done.stdout
-
-
-def test_a_calibration_that_changes_the_exposure_refuses_a_folder(tmp_path: Path) -> None:
-    config = SystemConfig(capture=FilesConfig(folder=tmp_path))
-    assert exposed(config, 1.0).capture == config.capture
-    with pytest.raises(ConfigError, match="that of another program cannot be changed"):
-        exposed(config, 0.5)

@@ -12,7 +12,7 @@ from support.bars import hold, tolerance
 from typer.testing import CliRunner, Result
 
 from quadfringe.calibration.session import FolderCaptures, Guided, Session, guide, take_captures
-from quadfringe.calibration.session.acquisition import exposed
+from quadfringe.calibration.session.exposures import exposed
 from quadfringe.calibration.session.pictures import write_pictures
 from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.cli import app
@@ -246,7 +246,7 @@ def test_a_board_that_is_never_seen_is_an_error(tmp_path: Path) -> None:
         asked.append(name)
         bench.hands("dark", "01", camera)
 
-    with pytest.raises(CalibrationError, match="pose 01: the image is dark"):
+    with pytest.raises(CalibrationError, match="pose 01: the board was not found: the image is dark"):
         take_captures(CONFIG, folder, nobody, ("poses",))
     assert asked == ["01"] * 3
     assert FolderCaptures(folder).missing("poses") == ["01", "02", "03", "04"]

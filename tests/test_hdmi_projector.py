@@ -98,6 +98,16 @@ def test_settings_at_fault(tmp_path: Path, table: str, reason: str) -> None:
         load_system(file)
 
 
+def test_a_lightcrafter_and_a_screen_are_no_pair() -> None:
+    lightcrafter = {"port": "1-1", "hdmi": {}}
+    with pytest.raises(ConfigError, match=r"visible is of kind hdmi: .* a LightCrafter in video mode is a screen"):
+        ProjectorsConfig.model_validate({"visible": screen(output="HDMI-1"), "infrared": lightcrafter})
+    with pytest.raises(ConfigError, match="visible is of kind lightcrafter: expected infrared of the same kind"):
+        ProjectorsConfig.model_validate({"visible": lightcrafter, "infrared": screen(output="HDMI-1")})
+    as_screens = [screen(output=f"HDMI-{n}", size_px=(912, 1140)) for n in (1, 2)]
+    assert ProjectorsConfig(visible=as_screens[0], infrared=as_screens[1]).lightcrafters is None
+
+
 def test_kinds_at_fault() -> None:
     with pytest.raises(ConfigError, match='expected a table whose kind is "lightcrafter", the default, or "hdmi"'):
         ProjectorsConfig.model_validate({"visible": {"kind": "laser"}})

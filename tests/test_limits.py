@@ -25,6 +25,7 @@ FILES = (
     "benches/**/*.py",
     "evaluation/**/*.py",
     "docs/**/*.py",
+    "scripts/**/*.py",
 )
 
 # `path`, or `path::function`, and why it is better long.

@@ -25,7 +25,8 @@ __all__ = ["capture", "windows"]
 
 @pytest.mark.usefixtures("capture")
 def test_the_walk_through_measures_any_projector_with_any_camera(tmp_path: Path) -> None:
-    (tmp_path / "system.toml").write_text(SYSTEM)
+    later = f'calibration = "calibration.json"\n{SYSTEM}\n[decode]\nresponse = "response.json"\n'  # none exists yet
+    (tmp_path / "system.toml").write_text(later)
     out = tmp_path / "response.json"
     command = ["calibrate", "response", "--system", str(tmp_path / "system.toml"), "--out", str(out), "--json", "-"]
     done = CliRunner().invoke(app, command, input="\n")

@@ -11,7 +11,7 @@ from support.shots import sees_no_infrared
 from support.videos import FakeCapture, let_opencv_open, write_video
 from typer.testing import CliRunner
 
-from quadfringe.calibration.session.acquisition import exposed
+from quadfringe.calibration.session.exposures import exposed
 from quadfringe.cli.app import app
 from quadfringe.config import SystemConfig, UvcConfig, load_system
 from quadfringe.data import BayerShot

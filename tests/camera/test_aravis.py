@@ -30,6 +30,8 @@ FORMATS = [
     ("BayerGR8", "Mono8"),
     ("BayerGB12Packed", "Mono12Packed"),
     ("BayerBG10", "Mono10"),
+    ("BayerRG10p", "Mono10p"),
+    ("BayerGB12p", "Mono12p"),
 ]
 
 

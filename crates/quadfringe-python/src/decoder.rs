@@ -99,7 +99,7 @@ impl Decoder {
         let named = PyDict::new(py);
         named.set_item("method", options.method.name())?;
         named.set_item("method_version", options.method.version())?;
-        named.set_item("modulation_min", options.modulation_min)?;
+        named.set_item("modulation_min", options.modulation_min_in_use())?;
         named.set_item("quality_min", options.quality_min)?;
         named.set_item("period_px", options.period_px)?;
         named.set_item("channel_instants_us", options.channel_instants_us())?;

@@ -43,7 +43,7 @@ pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geomet
         method = method.with_along_rays(table);
     }
     let mut options = Options::default().with_method(method);
-    options.modulation_min = choices.modulation_min.unwrap_or(options.modulation_min);
+    options.modulation_min = choices.modulation_min;
     options.quality_min = choices.quality_min.unwrap_or(options.quality_min);
     options.period_px = choices.period_px;
     options.albedo = choices.albedo.unwrap_or(options.albedo);

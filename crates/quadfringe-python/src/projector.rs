@@ -1,19 +1,21 @@
 //! The projectors of a real bench: `LightCrafter`, its sequences, the window on its HDMI output, the packer for flash.
 
+mod backend;
 mod errors;
 mod names;
 mod sequence;
 mod window;
 
+pub use backend::udev_rule;
 pub use sequence::{Pattern, PatternSequence, exposure_in_frame_us, pack_flash};
 pub use window::{PatternWindow, outputs};
 
+use backend::usb::{self, Selector, UsbTransport};
 use errors::device_error;
 use lightcrafter::command::{
     DisplayFreeze, Gamma, PowerMode, TestPatternColours, Timing, TriggerIn2Edge, Validation, Versions,
 };
-use lightcrafter::usb::{Selector, UsbTransport};
-use lightcrafter::{LightCrafter as Driver, Profile, Status, TriggerOut, Triggers, usb};
+use lightcrafter::{LightCrafter as Driver, Profile, Status, TriggerOut, Triggers};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -70,7 +72,8 @@ impl LightCrafter {
         profile.drive_limit = drive_limit.or(profile.drive_limit);
         profile.current_inverted = current_inverted.unwrap_or(profile.current_inverted);
         profile.trigger_invert_byte = trigger_invert_byte.unwrap_or(profile.trigger_invert_byte);
-        let driver = py.detach(|| Driver::open(&selector)).map_err(device_error)?.with_profile(profile);
+        let transport = py.detach(|| UsbTransport::open(&selector)).map_err(device_error)?;
+        let driver = Driver::new(transport).with_profile(profile);
         Ok(Self { place: driver.place(), driver: Mutex::new(Some(driver)) })
     }
 
@@ -284,12 +287,6 @@ impl LightCrafter {
 pub fn lightcrafters(py: Python<'_>) -> PyResult<Vec<(String, u8, Option<String>)>> {
     let found = py.detach(usb::list).map_err(device_error)?;
     Ok(found.into_iter().map(|device| (device.port.to_string(), device.address, device.serial)).collect())
-}
-
-/// The udev file and the line in it that give users permission.
-#[pyfunction]
-pub fn udev_rule() -> (&'static str, &'static str) {
-    (lightcrafter::error::UDEV_FILE, lightcrafter::error::UDEV_RULE)
 }
 
 /// The drive of the LEDs after power-on, which is also the limit of TI's light engine.

@@ -78,7 +78,7 @@ fn by_hand(light: [Array2<f32>; 4], code: &Encoding, table: Option<&PairTable>) 
             *least = f32::NAN;
         }
     });
-    let Options { modulation_min, quality_min, .. } = Options::default();
+    let (modulation_min, quality_min) = (0.02, Options::default().quality_min);
     let valid = discard_invalid(&absolute, modulation.view(), Limits { modulation_min, quality_min })?;
     let columns = columns_from_phase(code, valid.phase_rad.view());
     let mut wrong_order_probability = wrong_order_probability(valid.quality.view());

@@ -120,6 +120,9 @@ REGISTRATION_SPREAD_MIN = 0.1
 # --- Light, that is dark level, responses, crosstalk and flat field: pytest tests/test_channels.py
 
 LEVEL_STEPS = 8  # levels of a ramp: three determine its curvature, the others judge the fit
+# Shorter exposures of the brightest level, shares of the full one: at a quarter, an exponent of the camera that is off
+# by 0.1 changes the level by 3 % of full scale. A shorter one would need more frames of a projector at full exposure.
+SHORTER_EXPOSURES = (0.25, 0.5)
 DARK_LEVEL_MAX = 0.2  # share of full scale: a brighter shot was taken with the lens open
 HOT = 0.02  # share of full scale above the dark level from which a pixel is hot: 5 of 255
 # Share of full scale from which a captured mean is left out, because the sensor cuts off part of the noise.

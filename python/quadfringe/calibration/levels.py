@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.calibration._params import DARK_LEVEL_MAX, HOT, LEVEL_STEPS
+from quadfringe.calibration._params import DARK_LEVEL_MAX, HOT, LEVEL_STEPS, SHORTER_EXPOSURES
 from quadfringe.config import Row4
 from quadfringe.data import AnyShot
 from quadfringe.errors import InputError
@@ -42,13 +42,15 @@ class LevelPlan:
         return tuple("_".join(f"{w}{round(100 * v):03d}" for w, v in zip(words, row, strict=True)) for row in rows)
 
 
-def level_plan(steps: int = LEVEL_STEPS, channels: int = 4) -> LevelPlan:
+def level_plan(
+    steps: int = LEVEL_STEPS, channels: int = 4, exposures: Sequence[float] = SHORTER_EXPOSURES
+) -> LevelPlan:
     """Return the captures that `fit_channels` needs: black, a ramp of each channel, and a ramp of all of them together.
 
     There are 4 `channels`, or 3 without infrared.
 
-    The last two captures repeat the brightest level at shorter exposures, which separates the camera response from the
-    projector response.
+    The last captures repeat the brightest level at these shorter `exposures`, shares of the full one, which separates
+    the camera response from the projector response. Without any, the camera is taken as linear.
 
     >>> from quadfringe.calibration.levels import level_plan
     >>> level_plan(4).names[:2]
@@ -57,10 +59,10 @@ def level_plan(steps: int = LEVEL_STEPS, channels: int = 4) -> LevelPlan:
     ramp = np.round(np.arange(1, steps + 1) / steps, 2)
     single = [level * np.eye(channels)[channel] for channel in range(channels) for level in ramp]
     together = [np.full(channels, level) for level in ramp]
-    bright = [np.full(channels, ramp[-1])] * 2
+    bright = [np.full(channels, ramp[-1])] * len(exposures)
     levels = np.array([np.zeros(channels), *single, *together, *bright])
     exposure = np.ones(len(levels))
-    exposure[-2:] = (0.25, 0.5)
+    exposure[len(levels) - len(exposures) :] = exposures
     return LevelPlan(levels, exposure)
 
 

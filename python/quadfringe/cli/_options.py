@@ -30,6 +30,7 @@ __all__ = [
     "FileSizeOption",
     "FringesOption",
     "HostOption",
+    "InstantsOption",
     "JsonOption",
     "OutFolder",
     "PortOption",
@@ -40,7 +41,7 @@ __all__ = [
     "decode_settings",
     "fringes_from",
     "in_words",
-    "joined_fringes",
+    "joined_numbers",
     "method_named",
 ]
 
@@ -99,27 +100,29 @@ class ChannelsOfCode(StrEnum):
     rgb = "rgb"
 
 
-class FringeNumbers(tuple[float, ...]):
-    """Two or three fringe numbers of one option."""
+class SomeNumbers(tuple[float, ...]):
+    """The numbers of one option, whose count depends on the encoding."""
 
 
-def _fringe_numbers(words: str) -> FringeNumbers:
+def _some_numbers(words: str) -> SomeNumbers:
     """Read the numbers of one option; their count is checked with the encoding."""
     try:
-        return FringeNumbers(float(word) for word in words.split())
+        return SomeNumbers(float(word) for word in words.split())
     except ValueError:
         raise typer.BadParameter(f"expected numbers, such as 36 35 30, got {words!r}") from None
 
 
-def joined_fringes(words: list[str]) -> list[str]:
-    """Join the numbers after --fringes, of which there are two or three, to one word; an option takes one."""
-    if "--fringes" not in words:
-        return words
-    first = words.index("--fringes") + 1
-    count = 0
-    while count < len(FRINGES_3) and first + count < len(words) and _is_number(words[first + count]):
-        count += 1
-    return [*words[:first], " ".join(words[first : first + count]), *words[first + count :]] if count else words
+def joined_numbers(words: list[str]) -> list[str]:
+    """Join the numbers after an option that has as many as the encoding needs to one word; an option takes one."""
+    for option, most in SEVERAL_NUMBERS.items():
+        if option in words:
+            first = words.index(option) + 1
+            count = 0
+            while count < most and first + count < len(words) and _is_number(words[first + count]):
+                count += 1
+            if count:
+                words = [*words[:first], " ".join(words[first : first + count]), *words[first + count :]]
+    return words
 
 
 def _is_number(word: str) -> bool:
@@ -131,14 +134,25 @@ def _is_number(word: str) -> bool:
 
 
 FRINGES_3 = (36.0, 35.0, 30.0)
+SEVERAL_NUMBERS = {"--fringes": 3, "--channel-instants-us": 4}  # options, and how many numbers they have at most
 FringesOption = Annotated[
-    FringeNumbers | None,
+    SomeNumbers | None,
     typer.Option(
         "--fringes",
         metavar="N N [N]",
-        parser=_fringe_numbers,
+        parser=_some_numbers,
         help="Number of fringes over the projector width: of red and blue, of green, of infrared; with --encoding rgb "
         "of red, green, blue, or two: of red and blue in quadrature, and of green. Default: 36 35 30.",
+    ),
+]
+InstantsOption = Annotated[
+    SomeNumbers | None,
+    typer.Option(
+        "--channel-instants-us",
+        metavar="R G B [IR]",
+        parser=_some_numbers,
+        help="Time at which each channel is exposed, us, relative to the instant of the result; use it for moving "
+        "objects when the projector shows the colours one after another. Default: all at once.",
     ),
 ]
 EncodingOption = Annotated[

@@ -30,9 +30,12 @@ def say_outputs() -> bool:
     return True
 
 
-def say_picture_modes(projector: Projector, tell: Callable[[str], None] = say) -> None:
-    """Print what to check with a projector of kind hdmi, because no program can read it; nothing for others."""
+def say_picture_modes(projector: Projector | None = None, tell: Callable[[str], None] = say) -> None:
+    """Print what to check with a projector of kind hdmi, because no program can read it; nothing for others.
+
+    Without a projector there is one of kind hdmi, which need not be opened.
+    """
     from quadfringe.devices.hdmi import PICTURE_MODES, HdmiProjectors
 
-    if isinstance(projector, HdmiProjectors):
+    if projector is None or isinstance(projector, HdmiProjectors):
         tell("\n".join(["check by hand:", *(f"  {words}" for words in PICTURE_MODES)]))

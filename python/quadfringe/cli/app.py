@@ -30,7 +30,7 @@ from quadfringe.cli import (
     target,
     view,
 )
-from quadfringe.cli._options import in_words, joined_fringes
+from quadfringe.cli._options import in_words, joined_numbers
 from quadfringe.cli._output import cautions, complain
 from quadfringe.errors import BatchError, CameraError, DecodeError, MissingExtraError, RecordingError
 
@@ -43,8 +43,8 @@ class Commands(TyperGroup):
     """Exit with 2 for bad input and with 1 for a failed run; both print one message and no traceback."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Take two or three numbers after --fringes."""
-        return super().parse_args(ctx, joined_fringes(args))
+        """Take as many numbers after an option as the encoding needs."""
+        return super().parse_args(ctx, joined_numbers(args))
 
     def invoke(self, ctx: Any) -> Any:
         """Run the command and turn its errors into exit statuses."""

@@ -72,6 +72,10 @@ def run(
     _write_extras(found, pictures, heights, json)
     found.calibration.save(out)
     say(f"{out}: {'every step is good' if found.good else 'NOT every step is good; see above'}", json)
+    say(
+        f'use it with calibration = "{out.name}" in the system file; it holds the responses, so leave response out',
+        json,
+    )
     write_record({"good": found.good, "steps": [one.step.model_dump(mode="json") for one in found.outcomes]}, json)
     if not found.good:
         raise typer.Exit(NOT_GOOD)
@@ -116,15 +120,35 @@ def plan(
     folder: NewFolder,
     rig: Annotated[str, typer.Option(help="Name of the bench, kept in the calibration.")],
     poses: BoardPosesOption = 12,
+    system: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE",
+            help="System file, .toml: plan for its fringes, projectors and camera. Default: two "
+            "LightCrafters and a camera with infrared.",
+        ),
+    ] = None,
+    target: Annotated[
+        Path | None,
+        typer.Option(
+            "--target", metavar="FILE", help="Calibration board, .json of quadfringe target; default: the ring board."
+        ),
+    ] = None,
 ) -> None:
     """Write session.json, whose settings you may edit afterwards, and list every capture to take."""
-    from quadfringe.calibration.session.settings import FILE, Session
+    from quadfringe.calibration.session import session_of
+    from quadfringe.calibration.session.settings import FILE
+    from quadfringe.calibration.targets import Target
+    from quadfringe.config import SystemConfig, checked, load_system
+    from quadfringe.data.calibration import stored_values
     from quadfringe.errors import InputError
     from quadfringe.files import folder_for
 
     if (folder / FILE).exists():
         raise InputError(f"{folder / FILE}: exists already; edit it, or choose another folder")
-    session = Session(rig=rig, poses=poses)
+    board = {} if target is None else {"target": checked(Target, stored_values(target), str(target))}
+    config = SystemConfig() if system is None else load_system(system)
+    session = session_of(config, rig, poses=poses, **board)
     session.save(folder_for(folder) / FILE)
     _list_captures(folder)
 
@@ -160,9 +184,7 @@ def _list_captures(folder: Path) -> bool:
 @app.command()
 def capture(
     folder: CapturesFolder,
-    system: Annotated[
-        Path, typer.Option(metavar="FILE", help="System file with the camera and both projectors, .toml.")
-    ],
+    system: Annotated[Path, typer.Option(metavar="FILE", help="System file with camera and projectors, .toml.")],
     step: Annotated[
         list[str] | None,
         typer.Option(metavar="STEP", help="Take the captures of this step only; may be repeated; default: all steps."),
@@ -171,28 +193,48 @@ def capture(
     """Take the missing captures: say what to place in front of the camera, wait for Enter, project, take the shot.
 
     A pose in which the board is not found is repeated at once. Run the command again to continue an interrupted
-    session. On the virtual bench it does not wait for Enter.
+    session. Without --step, all steps are taken, also the optional ones. On the virtual bench it does not wait for
+    Enter. With files:FOLDER it says which exposure to set in the program of the camera, and waits for each image.
     """
     from quadfringe.calibration.session import FolderCaptures, take_captures
-    from quadfringe.calibration.session.settings import STEP_NAMES, step_named
+    from quadfringe.calibration.session.settings import STEP_NAMES
     from quadfringe.calibration.session.virtual import VirtualCaptures
     from quadfringe.config import load_system
     from quadfringe.config.cameras import VirtualConfig
 
-    explained: set[str] = set()
-
-    def person(step: str, name: str, _: object) -> None:
-        if step not in explained:
-            say(step_named(step).how)
-        if step not in explained or step not in ("dark", "levels", "flat"):
-            typer.prompt(f"{step}/{name}: press Enter when everything is still", default="", show_default=False)
-        explained.add(step)
-
     config, session = load_system(system), FolderCaptures(folder).session
     virtual = isinstance(config.capture, VirtualConfig)
-    hands = VirtualCaptures(config, session).hands if virtual else person
-    taken = take_captures(config, folder, hands, step or STEP_NAMES, say)
+    hands = VirtualCaptures(config, session).hands if virtual else _Person().hands
+    taken = take_captures(config, folder, hands, step or STEP_NAMES, say, _expose)
     say(f"{folder}: {len(taken)} captures taken; next: quadfringe calibrate check {folder}")
+
+
+class _Person:
+    """Asks a person to put the object of each capture in place, and explains each step once."""
+
+    def __init__(self) -> None:
+        self._explained: set[str] = set()
+
+    def hands(self, step: str, name: str, _: object) -> None:
+        """Wait until a person has put the object of a capture in place."""
+        from quadfringe.calibration.session import step_named
+
+        first = step not in self._explained
+        if first:
+            say(step_named(step).how)
+            self._explained.add(step)
+        if first or step not in ("dark", "levels", "flat"):
+            _wait(f"{step}/{name}: press Enter when everything is still")
+
+
+def _expose(share: float) -> None:
+    """Wait until a person has set the exposure in the program of the camera."""
+    to = f"set it to {share:.0%} of the full one" if share != 1 else "set it back to the full one"
+    _wait(f"exposure of the camera: {to}, in the program of the camera, and press Enter")
+
+
+def _wait(words: str) -> None:
+    typer.prompt(words, default="", show_default=False)
 
 
 @app.command()

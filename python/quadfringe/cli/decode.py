@@ -21,6 +21,7 @@ from quadfringe.cli._options import (
     ColumnsOption,
     EncodingOption,
     FringesOption,
+    InstantsOption,
     JsonOption,
     PredeformedOption,
     decode_settings,
@@ -117,14 +118,7 @@ PeriodOption = Annotated[
         "estimate fails, as on an object narrower than two fringes.",
     ),
 ]
-InstantsOption = Annotated[
-    tuple[float, float, float, float] | None,
-    typer.Option(
-        metavar="R G B IR",
-        help="Time at which each channel is exposed, us, relative to the instant of the result; use it for moving "
-        "objects when the projector shows the colours one after another. Default: all at once.",
-    ),
-]
+
 
 ReportOption = Annotated[
     Path | None,
@@ -182,7 +176,7 @@ def _settings(
     unwrapping: Unwrapping | None,
     depth_range_mm: tuple[float, float] | None,
     period_px: float | None,
-    channel_instants_us: tuple[float, float, float, float] | None,
+    channel_instants_us: tuple[float, ...] | None,
 ) -> dict[str, Any]:
     """Give the options of the method by the names of the settings."""
     given: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}

@@ -14,14 +14,17 @@ __all__ = ["demo"]
 
 
 def demo(
-    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the PLY files, reports and figures.")] = Path(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Folder for the surfaces, reports and figures.")] = Path(
         "out/demo"
     ),
     encoding: EncodingOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Measure two scenes, steps and a face, on the virtual bench; write PLY files, PNG reports and figures.json."""
-    from quadfringe.evaluation.demo import SCENES, run_scene
+    """Measure two scenes, steps and a face, on the virtual bench; write PLY files, PNG reports and figures.json.
+
+    Without the extras export and plot it writes GLB files and small reports.
+    """
+    from quadfringe.evaluation.demo import SCENES, missing_extras, run_scene
     from quadfringe.files import folder_for
 
     folder_for(out)
@@ -36,5 +39,7 @@ def demo(
     figures["decode_ms"] = min(decode_ms)
     table("one shot per scene, compared with the simulated truth", figures, json)
     say(f"files in {out}: {', '.join(sorted(p.name for p in out.iterdir()))}", json)
+    if (left_out := missing_extras()) is not None:
+        say(left_out, json)
     write_figures(figures, out / "figures.json")
     write_figures(figures, json)

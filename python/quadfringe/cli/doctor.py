@@ -22,6 +22,8 @@ from quadfringe.cli._options import (
     fringes_from,
 )
 from quadfringe.cli._output import say, write_record
+from quadfringe.cli._screens import say_picture_modes
+from quadfringe.cli._system import CameraOption, system_of
 
 if TYPE_CHECKING:
     from quadfringe.data import AnyShot
@@ -55,6 +57,10 @@ TargetOption = Annotated[
 PlaneOption = Annotated[
     bool, typer.Option("--plane", help="The shots show a flat plate that fills most of the image: measure its bow.")
 ]
+SystemOption = Annotated[
+    Path | None,
+    typer.Option("--system", metavar="FILE", help="System file, .toml: examine its camera, screens and settings."),
+]
 
 
 def doctor(
@@ -68,17 +74,22 @@ def doctor(
     board: BoardOption = False,
     target: TargetOption = None,
     plane: PlaneOption = False,
+    system: SystemOption = None,
+    camera: CameraOption = None,
     json: JsonOption = None,
 ) -> None:
-    """Examine the installation, or a shot or a calibration; say what is wrong and how to fix it.
+    """Examine the installation, or a shot, a calibration or a system; say what is wrong and how to fix it.
 
-    With --board or --plane, tell a fault of the calibration from one of the decoding. The exit status is 1 when a fault
-    is found.
+    With --board or --plane, tell a fault of the calibration from one of the decoding. With --system or --camera, open
+    the camera, look through some frames, and compare settings and screens. The exit status is 1 when a fault is found.
     """
     from quadfringe.data import Calibration
     from quadfringe.decoding import Plan
     from quadfringe.doctor import examine_calibration, examine_digest, examine_installation
 
+    if system is not None or camera is not None:
+        _report(_of_system(system, camera, files), json)
+        return
     surface = _surface(board, target, plane)
     given = _sorted_paths(files or [], several=surface is not None)
     calibration = None if given.calibration is None else Calibration.load(given.calibration)
@@ -90,6 +101,21 @@ def doctor(
         one = _examined(_shot_in(folder, bayer, bits), plan, surface)
         found += [replace(each, name=f"{folder.name} {each.name}") for each in one] if len(given.shots) > 1 else one
     _report(found, json)
+
+
+def _of_system(system: Path | None, camera: str | None, files: list[Path] | None) -> list[Finding]:
+    """Examine a system, and print what must be checked by hand."""
+    from quadfringe.config import HdmiProjectorConfig
+    from quadfringe.doctor import examine_system
+    from quadfringe.errors import InputError
+
+    if files:
+        raise InputError("--system and --camera examine devices, and paths name files; give one of them")
+    config = system_of(system, camera)
+    assert config is not None  # one of them was given
+    if config.projectors is not None and isinstance(config.projectors.visible, HdmiProjectorConfig):
+        say_picture_modes()
+    return examine_system(config)
 
 
 Examined = Callable[["AnyShot", "Plan"], "list[Finding]"]

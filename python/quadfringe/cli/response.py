@@ -120,6 +120,9 @@ def _taken(
     from quadfringe.devices.light import Levels
     from quadfringe.scanner import open_system
 
+    # Files that this command leads to may be named already, and need not exist yet.
+    linear = config.decode.model_copy(update={"response": "linear"})
+    config = config.model_copy(update={"calibration": None, "decode": linear})
     projectors = config.projectors
     virtual = config.capture.kind == "virtual"
     infrared = virtual if projectors is None else projectors.infrared is not None

@@ -23,6 +23,7 @@ __all__ = [
     "ResponseChoice",
     "ResponseSetting",
     "Row4",
+    "instants_of_four",
 ]
 
 Row4 = tuple[Finite, Finite, Finite, Finite]
@@ -30,6 +31,12 @@ SMALLEST = 16, 16  # rows and columns of the smallest image that the kernel deco
 PERIOD_MIN_PX = 3.0  # the least that the kernel takes; the most is the longer side of the image
 # Older settings and files call the joint method "best".
 Method = Annotated[Literal["published", "joint"], BeforeValidator(lambda v: "joint" if v == "best" else v)]
+
+
+def instants_of_four(instants: tuple[float, ...]) -> Row4:
+    """Give the times of R, G, B and IR; without infrared, the last one has no effect and is that of red."""
+    red, green, blue, ir = (*instants, instants[0])[:4]
+    return red, green, blue, ir
 
 
 class ChannelResponse(Model):
@@ -115,7 +122,8 @@ class DecodeConfig(Model):
     )
     modulation_min: Finite | None = Field(
         default=None,
-        description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels.",
+        description="Least fringe amplitude of a valid pixel, fraction of full scale. Raise it to drop dark pixels. "
+        "Absent: with method joint the noise of each shot decides; with method published 0.02.",
     )
     quality_min: Finite | None = Field(
         default=None,
@@ -128,10 +136,11 @@ class DecodeConfig(Model):
         "to a third. Absent: estimated from every shot. Give it if the estimate fails, as on an object narrower than "
         "two fringes.",
     )
-    channel_instants_us: Row4 | None = Field(
+    channel_instants_us: tuple[Finite, ...] | None = Field(
         default=None,
-        description="Times in us at which R, G, B and IR are exposed, relative to the instant of the shape. For "
-        "moving surfaces and a projector that shows its colours one after another (method joint).",
+        description="Times in us at which R, G, B and IR are exposed, relative to the instant of the shape; three "
+        "without infrared. For moving surfaces and a projector that shows its colours one after another (method "
+        "joint).",
     )
     albedo: bool | None = Field(
         default=None,
@@ -147,6 +156,10 @@ class DecodeConfig(Model):
     def _decoder_takes(cls, value: Any, info: ValidationInfo) -> Any:
         if value is not None and info.field_name is not None:
             settings = {info.field_name: value}
+            if info.field_name == "channel_instants_us":
+                if len(value) not in (3, 4):
+                    raise ValueError("expected four times, of R, G, B and IR, or three without infrared")
+                settings = {info.field_name: instants_of_four(value)}
             kernel_takes(info.field_name, lambda: _core.Decoder(SMALLEST, (36, 35, 30), 912, **settings))
         return value
 

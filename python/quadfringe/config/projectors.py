@@ -144,7 +144,10 @@ class ProjectorsConfig(Model):
             if infrared is None:
                 return self
             if not isinstance(infrared, HdmiProjectorConfig) or infrared.size_px != visible.size_px:
-                raise ValueError("visible is of kind hdmi: expected infrared of the same kind and size, or none")
+                raise ValueError(
+                    "visible is of kind hdmi: expected infrared of the same kind and size, or none; a LightCrafter in "
+                    "video mode is a screen of 912 x 1140, of that kind"
+                )
             windows = [visible.output, infrared.output]
         else:
             if not isinstance(infrared, ProjectorConfig):

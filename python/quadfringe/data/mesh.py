@@ -93,7 +93,7 @@ class Mesh:
 
         Coordinates are mm in the camera frame; in GLB they are metres with y up, as the format wants it. STL holds no
         colours and no normals of vertices, PLY alone holds `scalars`. Raises `InputError` for another suffix, a mesh
-        without triangles, and a folder that does not exist; `MissingExtraError` without trimesh.
+        without triangles, and a folder that does not exist; `MissingExtraError` without trimesh, except for GLB.
         """
         path = Path(path)
         require_suffix(path, SUFFIXES)

@@ -11,6 +11,7 @@ import numpy as np
 
 from quadfringe import _core
 from quadfringe.config import SIZE_MAX, Response, brief
+from quadfringe.config.decode import instants_of_four
 from quadfringe.config.memory import require_memory
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, Shot, conditioning, core_device
 from quadfringe.decoding.plan import Plan
@@ -42,7 +43,7 @@ class KernelDecoder:
         self._described = (
             plan.described
             | self._response_described(source)
-            | {"decode": rounded(self._idle[0].settings()) | _stated_depths(plan)}
+            | {"decode": rounded(self._idle[0].settings()) | _stated(plan)}
         )
 
     @property
@@ -105,6 +106,8 @@ class KernelDecoder:
         # Only the search along rays takes the range; else depths outside become no data after decoding.
         after = set() if plan.decode.unwrapping == "pair" else {"depth_range_mm"}
         settings = plan.decode.model_dump(exclude_none=True, exclude={"unwrapping", "response", *after})
+        if plan.decode.channel_instants_us is not None:
+            settings["channel_instants_us"] = instants_of_four(plan.decode.channel_instants_us)
         try:
             return _core.Decoder(
                 self._size,
@@ -208,9 +211,10 @@ def _of_rows(calibration: Calibration, first: int, count: int) -> Calibration:
     return calibration.model_copy(update={"camera": camera, "ir_registration": registration})
 
 
-def _stated_depths(plan: Plan) -> dict[str, Any]:
-    depths = plan.decode.depth_range_mm
-    return {} if depths is None else {"depth_range_mm": list(depths)}
+def _stated(plan: Plan) -> dict[str, Any]:
+    """Give the settings that stand in a file as they were stated, not as the kernel was given them."""
+    stated = {name: getattr(plan.decode, name) for name in ("depth_range_mm", "channel_instants_us")}
+    return {name: list(value) for name, value in stated.items() if value is not None}
 
 
 def _geometry(plan: Plan) -> dict[str, Any]:

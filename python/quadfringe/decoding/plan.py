@@ -51,11 +51,15 @@ class Plan:
     ) -> None:
         settings = decode if isinstance(decode, DecodeConfig) else checked(DecodeConfig, decode, "decode")
         columns = _columns(projector_width_px)
+        known, undone = calibration_of(calibration), response_of(response, settings.response)
+        shown = _fringes(fringes, columns)
+        _check_undone_once(undone, known)
+        _check_instants(settings.channel_instants_us, shown)
         fields = {
             "projector_width_px": columns,
-            "fringes": _fringes(fringes, columns),
-            "calibration": calibration_of(calibration),
-            "response": response_of(response, settings.response),
+            "fringes": shown,
+            "calibration": known,
+            "response": undone,
             "decode": settings.model_copy(update={"response": "auto"}),
         }
         for name, value in fields.items():
@@ -143,6 +147,26 @@ def response_of(given: Any, setting: Any = "auto") -> ResponseChoice:
         raise InputError(f"response: given as {given!r}, and as {setting!r} among the settings; give it once")
     found = checked(DecodeConfig, {"response": setting if given == "auto" else given}, "response").response
     return ResponseCalibration.load(found) if isinstance(found, Path) else found
+
+
+def _check_undone_once(response: ResponseChoice, known: Calibration | None) -> None:
+    """Raise `InputError` when the response of the projector would be undone twice, which shifts every depth."""
+    if not isinstance(response, ResponseCalibration) or known is None or known.projector_response is None:
+        return
+    if known.projector_response != Response():
+        raise InputError(
+            "response: a response file undoes camera and projector together, and this calibration holds a response of "
+            "the projector too; leave the response out"
+        )
+
+
+def _check_instants(instants: tuple[float, ...] | None, fringes: Fringes) -> None:
+    """Raise `InputError` unless there is one time for each channel of the encoding."""
+    if instants is not None and len(instants) != len(fringes.channels):
+        raise InputError(
+            f"channel_instants_us: expected {len(fringes.channels)} times, of {', '.join(fringes.channels)}, got "
+            f"{len(instants)}: {brief(instants)}"
+        )
 
 
 def stated_response(response: ResponseChoice, known: Calibration | None) -> ResponseChoice:

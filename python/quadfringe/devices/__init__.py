@@ -11,7 +11,7 @@ from typing import Literal, Protocol, Self
 from quadfringe.config import Fringes, SystemConfig, check_system
 from quadfringe.config.cameras import capture_config
 from quadfringe.data import AnyShot, Calibration
-from quadfringe.devices._frames import warn_of_part_frames, with_whole_frames
+from quadfringe.devices._frames import part_frames, warn_of_part_frames, with_whole_frames
 from quadfringe.devices.light import Light
 from quadfringe.errors import ConfigError
 
@@ -26,6 +26,8 @@ __all__ = [
     "open_camera",
     "open_devices",
     "open_projector",
+    "part_frames",
+    "with_whole_frames",
 ]
 
 Keep = Literal["latest", "all"]

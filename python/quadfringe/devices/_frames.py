@@ -7,11 +7,13 @@ differently, because nothing synchronises the two. Over whole frames, a still pa
 from __future__ import annotations
 
 import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 from quadfringe.config import AravisConfig, HdmiProjectorConfig, SystemConfig, UvcConfig
 from quadfringe.errors import CameraWarning
 
-__all__ = ["exposures_us", "warn_of_part_frames", "whole_frames_us", "with_whole_frames"]
+__all__ = ["PartFrame", "exposures_us", "part_frames", "warn_of_part_frames", "whole_frames_us", "with_whole_frames"]
 
 USUAL_RATE_HZ = 60.0  # of a screen that does not say
 PART = 0.02  # share of a frame that may be missing: cameras round their exposures to steps of up to 100 us
@@ -38,22 +40,52 @@ def exposures_us(config: SystemConfig) -> dict[str, float]:
     return {name: exposure_us for name, exposure_us in found.items() if exposure_us is not None}
 
 
-def warn_of_part_frames(config: SystemConfig) -> None:
-    """Warn of exposures that are no whole number of frames of a projector of kind hdmi; name the nearest one."""
-    projector = _projector(config)
-    if projector is None:
+@dataclass(frozen=True)
+class PartFrame:
+    """An exposure that is no whole number of frames of the projector: its setting, and how many frames it is."""
+
+    setting: str
+    exposure_us: float
+    frame_rate_hz: float
+
+    @property
+    def period_us(self) -> float:
+        """Duration of a frame."""
+        return 1e6 / self.frame_rate_hz
+
+    @property
+    def frames(self) -> float:
+        """Number of frames that the exposure lasts."""
+        return self.exposure_us / self.period_us
+
+    @property
+    def whole_us(self) -> float:
+        """The nearest exposure of whole frames."""
+        return whole_frames_us(self.exposure_us, self.frame_rate_hz)
+
+
+def part_frames(config: SystemConfig) -> Iterator[PartFrame]:
+    """Give the exposures that are no whole number of frames of a projector of kind hdmi."""
+    projector, exposures = _projector(config), exposures_us(config)
+    if projector is None or not exposures:
         return
     rate_hz = _rate_hz(projector)
-    for name, exposure_us in exposures_us(config).items():
-        best_us = whole_frames_us(exposure_us, rate_hz)
-        if abs(exposure_us - best_us) > PART * 1e6 / rate_hz:
-            warnings.warn(
-                f"capture.{name}: {exposure_us:g} us is {exposure_us * rate_hz / 1e6:.2f} frames of the projector "
-                f"({rate_hz:g} Hz), so that colours differ from shot to shot; set {best_us:g}, or match_exposure of "
-                "the projector",
-                CameraWarning,
-                stacklevel=2,
-            )
+    for name, exposure_us in exposures.items():
+        found = PartFrame(name, exposure_us, rate_hz)
+        if abs(exposure_us - found.whole_us) > PART * found.period_us:
+            yield found
+
+
+def warn_of_part_frames(config: SystemConfig) -> None:
+    """Warn of exposures that are no whole number of frames of a projector of kind hdmi; name the nearest one."""
+    for part in part_frames(config):
+        warnings.warn(
+            f"capture.{part.setting}: {part.exposure_us:g} us is {part.frames:.2f} frames of the projector "
+            f"({part.frame_rate_hz:g} Hz), so that colours differ from shot to shot; set {part.whole_us:g}, or "
+            "match_exposure of the projector",
+            CameraWarning,
+            stacklevel=2,
+        )
 
 
 def with_whole_frames(config: SystemConfig) -> SystemConfig:

@@ -5,6 +5,7 @@ from quadfringe.doctor.finding import Finding
 from quadfringe.doctor.installation import examine_installation
 from quadfringe.doctor.plate import examine_board, examine_plane
 from quadfringe.doctor.shot import examine_shot
+from quadfringe.doctor.system import examine_system
 
 __all__ = [
     "Finding",
@@ -14,4 +15,5 @@ __all__ = [
     "examine_installation",
     "examine_plane",
     "examine_shot",
+    "examine_system",
 ]

@@ -1,4 +1,4 @@
-"""The tuned numbers of the checks on a board and a plate: value, unit, trade-off, and what measured each.
+"""The tuned numbers of the checks on a board, a plate and devices: value, unit, trade-off, and what measured each.
 
 `pytest tests/test_doctor_board.py -rP` prints the figures that the limits separate: of sound benches, of calibrations
 with one wrong number, and of shots that are decoded wrongly. Each limit is (warning, fault).
@@ -62,3 +62,15 @@ WAVE_RAD = (0.012, 0.025)
 # Share of the pixels of the plate with a wrong order. Sound: up to 0.001, on a print with 3 % noise. Smaller limits
 # name single pixels at its edges.
 WRONG_ORDERS = (0.003, 0.02)
+
+# --- Screens and webcams: pytest tests/test_doctor_system.py
+
+# Relative difference of two rates, or of a period from an exposure, that counts: screens run at 59.94 Hz for 60.
+RATE_SHARE = 0.05
+# Frames that a webcam is looked through: at 15 Hz less than a second. More find slower changes of light.
+FRAMES = 8
+# Period of frames over the stated one from which frames are called slow; drivers deliver in bursts.
+SLOW_RATIO = 1.5
+# Range of the mean brightness of still frames, % (warning, fault). Not measured: as the steadiness of a projector in
+# calibrate response; half an exposure more or less is 50.
+STEADY_PERCENT = (2.0, 20.0)

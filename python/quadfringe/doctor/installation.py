@@ -47,13 +47,13 @@ def _opencv() -> list[Finding]:
     if len(names) != 1:
         words = f"{' and '.join(names)} are installed and overwrite each other" if names else "OpenCV is not installed"
         fix = f"pip uninstall -y {' '.join(names)}; pip install " if names else "pip install "
-        return [Finding("opencv", "fault", words, f'{fix}"{OPENCV[-1]}>=4.10,<6"')]
+        return [Finding("opencv", "fault", words, f'{fix}"{OPENCV[-1]}>=4.10.0.84,<6"')]
     import cv2
 
     wanted = ("findCirclesGrid", "aruco", "FileStorage")
     if missing := [name for name in wanted if not hasattr(cv2, name)]:
         words = f"{names[0]} {cv2.__version__} has no {', '.join(missing)}"
-        return [Finding("opencv", "fault", words, f'pip install --force-reinstall "{OPENCV[-1]}>=4.10,<6"')]
+        return [Finding("opencv", "fault", words, f'pip install --force-reinstall "{OPENCV[-1]}>=4.10.0.84,<6"')]
     if names[0] != OPENCV[-1]:
         words = f"{names[0]} {cv2.__version__} in place of {OPENCV[-1]}"
         fix = f"pip uninstall -y {names[0]}; pip install {OPENCV[-1]}"

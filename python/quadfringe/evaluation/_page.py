@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 from urllib.request import urlopen
 
-from websockets.sync.client import connect
+from quadfringe.errors import require
 
 FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"]
 
@@ -34,6 +34,7 @@ class Page:
         port = said.split("/")[2]
         with urlopen(f"http://{port}/json/list") as answer:
             target = next(target for target in json.load(answer) if target["type"] == "page")
+        connect: Any = require("websockets.sync.client", "view").connect
         self._wire = connect(target["webSocketDebuggerUrl"], max_size=None)
         self._asked = 0
 

@@ -110,25 +110,33 @@ class Triangles:
 
 
 def write_mesh(path: Path, mesh: Triangles) -> None:
-    """Write a mesh by suffix: .stl, .obj, .ply, or .glb.
+    """Write a mesh by suffix: .stl, .obj, .ply, or .glb, which alone needs no trimesh.
 
     glTF wants metres and y up: a GLB is turned and has no scalars.
     """
-    require("trimesh", "export")
-    from trimesh.exchange import obj, ply, stl
-
     suffix = path.suffix.lower()
     if suffix == ".glb":
         points, normals = mesh.vertices_mm * GLB_FROM_MM, np.nan_to_num(mesh.normals * np.sign(GLB_FROM_MM))
         content = glb_bytes(points, mesh.faces, mesh.colour, normals)
-    elif suffix == ".obj":
+    else:
+        content = _content(suffix, mesh)
+    with atomic(path) as temporary:
+        temporary.write_bytes(content)
+
+
+def _content(suffix: str, mesh: Triangles) -> bytes:
+    """Give the mesh in a format that trimesh writes."""
+    require("trimesh", "export")
+    from trimesh.exchange import obj, ply, stl
+
+    content: bytes
+    if suffix == ".obj":
         content = obj.export_obj(mesh.to_trimesh(), include_normals=True).encode()
     elif suffix == ".ply":
         content = ply.export_ply(mesh.to_trimesh(), vertex_normal=True)
     else:
         content = stl.export_stl(mesh.to_trimesh())
-    with atomic(path) as temporary:
-        temporary.write_bytes(content)
+    return content
 
 
 def write_depth(path: Path, depth_mm: NDArray[np.float32]) -> None:

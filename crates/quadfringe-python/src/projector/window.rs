@@ -1,8 +1,8 @@
 //! The window on an HDMI output.
 
+use super::backend::screen::{self, SIZE_PX};
 use super::errors::device_error;
 use crate::arrays::expected;
-use lightcrafter::window::SIZE_PX;
 use numpy::PyUntypedArrayMethods;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 /// A borderless window that covers the output of a projector.
 #[pyclass(frozen, module = "quadfringe._core")]
 pub struct PatternWindow {
-    window: Mutex<Option<lightcrafter::window::PatternWindow>>,
+    window: Mutex<Option<screen::PatternWindow>>,
     output: String,
     size_px: (u32, u32),
     frame_rate_hz: Option<f64>,
@@ -23,9 +23,8 @@ impl PatternWindow {
     #[pyo3(signature = (output = None, size_px = None))]
     fn new(py: Python<'_>, output: Option<&str>, size_px: Option<(u32, u32)>) -> PyResult<Self> {
         let size_px = size_px.unwrap_or(SIZE_PX);
-        let window = py
-            .detach(|| lightcrafter::window::PatternWindow::open_sized(output, size_px))
-            .map_err(device_error)?;
+        let window =
+            py.detach(|| screen::PatternWindow::open_sized(output, size_px)).map_err(device_error)?;
         let (name, frame_rate_hz) = (window.output().name.clone(), window.output().frame_rate_hz);
         Ok(Self { output: name, size_px, frame_rate_hz, window: Mutex::new(Some(window)) })
     }
@@ -85,8 +84,8 @@ type Row = (String, u32, u32, Option<f64>, Option<String>);
 #[pyo3(signature = (size_px = None))]
 pub fn outputs(py: Python<'_>, size_px: Option<(u32, u32)>) -> PyResult<Vec<Row>> {
     let size_px = size_px.unwrap_or(SIZE_PX);
-    let outputs = py.detach(lightcrafter::window::outputs).map_err(device_error)?;
-    let row = |output: lightcrafter::window::Output| {
+    let outputs = py.detach(screen::outputs).map_err(device_error)?;
+    let row = |output: screen::Output| {
         let unfit = output.unfit_for(size_px);
         (output.name, output.size_px.0, output.size_px.1, output.frame_rate_hz, unfit)
     };

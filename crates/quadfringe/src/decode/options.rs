@@ -9,16 +9,16 @@ use crate::error::{Error, Limit, Result};
 /// ```
 /// use quadfringe::Options;
 /// let options = Options::default().with_modulation_min(0.01).with_period_px(20.0);
-/// assert_eq!((options.modulation_min, options.quality_min), (0.01, 0.15));
+/// assert_eq!((options.modulation_min, options.quality_min), (Some(0.01), 0.15));
 /// ```
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Options {
     /// The method, with the options that only it has. Default: joint.
     pub method: Method,
-    /// Least modulation of R and B that counts as light, as a fraction of full scale. Lower it for dark surfaces; raise it
-    /// if noise in shadows is returned as data. Default: 0.02.
-    pub modulation_min: f32,
+    /// Least modulation of R and B that counts as light, as a fraction of full scale. `None`: by the joint method the noise of
+    /// the shot, so that dark surfaces count where the noise allows it; by the published one 0.02. Default: `None`.
+    pub modulation_min: Option<f32>,
     /// Least quality of a fringe order that is returned, in [0, 1]. A higher value removes more wrong orders, and
     /// correct points with them. Default: 0.15.
     pub quality_min: f32,
@@ -34,7 +34,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             method: Method::default(),
-            modulation_min: MODULATION_MIN,
+            modulation_min: None,
             quality_min: QUALITY_MIN,
             period_px: None,
             albedo: true,
@@ -53,7 +53,7 @@ impl Options {
     /// These options with this least modulation.
     #[must_use]
     pub const fn with_modulation_min(mut self, modulation_min: f32) -> Self {
-        self.modulation_min = modulation_min;
+        self.modulation_min = Some(modulation_min);
         self
     }
 
@@ -76,6 +76,15 @@ impl Options {
     pub const fn with_albedo(mut self, albedo: bool) -> Self {
         self.albedo = albedo;
         self
+    }
+
+    /// The least modulation that counts as light; `None` if the noise of each shot decides.
+    #[must_use]
+    pub const fn modulation_min_in_use(&self) -> Option<f32> {
+        match (self.modulation_min, &self.method) {
+            (None, Method::Published(_)) => Some(MODULATION_MIN),
+            (given, _) => given,
+        }
     }
 
     /// Whether decoded shots have the albedo, which only the joint method gives.
@@ -104,8 +113,8 @@ impl Options {
 
     /// Checks the options for images of `shape` (rows, columns).
     pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
-        let fractions = [("modulation_min", self.modulation_min), ("quality_min", self.quality_min)];
-        for (name, value) in fractions {
+        let modulation_min = self.modulation_min.map(|value| ("modulation_min", value));
+        for (name, value) in modulation_min.into_iter().chain([("quality_min", self.quality_min)]) {
             if !(0.0..1.0).contains(&value) {
                 return Err(Error::value(name, Limit::Fraction, value));
             }

@@ -12,9 +12,10 @@ pub(super) const PERIOD_MIN_PX: f64 = 3.0;
 /// fewer rows the time between tasks grows. It changes no result, only the time: `cargo bench -p quadfringe -- shot`.
 pub(crate) const ROWS_AT_ONCE: usize = 8;
 
-/// Default of the least modulation of R and B, fraction of full scale. A smaller value returns noise in shadows as data; a larger
-/// value loses dark surfaces. `cargo test -p quadfringe --test round_trip` holds the share of lit pixels that come back.
-pub(super) const MODULATION_MIN: f32 = 0.02;
+/// Default of the least modulation of R and B of the published method, fraction of full scale. A smaller value returns noise in
+/// shadows as data; a larger value loses dark surfaces. `cargo test -p quadfringe --test round_trip` holds the share of lit pixels
+/// that come back.
+pub(crate) const MODULATION_MIN: f32 = 0.02;
 
 /// Default of the least quality of a returned order. A smaller value returns more wrong orders; a larger value loses correct
 /// points with them. `python evaluation/accuracy.py` measures both shares.

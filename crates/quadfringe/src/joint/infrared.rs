@@ -29,7 +29,7 @@ pub(super) trait Waves: Copy {
     fn vector(self, i: usize) -> Self::Vector;
 
     /// The infrared wave at pixel `x` of a vector.
-    fn infrared(self, vector: Self::Vector, x: usize, phase: f32) -> Wave;
+    fn infrared(self, vector: &Self::Vector, x: usize, phase: f32) -> Wave;
 
     /// The order from which infrared cosines are counted, as a phase in rad: the middle one of a pair, whose cubic is not good far
     /// outside the field.
@@ -37,7 +37,7 @@ pub(super) trait Waves: Copy {
 
     /// The carriers of all channels at pixel `x` of a vector; `loss` as in [`carriers`].
     #[inline(always)]
-    fn carriers(self, vector: Self::Vector, x: usize, phase: f32, loss: f32) -> Carriers {
+    fn carriers(self, vector: &Self::Vector, x: usize, phase: f32, loss: f32) -> Carriers {
         carriers(phase, self.ratios(), self.infrared(vector, x, phase), loss)
     }
 }
@@ -84,7 +84,7 @@ impl Waves for Coaxial {
     fn vector(self, _: usize) {}
 
     #[inline(always)]
-    fn infrared(self, (): (), _: usize, phase: f32) -> Wave {
+    fn infrared(self, (): &(), _: usize, phase: f32) -> Wave {
         Wave::coaxial(phase, self.ratios[3])
     }
 
@@ -108,7 +108,7 @@ impl Waves for Pair<'_> {
     }
 
     #[inline(always)]
-    fn infrared(self, [e0, e1, e2, e3]: Self::Vector, x: usize, phase: f32) -> Wave {
+    fn infrared(self, [e0, e1, e2, e3]: &Self::Vector, x: usize, phase: f32) -> Wave {
         wave([e0[x], e1[x], e2[x], e3[x]], phase)
     }
 

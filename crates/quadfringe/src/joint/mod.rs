@@ -68,6 +68,7 @@ use infrared::PairPhase;
 use light::{fringe_period_px, linear_light};
 use memory::OutputMemory;
 use motion::{Motion, Timing};
+use noise::least_modulation;
 use params::motion::ROUNDS;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
 use phase::PhaseModel;
@@ -146,15 +147,17 @@ impl Joint {
         let period_px = options.period_px.unwrap_or_else(found);
         let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS_PER_PERIOD);
         let coarse_grid = grid.shrunk(pyramid::factor(period_px, &grid));
-        let frame = Frame::new(&grid, &coarse_grid, period_px, shot.mosaic().is_some());
+        let least = || least_modulation(&self.pyramid.full.light[0], &grid);
+        let modulation_min = options.modulation_min.unwrap_or_else(least);
+        let frame = Frame::new([&grid, &coarse_grid], period_px, modulation_min, shot.mosaic().is_some());
         // 2. to 6. Absolute phase.
         let mut spare = std::mem::take(&mut self.spare);
         let mut memory = OutputMemory::new(out, &mut spare, grid.pixels());
-        self.absolute_phase(&frame, options, &mut memory);
-        // 7. Motion between the channels.
         let instants = options.channel_instants_us().map(|times| motion::in_places(times, self.ratios));
+        self.absolute_phase(&frame, instants.is_some(), &mut memory);
+        // 7. Motion between the channels.
         if let Some(instants) = instants {
-            self.compensate_motion(&frame, Timing { instants, ratios: self.ratios }, options, &mut memory);
+            self.compensate_motion(&frame, Timing { instants, ratios: self.ratios }, &mut memory);
         }
         self.spare = spare;
         // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
@@ -170,17 +173,16 @@ impl Joint {
     }
 
     /// Steps 2 to 6.
-    fn absolute_phase(&mut self, frame: &Frame<'_>, options: &Options, memory: &mut OutputMemory<'_>) {
+    fn absolute_phase(&mut self, frame: &Frame<'_>, moving: bool, memory: &mut OutputMemory<'_>) {
         let Self { pyramid, coarse, ratios, .. } = self;
-        let moving = options.channel_instants_us().is_some();
         pyramid.shrink(frame);
         let level = &mut pyramid.coarse;
         // 2. Mask of lit pixels.
-        let (reach_px, least) = (frame.coarse_reach_px(), options.modulation_min);
+        let (reach_px, least) = (frame.coarse_reach_px(), frame.modulation_min);
         coarse.find_light(level, frame.coarse, reach_px, least, memory.scratch.lend());
         // 3. Coarse level: wrapped phase of R and B (S2), beats of G and IR (S3).
         let scene = level.scene(frame.coarse);
-        coarse.fit_fringes(&scene, &level.lit, options.modulation_min);
+        coarse.fit_fringes(&scene, &level.lit, least);
         // 4. Fringe orders (S4).
         coarse.choose_orders(&scene, *ratios);
         coarse.leave_out_shadows(level, frame.coarse, *ratios);
@@ -228,18 +230,12 @@ impl Joint {
     }
 
     /// Step 7: estimates the motion, brings the light to one instant and repeats steps 2 to 6.
-    fn compensate_motion(
-        &mut self,
-        frame: &Frame<'_>,
-        timing: Timing,
-        options: &Options,
-        memory: &mut OutputMemory<'_>,
-    ) {
+    fn compensate_motion(&mut self, frame: &Frame<'_>, timing: Timing, memory: &mut OutputMemory<'_>) {
         self.motion.begin(&self.pyramid.full.scene(frame.full));
         for _ in 0..ROUNDS {
             let map = self.pixels.map();
             self.motion.step(&mut self.pyramid.full, frame.full, timing, &self.coarse.photometry, map);
-            self.absolute_phase(frame, options, memory);
+            self.absolute_phase(frame, true, memory);
         }
     }
 
@@ -260,7 +256,8 @@ impl Joint {
         let map = PhaseMap { phase, modulation };
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
-        let evidence = validity::Evidence { map, pixel, orders: &self.coarse.orders, limits };
+        let (orders, ratios) = (&self.coarse.orders, self.ratios);
+        let evidence = validity::Evidence { map, pixel, orders, ratios, limits };
         self.validity.run(&scene, evidence, quality, reasons);
         if let Some(instants) = instants {
             self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid, reasons);

@@ -1,9 +1,13 @@
 //! Standard deviation of the intensities, estimated from the shot itself.
 
 use super::cells::Grid;
-use super::params::illumination::{NOISE_SAMPLES, NOISE_STRIDE};
+use super::model::{count, weights};
+use super::params::illumination::{
+    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES, NOISE_STRIDE,
+};
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
+use rayon::prelude::*;
 
 /// Median of the absolute value of a normal deviation, in standard deviations.
 const MEDIAN_OF_NORMAL: f32 = 0.6745;
@@ -11,17 +15,120 @@ const MEDIAN_OF_NORMAL: f32 = 0.6745;
 /// Noise of a plane of light, from a mask that gives 0 for every variation that is only along rows or only along
 /// columns (Immerkaer, Comput. Vis. Image Underst. 64, 300 (1996)); in the unit of the light.
 pub(super) fn noise_of_image(red: &[f32], grid: &Grid) -> f32 {
+    deviation(bends(red, grid, NOISE_SAMPLES).map(|seen| seen.bend).collect())
+}
+
+/// Least modulation that counts as light in a shot with this red image.
+pub(super) fn least_modulation(red: &[f32], grid: &Grid) -> f32 {
+    (MODULATION_NOISES * noise_of_image(red, grid)).max(MODULATION_FLOOR)
+}
+
+/// Variance of the noise of each channel by its light, relative to that of the whole red image. Photons make bright pixels noisier;
+/// a response that is undone makes those pixels noisier where it is flat.
+#[derive(Debug, Default)]
+pub(super) struct NoiseByLight {
+    channels: [Curve; 4],
+    /// 1 for a channel with light, 0 for infrared without a projector; their sum is 1.
+    weights: [f32; 4],
+}
+
+/// Steps of light between 0 and the brightest group.
+const STEPS: usize = 64;
+
+/// Relative variance of the noise at `STEPS` values of the light.
+#[derive(Debug)]
+struct Curve {
+    variance: [f32; STEPS],
+    /// Steps in a unit of light.
+    scale: f32,
+}
+
+impl Default for Curve {
+    fn default() -> Self {
+        Self { variance: [1.0; STEPS], scale: 1.0 }
+    }
+}
+
+impl NoiseByLight {
+    /// Estimates the noise of four planes of light.
+    pub fn measure(&mut self, light: [&[f32]; 4], grid: &Grid, ratios: [f32; 4]) {
+        let whole = noise_of_image(light[0], grid).powi(2);
+        self.weights = weights(ratios).map(|weight| weight / count(ratios));
+        let channels = self.channels.par_iter_mut().zip(light);
+        channels.for_each(|(curve, plane)| *curve = Curve::of(plane, grid, whole));
+    }
+
+    /// Mean relative variance of the channels for the light of each pixel of a row.
+    pub fn row(&self, light: [&[f32]; 4], out: &mut Vec<f32>) {
+        out.clear();
+        out.resize(light[0].len(), 0.0);
+        for ((curve, weight), light) in self.channels.iter().zip(self.weights).zip(light) {
+            for (out, light) in out.iter_mut().zip(light) {
+                *out += weight * curve.at(*light);
+            }
+        }
+    }
+}
+
+impl Curve {
+    /// The noise of groups of pixels of similar light, interpolated.
+    fn of(plane: &[f32], grid: &Grid, whole: f32) -> Self {
+        let mut seen: Vec<Seen> = bends(plane, grid, NOISE_SAMPLES / 4).collect();
+        if seen.len() < NOISE_GROUPS || whole <= 0.0 {
+            return Self::default();
+        }
+        seen.sort_unstable_by(|a, b| a.light.total_cmp(&b.light));
+        let groups = seen.chunks(seen.len().div_ceil(NOISE_GROUPS)).map(|group| {
+            let noise = deviation(group.iter().map(|seen| seen.bend).collect());
+            [group[group.len() / 2].light, (noise * noise / whole).clamp(NOISE_LIMITS[0], NOISE_LIMITS[1])]
+        });
+        let groups: Vec<[f32; 2]> = groups.collect();
+        let scale = (STEPS - 1) as f32 / groups[groups.len() - 1][0].max(1e-6);
+        Self { variance: std::array::from_fn(|step| between(&groups, step as f32 / scale)), scale }
+    }
+
+    #[inline(always)]
+    fn at(&self, light: f32) -> f32 {
+        self.variance[((light * self.scale) as usize).min(STEPS - 1)]
+    }
+}
+
+/// Linear interpolation between groups, as light and variance; constant beyond them.
+fn between(groups: &[[f32; 2]], light: f32) -> f32 {
+    let after = groups.partition_point(|[at, _]| *at <= light);
+    let ([from, a], [to, b]) = (groups[after.max(1) - 1], groups[after.min(groups.len() - 1)]);
+    let share = if to > from { ((light - from) / (to - from)).clamp(0.0, 1.0) } else { 0.0 };
+    a + share * (b - a)
+}
+
+/// What is seen around a pixel.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    /// Mean of 3 x 3 pixels.
+    light: f32,
+    /// Absolute value of the mask.
+    bend: f32,
+}
+
+/// What is seen around `samples` to twice as many pixels of a plane.
+fn bends<'a>(plane: &'a [f32], grid: &'a Grid, samples: usize) -> impl Iterator<Item = Seen> + 'a {
     let stride = grid.stride;
     // Rows are padded to whole vectors, so an odd step visits all columns.
-    let step = (red.len() / NOISE_SAMPLES) | 1;
-    let seen = (stride + 1..red.len().saturating_sub(stride + 1))
+    let step = (plane.len() / samples) | 1;
+    (stride + 1..plane.len().saturating_sub(stride + 1))
         .step_by(step)
-        .filter(|i| i % stride + 1 < grid.width)
-        .map(|i| {
-            let bend = |at: usize| red[at - 1] - 2.0 * red[at] + red[at + 1];
-            (bend(i - stride) - 2.0 * bend(i) + bend(i + stride)).abs()
-        });
-    median(seen.collect()) / (MEDIAN_OF_NORMAL * 6.0)
+        .filter(move |i| i % stride + 1 < grid.width)
+        .map(move |i| {
+            let rows = [i - stride, i, i + stride].map(|at| [plane[at - 1], plane[at], plane[at + 1]]);
+            let [above, here, below] = rows.map(|[left, middle, right]| left - 2.0 * middle + right);
+            let light = rows.iter().flatten().sum::<f32>() / 9.0;
+            Seen { light, bend: (above - 2.0 * here + below).abs() }
+        })
+}
+
+/// Standard deviation of the noise, from values of the mask, whose squares sum up to 36.
+fn deviation(bends: Vec<f32>) -> f32 {
+    median(bends) / (MEDIAN_OF_NORMAL * 6.0)
 }
 
 /// Noise of the intensities in linear light, from the second differences of a wrapped phase along rows, in which slopes and most

@@ -208,7 +208,7 @@ fn predict<W: Waves>(
         let ([phase, loss, lit], vector) = (take(&pixels, i), waves.vector(i));
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
+            let carriers = waves.carriers(&vector, x, phase[x], loss[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
             let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {

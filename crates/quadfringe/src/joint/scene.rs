@@ -21,16 +21,19 @@ pub(super) struct Frame<'a> {
     pub coarse: ScaledGrid<'a>,
     /// Number of pixels by which interpolated light reaches into a shadow.
     pub reach_px: usize,
+    /// Least modulation of R and B that counts as light, in linear light.
+    pub modulation_min: f32,
 }
 
 impl<'a> Frame<'a> {
     /// `coarse` must have the cells of `full`, each with fewer pixels. The fringe period is in pixels of `full`.
-    pub fn new(full: &'a Grid, coarse: &'a Grid, period_px: f64, is_mosaic: bool) -> Self {
+    pub fn new([full, coarse]: [&'a Grid; 2], period_px: f64, modulation_min: f32, is_mosaic: bool) -> Self {
         let factor = full.step / coarse.step;
         Self {
             full: ScaledGrid { grid: full, period_px, factor: 1 },
             coarse: ScaledGrid { grid: coarse, period_px: period_px / factor as f64, factor },
             reach_px: if is_mosaic { MOSAIC_REACH_PX } else { 0 },
+            modulation_min,
         }
     }
 

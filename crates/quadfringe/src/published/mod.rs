@@ -96,7 +96,7 @@ use crate::Shot;
 use crate::condition::{Plan, Sample};
 use crate::decode::options::Options;
 use crate::decode::output::{Decoded, Finish};
-use crate::decode::params::ROWS_AT_ONCE;
+use crate::decode::params::{MODULATION_MIN, ROWS_AT_ONCE};
 use crate::encoding::FourChannel;
 use crate::height::PairTable;
 use crate::parallel::slots::Slots;
@@ -218,7 +218,10 @@ impl Published {
             weights: FourierPair { green: weights(periods_px.green), infrared: weights(periods_px.infrared) },
             blocks,
             periods_px,
-            limits: Limits { modulation_min: options.modulation_min, quality_min: options.quality_min },
+            limits: Limits {
+                modulation_min: options.modulation_min.unwrap_or(MODULATION_MIN),
+                quality_min: options.quality_min,
+            },
             statistics: ShotStatistics::unit_noise(),
         }
     }

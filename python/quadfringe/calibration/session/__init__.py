@@ -7,6 +7,7 @@ bench. Every step calls functions of `quadfringe.calibration`; the result keeps 
 from quadfringe.calibration.session.acquisition import take_captures
 from quadfringe.calibration.session.captures import Captures, FolderCaptures
 from quadfringe.calibration.session.flow import Guided, guide
+from quadfringe.calibration.session.planning import session_of
 from quadfringe.calibration.session.settings import Session, step_named
 
-__all__ = ["Captures", "FolderCaptures", "Guided", "Session", "guide", "step_named", "take_captures"]
+__all__ = ["Captures", "FolderCaptures", "Guided", "Session", "guide", "session_of", "step_named", "take_captures"]

@@ -169,6 +169,11 @@ def acceptance(captures: Captures, calibration: Calibration) -> Outcome:
         for line in found.lines
         if not line.accepted
     ]
+    if problems and not session.fringes.infrared:
+        problems.append(
+            "the limits are those of 36 fringes on 1024 x 768 pixels, and fringes of three colours are wider; take a "
+            "larger image, less noise, or more fringes within columns_px, or judge by other limits"
+        )
     worst = max(found.lines, key=lambda line: abs(line.value_mm) / line.limit_mm)
     figure = f"{worst.name}, {worst.value_mm:.3f} of {worst.limit_mm:g} mm"
     good = f"all figures are within their limits; the closest is {figure}"

@@ -11,6 +11,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
+from quadfringe.calibration._params import SHORTER_EXPOSURES
 from quadfringe.calibration.acceptance import SPHERE_DIAMETER_MM, STEP_HEIGHTS_MM
 from quadfringe.calibration.levels import LevelPlan, level_plan
 from quadfringe.calibration.projector import AXES, StepPlan
@@ -39,14 +40,14 @@ STEPS = (
     Step(
         "dark",
         "dark level",
-        "Cover the lens and switch the projectors to black; take the shots one after another.",
+        "Cover the lens and switch every projector to black; take the shots one after another.",
         True,
     ),
     Step(
         "levels",
         "responses and crosstalk",
         "Put a white, matt board where you will measure, so that it fills the middle of the image. Project uniform "
-        "light at the levels in the name (per cent of red, green, blue, infrared), with the exposure e (per cent).",
+        "light at the levels in the name (per cent of each channel), with the exposure e (per cent).",
         True,
     ),
     Step(
@@ -58,9 +59,9 @@ STEPS = (
     Step(
         "poses",
         "camera, projectors and their poses",
-        "Hold the calibration board in the light of both projectors, and keep it still during all fringe images of a "
-        "pose; one projector shows them while the other is black. Tilt it to all four sides by 20 to 40 degrees, move "
-        "it nearer and farther, and into the corners of the image.",
+        "Hold the calibration board in the light of every projector, and keep it still during all fringe images of a "
+        "pose; of two projectors, one shows them while the other is black. Tilt it to all four sides by 20 to 40 "
+        "degrees, move it nearer and farther, and into the corners of the image.",
         True,
     ),
     Step(
@@ -93,7 +94,8 @@ class Session(Stored):
     """Settings of a session; the defaults are those of the published bench.
 
     `rig` is the name of the bench. `distance_mm` is the approximate distance of the first board from the camera, the
-    only check of its size. `bits` are the significant bits of 16-bit files.
+    only check of its size. `bits` are the significant bits of 16-bit files. `level_exposures` are the shorter exposures
+    of the brightest level, shares of the full one; without any, the camera is taken as linear.
     """
 
     schema_version: Literal[1] = 1
@@ -106,6 +108,7 @@ class Session(Stored):
     bayer: BayerPattern | None = None
     dark_shots: Annotated[int, Field(ge=2, le=100)] = 4
     level_steps: Annotated[int, Field(ge=4, le=32)] = 8
+    level_exposures: tuple[Annotated[float, Field(gt=0, lt=1)], ...] = SHORTER_EXPOSURES
     flat_shots: Annotated[int, Field(ge=4, le=100)] = 8
     poses: Annotated[int, Field(ge=4, le=60)] = 12
     phase_steps: Annotated[int, Field(ge=4, le=64)] = 8
@@ -118,7 +121,7 @@ class Session(Stored):
     @property
     def level_plan(self) -> LevelPlan:
         """The captures under uniform light."""
-        return level_plan(self.level_steps, len(self.fringes.channels))
+        return level_plan(self.level_steps, len(self.fringes.channels), self.level_exposures)
 
     @property
     def step_plan(self) -> StepPlan:

@@ -18,28 +18,38 @@ PIXEL_FORMATS: Final = {
     "Mono8": 0x01080001,
     "Mono10": 0x01100003,
     "Mono10Packed": 0x010C0004,
+    "Mono10p": 0x010A0046,
     "Mono12": 0x01100005,
     "Mono12Packed": 0x010C0006,
+    "Mono12p": 0x010C0047,
     "BayerRG8": 0x01080009,
     "BayerRG10": 0x0110000D,
     "BayerRG10Packed": 0x010C0027,
+    "BayerRG10p": 0x010A0058,
     "BayerRG12": 0x01100011,
     "BayerRG12Packed": 0x010C002B,
+    "BayerRG12p": 0x010C0059,
     "BayerGR8": 0x01080008,
     "BayerGR10": 0x0110000C,
     "BayerGR10Packed": 0x010C0026,
+    "BayerGR10p": 0x010A0056,
     "BayerGR12": 0x01100010,
     "BayerGR12Packed": 0x010C002A,
+    "BayerGR12p": 0x010C0057,
     "BayerGB8": 0x0108000A,
     "BayerGB10": 0x0110000E,
     "BayerGB10Packed": 0x010C0028,
+    "BayerGB10p": 0x010A0054,
     "BayerGB12": 0x01100012,
     "BayerGB12Packed": 0x010C002C,
+    "BayerGB12p": 0x010C0055,
     "BayerBG8": 0x0108000B,
     "BayerBG10": 0x0110000F,
     "BayerBG10Packed": 0x010C0029,
+    "BayerBG10p": 0x010A0052,
     "BayerBG12": 0x01100013,
     "BayerBG12Packed": 0x010C002D,
+    "BayerBG12p": 0x010C0053,
     "RGB8": 0x02180014,
 }
 FEATURES: Final = {
@@ -128,7 +138,7 @@ def _image_nodes(formats: list[str], sources: int) -> dict[str, str]:
     selector = "SourceSelector" if sources > 1 else None
     choice = {} if selector is None else {selector: _enumeration(selector, {f"Source{n}": n for n in range(sources)})}
     known = {name: PIXEL_FORMATS[name] for name in formats}
-    payload = "<Formula>W * H * ((P &gt;&gt; 16) &amp; 0xFF) / 8</Formula>"
+    payload = "<Formula>(W * H * ((P &gt;&gt; 16) &amp; 0xFF) + 7) / 8</Formula>"
     variables = "".join(
         f'<pVariable Name="{short}">{name}</pVariable>'
         for short, name in (("W", "Width"), ("H", "Height"), ("P", "PixelFormat"))

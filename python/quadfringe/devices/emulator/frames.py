@@ -72,12 +72,15 @@ class FileFrames:
 
 
 def packed(source: Source, chip: int, exposure: int, pixel_format: int, size_px: tuple[int, int]) -> memoryview[int]:
-    """Return the payload of a frame of `size_px` (width, height) in a GigE Vision pixel format; possibly a view."""
+    """Return the payload of a frame of `size_px` (width, height) in a GenICam pixel format; possibly a view."""
     name = NAMES[pixel_format]
     bits = int("".join(letter for letter in name if letter.isdigit()))
     frame = source.frame(chip, exposure, bits)[: size_px[1], : size_px[0]]
     if name == "RGB8" and frame.ndim == 2:
         frame = np.repeat(frame[:, :, None], 3, axis=2)
+    if name.endswith("p"):  # a stream of bits, the low ones first
+        stream = np.unpackbits(frame.astype("<u2").reshape(-1, 1).view(np.uint8), axis=1, bitorder="little")[:, :bits]
+        return _bytes(np.packbits(stream, bitorder="little"))
     if not name.endswith("Packed"):
         return _bytes(frame)
     pairs = frame.reshape(-1, 2)

@@ -7,7 +7,8 @@
 
 from __future__ import annotations
 
+from quadfringe.devices.uvc._controls import compression
 from quadfringe.devices.uvc._source import FoundDevice, found
 from quadfringe.devices.uvc.camera import UvcCamera, open_devices
 
-__all__ = ["FoundDevice", "UvcCamera", "found", "open_devices"]
+__all__ = ["FoundDevice", "UvcCamera", "compression", "found", "open_devices"]

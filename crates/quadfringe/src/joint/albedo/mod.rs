@@ -160,7 +160,7 @@ fn modulate_infrared<W: Waves>(pixels: &Pixels, waves: W, out: &mut [f32]) {
         let [phase, contrast] = take(&known, at);
         let vector = waves.vector(at);
         for x in 0..LANES {
-            let (_, cosine) = sin_cos(waves.infrared(vector, x, phase[x]).phase);
+            let (_, cosine) = sin_cos(waves.infrared(&vector, x, phase[x]).phase);
             out[x] = 1.0 + contrast[x] * cosine;
         }
     }

@@ -165,7 +165,7 @@ fn add_cosines<W: Waves>(
             let [light_rb, offset_rb, amplitude_rb] =
                 [&light, &offset, &amplitude].map(|rows| [rows[0][x], rows[2][x]]);
             let albedo = albedo(phase[x], light_rb, offset_rb, amplitude_rb, albedo_known(ratios));
-            let angles = [ratios[1] * unwrapped, waves.infrared(vector, x, unwrapped + origin_rad).phase];
+            let angles = [ratios[1] * unwrapped, waves.infrared(&vector, x, unwrapped + origin_rad).phase];
             for beat in 0..2 {
                 let c = 2 * beat + 1;
                 let s = observed_cosine(light[c][x], albedo, offset[c][x], amplitude[c][x]);

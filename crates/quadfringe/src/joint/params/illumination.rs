@@ -11,9 +11,25 @@ pub const REACH: f32 = 0.75;
 /// more wrong orders here; `cargo test --test round_trip` checks shadows).
 pub const HEIGHT_MIN: f32 = 0.02;
 
+/// Least modulation of R and B that counts as light, in standard deviations of the noise of a pixel: the window and the energy find
+/// the phase of many pixels together, so single ones may be noisier than a fringe. Larger: dark surfaces are lost. Smaller: noise in
+/// shadows counts as light. From 0.33 to 1 nothing changes by more than 0.2 % of the pixels: `python evaluation/dark.py`.
+pub const MODULATION_NOISES: f32 = 0.5;
+/// Least modulation that counts as light when there is no noise, as a fraction of full scale: a quarter of a step of 8 bits, which
+/// the rounding of an image without noise hides. Larger: dark surfaces of cameras with more bits are lost.
+/// `python evaluation/dark.py`.
+pub const MODULATION_FLOOR: f32 = 0.001;
+
 /// Number of pixels from which the noise of an image is estimated; up to twice as many are used. The median of 16,000 values
 /// is certain to 1 %. Varied: no effect, but 10 ppm fewer wrong orders of dim steps at x0.7.
 pub const NOISE_SAMPLES: usize = 1 << 14;
+
+/// Groups of pixels with similar light, in each of which the noise of a channel is estimated. More: each estimate is less certain
+/// (5 % with 8 groups). Fewer: less of the difference between dark and bright pixels is seen. `python evaluation/captures.py`.
+pub const NOISE_GROUPS: usize = 8;
+/// Bounds of the variance of the noise of a group, relative to that of the whole red image. They matter where light is clipped, at
+/// black or by the response. `python evaluation/captures.py`.
+pub const NOISE_LIMITS: [f32; 2] = [0.25, 25.0];
 
 /// Step between the pixels from which the noise of a phase is estimated. An odd step visits all columns. Varied: no effect, but
 /// 4 % near edges of dim steps at x0.7.

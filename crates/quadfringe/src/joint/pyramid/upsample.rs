@@ -267,7 +267,7 @@ fn explain<W: Waves>(
     let most = SQUARED_MISFIT_MAX * (0.25 * count(waves.ratios())) * pixels.modulation * pixels.modulation;
     let vector = waves.vector(0);
     for x in 0..LANES {
-        let carriers = waves.carriers(vector, x, pixels.phase[x], 0.0);
+        let carriers = waves.carriers(&vector, x, pixels.phase[x], 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {

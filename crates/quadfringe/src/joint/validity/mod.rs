@@ -7,6 +7,7 @@ mod support;
 
 use super::cells::{RowMaps, TaskWork};
 use super::neighbours::around;
+use super::noise::NoiseByLight;
 use super::orders::Orders;
 use super::params::validity::{
     COMPONENT_SIDE, GROWN_MISFIT_MAX, MISFIT_MAX, NEIGHBOURS_MIN, PIXEL_MISFIT_MAX,
@@ -39,6 +40,8 @@ pub(super) struct Evidence<'a> {
     pub map: PhaseMap<'a>,
     pub pixel: PixelFit<'a>,
     pub orders: &'a Orders,
+    /// Fringe numbers divided by the first.
+    pub ratios: [f32; 4],
     pub limits: Limits,
 }
 
@@ -61,6 +64,7 @@ pub(super) struct Validity {
     pub components: Vec<u8>,
     /// 1 for pixels whose intensities agree with their order.
     consistent: Vec<u8>,
+    noise: NoiseByLight,
     support: Support,
     labelling: Components,
     regrow: Regrow,
@@ -73,6 +77,7 @@ struct Rows {
     maps: RowMaps,
     sums: Vec<f32>,
     lead: Vec<f32>,
+    noise: Vec<f32>,
 }
 
 impl Validity {
@@ -109,17 +114,20 @@ impl Validity {
         quality: &mut [f32],
         reasons: &mut [Reason],
     ) {
-        let Evidence { map, pixel, orders, limits } = evidence;
+        let Evidence { map, pixel, orders, limits, .. } = evidence;
         let grid = scene.grid;
         self.consistent.resize(grid.pixels(), 0);
-        let Self { components, consistent, support, slots, .. } = self;
+        let Self { components, consistent, noise, support, slots, .. } = self;
+        noise.measure(scene.light, grid, evidence.ratios);
+        let noise = &*noise;
         let masks = components.par_chunks_mut(grid.stride).zip(consistent.par_chunks_mut(grid.stride));
         let masks = masks.zip(reasons.par_chunks_mut(grid.stride));
         let rows = quality.par_chunks_mut(grid.width).zip(masks).enumerate();
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (quality, ((passed, consistent), reasons)))| {
-                let Rows { maps, sums, lead } = &mut slot.rows;
+                let Rows { maps, sums, lead, noise: variance } = &mut slot.rows;
+                noise.row(scene.rows(y), variance);
                 lead.clear();
                 for node in orders.verdicts(scene, y / grid.step) {
                     lead.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
@@ -129,6 +137,7 @@ impl Validity {
                     squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
                     modulation: &scene.row(map.modulation, y)[..grid.width],
                     pixel_modulation: &pixel.modulation[y * grid.width..][..grid.width],
+                    noise: &variance[..grid.width],
                     lead: &lead[..grid.width],
                     support: &support.row(grid, y, maps)[..grid.width],
                 };
@@ -147,6 +156,8 @@ struct CheckRow<'a> {
     modulation: &'a [f32],
     /// Modulation by the albedo of the pixel.
     pixel_modulation: &'a [f32],
+    /// Variance of the noise relative to that of the shot.
+    noise: &'a [f32],
     lead: &'a [f32],
     support: &'a [f32],
 }
@@ -175,6 +186,7 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
     (sums[0], sums[width + 1]) = (sums[1], sums[width]);
     let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
     let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
+    let noise = &known.noise[..width];
     let (lead, support) = (&known.lead[..width], &known.support[..width]);
     let (quality, passed, consistent) =
         (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
@@ -187,8 +199,8 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
         let share = MISFIT_MAX * modulation[x];
         let [pixel_share, grown_share] =
             [PIXEL_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * pixel_modulation[x]);
-        let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] + share * share)
-            && here[x] <= floors[1] + pixel_share * pixel_share;
+        let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] * noise[x] + share * share)
+            && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
         quality[x] = order_quality + hole_unless(lit);
         let certain = lit & (order_quality >= limits.quality_min);
         let apart = passed[x] != 0;
@@ -198,7 +210,7 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
         let doubt = if apart { Reason::Discontinuity } else { doubt };
         let open = lit & (reasons[x] == Reason::Returned);
         reasons[x] = if open { doubt } else { reasons[x] };
-        consistent[x] = u8::from(lit & (here[x] <= floors[0] + grown_share * grown_share));
+        consistent[x] = u8::from(lit & (here[x] <= floors[0] * noise[x] + grown_share * grown_share));
     }
 }
 
@@ -225,6 +237,7 @@ mod tests {
             squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
             modulation: &[0.4; 16],
             pixel_modulation: &pixel_modulation,
+            noise: &[1.0; 16],
             lead: &[1.0; 16],
             support: &[1.0; 16],
         };
