@@ -4,6 +4,7 @@ mod common;
 
 use common::{BAYER, bench, cast_scene, clean, noisy, score};
 use ndarray::{Array2, s};
+use quadfringe::height::Triangulator;
 use quadfringe::rig::{Bench, Cast, Light, Planes, RenderOptions};
 use quadfringe::{Decoded, Decoder, Encoding, Method, Options, Shot};
 use std::f64::consts::TAU;
@@ -15,15 +16,13 @@ fn encoding() -> Encoding {
     Encoding::three_colours([36.0, 35.0, 30.0], 912).expect("valid")
 }
 
-fn decoder(shape: [usize; 2], method: Method) -> Decoder {
-    let options = Options::default().with_method(method);
-    Decoder::builder(&encoding(), shape).options(options).build().expect("valid")
-}
-
 /// Renders a cast scene, and decodes its colours.
 fn there_and_back(bench: &Bench, cast: &Cast, render: &RenderOptions, method: Method) -> Decoded {
     let lights = Light::shot(&encoding()).expect("lights");
-    let mut decoder = decoder([bench.camera.height, bench.camera.width], method);
+    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
+    let shape = [bench.camera.height, bench.camera.width];
+    let builder = Decoder::builder(&encoding(), shape).options(Options::default().with_method(method));
+    let mut decoder = builder.triangulator(triangulator).build().expect("valid");
     let decoded = match &bench.render(cast, &lights, render).expect("a valid scene") {
         Planes::U8([red, green, blue, _]) => {
             decoder.decode(&Shot::rgb([red.view(), green.view(), blue.view()]).expect("one size"))
@@ -43,7 +42,7 @@ fn there_and_back(bench: &Bench, cast: &Cast, render: &RenderOptions, method: Me
 fn surfaces_come_back() {
     let bench = bench(1);
     for (name, render, phase_max) in
-        [("steps", clean(), 0.015), ("face", noisy(2), 0.025), ("peaks", noisy(4), 0.006)]
+        [("steps", clean(), 0.002), ("face", noisy(2), 0.012), ("peaks", noisy(4), 0.006)]
     {
         let cast = cast_scene(&bench, name);
         let decoded = there_and_back(&bench, &cast, &render, Method::joint());
@@ -88,7 +87,11 @@ fn fringes_in_any_direction_come_back() {
         };
         let images = [36.0, 35.0, 30.0].map(image);
         let shot = Shot::rgb(images.each_ref().map(|image| image.view())).expect("one size");
-        let decoded = decoder([shape.0, shape.1], Method::joint()).decode(&shot).expect("three channels");
+        let decoded = Decoder::builder(&encoding(), shape.into())
+            .build()
+            .expect("valid")
+            .decode(&shot)
+            .expect("three channels");
         let off = decoded.column_px.indexed_iter().filter(|(_, found)| found.is_finite());
         let off: Vec<f64> = off.map(|(at, found)| (f64::from(*found) - column(at)).abs()).collect();
         let right = off.iter().filter(|off| **off < 0.2).count();
