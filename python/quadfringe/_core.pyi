@@ -211,9 +211,9 @@ class Bench:
         """Give red, green, blue, ir of a shot, (H, W) uint8 or uint16 by `bit_depth`; raw and ir with `bayer`.
 
         The infrared projector shows its fringes, or `infrared_image` (rows, columns), linear light from 0 to 1. With
-        two fringe numbers it is dark. `columns_px` are the first and the last column that can light the scene.
-        Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An unknown
-        option raises TypeError.
+        the fringe numbers of three colours it is dark. `columns_px` are the first and the last column that can light
+        the scene. Options are those of `quadfringe.SceneConfig`; `albedo` may be an image (H, W, 4) float32 too. An
+        unknown option raises TypeError.
         """
 
     def render_step(
@@ -254,8 +254,9 @@ class Cast:
 class Decoder:
     """Decodes shots of one size and one encoding; planned and checked when made.
 
-    Three fringe numbers are those of R with B, of G and of IR, two those of an encoding without infrared. With
-    `columns_px`, the first and the last column that can light the scene, only these must differ in their phases.
+    Three fringe numbers are those of R with B, of G and of IR, two those of R with B and of G without infrared, and
+    three and 0 those of R, G and B with a number each. With `columns_px`, the first and the last column that can light
+    the scene, only these must differ in their phases.
     An argument that is absent takes the kernel's default. `method` is "joint" ("best" is read as "joint") or
     "published". With `camera`, `projector` and `infrared` the infrared fringes are known along the camera rays, of an
     image plain or pre-deformed, for a range of depths or all of them; the published method searches orders in it alone;
@@ -567,7 +568,7 @@ def unwrap(
 ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Give absolute phase in rad and order margin in [0, 1] from three wrapped phases, point by point (S4).
 
-    With two fringe numbers the third phase is not read.
+    With two fringe numbers the third phase is not read; with three and 0 it is that of B.
     """
 
 def estimate_response(stacks: Sequence[NDArray[np.float32]]) -> dict[str, float]:

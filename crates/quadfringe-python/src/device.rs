@@ -89,11 +89,13 @@ impl Device {
     }
 }
 
-/// Fringe numbers of an encoding: of R with B, of G, and of IR if there is an infrared projector.
+/// Fringe numbers of an encoding: of R with B, of G, and of IR if there is an infrared projector; or of R, G, B, each alone, and 0 for
+/// the infrared projector that there is not.
 #[derive(Clone, Copy)]
 pub enum FringeNumbers {
     Colours([f64; 2]),
     Four([f64; 3]),
+    Alone([f64; 3]),
 }
 
 impl<'a, 'py> FromPyObject<'a, 'py> for FringeNumbers {
@@ -104,8 +106,10 @@ impl<'a, 'py> FromPyObject<'a, 'py> for FringeNumbers {
         match numbers[..] {
             [quadrature, green] => Ok(Self::Colours([quadrature, green])),
             [quadrature, green, infrared] => Ok(Self::Four([quadrature, green, infrared])),
+            [red, green, blue, 0.0] => Ok(Self::Alone([red, green, blue])),
             _ => {
-                let expected = "three (R with B, G, IR), or two without infrared";
+                let expected =
+                    "three (R with B, G, IR), two without infrared, or four (R, G, B and 0 for IR)";
                 let message = format!("fringe numbers: expected {expected}, got {}", numbers.len());
                 Err(PyValueError::new_err(message))
             }
@@ -124,6 +128,10 @@ impl FringeNumbers {
         match self {
             Self::Colours(numbers) => Encoding::rgb_within(numbers, projector_width, columns),
             Self::Four(numbers) => Encoding::four_channel_within(numbers, projector_width, columns),
+            Self::Alone(numbers) => {
+                let encoding = Encoding::three_colours_within(numbers, projector_width, columns)?;
+                encoding.four_channel_view().map(|_| encoding)
+            }
         }
     }
 }

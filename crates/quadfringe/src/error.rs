@@ -65,7 +65,7 @@ pub enum Error {
         /// The least distance that is accepted.
         needed_rad: f64,
     },
-    /// expected the encoding of a single shot (R, G and B from the visible projector and none or IR from the infrared one, R and B of one fringe number, B shifted by pi/2 and the others by 0), got {fault}; make it with Encoding::four_channel, Encoding::optimum or Encoding::rgb
+    /// expected the encoding of a single shot (R, G and B from the visible projector and none or IR from the infrared one, R and B of one fringe number, B shifted by pi/2 and the others by 0; or R, G and B of three fringe numbers and no shifts), got {fault}; make it with Encoding::four_channel, Encoding::optimum, Encoding::rgb or Encoding::three_colours
     NotFourChannel {
         /// The first difference.
         fault: FourChannelFault,
@@ -112,6 +112,8 @@ pub enum FourChannelFault {
         /// The shift of the encoding in rad.
         found_rad: f64,
     },
+    /// {0} fringes in G and in another channel
+    Alike(f64),
     /// {red} fringes in R and {blue} in B
     Quadrature {
         /// Fringe number of R.

@@ -141,8 +141,8 @@ FringesOption = Annotated[
         "--fringes",
         metavar="N N [N]",
         parser=_some_numbers,
-        help="Number of fringes over the projector width: of red and blue, of green, of infrared; two with --encoding "
-        "rgb. Default: 36 35 30, or 16 15.",
+        help="Number of fringes over the projector width: of red and blue, of green, of infrared; with --encoding rgb "
+        "of red, green, blue, or two: of red and blue in quadrature, and of green. Default: 36 35 30.",
     ),
 ]
 InstantsOption = Annotated[

@@ -197,7 +197,7 @@ def _plan(
     numbers, encoding = fringes["fringes"], fringes["encoding"]
     if numbers is None:
         raise InputError(
-            "a single shot needs --fringes N N N, or --encoding rgb --fringes N N without infrared, step images "
+            "a single shot needs --fringes N N N, or --encoding rgb --fringes N N [N] without infrared, step images "
             "--steps N and --numbers N...; give one"
         )
     others = {"predeformed_z_mm": fringes["predeformed_z_mm"]}

@@ -57,7 +57,8 @@ def pattern(
     """Give the ideal image of a channel, (height, width) float32, linear light from 0 to 1.
 
     `channel` is "red", "green", "blue" or "ir", or R, G, B or IR. ValueError for other names and wrong sizes, and for
-    images that do not fit into memory. Two fringe numbers are those of an encoding without infrared.
+    images that do not fit into memory. Two fringe numbers, or three and 0 as `Fringes.code` gives them, are
+    those of an encoding without infrared.
     """
     letters = CHANNELS.get(channel, channel)
     if letters not in CHANNELS.values():

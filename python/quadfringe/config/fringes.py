@@ -2,12 +2,12 @@
 
 >>> from quadfringe.config import Fringes
 >>> Fringes(encoding="rgb").numbers
-(16.0, 15.0)
+(36.0, 35.0, 30.0)
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, field_validator, model_validator
@@ -15,7 +15,7 @@ from pydantic import BeforeValidator, Field, field_validator, model_validator
 from quadfringe import _core
 from quadfringe.config._base import SIZE_MAX, Model, NotNegative, Positive, checked
 
-__all__ = ["CHANNELS", "NUMBERS", "Encoding", "Fringes", "fringe_numbers"]
+__all__ = ["CHANNELS", "NUMBERS", "Encoding", "Fringes", "fringe_numbers", "is_code"]
 
 FringeNumbers = tuple[float, ...]
 Encoding = Literal["rgb-ir", "rgb"]
@@ -24,7 +24,10 @@ CHANNELS: dict[Encoding, tuple[str, ...]] = {
     "rgb-ir": ("red", "green", "blue", "ir"),
     "rgb": ("red", "green", "blue"),
 }
-NUMBERS: dict[Encoding, FringeNumbers] = {"rgb-ir": (36.0, 35.0, 30.0), "rgb": (16.0, 15.0)}
+# How many fringe numbers an encoding may have.
+COUNTS: dict[Encoding, tuple[int, ...]] = {"rgb-ir": (3,), "rgb": (2, 3)}
+PAIR: FringeNumbers = (16.0, 15.0)  # two numbers that distinguish all columns
+NUMBERS: dict[Encoding, FringeNumbers] = {"rgb-ir": (36.0, 35.0, 30.0), "rgb": (36.0, 35.0, 30.0)}
 
 
 def _some(numbers: Any) -> Any:
@@ -37,6 +40,11 @@ def _some(numbers: Any) -> Any:
     return found
 
 
+def is_code(numbers: Any) -> bool:
+    """Tell whether these are the four numbers that `Fringes.code` gives for three colours of different numbers."""
+    return isinstance(numbers, Sequence) and not isinstance(numbers, str) and len(numbers) == 4 and numbers[3] == 0
+
+
 Numbers = Annotated[tuple[Positive, ...], BeforeValidator(_some)]
 
 
@@ -45,8 +53,9 @@ class Fringes(Model):
 
     numbers: Numbers = Field(
         default=NUMBERS["rgb-ir"],
-        description='Fringes over the full projector width: of red and blue, of green, of infrared; two for "rgb", by '
-        "default 16 and 15.",
+        description="Fringes over the full projector width: of red and blue, of green, of infrared. For "
+        '"rgb" of red, of green and of blue, by default 36, 35 and 30; or two, of red and blue in quadrature, and of '
+        "green.",
     )
     encoding: Encoding = Field(
         default="rgb-ir",
@@ -85,18 +94,23 @@ class Fringes(Model):
     @model_validator(mode="after")
     def _numbers_distinguish_columns(self) -> Fringes:
         count, encoding = len(self.numbers), self.encoding
-        if count != len(CHANNELS[encoding]) - 1:
-            raise ValueError(_other_count(count, encoding))
+        if count not in COUNTS[encoding]:
+            raise ValueError(_other_count(count))
+        if not self.quadrature and len(set(self.numbers)) < count:
+            raise ValueError(
+                f"numbers: expected three different numbers, of red, green and blue, got {_listed(self.numbers)}; "
+                'encoding = "rgb" with two numbers, such as (16, 15), has one for red and blue'
+            )
         if self.predeformed_z_mm is not None and not self.infrared:
             raise ValueError('predeformed_z_mm is of the infrared image, which encoding = "rgb" lacks; leave it out')
         # A wider projector forbids no further numbers, so that numbers that fail here fail for every projector.
         try:
             if self.columns_px is None:
-                _core.check_code(self.numbers, SIZE_MAX)
+                _core.check_code(self.code, SIZE_MAX)
         except ValueError:
             raise ValueError(
                 "numbers: expected fringe numbers whose joint range covers the projector, such as "
-                f"{_listed(NUMBERS[encoding])}, got {_listed(self.numbers)}"
+                f"{_listed(NUMBERS[encoding] if count > len(PAIR) else PAIR)}, got {_listed(self.numbers)}"
             ) from None
         return self
 
@@ -104,6 +118,19 @@ class Fringes(Model):
     def infrared(self) -> bool:
         """Whether the encoding has an infrared channel."""
         return self.encoding == "rgb-ir"
+
+    @property
+    def quadrature(self) -> bool:
+        """Whether red and blue have one fringe number and are in quadrature; else each colour has a number."""
+        return self.infrared or len(self.numbers) == len(CHANNELS["rgb"]) - 1
+
+    @property
+    def code(self) -> FringeNumbers:
+        """The numbers as functions of the kernel take them.
+
+        They are `numbers`, and for three colours of different numbers also 0 for the infrared that is absent.
+        """
+        return self.numbers if self.quadrature else (*self.numbers, 0.0)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -114,20 +141,15 @@ class Fringes(Model):
     def channel_numbers(self) -> tuple[float, ...]:
         """The fringe number of each of the channels."""
         first, second, *third = self.numbers
-        return (first, second, first, *third)
+        return (first, second, first, *third) if self.quadrature else self.numbers
 
 
 def _listed(numbers: FringeNumbers) -> str:
     return f"({', '.join(f'{number:g}' for number in numbers)})"
 
 
-def _other_count(count: int, encoding: Encoding) -> str:
-    """Say how many numbers the encoding has, and which encoding the given ones may be meant for."""
-    if encoding == "rgb":
-        return (
-            'numbers: encoding = "rgb" has two fringe numbers, of red and blue, which are in quadrature, and of green, '
-            f"such as (16, 15), and got {count}; give two, or leave the encoding out for a bench with infrared"
-        )
+def _other_count(count: int) -> str:
+    """Say how many numbers the encoding with infrared has, and which encoding the given ones may be meant for."""
     return (
         f"numbers: expected three fringe numbers, such as (36, 35, 30), got {count}; without infrared set "
         'encoding = "rgb" (--encoding rgb)'
@@ -139,5 +161,7 @@ class _SomeNumbers(Model):
 
 
 def fringe_numbers(given: Any) -> FringeNumbers:
-    """Give two or three fringe numbers for one stage alone; raises `ConfigError` for anything else."""
-    return checked(_SomeNumbers, {"numbers": given}, "fringe numbers").numbers
+    """Give fringe numbers for one stage alone, as `Fringes.code`; raises `ConfigError` for anything else."""
+    alone = is_code(given)
+    numbers = checked(_SomeNumbers, {"numbers": given[:3] if alone else given}, "fringe numbers").numbers
+    return (*numbers, 0.0) if alone else numbers

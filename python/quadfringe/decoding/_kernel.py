@@ -111,7 +111,7 @@ class KernelDecoder:
         try:
             return _core.Decoder(
                 self._size,
-                plan.fringes.numbers,
+                plan.fringes.code,
                 plan.projector_width_px,
                 columns_px=plan.fringes.columns_px,
                 full_scale=self._full_scale,
@@ -154,7 +154,7 @@ def check_channels(shot: AnyShot, plan: Plan) -> None:
         return
     expected, got = ", ".join(plan.fringes.channels), ", ".join(shot.images)
     if plan.fringes.infrared:
-        advice = 'give the infrared image ir, or, if none was projected, fringes with encoding = "rgb" and two numbers'
+        advice = 'give the infrared image ir, or, if none was projected, fringes with encoding = "rgb"'
     else:
         advice = 'leave ir out, or give fringes with encoding = "rgb-ir" and three numbers'
     words = f'the fringes have encoding = "{plan.fringes.encoding}", of {expected}, and the shot has {got}: {advice}'

@@ -24,11 +24,16 @@ QUANTILE = 0.75
 
 
 def channels_agree(shape: Shape, shot: AnyShot, plan: Plan) -> bool:
-    """Tell whether G and IR show their fringes where the phase of the shape puts them; False with too few tiles."""
+    """Tell whether G and IR show their fringes where the phase of the shape puts them; False with too few tiles.
+
+    B takes the place of IR if it has another fringe number than R.
+    """
     light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
     first, second, *third = plan.fringes.numbers
     channels = [(light["green"], second / first * shape.phase_rad)]
-    for number in third:
+    if third and not plan.fringes.quadrature:
+        channels.append((light["blue"], third[0] / first * shape.phase_rad))
+    for number in third if plan.fringes.infrared else ():
         per_px = 2 * np.pi * number / plan.projector_width_px
         channels.append((light["ir"], (per_px * infrared_column(shape, plan)).astype(np.float32)))
     return all(_offset_rad(image, phase_rad) <= OFFSET_MAX_RAD for image, phase_rad in channels)

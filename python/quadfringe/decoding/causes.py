@@ -105,8 +105,9 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
         return None
     first, second, *others = plan.fringes.numbers
     words = f"the fringe numbers {listed(plan.fringes.numbers)} are not those of this shot: for {first:g} fringes of "
-    words += f"red and blue it has {closure.green * second:.2f} of green"
-    words += "".join(f" and {closure.infrared * third:.2f} of infrared" for third in others)
+    seen, last = ("red and blue", "infrared") if plan.fringes.quadrature else ("red", "blue")
+    words += f"{seen} it has {closure.green * second:.2f} of green"
+    words += "".join(f" and {closure.infrared * third:.2f} of {last}" for third in others)
     if not others:
         return Cause("fringe numbers", words, NUMBERS_FIX)
     root = _root(plan, closure)
@@ -117,10 +118,10 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
 def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
     """Give the numbers n, n - 1, n - k of k^2 = n next to the ratio of infrared to red, without those of the plan.
 
-    Without infrared, give n, n - 1 next to the ratio of green to red.
+    With two numbers, give n, n - 1 next to the ratio of green to red.
     """
-    if not plan.fringes.infrared:
-        first, second = plan.fringes.numbers
+    first, second, *others = plan.fringes.numbers
+    if not others:
         whole = round(1 / max(1 - closure.green * second / first, 1e-3))
         pairs = [(float(n), float(n - 1)) for n in (whole - 1, whole, whole + 1) if SMALLEST_PAIR <= n <= LARGEST_PAIR]
         return [numbers for numbers in pairs if numbers != plan.fringes.numbers and _covers(numbers, plan)]
@@ -130,7 +131,7 @@ def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
 
 
 def _root(plan: Plan, closure: Closure) -> float:
-    """Give the k of n, n - 1, n - k with n = k^2, for which infrared has this frequency relative to red."""
+    """Give the k of n, n - 1, n - k with n = k^2, for which the third has this frequency relative to red."""
     return 1 / max(1 - closure.infrared * plan.fringes.numbers[2] / plan.fringes.numbers[0], 1e-3)
 
 

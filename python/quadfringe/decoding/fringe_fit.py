@@ -82,13 +82,16 @@ def fit_fringes(shot: AnyShot, shape: Shape, plan: Plan) -> Fit | None:
     if inside.sum() < PIXELS_MIN:
         return None
     phases = _phases(shape, plan, inside)
-    first, second, *third = phases
-    quadrature = -np.sin(first)  # blue, a quarter period before red
-    shown = np.stack([np.cos(first), np.cos(second), quadrature, *map(np.cos, third)], axis=1)
+    if plan.fringes.quadrature:  # blue is a quarter period before red
+        first, second, *third = phases
+        phases = (first, second, first, *third)
+    shown = np.stack([np.cos(phase) for phase in phases], axis=1)
+    if plan.fringes.quadrature:
+        shown[:, 2] = -np.sin(phases[2])
     names, count = plan.fringes.channels, len(plan.fringes.channels)
     amplitude, harmonic, crosstalk, contrast = np.zeros(count), np.zeros(count), np.zeros((count,) * 2), np.zeros(count)
     for i, name in enumerate(names):
-        phase = (first, second, first, *third)[i]
+        phase = phases[i]
         twice = np.stack([np.cos(2 * phase), np.sin(2 * phase), np.ones_like(phase)], axis=1)
         wave = light[name][inside] / backgrounds[name][inside] - 1
         found = np.linalg.lstsq(np.hstack([shown, twice]), wave, rcond=None)[0]
@@ -188,8 +191,8 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
 
 def _phases(shape: Shape, plan: Plan, inside: NDArray[np.bool_]) -> tuple[NDArray[np.float64], ...]:
     column = shape.column_px.astype(float)
-    columns = (column, column, infrared_column(shape, plan))
-    numbers = zip(plan.fringes.numbers, columns, strict=True)
+    third = infrared_column(shape, plan) if plan.fringes.infrared else column
+    numbers = zip(plan.fringes.numbers, (column, column, third), strict=False)  # there may be two
     return tuple(2 * np.pi * number * seen[inside] / plan.projector_width_px for number, seen in numbers)
 
 

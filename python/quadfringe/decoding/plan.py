@@ -10,6 +10,7 @@ from typing import Any, Literal
 
 from quadfringe import _core
 from quadfringe.config import SIZE_MAX, DecodeConfig, Fringes, Response, ResponseChoice, brief, checked, shortened
+from quadfringe.config.fringes import is_code
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.errors import InputError
 
@@ -23,8 +24,8 @@ class Plan:
     `projector_width_px` is the number of projector columns that the fringes cover. `calibration` is a `Calibration` or
     the path of its file; without one, shapes hold phase only. `response` is "auto", "linear", a `Response`, or the
     path of a response file, with the meaning of `DecodeConfig.response`; it may be given here or in `decode`,
-    and is kept here. `fringes` may be given as three numbers, or two without infrared, `decode` as a mapping of its
-    keys.
+    and is kept here. `fringes` may be given as three numbers, or two without infrared, or as `Fringes.code`, and
+    `decode` as a mapping of its keys.
 
     Raises `InputError` (`ConfigError` for settings) that names the argument at fault.
 
@@ -108,14 +109,19 @@ def _columns(width: Any) -> int:
 def _fringes(fringes: Fringes | Sequence[float], columns: int) -> Fringes:
     found = fringes if isinstance(fringes, Fringes) else fringes_of(fringes)
     try:
-        _core.check_code(found.numbers, columns, columns_px=found.columns_px)
+        _core.check_code(found.code, columns, columns_px=found.columns_px)
     except ValueError as error:
         raise InputError(str(error)) from None
     return found
 
 
 def fringes_of(numbers: Any) -> Fringes:
-    """Give the fringes of three numbers, or of two without infrared; raises `ConfigError` for anything else."""
+    """Give the fringes of three numbers, or of two without infrared, or of a `Fringes.code`.
+
+    Raises `ConfigError` for anything else.
+    """
+    if is_code(numbers):
+        return checked(Fringes, {"numbers": numbers[:3], "encoding": "rgb"}, "fringes")
     colours = isinstance(numbers, Sequence) and not isinstance(numbers, str) and len(numbers) == 2
     values = {"numbers": numbers, "encoding": "rgb" if colours else "rgb-ir"}
     return checked(Fringes, values, "fringes")

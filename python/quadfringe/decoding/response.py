@@ -89,7 +89,7 @@ def response_in_place_of(stated: KernelDecoder, shot: AnyShot) -> KernelDecoder:
 
 def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | Literal["linear"]:
     fringes = plan.fringes
-    given = (shot, shape.phase_rad, fringes.numbers, plan.projector_width_px, plan.calibration)
+    given = (shot, shape.phase_rad, fringes.code, plan.projector_width_px, plan.calibration)
     return response_of_shot(*given, columns_px=fringes.columns_px)
 
 

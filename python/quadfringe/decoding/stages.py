@@ -49,6 +49,7 @@ from quadfringe._core import (
 )
 from quadfringe.config import ChannelResponse, Response, ResponseChoice, brief
 from quadfringe.config.fringes import fringe_numbers as numbers_of
+from quadfringe.config.fringes import is_code
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
@@ -81,7 +82,7 @@ __all__ = [
 ]
 
 Map = NDArray[np.float32]
-FringeNumbers = tuple[float, ...]  # of red and blue, of green, of infrared if there is any
+FringeNumbers = tuple[float, ...]  # as `Fringes.code`: of red and blue, of green, of infrared if there is any
 CHANNELS = ("red", "green", "blue", "ir")
 
 
@@ -93,15 +94,15 @@ class Wrapped(NamedTuple):
     """
 
     phase_rad: Map
-    """Wrapped phase of R and B at every pixel, (H, W), rad (S2)."""
+    """Wrapped phase of R and B at every pixel, (H, W), rad (S2); of blocks of R if each colour has a number."""
     modulation: Map
     """Least modulation of all channels, (H, W), fraction of full scale; NaN where IR has no data."""
     red_blue_rad: Map
-    """Wrapped phase of the block means of R and B, (B, W), rad."""
+    """Wrapped phase of the block means of R and B, (B, W), rad; of R, up to whole turns, if each has a number."""
     green_rad: Map
     """Phase of the block means of G, (B, W), rad, up to whole turns (S3)."""
     infrared_rad: Map
-    """Phase of the block means of IR, (B, W), rad, up to whole turns (S3); 0 without infrared."""
+    """Phase of the block means of IR, or of B with a number for itself, (B, W), rad, up to whole turns (S3); else 0."""
     rows: int
     """Rows of a block."""
 
@@ -180,13 +181,19 @@ def _known(response: object, calibration: Calibration | None) -> ResponseChoice:
 def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     """Give the phases and the modulation of linear light by name, each (H, W) float32 (S2, S3).
 
-    Two fringe numbers are those of light without infrared.
+    Two fringe numbers are those of light without infrared, three those with it; three and 0, as `Fringes.code` gives
+    them, are those of red, green and blue, of which a Fourier filter gives all phases.
 
     The fringe period comes from the red image. Raises `InputError` for other light, `DecodeError` when no fringes, or
     less than one, cross the rows.
     """
-    first, second, *third = numbers_of(fringe_numbers)
-    _check_light(light, infrared=bool(third))
+    numbers = numbers_of(fringe_numbers)
+    _check_light(light, infrared=len(numbers) == len(CHANNELS) - 1)
+    return _each_alone(light, numbers[:3]) if is_code(numbers) else _with_quadrature(light, numbers)
+
+
+def _with_quadrature(light: dict[str, Map], numbers: FringeNumbers) -> Wrapped:
+    first, second, *third = numbers
     red, blue = light["red"], light["blue"]
     ir = light["ir"] if third else np.zeros_like(red)
     period_px, green_px, infrared_px = _periods_px(red, (first, second, *(third or [second])))
@@ -219,6 +226,23 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     )
 
 
+def _each_alone(light: dict[str, Map], numbers: FringeNumbers) -> Wrapped:
+    """Give the Fourier phases of red, green and blue."""
+    red, width = light["red"], light["red"].shape[1]
+    period_px, green_px, blue_px = _periods_px(red, numbers)
+    rows, columns = block_size(green_px, blue_px, width)
+    red_means = block_means(_fringes(red, rows, 1, period_px)[0], 1, columns)
+    green_means, blue_means = (
+        _fringes(light[name], rows, columns, px)[0] for name, px in (("green", green_px), ("blue", blue_px))
+    )
+    (red_rad, modulation), _ = fourier_pair(red_means, red_means, (period_px / columns,) * 2, columns, width)
+    found = fourier_pair(green_means, blue_means, (green_px / columns, blue_px / columns), columns, width)
+    (green, green_modulation), (blue, blue_modulation) = found
+    least = np.fmin(np.fmin(green_modulation, blue_modulation), modulation)
+    phase_rad, modulation = (np.repeat(blocks, rows, axis=0)[: len(red)] for blocks in (_wrap(red_rad), least))
+    return Wrapped(phase_rad, modulation, red_rad, green, blue, rows)
+
+
 def _periods_px(red: Map, numbers: FringeNumbers) -> list[float]:
     """Give the fringe periods of these numbers along the rows; raise `DecodeError` when no fringes cross them."""
     period_px = row_period(red)
@@ -248,7 +272,8 @@ def order(
 def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tuple[Map, ...]:
     """Give the wrapped phases in rad, (H, W): red and blue by two steps (S2), green and infrared by Fourier (S3).
 
-    With two fringe numbers there is no infrared, and two phases. Raises `DecodeError` when no fringes cross the rows.
+    With two fringe numbers there is no infrared, and two phases. With three and 0, as `Fringes.code` gives them, the
+    phases are those of red, green and blue. Raises `DecodeError` when no fringes cross the rows.
     """
     wrapped = demodulate(light, fringe_numbers)
     others = (wrapped.green_rad, wrapped.infrared_rad)[: len(fringe_numbers) - 1]

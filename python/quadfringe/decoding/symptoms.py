@@ -41,8 +41,9 @@ class Angle:
 class Closure:
     """How the phases of red and blue, green and infrared fit together.
 
-    `green` and `infrared` are local frequencies over what the fringe numbers say, 1 if they agree, negative where red
-    and blue run backwards. `infrared_px` is the period of the infrared fringes, NaN without infrared.
+    If each colour has another fringe number, blue has the place of infrared. `green` and `infrared` are local
+    frequencies over what the fringe numbers say, 1 if they agree, negative where red
+    and blue run backwards. `infrared_px` is the period of the infrared fringes, NaN without a third phase.
     """
 
     green: float
@@ -100,12 +101,12 @@ def sharpness(shot: AnyShot) -> float:
 def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
     """Measure how the three phases close; None when no fringes cross the rows.
 
-    Two phases close for every surface; without infrared only the frequency of green tells anything.
+    Two phases close for every surface; without a third one only the frequency of green tells anything.
     """
     light = _light(shot, plan)
     first, second, *others = plan.fringes.numbers
     try:
-        phases = wrapped_phases(light, plan.fringes.numbers)
+        phases = wrapped_phases(light, plan.fringes.code)
     except DecodeError:
         return None
     waves = [np.where(np.isfinite(p), np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]

@@ -220,7 +220,8 @@ def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
     if abs(closure.green + 1) < GREEN_OFF:
         words = "red and blue seem to be swapped, or the images mirrored: green runs against them"
     else:
-        words = f"green has {abs(closure.green):.2f} of the fringes that it should have for those of red and blue"
+        seen = "red and blue" if decoder.plan.fringes.quadrature else "red"
+        words = f"green has {abs(closure.green):.2f} of the fringes that it should have for those of {seen}"
     fix = (
         "check that the channels are red, green, blue in this order, and that the fringe numbers are those of this shot"
     )

@@ -30,6 +30,7 @@ __all__ = [
 
 # Peak memory of the images of both projectors, bytes per pixel (`pytest tests/test_size_limits.py` holds it).
 BYTES_PER_PX = 56
+WITH_INFRARED = 3  # fringe numbers of an encoding with infrared, as `Fringes.code` gives them
 
 
 @dataclass(frozen=True)
@@ -103,16 +104,16 @@ def projector_images(
     deformed: Predeformation | None = None,
     columns_px: tuple[float, float] | None = None,
 ) -> ProjectorImages:
-    """Return the images of both projectors for these fringes; `size_px` is (W, H).
+    """Return the images of both projectors for these fringes, as `Fringes.code`; `size_px` is (W, H).
 
-    With two fringe numbers the infrared image is black. `columns_px` are those that can light the scene.
+    Without infrared its image is black. `columns_px` are those that can light the scene.
 
     Raises ValueError when the ambiguity range of the fringe numbers does not cover the width, when the projectors of a
     pre-deformation have another size, and for images that are impossible or do not fit into memory.
     """
     require_image("projector images", size_px, BYTES_PER_PX)
     _core.check_code(fringes, size_px[0], columns_px=columns_px)
-    letters = ("R", "G", "B", "IR")[: len(fringes) + 1]
+    letters = ("R", "G", "B", "IR") if len(fringes) == WITH_INFRARED else ("R", "G", "B")
     images = [_core.pattern(letter, fringes, *size_px, layout=layout, columns_px=columns_px) for letter in letters]
     red, green, blue, ir = (*images, np.zeros_like(images[0]))[:4]
     if deformed is not None:
@@ -137,7 +138,7 @@ def light_images(light: Light, size_px: tuple[int, int], deformed: Predeformatio
     ([255, 0, 0], 128)
     """
     if isinstance(light, Fringes):
-        return projector_images(light.numbers, size_px, light.layout, deformed, light.columns_px)
+        return projector_images(light.code, size_px, light.layout, deformed, light.columns_px)
     require_image("projector images", size_px, BYTES_PER_PX)
     shape = size_px[::-1]
     if isinstance(light, Levels):

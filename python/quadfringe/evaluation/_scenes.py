@@ -136,7 +136,7 @@ def shape_of(scene: Scene, **how: Any) -> Shape:
 def scene_from(shot: Shot, config: SystemConfig, projector_width_px: int) -> Scene:
     """Give a shot of the virtual bench as a scene; pixels at edges and in shadow are not scored."""
     assert shot.truth is not None
-    numbers = config.fringes.numbers
+    numbers = config.fringes.code
     return Scene(
         name=config.scene.surface,
         red=shot.red,

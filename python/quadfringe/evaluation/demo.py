@@ -56,7 +56,7 @@ def run_scene(surface: str, out: Path, fringes: Fringes = Fringes()) -> SceneRes
     if find_spec("matplotlib") is None:
         write_plain_report(out / f"{surface}.png", surface, shot, shape, found)
     else:
-        wrapped = wrapped_phases(linear_light(shot, scanner.calibration), config.fringes.numbers)
+        wrapped = wrapped_phases(linear_light(shot, scanner.calibration), config.fringes.code)
         write_report(out / f"{surface}.png", surface, shot, shape, wrapped, found)
     figures = {
         f"{surface}_depth_rms_mm": found.overall.rms,

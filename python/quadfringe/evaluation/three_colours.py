@@ -1,6 +1,7 @@
 """What three colours lose against four channels: the scenes of `world`, and shots made of the real captures.
 
-The comparison is at the same fringe period: 16, 15 and 12 fringes with infrared, 16 and 15 without.
+Three colours have three fringe numbers, or two with red and blue in quadrature. The comparison is at the same fringe
+period: 36, 35 and 30 fringes with infrared and without, and 16, 15 and 12 with infrared against 16 and 15 without.
 """
 
 from __future__ import annotations
@@ -21,32 +22,39 @@ from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import world
 from quadfringe.evaluation.scoring import Scene, rms
 
-__all__ = ["CODES", "Captured", "capture_shot", "captures", "figures_of"]
+__all__ = ["CODES", "SAME_PERIOD", "Captured", "capture_shot", "captures", "captures_of_three", "figures_of"]
 
-# The fringe numbers that are compared: those of the paper, four channels with the fringes of the three, and these.
-CODES: dict[str, tuple[float, ...]] = {"paper": (36.0, 35.0, 30.0), "four": (16.0, 15.0, 12.0), "rgb": (16.0, 15.0)}
+# The fringes that are compared: those of the paper and as many in three colours; 16 with infrared, and 16 without.
+CODES: dict[str, Fringes] = {
+    "paper": Fringes(),
+    "four": Fringes(numbers=(16, 15, 12)),
+    "three": Fringes(encoding="rgb", numbers=(36, 35, 30)),
+    "two": Fringes(encoding="rgb", numbers=(16, 15)),
+}
+# The encodings with and without infrared at the same fringe period.
+SAME_PERIOD = {"three": "paper", "two": "four"}
 # Ranges of columns that light the objects of the captures. R and B with G repeat after 15 fringes of 42 columns.
 RANGES = {"plate": ((249, 879), (782, 1412)), "bottle": ((0, 630), (455, 1085), (910, 1540))}
 
 
 def figures_of(
-    name: str, numbers: tuple[float, ...], calibration: Calibration, seeds: tuple[int, ...], method: str = "joint"
+    name: str, fringes: Fringes, calibration: Calibration, seeds: tuple[int, ...], method: str = "joint"
 ) -> dict[str, float]:
     """Give the figures of `world.judge`, and the phase error of the right orders in rad, as means over the seeds."""
-    found = [_figures(world.take(name, seed, numbers=numbers), calibration, method) for seed in seeds]
+    found = [_figures(world.take(name, seed, numbers=fringes.code), fringes, calibration, method) for seed in seeds]
     return {key: fmean(one[key] for one in found) for key in found[0]}
 
 
-def _figures(taken: world.Take, calibration: Calibration, method: str) -> dict[str, float]:
-    shape = _decoded(taken, calibration, method)
+def _figures(taken: world.Take, fringes: Fringes, calibration: Calibration, method: str) -> dict[str, float]:
+    shape = _decoded(taken, fringes, calibration, method)
     error = (shape.phase_rad - taken.phase_rad)[shape.returned & taken.counted]
     return asdict(world.judge(shape, taken)) | {"phase_rms_rad": rms(error[np.abs(error) < np.pi])}
 
 
-def _decoded(taken: world.Take, calibration: Calibration, method: str) -> Shape:
+def _decoded(taken: world.Take, fringes: Fringes, calibration: Calibration, method: str) -> Shape:
     """Decode without a verdict, because a refused shot would have no figures."""
     decode = {"method": method}
-    plan = Plan(calibration.projector.width_px, taken.fringe_numbers, calibration, response="linear", decode=decode)
+    plan = Plan(calibration.projector.width_px, fringes, calibration, response="linear", decode=decode)
     return Decoder(taken.shot, plan).decode_without_verdict(taken.shot)
 
 
@@ -77,6 +85,15 @@ def captures(data: Path, **settings: Any) -> Iterator[tuple[str, Captured]]:
         yield name, Captured(*(sum(getattr(part, key) for part in parts) for key in ("pixels", "returned", "right")))
 
 
+def captures_of_three(data: Path, **settings: Any) -> Iterator[tuple[str, Captured]]:
+    """Decode each capture as three colours of different fringe numbers; its infrared image stands for blue."""
+    for name in RANGES:
+        scene = scenes.capture(data, name)
+        fringes = Fringes(encoding="rgb", numbers=scene.fringe_numbers)
+        assert scene.ir is not None, "captures have infrared"
+        yield name, _scored(scene, Shot(scene.red, scene.green, scene.ir), fringes, scene.scored, settings)
+
+
 def capture_shot(scene: Scene, columns_px: tuple[float, float]) -> Shot:
     """Give the colours of a capture as if the projector lit with these columns only."""
     lit = _lit(scene, columns_px)
@@ -91,7 +108,10 @@ def _lit(scene: Scene, columns_px: tuple[float, float]) -> Any:
 
 def _captured(scene: Scene, columns_px: tuple[float, float], settings: dict[str, Any]) -> Captured:
     fringes = Fringes(encoding="rgb", numbers=scene.fringe_numbers[:2], columns_px=columns_px)
-    shot, scored = capture_shot(scene, columns_px), scene.scored & _lit(scene, columns_px)
+    return _scored(scene, capture_shot(scene, columns_px), fringes, scene.scored & _lit(scene, columns_px), settings)
+
+
+def _scored(scene: Scene, shot: Shot, fringes: Fringes, scored: Any, settings: dict[str, Any]) -> Captured:
     try:
         phase_rad = Decoder(shot, Plan(scene.projector_width, fringes, decode=settings)).decode(shot).phase_rad
     except DecodeError:

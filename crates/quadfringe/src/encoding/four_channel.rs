@@ -1,5 +1,5 @@
 //! The encodings that decode a single shot: R and B in quadrature, G alone, and IR alone if there is an infrared
-//! projector, as in the paper.
+//! projector, as in the paper; or R, G and B, each alone.
 
 use super::Encoding;
 use super::channel::{ChannelCode, Projector, phase_at};
@@ -18,7 +18,7 @@ pub enum Channel {
     R,
     /// Green, visible projector, shift 0.
     G,
-    /// Blue, visible projector, shift `pi/2`: in quadrature with R.
+    /// Blue, visible projector, shift `pi/2`: in quadrature with R. Alone, with another fringe number than R: shift 0.
     B,
     /// Infrared, infrared projector, shift 0.
     Ir,
@@ -45,7 +45,7 @@ impl Channel {
         }
     }
 
-    /// Phase shift in rad: `pi/2` for B, else 0.
+    /// Phase shift in rad of a channel with infrared: `pi/2` for B, else 0. [`FourChannel::shift_rad`] is that of an encoding.
     #[must_use]
     pub const fn shift_rad(self) -> f64 {
         match self {
@@ -64,18 +64,19 @@ impl Channel {
     }
 }
 
-/// The encoding of a single shot as decoders see it: three fringe numbers over the projector width. Without an infrared
-/// projector the third number is 0, and the channel has no weight. [`Encoding::four_channel_view`] makes it, which
-/// guarantees valid numbers.
+/// The encoding of a single shot as decoders see it: two or three phases of different fringe numbers over the projector width, the
+/// third of IR, or of B if B is alone. [`Encoding::four_channel_view`] makes it, which guarantees valid numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[non_exhaustive]
 pub struct FourChannel {
-    /// Fringe number of R and B, which are in quadrature. Decoding makes their phase absolute.
+    /// Fringe number of R, and of B if the two are in quadrature. Decoding makes this phase absolute.
     pub quadrature: f64,
     /// Fringe number of G.
     pub green: f64,
     /// Fringe number of IR; 0 if there is no infrared channel.
     pub infrared: f64,
+    /// Fringe number of B if B is alone; 0 if it is in quadrature with R.
+    pub blue: f64,
     /// Number of projector columns that the fringe numbers refer to.
     pub projector_width: usize,
     /// [`Encoding::columns_px`] of the encoding.
@@ -91,29 +92,56 @@ impl FourChannel {
         self.infrared > 0.0
     }
 
-    /// Fringe number of a channel.
+    /// Whether R and B are in quadrature; otherwise each of the three colours is alone.
     #[must_use]
-    pub const fn fringe_number(&self, channel: Channel) -> f64 {
+    pub fn has_quadrature(&self) -> bool {
+        self.blue == 0.0
+    }
+
+    /// Fringe number of a channel; 0 for an infrared channel that is absent.
+    #[must_use]
+    pub fn fringe_number(&self, channel: Channel) -> f64 {
         match channel {
+            Channel::B if !self.has_quadrature() => self.blue,
             Channel::R | Channel::B => self.quadrature,
             Channel::G => self.green,
             Channel::Ir => self.infrared,
         }
     }
 
-    /// The fringe numbers of the three phases: of R and B, of G, of IR.
+    /// Phase shift of a channel in rad: `pi/2` for B in quadrature with R, else 0.
     #[must_use]
-    pub const fn numbers(&self) -> [f64; 3] {
-        [self.quadrature, self.green, self.infrared]
+    pub fn shift_rad(&self, channel: Channel) -> f64 {
+        if self.has_quadrature() { channel.shift_rad() } else { 0.0 }
     }
 
-    /// Number of fringe orders of R and B over the projector width.
+    /// The fringe numbers of the three phases: of R with or without B, of G, and of IR or B alone; the third is 0 if there are
+    /// two.
+    #[must_use]
+    pub fn numbers(&self) -> [f64; 3] {
+        [self.quadrature, self.green, if self.has_quadrature() { self.infrared } else { self.blue }]
+    }
+
+    /// Whether there is a third phase, of IR or of B alone.
+    #[must_use]
+    pub fn has_third(&self) -> bool {
+        self.numbers()[2] > 0.0
+    }
+
+    /// The fringe numbers, over the first, of R, G, B and IR as the steps of the joint method have them; 0 for a channel that is
+    /// absent. B alone has the place of IR, because both are a phase other than that of R, and nothing is then in quadrature with R.
+    pub(crate) fn ratios(&self) -> [f32; 4] {
+        let [first, second, third] = self.numbers().map(|number| (number / self.quadrature) as f32);
+        [first, second, if self.has_quadrature() { first } else { 0.0 }, third]
+    }
+
+    /// Number of fringe orders of R over the projector width.
     #[must_use]
     pub fn orders(&self) -> usize {
         self.quadrature.ceil() as usize
     }
 
-    /// Number of projector columns in one turn of the absolute phase, which is the phase of R and B.
+    /// Number of projector columns in one turn of the absolute phase, which is the phase of R.
     #[must_use]
     pub fn period_px(&self) -> f64 {
         self.projector_width as f64 / self.quadrature
@@ -127,8 +155,8 @@ impl FourChannel {
 }
 
 impl Encoding {
-    /// The encoding as the four channels of the paper, or as the first three of them. The decoders of this crate take only
-    /// these.
+    /// The encoding as the four channels of the paper, as the first three of them, or as three colours of different fringe
+    /// numbers and without shifts. The decoders of this crate take only these.
     ///
     /// ```
     /// use quadfringe::Encoding;
@@ -137,8 +165,12 @@ impl Encoding {
     /// assert_eq!((four.quadrature, four.green, four.infrared), (36.0, 35.0, 30.0));
     ///
     /// let three_colours = [36.0, 35.0, 30.0].map(|number| ChannelCode::new(number, 0.0, Projector::Visible));
-    /// let refused = Encoding::new(three_colours, 912)?.four_channel_view().unwrap_err();
-    /// assert!(refused.to_string().contains("got channel B shifted by 0 rad"));
+    /// let view = Encoding::new(three_colours, 912)?.four_channel_view()?;
+    /// assert_eq!((view.numbers(), view.has_quadrature()), ([36.0, 35.0, 30.0], false));
+    ///
+    /// let alike = [16.0, 15.0, 15.0].map(|number| ChannelCode::new(number, 0.0, Projector::Visible));
+    /// let refused = Encoding::new(alike, 912)?.four_channel_view().unwrap_err();
+    /// assert!(refused.to_string().contains("got 15 fringes in G and in another channel"));
     /// # Ok::<(), quadfringe::Error>(())
     /// ```
     ///
@@ -152,23 +184,29 @@ impl Encoding {
         if infrared.len() > 1 {
             return fault(FourChannelFault::Count(self.channels().len()));
         }
+        let is_alone =
+            infrared.is_empty() && blue.shift_rad == 0.0 && blue.fringe_number != red.fringe_number;
         for (channel, code) in Channel::ALL.into_iter().zip(self.channels()) {
             let ChannelCode { shift_rad, projector, .. } = *code;
             if projector != channel.projector() {
                 return fault(FourChannelFault::Projector { channel: channel.name() });
             }
-            if shift_rad != channel.shift_rad() {
+            if shift_rad != if is_alone { 0.0 } else { channel.shift_rad() } {
                 return fault(FourChannelFault::Shift { channel: channel.name(), found_rad: shift_rad });
             }
         }
-        if red.fringe_number != blue.fringe_number {
-            let (red, blue) = (red.fringe_number, blue.fringe_number);
-            return fault(FourChannelFault::Quadrature { red, blue });
+        let [number, green, other] = [red, green, blue].map(|channel| channel.fringe_number);
+        if is_alone && (green == number || green == other) {
+            return fault(FourChannelFault::Alike(green));
+        }
+        if !is_alone && number != other {
+            return fault(FourChannelFault::Quadrature { red: number, blue: other });
         }
         Ok(FourChannel {
-            quadrature: red.fringe_number,
-            green: green.fringe_number,
+            quadrature: number,
+            green,
             infrared: infrared.first().map_or(0.0, |channel| channel.fringe_number),
+            blue: if is_alone { other } else { 0.0 },
             projector_width: self.projector_width(),
             columns_px: self.columns_px(),
             ambiguity_margin_rad: self.ambiguity_margin_rad(),
@@ -216,9 +254,8 @@ mod tests {
             Ok(encoding) => encoding.four_channel_view(),
             Err(error) => Err(error),
         };
-        let two = count(encoding.channels()[..2].to_vec());
-        let five = count([encoding.channels(), &encoding.channels()[..2]].concat());
-        for (found, expected) in [(two, 2), (five, 5)] {
+        let (all, two) = (encoding.channels(), &encoding.channels()[..2]);
+        for (found, expected) in [(count(two.to_vec()), 2), (count([all, two].concat()), 5)] {
             assert!(
                 matches!(found, Err(Error::NotFourChannel { fault: FourChannelFault::Count(n) }) if n == expected)
             );
@@ -234,5 +271,30 @@ mod tests {
             assert_eq!(four.phase_rad(channel, 77.5), code.phase_rad(77.5, 912));
         }
         assert_eq!(four.period_px(), encoding.period_px());
+    }
+
+    #[test]
+    fn three_colours_of_different_numbers_are_each_alone() {
+        let encoding = Encoding::three_colours([36.0, 35.0, 30.0], 912).expect("valid");
+        let view = encoding.four_channel_view().expect("three colours");
+        assert_eq!((view.blue, view.has_infrared(), view.has_third()), (30.0, false, true));
+        assert_eq!(view.fringe_number(Channel::B), 30.0);
+        assert!(Channel::ALL.iter().all(|channel| view.shift_rad(*channel) == 0.0));
+        assert_eq!(view.ratios(), [1.0, 35.0 / 36.0, 0.0, 30.0 / 36.0]);
+        assert_eq!(FourChannel::of(Encoding::rgb([16.0, 15.0], 912)).ratios(), [1.0, 15.0 / 16.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn three_colours_of_which_two_are_alike_are_refused() {
+        let fault_of =
+            |numbers| match Encoding::three_colours(numbers, 912).and_then(|e| e.four_channel_view()) {
+                Err(Error::NotFourChannel { fault }) => fault,
+                other => panic!("expected a refusal, got {other:?}"),
+            };
+        for numbers in [[16.0, 16.0, 15.0], [16.0, 15.0, 15.0]] {
+            assert_eq!(fault_of(numbers), FourChannelFault::Alike(numbers[1]));
+        }
+        let fault = FourChannelFault::Shift { channel: "B", found_rad: 0.0 };
+        assert_eq!(fault_of([16.0, 15.0, 16.0]), fault);
     }
 }

@@ -149,6 +149,35 @@ impl Encoding {
         Self::within(channels, projector_width, columns_px)
     }
 
+    /// Makes three channels for a projector without infrared, from three different fringe numbers: for R, for G and for B.
+    /// None is in quadrature with another: a window along the surface gives the phase of each.
+    ///
+    /// ```
+    /// use quadfringe::Encoding;
+    /// let view = Encoding::three_colours([36.0, 35.0, 30.0], 912)?.four_channel_view()?;
+    /// assert_eq!((view.numbers(), view.has_infrared()), ([36.0, 35.0, 30.0], false));
+    /// # Ok::<(), quadfringe::Error>(())
+    /// ```
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn three_colours(numbers: [f64; 3], projector_width: usize) -> Result<Self> {
+        Self::three_colours_within(numbers, projector_width, [0.0, projector_width as f64])
+    }
+
+    /// As [`Self::three_colours`], for scenes that only a range of columns lights, as [`Self::within`].
+    ///
+    /// # Errors
+    /// As [`Self::within`].
+    pub fn three_colours_within(
+        numbers: [f64; 3],
+        projector_width: usize,
+        columns_px: [f64; 2],
+    ) -> Result<Self> {
+        let channels = numbers.map(|number| ChannelCode::new(number, 0.0, Projector::Visible));
+        Self::within(channels, projector_width, columns_px)
+    }
+
     /// Makes the four channels of the paper with the optimum fringe numbers `N`, `N - 1` and `N - sqrt(N)` (S4): the
     /// beats of the first with the others have 1 and `sqrt(N)` fringes.
     ///

@@ -3,6 +3,7 @@
 
 use super::illumination::LitMask;
 use super::local_fit::{LocalFit, PixelMaps};
+use super::model::absent;
 use super::noise::noise_of_phase;
 use super::orders::{Orders, Wrapped};
 use super::params::photometry as params;
@@ -59,8 +60,8 @@ impl CoarseLevel {
             noise: 0.0,
             relative_noise: 0.0,
             textured: false,
-            lit_mask: LitMask::new(code.has_infrared()),
-            fit: LocalFit::new(code.has_infrared()),
+            lit_mask: LitMask::new(absent(code.ratios())),
+            fit: LocalFit::new(code.ratios()),
             slopes: Slopes::default(),
             orders: Orders::new(code),
             photometry: Photometry::new(),
@@ -102,14 +103,15 @@ impl CoarseLevel {
         let maps = PixelMaps { phase: &mut self.work, modulation: &mut self.modulation };
         self.fit.run(scene, lit, modulation_min, maps);
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
-        self.noise = noise_of_phase(scene, map);
+        // A phase that is fitted in a window does not show the noise of a pixel.
+        self.noise = if self.fit.is_of_pixels() { noise_of_phase(scene, map) } else { self.lit_mask.noise };
         self.relative_noise = relative(self.noise, &self.modulation);
         self.slopes.measure(scene, map);
     }
 
     /// Step 4: chooses fringe orders (S4) with the offsets and amplitudes of the local fit, then once more with the offsets and
     /// amplitudes that a fit to these orders gives.
-    pub fn choose_orders(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
+    pub fn choose_orders(&mut self, scene: &Scene<'_>, ratios: [f32; 4]) {
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         let wrapped = Wrapped { map, fit: &self.fit, photometry: None, slopes: &self.slopes };
         self.orders.choose(scene, &wrapped, &mut self.phase);
@@ -123,7 +125,7 @@ impl CoarseLevel {
 
     /// Steps 5 and 6, alternating: fits offset and amplitude of every channel, and with them the phase from all four
     /// channels.
-    pub fn refine(&mut self, scene: &Scene<'_>, ratios: [f32; 3], moving: bool, mut scratch: Scratch<'_>) {
+    pub fn refine(&mut self, scene: &Scene<'_>, ratios: [f32; 4], moving: bool, mut scratch: Scratch<'_>) {
         self.textured = false;
         self.fit_phase(scene, ratios, scratch.lend());
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
@@ -157,7 +159,7 @@ impl CoarseLevel {
     }
 
     /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.
-    pub fn leave_out_shadows(&mut self, level: &mut Level, scaled: ScaledGrid<'_>, ratios: [f32; 3]) {
+    pub fn leave_out_shadows(&mut self, level: &mut Level, scaled: ScaledGrid<'_>, ratios: [f32; 4]) {
         let Self { shadows, phase, modulation, photometry, lit_mask, noise, .. } = self;
         let (place, map, noise) = (Where::Everywhere, PhaseMap { phase, modulation }, *noise);
         let scene = level.scene(scaled);
@@ -176,7 +178,7 @@ impl CoarseLevel {
         &mut self,
         level: &mut Level,
         frame: &Frame<'_>,
-        ratios: [f32; 3],
+        ratios: [f32; 4],
         pixels: &mut Pixels,
     ) {
         let Self { shadows, modulation, photometry, lit_mask, noise, .. } = self;
@@ -209,7 +211,7 @@ impl CoarseLevel {
 
     /// Step 6 on the coarse level: fits the phase with the present photometry, and computes squared residuals and
     /// discontinuities.
-    fn fit_phase(&mut self, scene: &Scene<'_>, ratios: [f32; 3], scratch: Scratch<'_>) {
+    fn fit_phase(&mut self, scene: &Scene<'_>, ratios: [f32; 4], scratch: Scratch<'_>) {
         let mut window = Window::new(scene, &self.slopes, &self.modulation, self.noise).near();
         if self.textured {
             window = window.loosened(&self.residuals);
@@ -224,7 +226,7 @@ impl CoarseLevel {
 
     /// Step 5: fits the photometry to the phase of a wide window. This phase follows the surface, while errors of the
     /// previous photometry average out.
-    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 3], fit: &PhotometryFit, scratch: Scratch<'_>) {
+    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 4], fit: &PhotometryFit, scratch: Scratch<'_>) {
         self.residuals.measure(scene, &self.work, &self.modulation);
         self.slopes.measure(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
         let window = Window::new(scene, &self.slopes, &self.modulation, self.noise).wide();
@@ -238,7 +240,7 @@ impl CoarseLevel {
 
     /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains its intensities best. If
     /// enough pixels take them from another place, the surface counts as textured.
-    fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 3]) {
+    fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 4]) {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
         let moved = self.photometry.choose_places(scene, ratios, map, &self.slopes, self.noise);
         self.textured = moved > params::TEXTURED_SHARE;

@@ -2,13 +2,14 @@
 //!
 //! R and B are a quarter period apart, so on a lit surface they are never both at the bottom of their range: at least one
 //! lies 0.146 of its range or more above it. In a shadow all channels lie at the bottom. Bottom and range are taken
-//! from the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known.
+//! from the neighbourhood of each pixel, so neither the ambient light nor the albedo has to be known. Three colours of different
+//! fringe numbers come closer to the bottom together, where two of them are alike.
 
 use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::levels::{LEVEL_MAPS, LevelRows, heights};
 use super::neighbours::{around, least_of_five, least_of_nine, sum_of_nine};
 use super::noise::noise_of_image;
-use super::params::illumination::{HEIGHT_MIN, REACH};
+use super::params::illumination::{HEIGHT_MIN, HEIGHT_MIN_ALONE, REACH};
 use super::params::tasks::ROWS;
 use super::scene::ScaledGrid;
 use crate::parallel::lanes::{Lanes, add, lanes, take};
@@ -28,8 +29,8 @@ pub(super) struct LitMask {
     pub noise: f32,
     /// Least range of fringes, in linear light.
     pub range_min: f32,
-    /// Whether there is an infrared channel; without it the plane of its light is 0.
-    pub infrared: bool,
+    /// The channel that is absent; the plane of its light is 0.
+    absent: Option<usize>,
     /// Whether the infrared light comes from a projector that may light where the visible one does not.
     visible_alone: bool,
 }
@@ -45,8 +46,8 @@ struct Rows {
 }
 
 impl LitMask {
-    pub fn new(infrared: bool) -> Self {
-        Self { infrared, ..Self::default() }
+    pub fn new(absent: Option<usize>) -> Self {
+        Self { absent, ..Self::default() }
     }
 
     /// From now on, only R, G and B decide which pixels are lit.
@@ -98,14 +99,19 @@ impl LitMask {
         sums.resize((ROWS + 2) * stride, 0.0);
         for (y, out) in high.clone().zip(above.chunks_exact_mut(stride)) {
             let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
-            let light = light.map(|plane| &plane[y * stride..][..stride]);
-            let (levels, variance) = (LevelRows::new(maps), self.noise * self.noise);
-            if self.visible_alone || !self.infrared {
-                heights::<3>(&levels, light, variance, out);
-            } else {
-                heights::<4>(&levels, light, variance, out);
+            let mut light = light.map(|plane| &plane[y * stride..][..stride]);
+            let (mut levels, variance) = (LevelRows::new(maps), self.noise * self.noise);
+            match if self.visible_alone { Some(3) } else { self.absent } {
+                None => heights::<4>(&levels, light, variance, out),
+                Some(absent) => {
+                    for rows in [&mut levels.bottom, &mut levels.precision, &mut light] {
+                        rows.swap(absent, 3);
+                    }
+                    heights::<3>(&levels, light, variance, out);
+                }
             }
         }
+        let least = if self.absent == Some(2) { HEIGHT_MIN_ALONE } else { HEIGHT_MIN };
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {
             let near = near(y, *high.start()).map(|at| &above[at..at + stride]);
@@ -114,7 +120,7 @@ impl LitMask {
         for (y, lit) in (first..=last).zip(lit.chunks_exact_mut(stride)) {
             // A mean over nine pixels carries light one pixel into a shadow; the least of nine such means does not.
             let near = near(y, *mean.start()).map(|at| &sums[at..at + stride]);
-            least_of_nine(near, grid.width, 9.0 * HEIGHT_MIN, spare, lit);
+            least_of_nine(near, grid.width, 9.0 * least, spare, lit);
         }
     }
 
@@ -238,7 +244,7 @@ mod tests {
         let grid = Grid::new([20, 32], 4.0);
         let mut lit = vec![1.0; grid.pixels()];
         lit[9 * grid.stride + 12] = 0.0;
-        LitMask::new(true).erode(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
+        LitMask::new(None).erode(&grid, 2, &mut vec![0.0; grid.pixels()], &mut lit);
         let dark = |y: usize| (0..grid.width).filter(|x| lit[y * grid.stride + x] == 0.0).collect::<Vec<_>>();
         assert_eq!((7..=11).map(dark).map(|row| row.len()).collect::<Vec<_>>(), [3, 5, 5, 5, 3]);
         assert_eq!((dark(6), dark(7), dark(9)), (vec![], vec![11, 12, 13], vec![10, 11, 12, 13, 14]));
@@ -262,7 +268,7 @@ mod tests {
             let mut lit = vec![0.0; grid.pixels()];
             let light = planes.each_ref().map(Vec::as_slice);
             let scaled = ScaledGrid { grid: &grid, period_px: 25.3, factor: 1 };
-            LitMask::new(true).find(scaled, light, 0.04, &mut lit);
+            LitMask::new(None).find(scaled, light, 0.04, &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {

@@ -23,13 +23,13 @@ pub(super) trait Waves: Copy {
     type Vector: Copy;
 
     /// Fringe numbers divided by the first.
-    fn ratios(self) -> [f32; 3];
+    fn ratios(self) -> [f32; 4];
 
     /// Vector `i` of the row.
     fn vector(self, i: usize) -> Self::Vector;
 
     /// The infrared wave at pixel `x` of a vector.
-    fn infrared(self, vector: Self::Vector, x: usize, phase: f32) -> Wave;
+    fn infrared(self, vector: &Self::Vector, x: usize, phase: f32) -> Wave;
 
     /// The order from which infrared cosines are counted, as a phase in rad: the middle one of a pair, whose cubic is not good far
     /// outside the field.
@@ -37,7 +37,7 @@ pub(super) trait Waves: Copy {
 
     /// The carriers of all channels at pixel `x` of a vector; `loss` as in [`carriers`].
     #[inline(always)]
-    fn carriers(self, vector: Self::Vector, x: usize, phase: f32, loss: f32) -> Carriers {
+    fn carriers(self, vector: &Self::Vector, x: usize, phase: f32, loss: f32) -> Carriers {
         carriers(phase, self.ratios(), self.infrared(vector, x, phase), loss)
     }
 }
@@ -45,13 +45,13 @@ pub(super) trait Waves: Copy {
 /// The waves of coaxial projectors.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Coaxial {
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
 }
 
 /// The waves of a calibrated pair.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair<'a> {
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub terms: [&'a [Lanes]; TERMS],
 }
 
@@ -76,7 +76,7 @@ impl Waves for Coaxial {
     type Vector = ();
 
     #[inline(always)]
-    fn ratios(self) -> [f32; 3] {
+    fn ratios(self) -> [f32; 4] {
         self.ratios
     }
 
@@ -84,8 +84,8 @@ impl Waves for Coaxial {
     fn vector(self, _: usize) {}
 
     #[inline(always)]
-    fn infrared(self, (): (), _: usize, phase: f32) -> Wave {
-        Wave::coaxial(phase, self.ratios[2])
+    fn infrared(self, (): &(), _: usize, phase: f32) -> Wave {
+        Wave::coaxial(phase, self.ratios[3])
     }
 
     #[inline(always)]
@@ -98,7 +98,7 @@ impl Waves for Pair<'_> {
     type Vector = [Lanes; TERMS];
 
     #[inline(always)]
-    fn ratios(self) -> [f32; 3] {
+    fn ratios(self) -> [f32; 4] {
         self.ratios
     }
 
@@ -108,7 +108,7 @@ impl Waves for Pair<'_> {
     }
 
     #[inline(always)]
-    fn infrared(self, [e0, e1, e2, e3]: Self::Vector, x: usize, phase: f32) -> Wave {
+    fn infrared(self, [e0, e1, e2, e3]: &Self::Vector, x: usize, phase: f32) -> Wave {
         wave([e0[x], e1[x], e2[x], e3[x]], phase)
     }
 
@@ -159,7 +159,7 @@ impl PairPhase {
     }
 
     /// The waves of row `y`.
-    pub fn row(&self, grid: &Grid, y: usize, ratios: [f32; 3]) -> Pair<'_> {
+    pub fn row(&self, grid: &Grid, y: usize, ratios: [f32; 4]) -> Pair<'_> {
         Pair {
             ratios,
             terms: self.planes.each_ref().map(|plane| lanes(&plane[y * grid.stride..][..grid.stride])),
@@ -210,7 +210,7 @@ impl Gathered {
     }
 
     /// The waves of the vector.
-    pub fn waves(&self, ratios: [f32; 3]) -> Pair<'_> {
+    pub fn waves(&self, ratios: [f32; 4]) -> Pair<'_> {
         Pair { ratios, terms: self.0.each_ref().map(std::slice::from_ref) }
     }
 }

@@ -1,9 +1,10 @@
 //! Step 1, planes of linear light (S1), and the fringe period of step 2.
 
+use super::model::has_quadrature;
 use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
 use super::pyramid::Level;
 use crate::condition::{Plan, Sample};
-use crate::stages::quadrature_carrier;
+use crate::stages::{difference_carrier, quadrature_carrier};
 use crate::{Reason, Shot};
 use multiversion::multiversion;
 use ndarray::{ArrayView2, s};
@@ -11,11 +12,12 @@ use rayon::prelude::*;
 
 /// Writes the linear light of a shot into the planes of a level. The mask `lit` becomes 0 for glare and for pixels that the
 /// infrared chip does not see; the mask `usable` becomes 0 also for saturated pixels. `reasons` tells one from the other, in
-/// rows as wide as those of the level.
+/// rows as wide as those of the level. B alone takes the place of IR, which is dark.
 pub(super) fn linear_light<T: Sample>(
     plan: &Plan,
     shot: &Shot<'_, T>,
     shape: [usize; 2],
+    ratios: [f32; 4],
     level: &mut Level,
     reasons: &mut Vec<Reason>,
 ) {
@@ -36,6 +38,9 @@ pub(super) fn linear_light<T: Sample>(
             linear_row(plan, shot, y, saturation, rows, masks);
         },
     );
+    if !has_quadrature(ratios) {
+        light.swap(2, 3);
+    }
 }
 
 /// Saturation of a row of pixels.
@@ -77,14 +82,19 @@ fn linear_row<T: Sample>(
     plan.continue_infrared(y, infrared);
 }
 
-/// Fringe period across the fringes in pixels, from the planes of red and blue; a fixed share of the image width if no
-/// carrier stands out.
-pub(super) fn fringe_period_px(light: &[Vec<f32>; 4], [height, width]: [usize; 2]) -> f64 {
-    let [red, _, blue, _] = light.each_ref().map(|plane| {
+/// Fringe period across the fringes in pixels, from the planes of red and blue, or of three colours with different fringe
+/// numbers; a fixed share of the image width if no carrier stands out.
+pub(super) fn fringe_period_px(light: &[Vec<f32>; 4], [height, width]: [usize; 2], ratios: [f32; 4]) -> f64 {
+    let [red, green, blue, third] = light.each_ref().map(|plane| {
         let stride = plane.len() / height;
         ArrayView2::from_shape((height, stride), plane).expect("a plane is whole").slice_move(s![.., ..width])
     });
-    let found = quadrature_carrier(red, blue).period_px();
+    let found = if has_quadrature(ratios) {
+        quadrature_carrier(red, blue)
+    } else {
+        difference_carrier(red, [green, third])
+    };
+    let found = found.period_px();
     let shorter = width.min(height) as f64;
     if found.is_finite() {
         found.clamp(PERIOD_MIN_PX, shorter.max(2.0 * PERIOD_MIN_PX))

@@ -85,8 +85,8 @@ pub(crate) struct Joint {
     shape: [usize; 2],
     /// Length of a row of pixels including padding.
     stride: usize,
-    /// Fringe numbers divided by the first.
-    ratios: [f32; 3],
+    /// Fringe numbers of R, G, B, IR divided by the first, as [`FourChannel::ratios`] gives them.
+    ratios: [f32; 4],
     energy: Energy,
     albedo: Albedo,
     pyramid: Pyramid,
@@ -106,11 +106,10 @@ pub(crate) struct Joint {
 impl Joint {
     pub fn new(code: &FourChannel, shape: [usize; 2]) -> Self {
         let stride = shape[1].next_multiple_of(FACTOR_MAX * LANES);
-        let numbers = code.numbers();
         Self {
             shape,
             stride,
-            ratios: numbers.map(|n| (n / numbers[0]) as f32),
+            ratios: code.ratios(),
             energy: Energy::default(),
             albedo: Albedo::default(),
             pyramid: Pyramid::new(stride * shape[0]),
@@ -141,9 +140,10 @@ impl Joint {
         out: &mut Decoded,
     ) {
         // 1. Linear light of the four channels (S1).
-        linear_light(plan, shot, self.shape, &mut self.pyramid.full, &mut self.pixels.reasons);
+        let Self { shape, ratios, .. } = *self;
+        linear_light(plan, shot, shape, ratios, &mut self.pyramid.full, &mut self.pixels.reasons);
         // 2. The fringe period scales all windows, cells and the coarse level.
-        let found = || fringe_period_px(&self.pyramid.full.light, self.shape);
+        let found = || fringe_period_px(&self.pyramid.full.light, self.shape, self.ratios);
         let period_px = options.period_px.unwrap_or_else(found);
         let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS_PER_PERIOD);
         let coarse_grid = grid.shrunk(pyramid::factor(period_px, &grid));
@@ -153,7 +153,7 @@ impl Joint {
         // 2. to 6. Absolute phase.
         let mut spare = std::mem::take(&mut self.spare);
         let mut memory = OutputMemory::new(out, &mut spare, grid.pixels());
-        let instants = options.channel_instants_us().map(|instants| instants.map(|t| 1e-6 * t));
+        let instants = options.channel_instants_us().map(|times| motion::in_places(times, self.ratios));
         self.absolute_phase(&frame, instants.is_some(), &mut memory);
         // 7. Motion between the channels.
         if let Some(instants) = instants {

@@ -4,20 +4,39 @@
 //! absolute phase of R and B, `rho` the albedo of the pixel. The shift `delta_c` is pi/2 for B and 0 for the others.
 //!
 //! Without an infrared projector `k_IR` is 0. This channel is then dark, with `A` and `B` of 0, so that it adds nothing to any sum
-//! over the channels. What counts channels or has a term for each of them takes their weights from here.
+//! over the channels. What counts channels or has a term for each of them takes their weights from here. Of three colours with
+//! different fringe numbers, B has the place of IR, and that of B is dark.
 
 use crate::parallel::angle::sin_cos;
 
-/// Weights of R, G, B, IR for these fringe numbers over the first: 1, and 0 for the infrared channel if there is none.
+/// Weights of R, G, B, IR for these fringe numbers over the first, of which that of an absent channel is 0: 1, and 0 for an absent
+/// channel.
 #[inline(always)]
-pub(super) fn weights([_, _, infrared]: [f32; 3]) -> [f32; 4] {
-    [1.0, 1.0, 1.0, if infrared > 0.0 { 1.0 } else { 0.0 }]
+pub(super) fn weights(ratios: [f32; 4]) -> [f32; 4] {
+    ratios.map(|ratio| if ratio > 0.0 { 1.0 } else { 0.0 })
 }
 
-/// Number of channels: 4, or 3 without infrared.
+/// Whether B is in quadrature with R; otherwise its place is dark.
 #[inline(always)]
-pub(super) fn count(ratios: [f32; 3]) -> f32 {
-    if ratios[2] > 0.0 { 4.0 } else { 3.0 }
+pub(super) fn has_quadrature(ratios: [f32; 4]) -> bool {
+    ratios[2] > 0.0
+}
+
+/// Share of R in the mean of R and B.
+#[inline(always)]
+pub(super) fn red_share(ratios: [f32; 4]) -> f32 {
+    if has_quadrature(ratios) { 0.5 } else { 1.0 }
+}
+
+/// The place that is dark; none of four channels.
+pub(super) fn absent(ratios: [f32; 4]) -> Option<usize> {
+    ratios.iter().position(|&ratio| ratio == 0.0)
+}
+
+/// Number of channels: 4, or 3 for three colours.
+#[inline(always)]
+pub(super) fn count(ratios: [f32; 4]) -> f32 {
+    weights(ratios).iter().sum()
 }
 
 /// Offset and amplitude of R, G, B, IR along one row of pixels, in linear light for an albedo of 1.
@@ -68,7 +87,7 @@ impl Wave {
 /// Carriers at an absolute phase in rad. `ratios` are the fringe numbers divided by the first; `loss` is the share of the
 /// contrast of R and B that was lost in averaging pixels.
 #[inline(always)]
-pub(super) fn carriers(phase: f32, [_, second, third]: [f32; 3], infrared: Wave, loss: f32) -> Carriers {
+pub(super) fn carriers(phase: f32, [_, second, _, third]: [f32; 4], infrared: Wave, loss: f32) -> Carriers {
     let (s, c) = sin_cos(phase);
     let (s_g, c_g) = sin_cos(second * phase);
     let (s_ir, c_ir) = sin_cos(infrared.phase);

@@ -9,7 +9,7 @@
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::infrared::{Waves, with_waves};
-use super::model::FringeRows;
+use super::model::{FringeRows, has_quadrature};
 use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
 use super::photometry::Photometry;
 use super::pyramid::Level;
@@ -27,7 +27,13 @@ pub(super) struct Timing {
     /// Instants of R, G, B, IR in any unit of time; 0 is the instant of the result.
     pub instants: [f32; 4],
     /// Fringe numbers over the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
+}
+
+/// Instants of R, G, B, IR, given in us, in seconds; B alone has the place of IR.
+pub(super) fn in_places(instants_us: [f32; 4], ratios: [f32; 4]) -> [f32; 4] {
+    let [red, green, blue, infrared] = instants_us.map(|t| 1e-6 * t);
+    [red, green, blue, if has_quadrature(ratios) { infrared } else { blue }]
 }
 
 /// Rows of one task.
@@ -193,7 +199,7 @@ fn add_motion<W: Waves>(
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
             let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
-            let carriers = waves.carriers(vector, x, phase[x], 0.0);
+            let carriers = waves.carriers(&vector, x, phase[x], 0.0);
             for c in 0..4 {
                 let (a, b) = (offset[c][x], amplitude[c][x]);
                 (m[c], d[c]) = (a + b * carriers.cosine[c], b * carriers.derivative[c]);
@@ -245,7 +251,7 @@ fn motion_terms(m: [f32; 4], d: [f32; 4], light: [f32; 4], instants: [f32; 4], u
 
 /// The cosine of channel `c` at pixel `x` of a vector.
 #[inline(always)]
-fn cosine<W: Waves>(c: usize, waves: W, vector: W::Vector, x: usize, phase: f32) -> f32 {
+fn cosine<W: Waves>(c: usize, waves: W, vector: &W::Vector, x: usize, phase: f32) -> f32 {
     let angle = match c {
         1 => waves.ratios()[1] * phase,
         3 => waves.infrared(vector, x, phase).phase,
@@ -277,7 +283,7 @@ fn compensate_row<W: Waves>(
             let mut change = [0.0f32; 4];
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
             for c in 0..4 {
-                let fringe = |phase: f32| cosine(c, waves, vector, x, phase);
+                let fringe = |phase: f32| cosine(c, waves, &vector, x, phase);
                 let moved = fringe(phase[x] + velocity[x] * instants[c]);
                 change[c] = amplitude[c][x] * (moved - fringe(phase[x]));
                 let model = offset[c][x] + amplitude[c][x] * moved;

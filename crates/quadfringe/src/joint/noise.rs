@@ -51,7 +51,7 @@ impl Default for Curve {
 
 impl NoiseByLight {
     /// Estimates the noise of four planes of light.
-    pub fn measure(&mut self, light: [&[f32]; 4], grid: &Grid, ratios: [f32; 3]) {
+    pub fn measure(&mut self, light: [&[f32]; 4], grid: &Grid, ratios: [f32; 4]) {
         let whole = noise_of_image(light[0], grid).powi(2);
         self.weights = weights(ratios).map(|weight| weight / count(ratios));
         let channels = self.channels.par_iter_mut().zip(light);

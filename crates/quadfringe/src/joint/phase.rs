@@ -5,7 +5,7 @@
 
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
-use super::model::{FringeRows, count};
+use super::model::{FringeRows, count, red_share};
 use super::neighbours::{around, binomial};
 use super::params::phase::{ALBEDO_MIN, ALBEDO_SHARE, UNLIT_WEIGHT};
 use super::params::tasks::ROWS;
@@ -48,7 +48,7 @@ pub(super) struct PhaseModel<'a> {
     pub scene: &'a Scene<'a>,
     pub photometry: &'a Photometry,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub window: Window<'a>,
 }
 
@@ -62,7 +62,7 @@ struct ModelRow {
     ms: Vec<f32>,
     ds: Vec<f32>,
     ss: Vec<f32>,
-    /// Mean amplitude of R and B for an albedo of 1.
+    /// Mean amplitude of R and B for an albedo of 1; that of R if there is no B.
     amplitude: Vec<f32>,
     /// The best-fitting albedo times `albedo_weight`.
     weighted_albedo: Vec<f32>,
@@ -208,7 +208,7 @@ fn predict<W: Waves>(
         let ([phase, loss, lit], vector) = (take(&pixels, i), waves.vector(i));
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
+            let carriers = waves.carriers(&vector, x, phase[x], loss[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
             let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {
@@ -225,7 +225,7 @@ fn predict<W: Waves>(
             let albedo = ms / mm;
             let albedo = if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
             let weight = if lit[x] > 0.0 { 1.0 } else { UNLIT_WEIGHT };
-            let mean = 0.5 * (amplitude[0][x] + amplitude[2][x]);
+            let mean = red_share(waves.ratios()) * (amplitude[0][x] + amplitude[2][x]);
             let values = [mm, md, dd, ms, ds, ss, mean, weight * albedo, weight];
             (0..9).for_each(|row| found[row][x] = values[row]);
         }

@@ -28,7 +28,7 @@ pub(super) enum Where<'a> {
 pub(super) struct Search<'a> {
     pub place: Where<'a>,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub photometry: &'a Photometry,
     pub map: PhaseMap<'a>,
     /// Standard deviation of the intensities, in linear light.
@@ -182,14 +182,14 @@ fn expect<W: Waves>(
         let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 2];
         for x in 0..LANES {
-            let carriers = waves.carriers(vector, x, phase[x], 0.0);
+            let carriers = waves.carriers(&vector, x, phase[x], 0.0);
             let red = offset[0][x] + amplitude[0][x] * carriers.cosine[0];
             let blue = offset[2][x] + amplitude[2][x] * carriers.cosine[2];
             let albedo = (red * light[0][x] + blue * light[2][x]) / (red * red + blue * blue + 1e-9);
             let expected = albedo * amplitude[3][x] * (1.0 + carriers.cosine[3]);
             let observed = light[3][x] - albedo * (offset[3][x] - amplitude[3][x]);
             let on = (modulation[x] > 0.0) & (usable[x] > 0.0);
-            let infrared = waves.infrared(vector, x, phase[x]).phase;
+            let infrared = waves.infrared(&vector, x, phase[x]).phase;
             let inside = (infrared > field_rad[0]) & (infrared < field_rad[1]);
             // Outside the image of the projector, as if more were expected than nine pixels can show.
             let [expected, observed] = if inside { [expected, observed] } else { [1e3, 0.0] };

@@ -104,7 +104,7 @@ use crate::stages::{Band, Blocks, Ladder, Limits, LineSpectrum, Phases, RowFilte
 use ndarray::ArrayView1;
 use rayon::prelude::*;
 use std::sync::Arc;
-use strip::{FourierPair, Strip, StripPlan, decode_strip};
+use strip::{Alone, FourierPair, Strip, StripPlan, decode_strip};
 use uncertainty::ShotStatistics;
 
 /// How fringe orders are found.
@@ -123,8 +123,10 @@ pub(crate) struct Published {
     spectrum: LineSpectrum,
     slots: Slots<Strip>,
     numbers: Phases<f64>,
-    /// Whether there is an infrared channel.
-    infrared: bool,
+    /// Whether there is a third phase, of IR or of B alone.
+    third: bool,
+    /// Whether R and B are in quadrature.
+    quadrature: bool,
     /// Rows and columns of the images.
     shape: [usize; 2],
 }
@@ -146,10 +148,11 @@ impl Published {
             slots: Slots::default(),
             // The row of a channel that is absent is dark, and any period will do.
             numbers: Phases {
-                infrared: if code.has_infrared() { code.infrared } else { code.green },
+                infrared: if code.has_third() { code.numbers()[2] } else { code.green },
                 ..Phases::from_array(code.numbers())
             },
-            infrared: code.has_infrared(),
+            third: code.has_third(),
+            quadrature: code.has_quadrature(),
             shape,
         }
     }
@@ -209,7 +212,9 @@ impl Published {
             conditioning,
             unwrapping: &self.unwrapping,
             filter,
-            infrared: self.infrared,
+            third: self.third,
+            alone: (!self.quadrature)
+                .then(|| Alone::new(filter, weights(periods_px.quadrature), pixels * blocks.rows)),
             weights: FourierPair { green: weights(periods_px.green), infrared: weights(periods_px.infrared) },
             blocks,
             periods_px,

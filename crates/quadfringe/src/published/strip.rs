@@ -1,5 +1,7 @@
 //! Steps 1 to 7 on a strip of a few rows, which is small enough to stay in the nearest cache.
 
+mod alone;
+
 use super::Unwrapping;
 use super::uncertainty::{ShotStatistics, two_step_sigma};
 use crate::condition::{Plan, Sample};
@@ -11,6 +13,7 @@ use crate::stages::{
     RowPair, RowScratch, coarsen, lesser, row_background, with_turns_of,
 };
 use crate::{Reason, Shot};
+pub(super) use alone::Alone;
 use multiversion::multiversion;
 
 /// The published background: half the sum of the envelopes.
@@ -22,8 +25,10 @@ pub(super) struct StripPlan<'a> {
     pub unwrapping: &'a Unwrapping,
     /// Fourier filter for rows of block means.
     pub filter: &'a RowFilter,
-    /// Whether there is an infrared channel.
-    pub infrared: bool,
+    /// Whether there is a third phase, of IR or of B alone.
+    pub third: bool,
+    /// The Fourier filter for R if B is not in quadrature with it. B then has the place of IR.
+    pub alone: Option<Alone>,
     /// Weights of the filter for G and IR.
     pub weights: FourierPair<Vec<f32>>,
     /// A strip has the rows of one block.
@@ -110,7 +115,7 @@ pub(super) fn decode_strip<T: Sample>(
     strip.resize(plan, out[0].phase.len());
     // 1. Linear light (S1).
     for i in 0..out.len() {
-        plan.conditioning.row(shot, y + i, &mut strip.light_of(i));
+        plan.conditioning.row(shot, y + i, &mut strip.light_of(i, plan.alone.is_some()));
         stages::fill_row_gaps(&mut strip.others.infrared, &mut strip.gaps[i]);
         strip.sum(i);
     }
@@ -118,11 +123,18 @@ pub(super) fn decode_strip<T: Sample>(
     let ratio = strip.two_step(plan, out.len());
     // 2. and 4. Background and Fourier phase of the block means of G and IR (S3).
     strip.fourier(plan, out.len());
+    if let Some(alone) = &plan.alone {
+        // 4. Without a quadrature, also of R.
+        strip.fourier_red(plan, alone);
+    }
     // 5. Fringe orders of the means (S4).
     strip.order(y + out.len() / 2, plan);
     // 6. and 7. Absolute two-step phase of single pixels, its uncertainty, and no data where the modulation is low.
     for (i, row) in out.iter_mut().enumerate() {
-        strip.row(i, ratio, plan, row);
+        match &plan.alone {
+            None => strip.row(i, ratio, plan, row),
+            Some(alone) => strip.row_of_means(i, alone, plan, row),
+        }
     }
 }
 
@@ -142,11 +154,12 @@ impl Strip {
         plan.filter.ready(&mut self.fourier);
     }
 
-    /// Rows for the linear light of R, G, B, IR of row `i`.
+    /// Rows for the linear light of R, G, B, IR of row `i`. B `alone` has the place of IR, which is dark.
     #[inline(always)]
-    fn light_of(&mut self, i: usize) -> [&mut [f32]; 4] {
+    fn light_of(&mut self, i: usize, alone: bool) -> [&mut [f32]; 4] {
         let Quadrature { red, blue } = &mut self.quadrature[i];
         let FourierPair { green, infrared } = &mut self.others;
+        let [blue, infrared] = if alone { [infrared, blue] } else { [blue, infrared] };
         [red, green, blue, infrared].map(|row| &mut **row)
     }
 
@@ -157,7 +170,7 @@ impl Strip {
         }
         let rows = self.quadrature[0].both_mut().into_iter().chain(self.others.both_mut());
         rows.for_each(|row| row.resize(width));
-        self.light_of(0)
+        self.light_of(0, false)
     }
 
     /// Linear red light of this single row.
@@ -230,7 +243,7 @@ impl Strip {
             (Half::Real, &plan.weights.green, &mut self.phases.green),
             (Half::Imaginary, &plan.weights.infrared, &mut self.phases.infrared),
         ];
-        for (half, weights, phase) in channels.into_iter().take(if plan.infrared { 2 } else { 1 }) {
+        for (half, weights, phase) in channels.into_iter().take(if plan.third { 2 } else { 1 }) {
             let signal = plan.filter.analytic(half, weights, &mut self.fourier);
             self.interpolation.run_for(pixels, signal, phase, &mut self.power);
         }

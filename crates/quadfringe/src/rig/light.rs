@@ -51,7 +51,7 @@ impl Light<'_> {
         let four = encoding.four_channel_view()?;
         Ok(Channel::ALL.map(|channel| match channel {
             Channel::Ir if !four.has_infrared() => Self::Uniform(0.0),
-            _ => Self::fringes(four.fringe_number(channel), channel.shift_rad()),
+            _ => Self::fringes(four.fringe_number(channel), four.shift_rad(channel)),
         }))
     }
 

@@ -50,7 +50,7 @@ pub use ladder::{Ladder, Ordered, unwrap};
 pub use n_step::{NStep, n_step};
 pub(crate) use params::SAMPLE_STRIDE;
 pub use phases::Phases;
-pub use quadrature::quadrature_carrier;
+pub use quadrature::{difference_carrier, quadrature_carrier};
 pub(crate) use two_step::row_modulation_ratio;
 pub use two_step::{modulation, modulation_ratio, two_step, two_step_coarse};
 pub(crate) use validity::Judged;

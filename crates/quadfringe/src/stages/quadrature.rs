@@ -12,7 +12,7 @@
 
 use super::carrier::{Carrier, LineTransform};
 use super::params::{
-    CARRIER_BAND, CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, DIRECTION_SHARE_MIN,
+    CARRIER_BAND, CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, DIRECTION_SHARE_MIN, MEAN_STRIDE,
     QUADRATURE_SHARE_MIN,
 };
 use ndarray::ArrayView2;
@@ -36,6 +36,11 @@ use ndarray::ArrayView2;
 pub fn quadrature_carrier(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Carrier {
     let along_columns = || line_waves(red.reversed_axes(), blue.reversed_axes());
     let (row, column) = rayon::join(|| line_waves(red, blue), along_columns);
+    stronger(row, column)
+}
+
+/// The carrier of waves along rows and along columns, of which the weaker may cross no fringes.
+fn stronger(row: Waves, column: Waves) -> Carrier {
     let least = DIRECTION_SHARE_MIN * row.strength.max(column.strength);
     let [row_px, column_px] = [row, column].map(|found| match found.strength {
         strength if strength > 0.0 && strength >= least => found.period_px,
@@ -44,12 +49,48 @@ pub fn quadrature_carrier(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -
     Carrier { row_px, column_px }
 }
 
+/// The carrier of the fringes of three images without a quadrature: `first`, and two `others` with other fringe numbers, in linear
+/// light of equal shapes. It is found in the differences to the first image, in which the outline of an object, its grey albedo
+/// and room light cancel, and lies between the carriers of the three.
+///
+/// NaN is replaced by the mean of its line.
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::stages::difference_carrier;
+/// use std::f32::consts::TAU;
+/// let object = |y: usize, x: usize| if y.abs_diff(60) < 30 && x.abs_diff(300) < 80 { 1.0 } else { 0.0 };
+/// let image = |period: f32| {
+///     Array2::from_shape_fn((128, 512), |(y, x)| object(y, x) * (2.0 + (x as f32 * TAU / period).cos()))
+/// };
+/// let [red, green, blue] = [20.0, 20.6, 24.0].map(image);
+/// let found = difference_carrier(red.view(), [green.view(), blue.view()]);
+/// assert!((20.0..24.0).contains(&found.period_px()));
+/// ```
+#[must_use]
+pub fn difference_carrier(first: ArrayView2<'_, f32>, others: [ArrayView2<'_, f32>; 2]) -> Carrier {
+    let along_columns = || difference_waves(first.reversed_axes(), others.map(|other| other.reversed_axes()));
+    let (row, column) = rayon::join(|| difference_waves(first, others), along_columns);
+    stronger(row, column)
+}
+
 /// The strongest waves along the lines of one direction.
 #[derive(Default)]
 struct Waves {
     period_px: f64,
     /// Sum of the band for a line and for a squared pixel; 0 if no waves stand out.
     strength: f64,
+}
+
+impl Waves {
+    /// The strongest waves in a spectrum over `lines`, if they exceed `least`.
+    fn strongest(spectrum: &[f32], least: f32, lines: f64) -> Self {
+        let length = 2 * (spectrum.len() - 1);
+        strongest_band(spectrum, least).map_or_else(Self::default, |band| Self {
+            period_px: length as f64 / band.cycles,
+            strength: band.sum / (lines * (length as f64).powi(2)),
+        })
+    }
 }
 
 fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
@@ -68,10 +109,33 @@ fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
             *sum += (r * b.conj()).im;
         }
     }
-    strongest_band(&quadrature, CARRIER_POWER_MIN * level).map_or_else(Waves::default, |band| Waves {
-        period_px: length as f64 / band.cycles,
-        strength: band.sum / (count * (length as f64).powi(2)),
-    })
+    Waves::strongest(&quadrature, CARRIER_POWER_MIN * level, count)
+}
+
+fn difference_waves(first: ArrayView2<'_, f32>, others: [ArrayView2<'_, f32>; 2]) -> Waves {
+    let (lines, length) = first.dim();
+    if length < 4 * CARRIER_CYCLES_MIN {
+        return Waves::default();
+    }
+    let mean = |image: ArrayView2<'_, f32>| {
+        image.iter().step_by(MEAN_STRIDE).filter(|light| light.is_finite()).sum::<f32>()
+    };
+    let gains = others.map(|other| mean(first) / mean(other).max(f32::MIN_POSITIVE));
+    let [mut one, mut two] = [(); 2].map(|()| LineTransform::new(length));
+    let (mut power, mut level) = (vec![0.0; length / 2 + 1], 0.0);
+    let sampled = (0..lines).step_by(lines.div_ceil(CARRIER_LINES).max(1));
+    let count = sampled.len() as f64;
+    for line in sampled {
+        let middle = one.run(first.row(line));
+        level += (middle * length as f32).powi(2);
+        for (other, gain) in others.iter().zip(gains) {
+            two.run(other.row(line));
+            for (sum, (a, b)) in power.iter_mut().zip(one.spectrum.iter().zip(&two.spectrum)) {
+                *sum += (a - b * gain).norm_sqr();
+            }
+        }
+    }
+    Waves::strongest(&power, CARRIER_POWER_MIN * level, count)
 }
 
 /// The band of a carrier in a quadrature spectrum.
@@ -182,6 +246,24 @@ mod tests {
             let found = ratio(&shot(inclined(25.0, degrees), |_, _, _| 1.0), 25.0);
             assert!((found - 1.0).abs() < 0.03, "{found} at {degrees} degrees");
         }
+    }
+
+    #[test]
+    fn three_colours_without_a_quadrature_have_a_carrier() {
+        for degrees in [0.0, 20.0, 45.0] {
+            for share in [0.02, 0.2, 1.0] {
+                let period = 20.0;
+                let images = [1.0, 35.0 / 36.0, 30.0 / 36.0].map(|ratio| {
+                    let [red, _] = shot(inclined(period / ratio, degrees), object(share));
+                    red
+                });
+                let [red, green, blue] = images.each_ref().map(|image| image.view());
+                let found = difference_carrier(red, [green, blue]).period_px() / f64::from(period);
+                assert!((0.75..1.34).contains(&found), "{found} at {degrees} degrees, {share} of the frame");
+            }
+        }
+        let same = shot(|_, _| 0.0, object(0.2)).map(|image| image);
+        assert!(difference_carrier(same[0].view(), [same[0].view(); 2]).period_px().is_infinite());
     }
 
     #[test]

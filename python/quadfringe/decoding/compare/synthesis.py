@@ -89,16 +89,17 @@ def recipe_of(shape: Shape) -> Plan | None:
     if not isinstance(fringes, Mapping) or width is None or decode.get("method") not in ("joint", "published"):
         return None
     kept = {name: decode[name] for name in ("method", "modulation_min", "quality_min") if name in decode}
-    numbers = fringes.get("numbers")
-    return Plan(width, () if numbers is None else numbers, response="linear", decode=kept)
+    numbers = () if fringes.get("numbers") is None else fringes["numbers"]
+    alone = fringes.get("encoding") == "rgb" and len(numbers) == len(CHANNELS) - 1
+    return Plan(width, (*numbers, 0.0) if alone else numbers, response="linear", decode=kept)
 
 
 def _light(column_px: Map, plan: Plan) -> Map:
     """Give the light of the channels, (H, W, 4), or 3 without infrared, 0 to 1; 0 where there is no surface."""
-    first, second, *third = plan.fringes.numbers
     turns = 2 * np.pi * np.nan_to_num(column_px) / plan.projector_width_px
-    waves = [np.cos(first * turns), np.cos(second * turns), -np.sin(first * turns)]
-    waves += [np.cos(number * turns) for number in third]
+    waves = [np.cos(number * turns) for number in plan.fringes.channel_numbers]
+    if plan.fringes.quadrature:
+        waves[2] = -np.sin(plan.fringes.numbers[0] * turns)
     lit = np.isfinite(column_px)
     return np.where(lit[..., None], 0.5 + 0.5 * np.stack(waves, axis=-1), 0.0)
 

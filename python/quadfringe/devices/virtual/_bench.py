@@ -114,7 +114,7 @@ class VirtualBench:
 
     def project(self, fringes: Fringes, calibration: Calibration | None = None) -> None:
         """Project these fringes; a pre-deformation uses `calibration`, or the exact one when it is None."""
-        _core.check_code(fringes.numbers, self._bench.visible.width, columns_px=fringes.columns_px)
+        _core.check_code(fringes.code, self._bench.visible.width, columns_px=fringes.columns_px)
         deformed = predeformation(fringes, calibration or self.calibration())
         self._infrared_image = None
         if deformed is not None:
@@ -181,7 +181,7 @@ class VirtualBench:
         cast, light = self._cast_at(after_s), self._light(seed, 0.0 if capped or self.capped else exposure)
         if isinstance(self.projected, Fringes):
             light |= {"infrared_image": self._infrared_image, "columns_px": self.projected.columns_px}
-            return self._shot(self._bench.render(cast, self.projected.numbers, **light), self._truth(cast))
+            return self._shot(self._bench.render(cast, self.projected.code, **light), self._truth(cast))
         if isinstance(self.projected, Levels):
             return self._shot(self._bench.render_levels(cast, self.projected.levels, **light), None)
         step = self.projected

@@ -68,7 +68,7 @@ Draw = Callable[[_core.Bench, np.random.Generator], World]
 def take(name: str, seed: int, noise: float = NOISE, numbers: tuple[float, ...] | None = None) -> Take:
     """Draw the scene with this name from a seed and expose it, 1024 x 768, 8 bit.
 
-    `numbers` replace the fringe numbers of the scene; with two there is no infrared.
+    `numbers` replace the fringe numbers of the scene, as `Fringes.code` gives them; with three there is infrared.
     """
     bench = _core.Bench()
     world = SCENES[name](bench, np.random.default_rng([seed, 77]))

@@ -10,10 +10,9 @@ mod texture;
 
 use super::energy::{Energy, FringeRows};
 use super::infrared::{Waves, with_waves};
-use super::model::weights;
+use super::model::absent;
 use super::params::albedo::ROWS;
 use super::scene::Scene;
-use crate::decode::output::hole_unless;
 use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
@@ -36,7 +35,7 @@ pub(super) struct Known<'a> {
     /// Not 0 for pixels that are returned.
     pub valid: &'a [u8],
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     /// Standard deviation of the intensity of a pixel, in linear light.
     pub noise: f32,
 }
@@ -68,7 +67,7 @@ impl Albedo {
                 work.refine(rows, known.noise * known.noise);
                 for (y, out) in out.chunks_exact_mut(4 * width).enumerate() {
                     let valid = scene.row(known.valid, first + y);
-                    work.rows[y].write(valid, hole_unless(weights(known.ratios)[3] > 0.0), out);
+                    work.rows[y].write(valid, absent(known.ratios), out);
                 }
             },
         );
@@ -106,8 +105,8 @@ impl Row {
             Pixels { phase: scene.row(known.phase, y), usable: scene.row(scene.usable, y), contrast };
         let waves = signal.each_mut().map(Vec::as_mut_slice);
         let [red, green, blue, infrared] = waves;
-        let [first, second, _] = known.ratios;
-        modulate(&pixels, [first, second, first], [red, green, blue]);
+        let [first, second, fourth, _] = known.ratios;
+        modulate(&pixels, [first, second, fourth], [red, green, blue]);
         with_waves!(scene, y, known.ratios, |waves| modulate_infrared(&pixels, waves, infrared));
         let waves = signal.each_ref().map(Vec::as_slice);
         choose(scene.rows(y), waves, fringes, known.noise * known.noise, albedo);
@@ -116,9 +115,12 @@ impl Row {
         }
     }
 
-    /// `hole` is added to the infrared albedo: 0, or NaN without this channel.
-    fn write(&self, valid: &[u8], hole: f32, out: &mut [f32]) {
+    /// Without four channels, the infrared albedo is NaN: its place is `absent`, or that of B, which is alone and has the place
+    /// of infrared.
+    fn write(&self, valid: &[u8], absent: Option<usize>, out: &mut [f32]) {
         let [red, green, blue, infrared] = &self.albedo;
+        let hole = if absent.is_none() { 0.0 } else { f32::NAN };
+        let [blue, infrared] = if absent == Some(2) { [infrared, blue] } else { [blue, infrared] };
         for (x, out) in out.chunks_exact_mut(4).enumerate() {
             let known = valid[x] != 0 && red[x] > 0.0;
             let pixel = [red[x], green[x], blue[x], infrared[x] + hole];
@@ -158,7 +160,7 @@ fn modulate_infrared<W: Waves>(pixels: &Pixels, waves: W, out: &mut [f32]) {
         let [phase, contrast] = take(&known, at);
         let vector = waves.vector(at);
         for x in 0..LANES {
-            let (_, cosine) = sin_cos(waves.infrared(vector, x, phase[x]).phase);
+            let (_, cosine) = sin_cos(waves.infrared(&vector, x, phase[x]).phase);
             out[x] = 1.0 + contrast[x] * cosine;
         }
     }

@@ -48,7 +48,7 @@ pub(super) struct Block {
 
 /// The block of a vector of cells.
 #[inline(always)]
-pub(super) fn block(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 3], at: usize) -> Block {
+pub(super) fn block(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 4], at: usize) -> Block {
     let (share, present) = (1.0 / count(ratios), channel_weights(ratios));
     let bright = difference_diagonal(&weights.brightness, at);
     let colour = difference_diagonal(&weights.colour, at);
@@ -73,7 +73,7 @@ pub(super) fn block(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 
 
 /// Mean information of the usable cells.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn information(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 3]) -> Information {
+pub(super) fn information(derivatives: &Derivatives, weights: &Weights, ratios: [f32; 4]) -> Information {
     let share = 1.0 / count(ratios);
     let [mut phase, mut albedo, mut contrast, mut cells] = [0.0f64; 4];
     for at in vectors() {
@@ -101,7 +101,7 @@ pub(super) fn information(derivatives: &Derivatives, weights: &Weights, ratios: 
 pub(super) fn phase_information(
     derivatives: &Derivatives,
     weights: &Weights,
-    ratios: [f32; 3],
+    ratios: [f32; 4],
     at: usize,
 ) -> Lanes {
     let Block { phase, mixed, contrast, .. } = block(derivatives, weights, ratios, at);

@@ -30,7 +30,7 @@ fn linear<const PAIR: bool>(tile: &mut Tile) -> DataSums {
         }
         let mut shared = Shared::default();
         for c in 0..4 {
-            let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
+            let ratio = ratios[c];
             let (albedo, light) = (unknown.albedo[c].get(at), light[c].get(at));
             let cells = Cells { phase, modulation, usable, albedo, light };
             let kept = scales.channel_contrast[c];
@@ -115,7 +115,7 @@ pub(super) struct Model {
 #[inline(always)]
 pub(super) fn predict(cells: &Cells, c: usize, ratio: f32, kept: f32, present: f32) -> Model {
     match c {
-        2 => predicted::<_, true, false>(cells, ratio, kept, present),
+        2 => predicted::<_, true, true>(cells, ratio, kept, present),
         3 => predicted::<_, false, true>(cells, ratio, kept, present),
         _ => predicted::<_, false, false>(cells, ratio, kept, present),
     }

@@ -8,7 +8,7 @@ use super::scales::{Determined, Scales, variance_share};
 use super::solve::solve;
 use super::start::{self, AlbedoOf, smooth};
 use super::tile::{Found, Tile};
-use crate::joint::model::{count, weights as channel_weights};
+use crate::joint::model::{absent, count};
 use crate::joint::params::energy::{
     ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
 };
@@ -83,9 +83,9 @@ impl Tile {
             found.inside.set(at, inside.get(at));
             write_light(&Column::of(unknown, at), inside.get(at), at, found);
         }
-        if channel_weights(*ratios)[3] == 0.0 {
+        if let Some(absent) = absent(*ratios) {
             // The channel has no albedo; its logarithm was 0.
-            found.albedo[3].clear();
+            found.albedo[absent].clear();
         }
         found.channel_contrast = scales.channel_contrast;
     }

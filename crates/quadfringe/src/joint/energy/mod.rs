@@ -41,7 +41,7 @@ pub(super) struct Energy {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Prior {
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     /// Standard deviation of the intensity of a pixel, in linear light.
     pub noise: f32,
 }

@@ -35,7 +35,7 @@ pub(super) fn prepare(
     lines: &mut Preconditioner,
     derivatives: &Derivatives,
     weights: &Weights,
-    ratios: [f32; 3],
+    ratios: [f32; 4],
 ) {
     let share = 1.0 / count(ratios);
     for x in (0..SIDE).step_by(LANES) {

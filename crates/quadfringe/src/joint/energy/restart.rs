@@ -86,7 +86,7 @@ fn has_texture(tile: &Tile) -> bool {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn hold_by_phase(
     inside: &Plane,
-    ratios: [f32; 3],
+    ratios: [f32; 4],
     first: &Fields,
     noise: f32,
     derivatives: &mut Derivatives,

@@ -94,7 +94,7 @@ pub(super) struct Determined {
 
 impl Scales {
     /// Estimates the variance of the noise from the residuals, and the contrasts of the channels.
-    pub fn estimate_noise(&mut self, sums: &DataSums, determined: Determined, ratios: [f32; 3], least: f32) {
+    pub fn estimate_noise(&mut self, sums: &DataSums, determined: Determined, ratios: [f32; 4], least: f32) {
         let channels = count(ratios);
         let Determined { phase, brightness, colour, contrast } = determined;
         let used = phase + brightness + (channels - 1.0) * colour + contrast;

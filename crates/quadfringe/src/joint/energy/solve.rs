@@ -104,11 +104,11 @@ pub(super) fn multiply<const DATA: bool>(
     derivatives: &Derivatives,
     weights: &Weights,
     inside: &Plane,
-    ratios: [f32; 3],
+    ratios: [f32; 4],
     from: &Fields,
     to: &mut Fields,
 ) -> f64 {
-    let (share, present) = (1.0 / count(ratios), channel_weights(ratios)[3]);
+    let (share, present) = (1.0 / count(ratios), channel_weights(ratios));
     let mut product = 0.0;
     for at in vectors() {
         let given = Column::of(from, at);
@@ -207,8 +207,8 @@ struct Between {
     colour: Lanes,
     /// Share of one channel in the mean of all.
     share: f32,
-    /// 1, or 0 without an infrared channel.
-    present: f32,
+    /// Weight of each channel.
+    present: [f32; 4],
 }
 
 /// Adds the gradients of the differences in brightness and colour over one edge of the cells.
@@ -221,7 +221,7 @@ fn colours(between: &Between, here: &[Lanes; 4], there: &[Lanes; 4], out: &mut [
         let shared = share * (bright[x] - colour[x]) * (a + b + c + d);
         out[0][x] += colour[x] * a + shared;
         out[1][x] += colour[x] * b + shared;
-        out[2][x] += colour[x] * c + shared;
-        out[3][x] += colour[x] * d + present * shared;
+        out[2][x] += colour[x] * c + present[2] * shared;
+        out[3][x] += colour[x] * d + present[3] * shared;
     }
 }

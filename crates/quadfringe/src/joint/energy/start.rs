@@ -32,7 +32,7 @@ pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
         if c == 3 && tile.pair {
             carrier(tile, c, |tile, at| Line::at(&tile.infrared, at));
         } else {
-            let ratio = [tile.ratios[0], tile.ratios[1], tile.ratios[0], tile.ratios[2]][c];
+            let ratio = tile.ratios[c];
             carrier(tile, c, |_, _| ratio);
         }
         for round in 0..START_ROUNDS {

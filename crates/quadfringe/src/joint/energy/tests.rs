@@ -12,7 +12,7 @@ use super::tile::Tile;
 use super::value::{Given, add_energy};
 use crate::joint::params::energy::SIDE;
 
-const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
+const RATIOS: [f32; 4] = [1.0, 35.0 / 36.0, 1.0, 30.0 / 36.0];
 
 /// A number in [-1, 1] for each place and seed.
 fn random(seed: usize, at: usize) -> f32 {
@@ -30,7 +30,7 @@ fn tile(noise: f32) -> (Tile, Plane) {
             let (u, v) = (x as f32 - 24.0, y as f32 - 24.0);
             let phase = 60.0 + 0.75 * u + 0.1 * v + 6e-4 * (u * u + v * v);
             let albedo = if x < SIDE / 2 { [0.5, 0.5, 0.5, 0.5] } else { [0.6, 0.3, 0.4, 0.5] };
-            let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[2] * phase];
+            let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[3] * phase];
             truth.row_mut(y)[x] = phase;
             tile.start.row_mut(y)[x] = phase + 0.2 * phase.sin();
             for c in 0..4 {
@@ -72,7 +72,7 @@ fn printed_tile() -> (Tile, Plane) {
             let ink = (30..40).contains(&y) && (30..50).contains(&x) && (x / 3 + y / 4) % 2 == 0;
             let phase = truth.row(y)[x];
             tile.start.row_mut(y)[x] = phase + if ink { 1.0 } else { 0.0 };
-            let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[2] * phase];
+            let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[3] * phase];
             for c in 0..4 {
                 let albedo = if ink { [0.05, 0.06, 0.05, 0.2][c] } else { 0.5 };
                 let light = albedo * (1.0 + 0.6 * turns[c].cos()) + 0.005 * random(c, y * SIDE + x);
@@ -137,7 +137,7 @@ fn a_tile_without_texture_has_one_start() {
     let (mut tile, _) = tile(0.0);
     for y in 0..SIDE {
         for x in 0..SIDE {
-            let turns = [1.0, RATIOS[1], 1.0, RATIOS[2]].map(|ratio| ratio * tile.start.row(y)[x]);
+            let turns = [1.0, RATIOS[1], 1.0, RATIOS[3]].map(|ratio| ratio * tile.start.row(y)[x]);
             for c in 0..4 {
                 let ahead = if c == 2 { std::f32::consts::FRAC_PI_2 } else { 0.0 };
                 tile.light[c].row_mut(y)[x] = 0.5 * (1.0 + 0.6 * (turns[c] + ahead).cos());
@@ -256,7 +256,7 @@ fn the_variance_is_that_of_the_mean_squared_gain() {
 #[test]
 fn an_absent_channel_takes_no_part() {
     let (mut tile, truth) = tile(0.0);
-    tile.ratios[2] = 0.0;
+    tile.ratios[3] = 0.0;
     tile.light[3].clear();
     tile.minimise(1e-8);
     let (rms, largest) = errors(&tile, &truth);

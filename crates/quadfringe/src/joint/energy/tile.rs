@@ -34,7 +34,7 @@ pub(super) struct Tile {
     pub torn: Plane,
     /// Fringe numbers divided by the first. Without an infrared channel the last is 0; its light and its logarithm of the albedo are
     /// then 0, and it takes no part.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     /// Whether the infrared phase is that of a calibrated pair; then its value and slope at a phase of 0, by the tangent of its
     /// cubic at the start.
     pub pair: bool,

@@ -18,7 +18,7 @@ pub(super) struct Given<'a> {
     pub inside: &'a Plane,
     /// 1 for lit cells, and for torn ones through which the surface may continue.
     pub continued: &'a Plane,
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub pair: bool,
     pub infrared: &'a [Plane; 2],
 }
@@ -72,7 +72,7 @@ fn data<const PAIR: bool>(given: &Given<'_>, here: &Column, scales: &Scales, at:
     for c in 0..4 {
         let (albedo, light) = (here.albedo[c], given.light[c].get(at));
         let cells = Cells { phase: here.phase, modulation, usable, albedo, light };
-        let ratio = [ratios[0], ratios[1], ratios[0], ratios[2]][c];
+        let ratio = ratios[c];
         let kept = scales.channel_contrast[c];
         let model = if PAIR && c == 3 {
             predicted::<_, false, false>(&cells, Line::at(given.infrared, at), kept, 1.0)

@@ -4,15 +4,19 @@
 //! and B and `rho` the albedo of the pixel. R and B give `Phi` pixel by pixel; G and IR have nearly the same carrier,
 //! so that `p - i q = b exp(i (Phi_c - Phi))` is their *beat* against it, six to thirty times slower than a fringe.
 //! Unlike a Fourier filter along rows, the fit prefers no direction, no band and no slope. Sums are kept once per cell.
+//!
+//! Of three colours with different fringe numbers, R gives `Phi` in a window (`carrier`), and B is the third channel.
 
+mod carrier;
 mod rows;
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
-use super::model::{CellFringes, FringeRows};
+use super::model::{CellFringes, FringeRows, has_quadrature};
 use super::neighbours::{around, binomial};
 use super::params::local_fit::{FIRST_WINDOW, SAMPLED_ROWS, WINDOW};
 use super::scene::Scene;
 use crate::parallel::slots::Slots;
+use carrier::Carrier;
 use rayon::prelude::*;
 use rows::{
     ChannelRows, RedBlueRows, StrengthRows, add_products, add_squares, finish_row, map, relative_albedo,
@@ -22,9 +26,10 @@ use rows::{
 /// Results of the fit on the cells, and its working maps.
 #[derive(Debug)]
 pub(super) struct LocalFit {
-    /// Whether there is an infrared channel; without it its offset, amplitude and beat are 0.
-    infrared: bool,
+    /// Fringe numbers over the first; offset, amplitude and beat of a channel that is absent are 0.
+    ratios: [f32; 4],
     start: CellMaps,
+    carrier: Carrier,
     maps: CellMaps,
     sums: CellMaps,
     slots: Slots<TaskWork<Rows>>,
@@ -55,20 +60,30 @@ pub(super) struct Beats<'a> {
 }
 
 impl LocalFit {
-    pub fn new(infrared: bool) -> Self {
+    pub fn new(ratios: [f32; 4]) -> Self {
         Self {
-            infrared,
+            ratios,
             start: CellMaps::new(4),
+            carrier: Carrier::default(),
             maps: CellMaps::new(map::COUNT),
             sums: CellMaps::default(),
             slots: Slots::default(),
         }
     }
 
+    /// Whether the phase of a pixel comes from the light of that pixel: from R and B in quadrature, not from a window.
+    pub fn is_of_pixels(&self) -> bool {
+        has_quadrature(self.ratios)
+    }
+
     /// Fit a scene with fringes in any direction. `lit` is 1 where light of the projector falls; `least` is the least
     /// modulation that counts.
     pub fn run(&mut self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
-        self.start(scene);
+        if self.is_of_pixels() {
+            self.start(scene);
+        } else {
+            self.carrier.find(scene, &self.slots, &mut self.sums);
+        }
         self.solve(scene);
         self.phase(scene, lit, least, out);
     }
@@ -120,7 +135,8 @@ impl LocalFit {
 
     /// Normal equations of every cell for `a`, `p`, `q` of the four channels.
     fn solve(&mut self, scene: &Scene<'_>) {
-        let (start, infrared) = (&self.start, self.infrared);
+        let ratios = self.ratios;
+        let source = Source::of(ratios, &self.carrier, &self.start);
         scene.grid.window_sums::<{ sum::COUNT }, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
@@ -128,13 +144,10 @@ impl LocalFit {
             &mut self.maps,
             |rows, y, sums| {
                 let Rows { maps, cos, sin, .. } = rows;
-                let red_blue = RedBlueRows::sample(maps, scene, start, y);
-                cos.resize(scene.grid.stride, 0.0);
-                sin.resize(scene.grid.stride, 0.0);
-                two_step(&red_blue, None, scene.rows(y), cos, sin);
+                source.row(scene, y, None, maps, [cos, sin]);
                 add_products(scene.row(scene.usable, y), [cos, sin], scene.rows(y), sums);
             },
-            |_, sums, out| solve_row(sums, infrared, out),
+            |_, sums, out| solve_row(sums, ratios, out),
         );
     }
 
@@ -163,8 +176,8 @@ impl LocalFit {
                     albedo_smooth.resize(grid.stride, 0.0);
                     let near = [0, 1, 2].map(|k| ring[(i + k) % 3].as_slice());
                     binomial(near, grid.width, smooth, albedo_smooth);
-                    let red_blue = RedBlueRows::sample(maps, scene, &self.maps, y);
-                    two_step(&red_blue, Some(albedo_smooth), scene.rows(y), cos, sin);
+                    let source = Source::of(self.ratios, &self.carrier, &self.maps);
+                    source.row(scene, y, Some(albedo_smooth), maps, [cos, sin]);
                     let [weakest, mean] = maps.sample(grid, &self.maps, map::WEAKEST, y);
                     let strength =
                         StrengthRows { weakest, mean, lit: scene.row(lit, y), albedo: albedo_smooth };
@@ -179,12 +192,16 @@ impl LocalFit {
     fn albedo_row(&self, scene: &Scene<'_>, y: usize, at: usize, rows: &mut Rows) {
         let Rows { maps, cos, sin, albedo, .. } = rows;
         let grid = scene.grid;
-        cos.resize(grid.stride, 0.0);
-        sin.resize(grid.stride, 0.0);
+        if !self.is_of_pixels() {
+            self.carrier.row(scene, y, maps, [&mut *cos, &mut *sin]);
+        }
         let maps = maps.sample::<14>(grid, &self.maps, map::A_R, y);
-        let [red_offset, red_amplitude, blue_offset, blue_amplitude, ..] = maps;
-        let red_blue = RedBlueRows { red_offset, red_amplitude, blue_offset, blue_amplitude };
-        two_step(&red_blue, None, scene.rows(y), cos, sin);
+        if self.is_of_pixels() {
+            let [red_offset, red_amplitude, blue_offset, blue_amplitude, ..] = maps;
+            let red_blue = RedBlueRows { red_offset, red_amplitude, blue_offset, blue_amplitude };
+            [&mut *cos, &mut *sin].into_iter().for_each(|row| row.resize(grid.stride, 0.0));
+            two_step(&red_blue, None, scene.rows(y), cos, sin);
+        }
         let channel = |a: usize, p: usize| ChannelRows { a: maps[a], p: maps[p], q: maps[p + 1] };
         let model = [
             channel(map::A_R, map::P_R),
@@ -193,6 +210,42 @@ impl LocalFit {
             channel(map::A_IR, map::A_IR + 1),
         ];
         relative_albedo(model, [cos, sin], scene.rows(y), &mut albedo[at]);
+    }
+}
+
+/// What the phasor of R comes from.
+#[derive(Clone, Copy)]
+enum Source<'a> {
+    /// R and B in quadrature, with offsets and amplitudes from these maps.
+    TwoStep(&'a CellMaps),
+    /// R in a window.
+    Window(&'a Carrier),
+}
+
+impl<'a> Source<'a> {
+    fn of(ratios: [f32; 4], carrier: &'a Carrier, maps: &'a CellMaps) -> Self {
+        if has_quadrature(ratios) { Self::TwoStep(maps) } else { Self::Window(carrier) }
+    }
+
+    /// Writes the phasor along row `y`.
+    #[inline(always)]
+    fn row(
+        self,
+        scene: &Scene<'_>,
+        y: usize,
+        albedo: Option<&[f32]>,
+        rows: &mut RowMaps,
+        [cos, sin]: [&mut Vec<f32>; 2],
+    ) {
+        match self {
+            Self::TwoStep(maps) => {
+                let red_blue = RedBlueRows::sample(rows, scene, maps, y);
+                cos.resize(scene.grid.stride, 0.0);
+                sin.resize(scene.grid.stride, 0.0);
+                two_step(&red_blue, albedo, scene.rows(y), cos, sin);
+            }
+            Self::Window(carrier) => carrier.row(scene, y, rows, [cos, sin]),
+        }
     }
 }
 

@@ -1,5 +1,6 @@
 //! Loops of the fit over one row of pixels or of cells.
 
+use crate::joint::model::weights;
 use crate::joint::params::local_fit::{CONTRAST_MIN, RIDGE, SPREAD_MIN};
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::parallel::angle::atan2;
@@ -39,7 +40,7 @@ pub(super) struct ChannelRows<'a> {
 pub(super) struct StrengthRows<'a> {
     /// Least amplitude of the channels.
     pub weakest: &'a [f32],
-    /// Mean amplitude of R and B.
+    /// Mean amplitude of R and B; that of R if there is no B.
     pub mean: &'a [f32],
     /// 1 where light of the projector falls.
     pub lit: &'a [f32],
@@ -103,6 +104,23 @@ pub(super) fn two_step(
     }
 }
 
+/// Turns a phasor by the beat `p - i q` of a fit against it, to length 1.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+pub(super) fn turn(beat: [&[f32]; 2], cos: &mut [f32], sin: &mut [f32]) {
+    let (beat, mut phasor) = (beat.map(lanes), [lanes_mut(cos), lanes_mut(sin)]);
+    for i in 0..phasor[0].len() {
+        let ([p, q], [cos, sin]) = (take(&beat, i), [phasor[0][i], phasor[1][i]]);
+        let mut turned = [[0.0; LANES]; 2];
+        for x in 0..LANES {
+            let (real, imaginary) = (p[x] * cos[x] + q[x] * sin[x], p[x] * sin[x] - q[x] * cos[x]);
+            let length = (real * real + imaginary * imaginary).sqrt();
+            let inverse = 1.0 / if length > 1e-12 { length } else { 1e-12 };
+            (turned[0][x], turned[1][x]) = (real * inverse, imaginary * inverse);
+        }
+        put(&mut phasor, i, &turned);
+    }
+}
+
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn add_products(
     usable: &[f32],
@@ -129,10 +147,10 @@ pub(super) fn add_products(
     }
 }
 
-/// Everything that follows from the sums of a row of cells, cell by cell. Without `infrared` the least amplitude is that of the
-/// other channels.
+/// Everything that follows from the sums of a row of cells, cell by cell. `ratios` are the fringe numbers over the first, 0 for a
+/// channel that is absent.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], infrared: bool, out: &mut [f32]) {
+pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], ratios: [f32; 4], out: &mut [f32]) {
     let columns = sums[0].len();
     let mut maps = out.chunks_exact_mut(columns);
     let mut maps: [&mut [f32]; map::COUNT] =
@@ -141,8 +159,10 @@ pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], infrared: bool, out: &mut [f
         let CellSolution { channels: [r, g, b, ir], spread } = solve_cell(sums, i);
         let strength = |[a, _, _, b]: [f32; 4]| if b > CONTRAST_MIN * a { b } else { 0.0 };
         let seen = if spread > SPREAD_MIN * sums[sum::W][i] { 1.0 } else { 0.0 };
-        let weakest = strength(r).min(strength(b)).min(strength(g));
-        let weakest = weakest.min(if infrared { strength(ir) } else { f32::INFINITY });
+        let [_, _, by_b, by_ir] = weights(ratios);
+        let optional = |weight: f32, fit: [f32; 4]| if weight > 0.0 { strength(fit) } else { f32::INFINITY };
+        let weakest = strength(r).min(strength(g)).min(optional(by_b, b)).min(optional(by_ir, ir));
+        let mean = if by_b > 0.0 { 0.5 * (r[3] + b[3]) } else { r[3] };
         let pairs = [
             [r[0], r[3]],
             [b[0], b[3]],
@@ -152,7 +172,7 @@ pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], infrared: bool, out: &mut [f
             [g[2], ir[0]],
             [ir[1], ir[2]],
             [g[3], ir[3]],
-            [seen * weakest, 0.5 * (r[3] + b[3])],
+            [seen * weakest, mean],
         ];
         for (map, value) in maps.iter_mut().zip(pairs.as_flattened()) {
             map[i] = *value;

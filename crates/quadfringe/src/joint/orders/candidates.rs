@@ -1,6 +1,6 @@
 //! Step 4 near discontinuities: each pixel of a cell chooses among the orders that the cell and its neighbours propose.
 
-use super::evidence::{albedo, observed_cosine};
+use super::evidence::{albedo, albedo_known, observed_cosine};
 use super::matching::Matching;
 use super::wrapped::Wrapped;
 use crate::joint::model::CellFringes;
@@ -26,8 +26,8 @@ pub(super) struct Nodes<'a> {
     /// Wrapped phase of every node.
     pub phase: &'a [f32],
     pub matching: &'a Matching,
-    /// Fringe numbers of G and IR divided by the fringe number of R and B.
-    pub ratios_g_ir: [f32; 2],
+    /// Fringe numbers of R, G, B, IR divided by the first.
+    pub ratios: [f32; 4],
 }
 
 impl Nodes<'_> {
@@ -117,7 +117,7 @@ impl Block {
         let node = cell.row * grid.columns + cell.column;
         let (phase, whole) = (nodes.phase[node], nodes.absolute(node));
         let fringes = wrapped.cell(scene, cell.row, cell.column);
-        let predicted = Predicted { scene, fringes: &fringes, ratios_g_ir: nodes.ratios_g_ir };
+        let predicted = Predicted { scene, fringes: &fringes, ratios: nodes.ratios };
         self.costs.clear();
         for i in 0..side * side {
             let y = (cell.row * step + i / side).saturating_sub(1).min(grid.height - 1);
@@ -156,16 +156,22 @@ struct Pixel {
 struct Predicted<'a> {
     scene: &'a Scene<'a>,
     fringes: &'a CellFringes,
-    ratios_g_ir: [f32; 2],
+    ratios: [f32; 4],
 }
 
 /// Adds for every candidate the squared differences between the observed and the predicted cosines of G and IR.
 fn add_costs(pixel: &Pixel, predicted: &Predicted<'_>, turns: &[f32], costs: &mut [f32]) {
-    let Predicted { scene, fringes: CellFringes { offset, amplitude }, ratios_g_ir } = predicted;
+    let Predicted { scene, fringes: CellFringes { offset, amplitude }, ratios } = predicted;
     let light = scene.light.map(|plane| plane[pixel.at]);
     let red_blue = |values: &[f32; 4]| [values[0], values[2]];
-    let albedo = albedo(pixel.wrapped_phase, red_blue(&light), red_blue(offset), red_blue(amplitude));
-    for (c, ratio) in [1, 3].into_iter().zip(*ratios_g_ir) {
+    let albedo = albedo(
+        pixel.wrapped_phase,
+        red_blue(&light),
+        red_blue(offset),
+        red_blue(amplitude),
+        albedo_known(*ratios),
+    );
+    for (c, ratio) in [1, 3].map(|c| (c, ratios[c])) {
         let seen = observed_cosine(light[c], albedo, offset[c], amplitude[c]);
         for (cost, turns) in costs.iter_mut().zip(turns) {
             let phase = pixel.absolute_phase + TAU * turns;

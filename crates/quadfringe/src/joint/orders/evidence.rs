@@ -6,8 +6,8 @@ use super::wrapped::Wrapped;
 use crate::joint::cells::RowMaps;
 use crate::joint::infrared::{Waves, with_waves};
 use crate::joint::local_fit::Beats;
-use crate::joint::model::FringeRows;
-use crate::joint::params::orders::{LIT_WEIGHT, OBSERVED_COSINE_MAX, SAMPLED_ROWS};
+use crate::joint::model::{FringeRows, has_quadrature};
+use crate::joint::params::orders::{ALBEDO_KNOWN, LIT_WEIGHT, OBSERVED_COSINE_MAX, SAMPLED_ROWS};
 use crate::joint::scene::{PixelRow, Scene};
 use crate::parallel::angle::{atan2, sin_cos, wrap, wrap_positive};
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
@@ -21,7 +21,7 @@ const SUMS: usize = 11;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ratios {
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     /// Phase of the middle order at a wrapped phase of 0.
     pub middle_rad: f32,
 }
@@ -44,13 +44,22 @@ pub(super) fn observed_cosine(light: f32, albedo: f32, offset: f32, amplitude: f
     if seen > -OBSERVED_COSINE_MAX { seen } else { -OBSERVED_COSINE_MAX }
 }
 
-/// Albedo of a pixel from R and B at a phase; the two are never both dark. The arrays hold values of R and B.
+/// Albedo of a pixel from R and B at a phase; the two are never both dark. The arrays hold values of R and B. R alone may be
+/// dark: the less it shows, the closer the albedo is to that of the surroundings, which is 1. `known` is the weight of the
+/// surroundings ([`albedo_known`]).
 #[inline(always)]
-pub(super) fn albedo(phase: f32, light: [f32; 2], offset: [f32; 2], amplitude: [f32; 2]) -> f32 {
+pub(super) fn albedo(phase: f32, light: [f32; 2], offset: [f32; 2], amplitude: [f32; 2], known: f32) -> f32 {
     let (s, c) = sin_cos(phase);
     let (r, b) = (offset[0] + amplitude[0] * c, offset[1] - amplitude[1] * s);
-    let norm = r * r + b * b;
-    (light[0] * r + light[1] * b) / if norm > 1e-6 { norm } else { 1e-6 }
+    let known = known * offset[0] * offset[0];
+    let norm = r * r + b * b + known;
+    (light[0] * r + light[1] * b + known) / if norm > 1e-6 { norm } else { 1e-6 }
+}
+
+/// Weight of the albedo of the surroundings, relative to that of the light of R: none for R and B in quadrature.
+#[inline(always)]
+pub(super) fn albedo_known(ratios: [f32; 4]) -> f32 {
+    if has_quadrature(ratios) { 0.0 } else { ALBEDO_KNOWN }
 }
 
 /// Wrapped phase of the nodes of one row, in [0, 2 pi): the phase of the lit pixel that is nearest to the middle of the
@@ -150,13 +159,13 @@ fn add_cosines<W: Waves>(
         for x in 0..LANES {
             let lit = modulation[x] > 0.0;
             let weight = if lit { usable[x] } else { 0.0 };
-            // A saturated lit pixel has a small weight, so that a node with only such pixels counts as lit but has no
-            // evidence.
+            // Saturated lit pixels have a small weight: a node with only such pixels counts as lit without evidence.
             terms[0][x] = if lit { weight + LIT_WEIGHT } else { 0.0 };
             let unwrapped = node[x] + wrap(phase[x] - node[x]);
-            let red_blue = |rows: &[Lanes; 4]| [rows[0][x], rows[2][x]];
-            let albedo = albedo(phase[x], red_blue(&light), red_blue(&offset), red_blue(&amplitude));
-            let angles = [ratios[1] * unwrapped, waves.infrared(vector, x, unwrapped + origin_rad).phase];
+            let [light_rb, offset_rb, amplitude_rb] =
+                [&light, &offset, &amplitude].map(|rows| [rows[0][x], rows[2][x]]);
+            let albedo = albedo(phase[x], light_rb, offset_rb, amplitude_rb, albedo_known(ratios));
+            let angles = [ratios[1] * unwrapped, waves.infrared(&vector, x, unwrapped + origin_rad).phase];
             for beat in 0..2 {
                 let c = 2 * beat + 1;
                 let s = observed_cosine(light[c][x], albedo, offset[c][x], amplitude[c][x]);

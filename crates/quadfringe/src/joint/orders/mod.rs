@@ -14,7 +14,6 @@ use super::params::orders::{JUMP_NODES_MAX, JUMP_NODES_MIN, JUMP_PERIODS};
 use super::scene::Scene;
 use super::slopes::Slopes;
 use super::uncertainty::{NodeVerdict, WrongOrderModel};
-use crate::Channel;
 use crate::encoding::FourChannel;
 use crate::parallel::angle::wrap;
 use crate::parallel::slots::Slots;
@@ -32,19 +31,18 @@ pub(super) struct Orders {
     phase: Vec<f32>,
     surfaces: Surfaces,
     /// Fringe numbers of G and IR divided by the fringe number of R and B.
-    ratios_g_ir: [f32; 2],
+    ratios: [f32; 4],
     slots: Slots<EvidenceRows>,
     blocks: Slots<Block>,
 }
 
 impl Orders {
     pub fn new(code: &FourChannel) -> Self {
-        let ratios_g_ir = [Channel::G, Channel::Ir].map(|c| (code.fringe_number(c) / code.quadrature) as f32);
         Self {
             matching: Matching::new(code),
             phase: Vec::new(),
             surfaces: Surfaces::default(),
-            ratios_g_ir,
+            ratios: code.ratios(),
             slots: Slots::default(),
             blocks: Slots::default(),
         }
@@ -59,8 +57,7 @@ impl Orders {
             .enumerate()
             .for_each(|(row, phase)| node_phases(scene, wrapped, row, phase));
         let (phase, slots) = (&self.phase, &self.slots);
-        let [green, infrared] = self.ratios_g_ir;
-        let ratios = Ratios { ratios: [1.0, green, infrared], middle_rad: self.matching.middle_rad() };
+        let ratios = Ratios { ratios: self.ratios, middle_rad: self.matching.middle_rad() };
         self.matching.choose([grid.rows, grid.columns], jump_nodes(scene), |row, out| {
             let nodes = &phase[row * grid.columns..][..grid.columns];
             row_evidence(scene, wrapped, ratios, row, nodes, &mut slots.take(), out);
@@ -116,7 +113,7 @@ impl Orders {
     }
 
     fn nodes(&self) -> Nodes<'_> {
-        Nodes { phase: &self.phase, matching: &self.matching, ratios_g_ir: self.ratios_g_ir }
+        Nodes { phase: &self.phase, matching: &self.matching, ratios: self.ratios }
     }
 
     /// Writes the absolute phase of the pixels of one cell.

@@ -7,7 +7,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_pcg::{Pcg64Mcg, rand_core::SeedableRng};
 use std::f32::consts::TAU;
 
-pub const RATIOS: [f32; 3] = [1.0, 35.0 / 36.0, 30.0 / 36.0];
+pub const RATIOS: [f32; 4] = [1.0, 35.0 / 36.0, 1.0, 30.0 / 36.0];
 pub const PERIOD_PX: f32 = 25.0;
 /// First column of the second texture.
 pub const EDGE: usize = 128;
@@ -33,7 +33,7 @@ impl Edge {
             let clean = |i: usize| {
                 let [a, b] = [2 * c, 2 * c + 1].map(|k| textures[usize::from(i % 256 >= EDGE)][k]);
                 ALBEDO
-                    * (a + b * carriers(phase[i], RATIOS, Wave::coaxial(phase[i], RATIOS[2]), 0.0).cosine[c])
+                    * (a + b * carriers(phase[i], RATIOS, Wave::coaxial(phase[i], RATIOS[3]), 0.0).cosine[c])
             };
             let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
             (0..grid.pixels()).map(|i| clean(i) + noise * draw()).collect()

@@ -73,7 +73,7 @@ impl Photometry {
 
     /// Starts from the offsets and amplitudes of the local fit, which needs no orders, averaged over the neighbourhood. Where the
     /// phase hardly changes in a window, later fits cannot improve them.
-    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit, slopes: &Slopes, ratios: [f32; 3]) {
+    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit, slopes: &Slopes, ratios: [f32; 4]) {
         let fine = scene.grid;
         let side = (CELL * scene.period_px).max(fine.step as f64);
         self.grid = Grid::with_stride([fine.height, fine.width], fine.stride, side);
@@ -85,7 +85,7 @@ impl Photometry {
                 let cell = [inside(row, fine.rows), inside(column, fine.columns)];
                 let CellFringes { offset, amplitude } = fit.cell(cell[0], cell[1]);
                 let loss = slopes.loss_at(scene, cell);
-                for (c, ratio) in [ratios[0], ratios[1], ratios[0], ratios[2]].into_iter().enumerate() {
+                for (c, ratio) in ratios.into_iter().enumerate() {
                     lines[2 * c][column] = offset[c];
                     lines[2 * c + 1][column] = amplitude[c] / contrast(loss * ratio * ratio);
                 }
@@ -112,7 +112,7 @@ impl Photometry {
     pub fn choose_places(
         &mut self,
         scene: &Scene<'_>,
-        ratios: [f32; 3],
+        ratios: [f32; 4],
         map: PhaseMap<'_>,
         slopes: &Slopes,
         noise: f32,
@@ -132,7 +132,7 @@ impl Photometry {
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
-        ratios: [f32; 3],
+        ratios: [f32; 4],
         PhaseMap { phase, modulation }: PhaseMap<'_>,
         slopes: &Slopes,
         fit: &PhotometryFit,

@@ -25,7 +25,7 @@ pub(super) fn add_projected<W: Waves>(
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
             let pixel = [phase[x], modulation[x], usable[x], loss[x]];
-            let infrared = waves.infrared(vector, x, phase[x]);
+            let infrared = waves.infrared(&vector, x, phase[x]);
             let pixel_terms = project(model, pixel, seen, (ratios, infrared), limits);
             for k in 0..SUMS {
                 terms[k][x] = pixel_terms[k];
@@ -42,7 +42,7 @@ fn project(
     model: [f32; 8],
     [phase, modulation, usable, loss]: [f32; 4],
     seen: [f32; 4],
-    (ratios, infrared): ([f32; 3], Wave),
+    (ratios, infrared): ([f32; 4], Wave),
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
     let (carriers, weights) = (carriers(phase, ratios, infrared, loss), weights(ratios));

@@ -14,7 +14,7 @@ fn a_window_on_two_colours_keeps_its_size() {
     let (grid, phase) = (&edge.grid, &edge.phase);
     let (usable, modulation) = (edge.plane(1.0), edge.plane(0.3));
     let scene = edge.scene(&usable);
-    let (mut fit, mut found, slopes) = (LocalFit::new(true), Photometry::new(), Slopes::flat(grid));
+    let (mut fit, mut found, slopes) = (LocalFit::new(RATIOS), Photometry::new(), Slopes::flat(grid));
     let (mut wrapped, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
     let maps = crate::joint::local_fit::PixelMaps { phase: &mut wrapped, modulation: &mut spare };
     fit.run(&scene, &usable, 0.02, maps);
@@ -45,14 +45,14 @@ fn offsets_and_amplitudes_are_found_under_texture_and_an_error_of_the_phase() {
         (0..grid.pixels())
             .map(|i| {
                 texture(i)
-                    * (a + b * carriers(truth[i], RATIOS, Wave::coaxial(truth[i], RATIOS[2]), 0.0).cosine[c])
+                    * (a + b * carriers(truth[i], RATIOS, Wave::coaxial(truth[i], RATIOS[3]), 0.0).cosine[c])
             })
             .collect()
     });
     let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
     let light = planes.each_ref().map(Vec::as_slice);
     let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
-    let (mut fit, mut found, slopes) = (LocalFit::new(true), Photometry::new(), Slopes::flat(&grid));
+    let (mut fit, mut found, slopes) = (LocalFit::new(RATIOS), Photometry::new(), Slopes::flat(&grid));
     let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
     let maps = crate::joint::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
     fit.run(&scene, &usable, 0.02, maps);

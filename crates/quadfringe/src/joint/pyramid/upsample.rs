@@ -65,7 +65,7 @@ pub(in crate::joint) struct Levels<'a> {
     /// Phase, discontinuities, slopes and photometry of the coarse level.
     pub found: &'a CoarseLevel,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     /// 1 for lit pixels of the fine level.
     pub lit: &'a [f32],
 }
@@ -267,7 +267,7 @@ fn explain<W: Waves>(
     let most = SQUARED_MISFIT_MAX * (0.25 * count(waves.ratios())) * pixels.modulation * pixels.modulation;
     let vector = waves.vector(0);
     for x in 0..LANES {
-        let carriers = waves.carriers(vector, x, pixels.phase[x], 0.0);
+        let carriers = waves.carriers(&vector, x, pixels.phase[x], 0.0);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {

@@ -41,7 +41,7 @@ pub(super) struct Evidence<'a> {
     pub pixel: PixelFit<'a>,
     pub orders: &'a Orders,
     /// Fringe numbers divided by the first.
-    pub ratios: [f32; 3],
+    pub ratios: [f32; 4],
     pub limits: Limits,
 }
 

@@ -85,6 +85,12 @@ impl RowFilter {
         weights
     }
 
+    /// Standard deviation in rad of the phase of an analytic signal of modulation 1 with these weights, for unit noise of the samples.
+    pub fn phase_noise(&self, weights: &[f32]) -> f32 {
+        let squares: f32 = weights.iter().map(|weight| weight * weight).sum();
+        (2.0 * self.forward.len() as f32 * squares).sqrt()
+    }
+
     pub fn scratch(&self) -> RowScratch {
         let length = self.forward.len();
         let work = (self.forward.get_inplace_scratch_len()).max(self.inverse.get_immutable_scratch_len());

@@ -14,8 +14,8 @@ use std::f64::consts::TAU;
 pub(super) struct CostTable {
     /// Turns of the beats of G and IR in one turn of the first phase.
     beat_ratios: [f64; 2],
-    /// Whether there is an infrared channel; without it only G counts.
-    infrared: bool,
+    /// Whether there is a third phase, of IR or of B alone; without it only G counts.
+    third: bool,
     /// Beats of G and IR for every label at a wrapped phase of 0.
     beats: [Vec<u16>; 2],
     /// Phase difference of G and IR between every label and order 0.
@@ -102,7 +102,7 @@ impl CostTable {
         });
         Self {
             beat_ratios,
-            infrared: code.has_infrared(),
+            third: code.has_third(),
             beats,
             rotations,
             middle: (0.5 * n[0]) as usize,
@@ -134,7 +134,7 @@ impl CostTable {
         let predicted = self.beat_ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
         let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
         // Without usable pixels, the cost by cosines is 0 for all labels.
-        let unit = if self.infrared { COSINE_UNIT } else { COSINE_UNIT_WITHOUT_INFRARED };
+        let unit = if self.third { COSINE_UNIT } else { COSINE_UNIT_WITHOUT_INFRARED };
         let scale = if node.pixels > 0.0 { unit / node.pixels } else { 0.0 };
         let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
         let [green_beats, infrared_beats] = &self.beats;
@@ -145,7 +145,7 @@ impl CostTable {
             infrared.predict(terms, wrapped, self.middle_rad(), self.count);
             let rows = [green_rotations, &infrared.rotations];
             costs::<2>([beats[0], node.beats[1]], cosines, [green_beats, &infrared.beats], rows, out);
-        } else if self.infrared {
+        } else if self.third {
             costs::<2>(beats, cosines, coaxial.0, coaxial.1, out);
         } else {
             costs::<1>(beats, cosines, coaxial.0, coaxial.1, out);

@@ -77,7 +77,7 @@ impl Choice {
         &mut self,
         (grid, maps): (&Grid, &CellMaps),
         scene: &Scene<'_>,
-        how: ([f32; 3], &Slopes),
+        how: ([f32; 4], &Slopes),
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
     ) -> f32 {

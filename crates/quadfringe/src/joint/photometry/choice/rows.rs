@@ -33,7 +33,7 @@ impl Rows {
         scene: &Scene<'_>,
         lines: &[usize],
         phase: &[f32],
-        (ratios, slopes): ([f32; 3], &Slopes),
+        (ratios, slopes): ([f32; 4], &Slopes),
     ) {
         let stride = scene.grid.stride;
         let Self { maps, carriers, best, active, smooth, .. } = self;
@@ -150,7 +150,7 @@ fn carry<W: Waves>(pixels: [&[f32]; 2], waves: W, out: [&mut [f32]; 8]) {
         let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let carriers = waves.carriers(vector, x, phase[x], loss[x]);
+            let carriers = waves.carriers(&vector, x, phase[x], loss[x]);
             for c in 0..4 {
                 (found[c][x], found[4 + c][x]) = (carriers.cosine[c], carriers.derivative[c]);
             }
