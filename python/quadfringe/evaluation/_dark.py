@@ -16,7 +16,7 @@ BITS = 12
 
 
 def dark(name: str, share: float, noise: float, seed: int) -> Take:
-    """Expose a scene of `world.SCENES` whose albedo is `share` of its own; `noise` is a share of full scale."""
+    """Expose a scene of `world.SCENES` with this share of its albedo; `noise` is a share of full scale."""
     bench, top = _core.Bench(), 2**BITS - 1
     world = SCENES[name](bench, np.random.default_rng([seed, 77]))
     whole = np.ones((*world.cast.shadow().shape, 4), np.float32)

@@ -3,7 +3,7 @@
 use super::cells::Grid;
 use super::model::{count, weights};
 use super::params::illumination::{
-    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES, NOISE_STRIDE,
+    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES, NOISE_STEPS, NOISE_STRIDE,
 };
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
@@ -32,20 +32,17 @@ pub(super) struct NoiseByLight {
     weights: [f32; 4],
 }
 
-/// Steps of light between 0 and the brightest group.
-const STEPS: usize = 64;
-
-/// Relative variance of the noise at `STEPS` values of the light.
+/// Relative variance of the noise at `NOISE_STEPS` values of the light.
 #[derive(Debug)]
 struct Curve {
-    variance: [f32; STEPS],
+    variance: [f32; NOISE_STEPS],
     /// Steps in a unit of light.
     scale: f32,
 }
 
 impl Default for Curve {
     fn default() -> Self {
-        Self { variance: [1.0; STEPS], scale: 1.0 }
+        Self { variance: [1.0; NOISE_STEPS], scale: 1.0 }
     }
 }
 
@@ -83,13 +80,13 @@ impl Curve {
             [group[group.len() / 2].light, (noise * noise / whole).clamp(NOISE_LIMITS[0], NOISE_LIMITS[1])]
         });
         let groups: Vec<[f32; 2]> = groups.collect();
-        let scale = (STEPS - 1) as f32 / groups[groups.len() - 1][0].max(1e-6);
+        let scale = (NOISE_STEPS - 1) as f32 / groups[groups.len() - 1][0].max(1e-6);
         Self { variance: std::array::from_fn(|step| between(&groups, step as f32 / scale)), scale }
     }
 
     #[inline(always)]
     fn at(&self, light: f32) -> f32 {
-        self.variance[((light * self.scale) as usize).min(STEPS - 1)]
+        self.variance[((light * self.scale) as usize).min(NOISE_STEPS - 1)]
     }
 }
 

@@ -27,6 +27,9 @@ pub const NOISE_SAMPLES: usize = 1 << 14;
 /// Groups of pixels with similar light, in each of which the noise of a channel is estimated. More: each estimate is less certain
 /// (5 % with 8 groups). Fewer: less of the difference between dark and bright pixels is seen. `python evaluation/captures.py`.
 pub const NOISE_GROUPS: usize = 8;
+/// Steps of light between 0 and the brightest group at which the noise is tabulated. More: nothing is gained. Fewer: the noise jumps
+/// from step to step. Not measured: it was set with `NOISE_GROUPS`.
+pub const NOISE_STEPS: usize = 64;
 /// Bounds of the variance of the noise of a group, relative to that of the whole red image. They matter where light is clipped, at
 /// black or by the response. `python evaluation/captures.py`.
 pub const NOISE_LIMITS: [f32; 2] = [0.25, 25.0];
