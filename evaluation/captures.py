@@ -1,11 +1,12 @@
 """Decode the real captures in forms that other benches could have made of them, and count refusals and right orders.
 
     python evaluation/captures.py [--data FOLDER] [--response known|auto|linear] [--offsets even|odd] [--only WORD ...]
-                                  [--draw FILE] [--json FILE]
+                                  [--draw FILE] [--json FILE] [--rings]
 
 Every capture gives shots at 12 offsets of the fringes, and at every fourth offset the variants of
 quadfringe.evaluation._variants. The response is estimated from the 12 images of the first frequency (known), or from
 the shot. A refused shot has no right pixel. Right order: |phase - truth| < pi. Tune on even offsets, report odd ones.
+With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
 """
@@ -36,6 +37,8 @@ CHOSEN = {"all": OFFSETS, "even": OFFSETS[::2], "odd": OFFSETS[1::2]}
 WORST = 10
 TILE = (480, 360)
 COLUMNS = 5
+RINGS_PX = (0.0, 1.5, 3.5, 6.5, np.inf)  # distances from an outline: pixels that mix, pixels next to them, the rest
+JUMP_RAD = np.pi / 2  # between neighbours
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ class Judged:
     reason: str
     score: scoring.Score
     picture: NDArray[np.uint8]
+    rings: NDArray[np.float64]  # of each ring, % of the object and % of it without the right order
 
 
 def shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
@@ -68,7 +72,22 @@ def judged(label: str, scene: scoring.Scene, response: Any) -> Judged:
         phase_rad = scenes.shape_of(scene, response=response).phase_rad
     except DecodeError as error:
         reason, phase_rad = str(error), np.full(scene.red.shape, np.nan, np.float32)
-    return Judged(label, reason, scoring.score(scene, phase_rad), drawn(label, scene, phase_rad))
+    score = scoring.score(scene, phase_rad)
+    return Judged(label, reason, score, drawn(label, scene, phase_rad), rings_of(scene, phase_rad))
+
+
+def rings_of(scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.float64]:
+    """Give the size of each ring around outlines, and what is lost in it."""
+    inner = scene.scored.copy()
+    for axis in (0, 1):
+        smooth = np.abs(np.diff(scene.phase_rad, axis=axis)) < JUMP_RAD
+        whole = np.ones((*smooth.shape[:axis], 1, *smooth.shape[axis + 1 :]), np.bool_)
+        inner &= np.concatenate([smooth, whole], axis) & np.concatenate([whole, smooth], axis)
+    distance_px = cv2.distanceTransform(inner.astype(np.uint8), cv2.DIST_L2, 5)
+    lost = scene.scored & ~(np.abs(phase_rad - scene.phase_rad) < np.pi)
+    edges = np.array(RINGS_PX)
+    counts = [np.histogram(distance_px[where], edges)[0] for where in (scene.scored, lost)]
+    return 100 * np.stack(counts, axis=1) / scene.scored.sum()
 
 
 def drawn(label: str, scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.uint8]:
@@ -107,6 +126,12 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
     return {f"{name}_{key}": value for key, value in figures.items()}
 
 
+def print_rings(name: str, found: list[Judged]) -> None:
+    mean = np.mean([one.rings for one in found], axis=0)
+    for nearest, farthest, (share, lost) in zip(RINGS_PX, RINGS_PX[1:], mean, strict=False):
+        print(f"{name}, {nearest} to {farthest} px: {share:.2f} % of the object, {lost:.2f} % of it lost here")
+
+
 def options_of() -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--data", type=Path, default=scenes.data_folder())
@@ -115,6 +140,7 @@ def options_of() -> argparse.Namespace:
     parser.add_argument("--only", nargs="+", metavar="WORD", help="shots whose name contains one of these words")
     parser.add_argument("--draw", type=Path, metavar="FILE", help="draw the worst shots here")
     parser.add_argument("--json", type=Path, help="write the figures here")
+    parser.add_argument("--rings", action="store_true", help="tell where pixels are lost")
     return parser.parse_args()
 
 
@@ -135,6 +161,8 @@ def main() -> None:
             print(f"{label:42}{score}  {one.reason}", flush=True)
         figures |= summary(name, found) if found else {}
         every += found
+        if options.rings and found:
+            print_rings(name, found)
     if options.draw and every:
         cv2.imwrite(str(options.draw), sheet(every))
     if options.json:

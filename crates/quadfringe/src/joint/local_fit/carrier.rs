@@ -3,9 +3,10 @@
 //! In a window of about a fringe R is fitted as an offset plus cosine and sine of a plane wave. The coefficients turn the wave
 //! into the phasor of R (J34), whose local frequency is closer to that of the fringes; so the fit is repeated with it.
 
-use super::rows::{add_products, map, solve_row, sum, turn};
-use super::{CellMaps, CellWindow, RowMaps, Rows, Scene, TaskWork};
+use super::rows::{Rows, add_products, map, solve_row, sum, turn};
+use crate::joint::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use crate::joint::params::local_fit::{CARRIER_FITS, CARRIER_WINDOWS, DIRECTION_STRIDE_PX, SAMPLED_ROWS};
+use crate::joint::scene::Scene;
 use crate::parallel::slots::Slots;
 use std::f32::consts::TAU;
 

@@ -19,8 +19,8 @@ use crate::parallel::slots::Slots;
 use carrier::Carrier;
 use rayon::prelude::*;
 use rows::{
-    ChannelRows, RedBlueRows, StrengthRows, add_products, add_squares, finish_row, map, relative_albedo,
-    solve_row, sum, two_step,
+    ChannelRows, RedBlueRows, Rows, StrengthRows, add_products, add_squares, finish_row, map,
+    relative_albedo, solve_row, sum, two_step,
 };
 
 /// Results of the fit on the cells, and its working maps.
@@ -40,17 +40,6 @@ pub(super) struct LocalFit {
 pub(super) struct PixelMaps<'a> {
     pub phase: &'a mut [f32],
     pub modulation: &'a mut [f32],
-}
-
-/// Rows of one task.
-#[derive(Debug, Default)]
-struct Rows {
-    maps: RowMaps,
-    cos: Vec<f32>,
-    sin: Vec<f32>,
-    albedo: [Vec<f32>; 3],
-    smooth: Vec<f32>,
-    albedo_smooth: Vec<f32>,
 }
 
 /// Beats of G and of IR against R and B in a row of cells: `cosine - i sine` is the phasor of each.

@@ -1,11 +1,23 @@
 //! Loops of the fit over one row of pixels or of cells.
 
+use crate::joint::cells::RowMaps;
 use crate::joint::model::weights;
 use crate::joint::params::local_fit::{CONTRAST_MIN, RIDGE, SPREAD_MIN};
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::parallel::angle::atan2;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use multiversion::multiversion;
+
+/// Working rows of one task of the fit.
+#[derive(Debug, Default)]
+pub(super) struct Rows {
+    pub maps: RowMaps,
+    pub cos: Vec<f32>,
+    pub sin: Vec<f32>,
+    pub albedo: [Vec<f32>; 3],
+    pub smooth: Vec<f32>,
+    pub albedo_smooth: Vec<f32>,
+}
 
 /// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`.
 pub(super) mod sum {

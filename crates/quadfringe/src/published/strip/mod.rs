@@ -1,6 +1,7 @@
 //! Steps 1 to 7 on a strip of a few rows, which is small enough to stay in the nearest cache.
 
 mod alone;
+mod pairs;
 
 use super::Unwrapping;
 use super::uncertainty::{ShotStatistics, two_step_sigma};
@@ -14,7 +15,10 @@ use crate::stages::{
 };
 use crate::{Reason, Shot};
 pub(super) use alone::Alone;
+use alone::MeansRow;
 use multiversion::multiversion;
+pub(super) use pairs::FourierPair;
+use pairs::Quadrature;
 
 /// The published background: half the sum of the envelopes.
 const BACKGROUND: Background = Background::MeanEnvelope;
@@ -37,34 +41,6 @@ pub(super) struct StripPlan<'a> {
     pub periods_px: Phases<f32>,
     pub limits: Limits,
     pub statistics: ShotStatistics,
-}
-
-/// A value for each of R and B, which are in quadrature.
-#[derive(Debug, Default)]
-struct Quadrature<T> {
-    red: T,
-    blue: T,
-}
-
-impl<T> Quadrature<T> {
-    #[inline(always)]
-    fn both_mut(&mut self) -> [&mut T; 2] {
-        [&mut self.red, &mut self.blue]
-    }
-}
-
-/// A value for each of G and IR, which share a Fourier transform.
-#[derive(Debug, Default)]
-pub(super) struct FourierPair<T> {
-    pub green: T,
-    pub infrared: T,
-}
-
-impl<T> FourierPair<T> {
-    #[inline(always)]
-    fn both_mut(&mut self) -> [&mut T; 2] {
-        [&mut self.green, &mut self.infrared]
-    }
 }
 
 type Row = Aligned<f32>;
@@ -133,7 +109,7 @@ pub(super) fn decode_strip<T: Sample>(
     for (i, row) in out.iter_mut().enumerate() {
         match &plan.alone {
             None => strip.row(i, ratio, plan, row),
-            Some(alone) => strip.row_of_means(i, alone, plan, row),
+            Some(alone) => alone.write(strip.means(i), plan.statistics.noise, plan.limits, row),
         }
     }
 }
@@ -152,6 +128,31 @@ impl Strip {
         rows.chain([&mut self.power, &mut self.absolute, &mut self.margin, &mut self.wrong])
             .for_each(|row| row.resize(width));
         plan.filter.ready(&mut self.fourier);
+    }
+
+    /// Computes phase and modulation of R from the means of the rows, whose background is removed.
+    #[inline(always)]
+    fn fourier_red(&mut self, plan: &StripPlan<'_>, alone: &Alone) {
+        let pixels = plan.blocks.columns;
+        let period = plan.periods_px.quadrature / pixels as f32;
+        let Self { quadrature_means, coarse, spare, power, phases, .. } = self;
+        coarsen(&quadrature_means.red, pixels, coarse, spare);
+        let both = RowPair { real: &**coarse, imaginary: &**coarse };
+        plan.filter.transform(both, RowPair { real: period, imaginary: period }, &mut self.fourier);
+        let signal = plan.filter.analytic(Half::Real, &alone.weights, &mut self.fourier);
+        self.interpolation.run_for(pixels, signal, &mut phases.quadrature, power);
+    }
+
+    /// What the means of the rows say about row `i`.
+    fn means(&self, i: usize) -> MeansRow<'_> {
+        MeansRow {
+            absolute: &self.absolute,
+            margin: &self.margin,
+            wrong: &self.wrong,
+            power: &self.power,
+            light: &self.quadrature[i].red,
+            level: &self.levels.red,
+        }
     }
 
     /// Rows for the linear light of R, G, B, IR of row `i`. B `alone` has the place of IR, which is dark.
