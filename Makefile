@@ -108,13 +108,19 @@ lowest: $(STAMPS)/wheel
 	PYTHONWARNINGS=ignore::DeprecationWarning \
 		$(VENV)/lowest/bin/python -m pytest -p no:cacheprovider -W ignore::DeprecationWarning $(LOWEST_TESTS)
 
-# Changes of the crates' interfaces since the last version, which need a higher number.
-SEMVER_BASE ?= $(shell git describe --tags --abbrev=0 2>/dev/null)
+# Changes of the crates' interfaces since the last tagged version, which need a higher number; before the first tag there is
+# nothing to compare with.
+SEMVER_BASE ?= $(shell git describe --tags --abbrev=0 HEAD^ 2>/dev/null)
 semver:
+ifeq ($(SEMVER_BASE),)
+	@echo "no earlier version is tagged: there is nothing to compare with"
+else
 	cargo install --quiet --locked cargo-semver-checks
-	cargo semver-checks --package lightcrafter --package quadfringe --baseline-rev $(or $(SEMVER_BASE),HEAD)
+	cargo semver-checks --package lightcrafter --package quadfringe --baseline-rev $(SEMVER_BASE)
+endif
 
-# The workflows of .github against their schema and for unsafe steps; CI runs actionlint too, which no registry has.
+# The workflows of .github against their schema and for unsafe steps; CI runs actionlint too, which comes as a
+# program from GitHub.
 workflows: $(STAMPS)/tools
 	$(BIN)/pip install --quiet --disable-pip-version-check "check-jsonschema>=0.33" "zizmor>=1.16"
 	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml

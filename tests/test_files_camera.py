@@ -16,8 +16,8 @@ from support.shots import first_values
 from typer.testing import CliRunner
 
 from quadfringe.cli.app import app
-from quadfringe.config import FilesConfig, SystemConfig, load_system
-from quadfringe.data import BayerShot
+from quadfringe.config import FilesConfig, Fringes, SystemConfig, load_system
+from quadfringe.data import BayerShot, Shape
 from quadfringe.devices import open_camera
 from quadfringe.devices.files import FilesCamera
 from quadfringe.errors import CameraWarning, ConfigError, InputError, ShotTimeoutError
@@ -262,6 +262,19 @@ def test_measure_and_record_from_a_folder(tmp_path: Path) -> None:
         done = run(app, [*take, "--json", "-"])
     assert json.loads(done.stdout)["figures"]["written"] == 3
     assert Recording(tmp_path / "take.h5")[0].images["red"].shape == SHAPE
+
+
+def test_colour_images_are_measured_without_a_system_file(tmp_path: Path) -> None:
+    with open_system(SystemConfig(fringes=Fringes(encoding="rgb"))) as bench:
+        shot = bench.grab()
+    image = np.dstack([shot.images[name] for name in ("blue", "green", "red")])
+    later(lambda: cv2.imwrite(str(tmp_path / "take.png"), image), 1.0)
+    out = tmp_path / "out" / "shape.npz"
+    out.parent.mkdir()
+    take = ["measure", "--camera", f"files:{tmp_path}", "--encoding", "rgb", "--fringes", "36 35 30", "--out", str(out)]
+    done = CliRunner().invoke(app, take)
+    assert done.exit_code == 0, done.output
+    assert Shape.load(out).returned.mean() > 0.9
 
 
 def test_a_recording_of_seconds_ends_although_no_image_comes(tmp_path: Path) -> None:

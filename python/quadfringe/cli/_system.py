@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+from quadfringe.cli._options import ChannelsOfCode, SomeNumbers, fringes_from
 
 if TYPE_CHECKING:
     from quadfringe.config import SystemConfig
@@ -23,14 +25,20 @@ CameraOption = Annotated[
 ]
 
 
-def system_of(system: Path | None, camera: str | None) -> SystemConfig | None:
-    """Return the settings of a system file with this camera; None for neither, which is the virtual bench."""
+def system_of(
+    system: Path | None,
+    camera: str | None,
+    encoding: ChannelsOfCode | None = None,
+    numbers: SomeNumbers | None = None,
+) -> SystemConfig | None:
+    """Return the settings of a system file with this camera and these fringes; None for none, the virtual bench."""
     from quadfringe.config import SystemConfig, load_system
     from quadfringe.config.cameras import capture_config
 
-    if camera is None:
-        return None if system is None else load_system(system)
+    changes: dict[str, Any] = {} if camera is None else {"capture": capture_config(camera)}
+    if encoding is not None or numbers is not None:
+        changes["fringes"] = fringes_from(encoding, numbers, None)
     if system is None:
-        return SystemConfig(capture=capture_config(camera))
-    # A file that says nothing of a setting leaves it to a recording; so must the file with another camera.
-    return load_system(system).model_copy(update={"capture": capture_config(camera)})
+        return SystemConfig(**changes) if changes else None
+    # A file that says nothing of a setting leaves it to a recording; so must the file with other settings.
+    return load_system(system).model_copy(update=changes)

@@ -10,7 +10,9 @@ import typer
 from quadfringe.cli._options import (
     AllowHostOption,
     Colouring,
+    EncodingOption,
     FileSizeOption,
+    FringesOption,
     HostOption,
     PortOption,
     ShotsOption,
@@ -48,6 +50,8 @@ SurfaceOption = Annotated[
 def live(
     system: SystemFile = None,
     camera: CameraOption = None,
+    encoding: EncodingOption = None,
+    fringes: FringesOption = None,
     record: RecordOption = None,
     host: HostOption = "127.0.0.1",
     port: PortOption = 8080,
@@ -75,7 +79,7 @@ def live(
         shown: dict[str, Any] = {"stride": view_stride, "colouring": colour.value, "clouds_per_s": clouds_per_s}
         shown["drawn"] = "surface" if surface else "points"
         viewer = stack.enter_context(Viewer(host, port, allow_hosts=allow_host or (), **shown))
-        scanner = stack.enter_context(open_system(system_of(system, camera)))
+        scanner = stack.enter_context(open_system(system_of(system, camera, encoding, fringes)))
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from quadfringe.cli._options import SystemFile
+from quadfringe.cli._options import EncodingOption, FringesOption, SystemFile
 from quadfringe.cli._output import say
 from quadfringe.cli._steps import Beam, BeamOption
 from quadfringe.cli._system import CameraOption, system_of
@@ -24,6 +24,8 @@ def measure(
     ],
     system: SystemFile = None,
     camera: CameraOption = None,
+    encoding: EncodingOption = None,
+    fringes: FringesOption = None,
     reference: Annotated[
         bool,
         typer.Option(
@@ -47,7 +49,7 @@ def measure(
     if not reference and (steps is not None or beam is not None):
         raise InputError("--steps and --beam belong to --reference; give it too")
     given = {} if steps is None else {"steps": steps}
-    with open_system(system_of(system, camera)) as scanner:
+    with open_system(system_of(system, camera, encoding, fringes)) as scanner:
         shape = scanner.measure(reference=reference, infrared=beam is Beam.infrared, **given)
     for path in out:
         shape.save(path)

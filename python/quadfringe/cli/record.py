@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from quadfringe.cli._options import FileSizeOption, JsonOption, ShotsOption, SystemFile
+from quadfringe.cli._options import (
+    EncodingOption,
+    FileSizeOption,
+    FringesOption,
+    JsonOption,
+    ShotsOption,
+    SystemFile,
+)
 from quadfringe.cli._output import caution, complain, progress, say, stop_requested, write_figures
 from quadfringe.cli._system import CameraOption, system_of
 
@@ -35,6 +42,8 @@ def record(
     ],
     system: SystemFile = None,
     camera: CameraOption = None,
+    encoding: EncodingOption = None,
+    fringes: FringesOption = None,
     shots: ShotsOption = None,
     seconds: SecondsOption = None,
     file_gb: FileSizeOption = None,
@@ -49,7 +58,7 @@ def record(
     from quadfringe.scanner import open_system
 
     with (
-        open_system(system_of(system, camera)) as scanner,
+        open_system(system_of(system, camera, encoding, fringes)) as scanner,
         Recorder(out, scanner.config, scanner.calibration, file_gb=file_gb) as recorder,
         stop_requested() as stop,
         progress(_shots(scanner, shots, seconds, stop), "recording", shots) as taken,

@@ -56,7 +56,7 @@ def examine_shot(shot: AnyShot, plan: Plan) -> list[Finding]:
     except DecodeError as error:
         refused = Finding(error.reason or "fringe orders", "fault", str(error), error.fix)
         return [refused, *sorted((one for one in found if one.name != refused.name), key=_rank)]
-    found += [*_geometry(shape), *_orders(shape), *_waves(shot, shape, plan)]
+    found += [*_geometry(shape, plan), *_orders(shape), *_waves(shot, shape, plan)]
     return sorted(found, key=_rank)
 
 
@@ -89,17 +89,24 @@ def _bits(shot: AnyShot) -> list[Finding]:
     return told([wrong_bits(shot)])
 
 
-def _geometry(shape: Shape) -> list[Finding]:
+def _geometry(shape: Shape, plan: Plan) -> list[Finding]:
     """Check a shape against its calibration; say what a calibration cannot show."""
     if doubts := told(implausible(shape)):
         return doubts
     measured = geometry_of(shape)
     if measured is None:
         return []
-    words = (
-        "columns run as the calibration demands, and points lie inside the image of the projector. Fringes along the "
-    )
-    words += "rows do not show images that are flipped up and down or moved along y: check a mark at the upper edge"
+    words = "points lie inside the image of the projector. "
+    if plan.fringes.quadrature:
+        words = (
+            f"columns run as the calibration demands, and {words}Fringes along the rows do not show images that are "
+        )
+        words += "flipped up and down or moved along y: check a mark at the upper edge"
+    else:
+        words += (
+            "Three colours of different fringe numbers do not show images that are mirrored, flipped up and down or "
+        )
+        words += "moved along y: check marks at the upper and at the left edge"
     return [Finding("geometry", "good", words, value=measured.backwards)]
 
 

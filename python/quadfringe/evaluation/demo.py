@@ -57,7 +57,8 @@ def run_scene(surface: str, out: Path, fringes: Fringes = Fringes()) -> SceneRes
         write_plain_report(out / f"{surface}.png", surface, shot, shape, found)
     else:
         wrapped = wrapped_phases(linear_light(shot, scanner.calibration), config.fringes.code)
-        write_report(out / f"{surface}.png", surface, shot, shape, wrapped, found)
+        quadrature = config.fringes.quadrature
+        write_report(out / f"{surface}.png", surface, shot, shape, wrapped, found, quadrature=quadrature)
     figures = {
         f"{surface}_depth_rms_mm": found.overall.rms,
         f"{surface}_wrong_order_percent": found.wrong_order_percent,

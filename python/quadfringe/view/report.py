@@ -139,9 +139,17 @@ def write_report(
     shape: Shape,
     wrapped: Sequence[NDArray[np.float32]],
     found: ShapeComparison,
+    *,
+    quadrature: bool = True,
 ) -> None:
-    """Write the report of a calibrated shape and of its comparison with the truth to a PNG."""
-    names = ("red and blue, two-step", "green, Fourier", "infrared, Fourier")[: len(wrapped)]
+    """Write the report of a calibrated shape and of its comparison with the truth to a PNG.
+
+    Without `quadrature` each of three colours has a wrapped phase.
+    """
+    first, *others = (
+        ("red and blue, two-step", "green", "infrared") if quadrature else ("red, Fourier", "green", "blue")
+    )
+    names = [first, *(f"{name}, Fourier" for name in others)][: len(wrapped)]
     turn = (-np.pi, np.pi)
     rms_mm = found.overall.rms
     error_mm = 4 * rms_mm if np.isfinite(rms_mm) else 1.0
