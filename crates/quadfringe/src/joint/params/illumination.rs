@@ -13,12 +13,13 @@ pub const HEIGHT_MIN: f32 = 0.02;
 
 /// Least modulation of R and B that counts as light, in standard deviations of the noise of a pixel: the window and the energy find
 /// the phase of many pixels together, so single ones may be noisier than a fringe. Larger: dark surfaces are lost. Smaller: noise in
-/// shadows counts as light. From 0.33 to 1 nothing changes by more than 0.2 % of the pixels: `python evaluation/dark.py`.
-pub const MODULATION_NOISES: f32 = 0.5;
-/// Least modulation that counts as light when there is no noise, as a fraction of full scale: a quarter of a step of 8 bits, which
-/// the rounding of an image without noise hides. Larger: dark surfaces of cameras with more bits are lost.
-/// `python evaluation/dark.py`.
-pub const MODULATION_FLOOR: f32 = 0.001;
+/// shadows counts as light (with 0.5, 6 instead of 5 % of what only one projector of a pair lights is no shadow). From 0.33 to 1
+/// nothing else changes by more than 0.2 % of the pixels: `python evaluation/dark.py`, `pytest tests/test_pair_joint.py -rP`.
+pub const MODULATION_NOISES: f32 = 0.67;
+/// Least modulation that counts as light when there is no noise, as a fraction of full scale: half a step of 8 bits, which the
+/// rounding of an image without noise hides. Larger: dark surfaces of cameras with more bits are lost. Smaller: noise that is clipped
+/// at black counts as light (with 0.001 a small object on black loses 9 % of its pixels): `pytest tests/test_real_objects.py -rP`.
+pub const MODULATION_FLOOR: f32 = 0.002;
 
 /// Number of pixels from which the noise of an image is estimated; up to twice as many are used. The median of 16,000 values
 /// is certain to 1 %. Varied: no effect, but 10 ppm fewer wrong orders of dim steps at x0.7.
