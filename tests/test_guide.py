@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.bars import hold, tolerance
+from support.lit_scene import CAMERA
 from typer.testing import CliRunner, Result
 
 from quadfringe.calibration.session import FolderCaptures, Guided, Session, guide, take_captures
@@ -16,7 +17,7 @@ from quadfringe.calibration.session.exposures import exposed
 from quadfringe.calibration.session.pictures import write_pictures
 from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.cli import app
-from quadfringe.config import Device, SceneConfig, SystemConfig
+from quadfringe.config import SceneConfig, SystemConfig
 from quadfringe.config.cameras import AravisConfig, ReplayConfig
 from quadfringe.data import Calibration
 from quadfringe.devices import Camera, ExternalLight
@@ -26,13 +27,6 @@ from quadfringe.doctor import examine_calibration
 from quadfringe.errors import CalibrationError, ConfigError, InputError
 from quadfringe.io.images import write_image
 
-CAMERA = Device(
-    width_px=512,
-    height_px=384,
-    focal_px=(1290.0, 1291.0),
-    centre_px=(257.0, 189.0),
-    distortion=(-0.05, 0.02, 2e-4, -3e-4, 0.0),
-)
 MIXED = tuple(tuple(1.0 if i == j else 0.05 for j in range(4)) for i in range(4))
 CHIPS = ((1.001, 0.002, 1.2), (-0.002, 1.001, -0.8))
 CONFIG = SystemConfig(

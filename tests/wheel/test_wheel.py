@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -93,7 +94,8 @@ def test_the_installation_is_examined(bare: Environment) -> None:
     assert "compiled with optimisation" in bare.quadfringe("doctor")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="auditwheel examines wheels for Linux")
+# In CI this runs or fails.
+@pytest.mark.skipif(sys.platform != "linux" and "CI" not in os.environ, reason="auditwheel examines wheels for Linux")
 @pytest.mark.parametrize("policy", ["manylinux_2_12", "musllinux_1_2"])
 def test_a_wheel_for_newer_or_other_systems_is_refused(wheel: Path, policy: str) -> None:
     done = subprocess.run([sys.executable, str(CHECK), str(wheel), policy], capture_output=True, text=True)

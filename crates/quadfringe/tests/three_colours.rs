@@ -2,11 +2,10 @@
 
 mod common;
 
-use common::{BAYER, bench, cast_scene, clean, noisy, score};
+use common::{BAYER, bench, cast_scene, clean, noisy, score, there_and_back};
 use ndarray::{Array2, s};
-use quadfringe::height::Triangulator;
-use quadfringe::rig::{Bench, Cast, Light, Planes, RenderOptions};
-use quadfringe::{Decoded, Decoder, Encoding, Method, Options, Shot};
+use quadfringe::rig::RenderOptions;
+use quadfringe::{Decoder, Encoding, Method, Shot};
 use std::f64::consts::TAU;
 
 /// Width of a fringe of the reference bench in camera pixels.
@@ -16,28 +15,6 @@ fn encoding() -> Encoding {
     Encoding::three_colours([36.0, 35.0, 30.0], 912).expect("valid")
 }
 
-/// Renders a cast scene, and decodes its colours.
-fn there_and_back(bench: &Bench, cast: &Cast, render: &RenderOptions, method: Method) -> Decoded {
-    let lights = Light::shot(&encoding()).expect("lights");
-    let triangulator = Triangulator::new(&bench.camera, &bench.visible).expect("a valid bench");
-    let shape = [bench.camera.height, bench.camera.width];
-    let builder = Decoder::builder(&encoding(), shape).options(Options::default().with_method(method));
-    let mut decoder = builder.triangulator(triangulator).build().expect("valid");
-    let decoded = match &bench.render(cast, &lights, render).expect("a valid scene") {
-        Planes::U8([red, green, blue, _]) => {
-            decoder.decode(&Shot::rgb([red.view(), green.view(), blue.view()]).expect("one size"))
-        }
-        Planes::U16([red, green, blue, _]) => {
-            decoder.decode(&Shot::rgb([red.view(), green.view(), blue.view()]).expect("one size"))
-        }
-        Planes::BayerU8([raw, _]) => {
-            decoder.decode(&Shot::bayer_rgb(raw.view(), BAYER).expect("large enough"))
-        }
-        _ => panic!("8 or 16 bit"),
-    };
-    decoded.expect("the channels of the encoding")
-}
-
 #[test]
 fn surfaces_come_back() {
     let bench = bench(1);
@@ -45,7 +22,7 @@ fn surfaces_come_back() {
         [("steps", clean(), 0.002), ("face", noisy(2), 0.012), ("peaks", noisy(4), 0.006)]
     {
         let cast = cast_scene(&bench, name);
-        let decoded = there_and_back(&bench, &cast, &render, Method::joint());
+        let decoded = there_and_back(&bench, &cast, &encoding(), &render, &Method::joint());
         let found = score(&decoded, &cast, &encoding(), FRINGE_PX);
         println!("{name}: {found:?}");
         assert!(found.phase_rms_rad < phase_max, "{name}: {found:?}");
@@ -63,12 +40,20 @@ fn mosaics_and_the_published_method_come_back() {
     let bench = bench(1);
     let cast = cast_scene(&bench, "peaks");
     let mosaic = RenderOptions { bayer: Some(BAYER), ..noisy(2) };
-    let found =
-        score(&there_and_back(&bench, &cast, &mosaic, Method::joint()), &cast, &encoding(), FRINGE_PX);
+    let found = score(
+        &there_and_back(&bench, &cast, &encoding(), &mosaic, &Method::joint()),
+        &cast,
+        &encoding(),
+        FRINGE_PX,
+    );
     println!("mosaic: {found:?}");
     assert!(found.phase_rms_rad < 0.01 && found.wrong_share() == 0.0, "{found:?}");
-    let found =
-        score(&there_and_back(&bench, &cast, &clean(), Method::published()), &cast, &encoding(), FRINGE_PX);
+    let found = score(
+        &there_and_back(&bench, &cast, &encoding(), &clean(), &Method::published()),
+        &cast,
+        &encoding(),
+        FRINGE_PX,
+    );
     println!("published: {found:?}");
     assert!(found.phase_rms_rad < 0.05 && found.wrong_share() < 5e-3, "{found:?}");
     assert!(found.returned_share() > 0.95, "{found:?}");

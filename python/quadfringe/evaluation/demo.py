@@ -33,7 +33,7 @@ class SceneResult:
 
 
 def missing_extras() -> str | None:
-    """Say in one line what is left out because extras are not installed; None if nothing is."""
+    """Name, in one line, what the demo leaves out without the missing extras; None if all are installed."""
     missing = [words for module, words in EXTRAS.items() if find_spec(module) is None]
     if not missing:
         return None

@@ -63,8 +63,18 @@ pub fn bytes(planes: Planes) -> [Array2<u8>; 4] {
     planes.into_u8().expect("the default bit depth")
 }
 
-/// Decodes images that the bench rendered. A mosaic must have the pattern `BAYER`.
+/// Decodes images that the bench rendered, of the channels of the decoder. A mosaic must have the pattern `BAYER`.
 pub fn decode_planes(decoder: &mut Decoder, planes: &Planes) -> Result<Decoded> {
+    if !decoder.encoding().four_channel_view()?.has_infrared() {
+        return match planes {
+            Planes::BayerU8([raw, _]) => decoder.decode(&Shot::bayer_rgb(raw.view(), BAYER)?),
+            Planes::BayerU16([raw, _]) => decoder.decode(&Shot::bayer_rgb(raw.view(), BAYER)?),
+            Planes::BayerF32([raw, _]) => decoder.decode(&Shot::bayer_rgb(raw.view(), BAYER)?),
+            Planes::U8([r, g, b, _]) => decoder.decode(&Shot::rgb([r.view(), g.view(), b.view()])?),
+            Planes::U16([r, g, b, _]) => decoder.decode(&Shot::rgb([r.view(), g.view(), b.view()])?),
+            Planes::F32([r, g, b, _]) => decoder.decode(&Shot::rgb([r.view(), g.view(), b.view()])?),
+        };
+    }
     match planes {
         Planes::BayerU8([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
         Planes::BayerU16([raw, ir]) => decoder.decode(&Shot::bayer(raw.view(), BAYER, ir.view())?),
