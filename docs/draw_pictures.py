@@ -13,18 +13,24 @@ import time
 from contextlib import closing
 from pathlib import Path
 
+import cv2
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import LightSource
-from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 import quadfringe as qf
+from quadfringe.data import AnyShot
 from quadfringe.evaluation._page import Page
 from quadfringe.evaluation.moving_scene import hand_system
+from quadfringe.view.movie import solid_picture
 from quadfringe.view.viewer import Viewer
 
 ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs" / "images"
+HALF_PX = (560, 420)  # width and height of each half of the picture of the README
+CLAY, SLATE = (222, 202, 178), (104, 114, 128)  # of the face and of the wall behind it
+WALL_MM = 797.0  # what is further away is the wall
+VIEW_DEG = (27.0, -7.0)  # yaw and pitch
+FINER = 2
 PAGE_S = 20.0  # until chromium without a graphics card has drawn the page
 
 
@@ -33,46 +39,41 @@ def main() -> None:
     with qf.open(qf.SystemConfig(scene=qf.SceneConfig(surface="face", noise=0.03))) as scanner:
         shot = scanner.grab()
         shape = scanner.decode(shot)
-    draw_fringes(PICTURES / "fringes.png", shot)
-    draw_shape(PICTURES / "shape.png", shape)
+    draw_shot_and_shape(PICTURES / "shot_to_shape.jpg", shot, shape)
     if shutil.which("chromium") is not None:
         draw_page(PICTURES / "live.png")
 
 
-def draw_fringes(path: Path, shot: qf.Shot) -> None:
-    """Draw the visible image and the infrared one, side by side, each cut in half."""
-    full = shot.full_scale_value
-    colour = np.stack([shot.red, shot.green, shot.blue], axis=2) / full
-    infrared = np.repeat(shot.ir[:, :, None], 3, axis=2) / full
-    middle = colour.shape[1] // 2
-    joined = np.concatenate([colour[:, :middle], infrared[:, middle:]], axis=1)
-    figure = Figure(figsize=(5.12, 3.84), dpi=110)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.imshow(joined, interpolation="antialiased", aspect="auto")
-    axes.axvline(middle, color="white", linewidth=1.5)
-    for x, words in ((0.02, "red, green, blue"), (0.52, "infrared")):
-        style = {"color": "white", "fontsize": 10, "transform": axes.transAxes}
-        axes.text(x, 0.03, words, bbox={"facecolor": "black", "alpha": 0.6, "edgecolor": "none"}, **style)
-    axes.set_axis_off()
-    figure.savefig(path)
+def draw_shot_and_shape(path: Path, shot: AnyShot, shape: qf.Shape) -> None:
+    """Draw the images of a shot, half of them visible light and half infrared, beside the surface decoded from them."""
+    joined = cv2.cvtColor(np.hstack([fringes(shot), solid(shape)]), cv2.COLOR_RGB2BGR)
+    cv2.imwrite(str(path), joined, [cv2.IMWRITE_JPEG_QUALITY, 88])
 
 
-def draw_shape(path: Path, shape: qf.Shape, stride: int = 3) -> None:
-    """Draw the points as a lit surface, colour by depth."""
+def fringes(shot: AnyShot) -> NDArray[np.uint8]:
+    """Give the visible image left of the middle and the infrared one right of it, with their names."""
+    images = {name: cv2.resize(image, HALF_PX, interpolation=cv2.INTER_AREA) for name, image in shot.channels.items()}
+    picture = np.stack([images["red"], images["green"], images["blue"]], axis=2)
+    middle = HALF_PX[0] // 2
+    picture[:, middle:] = images["ir"][:, middle:, None]
+    picture[:, middle - 1 : middle + 1] = 255
+    for x, words in ((12, "red, green, blue"), (middle + 12, "infrared")):
+        picture[HALF_PX[1] - 34 : HALF_PX[1] - 8, x - 6 : x + 9 * len(words) + 6] //= 4
+        place = (x, HALF_PX[1] - 15)
+        cv2.putText(picture, words, place, cv2.FONT_HERSHEY_SIMPLEX, 0.55, (255, 255, 255), 1, cv2.LINE_AA)
+    return picture
+
+
+def solid(shape: qf.Shape) -> NDArray[np.uint8]:
+    """Render the surface, turned and lit. Points are interpolated, so that no gaps open where it is turned away."""
     assert shape.xyz_mm is not None
-    x, y, z = np.moveaxis(shape.xyz_mm[::stride, ::stride], 2, 0).astype(float)
-    near, far = np.nanquantile(z, (0.001, 0.999))
-    height = np.clip(far - z, 0, far - near)
-    light = LightSource(azdeg=315, altdeg=40)
-    colour = light.shade(np.nan_to_num(height), cmap=colormaps["viridis"], vert_exag=2.0 / stride, blend_mode="soft")
-    colour[np.isnan(z)] = 0
-    figure = Figure(figsize=(5.12, 3.84), dpi=110)
-    axes = figure.add_axes((-0.32, -0.38, 1.64, 1.76), projection="3d")
-    axes.plot_surface(x, -y, height, facecolors=colour, rstride=1, cstride=1, antialiased=False, shade=False)
-    axes.set_box_aspect((np.ptp(x[np.isfinite(x)]), np.ptp(y[np.isfinite(y)]), 1.6 * (far - near)))
-    axes.view_init(elev=62, azim=-80)
-    axes.set_axis_off()
-    figure.savefig(path)
+    height, width = shape.phase_rad.shape
+    dense = cv2.resize(shape.xyz_mm, (FINER * width, FINER * height))  # no data spreads to the neighbours
+    maps = {name: np.zeros(dense.shape[:2], np.float32) for name in ("phase_rad", "column_px", "modulation", "quality")}
+    colours = np.where(dense[:, :, 2:] < WALL_MM, CLAY, SLATE).astype(np.uint8)
+    size_px = (FINER * HALF_PX[0], FINER * HALF_PX[1])
+    picture = solid_picture(qf.Shape(**maps, xyz_mm=dense), colours, turn_deg=VIEW_DEG, size_px=size_px, field_mm=330)
+    return cv2.resize(picture, HALF_PX, interpolation=cv2.INTER_AREA)
 
 
 def draw_page(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""The rows of the README's table of figures: for each command, the figures it measures, their words and their bars."""
+"""The rows of the table of docs/figures.md: for each command, the figures it measures, their words and their bars."""
 
 from __future__ import annotations
 

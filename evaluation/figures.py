@@ -1,9 +1,10 @@
-"""Measure the figures of the README again and write them into its table; `make figures` runs this.
+"""Measure all figures again and write them into docs/figures.md and the README; `make figures` runs this.
 
     python evaluation/figures.py [--only WORD ...]
 
-With `--only`, runs the commands that contain one of these words. The table is written after every command, so that an
-interrupted run keeps what it has measured.
+With `--only`, runs the commands that contain one of these words. The table of docs/figures.md is written after every
+command, so that an interrupted run keeps what it has measured. The README repeats some of its rows, which
+figure_choice.py lists.
 
 Each row names the command that gave its figure. Rows on captures and renders need the test data (QUADFRINGE_DATA, or
 ../shared/data), rows on cameras need Aravis and a network namespace (`make test-camera`), rows on the browser need
@@ -19,11 +20,14 @@ import sys
 import tempfile
 from pathlib import Path
 
+from figure_choice import CHOSEN
 from figure_rows import ROOT, SOURCES, Source
 
 from quadfringe.evaluation._ledger import bars
 
 BEGIN, END = "<!-- figures -->", "<!-- /figures -->"
+HEAD = ("| figure | value | bar | command |", "|---|---|---|---|")
+PAGE, README = ROOT / "docs" / "figures.md", ROOT / "README.md"
 
 
 def main() -> None:
@@ -32,28 +36,51 @@ def main() -> None:
     only = parser.parse_args().only
     chosen = [source for source in SOURCES if only is None or any(word in words_of(source.command) for word in only)]
     if not chosen:
-        parser.error(f"no command contains one of {only}; the last column of the table in README.md lists the commands")
+        parser.error(f"no command contains one of {only}; the last column of the table in docs/figures.md lists them")
     for source in chosen:
         if source.there():
             write_table(source, run(source))
 
 
 def write_table(measured: Source, figures: dict[str, float]) -> None:
-    """Put the figures of one source into the README's table; all other rows stay as they stand there."""
-    readme = ROOT / "README.md"
-    before, _, rest = readme.read_text().partition(BEGIN)
-    old, _, after = rest.partition(END)
-    lines = ["| figure | value | bar | command |", "|---|---|---|---|"]
+    """Put the figures of one source into the table of the page; all other rows stay as they stand there."""
+    old = between(PAGE)
+    lines = []
     for source in SOURCES:
-        command = words_of(source.command)
         if source is measured:
             lines += [
-                f"| {words} | {figures[name]:.4g} | {bar_text(bar)} | `{command}` |" for name, words, bar in source.rows
+                f"| {words} | {figures[name]:.4g} | {bar_text(bar)} | `{words_of(source.command)}` |"
+                for name, words, bar in source.rows
             ]
         else:
-            lines += [line for line in old.splitlines() if line.endswith(f"| `{command}` |")]
-    table = "\n".join(lines)
-    readme.write_text(f"{before}{BEGIN}\n{table}\n{END}{after}")
+            lines += rows_of(old, source)
+    put_between(PAGE, lines)
+    put_between(README, chosen(lines))
+
+
+def chosen(lines: list[str]) -> list[str]:
+    """Give the rows of the README: those of the chosen figures, in words that need no other row."""
+    rows = []
+    for name, words in CHOSEN:
+        source = next(one for one in SOURCES if name in (row[0] for row in one.rows))
+        found = rows_of(lines, source)[[row[0] for row in source.rows].index(name)]
+        rows.append(f"| {words} |{found.split(' |', 1)[1]}")
+    return rows
+
+
+def rows_of(lines: list[str], source: Source) -> list[str]:
+    return [line for line in lines if line.endswith(f"| `{words_of(source.command)}` |")]
+
+
+def between(document: Path) -> list[str]:
+    """Give the lines between the two marks of a document."""
+    return document.read_text().partition(BEGIN)[2].partition(END)[0].splitlines()
+
+
+def put_between(document: Path, lines: list[str]) -> None:
+    before, _, rest = document.read_text().partition(BEGIN)
+    table = "\n".join((*HEAD, *lines))
+    document.write_text(f"{before}{BEGIN}\n{table}\n{END}{rest.partition(END)[2]}")
 
 
 def bar_text(bar: str) -> str:

@@ -113,5 +113,5 @@ pub use optics::{BayerPattern, Device};
 
 /// Runs the Rust blocks of the README as tests.
 #[cfg(doctest)]
-#[doc = include_str!("../../../README.md")]
+#[doc = include_str!("../README.md")]
 struct Readme;
