@@ -12,7 +12,7 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
-.PHONY: demo test test-usb test-camera test-live wheel wheel-test cross publish-check msrv lowest semver workflows audit \
+.PHONY: demo test docs test-usb test-camera test-live wheel wheel-test cross publish-check msrv lowest semver workflows audit \
 	release fuzz miri hostile coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
@@ -46,6 +46,15 @@ python: $(STAMPS)/built stubs
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 	$(BIN)/pytest --numprocesses 2 --dist loadfile
+
+# The documentation site, into out/docs: every notebook and every picture of the gallery is computed; warnings are errors.
+docs: $(STAMPS)/docs
+	PYTHONPATH=docs/extensions $(BIN)/sphinx-build -W --keep-going -q -j 2 -d out/doctrees docs out/docs
+	@echo "open out/docs/index.html"
+
+$(STAMPS)/docs: $(STAMPS)/built
+	$(BIN)/pip install --quiet --disable-pip-version-check "$$(ls $(VENV)/editable/quadfringe-*.whl)[docs]"
+	touch $@
 
 # The wheel for this machine, with the list of all crates in it. On Linux, Zig links it against glibc 2.17, the oldest that
 # Rust supports, and $(BASELINE) is checked (docs/decisions/0042-*.md); elsewhere the linker of the system is used.

@@ -1,105 +1,63 @@
-"""The README runs: every block, in order, in one empty folder, unless the line above it says why it cannot."""
+"""README and pages run: every block of each, in order, in one folder, unless the line above it says why not.
+
+Pages that are notebooks run when the site is built (`make docs`).
+"""
 
 from __future__ import annotations
 
-import os
 import re
-import shlex
-import subprocess
-import sys
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import pytest
-from typer.main import get_command
+from support.blocks import FENCE, ROOT, Block, blocks_of, check_commands, judge, run
 
-from quadfringe.cli import app
-from quadfringe.config import load_system
-
-ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text()
-FENCE = re.compile(r"^(?:<!-- not run: (?P<reason>[^\n]*) -->\n)?```(?P<kind>\w*)\n(?P<text>.*?)^```$", re.M | re.S)
-MOST_WORDS, LEAST_WORDS = 30, 4  # of a reason
+README = ROOT / "README.md"
+NOTEBOOK = re.compile(r"\A---\n.*?^kernelspec:.*?^---$", re.MULTILINE | re.DOTALL)
+PAGES = [README, *(page for page in sorted((ROOT / "docs").rglob("*.md")) if not NOTEBOOK.match(page.read_text()))]
+BLOCKS = [(page, i, block) for page in PAGES for i, block in enumerate(blocks_of(page.read_text()))]
 
 
-class Block(NamedTuple):
-    """One fenced block; `reason` says why it is not run, None when it is."""
-
-    kind: str
-    text: str
-    reason: str | None
-
-
-def blocks_of(document: str) -> list[Block]:
-    return [Block(found["kind"], found["text"], found["reason"]) for found in FENCE.finditer(document)]
-
-
-def run(block: Block, folder: Path) -> None:
-    """Run a block as its kind says, in a folder that keeps what earlier blocks have written."""
-    if block.kind in ("python", "sh"):
-        command = [sys.executable, "-c"] if block.kind == "python" else ["bash", "-euc"]
-        path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
-        environment = {**os.environ, "PATH": path}
-        done = subprocess.run([*command, block.text], cwd=folder, env=environment, capture_output=True, text=True)
-        assert done.returncode == 0, done.stdout + done.stderr
-    elif block.kind == "toml":
-        (folder / "system.toml").write_text(block.text)
-        load_system(folder / "system.toml")
-    elif block.kind == "rust":
-        # The doc tests of the crate run every Rust block of the README.
-        assert 'include_str!("../../../README.md")' in (ROOT / "crates" / "quadfringe" / "src" / "lib.rs").read_text()
-    else:
-        pytest.fail(f"a block of kind {block.kind!r} is not run; state why in a line <!-- not run: REASON --> above it")
-
-
-def check_commands(block: Block) -> None:
-    """Check what can be checked without running: commands and options of quadfringe, targets of make."""
-    for line in block.text.replace("\\\n", " ").splitlines():
-        words = shlex.split(line, comments=True)
-        if words[:1] == ["make"]:
-            assert re.search(rf"^{words[1]}:", (ROOT / "Makefile").read_text(), re.M), line
-        elif words[:1] == ["quadfringe"]:
-            check_options(words[1:], line)
-
-
-def check_options(words: list[str], line: str) -> None:
-    command: Any = get_command(app)
-    while hasattr(command, "commands"):  # a group
-        assert words, line
-        assert words[0] in command.commands, line
-        command, words = command.commands[words[0]], words[1:]
-    known = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
-    assert {word for word in words if word.startswith("--")} <= known, line
-
-
-BLOCKS = blocks_of(README)
+def name(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return tmp_path_factory.mktemp("readme")
+def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[Path, Path]:
+    return {page: tmp_path_factory.mktemp(page.stem) for page in PAGES}
 
 
-@pytest.mark.parametrize("block", BLOCKS, ids=[f"{i}-{block.kind}" for i, block in enumerate(BLOCKS)])
-def test_block_runs_or_says_why_not(block: Block, folder: Path) -> None:
-    if block.reason is None:
-        run(block, folder)
-    else:
-        assert LEAST_WORDS <= len(block.reason.split()) <= MOST_WORDS
-        check_commands(block)
+@pytest.mark.parametrize(
+    ("page", "block"),
+    [(page, block) for page, _, block in BLOCKS],
+    ids=[f"{name(page)}-{i}-{block.kind}" for page, i, block in BLOCKS],
+)
+def test_block_runs_or_says_why_not(page: Path, block: Block, folders: dict[Path, Path]) -> None:
+    judge(block, folders[page], page)
 
 
-def test_every_block_is_seen() -> None:
-    assert 2 * len(BLOCKS) == len(re.findall(r"^ *(?:```|~~~)", README, re.M))
-    assert {"python", "sh", "toml", "rust"} <= {block.kind for block in BLOCKS if block.reason is None}
+@pytest.mark.parametrize("page", PAGES, ids=name)
+def test_every_block_is_seen(page: Path) -> None:
+    rest = FENCE.sub("", page.read_text())
+    assert re.findall(r"^ *(?:```|~~~).*$", rest, re.MULTILINE) == []
 
 
-@pytest.mark.parametrize("picture", re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README))
+def test_each_kind_of_block_is_run() -> None:
+    run_kinds = {block.kind for page, _, block in BLOCKS if page == README and block.reason is None}
+    assert {"python", "sh"} <= run_kinds
+    assert {"toml", "rust"} <= {block.kind for _, _, block in BLOCKS if block.reason is None}
+
+
+@pytest.mark.parametrize("picture", re.findall(r"!\[[^\]]*\]\(([^)]+)\)", README.read_text()))
 def test_pictures_exist(picture: str) -> None:
     assert (ROOT / picture).is_file()
 
 
 # On planted faults
+
+
+def test_directives_are_no_blocks_but_hold_some() -> None:
+    document = "````{tab-set}\n```sh\nfalse\n```\n````\n\n```{toctree}\na\n```\n\n```sh\ntrue\n```\n"
+    assert [block.text for block in blocks_of(document)] == ["false\n", "true\n"]
 
 
 @pytest.mark.parametrize(
@@ -109,13 +67,15 @@ def test_pictures_exist(picture: str) -> None:
         ("```sh\nfalse\ntrue\n```\n", AssertionError),
         ("```toml\n[decode]\nmethd = 1\n```\n", ValueError),
         ("```console\nquadfringe live\n```\n", pytest.fail.Exception),
-        ("```\nplain\n```\n", pytest.fail.Exception),
+        ("```\nquadfringe live\n```\n", pytest.fail.Exception),
+        ("1. Do\n\n   ```sh\n   false\n   ```\n", AssertionError),
+        ("```rust\nfn main() {}\n```\n", AssertionError),
     ],
 )
 def test_a_block_that_fails_is_found(document: str, error: type[BaseException], tmp_path: Path) -> None:
     (block,) = blocks_of(document)
     with pytest.raises(error):
-        run(block, tmp_path)
+        run(block, tmp_path, ROOT / "docs" / "glossary.md")
 
 
 @pytest.mark.parametrize("line", ["quadfringe lve", "quadfringe decode --gren x.png", "make nothing"])

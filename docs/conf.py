@@ -1,0 +1,91 @@
+"""The documentation site; `make docs` builds it into out/docs, without network."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from pathlib import Path
+
+import quadfringe
+
+ROOT = Path(__file__).resolve().parents[1]
+REPOSITORY = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["repository"]
+
+project = "quadfringe"
+author = "the quadfringe contributors"
+copyright = "the quadfringe contributors; MIT or Apache-2.0"  # noqa: A001 - Sphinx reads this name
+version = release = quadfringe.__version__
+
+extensions = [
+    "myst_nb",
+    "numpydoc",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx_copybutton",
+    "sphinx_design",
+    "mathml",
+    "site_pages",
+]
+exclude_patterns = ["extensions", "_static", "_templates"]
+templates_path = ["_templates"]
+nitpicky = False
+suppress_warnings = ["config.cache"]
+
+# Pages: Markdown as GitHub reads it, and notebooks as text. Every cell of them runs at every build.
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "substitution"]
+myst_heading_anchors = 4
+myst_dmath_double_inline = True
+nb_execution_mode = "force"
+nb_execution_in_temp = True
+nb_execution_raise_on_error = True
+nb_execution_timeout = 120
+nb_execution_show_tb = True
+nb_merge_streams = True
+
+# The reference
+autosummary_generate = True
+autodoc_typehints = "signature"
+autodoc_member_order = "bysource"
+autodoc_preserve_defaults = True
+numpydoc_show_class_members = False
+default_role = "py:obj"
+python_use_unqualified_type_names = True
+toc_object_entries_show_parents = "hide"
+
+# Names of other projects become links when the inventories may be fetched: QUADFRINGE_INTERSPHINX=1 make docs
+if os.environ.get("QUADFRINGE_INTERSPHINX"):
+    extensions.append("sphinx.ext.intersphinx")
+    intersphinx_mapping = {
+        "python": ("https://docs.python.org/3", None),
+        "numpy": ("https://numpy.org/doc/stable", None),
+        "h5py": ("https://docs.h5py.org/en/stable", None),
+    }
+
+html_theme = "pydata_sphinx_theme"
+html_title = f"quadfringe {version}"
+html_logo = "_static/logo.svg"
+html_favicon = "_static/favicon.svg"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sourcelink = False
+html_copy_source = False
+html_math_renderer = "mathml"
+html_sidebars = {"hardware": [], "accuracy": [], "troubleshooting": [], "performance": [], "changelog": []}
+pygments_style = "tango"
+html_theme_options = {
+    "logo": {"text": "quadfringe"},
+    "show_nav_level": 1,
+    "navigation_depth": 2,
+    "header_links_before_dropdown": 6,
+    "navbar_align": "left",
+    "navigation_with_keys": False,
+    "show_prev_next": True,
+    "secondary_sidebar_items": ["page-toc"],
+    "footer_start": ["copyright"],
+    "footer_end": ["sphinx-version"],
+    "pygments_light_style": "tango",
+    "pygments_dark_style": "monokai",
+    "icon_links": [{"name": "Repository", "url": REPOSITORY, "icon": "fa-brands fa-github"}],
+}
+copybutton_prompt_text = r">>> |\.\.\. |\$ "
+copybutton_prompt_is_regexp = True
