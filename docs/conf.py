@@ -29,6 +29,7 @@ extensions = [
 exclude_patterns = ["extensions", "_static", "_templates"]
 templates_path = ["_templates"]
 nitpicky = False
+smartquotes = False  # two hyphens begin an option
 suppress_warnings = ["config.cache"]
 
 # Pages: Markdown as GitHub reads it, and notebooks as text. Every cell of them runs at every build.
@@ -46,6 +47,7 @@ nb_merge_streams = True
 autosummary_generate = True
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
+maximum_signature_line_length = 88
 autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 default_role = "py:obj"
@@ -75,6 +77,7 @@ pygments_style = "tango"
 html_theme_options = {
     "logo": {"text": "quadfringe"},
     "show_nav_level": 1,
+    "show_toc_level": 2,
     "navigation_depth": 2,
     "header_links_before_dropdown": 6,
     "navbar_align": "left",
