@@ -23,12 +23,14 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
+    "sphinx_gallery.gen_gallery",
     "mathml",
     "site_pages",
 ]
-exclude_patterns = ["extensions", "_static", "_templates"]
+exclude_patterns = ["extensions", "gallery", "_static", "_templates", "generated/**/*.ipynb", "generated/**/*.py"]
 templates_path = ["_templates"]
 nitpicky = False
+smartquotes = False  # two hyphens begin an option
 suppress_warnings = ["config.cache"]
 
 # Pages: Markdown as GitHub reads it, and notebooks as text. Every cell of them runs at every build.
@@ -46,11 +48,31 @@ nb_merge_streams = True
 autosummary_generate = True
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
+maximum_signature_line_length = 88
 autodoc_preserve_defaults = True
 numpydoc_show_class_members = False
 default_role = "py:obj"
 python_use_unqualified_type_names = True
 toc_object_entries_show_parents = "hide"
+
+# The gallery: every script runs when it was changed since the last build.
+sphinx_gallery_conf = {
+    "examples_dirs": ["gallery"],
+    "gallery_dirs": ["generated/gallery"],
+    "backreferences_dir": "generated/uses",
+    "doc_module": ("quadfringe",),
+    "within_subsection_order": "FileNameSortKey",
+    "reset_modules": ("gallery_style.apply",),
+    "capture_repr": (),
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "show_signature": False,
+    "remove_config_comments": True,
+    "thumbnail_size": (480, 300),
+    "min_reported_time": 3600,
+    "notebook_extensions": set(),
+    "plot_gallery": True,
+}
 
 # Names of other projects become links when the inventories may be fetched: QUADFRINGE_INTERSPHINX=1 make docs
 if os.environ.get("QUADFRINGE_INTERSPHINX"):
@@ -75,6 +97,7 @@ pygments_style = "tango"
 html_theme_options = {
     "logo": {"text": "quadfringe"},
     "show_nav_level": 1,
+    "show_toc_level": 2,
     "navigation_depth": 2,
     "header_links_before_dropdown": 6,
     "navbar_align": "left",

@@ -11,15 +11,27 @@ from os.path import relpath
 from pathlib import Path
 from typing import Any
 
+import api_pages
+import command_pages
+import settings_pages
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
 REPOSITORY = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]["repository"]
 # A page with one of these names is the head of its folder: the pages that its table links to follow it.
-HEADS = ("method/index", "decisions/README")
+HEADS = ("method/index", "decisions/README", "reference/api/index")
 LINK = re.compile(r"(?<=\]\()(?!https?:|#)([^)#\s]+)(#[^)\s]*)?(?=\))")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 INCLUDE = re.compile(r"^```\{include\} (\S+\.md)\n```$", re.MULTILINE)
-ROW = re.compile(r"^\| \[[^\]]*\]\(([\w-]+)\.md\)", re.MULTILINE)
+ROW = re.compile(r"^\| \[[^\]]*\]\(([\w.-]+)\.md\)", re.MULTILINE)
+
+
+GENERATED = re.compile(r"^<!-- generated: (\w+) ?([\w.]*) -->$", re.MULTILINE)
+GENERATORS = {
+    "api": api_pages.page,
+    "commands": lambda _: command_pages.page(),
+    "settings": lambda _: settings_pages.page(),
+}
 
 
 def read(app: Any, name: str, content: list[str]) -> None:
@@ -28,6 +40,7 @@ def read(app: Any, name: str, content: list[str]) -> None:
     if path.suffix != ".md":
         return
     content[0] = with_repository_links(with_included(content[0], path.parent), path.parent)
+    content[0] = GENERATED.sub(lambda mark: GENERATORS[mark[1]](mark[2]), content[0])
     if name in HEADS:
         pages = dict.fromkeys(ROW.findall(content[0]))
         content[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(pages) + "\n```\n"
@@ -67,5 +80,7 @@ def with_repository_links(text: str, folder: Path) -> str:
 
 def setup(app: Any) -> dict[str, bool]:
     """Connect to Sphinx."""
+    app.setup_extension("sphinx.ext.autodoc")
+    api_pages.setup(app)
     app.connect("source-read", read)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

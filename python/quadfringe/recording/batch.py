@@ -4,7 +4,7 @@ The work runs on any executor of `concurrent.futures`; `executor_for` makes one 
 Each shot is one task, which writes its status last; a run that was killed can therefore be continued, and ends with the
 same files. The results belong to one recording, by its SHA-256, and a finished shot is taken as finished only when its
 files match their checksum. A damaged shot has no shape; if its stamp is damaged, its id and time_us are 0. A shot that
-cannot be read now, damaged or not, is reported, and the same command tries it again.
+cannot be read now, damaged or not, is reported, and the same command tries it again. It writes::
 
     OUT/take.zarr        the maps of `Shape` by their names, but for column_px and order, which follow from phase_rad
                          (shot, row, column); id, time_us, status, checksum (shot); settings, SHA-256 of the recording
