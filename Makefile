@@ -234,7 +234,7 @@ coverage:
 	scripts/set-up testbed
 	scripts/coverage
 
-# Pictures and figures of the README.
+# The picture of the README, docs/figures.md, and the figures of both.
 figures: $(STAMPS)/built
 	$(BIN)/python docs/draw_pictures.py
 	$(BIN)/python evaluation/figures.py

@@ -1,4 +1,4 @@
-"""Draw the pictures of the README from the virtual bench; `make figures` runs this.
+"""Draw the pictures of README and docs from the virtual bench; `make figures` runs this.
 
     python docs/draw_pictures.py
 

@@ -19,7 +19,11 @@ ROOT = Path(__file__).parents[1]
 DOCUMENTS = [
     ROOT / "README.md",
     *sorted((ROOT / "docs").glob("*.md")),
-    *sorted((ROOT / "docs" / "method").glob("*.md")),
+    *(
+        page
+        for name in ("method", "howto", "start", "tutorials")
+        for page in sorted((ROOT / "docs" / name).glob("*.md"))
+    ),
 ]
 
 

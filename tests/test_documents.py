@@ -1,6 +1,6 @@
 """The documents: links lead somewhere, commands exist (those quoted in the code too), decision records are complete.
 
-Figures that docs/method/approximations.md takes from the table of the README equal those of the table.
+Figures that docs/method/approximations.md and the README take from the table of docs/figures.md equal those of it.
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ AVOIDED = re.compile(r"\b(?:(?:its|their|your) own|beside|as far as|(?:is|are) t
 
 APPROXIMATIONS = (ROOT / "docs" / "method" / "approximations.md").read_text()
 README = (ROOT / "README.md").read_text()
-# A figure of the page, as {} in its words, and its row of the README table. "A > B" is the first row B after the row A.
-# "below {}" is a limit; words without {} state that the figure is 0.
+ALL_FIGURES = (ROOT / "docs" / "figures.md").read_text()
+README_LINES_MAX, README_FIGURES = 150, 10
+# A figure of the page, as {} in its words, and its row of the table of docs/figures.md. "A > B" is the first row B
+# after the row A. "below {}" is a limit; words without {} state that the figure is 0.
 FIGURES = (
     ("{} % of full scale of stray light", "gamma 2.2, crosstalk 15 % each way: stray light left, % of full scale"),
     ("levels within {} % RMS", "the same: RMS of the levels, % of full scale"),
@@ -123,7 +125,7 @@ def missing(command: str) -> list[str]:
 
 
 def table(text: str) -> list[tuple[str, str, str]]:
-    """Give figure, value and command of the rows of the README table."""
+    """Give figure, value and command of the rows of a table of figures."""
     rows = text.partition("<!-- figures -->")[2].partition("<!-- /figures -->")[0].splitlines()
     return [
         (c[0], c[1], c[3].strip("`"))
@@ -140,9 +142,9 @@ def measured(rows: list[tuple[str, str, str]], figure: str) -> float:
     return float(rows[start][1])
 
 
-def stated_wrongly(page: str, readme: str) -> list[str]:
+def stated_wrongly(page: str, figures: str) -> list[str]:
     """Name the figures of the page that differ from the table, by more than the rounding of the page."""
-    rows, faults = table(readme), []
+    rows, faults = table(figures), []
     for words, figure in FIGURES:
         found = re.search(re.escape(words).replace(r"\{\}", r"(\d+(?:\.\d+)?)"), page)
         if found is None:
@@ -156,9 +158,9 @@ def stated_wrongly(page: str, readme: str) -> list[str]:
     return faults
 
 
-def untied(page: str, readme: str) -> list[str]:
+def untied(page: str, figures: str) -> list[str]:
     """Give the costs with a number that is not in `FIGURES` or `CONDITIONS`, in rows with a command of the table."""
-    commands_of_figures, faults = {command for _, _, command in table(readme)}, []
+    commands_of_figures, faults = {command for _, _, command in table(figures)}, []
     for line in page.splitlines():
         cells = line.strip("| ").split(" | ")
         if len(cells) != 4 or not commands_of_figures & set(re.findall(r"`([^`]+)`", cells[3])):
@@ -172,16 +174,23 @@ def untied(page: str, readme: str) -> list[str]:
 
 
 def test_the_page_of_approximations_has_the_figures_of_the_table() -> None:
-    assert stated_wrongly(APPROXIMATIONS, README) == []
-    assert untied(APPROXIMATIONS, README) == []
+    assert stated_wrongly(APPROXIMATIONS, ALL_FIGURES) == []
+    assert untied(APPROXIMATIONS, ALL_FIGURES) == []
 
 
 def test_a_figure_that_parts_from_the_table_is_found() -> None:
-    assert len(stated_wrongly(APPROXIMATIONS.replace("0.068 rad", "0.069 rad"), README)) == 1
-    assert len(stated_wrongly(APPROXIMATIONS, README.replace("| 0.06799 |", "| 0.06899 |"))) == 1
-    assert len(stated_wrongly(APPROXIMATIONS, README.replace("| 0.004284 |", "| 0.005284 |"))) == 1
-    assert len(stated_wrongly(APPROXIMATIONS.replace("traditional 0.068", "the first 0.068"), README)) == 1
-    assert len(untied(APPROXIMATIONS.replace("99.9 % of a face", "99.9 % of a face, 98 % of peaks"), README)) == 1
+    assert len(stated_wrongly(APPROXIMATIONS.replace("0.068 rad", "0.069 rad"), ALL_FIGURES)) == 1
+    assert len(stated_wrongly(APPROXIMATIONS, ALL_FIGURES.replace("| 0.06799 |", "| 0.06899 |"))) == 1
+    assert len(stated_wrongly(APPROXIMATIONS, ALL_FIGURES.replace("| 0.004284 |", "| 0.005284 |"))) == 1
+    assert len(stated_wrongly(APPROXIMATIONS.replace("traditional 0.068", "the first 0.068"), ALL_FIGURES)) == 1
+    assert len(untied(APPROXIMATIONS.replace("99.9 % of a face", "99.9 % of a face, 98 % of peaks"), ALL_FIGURES)) == 1
+
+
+def test_the_readme_is_short_and_has_ten_figures_of_the_table() -> None:
+    assert len(README.splitlines()) <= README_LINES_MAX
+    chosen = {(value, command) for _, value, command in table(README)[1:]}
+    assert len(table(README)) == README_FIGURES + 1  # with the head
+    assert chosen <= {(value, command) for _, value, command in table(ALL_FIGURES)}
 
 
 @pytest.mark.parametrize("document", DOCUMENTS, ids=name)

@@ -13,7 +13,12 @@ from support.blocks import FENCE, ROOT, Block, blocks_of, check_commands, judge,
 
 README = ROOT / "README.md"
 NOTEBOOK = re.compile(r"\A---\n.*?^kernelspec:.*?^---$", re.MULTILINE | re.DOTALL)
-PAGES = [README, *(page for page in sorted((ROOT / "docs").rglob("*.md")) if not NOTEBOOK.match(page.read_text()))]
+CRATE = ROOT / "crates" / "quadfringe" / "README.md"
+PAGES = [
+    README,
+    CRATE,
+    *(page for page in sorted((ROOT / "docs").rglob("*.md")) if not NOTEBOOK.match(page.read_text())),
+]
 BLOCKS = [(page, i, block) for page in PAGES for i, block in enumerate(blocks_of(page.read_text()))]
 
 

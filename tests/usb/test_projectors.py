@@ -165,13 +165,13 @@ def test_doctor_prints_the_rule(order: Order) -> None:
 
 
 @pytest.mark.usefixtures("screen")
-def test_the_readme_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    readme = (Path(__file__).resolve().parents[2] / "README.md").read_text()
-    (system,) = (text for text in re.findall(r"```toml\n(.*?)```", readme, re.DOTALL) if "[projectors" in text)
+def test_the_page_on_these_projectors_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "howto" / "lightcrafter_usb.md").read_text()
+    (system,) = (text for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "[projectors" in text)
     ((output, *_),) = outputs()
     monkeypatch.chdir(tmp_path)
     Path("system.toml").write_text(system.replace("HDMI-1", output))
-    blocks = re.findall(r"```console\n(.*?)```", readme, re.DOTALL)
+    blocks = re.findall(r"```console\n(.*?)```", page, re.DOTALL)
     (commands,) = (text for text in blocks if "quadfringe projector" in text)
     for line in commands.splitlines():
         words = line.partition("#")[0].split()

@@ -56,7 +56,7 @@ def _system(file: Path) -> SystemConfig:
     if config.projectors is None:
         raise InputError(
             f"{file}: no [projectors] table, so its fringes belong to the virtual bench (quadfringe simulate); add a "
-            "table that names the ports of both projectors, as in the README"
+            'table for each projector, such as [projectors.visible] with port = "1-1"'
         )
     return config
 
