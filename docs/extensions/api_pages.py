@@ -184,7 +184,7 @@ def signature(_app: Any, _what: str, _name: str, _thing: Any, _options: Any, giv
     return tuple(None if one is None else ARRAY.sub(r"ndarray[\1]", one) for one in (given, returned))
 
 
-def skip(_app: Any, _what: str, name: str, thing: Any, skipped: bool, _options: Any) -> bool | None:
+def skip(_app: Any, _what: str, name: str, _thing: Any, _skipped: bool, _options: Any) -> bool | None:
     """Leave out what pydantic adds to a model, and its fields, which the docstring lists."""
     return True if name in {"model_config", "model_fields", "model_computed_fields", "model_post_init"} else None
 

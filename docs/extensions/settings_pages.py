@@ -1,4 +1,4 @@
-"""The page of the system file: every key with its type, unit, default and meaning, from the models that read the file."""
+"""The page of the system file: every key with type, unit, default and meaning, from the models that read it."""
 
 from __future__ import annotations
 
