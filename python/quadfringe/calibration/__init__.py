@@ -2,7 +2,7 @@
 
 The usual way is the guided calibration, `quadfringe.calibration.session`; the functions here are its parts.
 
-Boards and their points, and a camera from four poses:
+Boards and their points, and a camera from nine poses:
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
