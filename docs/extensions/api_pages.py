@@ -101,7 +101,7 @@ def find(app: Any, env: Any, node: Any, content: Any) -> Any:
         return None
     words = node["reftarget"].removeprefix("quadfringe.").removeprefix("qf.")
     first, _, rest = words.partition(".")
-    if first not in places():
+    if first not in places() or not (rest or first[0].isupper()):  # a word in small letters may be an argument
         return None
     target = f"{places()[first]}.{rest}" if rest else places()[first]
     domain = env.domains.python_domain
