@@ -52,7 +52,7 @@ python: $(STAMPS)/built stubs
 
 # The documentation site, into out/docs: every notebook and every picture of the gallery is computed; warnings are errors.
 docs: $(STAMPS)/docs
-	PYTHONPATH=docs/extensions $(BIN)/sphinx-build -W --keep-going -q -j 2 -d out/doctrees docs out/docs
+	PYTHONPATH=$(CURDIR)/docs/extensions $(BIN)/sphinx-build -W --keep-going -q -j 2 -d out/doctrees docs out/docs
 	@echo "open out/docs/index.html"
 
 $(STAMPS)/docs: $(STAMPS)/built
