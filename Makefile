@@ -18,10 +18,13 @@ KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
 
-# The kernel's tests and the wheel are compiled at the same time: each leaves a core idle now and then.
+# The kernel's tests and the wheel are compiled at the same time, and the site is built while the projectors are tested: each
+# leaves a core idle now and then.
 test:
 	$(MAKE) --jobs 2 rust $(STAMPS)/built
-	$(MAKE) wheel-test python test-usb test-camera test-live
+	$(MAKE) wheel-test python
+	$(MAKE) --jobs 2 docs test-usb
+	$(MAKE) test-camera test-live
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
 # only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
@@ -49,7 +52,7 @@ python: $(STAMPS)/built stubs
 
 # The documentation site, into out/docs: every notebook and every picture of the gallery is computed; warnings are errors.
 docs: $(STAMPS)/docs
-	PYTHONPATH=docs/extensions $(BIN)/sphinx-build -W --keep-going -q -j 2 -d out/doctrees docs out/docs
+	PYTHONPATH=$(CURDIR)/docs/extensions $(BIN)/sphinx-build -W --keep-going -q -j 2 -d out/doctrees docs out/docs
 	@echo "open out/docs/index.html"
 
 $(STAMPS)/docs: $(STAMPS)/built

@@ -24,6 +24,7 @@ extensions = [
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
+    "glossary_terms",
     "mathml",
     "site_pages",
 ]
@@ -68,8 +69,9 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "show_signature": False,
     "remove_config_comments": True,
-    "thumbnail_size": (480, 300),
+    "thumbnail_size": (600, 270),
     "min_reported_time": 3600,
+    "write_computation_times": False,
     "notebook_extensions": set(),
     "plot_gallery": True,
 }

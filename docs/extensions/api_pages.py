@@ -84,6 +84,30 @@ def identity(module: str, name: str) -> str:
     return f"{name} = {thing!r}"
 
 
+def link_to(thing: type) -> str:
+    """Give a link to the place where a class is described."""
+    return f"{{py:obj}}`~{'.'.join(owners()[f'{thing.__module__}.{thing.__qualname__}'])}`"
+
+
+@cache
+def places() -> dict[str, str]:
+    """Give the full name of everything that is described, by the name that docstrings use."""
+    return {name: f"{module}.{name}" for module, name in reversed(owners().values())}
+
+
+def find(app: Any, env: Any, node: Any, content: Any) -> Any:
+    """Resolve a name in backticks that stands on the page of another module, such as `Shape.save`."""
+    if node.get("refdomain") != "py" or node.get("reftype") != "obj":
+        return None
+    words = node["reftarget"].removeprefix("quadfringe.").removeprefix("qf.")
+    first, _, rest = words.partition(".")
+    if first not in places() or not (rest or first[0].isupper()):  # a word in small letters may be an argument
+        return None
+    target = f"{places()[first]}.{rest}" if rest else places()[first]
+    domain = env.domains.python_domain
+    return domain.resolve_xref(env, node["refdoc"], app.builder, "obj", target, node, content)
+
+
 def kind_of(thing: Any) -> str:
     """Give the heading under which something stands."""
     if inspect.isclass(thing):
@@ -184,7 +208,7 @@ def signature(_app: Any, _what: str, _name: str, _thing: Any, _options: Any, giv
     return tuple(None if one is None else ARRAY.sub(r"ndarray[\1]", one) for one in (given, returned))
 
 
-def skip(_app: Any, _what: str, name: str, thing: Any, skipped: bool, _options: Any) -> bool | None:
+def skip(_app: Any, _what: str, name: str, _thing: Any, _skipped: bool, _options: Any) -> bool | None:
     """Leave out what pydantic adds to a model, and its fields, which the docstring lists."""
     return True if name in {"model_config", "model_fields", "model_computed_fields", "model_post_init"} else None
 
@@ -194,4 +218,5 @@ def setup(app: Any) -> dict[str, bool]:
     app.connect("autodoc-process-docstring", docstring, priority=400)
     app.connect("autodoc-process-signature", signature)
     app.connect("autodoc-skip-member", skip)
+    app.connect("missing-reference", find)
     return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,8 +1,9 @@
-"""The page of the system file: every key with its type, unit, default and meaning, from the models that read the file."""
+"""The page of the system file: every key with type, unit, default and meaning, from the models that read it."""
 
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import BaseModel
@@ -90,12 +91,14 @@ def models_in(annotation: Any) -> list[type[BaseModel]]:
     return list(dict.fromkeys(model for one in get_args(annotation) for model in models_in(one)))
 
 
-def page() -> str:
+def page(link_to: Callable[[type[BaseModel]], str]) -> str:
     """Give the Markdown of the page: one section for each table of the file, in the order of the file."""
-    return "\n\n".join([_table(SystemConfig, ""), *_sections(SystemConfig, "", set())])
+    return "\n\n".join([_table(SystemConfig, ""), *_sections(SystemConfig, "", set(), link_to)])
 
 
-def _sections(model: type[BaseModel], path: str, seen: set[type[BaseModel]]) -> list[str]:
+def _sections(
+    model: type[BaseModel], path: str, seen: set[type[BaseModel]], link_to: Callable[[type[BaseModel]], str]
+) -> list[str]:
     parts = []
     for name, field in model.model_fields.items():
         below = f"{path}{name}"
@@ -107,14 +110,13 @@ def _sections(model: type[BaseModel], path: str, seen: set[type[BaseModel]]) -> 
                 parts.append(f"## {heading}\n\nThe keys are those of the first `{table.__name__}` on this page.")
                 continue
             seen.add(table)
-            parts.append(f"## {heading}\n\n{_summary(table)}\n\n{_table(table, below)}")
-            parts += _sections(table, f"{below}.", seen)
+            parts.append(f"## {heading}\n\n{_summary(table)}\n\nIn Python: {link_to(table)}.\n\n{_table(table, below)}")
+            parts += _sections(table, f"{below}.", seen, link_to)
     return parts
 
 
 def _summary(model: type[BaseModel]) -> str:
-    text = (inspect.getdoc(model) or "").partition("\nFields\n")[0].strip()
-    return f"{text}\n\nIn Python: `quadfringe.config.{model.__name__}`."
+    return (inspect.getdoc(model) or "").partition("\nFields\n")[0].strip()
 
 
 def _table(model: type[BaseModel], path: str) -> str:

@@ -5,6 +5,7 @@ The documents in docs are read on GitHub as well, so they hold no directive of S
 
 from __future__ import annotations
 
+import os
 import re
 import tomllib
 from os.path import relpath
@@ -26,11 +27,20 @@ INCLUDE = re.compile(r"^```\{include\} (\S+\.md)\n```$", re.MULTILINE)
 ROW = re.compile(r"^\| \[[^\]]*\]\(([\w.-]+)\.md\)", re.MULTILINE)
 
 
+def rustdoc() -> str:
+    """Give links to the pages of rustdoc that were made on this machine; `make rust` makes them."""
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    pages = {crate: target / "doc" / crate / "index.html" for crate in ("quadfringe", "lightcrafter")}
+    links = [f'<a href="{page.as_uri()}"><code>{crate}</code></a>' for crate, page in pages.items() if page.is_file()]
+    return f"On this machine: {', '.join(links)}." if links else ""
+
+
 GENERATED = re.compile(r"^<!-- generated: (\w+) ?([\w.]*) -->$", re.MULTILINE)
 GENERATORS = {
     "api": api_pages.page,
     "commands": lambda _: command_pages.page(),
-    "settings": lambda _: settings_pages.page(),
+    "rustdoc": lambda _: rustdoc(),
+    "settings": lambda _: settings_pages.page(api_pages.link_to),
 }
 
 

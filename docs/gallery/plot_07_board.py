@@ -2,8 +2,8 @@
 The calibration board and its points
 ====================================
 
-The ring board of the paper, tilted before the virtual camera. The centres of the rings are found to a small fraction of a
-pixel; two dots show which corner is the first.
+The ring board of the paper, tilted before the virtual camera. The centres of the rings are found to a small fraction
+of a pixel; two dots show which corner is the first.
 """
 
 import matplotlib.pyplot as plt

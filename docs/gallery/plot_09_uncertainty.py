@@ -2,8 +2,8 @@
 How sure is each pixel?
 =======================
 
-Each shape states the standard deviation of its depth at every pixel: small in bright light, larger on slopes, in the dark
-and at edges. On the virtual bench the error is known, so that the statement can be checked.
+Each shape states the standard deviation of its depth at every pixel: small in bright light, larger on slopes, in the
+dark and at edges. On the virtual bench the error is known, so that the statement can be checked.
 """
 
 import matplotlib.pyplot as plt

@@ -2,8 +2,8 @@
 The live page
 =============
 
-``quadfringe live`` shows the shape in a browser while it moves, with the four channels, rates and queues. This picture is
-taken by ``make figures``, because it needs a browser.
+``quadfringe live`` shows the shape in a browser while it moves, with the four channels, rates and queues. This picture
+is taken by ``make figures``, because it needs a browser.
 """
 
 import matplotlib.pyplot as plt

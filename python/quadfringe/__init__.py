@@ -10,6 +10,48 @@ writes, takes arguments, can fail, or computes for long.
 Names are loaded when they are first used, so that the import is fast. `quadfringe.open` is `open_system`; a star
 import leaves it out, because it would replace the built-in function, and the packages (`devices`, `recording`, ...)
 because `io` would replace the module of Python.
+
+A shot of the virtual bench with a small camera, its shape, and what may go wrong:
+
+>>> import quadfringe as qf
+>>> camera = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> scene = qf.SceneConfig(surface="sphere", noise=0.01, seed=1)
+>>> with qf.open_system(qf.SystemConfig(camera=camera, scene=scene)) as scanner:  # or qf.open
+...     shot, calibration = scanner.grab(), scanner.calibration
+>>> isinstance(calibration, qf.Calibration), isinstance(shot.truth, qf.Truth), qf.__version__ >= "0.1"
+(True, True, True)
+>>> decode = qf.DecodeConfig(method="joint", quality_min=0.2)
+>>> try:
+...     shape = qf.decode(shot, qf.Plan(912, qf.Fringes(), calibration, decode=decode, response=qf.Response()))
+... except qf.DecodeError as error:  # a shot that cannot be trusted
+...     print(error.reason, error.fix)
+... except (qf.ConfigError, qf.InputError) as error:  # settings or files that cannot be used
+...     print(error)
+>>> shape.depth_mm.shape
+(192, 256)
+
+Fringe numbers and patterns:
+
+>>> qf.optimum(36, 912), round(qf.check_code((36, 35, 30), 912), 2)
+([36.0, 35.0, 30.0], 1.05)
+>>> qf.pattern("red", (36, 35, 30), 912, 1140).shape
+(1140, 912)
+
+Errors of devices and files are `OSError` or say what to install, and every one names what to do:
+
+>>> camera_errors = (qf.CameraNotFoundError, qf.CameraBusyError, qf.CameraLostError, qf.ShotTimeoutError)
+>>> all(issubclass(error, qf.CameraError) for error in (*camera_errors, qf.UnpairedError, qf.WrongFrameError))
+True
+>>> issubclass(qf.CameraError, OSError), issubclass(qf.RecordingError, OSError)
+(True, True)
+>>> issubclass(qf.CalibrationError, qf.DecodeError), issubclass(qf.MissingExtraError, ImportError)
+(True, True)
+>>> issubclass(qf.BatchError, RuntimeError)  # the same command continues the batch
+True
+>>> import warnings
+>>> with warnings.catch_warnings():
+...     for doubt in (qf.DecodeWarning, qf.CameraWarning, qf.RecordingWarning):
+...         warnings.simplefilter("error", doubt)  # doubts become errors
 """
 
 from __future__ import annotations

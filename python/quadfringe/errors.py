@@ -3,6 +3,13 @@
 >>> from quadfringe.errors import ConfigError, InputError
 >>> issubclass(ConfigError, InputError), issubclass(InputError, ValueError)
 (True, True)
+
+>>> from quadfringe import errors
+>>> try:
+...     errors.require("a_library", "view")
+... except errors.MissingExtraError as error:
+...     print(error)
+a_library is needed here and is not installed: pip install "quadfringe[view]"
 """
 
 from __future__ import annotations

@@ -1,4 +1,21 @@
-"""Acceptance test of the instrument: a plane, a sphere and steps, in the manner of VDI/VDE 2634 part 2."""
+"""Acceptance test of the instrument: a plane, a sphere and steps, in the manner of VDI/VDE 2634 part 2.
+
+>>> import numpy as np
+>>> from quadfringe.calibration.acceptance import *
+>>> x, y = np.meshgrid(np.linspace(-100, 100, 400), np.linspace(-80, 80, 320))
+>>> plane = np.dstack([x, y, 800 + 0.02 * np.sin(x / 20)])
+>>> found = accept(Artefacts(planes=(plane,)), Limits(plane_form_mm=0.05))
+>>> isinstance(found, Acceptance), found.accepted
+(True, True)
+>>> [(line.name, line.accepted) for line in found.lines if isinstance(line, Line)]
+[('plane_1_form_mm', True)]
+>>> SPHERE_DIAMETER_MM, STEP_HEIGHTS_MM[0]  # of the virtual bench, which measure_artefacts renders and decodes
+(68.0, 5.0)
+>>> from pathlib import Path
+>>> write_acceptance(Path("acceptance.png"), found)  # doctest: +SKIP
+>>> saved = read_artefacts([Path("plane.npz")], [], [], SPHERE_DIAMETER_MM, ())  # doctest: +SKIP
+>>> virtual = measure_artefacts(qf.SystemConfig())  # doctest: +SKIP
+"""
 
 from __future__ import annotations
 

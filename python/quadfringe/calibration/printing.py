@@ -1,4 +1,13 @@
-"""Calibration boards as files for a printer: PDF and SVG in millimetres, and PNG at a stated resolution."""
+"""Calibration boards as files for a printer: PDF and SVG in millimetres, and PNG at a stated resolution.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> from quadfringe.calibration import ring_board
+>>> with TemporaryDirectory() as folder:
+...     size = write_target(Path(folder) / "board.pdf", ring_board(), page="a4")
+>>> isinstance(size, PageSize), size == PAGES_MM["a4"]
+(True, True)
+"""
 
 from __future__ import annotations
 

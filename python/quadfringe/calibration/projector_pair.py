@@ -74,7 +74,7 @@ def pair_pose(
     >>> sd = np.array([1e-4, 1e-4, 1e-4, 0.1, 0.1, 0.1] * 2)  # rad and mm
     >>> pose = pair_pose(np.eye(3), [-200, 0, 0], np.eye(3), [-199.5, 0, 0], np.diag(sd**2))
     >>> pose.translation_mm.tolist(), pose.sd[3:].round(3).tolist()
-    ([0.5, 0.0, 0.0], [0.141, 0.142, 0.142])
+    ([0.5, 0.0, 0.0], [0.141, 0.144, 0.144])
     """
     posed = [
         np.concatenate([_vector(_array(name, rotation, (3, 3))), _array("translation_mm", translation_mm, (3,))])

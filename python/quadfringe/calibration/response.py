@@ -1,4 +1,17 @@
-"""The response (gamma) of channels, from images of one fringe pattern at equal phase steps: files, or taken here."""
+"""The response (gamma) of channels, from images of one fringe pattern at equal phase steps: files, or taken here.
+
+>>> import numpy as np
+>>> from quadfringe.calibration.response import *
+>>> phase_rad = 2 * np.pi * np.arange(256) / 32 + 2 * np.pi * np.arange(12)[:, None] / 12
+>>> light = np.tile((0.5 + 0.4 * np.cos(phase_rad))[:, None, :], (1, 24, 1))
+>>> stacks = {name: (light**0.5).astype(np.float32) for name in ("red", "green", "blue")}  # a gamma of 2
+>>> dark = {name: np.zeros((24, 256), np.float32) for name in stacks}
+>>> found = estimate_from_steps(StepsTaken(stacks, dark, steadiness=0.0, camera="example"))
+>>> isinstance(found, EstimatedResponse), round(found.calibration.red.exponent, 1)
+(True, 2.0)
+>>> from pathlib import Path
+>>> saved = estimate_from_files(sorted(Path("steps").glob("*.png")), steps=12)  # doctest: +SKIP
+"""
 
 from __future__ import annotations
 
@@ -115,11 +128,12 @@ def take_steps(
     `ConfigError` when the projector cannot show single steps.
 
     >>> from quadfringe.devices import open_devices
-    >>> from quadfringe.config import SystemConfig
-    >>> devices = open_devices(SystemConfig())
+    >>> from quadfringe.config import Device, SystemConfig
+    >>> camera = Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+    >>> devices = open_devices(SystemConfig(camera=camera))
     >>> taken = take_steps(devices.projector, devices.camera, WalkThrough(steps=4))
     >>> taken.stacks["green"].shape
-    (4, 768, 1024)
+    (4, 192, 256)
     """
     images = plan.steps * len(plan.beams) + 2  # and black, and one step again after white
     counter = count(1)

@@ -2,6 +2,30 @@
 
 Terms follow VDI/VDE 2634 part 2: the form error is the range of the distances of the measured points from the fitted
 surface without the worst three of a thousand; the size error is the measured minus the calibrated diameter.
+
+>>> import numpy as np
+>>> from quadfringe.calibration.surfaces import *
+>>> x, y = np.meshgrid(np.linspace(-60, 60, 121), np.linspace(-60, 60, 121))
+>>> flat = np.dstack([x, y, 800 + 0.01 * x])
+>>> plane = fit_plane(flat)
+>>> isinstance(plane, Plane), form_of(plane.distances_mm(flat)).form_mm < 1e-6
+(True, True)
+>>> isinstance(form_of(dominant_plane(flat).distances_mm(flat)), Form)
+True
+>>> radius = 34.0
+>>> ball = np.dstack([x, y, 800 - np.sqrt(np.maximum(radius**2 - x**2 - y**2, 0))])
+>>> ball[x**2 + y**2 > (0.8 * radius) ** 2] = np.nan
+>>> sphere = fit_sphere(ball, guess=dominant_sphere(ball, 2 * radius))
+>>> isinstance(sphere, Sphere), round(sphere.radius_mm, 6)
+(True, 34.0)
+>>> bool(cap_towards_camera(ball, sphere, 30.0).any())
+True
+>>> stairs = flat.copy()
+>>> stairs[40:80, 20:50, 2] -= 10.0
+>>> stairs[40:80, 70:100, 2] -= 20.0
+>>> steps = measure_steps(stairs, (10.0, 20.0))
+>>> isinstance(steps, StepsResult), [round(height, 1) for height in steps.measured_mm]
+(True, [10.0, 20.0])
 """
 
 from __future__ import annotations

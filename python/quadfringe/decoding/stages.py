@@ -5,7 +5,8 @@ The recipe, step by step as in docs/method/published.md. Each line can be change
 >>> import numpy as np
 >>> import quadfringe as qf
 >>> from quadfringe import stages
->>> with qf.open() as scanner:
+>>> camera = qf.Device(width_px=512, height_px=384, focal_px=(1290, 1290), centre_px=(255.5, 191.5))
+>>> with qf.open(qf.SystemConfig(camera=camera)) as scanner:
 ...     shot, calibration = scanner.grab(), scanner.calibration
 >>> light = stages.linear_light(shot, calibration)  # 1. linear light (S1)
 >>> wrapped = stages.demodulate(light, (36, 35, 30))  # 2. to 4. background, phases of blocks and of pixels (S2, S3)
@@ -17,16 +18,41 @@ The recipe, step by step as in docs/method/published.md. Each line can be change
 >>> plan = qf.Plan(912, decode=qf.DecodeConfig(method="published"), calibration=calibration, response=qf.Response())
 >>> np.array_equal(phase_rad, qf.decode(shot, plan).phase_rad, equal_nan=True)
 True
+
+The functions that these steps call, on fringes of 16 columns:
+
+>>> row = np.cos(2 * np.pi * np.arange(512) / 16).astype(np.float32)
+>>> red = np.tile(0.5 + 0.4 * row, (64, 1))
+>>> blue = np.tile(0.5 - 0.4 * np.roll(row, 4), (64, 1))  # in quadrature
+>>> stages.row_period(red), round(float(stages.carrier(red)[0]), 3)
+(16.0, 16.0)
+>>> rows, columns = stages.block_size(16.0, 19.2, 512)
+>>> means = stages.block_means(red, rows, 1)
+>>> level = stages.background(means, 16.0, kind="mean_envelope")
+>>> stages.modulation_ratio(means - level, means - level).shape
+(32,)
+>>> stages.two_step(red - 0.5, blue - 0.5).shape, stages.fourier(means - level, 16.0).shape
+((64, 512), (32, 512))
+>>> (green_rad, modulation), _ = stages.fourier_pair(means - level, means - level, (16.0, 16.0), 1, 512)
+>>> stages.fill_gaps(np.where(row > 0.99, np.nan, red).astype(np.float32)).shape
+(64, 512)
+>>> steps = np.cos(np.arange(4)[:, None, None] * np.pi / 2 + np.zeros((4, 8, 8))).astype(np.float32)
+>>> phase_rad, mean, amplitude = stages.n_step(steps)
+>>> absolute_rad, certain = stages.unwrap(phase_rad, phase_rad, phase_rad, (36, 35, 30), 912)
+>>> stages.nearest_turn(phase_rad, absolute_rad).shape, stages.wrong_order_probability(certain).shape
+((8, 8), (8, 8))
+>>> isinstance(wrapped, stages.Wrapped), len(stages.wrapped_phases(light, (36, 35, 30)))
+(True, 3)
+>>> sound_rad = np.nan_to_num(qf.decode(shot, plan).phase_rad)
+>>> isinstance(stages.response_of_shot(shot, sound_rad, (36, 35, 30), 912), qf.Response)
+True
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal, NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Literal
 
 from quadfringe import _core
 from quadfringe._core import (
@@ -53,8 +79,9 @@ from quadfringe.config.fringes import is_code
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
 from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
+from quadfringe.decoding._wrapped import FringeNumbers, Map, Wrapped, each_alone, with_quadrature, wrap
 from quadfringe.decoding.plan import calibration_of, response_of, stated_response
-from quadfringe.errors import DecodeError, InputError
+from quadfringe.errors import InputError
 
 __all__ = [
     "Wrapped",
@@ -81,38 +108,7 @@ __all__ = [
     "wrong_order_probability",
 ]
 
-Map = NDArray[np.float32]
-FringeNumbers = tuple[float, ...]  # as `Fringes.code`: of red and blue, of green, of infrared if there is any
 CHANNELS = ("red", "green", "blue", "ir")
-
-
-class Wrapped(NamedTuple):
-    """Phases of one shot before unwrapping, float32.
-
-    Orders are found on means over blocks of a few rows, (B, W) with one row for each block; the phase of the result is
-    that of single pixels, (H, W).
-    """
-
-    phase_rad: Map
-    """Wrapped phase of R and B at every pixel, (H, W), rad (S2); of blocks of R if each colour has a number."""
-    modulation: Map
-    """Least modulation of all channels, (H, W), fraction of full scale; NaN where IR has no data."""
-    red_blue_rad: Map
-    """Wrapped phase of the block means of R and B, (B, W), rad; of R, up to whole turns, if each has a number."""
-    green_rad: Map
-    """Phase of the block means of G, (B, W), rad, up to whole turns (S3)."""
-    infrared_rad: Map
-    """Phase of the block means of IR, or of B with a number for itself, (B, W), rad, up to whole turns (S3); else 0."""
-    rows: int
-    """Rows of a block."""
-
-    def __repr__(self) -> str:
-        height, width = self.phase_rad.shape
-        return f"Wrapped({width} x {height}, blocks of {self.rows} rows)"
-
-    def repeated(self, blocks: Map) -> Map:
-        """Give a map of blocks, (B, W), at every pixel, (H, W)."""
-        return np.repeat(blocks, self.rows, axis=0)[: len(self.phase_rad)]
 
 
 def linear_light(
@@ -189,67 +185,7 @@ def demodulate(light: dict[str, Map], fringe_numbers: FringeNumbers) -> Wrapped:
     """
     numbers = numbers_of(fringe_numbers)
     _check_light(light, infrared=len(numbers) == len(CHANNELS) - 1)
-    return _each_alone(light, numbers[:3]) if is_code(numbers) else _with_quadrature(light, numbers)
-
-
-def _with_quadrature(light: dict[str, Map], numbers: FringeNumbers) -> Wrapped:
-    first, second, *third = numbers
-    red, blue = light["red"], light["blue"]
-    ir = light["ir"] if third else np.zeros_like(red)
-    period_px, green_px, infrared_px = _periods_px(red, (first, second, *(third or [second])))
-    rows, columns = block_size(green_px, infrared_px, red.shape[1])
-    red_means, red_level = _fringes(red, rows, 1, period_px)
-    blue_means, blue_level = _fringes(blue, rows, 1, period_px)
-    ratio = modulation_ratio(red_means, blue_means)[:, np.newaxis]
-    green_means, _ = _fringes(light["green"], rows, columns, green_px)
-    infrared_means, _ = _fringes(fill_gaps(ir), rows, columns, infrared_px)
-    periods = (green_px / columns, infrared_px / columns)
-    found = fourier_pair(green_means, infrared_means, periods, columns, red.shape[1])
-    (green, green_modulation), (infrared, infrared_modulation) = found
-
-    def pixels(blocks: Map) -> Map:
-        return np.repeat(blocks, rows, axis=0)[: len(red)]
-
-    red_fringes = red - pixels(red_level)
-    blue_fringes = (blue - pixels(blue_level)) * pixels(ratio)
-    modulation = np.sqrt(red_fringes * red_fringes + blue_fringes * blue_fringes)
-    least = np.fmin(modulation, pixels(green_modulation))
-    least = np.fmin(least, pixels(infrared_modulation)) if third else least
-    least[np.isnan(ir)] = np.nan
-    return Wrapped(
-        phase_rad=two_step(red_fringes, blue_fringes),
-        modulation=least,
-        red_blue_rad=two_step(red_means, blue_means * ratio, coarse=True),
-        green_rad=green,
-        infrared_rad=infrared if third else np.zeros_like(infrared),
-        rows=rows,
-    )
-
-
-def _each_alone(light: dict[str, Map], numbers: FringeNumbers) -> Wrapped:
-    """Give the Fourier phases of red, green and blue."""
-    red, width = light["red"], light["red"].shape[1]
-    period_px, green_px, blue_px = _periods_px(red, numbers)
-    rows, columns = block_size(green_px, blue_px, width)
-    red_means = block_means(_fringes(red, rows, 1, period_px)[0], 1, columns)
-    green_means, blue_means = (
-        _fringes(light[name], rows, columns, px)[0] for name, px in (("green", green_px), ("blue", blue_px))
-    )
-    (red_rad, modulation), _ = fourier_pair(red_means, red_means, (period_px / columns,) * 2, columns, width)
-    found = fourier_pair(green_means, blue_means, (green_px / columns, blue_px / columns), columns, width)
-    (green, green_modulation), (blue, blue_modulation) = found
-    least = np.fmin(np.fmin(green_modulation, blue_modulation), modulation)
-    phase_rad, modulation = (np.repeat(blocks, rows, axis=0)[: len(red)] for blocks in (_wrap(red_rad), least))
-    return Wrapped(phase_rad, modulation, red_rad, green, blue, rows)
-
-
-def _periods_px(red: Map, numbers: FringeNumbers) -> list[float]:
-    """Give the fringe periods of these numbers along the rows; raise `DecodeError` when no fringes cross them."""
-    period_px = row_period(red)
-    others_px = [period_px * numbers[0] / number for number in numbers[1:]]
-    if not np.isfinite(carrier(red)[0]) or max(others_px) > red.shape[1]:
-        raise DecodeError("no fringes cross the rows of the red image; the published stages need them")
-    return [period_px, *others_px]
+    return each_alone(light, numbers[:3]) if is_code(numbers) else with_quadrature(light, numbers)
 
 
 def order(
@@ -277,7 +213,7 @@ def wrapped_phases(light: dict[str, Map], fringe_numbers: FringeNumbers) -> tupl
     """
     wrapped = demodulate(light, fringe_numbers)
     others = (wrapped.green_rad, wrapped.infrared_rad)[: len(fringe_numbers) - 1]
-    return wrapped.phase_rad, *(_wrap(wrapped.repeated(phase)) for phase in others)
+    return wrapped.phase_rad, *(wrap(wrapped.repeated(phase)) for phase in others)
 
 
 def _check_light(light: object, *, infrared: bool) -> None:
@@ -286,15 +222,3 @@ def _check_light(light: object, *, infrared: bool) -> None:
         got = f"only {', '.join(map(str, light))}" if isinstance(light, Mapping) and light else brief(light)
         raise InputError(f"light: expected {', '.join(channels)} by name, as stages.linear_light gives them, got {got}")
     check_maps({name: light[name] for name in channels})
-
-
-def _wrap(phase_rad: Map) -> Map:
-    turn = np.float32(2 * np.pi)
-    return (phase_rad - turn * np.round(phase_rad / turn)).astype(np.float32)
-
-
-def _fringes(image: Map, rows: int, columns: int, period_px: float) -> tuple[Map, Map]:
-    """Give block means minus their background, and the background by the mean envelope."""
-    means = block_means(image, rows, columns)
-    level = background(means, period_px / columns, kind="mean_envelope")
-    return means - level, level

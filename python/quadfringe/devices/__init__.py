@@ -1,4 +1,32 @@
-"""The devices of a system: the protocols of camera and projector, and how they are opened."""
+"""The devices of a system: the protocols of camera and projector, and how they are opened.
+
+>>> import quadfringe as qf
+>>> from quadfringe.devices import *
+>>> keep: Keep = "all"
+>>> with open_camera("virtual:") as camera:
+...     statistics = camera.statistics()
+>>> isinstance(statistics, CameraStatistics)
+True
+>>> all(isinstance(chip, ChipStatistics) for chip in statistics.chips.values())
+True
+>>> small = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> devices = open_devices(qf.SystemConfig(camera=small))
+>>> isinstance(devices, Devices)
+True
+>>> projector: Projector = devices.projector
+>>> projector.show(qf.Fringes())
+>>> camera: Camera = devices.camera
+>>> camera.snap().red.shape
+(192, 256)
+>>> ExternalLight().show(qf.Fringes())  # light that no program drives
+>>> with open_projector(qf.SystemConfig(projectors={"visible": {"port": "1-1", "hdmi": {}}})) as pair:  # doctest: +SKIP
+...     pair.show(qf.Fringes())
+>>> system = qf.SystemConfig(capture={"kind": "uvc", "exposure_us": 16700.0}, projectors={
+...     "visible": {"kind": "hdmi", "size_px": (1280, 720), "frame_rate_hz": 60.0, "match_exposure": True}
+... }, fringes=qf.Fringes(encoding="rgb"))
+>>> list(part_frames(system)), with_whole_frames(system).capture.exposure_us
+([], 16666.7)
+"""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@
 >>> from quadfringe.devices._shots import shot_of
 >>> grey = np.zeros((6, 8), np.uint8)
 >>> shot_of({"red": grey, "green": grey, "blue": grey}, 255.0)
-Shot(8 x 6 uint8 up to 255)
+Shot(8 x 6 uint8 up to 255, without infrared)
 """
 
 from __future__ import annotations

@@ -3,6 +3,19 @@
 >>> from quadfringe.devices import open_camera
 >>> with open_camera("files:captures") as camera:  # doctest: +SKIP
 ...     shot = camera.snap()  # the next image that appears in the folder
+>>> from tempfile import TemporaryDirectory
+>>> import numpy as np
+>>> from quadfringe.config import FilesConfig, SystemConfig
+>>> from quadfringe.data import Shot, write_shot
+>>> from quadfringe.devices.files import *
+>>> with TemporaryDirectory() as folder:
+...     _ = write_shot(f"{folder}/one", Shot(*[np.full((48, 64), grey, np.uint8) for grey in (10, 20, 30, 40)]))
+...     settings = FilesConfig(folder=folder, start="all", settle_s=0.0)
+...     with FilesCamera(settings) as camera:
+...         shot = camera.snap()
+...     open_devices(SystemConfig(capture=settings)).camera.close()
+>>> [int(image[0, 0]) for image in shot.channels.values()]
+[10, 20, 30, 40]
 """
 
 from __future__ import annotations

@@ -3,6 +3,13 @@
 >>> from quadfringe.devices import open_projector
 >>> with open_projector(config) as projector:  # doctest: +SKIP
 ...     projector.show(config.fringes)
+>>> from quadfringe.config import Fringes, HdmiProjectorConfig, ProjectorsConfig
+>>> from quadfringe.devices.hdmi import *
+>>> settings = ProjectorsConfig(visible=HdmiProjectorConfig(size_px=(1280, 720)))
+>>> with HdmiProjectors(settings) as projector:  # doctest: +SKIP
+...     projector.show(Fringes(encoding="rgb"))
+>>> len(PICTURE_MODES) > 3  # what to switch off by hand
+True
 """
 
 from __future__ import annotations

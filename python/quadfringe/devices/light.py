@@ -1,4 +1,17 @@
-"""The light that projectors show, and the images for it."""
+"""The light that projectors show, and the images for it.
+
+>>> import quadfringe as qf
+>>> from quadfringe.devices.light import *
+>>> white, fringes = Levels((1.0, 1.0, 1.0, 0.0)), Step(36.0, 0.0, "columns", "visible")
+>>> lights: list[Light] = [qf.Fringes(), white, fringes]
+>>> images = projector_images((36, 35, 30), (912, 1140), "diamond")
+>>> isinstance(images, ProjectorImages), images.visible.shape, images.infrared.shape
+(True, (1140, 912, 3), (1140, 912))
+>>> with qf.open() as scanner:
+...     deformed = predeformation(qf.Fringes(predeformed_z_mm=800.0), scanner.calibration)
+>>> isinstance(deformed, Predeformation), deformed.z_mm
+(True, 800.0)
+"""
 
 from __future__ import annotations
 

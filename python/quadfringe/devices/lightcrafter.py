@@ -3,6 +3,27 @@
 `LightCrafter` is one projector with all its commands; `PatternProjector` shows fringes on one projector by either
 route; `ProjectorPair` is the `Projector` of a scanner. All are context managers. Bad arguments raise ValueError; device
 faults raise OSError (PermissionError, TimeoutError, ConnectionError, FileNotFoundError).
+
+>>> from quadfringe.config import Fringes, HdmiRoute, ProjectorConfig
+>>> from quadfringe.devices.lightcrafter import *
+>>> file, rule = udev_rule()  # for a projector that is not yours to open
+>>> SIZE_PX, "0451" in rule
+((912, 1140), True)
+>>> files, places = pack_flash([(np.zeros((1140, 912), np.uint8), 8)])  # BMP files for TI's program
+>>> len(files), len(places)
+(1, 1)
+>>> pattern = Pattern(0, 8, "rgb", trigger="rising")
+>>> sequence = PatternSequence([pattern], [(8333, 8333)], trigger_mode="video-sync", frame_rate_hz=60.0)
+>>> config = ProjectorConfig(port="1-1", hdmi=HdmiRoute())
+>>> [one.port for one in lightcrafters()], [one.name for one in outputs(SIZE_PX)]  # doctest: +SKIP
+(['1-1', '1-2'], ['HDMI-1'])
+>>> with LightCrafter("1-1") as device:  # doctest: +SKIP
+...     device.status()
+>>> device = open_device(config)  # doctest: +SKIP
+>>> with PatternProjector(config, colour=True) as projector:  # doctest: +SKIP
+...     projector.show(Fringes(), image)
+>>> with PatternWindow("HDMI-1", SIZE_PX) as window:  # doctest: +SKIP
+...     window.show(image)
 """
 
 from __future__ import annotations

@@ -10,6 +10,29 @@ cannot be read now, damaged or not, is reported, and the same command tries it a
                          (shot, row, column); id, time_us, status, checksum (shot); settings, SHA-256 of the recording
     OUT/take/shot_000000.ply ...
     OUT/take/errors.json     reason for each shot without a shape; only when there are such shots
+
+>>> from concurrent.futures import ThreadPoolExecutor
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> import quadfringe as qf
+>>> from quadfringe.recording import Recorder, batch
+>>> camera = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> with TemporaryDirectory() as name, qf.open(qf.SystemConfig(camera=camera)) as scanner:
+...     take = Path(name) / "take.h5"
+...     with Recorder(take, scanner.config, scanner.calibration) as recorder:
+...         recorder.write(scanner.grab())
+...     jobs: list[batch.Job] = batch.prepare([take], Path(name) / "results", ply=False)
+...     with ThreadPoolExecutor(1) as executor:  # or `executor_for(scheduler="tcp://lab:8786")`
+...         (outcome,) = batch.run(jobs, executor)
+>>> isinstance(outcome, batch.Outcome), outcome.error
+(True, None)
+
+All at once, on every core or on the workers of a dask cluster:
+
+>>> for outcome in batch.decode_recordings([Path("take.h5")], Path("results")):  # doctest: +SKIP
+...     print(outcome.shot, outcome.returned_percent, outcome.error)
+>>> with batch.executor_for(workers=2) as executor:  # doctest: +SKIP
+...     outcomes = list(batch.run(jobs, executor))
 """
 
 from __future__ import annotations

@@ -1,4 +1,21 @@
-"""Pictures of maps and channels: (H, W) to (H, W, 3) uint8 in R, G, B order, with missing data in grey."""
+"""Pictures of maps and channels: (H, W) to (H, W, 3) uint8 in R, G, B order, with missing data in grey.
+
+>>> from quadfringe.view.colours import *
+>>> import quadfringe as qf
+>>> small = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface="sphere", noise=0.01))) as scanner:
+...     shot = scanner.grab()
+...     shape = scanner.decode(shot)
+>>> channels_picture(shot).shape, phase_picture(shape, 912).shape, texture(shot, shape).shape
+((384, 512, 3), (192, 256, 3), (192, 256, 3))
+>>> colouring: Colouring = "height"
+>>> low, high = limits_of(shape.depth_mm)
+>>> limits_for(colouring, shape.depth_mm) == (low, high), colouring in COLOURINGS
+(True, True)
+>>> picture: Picture = coloured(shape.depth_mm, (low, high))
+>>> picture.shape
+(192, 256, 3)
+"""
 
 from __future__ import annotations
 

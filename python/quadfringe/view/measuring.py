@@ -7,6 +7,18 @@ of the calibration move neighbours alike and are not part of it.
 >>> b = Spot((3.0, 4.0, 800.0), (10, 30), 0.1)
 >>> distance(a, b).length_mm
 5.0
+
+>>> points_mm = np.array([[0.0, 0.0, 800.0], [10.0, 0.0, 800.0], [0.0, 10.0, 800.0]], np.float32)
+>>> faces = np.array([[0, 1, 2]])
+>>> ray = Ray(np.zeros(3), np.array([2.0, 1.0, 800.0]) / np.linalg.norm([2.0, 1.0, 800.0]))
+>>> isinstance(ray, Ray), hit(points_mm, faces, ray).corner
+(True, 0)
+>>> length = distance(Spot((0.0, 0.0, 800.0)), Spot((10.0, 0.0, 800.0)))
+>>> isinstance(length, Distance), length.length_mm
+(True, 10.0)
+>>> section = plane_section(points_mm, faces, (0.0, 1.0, 800.0), (9.0, 1.0, 800.0), np.array([0.0, 0.0, 1.0]))
+>>> isinstance(section, Section), section.unit
+(True, 'mm')
 """
 
 from __future__ import annotations

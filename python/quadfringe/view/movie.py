@@ -1,4 +1,21 @@
-"""Rendered pictures of shapes from any viewpoint, and MP4 movies of pictures."""
+"""Rendered pictures of shapes from any viewpoint, and MP4 movies of pictures.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> import quadfringe as qf
+>>> from quadfringe.view.movie import *
+>>> small = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface="sphere", noise=0.01))) as scanner:
+...     shape = scanner.measure()
+>>> with TemporaryDirectory() as folder:
+...     path = Path(folder) / "turn.mp4"
+...     with movie(path, rate_hz=10.0) as pictures:
+...         taken: Movie = pictures
+...         for angle_deg in (0.0, 10.0):
+...             taken.add(solid_picture(shape, shape.colour, turn_deg=(angle_deg, 0.0), size_px=(320, 240)))
+...     path.stat().st_size > 1000
+True
+"""
 
 from __future__ import annotations
 

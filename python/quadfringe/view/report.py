@@ -1,4 +1,19 @@
-"""Report of one shot as a PNG: fringes, wrapped phases, absolute phase, depth and error."""
+"""Report of one shot as a PNG: fringes, wrapped phases, absolute phase, depth and error.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> from quadfringe.view.report import Graph, Panel, draw_panels, drawn, write_report
+>>> depth_mm = np.linspace(790, 810, 48).reshape(6, 8)
+>>> row = Graph("row", "column, px", "depth, mm", {"row 3": (np.arange(8), depth_mm[3])})
+>>> panels = [Panel("depth", depth_mm, "mm"), row]
+>>> len(drawn(panels[0], (3.0, 2.0), 72)) > 1000  # a PNG
+True
+>>> with TemporaryDirectory() as folder:
+...     draw_panels(Path(folder) / "page.png", "two panels", [panels])
+...     (Path(folder) / "page.png").stat().st_size > 1000
+True
+>>> write_report(Path("report.png"), "face", shot, shape, wrapped, comparison)  # doctest: +SKIP
+"""
 
 from __future__ import annotations
 

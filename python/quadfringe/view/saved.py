@@ -1,7 +1,7 @@
 """The page of saved shapes in the browser, which `quadfringe view` serves.
 
->>> from quadfringe.view.saved import SavedViewer                                        # doctest: +SKIP
->>> with SavedViewer(["face.npz", "take.zarr"]) as viewer:
+>>> from quadfringe.view.saved import SavedViewer
+>>> with SavedViewer(["face.npz", "take.zarr"]) as viewer:  # doctest: +SKIP
 ...     input(f"{viewer.url}; Enter ends it")
 """
 

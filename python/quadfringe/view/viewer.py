@@ -1,8 +1,13 @@
 """The live page in the browser, which `quadfringe live` serves.
 
->>> from quadfringe.view.viewer import Viewer                                            # doctest: +SKIP
->>> with qf.open() as scanner, Viewer() as viewer, scanner.stream() as stream:
+>>> import quadfringe as qf
+>>> with qf.open() as scanner, Viewer() as viewer, scanner.stream() as stream:  # doctest: +SKIP
 ...     viewer.follow(stream)
+>>> from quadfringe.view.viewer import CLOUDS_PER_S, Colouring, Drawn, Viewer
+>>> drawn: Drawn = "surface"
+>>> colouring: Colouring = "height"
+>>> with Viewer(drawn=drawn, colouring=colouring, clouds_per_s=CLOUDS_PER_S) as viewer:  # doctest: +SKIP
+...     print(viewer.url)
 """
 
 from __future__ import annotations

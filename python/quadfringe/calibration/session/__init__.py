@@ -2,6 +2,19 @@
 
 The captures come from a folder, which `take_captures` fills from the camera and the projectors, or from the virtual
 bench. Every step calls functions of `quadfringe.calibration`; the result keeps a record of every step.
+
+>>> from pathlib import Path
+>>> from tempfile import TemporaryDirectory
+>>> from quadfringe.calibration.session import *
+>>> session = Session(rig="bench 1", poses=9)
+>>> session.captures("dark"), step_named("poses").needed
+(('01', '02', '03', '04'), True)
+>>> with TemporaryDirectory() as name:
+...     session.save(Path(name) / "session.json")
+...     captures: Captures = FolderCaptures(Path(name), rig="bench 1")
+...     done = guide(captures)  # nothing is there yet
+>>> isinstance(done, Guided), done.calibration, len(done.missing["dark"])
+(True, None, 4)
 """
 
 from quadfringe.calibration.session.acquisition import take_captures

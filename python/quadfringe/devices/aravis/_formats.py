@@ -48,7 +48,7 @@ class PixelFormat:
         """Return the pixels (H, W), or (H, W, 3) of a colour image, uint8 or uint16; a view unless packed.
 
         >>> FORMATS["Mono12Packed"].pixels(np.array([0x12, 0x43, 0x56], np.uint8), 2, 1)
-        array([[291, 1380]], dtype=uint16)
+        array([[ 291, 1380]], dtype=uint16)
         """
         values: NDArray[Any] = data[: self.payload(width, height)]
         if self.packing is not None:

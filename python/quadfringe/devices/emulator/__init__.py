@@ -7,6 +7,10 @@ obeys triggers, resends lost packets, and simulates the faults of real cameras (
 >>> from quadfringe.devices.emulator import Emulator
 >>> with Emulator() as camera:  # doctest: +SKIP
 ...     camera.order("lost_packets", 0.01)
+>>> from quadfringe.devices import emulator
+>>> emulator.MODEL, emulator.SERIAL, emulator.ADDRESSES
+('AD-080GE', 'E000001', ('127.0.0.1', '127.0.0.2'))
+>>> emulator.keep_pace()  # doctest: +SKIP
 """
 
 from __future__ import annotations

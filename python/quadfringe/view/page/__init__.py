@@ -3,6 +3,15 @@
 `write_page` writes it. `page.html`, `page.css` and `page.js` are its frame, its style and the program that turns the
 surface; `figures` draws the pictures with the panels of `quadfringe.view.report`, `scene` packs the surface, and
 `tables` writes the words. Texts of files are escaped, and a content security policy allows no program but `page.js`.
+
+>>> from quadfringe.view.page import SUFFIXES, page_of, write_page
+>>> import quadfringe as qf
+>>> small = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> with qf.open(qf.SystemConfig(camera=small, scene=qf.SceneConfig(surface="sphere", noise=0.01))) as scanner:
+...     shape = scanner.measure()
+>>> "<html" in page_of(shape, "sphere"), SUFFIXES
+(True, ('.html', '.htm'))
+>>> write_page("sphere.html", shape, "sphere")  # doctest: +SKIP
 """
 
 from __future__ import annotations
