@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
-from settings_pages import default_of, described, type_of
+from settings_pages import default_of, described, models_in, type_of
 
 MODULES = (
     "quadfringe",
@@ -54,6 +54,8 @@ MODULES = (
     "quadfringe.errors",
 )
 KINDS = ("Classes", "Functions", "Errors and warnings", "Values and types")
+SCRIPT = re.compile(r"sphx_glr_generated_gallery_\w+\.py")
+MOST_PICTURES = 4  # links from one name
 EXAMPLE = re.compile(r"^\s*(?:>>>|\.\.\. )")
 ARRAY = re.compile(r"~?(?:numpy\.)?ndarray\[tuple\[~?(?:typing\.)?Any, \.\.\.\], ~?(?:numpy\.)?dtype\[([^\[\]]*)\]\]")
 SPAN = re.compile(r"(`+[^`]*`+)")
@@ -127,8 +129,16 @@ def page(module: str) -> str:
         members = [name for name in own if kind_of(getattr(home, name)) == heading]
         if members:
             parts.append(f"## {heading}")
-            parts += [f"### {name}\n\n{_rst(_entry(module, name))}" for name in members]
+            parts += [f"### {name}\n\n{_rst(_entry(module, name))}{_pictures(module, name)}" for name in members]
     return "\n\n".join(parts)
+
+
+def _pictures(module: str, name: str) -> str:
+    """Give links to the first scripts of the gallery that use a name; sphinx-gallery has listed them."""
+    uses = Path(__file__).parents[1] / "generated" / "uses" / f"{module}.{name}.examples"
+    found = dict.fromkeys(SCRIPT.findall(uses.read_text())) if uses.is_file() else {}
+    links = [f"{{ref}}`{label}`" for label in found][:MOST_PICTURES]
+    return f"\n\nIn the gallery: {', '.join(links)}." if links else ""
 
 
 def _rst(text: str) -> str:
@@ -199,7 +209,9 @@ def _fields(model: type[BaseModel]) -> list[str]:
     for name, field in model.model_fields.items():
         default = default_of(field)
         default = {"required": " Required.", "absent": "", "defaults": ""}.get(default, f" Default: ``{default}``.")
-        lines += [f"``{name}`` : {type_of(field)}", f"    {_plain(described(field))}{default}", ""]
+        tables = " or ".join(f"`{table.__name__}`" for table in models_in(field.annotation))
+        kind = type_of(field).replace("table", tables) if tables else type_of(field)
+        lines += [f"``{name}`` : {kind}", f"    {_plain(described(field))}{default}", ""]
     return lines
 
 

@@ -38,11 +38,12 @@ class Decoder:
     another size.
 
     >>> import quadfringe as qf
-    >>> with qf.open() as scanner:
+    >>> camera = qf.Device(width_px=512, height_px=384, focal_px=(1290, 1290), centre_px=(255.5, 191.5))
+    >>> with qf.open(qf.SystemConfig(camera=camera)) as scanner:
     ...     shots = [scanner.grab() for _ in range(2)]
     >>> decoder = qf.Decoder(shots[0], qf.Plan(912, calibration=scanner.calibration))
     >>> [decoder.decode(shot).xyz_mm.shape for shot in shots]
-    [(768, 1024, 3), (768, 1024, 3)]
+    [(384, 512, 3), (384, 512, 3)]
     """
 
     def __init__(self, like: AnyShot | Size, plan: Plan, *, full_scale: float | None = None) -> None:

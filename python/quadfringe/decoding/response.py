@@ -39,7 +39,8 @@ def estimate_response(shot: AnyShot, plan: Plan) -> Response | Literal["linear"]
 
     >>> import quadfringe as qf
     >>> from dataclasses import replace
-    >>> gamma = qf.SystemConfig(scene=qf.SceneConfig(projector_exponent=1.8))
+    >>> camera = qf.Device(width_px=512, height_px=384, focal_px=(1290, 1290), centre_px=(255.5, 191.5))
+    >>> gamma = qf.SystemConfig(camera=camera, scene=qf.SceneConfig(projector_exponent=1.8))
     >>> with qf.open(gamma) as scanner:
     ...     shot = scanner.grab()
     >>> plan = qf.Plan(projector_width_px=912)

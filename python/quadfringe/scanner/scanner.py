@@ -167,7 +167,8 @@ class Scanner:
         stream ends the first.
 
         >>> import quadfringe as qf
-        >>> with qf.open() as scanner, scanner.stream(2, keep="all") as stream:
+        >>> camera = qf.Device(width_px=512, height_px=384, focal_px=(1290, 1290), centre_px=(255.5, 191.5))
+        >>> with qf.open(qf.SystemConfig(camera=camera)) as scanner, scanner.stream(2, keep="all") as stream:
         ...     depths = [measured.result().depth_mm for measured in stream]
         >>> len(depths)
         2

@@ -65,7 +65,8 @@ def compare(
     millimetres.
 
     >>> import quadfringe as qf
-    >>> with qf.open(qf.SystemConfig(scene=qf.SceneConfig(noise=0.03))) as scanner:
+    >>> camera = qf.Device(width_px=512, height_px=384, focal_px=(1290, 1290), centre_px=(255.5, 191.5))
+    >>> with qf.open(qf.SystemConfig(camera=camera, scene=qf.SceneConfig(noise=0.03))) as scanner:
     ...     shot = scanner.grab()
     ...     shape = scanner.decode(shot)
     >>> found = qf.compare(shape, shot.truth)
