@@ -282,4 +282,4 @@ $(STAMPS)/built: $(STAMPS)/tools $(KERNEL)
 	touch $@
 
 clean:
-	rm -rf $(VENV) target out
+	rm -rf $(VENV) target out docs/generated

@@ -20,7 +20,6 @@ extensions = [
     "myst_nb",
     "numpydoc",
     "sphinx.ext.autodoc",
-    "sphinx.ext.autosummary",
     "sphinx_copybutton",
     "sphinx_design",
     "sphinx_gallery.gen_gallery",
@@ -28,14 +27,11 @@ extensions = [
     "mathml",
     "site_pages",
 ]
-exclude_patterns = ["extensions", "gallery", "_static", "_templates", "generated/**/*.ipynb", "generated/**/*.py"]
-templates_path = ["_templates"]
-nitpicky = False
+exclude_patterns = ["extensions", "gallery", "_static", "generated/**/*.ipynb", "generated/**/*.py"]
 smartquotes = False  # two hyphens begin an option
-suppress_warnings = ["config.cache"]
 
 # Pages: Markdown as GitHub reads it, and notebooks as text. Every cell of them runs at every build.
-myst_enable_extensions = ["colon_fence", "deflist", "dollarmath", "substitution"]
+myst_enable_extensions = ["colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 myst_dmath_double_inline = True
 nb_execution_mode = "force"
@@ -46,7 +42,7 @@ nb_execution_show_tb = True
 nb_merge_streams = True
 
 # The reference
-autosummary_generate = True
+autosummary_generate = False
 autodoc_typehints = "signature"
 autodoc_member_order = "bysource"
 maximum_signature_line_length = 88
@@ -73,7 +69,6 @@ sphinx_gallery_conf = {
     "min_reported_time": 3600,
     "write_computation_times": False,
     "notebook_extensions": set(),
-    "plot_gallery": True,
 }
 
 # Names of other projects become links when the inventories may be fetched: QUADFRINGE_INTERSPHINX=1 make docs

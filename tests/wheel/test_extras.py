@@ -12,7 +12,8 @@ from environments import Environment
 
 ROOT = Path(__file__).resolve().parents[2]
 LARGE = ("open3d",)  # 900 MB, which every run cannot afford
-# `test` and `docs` are for this checkout. PyGObject is compiled where it is installed; `make test-camera` does so and uses it.
+# `test` and `docs` are for this checkout. PyGObject is compiled where it is installed; `make test-camera` does so and
+# uses it.
 ELSEWHERE = ("test", "docs", "aravis")
 
 SHAPE = """
