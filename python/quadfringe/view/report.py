@@ -19,14 +19,18 @@ from quadfringe.view.style import DIVERGING, below, lettered, mark_no_data, no_d
 __all__ = ["Graph", "Panel", "draw_panels", "drawn", "write_report"]
 
 LEGEND_LETTERS = 66  # of a line of a legend below a graph
-PANEL_INCHES = (4.3, 3.5)  # width and height of a panel with its labels, colour bar and legend
-IMAGE_INCHES = (2.6, 1.45)  # height of the image in a panel, and width of its labels and colour bar
+PANEL_INCHES = (4.3, 3.1)  # width of a panel with its labels and colour bar, height of a graph without its legend
+IMAGE_INCHES = 2.6  # greatest height of the image in a panel
+AROUND_INCHES = (1.5, 0.95)  # width of the labels and the colour bar around an image; height of title, labels, legend
+TITLE_INCHES = 0.3
+LINE_INCHES = 0.17  # height of a line of a legend
 
 
 class Panel:
     """One picture of a page: an array with title, unit, colour map and range; the default range skips outliers.
 
-    Missing data have a colour that no value has, and are named where there are any.
+    Missing data have a colour that no value has, and are named where there are any. A picture that is no map of pixels
+    is `bare`: it has no axes.
     """
 
     def __init__(
@@ -36,28 +40,35 @@ class Panel:
         unit: str = "",
         colours: str = "viridis",
         limits: tuple[float, float] | None = None,
+        *,
+        bare: bool = False,
     ) -> None:
-        self.title, self.image, self.unit = title, image, unit
+        self.title, self.image, self.unit, self.bare = title, image, unit, bare
         self.colours, self.limits = colours, limits or _limits(image)
 
     @property
-    def width_inches(self) -> float:
-        """Width that the picture needs at the height of a row."""
-        height, width = self.image.shape[:2]
-        return min(PANEL_INCHES[0], IMAGE_INCHES[0] * width / height + IMAGE_INCHES[1])
+    def inches(self) -> tuple[float, float]:
+        """Width and height that the picture needs with all that is around it."""
+        rows, columns = self.image.shape[:2]
+        height = min(IMAGE_INCHES, (PANEL_INCHES[0] - AROUND_INCHES[0]) * rows / columns)
+        return height * columns / rows + AROUND_INCHES[0], height + AROUND_INCHES[1]
 
     def draw(self, figure: Any, axes: Any, title: str | None = None) -> None:
         """Draw the picture with its colour bar; `title` replaces the title, such as by one with a letter."""
         low, high = self.limits
         drawn = axes.imshow(self.image, cmap=self.colours, vmin=low, vmax=high, interpolation="nearest")
         axes.set_title(self.title if title is None else title, parse_math=False)
+        if self.bare:
+            axes.set_axis_off()
+            return
         axes.set(xlabel="column, px", ylabel="row, px")
         for side in ("top", "right"):
             axes.spines[side].set_visible(True)
         if self.image.ndim == 2 and not np.isfinite(self.image).all():
             mark_no_data(figure, axes, no_data_of(self.colours))
         if self.unit:
-            bar = figure.colorbar(drawn, ax=axes, shrink=0.9, pad=0.02, extend=_beyond(self.image, self.limits))
+            place = axes.inset_axes((1.03, 0.0, 0.045, 1.0))  # as high as the image, whatever its shape
+            bar = figure.colorbar(drawn, cax=place, extend=_beyond(self.image, self.limits))
             bar.set_label(self.unit, parse_math=False)
             bar.outline.set_linewidth(0.5)
 
@@ -67,7 +78,8 @@ class Graph:
     """Lines or points, x and y by name, over a common axis; `limit` is a named dashed line.
 
     `spread` adds symmetric error bars to the points of that name; `ticks` name the x positions 0, 1, 2 and so on.
-    `marks` are named vertical lines. The legend stands below the axes, where it hides nothing.
+    `marks` are named vertical lines, `dots` the names that are drawn as points. The legend stands below the axes, where it
+    hides nothing; a line without name is not in it.
     """
 
     title: str
@@ -81,29 +93,34 @@ class Graph:
     ticks: Sequence[str] = ()
     log_x: bool = False
     y_limits: tuple[float, float] | None = None
-    marks: Mapping[str, float] = field(default_factory=dict)
+    dots: Sequence[str] = ()
+    marks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
-    def width_inches(self) -> float:
-        """Width that the graph needs."""
-        return PANEL_INCHES[0]
+    def inches(self) -> tuple[float, float]:
+        """Width and height that the graph needs with its legend."""
+        names = [*self.lines, *([self.limit[0]] if self.limit else []), *self.marks]
+        lines = -(-len(names) // _legend_columns(names))
+        return PANEL_INCHES[0], PANEL_INCHES[1] + LINE_INCHES * lines
 
     def draw(self, figure: Any, axes: Any, title: str | None = None) -> None:
         """Draw the lines with a legend below them; `title` replaces the title, such as by one with a letter."""
         for name, (x, y) in self.lines.items():
-            marker = "." if self.points or len(x) < 50 else None
+            marker = "." if len(x) < 50 else None
             if name in self.spread:
                 axes.errorbar(x, y, yerr=self.spread[name], label=name, fmt="o", capsize=3)
                 continue
-            axes.plot(x, y, label=name, linewidth=0 if self.points else 1.1, marker=marker)
+            bare = self.points or name in self.dots
+            axes.plot(x, y, label=name, linewidth=0 if bare else 1.1, marker="." if bare else marker)
         if self.ticks:
             axes.set_xticks(range(len(self.ticks)), self.ticks)
             axes.set_xlim(-0.5, len(self.ticks) - 0.5)
             axes.axhline(0, color="black", linewidth=0.5)
         if self.limit is not None:
             axes.axhline(self.limit[1], color="black", linestyle="--", linewidth=0.9, label=self.limit[0])
-        for (name, x), dashes in zip(self.marks.items(), ("--", ":", "-.") * len(self.marks), strict=False):
-            axes.axvline(x, color="black", linestyle=dashes, linewidth=0.9, label=name)
+        for (name, places), dashes in zip(self.marks.items(), ("-.", ":") * len(self.marks), strict=False):
+            for i, at in enumerate(places):
+                axes.axvline(at, color="black", linestyle=dashes, linewidth=0.9, label="" if i else name)
         if self.log:
             axes.set_yscale("log")
         if self.log_x:
@@ -119,12 +136,16 @@ class Graph:
 
     def _legend(self, figure: Any, axes: Any) -> None:
         handles, names = axes.get_legend_handles_labels()
-        longest = max((len(name) for name in names), default=0)
-        columns = max(1, min(len(names), LEGEND_LETTERS // (longest + 5)))
+        columns = _legend_columns(names)
         if names:
             axes.legend(
                 handles, names, loc="upper left", bbox_to_anchor=(0.0, 0.0), ncols=columns, **below(figure, axes)
             )
+
+
+def _legend_columns(names: Sequence[str]) -> int:
+    longest = max((len(name) for name in names), default=0)
+    return max(1, min(len(names), LEGEND_LETTERS // (longest + 5)))
 
 
 def _limits(image: NDArray[Any]) -> tuple[float, float]:
@@ -145,11 +166,12 @@ def _beyond(image: NDArray[Any], limits: tuple[float, float]) -> str:
 def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]]) -> None:
     """Write rows of panels and graphs, lettered (a), (b) and so on, to one PNG; needs matplotlib (extra `plot`)."""
     columns = max(len(row) for row in rows)
-    widths = [max(row[j].width_inches for row in rows if j < len(row)) for j in range(columns)]
+    widths = [max(row[j].inches[0] for row in rows if j < len(row)) for j in range(columns)]
+    heights = [max(panel.inches[1] for panel in row) for row in rows]
     with styled():
-        figure = _figure((sum(widths), PANEL_INCHES[1] * len(rows)))
+        figure = _figure((sum(widths), sum(heights) + TITLE_INCHES * (1 + title.count("\n"))))
         figure.suptitle(title, parse_math=False)
-        grid = figure.add_gridspec(len(rows), columns, width_ratios=widths)
+        grid = figure.add_gridspec(len(rows), columns, width_ratios=widths, height_ratios=heights)
         places = [(i, j) for i, row in enumerate(rows) for j in range(len(row))]
         for number, (i, j) in enumerate(places):
             panel = rows[i][j]

@@ -80,7 +80,8 @@ def styled() -> Iterator[None]:
     from cycler import cycler
     from matplotlib import rc_context
 
-    with rc_context(LOOK | {"axes.prop_cycle": cycler(color=CYCLE)}):
+    look: Any = LOOK | {"axes.prop_cycle": cycler(color=CYCLE)}
+    with rc_context(look):
         yield
 
 
