@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from textwrap import fill
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,14 +17,30 @@ from quadfringe.decoding.compare import ShapeComparison
 from quadfringe.files import atomic
 from quadfringe.view.style import DIVERGING, below, lettered, mark_no_data, no_data_of, styled
 
-__all__ = ["Graph", "Panel", "draw_panels", "drawn", "write_report"]
+__all__ = ["Drawable", "Graph", "Panel", "draw_panels", "drawn", "write_report"]
 
-LEGEND_LETTERS = 66  # of a line of a legend below a graph
+LEGEND_LETTERS, HANDLE_LETTERS = 58, 8  # of a line of a legend below a graph, and of the sign before each name
+TITLE_LETTERS = 11  # of a title, for each inch of a panel
 PANEL_INCHES = (4.3, 3.1)  # width of a panel with its labels and colour bar, height of a graph without its legend
 IMAGE_INCHES = 2.6  # greatest height of the image in a panel
 AROUND_INCHES = (1.5, 0.95)  # width of the labels and the colour bar around an image; height of title, labels, legend
 TITLE_INCHES = 0.3
 LINE_INCHES = 0.17  # height of a line of a legend
+
+
+class Drawable(Protocol):
+    """A panel of a page: a title, the width and height in inches that it needs, and how it is drawn."""
+
+    @property
+    def title(self) -> str:
+        """Title, without a letter."""
+
+    @property
+    def inches(self) -> tuple[float, float]:
+        """Width and height with all that is around it."""
+
+    def draw(self, figure: Any, axes: Any, title: str | None = None) -> None:
+        """Draw it; `title` replaces the title, such as by one with a letter."""
 
 
 class Panel:
@@ -57,7 +74,7 @@ class Panel:
         """Draw the picture with its colour bar; `title` replaces the title, such as by one with a letter."""
         low, high = self.limits
         drawn = axes.imshow(self.image, cmap=self.colours, vmin=low, vmax=high, interpolation="nearest")
-        axes.set_title(self.title if title is None else title, parse_math=False)
+        axes.set_title(_wrapped(self.title if title is None else title, self.inches[0]), parse_math=False)
         if self.bare:
             axes.set_axis_off()
             return
@@ -78,8 +95,8 @@ class Graph:
     """Lines or points, x and y by name, over a common axis; `limit` is a named dashed line.
 
     `spread` adds symmetric error bars to the points of that name; `ticks` name the x positions 0, 1, 2 and so on.
-    `marks` are named vertical lines, `dots` the names that are drawn as points. The legend stands below the axes, where it
-    hides nothing; a line without name is not in it.
+    `marks` are named vertical lines, `dots` the names that are drawn as points, `colours` those of lines by name. The
+    legend stands below the axes, where it hides nothing; a line without name is not in it.
     """
 
     title: str
@@ -94,6 +111,7 @@ class Graph:
     log_x: bool = False
     y_limits: tuple[float, float] | None = None
     dots: Sequence[str] = ()
+    colours: Mapping[str, str] = field(default_factory=dict)
     marks: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
     @property
@@ -111,7 +129,14 @@ class Graph:
                 axes.errorbar(x, y, yerr=self.spread[name], label=name, fmt="o", capsize=3)
                 continue
             bare = self.points or name in self.dots
-            axes.plot(x, y, label=name, linewidth=0 if bare else 1.1, marker="." if bare else marker)
+            axes.plot(
+                x,
+                y,
+                label=name,
+                linewidth=0 if bare else 1.1,
+                marker="." if bare else marker,
+                color=self.colours.get(name),
+            )
         if self.ticks:
             axes.set_xticks(range(len(self.ticks)), self.ticks)
             axes.set_xlim(-0.5, len(self.ticks) - 0.5)
@@ -127,7 +152,7 @@ class Graph:
             axes.set_xscale("log")
         if self.y_limits is not None:
             axes.set_ylim(*self.y_limits)
-        axes.set_title(self.title if title is None else title, parse_math=False)
+        axes.set_title(_wrapped(self.title if title is None else title, self.inches[0]), parse_math=False)
         axes.set_xlabel(self.x_label, parse_math=False)
         axes.set_ylabel(self.y_label, parse_math=False)
         axes.grid(color="#e4e4e4", linewidth=0.6)
@@ -143,9 +168,14 @@ class Graph:
             )
 
 
+def _wrapped(title: str, inches: float) -> str:
+    """Break a title into lines that fit the width of its panel."""
+    return "\n".join(fill(line, round(TITLE_LETTERS * inches)) for line in title.split("\n"))
+
+
 def _legend_columns(names: Sequence[str]) -> int:
     longest = max((len(name) for name in names), default=0)
-    return max(1, min(len(names), LEGEND_LETTERS // (longest + 5)))
+    return max(1, min(len(names), LEGEND_LETTERS // (longest + HANDLE_LETTERS)))
 
 
 def _limits(image: NDArray[Any]) -> tuple[float, float]:
@@ -163,7 +193,7 @@ def _beyond(image: NDArray[Any], limits: tuple[float, float]) -> str:
     return {(False, False): "neither", (True, False): "min", (False, True): "max", (True, True): "both"}[low, high]
 
 
-def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]]) -> None:
+def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Drawable]]) -> None:
     """Write rows of panels and graphs, lettered (a), (b) and so on, to one PNG; needs matplotlib (extra `plot`)."""
     columns = max(len(row) for row in rows)
     widths = [max(row[j].inches[0] for row in rows if j < len(row)) for j in range(columns)]
@@ -180,7 +210,7 @@ def draw_panels(path: Path, title: str, rows: Sequence[Sequence[Panel | Graph]])
             figure.savefig(temporary, format="png")
 
 
-def drawn(panel: Panel | Graph, inches: tuple[float, float], dpi: int) -> bytes:
+def drawn(panel: Drawable, inches: tuple[float, float], dpi: int) -> bytes:
     """Give one panel or graph as the bytes of a PNG of this width and height; needs matplotlib (extra `plot`)."""
     with styled():
         figure = _figure(inches)

@@ -34,12 +34,18 @@ def write_all_page(path: Path, outcomes: Sequence[Outcome]) -> None:
         machine=escaped(f"quadfringe {facts['quadfringe']}, Python {facts['python']}, {facts['cores']} cores"),
         spent=f"All experiments took {sum(outcome.spent_s for outcome in outcomes):.0f} s.",
         failures=_failures(outcomes),
-        published=_table([(o, one) for o in outcomes for one in o.records if one.published is not None], named=True),
+        published=_table(_stated(outcomes), named=True),
         contents="".join(_entry(outcome) for outcome in outcomes),
         experiments="".join(_section(outcome) for outcome in outcomes),
     )
     with atomic(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
+
+
+def _stated(outcomes: Sequence[Outcome]) -> list[tuple[Outcome, Figure]]:
+    """Give the figures that the paper states, each once, with its experiment."""
+    rows = {one.name: (outcome, one) for outcome in outcomes for one in outcome.records if one.published is not None}
+    return list(rows.values())
 
 
 def _failures(outcomes: Sequence[Outcome]) -> str:
@@ -66,7 +72,7 @@ def _section(outcome: Outcome) -> str:
         lines.append(f'<p class="note">Made smaller for this page: {escaped(one.smaller_words)}.</p>')
     if outcome.result is None:
         return "".join([*lines, f'<p class="failed">{escaped(outcome.error)}</p></section>'])
-    lines.append(f'<p class="verdict">{escaped(outcome.result.verdict)}.</p>')
+    lines.append(f'<p class="verdict">{escaped(outcome.result.verdict[:1].upper() + outcome.result.verdict[1:])}.</p>')
     lines += [_image(path, one.title) for path in outcome.result.pictures if path.suffix in PICTURES]
     others = [path.name for path in outcome.result.pictures if path.suffix not in PICTURES]
     lines += [f'<p class="note">Next to this page: {escaped(", ".join(others))}</p>'] if others else []
@@ -98,7 +104,7 @@ def _table(rows: Sequence[tuple[Outcome, Figure]], *, named: bool = False) -> st
             "unit": escaped(one.unit),
         }
         lines.append("".join(_cell(word, cells[word]) for word in head))
-    heads = "".join(f'<th{_class(word)}>{word}</th>' for word in head)
+    heads = "".join(f"<th{_class(word)}>{word}</th>" for word in head)
     body = "".join(f"<tr>{line}</tr>" for line in lines)
     return f"<table><thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table>"
 

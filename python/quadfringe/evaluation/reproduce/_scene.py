@@ -90,7 +90,10 @@ def draw(path: Path, title: str, seen: SceneShot, last: Graph, *, painted: bool 
             Panel("depth", depth_mm, "mm", "viridis_r"),
             Panel("shaded surface, turned", solid, bare=True),
             Panel(
-                f"depth error: {found.right.rms:.3f} mm RMS", found.difference, "mm", DIVERGING,
+                f"depth error: {found.right.rms:.3f} mm RMS",
+                found.difference,
+                "mm",
+                DIVERGING,
                 symmetric(np.where(found.wrong_order, np.nan, found.difference)),
             ),
             last,

@@ -70,7 +70,9 @@ def _field_figures(cases: Cases) -> list[Figure]:
         for name, off in cases.off_single.items()
     ]
     infrared = [
-        Figure(f"infrared_{name}_rms_rad", f"{cases.words[name]}: infrared fringes", rms(cases.infrared[name]), "rad RMS")
+        Figure(
+            f"infrared_{name}_rms_rad", f"{cases.words[name]}: infrared fringes", rms(cases.infrared[name]), "rad RMS"
+        )
         for name in CASES
     ]
     return [*wrong, *phase, *infrared]

@@ -34,12 +34,16 @@ def crosstalk(out: Path) -> Reproduction:
 
     Every channel sees 0 to 15 % of the light of every other one. The matrix is calibrated as on a bench, from shots of
     a white board under uniform light, at 15 %. The peaks are decoded by the published method; noise is 1 %. Writes
-    `out`/crosstalk.png. Figures: stray light before and after the calibration, per cent of full scale; greatest error of
-    the matrix; depth RMS in mm and wrong orders in per cent at 15 %.
+    `out`/crosstalk.png. Figures: stray light before and after the calibration, per cent of full scale; greatest error
+    of the matrix; depth RMS in mm and wrong orders in per cent at 15 %.
     """
     found = _calibrated(SHARES[-1])
     shots = [_Peaks(share) for share in SHARES]
-    known = {"plain": np.eye(4), "calibrated": np.array(found.channels.crosstalk), "exact": np.array(_matrix(SHARES[-1]))}
+    known = {
+        "plain": np.eye(4),
+        "calibrated": np.array(found.channels.crosstalk),
+        "exact": np.array(_matrix(SHARES[-1])),
+    }
     last = {way: shots[-1].judged(matrix) for way, matrix in known.items()}
     curves = {
         "plain": [one.judged(np.eye(4)) for one in shots],
@@ -48,14 +52,27 @@ def crosstalk(out: Path) -> Reproduction:
     figures = found.channels.figures
     records = [
         Figure("stray_before_percent", "stray light before", figures["stray_before_percent"], "% of full scale"),
-        Figure("stray_after_percent", "stray light after", figures["stray_after_percent"], "% of full scale", None, 0.0),
-        Figure("matrix_error", "greatest error of the matrix", float(np.abs(known["calibrated"] - known["exact"]).max()), "1"),
-        *(Figure(f"{way}_depth_rms_mm", f"peaks, {WAYS[way]}: depth", one.depth_rms_mm, "mm RMS") for way, one in last.items()),
+        Figure(
+            "stray_after_percent", "stray light after", figures["stray_after_percent"], "% of full scale", None, 0.0
+        ),
+        Figure(
+            "matrix_error",
+            "greatest error of the matrix",
+            float(np.abs(known["calibrated"] - known["exact"]).max()),
+            "1",
+        ),
+        *(
+            Figure(f"{way}_depth_rms_mm", f"peaks, {WAYS[way]}: depth", one.depth_rms_mm, "mm RMS")
+            for way, one in last.items()
+        ),
         *(
             Figure(f"{way}_wrong_order_percent", f"peaks, {WAYS[way]}: wrong orders", one.wrong_order_percent, "%")
             for way, one in last.items()
         ),
-        *(Figure(f"{way}_returned_percent", f"peaks, {WAYS[way]}: returned", one.returned_percent, "%") for way, one in last.items()),
+        *(
+            Figure(f"{way}_returned_percent", f"peaks, {WAYS[way]}: returned", one.returned_percent, "%")
+            for way, one in last.items()
+        ),
     ]
     path = out / "crosstalk.png"
     _draw(path, found, last, curves)

@@ -58,9 +58,9 @@ def depth(out: Path, shrink: int = 1, depths_mm: Sequence[float] = DEPTHS_MM) ->
         curves = {way: np.array([_measured(pair, way, z, alone[z]) for z in depths_mm]) for way in WAYS}
         for way, found in curves.items():
             records += _records(f"{way}_{translation_mm:g}mm", f"{WORDS[way]}, {translation_mm:g} mm", found)
-        graphs.append(_graphs(f"1 degree and {translation_mm:g} mm on every axis", depths, curves))
+        graphs.append(_graphs(f"{translation_mm:g} mm apart", depths, curves))
     path = out / "depth.png"
-    draw_panels(path, "a deviated pair: error against depth", graphs)
+    draw_panels(path, "a pair 1 degree and 0.5 or 5 mm apart on every axis: error against depth", graphs)
     known = {one.name: one.value for one in records}
     drift = " and ".join(f"{known[f'corrected_{t:g}mm_infrared_rms_rad']:.3g} rad at {t:g} mm" for t in TRANSLATIONS_MM)
     kept = max(known[f"searched_{t:g}mm_infrared_rms_rad"] for t in TRANSLATIONS_MM)
@@ -109,9 +109,9 @@ def _measured(pair: ProjectorPair, way: str, z_mm: float, alone: Map) -> _Errors
 
 def _graphs(title: str, depths: NDArray[np.float64], curves: dict[str, NDArray[np.float64]]) -> list[Graph]:
     quantities = (
-        ("infrared fringes against expectation", "rad RMS at 36 fringes", True),
-        ("unwrapped phase against one projector", "rad RMS", True),
-        ("wrong orders", "%", False),
+        ("infrared fringes, error", "rad RMS at 36 fringes", True),
+        ("unwrapped phase, error", "rad RMS", True),
+        ("wrong orders", "% of the pixels", False),
     )
     return [
         Graph(

@@ -58,7 +58,10 @@ def geometry(out: Path) -> Reproduction:
     peaks = heights(seen)
     off = {way: peaks[way] - bench.peaks_mm for way in WAYS}
     records = [
-        *(Figure(f"planes_{way}_rms_mm", f"planes between, {WAYS[way]}", rms(e), "mm RMS") for way, e in errors.items()),
+        *(
+            Figure(f"planes_{way}_rms_mm", f"planes between, {WAYS[way]}", rms(e), "mm RMS")
+            for way, e in errors.items()
+        ),
         *(Figure(f"peaks_{way}_rms_mm", f"peaks, {WAYS[way]}", rms(e), "mm RMS") for way, e in off.items()),
     ]
     for first, second in (("closed_form", "triangulation"), ("polynomial", "triangulation")):

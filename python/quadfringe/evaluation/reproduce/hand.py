@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import cv2
@@ -44,13 +45,18 @@ def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> R
 def _figures(film: HandFilm) -> list[Figure]:
     made = film.made
     figures = [
-        Figure("hand_over_gige_vision", "frames came over GigE Vision (1) or from a file (0)", float(film.over_wire), "1"),
+        Figure(
+            "hand_over_gige_vision", "frames came over GigE Vision (1) or from a file (0)", float(film.over_wire), "1"
+        ),
         Figure("hand_shots", "shots", float(made.shots), "shots"),
         Figure("hand_shapes", "shapes", float(made.shapes), "shots"),
         Figure("hand_lost", "exposures lost", float(made.lost), "shots", expected=0.0),
         Figure(
-            "hand_shots_with_wrong_pixels", "shots with a pixel changed on the way",
-            float(made.shapes - len(made.depth_rms_mm)), "shots", expected=0.0,
+            "hand_shots_with_wrong_pixels",
+            "shots with a pixel changed on the way",
+            float(made.shapes - len(made.depth_rms_mm)),
+            "shots",
+            expected=0.0,
         ),
     ]
     if made.depth_rms_mm:
@@ -73,13 +79,13 @@ def _frames(movie: Path) -> list[Picture]:
 
 
 def _draw(path: Path, film: HandFilm, frames: list[Picture]) -> None:
-    chosen = np.unique(np.linspace(0, len(frames) - 1, STILLS).round().astype(int)) if frames else []
+    chosen = sorted({round(i) for i in np.linspace(0, len(frames) - 1, min(STILLS, len(frames))).tolist()})
     stills = [Panel(f"{i / RATE_HZ:.1f} s: camera, shape", frames[i], bare=True) for i in chosen]
     times_s = np.arange(len(film.made.depth_rms_mm)) / RATE_HZ
     depth = {"": (times_s, np.array(film.made.depth_rms_mm))}
     wrong = {"": (times_s, np.array(film.made.wrong_order_percent))}
-    rows: list[list[Panel | Graph]] = [
-        *(list(stills[i : i + 2]) for i in range(0, len(stills), 2)),
+    rows: list[Sequence[Panel | Graph]] = [
+        *(stills[i : i + 2] for i in range(0, len(stills), 2)),
         [
             Graph("depth error of every shot", "time, s", "mm RMS", depth),
             Graph("wrong fringe orders of every shot", "time, s", "%", wrong),
@@ -95,6 +101,11 @@ def _animate(path: Path, frames: list[Picture]) -> None:
     if small:
         with atomic(path) as temporary:
             small[0].save(
-                temporary, format="webp", save_all=True, append_images=small[1:], duration=round(1e3 / RATE_HZ), loop=0,
+                temporary,
+                format="webp",
+                save_all=True,
+                append_images=small[1:],
+                duration=round(1e3 / RATE_HZ),
+                loop=0,
                 quality=60,
             )

@@ -38,7 +38,9 @@ def identity(out: Path) -> Reproduction:
     projected, captured = identity_shot()
     apart = {name: captured[name] - projected[name] for name in CHANNELS}
     worst = max(float(np.abs(one).max()) for one in apart.values())
-    record = Figure("identity_max_difference", "captured less projected image, greatest", worst, "share", 0.0, 0.5 / FULL)
+    record = Figure(
+        "identity_max_difference", "captured less projected image, greatest", worst, "share", 0.0, 0.5 / FULL
+    )
     path = out / "identity.png"
     _draw(path, projected, captured, apart)
     exact = worst <= 0.51 / FULL

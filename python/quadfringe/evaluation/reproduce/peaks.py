@@ -135,7 +135,10 @@ def _draw(path: Path, shot: Shot, truth_rad: Map, errors: Mapping[str, Map]) -> 
     maps = [Panel(WORDS[n], truth_rad + e, "rad", "turbo", limits) for n, e in errors.items()]
     misses = [
         Panel(
-            f"{WORDS[n]}: error{', finer scale' if n == 'proposed' else ''}", e, "rad", DIVERGING,
+            f"{WORDS[n]}: error{', finer scale' if n == 'proposed' else ''}",
+            e,
+            "rad",
+            DIVERGING,
             fine if n == "proposed" else common,
         )
         for n, e in errors.items()

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadfringe.calibration.bundle import RigCalibration
 from quadfringe.calibration.projector import StepPlan
@@ -33,18 +32,23 @@ __all__ = ["projector_calibration"]
 
 POSES, STEPS = 9, 8  # nine poses, as published
 # Each fit in words, with its published mean reprojection error, px.
-FITS = (("camera", "camera", None), ("visible", "visible projector", 0.2690), ("infrared", "infrared projector", 0.2210))
+FITS = (
+    ("camera", "camera", None),
+    ("visible", "visible projector", 0.2690),
+    ("infrared", "infrared projector", 0.2210),
+)
 ENDS_MM = (700.0, 900.0)  # ends of the depth range
 
 
 def projector_calibration(out: Path, shrink: int = 1, poses: int = POSES, steps: int = STEPS) -> Reproduction:
     """Calibrate a deviated pair from a ring board in nine poses; then use the result to correct and to search.
 
-    The bench has all defects of a real one; its camera has 1/`shrink` of the pixels in each direction. Writes `out`/projector-calibration.png. The figures are: the mean reprojection
-    errors in px (published: 0.2690 and 0.2210); the six parameters of the pair by the names of
-    `quadfringe.calibration.projector_pair.AXES`, each with its error and the half width of its joint 95 % interval; the
-    RMS error of the infrared fringes in rad at 36 fringes and the share of wrong orders in per cent, both after the
-    correction on the reference plane and by the search along the ray at both ends of the depth range.
+    The bench has all defects of a real one; its camera has 1/`shrink` of the pixels in each direction. Writes
+    `out`/projector-calibration.png. The figures are: the mean reprojection errors in px (published: 0.2690 and 0.2210);
+    the six parameters of the pair by the names of `quadfringe.calibration.projector_pair.AXES`, each with its error and
+    the half width of its joint 95 % interval; the RMS error of the infrared fringes in rad at 36 fringes and the share
+    of wrong orders in per cent, both after the correction on the reference plane and by the search along the ray at
+    both ends of the depth range.
     """
     pair = real_pair(shrink=shrink)
     scene = SceneConfig(seed=SEED, **pair.light)
@@ -68,11 +72,7 @@ def projector_calibration(out: Path, shrink: int = 1, poses: int = POSES, steps:
     off, used = _pair_figures(found, pair), _use_figures(pair, known)
     path = out / "projector-calibration.png"
     _draw(path, found, {one.name: one.value for one in off})
-    outside = [
-        one.name
-        for one, reach in zip(off[1::3], off[2::3], strict=True)
-        if abs(one.value) > reach.value
-    ]
+    outside = [one.name for one, reach in zip(off[1::3], off[2::3], strict=True) if abs(one.value) > reach.value]
     truth = "the true pose of the pair lies inside the stated interval"
     verdict = f"{truth}" if not outside else f"outside their stated interval: {', '.join(outside)}"
     return Reproduction((*means, *off, *used), (path,), verdict)
@@ -101,12 +101,16 @@ def _use_figures(pair: ProjectorPair, known: Calibration) -> list[Figure]:
     corrected = expose(pair, known=known, predeformed=True)
     figures = [
         Figure(
-            "corrected_infrared_rms_rad", "pre-deformed by it: infrared fringes", rms(infrared_error_rad(corrected)),
+            "corrected_infrared_rms_rad",
+            "pre-deformed by it: infrared fringes",
+            rms(infrared_error_rad(corrected)),
             "rad RMS",
         ),
         Figure(
-            "corrected_wrong_order_percent", "pre-deformed by it: wrong orders",
-            wrong_percent(decoded(corrected), corrected.phase_rad), "%",
+            "corrected_wrong_order_percent",
+            "pre-deformed by it: wrong orders",
+            wrong_percent(decoded(corrected), corrected.phase_rad),
+            "%",
         ),
     ]
     for z_mm in ENDS_MM:
@@ -122,10 +126,10 @@ def _use_figures(pair: ProjectorPair, known: Calibration) -> list[Figure]:
 def _draw(path: Path, found: RigCalibration, figures: Mapping[str, float]) -> None:
     def residuals(name: str, words: str) -> Graph:
         fit = getattr(found, name)
-        poses: dict[str, tuple[NDArray[np.float64], NDArray[np.float64]]] = {
-            f"pose {i + 1}": (r[:, 0], r[:, 1]) for i, r in enumerate(fit.residuals_px)
-        }
-        return Graph(f"{words}: {fit.mean_px:.4f} px mean", "residual of x, px", "residual of y, px", poses, points=True)
+        missed = np.concatenate(fit.residuals_px)
+        lines = {"": (missed[:, 0], missed[:, 1])}
+        title = f"{words}: {fit.mean_px:.4f} px mean"
+        return Graph(title, "residual of x, px", "residual of y, px", lines, points=True)
 
     kinds = {"rotation, deg": AXES[:3], "translation, mm": AXES[3:]}
     errors = []
@@ -135,6 +139,16 @@ def _draw(path: Path, found: RigCalibration, figures: Mapping[str, float]) -> No
         reach = np.array([figures[f"{axis}_interval"] for axis in axes])
         name = "error, joint 95 % interval"
         lines, unit = {name: (x, error)}, words.rsplit(" ", 1)[1]
-        errors.append(Graph(f"pair: error of {words}", "axis", unit, lines, points=True, spread={name: reach}, ticks=axes))
+        errors.append(
+            Graph(
+                f"pair: error of {words}",
+                "axis",
+                unit,
+                lines,
+                points=True,
+                spread={name: reach},
+                ticks=[axis[:2] for axis in axes],
+            )
+        )
     row = [residuals("visible", "visible projector"), residuals("infrared", "infrared projector"), *errors]
     draw_panels(path, "both projectors calibrated: residuals and the pair", [row[:2], row[2:]])

@@ -51,23 +51,23 @@ WAYS = {
 def slope_range(out: Path) -> Reproduction:
     """Measure the slope at which the traditional and the improved filter fail, on a ramp of growing slope.
 
-    The ramp is a parabola along the rows, whose slope reaches 0.97 L0 / d at both ends, under a projector with
-    gamma 2.2, without noise. The traditional filter gets the light as captured, the improved one the linear light. A
-    filter fails at the least slope, up or down, at which its phase error has more than pi / 30 RMS over a fringe. Writes
-    `out`/range.png. Figures: the limits as shares of L0 / d, their ratio, and the limit of the traditional filter when it
-    gets linear light, where the width of its band is what fails.
+    The ramp is a parabola along the rows, whose slope reaches 0.97 L0 / d at both ends, under a projector with gamma
+    2.2, without noise. The traditional filter gets the light as captured, the improved one the linear light. A filter
+    fails at the least slope, up or down, at which its phase error has more than pi / 30 RMS over a fringe. Writes
+    `out`/range.png. Figures: the limits as shares of L0 / d, their ratio, and the limit of the traditional filter when
+    it gets linear light, where the width of its band is what fails.
     """
     ramp = _ramp()
     errors = {way: _error(ramp, way) for way in WAYS}
     limits = {way: _limit(ramp.slope, error, ramp.period_px) for way, error in errors.items()}
     factor = limits["improved"] / limits["traditional"]
     records = (
-        Figure("range_traditional", "traditional filter: limit of |dh/dx|", limits["traditional"], "L0/d", 1 / 3, 1 / 3),
+        Figure(
+            "range_traditional", "traditional filter: limit of |dh/dx|", limits["traditional"], "L0/d", 1 / 3, 1 / 3
+        ),
         Figure("range_improved", "improved filter: limit of |dh/dx|", limits["improved"], "L0/d", 1.0, 1.0),
         Figure("range_factor", "improved over traditional", factor, "times", 3.0, 3.0),
-        Figure(
-            "range_traditional_linear", "traditional filter on linear light", limits["traditional_linear"], "L0/d"
-        ),
+        Figure("range_traditional_linear", "traditional filter on linear light", limits["traditional_linear"], "L0/d"),
     )
     path = out / "range.png"
     _draw(path, ramp, errors, limits)
@@ -125,9 +125,7 @@ def _bench() -> _core.Bench:
     camera = _core.Device(WIDTH_PX, HEIGHT_PX, (focal_px, focal_px), middle_px)
     wider_px = focal_px / 1.15
     aside_px = (middle_px[0] - wider_px * BASELINE_MM / DISTANCE_MM, (1140 - 1) / 2)
-    projector = _core.Device(
-        WIDTH_PX, 1140, (wider_px, wider_px), aside_px, translation_mm=(BASELINE_MM, 0.0, 0.0)
-    )
+    projector = _core.Device(WIDTH_PX, 1140, (wider_px, wider_px), aside_px, translation_mm=(BASELINE_MM, 0.0, 0.0))
     return _core.Bench(camera=camera, visible=projector, infrared=projector)
 
 

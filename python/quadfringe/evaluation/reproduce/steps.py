@@ -20,9 +20,9 @@ __all__ = ["steps"]
 def steps(out: Path, camera: Device | None = None) -> Reproduction:
     """Measure steps of 5 to 50 mm in one shot of the virtual bench, 3 % noise, 8 bit.
 
-    `camera` replaces the camera of the published bench. Writes `out`/steps.png. Figures, for the published and the joint
-    method: depth RMS in mm over the right orders away from edges, wrong orders and returned pixels in per cent, and the
-    greatest error of the height of a step in mm.
+    `camera` replaces the camera of the published bench. Writes `out`/steps.png. Figures, for the published and the
+    joint method: depth RMS in mm over the right orders away from edges, wrong orders and returned pixels in per cent,
+    and the greatest error of the height of a step in mm.
     """
     seen = measured("steps", camera)
     found = {m: measure_steps(xyz_mm_of(seen.shapes[m]), STEP_HEIGHTS_MM) for m in METHODS}

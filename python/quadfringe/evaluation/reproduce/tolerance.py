@@ -24,8 +24,8 @@ def tolerance(out: Path, shrink: int = 4) -> Reproduction:
     """Find the largest deviation of each of the six parameters for which every order of a plane is still right.
 
     Every `shrink`-th camera pixel is checked. Writes `out`/tolerance.png: the share of wrong orders against each
-    deviation. The figures have the names of `quadfringe.calibration.projector_pair.AXES`, in deg and mm; one that equals
-    its entry in `LIMITS`, where the search ends, is marked `at_least`: this parameter does no harm within the field.
+    deviation. The figures have the names of `quadfringe.calibration.projector_pair.AXES`, in deg and mm; one that
+    equals its entry in `LIMITS`, where the search ends, is marked `at_least`: it does no harm within the field.
     """
     found = tolerances(shrink)
     records = tuple(
