@@ -74,7 +74,7 @@ class Panel:
         """Draw the picture with its colour bar; `title` replaces the title, such as by one with a letter."""
         low, high = self.limits
         drawn = axes.imshow(self.image, cmap=self.colours, vmin=low, vmax=high, interpolation="nearest")
-        axes.set_title(_wrapped(self.title if title is None else title, self.inches[0]), parse_math=False)
+        axes.set_title(_wrapped(self.title if title is None else title, self.inches[0]), loc="left", parse_math=False)
         if self.bare:
             axes.set_axis_off()
             return
@@ -152,7 +152,7 @@ class Graph:
             axes.set_xscale("log")
         if self.y_limits is not None:
             axes.set_ylim(*self.y_limits)
-        axes.set_title(_wrapped(self.title if title is None else title, self.inches[0]), parse_math=False)
+        axes.set_title(_wrapped(self.title if title is None else title, self.inches[0]), loc="left", parse_math=False)
         axes.set_xlabel(self.x_label, parse_math=False)
         axes.set_ylabel(self.y_label, parse_math=False)
         axes.grid(color="#e4e4e4", linewidth=0.6)

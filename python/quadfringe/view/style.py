@@ -51,7 +51,6 @@ LOOK: dict[str, Any] = {
     "font.sans-serif": ["Liberation Sans", "Arial", "Helvetica", "DejaVu Sans"],
     "font.size": 9.0,
     "axes.titlesize": 9.5,
-    "axes.titlelocation": "left",
     "axes.labelsize": 9.0,
     "axes.linewidth": 0.7,
     "axes.spines.top": False,

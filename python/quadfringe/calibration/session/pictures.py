@@ -126,7 +126,7 @@ class _Arrows:
 def _over_the_image(axes: Any, shape: tuple[int, ...], title: str) -> None:
     height, width = shape
     axes.set(xlabel="column, px", ylabel="row, px", xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
-    axes.set_title(title, parse_math=False)
+    axes.set_title(title, loc="left", parse_math=False)
     axes.set_aspect("equal")
     for side in ("top", "right"):
         axes.spines[side].set_visible(True)

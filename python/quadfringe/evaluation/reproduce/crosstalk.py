@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -29,20 +30,21 @@ CAMERA = Device(width_px=512, height_px=384, focal_px=(1290.32, 1290.32), centre
 WAYS = {"plain": "not corrected", "calibrated": "calibrated and undone", "exact": "undone exactly"}
 
 
-def crosstalk(out: Path) -> Reproduction:
+def crosstalk(out: Path, shares: Sequence[float] = SHARES, camera: Device = CAMERA) -> Reproduction:
     """Decode the peaks surface under growing crosstalk between all four channels, before and after it is undone.
 
-    Every channel sees 0 to 15 % of the light of every other one. The matrix is calibrated as on a bench, from shots of
-    a white board under uniform light, at 15 %. The peaks are decoded by the published method; noise is 1 %. Writes
-    `out`/crosstalk.png. Figures: stray light before and after the calibration, per cent of full scale; greatest error
-    of the matrix; depth RMS in mm and wrong orders in per cent at 15 %.
+    Every channel sees these `shares` of the light of every other one, by default 0 to 15 %. The matrix is
+    calibrated as on a bench, from shots of a white board under uniform light, at 15 %. The peaks are decoded by the
+    published method; noise is 1 %. Writes `out`/crosstalk.png. Figures: stray light before and after the
+    calibration, per cent of full scale; greatest error of the matrix; depth RMS in mm and wrong orders in per cent
+    at 15 %.
     """
-    found = _calibrated(SHARES[-1])
-    shots = [_Peaks(share) for share in SHARES]
+    found = _calibrated(shares[-1], camera)
+    shots = [_Peaks(share, camera) for share in shares]
     known = {
         "plain": np.eye(4),
         "calibrated": np.array(found.channels.crosstalk),
-        "exact": np.array(_matrix(SHARES[-1])),
+        "exact": np.array(_matrix(shares[-1])),
     }
     last = {way: shots[-1].judged(matrix) for way, matrix in known.items()}
     curves = {
@@ -75,10 +77,10 @@ def crosstalk(out: Path) -> Reproduction:
         ),
     ]
     path = out / "crosstalk.png"
-    _draw(path, found, last, curves)
+    _draw(path, found, last, curves, shares)
     before, after = last["plain"].depth_rms_mm, last["calibrated"].depth_rms_mm
     word = "takes" if after < before else "makes it WORSE: it takes"
-    verdict = f"undoing 15 % of crosstalk {word} the depth error from {before:.3g} to {after:.3g} mm RMS"
+    verdict = f"undoing {shares[-1]:.0%} of crosstalk {word} the depth error from {before:.3g} to {after:.3g} mm RMS"
     return Reproduction(tuple(records), (path,), verdict)
 
 
@@ -98,9 +100,9 @@ class _Calibrated(NamedTuple):
     levels: Array
 
 
-def _calibrated(share: float) -> _Calibrated:
+def _calibrated(share: float, camera: Device) -> _Calibrated:
     scene = SceneConfig.model_validate(_light(share) | {"surface": "peaks"})
-    captures = VirtualCaptures(SystemConfig(scene=scene, camera=CAMERA))
+    captures = VirtualCaptures(SystemConfig(scene=scene, camera=camera))
     dark = dark_level([captures.shot("dark", name) for name in captures.session.captures("dark")]).level
     plan = captures.session.level_plan
     seen = np.array([mean_levels(captures.shot("levels", name)) for name in plan.names])
@@ -119,9 +121,9 @@ class _Judged(NamedTuple):
 class _Peaks:
     """A shot of the peaks under a share of crosstalk."""
 
-    def __init__(self, share: float) -> None:
+    def __init__(self, share: float, camera: Device) -> None:
         self.share = share
-        config = SystemConfig(scene=SceneConfig.model_validate(_light(share) | {"surface": "peaks"}), camera=CAMERA)
+        config = SystemConfig(scene=SceneConfig.model_validate(_light(share) | {"surface": "peaks"}), camera=camera)
         bench = VirtualBench(config)
         bench.project(config.fringes)
         self._exact = bench.calibration()
@@ -140,8 +142,10 @@ class _Peaks:
         return _Judged(found.overall.rms, found.wrong_order_percent, found.returned_percent, found.difference_mm)
 
 
-def _draw(path: Path, found: _Calibrated, last: dict[str, _Judged], curves: dict[str, list[_Judged]]) -> None:
-    percent = 100 * np.array(SHARES)
+def _draw(
+    path: Path, found: _Calibrated, last: dict[str, _Judged], curves: dict[str, list[_Judged]], shares: Sequence[float]
+) -> None:
+    percent = 100 * np.array(shares)
     level = np.repeat(100 * found.levels.max(axis=1), found.levels.shape[1])
     stray = {"before": found.channels.stray_before, "after": found.channels.stray_after}
     points = {

@@ -23,6 +23,7 @@ Map = NDArray[np.float32]
 WIDTH_PX, HEIGHT_PX = 640, 480
 DISTANCE_MM, BASELINE_MM = 800.0, 300.0  # L0 and d
 FIELD_MM = 220.0  # width of the field of view
+FIELD_LIT_MM = 300.0  # width that the projector lights on the plane normal to its axis
 NOISE, SEED = 0.01, 5
 PLANES_MM = (-40.0, -20.0, 0.0, 20.0, 40.0)  # heights that the polynomials are fitted to
 BETWEEN_MM = (-30.0, -10.0, 10.0, 30.0)  # heights that they have not seen
@@ -32,16 +33,16 @@ WAYS = {"closed_form": "closed form (S5)", "polynomial": "polynomial (S6)", "tri
 Heights = dict[str, Map]
 
 
-def geometry(out: Path) -> Reproduction:
+def geometry(out: Path, shrink: int = 1) -> Reproduction:
     """Measure planes and the peaks surface by the closed form, by polynomials and by triangulation, on the same shots.
 
-    The bench meets the conditions of the closed form: the camera looks straight down from L0 = 800 mm, the projector of
-    the same height stands d = 300 mm to its side, and their axes cross on the reference plane. The polynomials of
-    degree 3 are fitted to five planes and judged between them; noise is 1 %. Writes `out`/geometry.png. Figures: RMS
-    error of the height in mm against the truth, of each way on the planes and on the peaks, and how far each pair of
-    ways differs there.
+    The bench meets the conditions of the closed form: the camera looks straight down from L0 = 800 mm, the
+    projector of the same height stands d = 300 mm to its side, and their axes cross on the reference plane. The
+    polynomials of degree 3 are fitted to five planes and judged between them; noise is 1 %. The camera has
+    1/`shrink` of the pixels in each direction. Writes `out`/geometry.png. Figures: RMS error of the height in mm
+    against the truth, of each way on the planes and on the peaks, and how far each pair of ways differs there.
     """
-    bench = _Bench()
+    bench = _Bench(shrink)
     polynomial = fit_heights(PLANES_MM, [bench.plane(h).phase_rad for h in PLANES_MM], DEGREE)
     reference_rad = bench.plane(0.0).phase_rad
 
@@ -92,15 +93,13 @@ def crossed_axes_mm(difference_rad: Map, x_mm: Map) -> Map:
     return np.where(difference_rad == 0, 0.0, height).astype(np.float32)
 
 
-FIELD_LIT_MM = 300.0  # width that the projector lights on the plane normal to its axis
-
-
 class _Bench:
     """The bench of the closed form, and shots on it."""
 
-    def __init__(self) -> None:
-        focal_px = WIDTH_PX / FIELD_MM * DISTANCE_MM
-        self.camera = _device(WIDTH_PX, HEIGHT_PX, focal_px)
+    def __init__(self, shrink: int) -> None:
+        width_px, height_px = WIDTH_PX // shrink, HEIGHT_PX // shrink
+        focal_px = width_px / FIELD_MM * DISTANCE_MM
+        self.camera = _device(width_px, height_px, focal_px)
         angle = np.arctan2(BASELINE_MM, DISTANCE_MM)
         sine, cosine = float(np.sin(angle)), float(np.cos(angle))
         along_mm = DISTANCE_MM / cosine
@@ -116,8 +115,8 @@ class _Bench:
         known = Calibration(camera=self.camera, projector=self.projector)
         self._plan = Plan(912, Fringes(), known)
         self._decoder: Decoder | None = None
-        columns = np.arange(WIDTH_PX, dtype=np.float32) - np.float32((WIDTH_PX - 1) / 2)
-        self.x_mm = np.broadcast_to(columns * np.float32(DISTANCE_MM / focal_px), (HEIGHT_PX, WIDTH_PX))
+        columns = np.arange(width_px, dtype=np.float32) - np.float32((width_px - 1) / 2)
+        self.x_mm = np.broadcast_to(columns * np.float32(DISTANCE_MM / focal_px), (height_px, width_px))
 
     def plane(self, height_mm: float) -> Shape:
         """Measure a plane at a height over the reference plane."""
@@ -146,8 +145,8 @@ def _draw(path: Path, peaks: Heights, off: Heights, errors: Heights) -> None:
     common_mm = symmetric(*off.values())
     heights = np.array(BETWEEN_MM)
     lines = {WAYS[way]: (heights, np.array([rms(one) for one in e])) for way, e in errors.items()}
-    row = HEIGHT_PX // 2
-    along = {WAYS[way]: (np.arange(WIDTH_PX), e[row]) for way, e in off.items()}
+    row, columns = (length // n for length, n in zip(off["polynomial"].shape, (2, 1), strict=True))
+    along = {WAYS[way]: (np.arange(columns), e[row]) for way, e in off.items()}
     rows: list[list[Panel | Graph]] = [
         [Panel(f"peaks: {WAYS[way]}", image, "height, mm", "viridis", shown_mm) for way, image in peaks.items()],
         [Panel(f"error: {rms(e):.3f} mm RMS", e, "mm", DIVERGING, common_mm) for e in off.values()],

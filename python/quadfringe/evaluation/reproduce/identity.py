@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from quadfringe.evaluation.reproduction import Figure, Reproduction
 from quadfringe.view.report import Graph, Panel, draw_panels
 from quadfringe.view.style import DIVERGING
 
-__all__ = ["Seen", "identity", "identity_shot"]
+__all__ = ["IdentityShot", "identity", "identity_shot"]
 
 Map = NDArray[np.float64]
 WIDTH_PX, HEIGHT_PX = 1024, 768
@@ -24,8 +25,11 @@ WORDS = {"red": "red", "green": "green", "blue": "blue", "ir": "infrared"}
 SHOWN_PX = 90  # columns of the profile
 
 
-class Seen(dict[str, Map]):
-    """Images (H, W) by channel, share of full scale."""
+class IdentityShot(NamedTuple):
+    """The projected and the captured images (H, W) by channel, share of full scale."""
+
+    projected: dict[str, Map]
+    captured: dict[str, Map]
 
 
 def identity(out: Path) -> Reproduction:
@@ -35,32 +39,33 @@ def identity(out: Path) -> Reproduction:
     the 36 fringes come back exactly; the camera rounds to 16 bit, so half a step, 7.6e-6 of full scale, is allowed.
     Writes `out`/identity.png. The figure is the greatest difference, share of full scale.
     """
-    projected, captured = identity_shot()
-    apart = {name: captured[name] - projected[name] for name in CHANNELS}
+    seen = identity_shot()
+    apart = {name: seen.captured[name] - seen.projected[name] for name in CHANNELS}
     worst = max(float(np.abs(one).max()) for one in apart.values())
     record = Figure(
         "identity_max_difference", "captured less projected image, greatest", worst, "share", 0.0, 0.5 / FULL
     )
     path = out / "identity.png"
-    _draw(path, projected, captured, apart)
+    _draw(path, seen, apart)
     exact = worst <= 0.51 / FULL
     verdict = "what is captured is what was projected, but for the rounding of the camera"
     return Reproduction((record,), (path,), verdict if exact else "the captured images differ from the projected ones")
 
 
-def identity_shot() -> tuple[Seen, Seen]:
+def identity_shot() -> IdentityShot:
     """Return the projected and the captured images of the identity."""
     centre_px = ((WIDTH_PX - 1) / 2, (HEIGHT_PX - 1) / 2)
     device = _core.Device(WIDTH_PX, HEIGHT_PX, (FOCAL_PX, FOCAL_PX), centre_px)
     bench = _core.Bench(camera=device, visible=device, infrared=device)
     numbers = Fringes().numbers
     images = bench.render(bench.cast("plane"), numbers, bit_depth=16, albedo=(1.0,) * 4, ambient=(0.0,) * 4)
-    captured = Seen({name: images[name] / FULL for name in CHANNELS})
+    captured = {name: images[name] / FULL for name in CHANNELS}
     projected = {name: _core.pattern(key, numbers, WIDTH_PX, HEIGHT_PX) for name, key in CHANNELS.items()}
-    return Seen({name: image.astype(np.float64) for name, image in projected.items()}), captured
+    return IdentityShot({name: image.astype(np.float64) for name, image in projected.items()}, captured)
 
 
-def _draw(path: Path, projected: Seen, captured: Seen, apart: dict[str, Map]) -> None:
+def _draw(path: Path, seen: IdentityShot, apart: dict[str, Map]) -> None:
+    projected, captured = seen
     limits = (0.0, 1.0)
     x = np.arange(SHOWN_PX)
     row = HEIGHT_PX // 2
