@@ -14,6 +14,7 @@ from typer.testing import CliRunner, Result
 
 from quadfringe.calibration.session import FolderCaptures, Guided, Session, guide, take_captures
 from quadfringe.calibration.session.exposures import exposed
+from quadfringe.calibration.session.outcome import record, worse
 from quadfringe.calibration.session.pictures import write_pictures
 from quadfringe.calibration.session.virtual import VirtualCaptures
 from quadfringe.cli import app
@@ -106,6 +107,25 @@ def test_the_pictures_are_drawn(guided: Guided, tmp_path: Path) -> None:
     assert all(path.stat().st_size > 10_000 for path in written)
 
 
+def test_the_covered_share_is_that_of_the_outlines(guided: Guided) -> None:
+    poses = guided.outcome("poses")
+    assert poses is not None
+    seen = poses.details["seen"]
+    assert poses.step.figures["covered_percent"] == pytest.approx(100 * seen.mean(), rel=1e-5)
+    points = np.round(np.concatenate([pose.view.points_px for pose in poses.details["observed"]])).astype(int)
+    assert seen[points[:, 1], points[:, 0]].all()
+    inside = np.s_[points[:, 1].min() : points[:, 1].max() + 1, points[:, 0].min() : points[:, 0].max() + 1]
+    assert seen.sum() == seen[inside].sum() < seen.size  # the borders, where no point was, do not count
+
+
+def test_a_verdict_says_when_a_correction_made_things_worse() -> None:
+    assert worse("crosstalk", before=0.3, after=0.2) == []
+    remarks = worse("crosstalk", before=0.2, after=0.3)
+    step = record("levels", (), {}, [], "crosstalk 0.20 % before, 0.30 % after", remarks=remarks)
+    assert step.good
+    assert step.verdict.startswith("crosstalk 0.20 % before, 0.30 % after; crosstalk is worse after the correction")
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Dark shots and levels of the bench as files, and no more."""
@@ -153,6 +173,21 @@ def test_what_is_missing_is_said_and_nothing_written(folder: Path, tmp_path: Pat
     assert listed.exit_code == 1
     assert "levels: 23 of 23" in listed.stdout.replace("  ", " ")
     assert str(folder / "poses" / "01") in listed.stdout
+
+
+def test_steps_have_their_pictures_also_when_a_later_one_fails(folder: Path, tmp_path: Path) -> None:
+    options = ("--out", tmp_path / "c.json", "--pictures", tmp_path / "pictures")
+    assert run("run", "--captures", folder, *options).exit_code == 1  # poses are missing
+    assert [path.name for path in (tmp_path / "pictures").iterdir()] == ["levels.png"]
+    shutil.rmtree(tmp_path / "pictures")
+    broken = tmp_path / "broken"
+    shutil.copytree(folder, broken)
+    for name in SESSION.captures("flat"):
+        shutil.copytree(folder / "dark" / "01", broken / "flat" / name)
+    write_image(broken / "flat" / "02" / "red.png", np.zeros((10, 12), np.uint16))
+    failed = run("run", "--captures", broken, *options)
+    assert (failed.exit_code, "got red 12 x 10" in failed.stderr) == (2, True), failed.output
+    assert [path.name for path in (tmp_path / "pictures").iterdir()] == ["levels.png"]
 
 
 def test_folders_at_fault_are_explained(folder: Path, tmp_path: Path) -> None:

@@ -51,8 +51,19 @@ def crosstalk(out: Path, shares: Sequence[float] = SHARES, camera: Device = CAME
         "plain": [one.judged(np.eye(4)) for one in shots],
         "exact": [one.judged(np.array(_matrix(one.share))) for one in shots],
     }
+    error = float(np.abs(known["calibrated"] - known["exact"]).max())
+    path = out / "crosstalk.png"
+    _draw(path, found, last, curves, shares)
+    before, after = last["plain"].depth_rms_mm, last["calibrated"].depth_rms_mm
+    word = "takes" if after < before else "makes it WORSE: it takes"
+    verdict = f"undoing {100 * shares[-1]:.0f} % of crosstalk {word} the depth error from {before:.3g} to {after:.3g} mm RMS"
+    return Reproduction(tuple(_records(found, error, last)), (path,), verdict)
+
+
+def _records(found: _Calibrated, error: float, last: dict[str, _Judged]) -> list[Figure]:
+    """Name the stray light, the error of the matrix, and the errors at the greatest share."""
     figures = found.channels.figures
-    records = [
+    return [
         Figure("stray_before_percent", "stray light before", figures["stray_before_percent"], "% of full scale"),
         Figure(
             "stray_after_percent", "stray light after", figures["stray_after_percent"], "% of full scale", None, 0.0
@@ -60,7 +71,7 @@ def crosstalk(out: Path, shares: Sequence[float] = SHARES, camera: Device = CAME
         Figure(
             "matrix_error",
             "greatest error of the matrix",
-            float(np.abs(known["calibrated"] - known["exact"]).max()),
+            error,
             "1",
         ),
         *(
@@ -76,12 +87,6 @@ def crosstalk(out: Path, shares: Sequence[float] = SHARES, camera: Device = CAME
             for way, one in last.items()
         ),
     ]
-    path = out / "crosstalk.png"
-    _draw(path, found, last, curves, shares)
-    before, after = last["plain"].depth_rms_mm, last["calibrated"].depth_rms_mm
-    word = "takes" if after < before else "makes it WORSE: it takes"
-    verdict = f"undoing {shares[-1]:.0%} of crosstalk {word} the depth error from {before:.3g} to {after:.3g} mm RMS"
-    return Reproduction(tuple(records), (path,), verdict)
 
 
 def _matrix(share: float) -> Matrix4:

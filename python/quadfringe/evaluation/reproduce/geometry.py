@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe import _core
-from quadfringe.calibration.height import fit_heights
+from quadfringe.calibration.height import HeightCalibration, fit_heights
 from quadfringe.config import Device, Fringes
 from quadfringe.data import Calibration, Shape, Shot, core_device, xyz_mm_of
 from quadfringe.decoding import Decoder, Plan
@@ -44,19 +44,11 @@ def geometry(out: Path, shrink: int = 1) -> Reproduction:
     """
     bench = _Bench(shrink)
     polynomial = fit_heights(PLANES_MM, [bench.plane(h).phase_rad for h in PLANES_MM], DEGREE)
-    reference_rad = bench.plane(0.0).phase_rad
-
-    def heights(shape: Shape) -> Heights:
-        return {
-            "closed_form": crossed_axes_mm(shape.phase_rad - reference_rad, bench.x_mm),
-            "polynomial": polynomial.height_from_phase(shape.phase_rad),
-            "triangulation": np.float32(DISTANCE_MM) - xyz_mm_of(shape)[:, :, 2],
-        }
-
-    planes = {h: heights(bench.plane(h)) for h in BETWEEN_MM}
+    ways = _Ways(bench, polynomial)
+    planes = {h: ways.heights(bench.plane(h)) for h in BETWEEN_MM}
     errors = {way: np.stack([found[way] - np.float32(h) for h, found in planes.items()]) for way in WAYS}
     seen = bench.peaks()
-    peaks = heights(seen)
+    peaks = ways.heights(seen)
     off = {way: peaks[way] - bench.peaks_mm for way in WAYS}
     records = [
         *(
@@ -133,6 +125,22 @@ class _Bench:
         shot = Shot(images["red"], images["green"], images["blue"], images["ir"])
         self._decoder = self._decoder or Decoder(shot, self._plan)
         return self._decoder.decode_without_verdict(shot)
+
+
+class _Ways:
+    """The three ways from the phase of a shot to heights."""
+
+    def __init__(self, bench: _Bench, polynomial: HeightCalibration) -> None:
+        self._bench, self._polynomial = bench, polynomial
+        self._reference_rad = bench.plane(0.0).phase_rad
+
+    def heights(self, shape: Shape) -> Heights:
+        """Return the heights (H, W) over the reference plane by each way, mm."""
+        return {
+            "closed_form": crossed_axes_mm(shape.phase_rad - self._reference_rad, self._bench.x_mm),
+            "polynomial": self._polynomial.height_from_phase(shape.phase_rad),
+            "triangulation": np.float32(DISTANCE_MM) - xyz_mm_of(shape)[:, :, 2],
+        }
 
 
 def _device(width_px: int, height_px: int, focal_px: float) -> Device:

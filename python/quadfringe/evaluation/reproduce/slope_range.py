@@ -73,7 +73,7 @@ def slope_range(out: Path) -> Reproduction:
     _draw(path, ramp, errors, limits)
     verdict = (
         f"the improved filter follows slopes {factor:.2g} times as steep; the flanks of both filters leave "
-        f"{limits['improved']:.0%} of the ideal range"
+        f"{100 * limits['improved']:.0f} % of the ideal range"
     )
     return Reproduction(records, (path,), verdict)
 
