@@ -270,15 +270,6 @@ def test_a_recording_of_version_1_is_read_with_a_warning(tmp_path: Path) -> None
             assert not recovered.verifiable
 
 
-def test_a_recording_is_described_on_one_screen(take: Path) -> None:
-    short, full = (run("info", take, *options).stdout.splitlines() for options in ((), ("--full",)))
-    assert len(short) < 24
-    assert max(map(len, short)) <= 80
-    assert short[-1].endswith("info --full")
-    assert len(full) > 24
-    assert full[1] in short  # the identity, whole
-
-
 def test_wild_times_of_version_1_are_described_and_replayed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """They have no checksum there."""
     path = tmp_path / "take.h5"
