@@ -29,7 +29,13 @@ LINE_INCHES = 0.17  # height of a line of a legend
 
 
 class Drawable(Protocol):
-    """A panel of a page: a title, the width and height in inches that it needs, and how it is drawn."""
+    """A panel of a page: a title, the width and height in inches that it needs, and how it is drawn.
+
+    >>> from quadfringe.view.report import Drawable, Graph
+    >>> one: Drawable = Graph("row", "column, px", "depth, mm", {})
+    >>> one.title
+    'row'
+    """
 
     @property
     def title(self) -> str:
