@@ -7,7 +7,7 @@ white, over limits from `symmetric`.
 >>> from quadfringe.view.style import lettered, symmetric
 >>> lettered(27, "depth")
 '(ab) depth'
->>> symmetric([[-1.0, 0.5]])
+>>> symmetric([[-1.0, 0.5]], share=1)
 (-1.0, 1.0)
 """
 
