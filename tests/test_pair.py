@@ -21,10 +21,9 @@ from quadfringe.data import Calibration, device_from_core
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import ConfigError, InputError
 from quadfringe.evaluation.reproduce import correction as correction_of
-from quadfringe.evaluation.reproduce import depth, deviated_pair, projector_calibration, row_profile
+from quadfringe.evaluation.reproduce import Reproduction, depth, deviated_pair, projector_calibration, row_profile
 from quadfringe.evaluation.reproduce import tolerance as tolerance_of
 from quadfringe.evaluation.reproduce._pair_bench import ideal_pair, real_pair
-from quadfringe.evaluation.reproduce.tolerance import tolerances
 from quadfringe.io.images import read_image
 
 APART = ((1.0, 1.0, 1.0), (0.5, 0.5, 0.5))
@@ -93,13 +92,17 @@ def test_a_deviated_pair_is_unwrapped_wrong(folder: Path) -> None:
     assert picture.stat().st_size > 10_000
 
 
-def test_tolerances_are_where_the_geometry_puts_them(folder: Path) -> None:
-    result = tolerance_of(folder, shrink=16)
-    found = result.figures
+@pytest.fixture(scope="module")
+def allowed(folder: Path) -> Reproduction:
+    return tolerance_of(folder, shrink=16)
+
+
+def test_tolerances_are_where_the_geometry_puts_them(allowed: Reproduction) -> None:
+    found = allowed.figures
     assert tuple(found) == AXES
     # The search along the fringes ends before any harm is done.
-    assert [one.name for one in result.records if one.at_least] == ["ty_mm"]
-    assert "ty at least 100 mm" in result.verdict
+    assert [one.name for one in allowed.records if one.at_least] == ["ty_mm"]
+    assert "ty at least 100 mm" in allowed.verdict
     # A sixth of a turn of half the infrared fringe, seen from 632 mm by a lens of 1573 px.
     columns = 912 / 30 / 12
     assert found["ry_deg"] == pytest.approx(np.degrees(columns / 1573), rel=tolerance("pair.tolerance_relative"))
@@ -131,10 +134,9 @@ def test_the_row_of_the_corrected_pair_is_better_than_published(folder: Path) ->
     assert "WORSE" not in found.verdict
 
 
-def test_what_remains_is_allowed(correction: Figures) -> None:
-    allowed = tolerances(shrink=16)
+def test_what_remains_is_allowed(correction: Figures, allowed: Reproduction) -> None:
     for axis in AXES:
-        assert abs(correction[f"remaining_{axis}"]) < allowed[axis], axis
+        assert abs(correction[f"remaining_{axis}"]) < allowed.figures[axis], axis
 
 
 def test_the_search_needs_no_coaxial_pair_at_any_depth(folder: Path) -> None:

@@ -95,7 +95,7 @@ def _print_figures(title: str, records: Sequence[Figure], json: Path | None) -> 
     """Print the figures with what the paper and theory have, where they have any."""
     theory = any(one.expected is not None for one in records)
     published = any(one.published is not None for one in records)
-    head = ["figure", "ours", *(["published"] if published else []), *(["theory"] if theory else []), "unit"]
+    head = ["figure", "ours", *(["published"] if published else []), *(["expected"] if theory else []), "unit"]
     lines = []
     for one in records:
         line = [one.words, one.shown]

@@ -102,7 +102,7 @@ class _Seen:
         axes.imshow(self.image, cmap="Greens", vmin=0.0, vmax=3.0, interpolation="nearest")
         for i, points in enumerate(self.points, 1):
             axes.plot(*points.T, ".", ms=1.5)
-            axes.text(*points.mean(axis=0), str(i), fontsize=9)
+            axes.text(*points[0], str(i), fontsize=9, ha="right", va="bottom")
 
 
 @dataclass(frozen=True)

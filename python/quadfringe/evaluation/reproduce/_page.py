@@ -89,10 +89,10 @@ def _table(rows: Sequence[tuple[Outcome, Figure]], *, named: bool = False) -> st
     """Give figures as a table; `named` tells the experiment of each."""
     if not rows:
         return "<p>none</p>"
-    head = [*(["experiment"] if named else []), "figure", "ours", "published", "theory", "unit"]
+    head = [*(["experiment"] if named else []), "figure", "ours", "published", "expected", "unit"]
     theory = any(figure.expected is not None for _, figure in rows)
     published = any(figure.published is not None for _, figure in rows)
-    head = [word for word in head if (word != "theory" or theory) and (word != "published" or published)]
+    head = [word for word in head if (word != "expected" or theory) and (word != "published" or published)]
     lines = []
     for outcome, one in rows:
         cells = {
@@ -100,7 +100,7 @@ def _table(rows: Sequence[tuple[Outcome, Figure]], *, named: bool = False) -> st
             "figure": escaped(one.words),
             "ours": escaped(one.shown),
             "published": _number(one.published),
-            "theory": _number(one.expected),
+            "expected": _number(one.expected),
             "unit": escaped(one.unit),
         }
         lines.append("".join(_cell(word, cells[word]) for word in head))
@@ -114,7 +114,7 @@ def _cell(head: str, text: str) -> str:
 
 
 def _class(head: str) -> str:
-    return ' class="number"' if head in ("ours", "published", "theory") else ""
+    return ' class="number"' if head in ("ours", "published", "expected") else ""
 
 
 def _number(value: float | None) -> str:

@@ -21,7 +21,7 @@ from quadfringe.view.movie import solid_picture
 from quadfringe.view.report import Graph, Panel, draw_panels, fringe_panels
 from quadfringe.view.style import DIVERGING, symmetric
 
-__all__ = ["METHODS", "SceneShot", "draw", "figures_of", "measured"]
+__all__ = ["METHODS", "SceneShot", "draw", "figures_of", "measured", "wrong_words"]
 
 NOISE, SEED = 0.03, 1  # standard deviation, share of full scale, as in the published evaluation
 GREY = 165  # level of the shaded surface
@@ -65,6 +65,11 @@ def figures_of(name: str, seen: SceneShot) -> list[Figure]:
             Figure(f"{name}_{method}_returned_percent", f"{words}: lit pixels returned", found.returned_percent, "%"),
         ]
     return figures
+
+
+def wrong_words(seen: SceneShot) -> str:
+    """Say how many of the pixels that the published method returns have a wrong order."""
+    return f"{seen.found['published'].wrong_order_percent:.2g} % of the returned pixels have a wrong order"
 
 
 def draw(path: Path, title: str, seen: SceneShot, last: Graph, *, painted: bool = False) -> None:

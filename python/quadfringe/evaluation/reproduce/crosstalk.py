@@ -56,7 +56,9 @@ def crosstalk(out: Path, shares: Sequence[float] = SHARES, camera: Device = CAME
     _draw(path, found, last, curves, shares)
     before, after = last["plain"].depth_rms_mm, last["calibrated"].depth_rms_mm
     word = "takes" if after < before else "makes it WORSE: it takes"
-    verdict = f"undoing {100 * shares[-1]:.0f} % of crosstalk {word} the depth error from {before:.3g} to {after:.3g} mm RMS"
+    verdict = (
+        f"undoing {100 * shares[-1]:.0f} % of crosstalk {word} the depth error from {before:.3g} to {after:.3g} mm RMS"
+    )
     return Reproduction(tuple(_records(found, error, last)), (path,), verdict)
 
 

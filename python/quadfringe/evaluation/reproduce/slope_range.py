@@ -71,9 +71,11 @@ def slope_range(out: Path) -> Reproduction:
     )
     path = out / "range.png"
     _draw(path, ramp, errors, limits)
+    left = " and ".join(
+        f"{100 * limits[way] / ideal:.0f}" for way, ideal in (("traditional", 1 / 3), ("improved", 1.0))
+    )
     verdict = (
-        f"the improved filter follows slopes {factor:.2g} times as steep; the flanks of both filters leave "
-        f"{100 * limits['improved']:.0f} % of the ideal range"
+        f"the improved filter follows slopes {factor:.2g} times as steep; flanks leave {left} % of the ideal ranges"
     )
     return Reproduction(records, (path,), verdict)
 
@@ -163,7 +165,7 @@ def _draw(path: Path, ramp: _Ramp, errors: dict[str, Line], limits: dict[str, fl
     rows = [
         [
             Graph("ramp of growing slope", "column, px", "height, mm", {"": (x, ramp.height_mm)}),
-            Graph("captured red light, projector with gamma 2.2", "column, px", "share of full scale", level),
+            Graph("captured red light, gamma 2.2", "column, px", "share of full scale", level),
         ],
         [
             Graph("phase error over a fringe", "slope, L0/d", "rad RMS", curves, limit=fails, log=True, marks=marks),
