@@ -20,8 +20,8 @@ from quadfringe.config import DecodeConfig, Device
 from quadfringe.data import Calibration, device_from_core
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import ConfigError, InputError
-from quadfringe.evaluation.reproduce import correction as correction_of
 from quadfringe.evaluation.reproduce import Reproduction, depth, deviated_pair, projector_calibration, row_profile
+from quadfringe.evaluation.reproduce import correction as correction_of
 from quadfringe.evaluation.reproduce import tolerance as tolerance_of
 from quadfringe.evaluation.reproduce._pair_bench import ideal_pair, real_pair
 from quadfringe.io.images import read_image

@@ -41,7 +41,7 @@ def steps(out: Path, camera: Device | None = None) -> Reproduction:
     draw(path, "steps in one shot, 3 % noise, 8 bit", seen, last, painted=True)
     joint, published = (f"{np.abs(errors[m]).max():.2g} mm" for m in ("joint", "published"))
     verdict = (
-        f"steps of 5 to 50 mm are right within {joint} by the joint method; by the published one within {published}, and "
-        f"{wrong_words(seen)}"
+        f"steps of 5 to 50 mm are right within {joint} by the joint method; by the published one within {published}, "
+        f"and {wrong_words(seen)}"
     )
     return Reproduction(tuple(records), (path,), verdict)
