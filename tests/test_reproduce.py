@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from pathlib import Path
 
 import pytest
@@ -170,3 +171,11 @@ def test_long_commands_say_how_far_they_are(
     with _progress.meter("work", 2, 90.0, each=True) as shown:
         shown.begin("first")
     assert capsys.readouterr().err == "work: 0%, first, about 1 min 30 s to go\n"
+
+
+def test_one_long_experiment_says_its_time(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.setattr(_progress, "EVERY_S", 0.01)
+    with _progress.clock("hand", 110.0):
+        time.sleep(0.1)
+    said = capsys.readouterr().err.splitlines()
+    assert said[:2] == ["hand: about 1 min 50 s on two cores", "hand: 0 s of about 1 min 50 s"]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from functools import partial
+from threading import Event, Thread
 from time import monotonic
 from typing import Protocol
 
@@ -12,8 +14,9 @@ import typer
 
 from quadfringe.cli._output import printable
 
-__all__ = ["Meter", "duration", "meter"]
+__all__ = ["Meter", "clock", "duration", "meter"]
 
+BEAT_S = 1.0  # between two times on a terminal
 EVERY_S = 10.0  # least time between two plain lines
 SLOW_S = 5.0  # no plain line before this time: short commands say nothing
 
@@ -92,6 +95,35 @@ def meter(title: str, total: float, expected_s: float | None = None, *, each: bo
     above = sys.stdout.isatty()
     with Progress(*columns, console=console, transient=True, redirect_stdout=above) as progress:
         yield _Bar(progress, title, total, expected_s)
+
+
+@contextmanager
+def clock(title: str, expected_s: float) -> Iterator[None]:
+    """Show the time spent of the time that the block takes by experience, which does not say how far it is."""
+    from rich.console import Console
+
+    console, start, over = Console(stderr=True), monotonic(), Event()
+    with ExitStack() as stack:
+        if console.is_terminal:
+            from rich.status import Status
+
+            status = stack.enter_context(Status(title, console=console))
+            tell: Callable[[str], None] = status.update
+        else:
+            tell = partial(typer.echo, err=True)
+
+        def tick() -> None:
+            tell(f"{title}: about {duration(expected_s)} on two cores")
+            while not over.wait(BEAT_S if console.is_terminal else EVERY_S):
+                tell(f"{title}: {duration(monotonic() - start)} of about {duration(expected_s)}")
+
+        thread = Thread(target=tick, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            over.set()
+            thread.join()
 
 
 class _Bar:

@@ -50,11 +50,10 @@ def reproduce(
 
 
 def _one(experiment: Experiment, out: Path, json: Path | None) -> None:
-    from quadfringe.cli._progress import duration
+    from quadfringe.cli._progress import clock
 
-    if experiment.expected_s >= 5:
-        typer.echo(f"{experiment.name}: about {duration(experiment.expected_s)} on two cores", err=True)
-    result = experiment.run(out)
+    with clock(experiment.name, experiment.expected_s):
+        result = experiment.run(out)
     _print_figures(f"reproduce {experiment.name}", result.records, json)
     say(f"{result.verdict}", json)
     say("\n".join(str(path) for path in result.pictures), json)
