@@ -15,14 +15,13 @@ from pathlib import Path
 import numpy as np
 
 import quadfringe as qf
-from quadfringe import _core
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
+from quadfringe.evaluation.reproduce.identity import identity_shot
 from quadfringe.files import figures_text
 
 SURFACES = ("plane", "peaks", "steps", "sphere")
 FRINGE_PX = 28
-FOCAL_PX = 12.0 / 4.65e-3  # the camera of the published bench: 12 mm lens, 4.65 um pixels
 
 
 def round_trip(surface: str) -> dict[str, float]:
@@ -45,15 +44,8 @@ def round_trip(surface: str) -> dict[str, float]:
 
 def identity() -> float:
     """Give the greatest difference between captured and projected images, as a share of full scale."""
-    device = _core.Device(1024, 768, (FOCAL_PX, FOCAL_PX), (511.5, 383.5))
-    bench = _core.Bench(camera=device, visible=device, infrared=device)
-    numbers, ideal = (36.0, 35.0, 30.0), {"albedo": (1.0,) * 4, "ambient": (0.0,) * 4}
-    captured = bench.render(bench.cast("plane"), numbers, bit_depth=16, **ideal)
-    names = zip(("red", "green", "blue", "ir"), ("R", "G", "B", "IR"), strict=True)
-    return max(
-        float(np.abs(captured[name] / 65535 - _core.pattern(channel, numbers, 1024, 768)).max())
-        for name, channel in names
-    )
+    projected, captured = identity_shot()
+    return max(float(np.abs(captured[name] - projected[name]).max()) for name in projected)
 
 
 def main() -> None:

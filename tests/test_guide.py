@@ -106,6 +106,17 @@ def test_the_pictures_are_drawn(guided: Guided, tmp_path: Path) -> None:
     assert all(path.stat().st_size > 10_000 for path in written)
 
 
+def test_the_covered_share_is_that_of_the_outlines(guided: Guided) -> None:
+    poses = guided.outcome("poses")
+    assert poses is not None
+    seen = poses.details["seen"]
+    assert poses.step.figures["covered_percent"] == pytest.approx(100 * seen.mean(), rel=1e-5)
+    points = np.round(np.concatenate([pose.view.points_px for pose in poses.details["observed"]])).astype(int)
+    assert seen[points[:, 1], points[:, 0]].all()
+    (x0, y0), (x1, y1) = points.min(axis=0), points.max(axis=0) + 1
+    assert seen.sum() == seen[y0:y1, x0:x1].sum() < seen.size  # the borders, where no point was, do not count
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Dark shots and levels of the bench as files, and no more."""
@@ -153,6 +164,16 @@ def test_what_is_missing_is_said_and_nothing_written(folder: Path, tmp_path: Pat
     assert listed.exit_code == 1
     assert "levels: 23 of 23" in listed.stdout.replace("  ", " ")
     assert str(folder / "poses" / "01") in listed.stdout
+
+
+def test_steps_have_their_pictures_also_when_a_later_one_fails(folder: Path, tmp_path: Path) -> None:
+    broken = shutil.copytree(folder, tmp_path / "broken")
+    for name in SESSION.captures("flat"):
+        shutil.copytree(folder / "dark" / "01", broken / "flat" / name)
+    write_image(broken / "flat" / "02" / "red.png", np.zeros((10, 12), np.uint16))
+    failed = run("run", "--captures", broken, "--out", tmp_path / "c.json", "--pictures", tmp_path / "p")
+    assert (failed.exit_code, "got red 12 x 10" in failed.stderr) == (2, True), failed.output
+    assert [path.name for path in (tmp_path / "p").iterdir()] == ["levels.png"]
 
 
 def test_folders_at_fault_are_explained(folder: Path, tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from support.bars import hold
 import quadfringe as qf
 from quadfringe.errors import InputError
 from quadfringe.evaluation import moving_scene
+from quadfringe.evaluation.reproduce import hand
 from quadfringe.recording import Recording
 from quadfringe.view.colours import texture
 from quadfringe.view.movie import movie, solid_picture
@@ -32,7 +33,8 @@ def frames_of(path: Path) -> list[np.ndarray]:
 def test_a_film_of_the_hand(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(moving_scene, "find_spec", lambda _: None)  # as without the extra
     system = moving_scene.hand_system().model_copy(update={"camera": SMALL})
-    figures, path = moving_scene.hand(tmp_path, 4, system)
+    made = hand(tmp_path, 4, system)
+    figures, path = made.figures, made.pictures[1]
     assert (figures["hand_shots"], figures["hand_shapes"], figures["hand_lost"]) == (4, 4, 0)
     assert figures["hand_shots_with_wrong_pixels"] == figures["hand_over_gige_vision"] == 0
     hold("demo.hand_depth_rms_mm", figures["hand_depth_rms_mm_median"])

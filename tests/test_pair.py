@@ -20,9 +20,10 @@ from quadfringe.config import DecodeConfig, Device
 from quadfringe.data import Calibration, device_from_core
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import ConfigError, InputError
-from quadfringe.evaluation.reproduce import pair_calibration, pair_correction, pair_depth, pair_deviation
-from quadfringe.evaluation.reproduce._deviated_pair import ideal_pair, real_pair
-from quadfringe.evaluation.reproduce.pair_tolerance import tolerances
+from quadfringe.evaluation.reproduce import Reproduction, depth, deviated_pair, projector_calibration, row_profile
+from quadfringe.evaluation.reproduce import correction as correction_of
+from quadfringe.evaluation.reproduce import tolerance as tolerance_of
+from quadfringe.evaluation.reproduce._pair_bench import ideal_pair, real_pair
 from quadfringe.io.images import read_image
 
 APART = ((1.0, 1.0, 1.0), (0.5, 0.5, 0.5))
@@ -83,16 +84,25 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_deviated_pair_is_unwrapped_wrong(folder: Path) -> None:
-    figures, picture = pair_deviation(folder, shrink=4)
+    found = deviated_pair(folder, shrink=4)
+    figures, picture = found.figures, found.picture
     assert figures["single_wrong_order_percent"] == 0
     hold("pair.single_rms_rad", figures["single_rms_rad"])
     hold("pair.deviated_wrong_order_percent", figures["deviated_wrong_order_percent"])
     assert picture.stat().st_size > 10_000
 
 
-def test_tolerances_are_where_the_geometry_puts_them() -> None:
-    found = tolerances(shrink=16)
+@pytest.fixture(scope="module")
+def allowed(folder: Path) -> Reproduction:
+    return tolerance_of(folder, shrink=16)
+
+
+def test_tolerances_are_where_the_geometry_puts_them(allowed: Reproduction) -> None:
+    found = allowed.figures
     assert tuple(found) == AXES
+    # The search along the fringes ends before any harm is done.
+    assert [one.name for one in allowed.records if one.at_least] == ["ty_mm"]
+    assert "ty at least 100 mm" in allowed.verdict
     # A sixth of a turn of half the infrared fringe, seen from 632 mm by a lens of 1573 px.
     columns = 912 / 30 / 12
     assert found["ry_deg"] == pytest.approx(np.degrees(columns / 1573), rel=tolerance("pair.tolerance_relative"))
@@ -103,7 +113,7 @@ def test_tolerances_are_where_the_geometry_puts_them() -> None:
 
 @pytest.fixture(scope="module")
 def correction(folder: Path) -> Figures:
-    return pair_correction(folder, shrink=2)[0]
+    return correction_of(folder, shrink=2).figures
 
 
 def test_the_corrected_pair_is_as_good_as_one_projector(correction: Figures) -> None:
@@ -114,14 +124,24 @@ def test_the_corrected_pair_is_as_good_as_one_projector(correction: Figures) -> 
         hold("pair.rms_rad", [correction[kind], correction[f"{kind}_row130"]])
 
 
-def test_what_remains_is_allowed(correction: Figures) -> None:
-    allowed = tolerances(shrink=16)
+def test_the_row_of_the_corrected_pair_is_better_than_published(folder: Path) -> None:
+    found = row_profile(folder, shrink=4)
+    known = {one.name: one for one in found.records}
+    before, after = (known[f"infrared_{when}_rms_rad_row130"] for when in ("before", "after"))
+    assert (before.published, after.published) == (0.277, 0.031)
+    hold("pair.deviated_rms_rad", before.value)
+    hold("pair.rms_rad", after.value)
+    assert "WORSE" not in found.verdict
+
+
+def test_what_remains_is_allowed(correction: Figures, allowed: Reproduction) -> None:
     for axis in AXES:
-        assert abs(correction[f"remaining_{axis}"]) < allowed[axis], axis
+        assert abs(correction[f"remaining_{axis}"]) < allowed.figures[axis], axis
 
 
 def test_the_search_needs_no_coaxial_pair_at_any_depth(folder: Path) -> None:
-    figures, picture = pair_depth(folder, shrink=2, depths_mm=(700.0, 800.0, 900.0))
+    found = depth(folder, shrink=2, depths_mm=(700.0, 800.0, 900.0))
+    figures, picture = found.figures, found.picture
     for translation in ("0.5mm", "5mm"):
         hold("pair.rms_rad", figures[f"searched_{translation}_rms_rad"])
         hold("pair.rms_rad", figures[f"searched_{translation}_infrared_rms_rad"])
@@ -137,8 +157,9 @@ def test_the_search_needs_no_coaxial_pair_at_any_depth(folder: Path) -> None:
 
 
 def test_a_calibrated_pair_is_as_good_as_a_known_one(folder: Path) -> None:
-    """A sixteenth of the pixels, six poses and four steps; `quadfringe reproduce pair-calibration` runs it in full."""
-    figures, picture = pair_calibration(folder, shrink=4, poses=6, steps=4)
+    """A sixteenth of the pixels, few poses and steps; `quadfringe reproduce projector-calibration` runs it in full."""
+    found = projector_calibration(folder, shrink=4, poses=6, steps=4)
+    figures, picture = found.figures, found.picture
     for name in ("camera", "visible", "infrared"):
         hold(f"calibration.{name}_mean_px", figures[f"{name}_mean_px"])
     assert all(abs(figures[f"{axis}_error"]) <= figures[f"{axis}_interval"] for axis in AXES)

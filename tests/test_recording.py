@@ -19,6 +19,7 @@ from quadfringe.errors import InputError, RecordingError, RecordingWarning, Shot
 from quadfringe.evaluation._takes import kill_writer, numbered_shot, run_with_file_limit, whole
 from quadfringe.recording import Recorder, Recording, RecordingWriter, recover
 from quadfringe.recording._layout import Header
+from quadfringe.recording.inspection import lines_about
 from quadfringe.recording.replay import ReplayCamera
 
 
@@ -270,3 +271,14 @@ def test_a_replay_has_one_stream_at_a_time(take: Path) -> None:
             camera.snap()
         stream.close()  # type: ignore[attr-defined]
         assert camera.snap().id is not None
+
+
+def test_a_recording_is_described_on_one_screen() -> None:
+    path = Path(__file__).parent / "golden" / "take.h5"
+    with pytest.warns(RecordingWarning, match="earlier version"):
+        short, full = lines_about(path), lines_about(path, full=True)
+    assert len(short) < 24
+    assert max(map(len, short)) <= 80
+    assert short[-1].endswith("info --full")
+    assert len(full) > 24
+    assert full[1] in short  # the identity, whole

@@ -12,6 +12,7 @@ from hashlib import sha256
 from html.parser import HTMLParser
 from pathlib import Path
 
+import cv2
 import numpy as np
 import pytest
 from support.bars import hold
@@ -21,8 +22,10 @@ import quadfringe as qf
 from quadfringe.cli import app
 from quadfringe.data import Calibration, CalibrationRecord, CalibrationStep, Reason
 from quadfringe.errors import InputError, MissingExtraError
+from quadfringe.view import style
 from quadfringe.view.page import page_of, write_page
 from quadfringe.view.page._params import VERTICES_MAX
+from quadfringe.view.report import Graph, Panel, draw_panels
 
 EVIL = '</script></table><script>document.title="taken"</script><img src=x onerror="alert(1)">\x00\u202e\'"&'
 FETCHING = {"src", "href", "srcset", "data", "action", "poster", "background"}
@@ -209,3 +212,43 @@ def test_what_is_missing_is_named(shape: qf.Shape, tmp_path: Path, monkeypatch: 
     with pytest.raises(MissingExtraError, match=r"quadfringe\[plot\]"):
         write_page(tmp_path / "r.html", shape, "face")
     assert list(tmp_path.iterdir()) == []
+
+
+# The look of pictures
+
+
+def test_missing_data_are_told_from_every_value_of_a_map() -> None:
+    from matplotlib import colormaps
+    from matplotlib.colors import to_rgb
+
+    def lab(colours: object) -> np.ndarray:
+        return cv2.cvtColor(np.asarray(colours, np.float32).reshape(1, -1, 3), cv2.COLOR_RGB2LAB)[0]
+
+    for name in (*style.MAPS, "gray"):
+        values = lab(colormaps[name](np.arange(256))[:, :3])
+        apart = np.linalg.norm(values - lab(to_rgb(style.no_data_of(name))), axis=1).min()
+        hold("pictures.no_data_apart", apart)
+    middle = np.array(colormaps[style.DIVERGING](0.5)[:3])
+    assert middle.min() > 0.95  # zero is white
+
+
+def test_panels_have_letters_units_and_a_name_for_missing_data(tmp_path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    image = np.array([[0.0, np.nan], [9.0, -1.0]])
+    axes = Figure().add_subplot()
+    panel = Panel("depth, $x$", image, "mm", limits=(0.0, 1.0))
+    panel.draw(axes.figure, axes, style.lettered(1, panel.title))
+    assert axes.get_title(loc="left") == "(b) depth, $x$"
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("column, px", "row, px")
+    assert [text.get_text() for text in axes.get_legend().get_texts()] == ["no data"]
+    (place,) = axes.child_axes
+    assert place.get_ylabel() == "mm"
+    line = {"a": (np.arange(3), np.arange(3))}
+    draw_panels(tmp_path / "two.png", "title $", [[panel, Graph("curve", "x, mm", "y, mm", line)]])
+    assert cv2.imread(str(tmp_path / "two.png")).shape[1] > 600
+
+
+def test_limits_about_zero_hold_the_values() -> None:
+    assert style.symmetric(np.array([np.nan, -3.0]), np.array([1.0])) == (-3.0, 3.0)
+    assert style.symmetric(np.array([np.nan]), least=0.5) == (-0.5, 0.5)

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from quadfringe.calibration.session import FolderCaptures, Session, session_of, take_captures
 from quadfringe.calibration.session.exposures import check_exposures, exposed
+from quadfringe.calibration.session.outcome import record, worse
 from quadfringe.calibration.session.planning import check_session
 from quadfringe.calibration.targets import circle_grid
 from quadfringe.cli.app import app
@@ -204,3 +205,11 @@ def test_the_command_asks_for_the_exposure(tmp_path: Path) -> None:
     assert done.exit_code == 1  # nobody did
     assert "the image has 100% of the brightness" in done.stderr
     assert config.capture.kind == "files"
+
+
+def test_a_verdict_says_when_a_correction_made_things_worse() -> None:
+    assert worse("crosstalk", before=0.3, after=0.2) == []
+    remarks = worse("crosstalk", before=0.2, after=0.3)
+    step = record("levels", (), {}, [], "crosstalk 0.20 % before, 0.30 % after", remarks=remarks)
+    assert step.good
+    assert step.verdict.startswith("crosstalk 0.20 % before, 0.30 % after; crosstalk is worse after the correction")

@@ -48,6 +48,7 @@ from quadfringe.data import AnyShot, Calibration, Shape, xyz_mm_of
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.devices.virtual import VirtualBench
 from quadfringe.view.report import Panel, draw_panels
+from quadfringe.view.style import DIVERGING, symmetric
 
 __all__ = [
     "SPHERE_DIAMETER_MM",
@@ -65,6 +66,7 @@ __all__ = [
 Map = NDArray[np.float32]
 # Calibrated sizes of the artefacts in the built-in scenes of the virtual bench.
 SPHERE_DIAMETER_MM = 68.0
+FORM_LEAST_MM = 0.01  # least end of the colours of deviations
 STEP_HEIGHTS_MM = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 40.0, 45.0, 50.0)
 
 
@@ -246,12 +248,15 @@ def read_artefacts(
 
 def write_acceptance(path: Path, found: Acceptance) -> None:
     """Write the deviation maps of all artefacts as one PNG; needs matplotlib (extra `plot`)."""
-    panels = [_panel(name, image) for name, image in found.deviations_mm.items()]
+    forms = [image for name, image in found.deviations_mm.items() if not name.startswith("steps")]
+    limits_mm = symmetric(*forms, least=FORM_LEAST_MM)
+    panels = [_panel(name, image, limits_mm) for name, image in found.deviations_mm.items()]
     word = "accepted" if found.accepted else "not accepted"
     draw_panels(path, f"acceptance: {word}", [panels[i : i + 3] for i in range(0, len(panels), 3)])
 
 
-def _panel(name: str, image: NDArray[np.float64]) -> Panel:
+def _panel(name: str, image: NDArray[np.float64], limits_mm: tuple[float, float]) -> Panel:
+    words = name.replace("_", " ")
     if name.startswith("steps"):
-        return Panel(name, image, "mm")
-    return Panel(name, image, "mm", "coolwarm", (-0.1, 0.1))
+        return Panel(f"{words}: height over the base", image, "mm")
+    return Panel(f"{words}: deviation from the fit", image, "mm", DIVERGING, limits_mm)

@@ -7,12 +7,14 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from quadfringe.cli._calibrating import RENDER_S, images_of, meter_of, progress_of
 from quadfringe.cli._options import BoardPosesOption, JsonOption, VirtualSystemOption
 from quadfringe.cli._output import say, write_record
 from quadfringe.cli.response import response
 
 if TYPE_CHECKING:
     from quadfringe.calibration.session import Captures, Guided
+    from quadfringe.calibration.session.outcome import Outcome
 
 __all__ = ["app"]
 
@@ -65,11 +67,13 @@ def run(
     require_suffix(out, (".json",))
     if heights is not None:
         require_suffix(heights, (".npz",))
-    found = guide(_captures(captures, rig, system, poses), lambda words: say(words, json))
+    chosen = _captures(captures, rig, system, poses)
+    with progress_of("calibrate run", chosen, rendered=captures is None) as counted:
+        found = guide(counted, lambda words: say(words, json), lambda outcome: _picture(outcome, pictures, json))
     if found.calibration is None:
         say("no calibration: take the missing captures and run this command again", json)
         raise typer.Exit(NOT_GOOD)
-    _write_extras(found, pictures, heights, json)
+    _write_heights(found, heights)
     found.calibration.save(out)
     say(f"{out}: {'every step is good' if found.good else 'NOT every step is good; see above'}", json)
     say(
@@ -101,14 +105,20 @@ def _captures(folder: Path | None, rig: str | None, system: Path | None, poses: 
     return VirtualCaptures(config, virtual_session(config, poses))
 
 
-def _write_extras(found: Guided, pictures: Path | None, heights: Path | None, json: Path | None) -> None:
-    """Write the pictures and the height polynomials, when they are wanted."""
+def _picture(outcome: Outcome, folder: Path | None, json: Path | None) -> None:
+    """Write the picture of a step as soon as it is done, so that it exists also when a later step fails."""
+    if folder is None:
+        return
+    from quadfringe.calibration.session.pictures import write_picture
+
+    if (path := write_picture(folder, outcome)) is not None:
+        say(f"  {path}", json)
+
+
+def _write_heights(found: Guided, heights: Path | None) -> None:
+    """Write the height polynomials, when they are wanted."""
     from quadfringe.calibration.session.geometry import height_calibration
 
-    if pictures is not None:
-        from quadfringe.calibration.session.pictures import write_pictures
-
-        say("\n".join(str(path) for path in write_pictures(pictures, found)), json)
     planes = found.outcome("planes")
     polynomial = None if planes is None else height_calibration(planes)
     if heights is not None and polynomial is not None:
@@ -248,7 +258,9 @@ def rehearse(
     from quadfringe.evaluation.simulate import virtual_bench_config
 
     config = virtual_bench_config(system, noise=None if system else 0.01)
-    written = VirtualCaptures(config, virtual_session(config, poses)).write(folder)
+    captures = VirtualCaptures(config, virtual_session(config, poses))
+    with meter_of("calibrate rehearse", captures.session, RENDER_S) as shown:
+        written = captures.write(folder, done=lambda step, _: shown.advance(images_of(captures.session, step)))
     say(f"{folder}: {len(written)} captures; next: quadfringe calibrate run --captures {folder} --out calibration.json")
 
 

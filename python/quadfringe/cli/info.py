@@ -20,8 +20,11 @@ def info(
     verify: Annotated[
         bool, typer.Option("--verify", help="Read all shots of a recording and compare them with their checksums.")
     ] = False,
+    full: Annotated[
+        bool, typer.Option("--full", help="Print all settings and the whole calibration of a recording.")
+    ] = False,
 ) -> None:
-    """Describe a file: its maps and their ranges, its settings, its calibration.
+    """Describe a file: its maps and their ranges, its settings, its calibration; a recording on one screen.
 
     With --verify, a recording that is damaged, was changed or is incomplete makes the exit status 1.
     """
@@ -30,7 +33,7 @@ def info(
     if verify:
         _verify(file)
         return
-    for line in lines_about(file):
+    for line in lines_about(file, full=full):
         say(line)
 
 

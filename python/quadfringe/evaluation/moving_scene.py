@@ -17,14 +17,13 @@ from quadfringe.config.cameras import AravisConfig, ChipConfig, ReplayConfig, Vi
 from quadfringe.data import AnyShot, BayerShot, Shape, Truth
 from quadfringe.decoding.compare import ShapeComparison, compare
 from quadfringe.devices.emulator import Emulator
-from quadfringe.evaluation.reproduction import Reproduction
 from quadfringe.files import folder_for
 from quadfringe.recording import Recorder
 from quadfringe.scanner import Scanner, open_system
 from quadfringe.view.colours import Picture, channels_picture, texture
 from quadfringe.view.movie import movie, solid_picture
 
-__all__ = ["MovingScene", "hand", "hand_system", "measure_scene"]
+__all__ = ["RATE_HZ", "SHOTS", "HandFilm", "MovingScene", "film_hand", "hand_system", "measure_scene"]
 
 RATE_HZ = 10.0  # frame rate of the movie and of the virtual camera
 SHOTS = 30  # three seconds: the fingers close and open once
@@ -51,12 +50,20 @@ def hand_system() -> SystemConfig:
     return SystemConfig(capture=VirtualConfig(frame_rate_hz=RATE_HZ), scene=scene)
 
 
-def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> Reproduction:
+@dataclass(frozen=True)
+class HandFilm:
+    """The measured hand, and whether its frames came over GigE Vision."""
+
+    made: MovingScene
+    over_wire: bool
+
+
+def film_hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> HandFilm:
     """Measure the moving hand; write `out`/hand.h5, `out`/hand/shot_000000.ply and so on, and `out`/hand.mp4.
 
     The virtual bench renders the frames, and two emulated chips send them over GigE Vision on the loopback interface.
     The camera driver receives, matches, records and decodes them like those of a real camera. Without the extra
-    `aravis`, they are replayed from a file, and `hand_over_gige_vision` is 0.
+    `aravis`, they are replayed from a file.
     """
     with TemporaryDirectory(prefix="quadfringe-") as name:
         stage = _render(system or hand_system(), shots, Path(name))
@@ -64,17 +71,7 @@ def hand(out: Path, shots: int = SHOTS, system: SystemConfig | None = None) -> R
             scanner = _wired(stage, stack)
             over_wire = scanner is not None
             made = measure_scene(scanner or stack.enter_context(_replayed(stage)), out, "hand", shots, stage.truth_of)
-    figures = {
-        "hand_over_gige_vision": float(over_wire),
-        "hand_shots": float(made.shots),
-        "hand_shapes": float(made.shapes),
-        "hand_lost": float(made.lost),
-        "hand_shots_with_wrong_pixels": float(made.shapes - len(made.depth_rms_mm)),
-    }
-    if made.depth_rms_mm:
-        figures["hand_depth_rms_mm_median"] = float(np.median(made.depth_rms_mm))
-        figures["hand_wrong_order_percent_worst"] = max(made.wrong_order_percent)
-    return Reproduction(figures, made.movie)
+    return HandFilm(made, over_wire)
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import shorten, wrap
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel
 
-from quadfringe.config import load_system
+from quadfringe.config import SystemConfig, brief, load_system
 from quadfringe.data import Calibration, ResponseCalibration
 from quadfringe.data.calibration import DIGEST
 from quadfringe.data.reason import Reason
@@ -25,11 +27,16 @@ DIGEST_FOUND = {
     True: "unchanged since it was saved",
     False: "without a digest, so a change since it was saved cannot be told",
 }
+SCREEN_COLUMNS, SCREEN_LINES = 80, 24
+SETTINGS = 12  # changed settings of a recording that are listed
 IMAGES = (".png", ".tif", ".tiff", ".bmp")
 
 
-def lines_about(path: Path) -> list[str]:
-    """Describe a shape, calibration, response, system file, recording, array or image; else raises `InputError`."""
+def lines_about(path: Path, *, full: bool = False) -> list[str]:
+    """Describe a shape, calibration, response, system file, recording, array or image; else raises `InputError`.
+
+    A recording is described on one screen, 80 columns and 24 lines at most; `full` gives all its settings.
+    """
     suffix = path.suffix.lower()
     if suffix == ".npz":
         return _arrays(read_npz(path))
@@ -44,7 +51,7 @@ def lines_about(path: Path) -> list[str]:
     if suffix == ".ply":
         return _ply_header(path)
     if suffix == ".h5":
-        return _recording(path)
+        return _recording(path, full=full)
     raise InputError(f"{path}: expected .npz, .npy, .json, .toml, .ply, .h5 or {', '.join(IMAGES)}")
 
 
@@ -94,7 +101,7 @@ def _json(path: Path) -> list[str]:
     ]
 
 
-def _recording(path: Path) -> list[str]:
+def _recording(path: Path, *, full: bool) -> list[str]:
     with Recording(path, rescue=True) as recording:
         lines = [f"Recording: {len(recording)} shots of {recording.header.described}", f"SHA-256: {recording.sha256}"]
         ids, times_us = recording.ids[recording.stamped], recording.times_us[recording.stamped]
@@ -105,10 +112,54 @@ def _recording(path: Path) -> list[str]:
             lines.append(f"begin: {begin}, {spent_s:.3f} s, {lost} exposures missing")
         if not recording.closed_in_order:
             lines.append("not closed: still being written, or its writer was killed (then use quadfringe recover)")
-        for name, model in (("calibration", recording.calibration), ("config", recording.config)):
-            known = None if model is None else model.model_dump_json(indent=2, exclude_none=True)
-            lines += [f"{name}:", *("none" if known is None else known).splitlines()]
-    return lines
+        calibration, config = recording.calibration, recording.config
+        if full:
+            return [*lines, *_whole("calibration", calibration), *_whole("config", config)]
+    summed = [_fitting(line) for line in (*lines, *_devices(calibration), *_changed(config))]
+    screen = [line for lines in summed for line in lines][: SCREEN_LINES - 2]  # a line for the prompt
+    return [*screen, "all settings and the whole calibration: quadfringe info --full"]
+
+
+def _whole(name: str, model: BaseModel | None) -> list[str]:
+    known = None if model is None else model.model_dump_json(indent=2, exclude_none=True)
+    return [f"{name}:", *("none" if known is None else known).splitlines()]
+
+
+def _fitting(line: str) -> list[str]:
+    return wrap(line, SCREEN_COLUMNS, subsequent_indent="  ") or [line]
+
+
+def _devices(calibration: Calibration | None) -> list[str]:
+    """Sum up a calibration: its devices, what it corrects, and its record."""
+    if calibration is None:
+        return ["calibration: none"]
+    devices = {"camera": calibration.camera, "projector": calibration.projector, "infrared": calibration.infrared}
+    sizes = [f"{name} {one.width_px} x {one.height_px}" for name, one in devices.items() if one is not None]
+    kept = ("dark", "response", "projector_response", "crosstalk", "ir_registration")
+    corrected = [name.replace("_", " ") for name in kept if getattr(calibration, name, None) is not None]
+    record = calibration.record
+    made = "" if record is None else f"; {record.rig}, {record.made_utc}"
+    return [f"calibration: {', '.join(sizes)}{made}", *([f"it corrects: {', '.join(corrected)}"] if corrected else [])]
+
+
+def _changed(config: SystemConfig | None) -> list[str]:
+    """List the settings that differ from the defaults, as in a system file."""
+    if config is None:
+        return ["config: none"]
+    values = config.model_dump(mode="json", exclude_defaults=True, exclude_none=True)
+    found = [f"{key} = {brief(value)}" for key, value in _flat(values)]
+    more = [f"... and {len(found) - SETTINGS} more"] if len(found) > SETTINGS else []
+    shown = [shorten(one, SCREEN_COLUMNS - 2, placeholder=" ...") for one in (*found[:SETTINGS], *more)]
+    return [f"config, changed from the defaults: {'' if found else 'nothing'}".rstrip(), *(f"  {one}" for one in shown)]
+
+
+def _flat(values: dict[str, Any], head: str = "") -> list[tuple[str, Any]]:
+    """Give nested settings with dotted keys."""
+    found: list[tuple[str, Any]] = []
+    for key, value in values.items():
+        name = f"{head}{key}"
+        found += _flat(value, f"{name}.") if isinstance(value, dict) else [(name, value)]
+    return found
 
 
 def _ply_header(path: Path) -> list[str]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from quadfringe.decoding.compare import MeshComparison, Profile, ShapeComparison
 from quadfringe.view.report import Graph, Panel, draw_panels
+from quadfringe.view.style import DIVERGING
 
 __all__ = ["write_comparison"]
 
@@ -27,8 +28,8 @@ def write_comparison(path: Path, title: str, found: Comparison) -> None:
     range_ = _range(found)
     sign = "A less B" if isinstance(found, ShapeComparison) else "from the surface, + towards the camera"
     maps = [
-        Panel(f"difference, {sign}", found.difference, unit, "coolwarm", (-range_, range_)),
-        Panel("its slow part (form)", found.bands.form, unit, "coolwarm", (-range_, range_)),
+        Panel(f"difference, {sign}", found.difference, unit, DIVERGING, (-range_, range_)),
+        Panel("its slow part (form)", found.bands.form, unit, DIVERGING, (-range_, range_)),
         _returned(found) if isinstance(found, ShapeComparison) else _histogram(found, range_),
     ]
     graphs: list[Panel | Graph] = [_graph(found.profiles[name], unit) for name in PROFILES if name in found.profiles]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
@@ -40,13 +40,18 @@ class Guided:
         return next((outcome for outcome in self.outcomes if outcome.step.name == name), None)
 
 
-def guide(captures: Captures, say: Callable[[str], None] = lambda _: None) -> Guided:
+def guide(
+    captures: Captures,
+    say: Callable[[str], None] = lambda _: None,
+    done: Callable[[Outcome], None] = lambda _: None,
+) -> Guided:
     """Do every step whose captures exist; call `say` with instructions, missing captures and results.
 
-    Raises `InputError` for captures that cannot be read, and `CalibrationError` for captures that do not give a
-    trustworthy calibration. Writes no file.
+    `done` is called with the outcome of every step at once, before a later one may fail. Raises `InputError` for
+    captures that cannot be read, and `CalibrationError` for captures that do not give a trustworthy calibration.
+    Writes no file.
     """
-    walk = _Walk(captures, say)
+    walk = _Walk(captures, say, done)
     for step in STEPS:
         walk.take(step)
     return Guided(walk.calibration(), tuple(walk.outcomes), walk.missing)
@@ -55,8 +60,8 @@ def guide(captures: Captures, say: Callable[[str], None] = lambda _: None) -> Gu
 class _Walk:
     """The state of a session while its steps are done."""
 
-    def __init__(self, captures: Captures, say: Callable[[str], None]) -> None:
-        self.captures, self.say = captures, say
+    def __init__(self, captures: Captures, say: Callable[[str], None], done: Callable[[Outcome], None]) -> None:
+        self.captures, self.say, self.done = captures, say, done
         self.outcomes: list[Outcome] = []
         self.missing: dict[str, tuple[str, ...]] = {}
         self.fields: dict[str, Any] = {}
@@ -79,8 +84,9 @@ class _Walk:
             self.fields |= outcome.fields
             word = "good" if outcome.step.good else "NOT GOOD"
             self.say(f"  {outcome.step.name}: {word}: {outcome.step.verdict}")
+            self.done(outcome)
 
-    def _outcomes(self, name: str) -> list[Outcome]:
+    def _outcomes(self, name: str) -> Iterable[Outcome]:
         dark = self.fields.get("dark", (0.0,) * 4)
         if name == "dark":
             return [light.dark(self.captures)]
@@ -95,15 +101,16 @@ class _Walk:
         work = geometry.planes if name == "planes" else geometry.acceptance
         return [work(self.captures, calibration)]
 
-    def _poses(self) -> list[Outcome]:
+    def _poses(self) -> Iterator[Outcome]:
         maps = {}
         for name in self.captures.session.captures("poses"):
             maps[name] = self.captures.pose(name)
             self.say(f"  pose {name}: read")
         registered = geometry.registration(self.captures, maps) if len(self.captures.session.beams) > 1 else None
+        if registered is not None:
+            yield registered  # before the poses, which may fail
         found = None if registered is None else registered.details["registration"]
-        rest = [geometry.poses(self.captures, maps, found)]
-        return rest if registered is None else [registered, *rest]
+        yield geometry.poses(self.captures, maps, found)
 
     def calibration(self) -> Calibration | None:
         """Return the calibration from the completed steps; None while a needed step is missing."""

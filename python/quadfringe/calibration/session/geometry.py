@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,12 +23,12 @@ from quadfringe.calibration.height import HeightCalibration, compare_heights, fi
 from quadfringe.calibration.projector import ProjectorMap, projector_points
 from quadfringe.calibration.registration import Registration, register_views
 from quadfringe.calibration.session.captures import Captures
-from quadfringe.calibration.session.outcome import Outcome, record
+from quadfringe.calibration.session.outcome import Outcome, record, worse
 from quadfringe.data import Calibration, Shape, xyz_mm_of
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.errors import CalibrationError, DecodeError
 
-__all__ = ["acceptance", "planes", "poses", "registration"]
+__all__ = ["acceptance", "coverage", "planes", "poses", "registration", "seen_image"]
 
 Array = NDArray[np.float64]
 Maps = Mapping[str, dict[str, ProjectorMap]]
@@ -54,7 +55,8 @@ def registration(captures: Captures, maps: Maps) -> Outcome:
         f"{found.rotation_deg:+.3f} degrees and scaled by {found.scale:.5f}; {found.before_rms_px:.2f} px apart "
         f"before, {found.after_rms_px:.3f} px after"
     )
-    step = record("registration", tuple(maps), found.figures, problems, good)
+    remarks = worse("the distance of the chips", found.before_rms_px, found.after_rms_px)
+    step = record("registration", tuple(maps), found.figures, problems, good, remarks=remarks)
     return Outcome(step, {"ir_registration": found.ir_registration}, {"registration": found})
 
 
@@ -76,7 +78,8 @@ def poses(captures: Captures, maps: Maps, registered: Registration | None) -> Ou
     figures = {f"{name}_mean_px": fit.mean_px for name, fit in fits.items()}
     figures |= {f"{name}_worst_px": fit.max_px for name, fit in fits.items()}
     figures |= {f"{name}_left_out": float(fit.left_out) for name, fit in fits.items()}
-    figures["covered_percent"] = 100 * float((covered > 0).mean())
+    seen = seen_image([pose.view for pose in observed])
+    figures["covered_percent"] = 100 * float(seen.mean())
     problems = _pose_problems(figures, covered)
     means = ", ".join(f"{name} {fit.mean_px:.3f} px" for name, fit in fits.items())
     good = f"mean reprojection error: {means}; the board covered {figures['covered_percent']:.0f} % of the image"
@@ -84,7 +87,7 @@ def poses(captures: Captures, maps: Maps, registered: Registration | None) -> Ou
     good += f"; {lost} outliers were left out" if lost else ""
     step = record("poses", tuple(maps), figures, problems, good, _observations(rig, observed))
     fields = {name: fit.device for name, fit in fits.items()}
-    return Outcome(step, fields, {"rig": rig, "observed": observed, "covered": covered})
+    return Outcome(step, fields, {"rig": rig, "observed": observed, "seen": seen})
 
 
 def coverage(views: list[View]) -> NDArray[np.intp]:
@@ -95,6 +98,16 @@ def coverage(views: list[View]) -> NDArray[np.intp]:
         points[:, 1], points[:, 0], bins=COVERAGE_GRID, range=((-0.5, height - 0.5), (-0.5, width - 0.5))
     )[0]
     return np.asarray(counts, np.intp)
+
+
+def seen_image(views: list[View]) -> NDArray[np.bool_]:
+    """Return which pixels of the image, (H, W), lie inside the outline of the board points of any view."""
+    width, height = views[0].size_px
+    seen = np.zeros((height, width), np.uint8)
+    for view in views:
+        outline = cv2.convexHull(np.round(view.points_px).astype(np.int32))
+        cv2.fillConvexPoly(seen, outline, 1)
+    return seen.astype(np.bool_)
 
 
 def _view(lit: ProjectorMap, target: Any, words: str) -> View:

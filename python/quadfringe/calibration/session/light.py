@@ -9,7 +9,7 @@ from quadfringe.calibration.channels import fit_channels
 from quadfringe.calibration.flat import flat_field
 from quadfringe.calibration.levels import dark_level, mean_levels
 from quadfringe.calibration.session.captures import Captures
-from quadfringe.calibration.session.outcome import Outcome, record
+from quadfringe.calibration.session.outcome import Outcome, record, worse
 
 __all__ = ["dark", "flat", "levels"]
 
@@ -59,7 +59,11 @@ def levels(captures: Captures, dark_row: tuple[float, ...]) -> Outcome:
         f"crosstalk {figures['stray_before_percent']:.1f} % before, {figures['stray_after_percent']:.2f} % after; "
         f"levels err by {before:.1f} % before, {after:.2f} % after"
     )
-    outcome = record("levels", plan.names, figures, problems, good)
+    remarks = [
+        *worse("crosstalk", figures["stray_before_percent"], figures["stray_after_percent"]),
+        *worse("the error of the levels", before, after),
+    ]
+    outcome = record("levels", plan.names, figures, problems, good, remarks=remarks)
     return Outcome(outcome, found.keywords(), {"channels": found, "level_plan": plan, "levels": seen})
 
 
@@ -80,4 +84,5 @@ def flat(captures: Captures, dark_row: tuple[float, ...]) -> Outcome:
         f"uneven by {before:.1f} % before, {after:.2f} % after; pixels differ by {figures['pixels_percent']:.2f} %, "
         f"{found.defects} are defective; decoding needs no correction for it"
     )
-    return Outcome(record("flat", names, figures, problems, good), {}, {"flat": found})
+    remarks = worse("the unevenness", before, after)
+    return Outcome(record("flat", names, figures, problems, good, remarks=remarks), {}, {"flat": found})

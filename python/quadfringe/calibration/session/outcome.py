@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 from quadfringe.data import CalibrationStep
 
-__all__ = ["Outcome", "record"]
+__all__ = ["Outcome", "record", "worse"]
 
 
 @dataclass(frozen=True)
@@ -27,10 +27,22 @@ def record(
     problems: list[str],
     good: str,
     settings: Mapping[str, Any] | None = None,
+    remarks: Sequence[str] = (),
 ) -> CalibrationStep:
-    """Make the record of a step: good with the text `good`, or not good with its problems."""
+    """Make the record of a step: good with the text `good`, or not good with its problems; `remarks` follow either."""
     rounded = {name: float(f"{value:.6g}") for name, value in figures.items()}
-    verdict = "; ".join(problems) if problems else good
+    verdict = "; ".join([*(problems or [good]), *remarks])
     return CalibrationStep(
         name=name, inputs=inputs, settings=dict(settings or {}), figures=rounded, good=not problems, verdict=verdict
     )
+
+
+def worse(what: str, before: float, after: float) -> list[str]:
+    """Say that a correction made things worse; nothing when it did not.
+
+    >>> worse("crosstalk", 0.2, 0.3)
+    ['crosstalk is worse after the correction than before it: leave the correction out']
+    >>> worse("crosstalk", 0.3, 0.2)
+    []
+    """
+    return [f"{what} is worse after the correction than before it: leave the correction out"] if after > before else []

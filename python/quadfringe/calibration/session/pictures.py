@@ -2,122 +2,182 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from quadfringe.calibration.acceptance import write_acceptance
 from quadfringe.calibration.levels import CHANNELS
 from quadfringe.calibration.session.flow import Guided
 from quadfringe.calibration.session.outcome import Outcome
-from quadfringe.errors import require
-from quadfringe.files import atomic, folder_for
+from quadfringe.decoding.compare import rms
+from quadfringe.files import folder_for
+from quadfringe.view import style
+from quadfringe.view.report import Drawable, Graph, Panel, draw_panels
 
-__all__ = ["write_pictures"]
+__all__ = ["write_picture", "write_pictures"]
 
-COLOURS = ("tab:red", "tab:green", "tab:blue", "tab:gray")
+Array = NDArray[np.float64]
 ARROW = 0.1  # largest length of a residual arrow, share of the image width
+BINS = 40
+MAP_INCHES = (4.6, 3.7)  # width and height of a drawing over the image
 
 
 def write_pictures(folder: Path, guided: Guided) -> list[Path]:
     """Write one PNG for each step that has a picture; return the paths. Needs matplotlib (extra `plot`)."""
-    require("matplotlib", "plot")
-    folder_for(folder)
-    drawers: dict[str, Callable[[Any, Outcome], None]] = {
-        "levels": _levels,
-        "flat": _flat,
-        "registration": _registration,
-        "poses": _poses,
-        "planes": _planes,
-    }
-    written = []
-    for outcome in guided.outcomes:
-        path = folder / f"{outcome.step.name}.png"
-        if outcome.step.name in drawers:
-            _draw(path, outcome, drawers[outcome.step.name])
-            written.append(path)
-        elif outcome.step.name == "acceptance":
-            write_acceptance(path, outcome.details["acceptance"])
-            written.append(path)
-    return written
+    written = [write_picture(folder, outcome) for outcome in guided.outcomes]
+    return [path for path in written if path is not None]
 
 
-def _draw(path: Path, outcome: Outcome, drawer: Callable[[Any, Outcome], None]) -> None:
-    from matplotlib.figure import Figure
+def write_picture(folder: Path, outcome: Outcome) -> Path | None:
+    """Write the PNG of one step; return its path, None for a step without a picture. Needs matplotlib."""
+    path = folder_for(folder) / f"{outcome.step.name}.png"
+    if outcome.step.name == "acceptance":
+        write_acceptance(path, outcome.details["acceptance"])
+        return path
+    drawer = DRAWERS.get(outcome.step.name)
+    if drawer is None:
+        return None
+    word = "good" if outcome.step.good else "NOT good"
+    draw_panels(path, f"{outcome.step.name}: {word}", drawer(outcome))
+    return path
 
-    figure = Figure(figsize=(12.0, 4.6), layout="constrained")
-    word = "good" if outcome.step.good else "not good"
-    figure.suptitle(f"{outcome.step.name}: {word}", fontsize=13)
-    drawer(figure, outcome)
-    with atomic(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=90)
 
-
-def _levels(figure: Any, outcome: Outcome) -> None:
+def _levels(outcome: Outcome) -> list[list[Drawable]]:
     found, plan = outcome.details["channels"], outcome.details["level_plan"]
-    left, right = figure.subplots(1, 2)
-    for axes, error, title in ((left, found.level_before, "before"), (right, found.level_after, "after")):
-        for channel, (name, colour) in enumerate(zip(CHANNELS, COLOURS, strict=True)):
-            if channel >= plan.channels:
-                continue
-            axes.plot(100 * plan.levels[:, channel], 100 * error[:, channel], "o", color=colour, label=name, ms=4)
-        axes.axhline(0, color="k", lw=0.5)
-        axes.set(xlabel="projected level, %", ylabel="error of the level, % of full scale", title=title)
-        axes.legend(fontsize=8)
+    colours = dict(zip(CHANNELS, style.CHANNELS, strict=True))
+    panels: list[Drawable] = []
+    for words, error in (("before", found.level_before), ("after, finer scale", found.level_after)):
+        points = {
+            name: (100 * plan.levels[:, i], 100 * error[:, i]) for i, name in enumerate(CHANNELS[: plan.channels])
+        }
+        title = f"{words}: {100 * rms(error):.3g} % RMS"
+        limit = ("no error", 0.0)
+        axes = ("projected level, %", "error of the level, % of full scale")
+        panels.append(Graph(title, *axes, points, limit, points=True, colours=colours))
+    return [panels]
 
 
-def _flat(figure: Any, outcome: Outcome) -> None:
-    found = outcome.details["flat"]
-    for axes, name, gain in zip(figure.subplots(1, len(found.gain)), CHANNELS, found.gain, strict=False):
-        drawn = axes.imshow(gain, cmap="viridis", vmin=np.nanquantile(gain, 0.01), vmax=np.nanquantile(gain, 0.99))
-        axes.set_title(f"gain of {name}", fontsize=10)
-        figure.colorbar(drawn, ax=axes, shrink=0.6)
+def _flat(outcome: Outcome) -> list[list[Drawable]]:
+    gains = outcome.details["flat"].gain
+    low, high = (float(np.nanquantile(np.stack(gains), share)) for share in (0.01, 0.99))
+    return [
+        [
+            Panel(f"gain of {name}", gain, "share of the mean", "viridis", (low, high))
+            for name, gain in zip(CHANNELS, gains, strict=False)
+        ]
+    ]
 
 
-def _registration(figure: Any, outcome: Outcome) -> None:
+def _registration(outcome: Outcome) -> list[list[Drawable]]:
     found = outcome.details["registration"]
-    left, right = figure.subplots(1, 2)
     away = np.linalg.norm(found.residuals_px, axis=1)
-    left.hist(away, bins=40, color="tab:purple")
-    left.set(xlabel="distance after registration, px", ylabel="points")
-    right.plot(*found.residuals_px.T, ".", ms=2, color="tab:purple")
-    right.set(xlabel="x, px", ylabel="y, px", title="residuals", aspect="equal")
+    counts, edges = np.histogram(away, BINS)
+    middles = (edges[1:] + edges[:-1]) / 2
+    words = f"{found.before_rms_px:.3g} px RMS before, {found.after_rms_px:.3g} px after"
+    return [
+        [
+            Graph(words, "distance after registration, px", "points", {"": (middles, counts)}),
+            Graph("residuals", "x, px", "y, px", {"": tuple(found.residuals_px.T)}, points=True),
+        ]
+    ]
 
 
-def _poses(figure: Any, outcome: Outcome) -> None:
-    rig, observed, covered = (outcome.details[name] for name in ("rig", "observed", "covered"))
-    left, middle, right = figure.subplots(1, 3)
-    width, height = observed[0].view.size_px
-    left.imshow(covered, cmap="Greens", extent=(-0.5, width - 0.5, height - 0.5, -0.5), vmin=0)
-    for i, pose in enumerate(observed, 1):
-        left.plot(*pose.view.points_px.T, ".", ms=2)
-        left.text(*pose.view.points_px.mean(axis=0), str(i), fontsize=9)
-    left.set(title="where the board was seen", xlabel="x, px", ylabel="y, px", xlim=(0, width), ylim=(height, 0))
+@dataclass(frozen=True)
+class _Seen:
+    """Where the board was seen: the outlines of all poses over the whole image, borders and all."""
+
+    title: str
+    image: NDArray[np.bool_]
+    points: Sequence[Array]
+    inches: tuple[float, float] = MAP_INCHES
+
+    def draw(self, _figure: Any, axes: Any, title: str | None = None) -> None:
+        """Draw the covered pixels, and the points of each pose with its number."""
+        _over_the_image(axes, self.image.shape, self.title if title is None else title)
+        axes.imshow(self.image, cmap="Greens", vmin=0.0, vmax=3.0, interpolation="nearest")
+        for i, points in enumerate(self.points, 1):
+            axes.plot(*points.T, ".", ms=1.5)
+            axes.text(*points[0], str(i), fontsize=9, ha="right", va="bottom")
+
+
+@dataclass(frozen=True)
+class _Arrows:
+    """Residuals as arrows from the points, enlarged."""
+
+    title: str
+    shape: tuple[int, int]
+    points: Sequence[Array]
+    missed: Sequence[Array]
+    times: float
+    inches: tuple[float, float] = MAP_INCHES
+
+    def draw(self, _figure: Any, axes: Any, title: str | None = None) -> None:
+        """Draw the arrows of all poses."""
+        _over_the_image(axes, self.shape, self.title if title is None else title)
+        for points, missed in zip(self.points, self.missed, strict=True):
+            axes.quiver(*points.T, *missed.T, angles="xy", scale_units="xy", scale=1 / self.times, width=0.003)
+
+
+def _over_the_image(axes: Any, shape: tuple[int, ...], title: str) -> None:
+    height, width = shape
+    axes.set(xlabel="column, px", ylabel="row, px", xlim=(-0.5, width - 0.5), ylim=(height - 0.5, -0.5))
+    axes.set_title(title, loc="left", parse_math=False)
+    axes.set_aspect("equal")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(True)
+
+
+def _poses(outcome: Outcome) -> list[list[Drawable]]:
+    rig, observed, seen = (outcome.details[name] for name in ("rig", "observed", "seen"))
+    points = [pose.view.points_px for pose in observed]
     longest = max(float(np.nanmax(np.abs(missed))) for missed in rig.camera.residuals_px)
-    times = 10.0 ** np.floor(np.log10(ARROW * width / max(longest, 1e-9)))
-    for pose, missed in zip(observed, rig.camera.residuals_px, strict=True):
-        middle.quiver(*pose.view.points_px.T, *missed.T, angles="xy", scale_units="xy", scale=1 / times, width=0.003)
-    middle.set(title=f"camera residuals, {times:g} times", xlim=(0, width), ylim=(height, 0), xlabel="x, px")
-    middle.set_aspect("equal")
-    fits = [("camera", rig.camera), ("projector", rig.visible), ("infrared", rig.infrared)]
-    shown = [(name, fit) for name, fit in fits if fit is not None]
-    for i, (name, fit) in enumerate(shown):
-        means = [float(np.nanmean(np.linalg.norm(missed, axis=1))) for missed in fit.residuals_px]
-        right.bar(np.arange(1, len(means) + 1) + 0.27 * (i - 1), means, width=0.25, label=name)
-    right.set(title="mean reprojection error of each pose", xlabel="pose", ylabel="px")
-    right.legend(fontsize=8)
+    times = float(10.0 ** np.floor(np.log10(ARROW * seen.shape[1] / max(longest, 1e-9))))
+    fits = {"camera": rig.camera, "projector": rig.visible, "infrared": rig.infrared}
+    means = {
+        f"{name}: {fit.mean_px:.3f} px": (np.arange(1, 1 + len(fit.residuals_px)), _means(fit.residuals_px))
+        for name, fit in fits.items()
+        if fit is not None
+    }
+    arrows = f"camera residuals, {times:g} times as long"
+    return [
+        [
+            _Seen(f"board seen in {100 * seen.mean():.0f} % of the image", seen, points),
+            _Arrows(arrows, seen.shape, points, rig.camera.residuals_px, times),
+            Graph("mean reprojection error of each pose", "pose", "px", means, dots=tuple(means)),
+        ]
+    ]
 
 
-def _planes(figure: Any, outcome: Outcome) -> None:
+def _means(residuals_px: Sequence[Array]) -> Array:
+    return np.array([float(np.nanmean(np.linalg.norm(missed, axis=1))) for missed in residuals_px])
+
+
+def _planes(outcome: Outcome) -> list[list[Drawable]]:
     found, polynomial, triangulated = (outcome.details[n] for n in ("heights", "polynomial", "triangulated"))
-    left, right = figure.subplots(1, 2)
-    for height, p, t in zip(found.heights_mm, polynomial, triangulated, strict=True):
-        left.errorbar(height, np.nanmean(p - t), np.nanstd(p - t), fmt="o", color="tab:blue", capsize=3)
-    left.axhline(0, color="k", lw=0.5)
-    left.set(xlabel="height of the plane, mm", ylabel="polynomial minus triangulation, mm")
+    apart = [p - t for p, t in zip(polynomial, triangulated, strict=True)]
+    name = "mean and standard deviation"
+    line = (np.array(found.heights_mm), np.array([float(np.nanmean(one)) for one in apart]))
+    spread = {name: np.array([float(np.nanstd(one)) for one in apart])}
     worst = int(np.argmax(np.abs(found.heights_mm)))
-    drawn = right.imshow(polynomial[worst] - triangulated[worst], cmap="coolwarm", vmin=-0.1, vmax=0.1)
-    right.set_title(f"difference at {found.heights_mm[worst]:g} mm", fontsize=10)
-    figure.colorbar(drawn, ax=right, shrink=0.8, label="mm")
+    words = f"difference at {found.heights_mm[worst]:g} mm: {rms(apart[worst]):.3g} mm RMS"
+    axes = ("height of the plane, mm", "polynomial less triangulation, mm")
+    return [
+        [
+            Graph("all planes", *axes, {name: line}, ("no difference", 0.0), spread=spread),
+            Panel(words, apart[worst], "mm", style.DIVERGING, style.symmetric(apart[worst])),
+        ]
+    ]
+
+
+DRAWERS: dict[str, Callable[[Outcome], list[list[Drawable]]]] = {
+    "levels": _levels,
+    "flat": _flat,
+    "registration": _registration,
+    "poses": _poses,
+    "planes": _planes,
+}

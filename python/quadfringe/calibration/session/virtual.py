@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -74,8 +74,16 @@ class VirtualCaptures:
         self._place(self._bench, "poses", name)
         return pose_maps(self.session, lambda image: np.asarray(self._fringes(image) / self._full_scale, np.float32))
 
-    def write(self, folder: Path, steps: Iterable[str] = STEP_NAMES) -> list[Path]:
-        """Write session.json and the captures of these steps as image files; return the folders of the captures."""
+    def write(
+        self,
+        folder: Path,
+        steps: Iterable[str] = STEP_NAMES,
+        done: Callable[[str, str], None] = lambda _step, _name: None,
+    ) -> list[Path]:
+        """Write session.json and the captures of these steps as image files; return the folders of the captures.
+
+        `done` is called with step and name after each capture.
+        """
         self.session.save(folder_for(folder) / FILE)
         written = []
         for step in steps:
@@ -86,6 +94,7 @@ class VirtualCaptures:
                 else:
                     write_shot(place, self.shot(step, name))
                 written.append(place)
+                done(step, name)
         return written
 
     def _write_pose(self, folder: Path, name: str) -> None:

@@ -1,45 +1,62 @@
-"""Published results computed again: each function writes a picture and returns its figures.
+"""Published results computed again: each experiment writes a picture and returns its figures.
 
 The method: "Single-shot 3D shape measurement of discontinuous objects based on a coaxial fringe projection
-system", Applied Optics (2019). Each result has a module; the results of the projector pair share
-the virtual bench of `_deviated_pair`.
+system", Applied Optics (2019). Each experiment has a module; those of the projector pair share the virtual bench of
+`_pair_bench`. `EXPERIMENTS` lists them by name, and `run_all` runs them all.
+
+>>> from quadfringe.evaluation.reproduce import named
+>>> named("pair-tolerance").name
+'tolerance'
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-
-from quadfringe.evaluation.moving_scene import hand
-from quadfringe.evaluation.reproduce.pair_calibration import pair_calibration
-from quadfringe.evaluation.reproduce.pair_correction import pair_correction
-from quadfringe.evaluation.reproduce.pair_depth import pair_depth
-from quadfringe.evaluation.reproduce.pair_deviation import pair_deviation
-from quadfringe.evaluation.reproduce.pair_tolerance import pair_tolerance
+from quadfringe.evaluation.reproduce._names import ALIASES, ALL, NAMES
+from quadfringe.evaluation.reproduce._registry import EXPERIMENTS, Experiment, named
+from quadfringe.evaluation.reproduce._together import Outcome, record_of, run_all
+from quadfringe.evaluation.reproduce.correction import correction
+from quadfringe.evaluation.reproduce.crosstalk import crosstalk
+from quadfringe.evaluation.reproduce.depth import depth
+from quadfringe.evaluation.reproduce.deviated_pair import deviated_pair
+from quadfringe.evaluation.reproduce.geometry import geometry
+from quadfringe.evaluation.reproduce.hand import hand
+from quadfringe.evaluation.reproduce.identity import identity
+from quadfringe.evaluation.reproduce.mask import mask
 from quadfringe.evaluation.reproduce.peaks import WIDTH_PX, inside, peaks, peaks_shot
-from quadfringe.evaluation.reproduction import Reproduction
+from quadfringe.evaluation.reproduce.projector_calibration import projector_calibration
+from quadfringe.evaluation.reproduce.row_profile import row_profile
+from quadfringe.evaluation.reproduce.slope_range import slope_range
+from quadfringe.evaluation.reproduce.steps import steps
+from quadfringe.evaluation.reproduce.tolerance import tolerance
+from quadfringe.evaluation.reproduction import Figure, Reproduction
 
 __all__ = [
-    "REPRODUCTIONS",
+    "ALIASES",
+    "ALL",
+    "EXPERIMENTS",
+    "NAMES",
     "WIDTH_PX",
+    "Experiment",
+    "Figure",
+    "Outcome",
     "Reproduction",
+    "correction",
+    "crosstalk",
+    "depth",
+    "deviated_pair",
+    "geometry",
     "hand",
+    "identity",
     "inside",
-    "pair_calibration",
-    "pair_correction",
-    "pair_depth",
-    "pair_deviation",
-    "pair_tolerance",
+    "mask",
+    "named",
     "peaks",
     "peaks_shot",
+    "projector_calibration",
+    "record_of",
+    "row_profile",
+    "run_all",
+    "slope_range",
+    "steps",
+    "tolerance",
 ]
-
-REPRODUCTIONS: dict[str, Callable[[Path], Reproduction]] = {
-    "hand": hand,
-    "peaks": peaks,
-    "pair-deviation": pair_deviation,
-    "pair-tolerance": pair_tolerance,
-    "pair-calibration": pair_calibration,
-    "pair-correction": pair_correction,
-    "pair-depth": pair_depth,
-}

@@ -16,8 +16,9 @@ from quadfringe.data import Shot, core_device
 from quadfringe.decoding import Plan, decode
 from quadfringe.decoding.compare import rms
 from quadfringe.decoding.stages import carrier, fourier, linear_light
-from quadfringe.evaluation.reproduction import Reproduction
-from quadfringe.view.report import Panel, draw_panels
+from quadfringe.evaluation.reproduction import Figure, Reproduction
+from quadfringe.view.report import Graph, Panel, draw_panels
+from quadfringe.view.style import DIVERGING, symmetric
 
 __all__ = ["WIDTH_PX", "PeaksShot", "inside", "peaks", "peaks_shot"]
 
@@ -31,6 +32,8 @@ FIELD_MM = 300.0  # width of the field of view
 DEPTH_MM = 800.0  # distance of the surface
 ANGLE_DEG = 45.0  # between the axes of camera and projector
 DISTANCE_MM = 5000.0  # from projector to object: fringes of nearly one period
+WORDS = {"traditional_ftp": "traditional FTP", "improved_ftp": "improved FTP", "proposed": "proposed"}
+PUBLISHED_RAD = {"traditional_ftp": 0.1316, "improved_ftp": 0.0408, "proposed": 0.0099}  # along the row
 PEAKS_SCALE_MM = 4.0  # slopes take the local fringe frequency from 0.43 to 1.6 of the carrier
 
 
@@ -50,10 +53,15 @@ def peaks(out: Path) -> Reproduction:
         "proposed": shape.phase_rad - truth_rad,
     }
     errors = {name: inside(miss, period_px) for name, miss in misses.items()}
-    figures = {f"{name}_rms_rad": rms(error) for name, error in errors.items()}
-    figures |= {f"{name}_rms_rad_row{ROW}": rms(error[ROW]) for name, error in errors.items()}
-    _draw(out / "peaks.png", shot, truth_rad, errors, figures)
-    return Reproduction(figures, out / "peaks.png")
+    field = [Figure(f"{name}_rms_rad", f"{WORDS[name]}, full field", rms(e), "rad RMS") for name, e in errors.items()]
+    row = [
+        Figure(f"{name}_rms_rad_row{ROW}", f"{WORDS[name]}, row {ROW}", rms(e[ROW]), "rad RMS", PUBLISHED_RAD[name])
+        for name, e in errors.items()
+    ]
+    better = all(one.value <= (one.published or 0.0) for one in row[1:])
+    verdict = f"improved FTP and the proposed method err {'less' if better else 'MORE'} than published"
+    _draw(out / "peaks.png", shot, truth_rad, errors)
+    return Reproduction((*field, *row), (out / "peaks.png",), verdict)
 
 
 class PeaksShot(NamedTuple):
@@ -118,16 +126,29 @@ def inside(error: Map, period_px: float) -> Map:
     return blank
 
 
-def _draw(path: Path, shot: Shot, truth_rad: Map, errors: Mapping[str, Map], figures: Mapping[str, float]) -> None:
-    titles = {"traditional_ftp": "traditional FTP", "improved_ftp": "improved FTP", "proposed": "proposed"}
+def _draw(path: Path, shot: Shot, truth_rad: Map, errors: Mapping[str, Map]) -> None:
     limits = (float(np.nanmin(truth_rad)), float(np.nanmax(truth_rad)))
-    maps = [Panel(titles[n], truth_rad + e, "rad", "turbo", limits) for n, e in errors.items()]
+    common, fine = symmetric(errors["traditional_ftp"], errors["improved_ftp"]), symmetric(errors["proposed"])
+    x = np.arange(WIDTH_PX)
+    along = {f"{WORDS[n]}: {rms(e[ROW]):.4f} rad RMS": (x, e[ROW]) for n, e in errors.items()}
+    alone = {name: line for name, line in along.items() if name.startswith("proposed")}
+    maps = [Panel(WORDS[n], truth_rad + e, "rad", "turbo", limits) for n, e in errors.items()]
     misses = [
-        Panel(f"error {titles[n]}: {figures[f'{n}_rms_rad']:.4f} rad RMS", e, "rad", "coolwarm", (-0.3, 0.3))
+        Panel(
+            f"{WORDS[n]}: error{', finer scale' if n == 'proposed' else ''}",
+            e,
+            "rad",
+            DIVERGING,
+            fine if n == "proposed" else common,
+        )
         for n, e in errors.items()
     ]
-    rows = [
+    rows: list[list[Panel | Graph]] = [
         [Panel("exact phase", truth_rad, "rad", "turbo", limits), *maps],
-        [Panel("captured red", shot.red, "", "gray", (0.0, 255.0)), *misses],
+        [Panel("captured red", shot.red, "counts", "gray", (0.0, 255.0)), *misses],
+        [
+            Graph(f"error along row {ROW}", "column, px", "rad", along),
+            Graph(f"error along row {ROW}, finer scale", "column, px", "rad", alone),
+        ],
     ]
-    draw_panels(path, "peaks, 3 % noise, 8 bit", rows)
+    draw_panels(path, "peaks, 3 % noise, 8 bit: phase of 36 fringes", rows)

@@ -9,36 +9,45 @@ from numpy.typing import NDArray
 
 from quadfringe import _core
 from quadfringe.calibration.projector_pair import AXES
-from quadfringe.evaluation.reproduce._deviated_pair import FRINGES, PLANE_MM, ProjectorPair, ideal_pair
-from quadfringe.evaluation.reproduction import Reproduction
+from quadfringe.evaluation.reproduce._pair_bench import FRINGES, PLANE_MM, ProjectorPair, ideal_pair
+from quadfringe.evaluation.reproduction import Figure, Reproduction
 from quadfringe.view.report import Graph, draw_panels
 
-__all__ = ["orders_are_right", "pair_tolerance", "tolerances"]
+__all__ = ["orders_are_right", "tolerance", "tolerances"]
 
 LIMITS = (5.0, 5.0, 5.0, 100.0, 100.0, 100.0)  # deg and mm: beyond them the infrared light leaves the field of view
+TIMES, POINTS = 4.0, 15  # curves reach this multiple of the allowable deviation
 PRECISION = 1e-3  # relative precision of a tolerance
 
 
-def pair_tolerance(out: Path, shrink: int = 4) -> Reproduction:
+def tolerance(out: Path, shrink: int = 4) -> Reproduction:
     """Find the largest deviation of each of the six parameters for which every order of a plane is still right.
 
-    Every `shrink`-th camera pixel is checked. Writes `out`/pair-tolerance.png: the share of wrong orders against each
-    deviation. The figures have the names of `quadfringe.calibration.projector_pair.AXES`, in deg and mm; a figure that
-    equals its entry in `LIMITS` means that this parameter does no harm within the field.
+    Every `shrink`-th camera pixel is checked. Writes `out`/tolerance.png: the share of wrong orders against each
+    deviation. The figures have the names of `quadfringe.calibration.projector_pair.AXES`, in deg and mm; one that
+    equals its entry in `LIMITS`, where the search ends, is marked `at_least`: it does no harm within the field.
     """
     found = tolerances(shrink)
-    factors = np.linspace(0.0, 3.0, 13)
-    graphs = []
-    for kind in ("deg", "mm"):
-        lines = {}
-        for axis, allowed in found.items():
-            if axis.endswith(kind):
-                deviations = factors * min(allowed, LIMITS[AXES.index(axis)] / 3)
-                wrong = np.array([_wrong_percent(_deviated(axis, d, shrink)) for d in deviations])
-                lines[f"{axis[:2]}: {allowed:.3g} {kind}"] = (np.maximum(deviations, deviations[1] / 10), wrong)
-        graphs.append(Graph(f"one parameter at a time, {kind}", f"deviation, {kind}", "wrong orders, %", lines))
-    draw_panels(out / "pair-tolerance.png", "allowable deviations of the infrared projector", [graphs])
-    return Reproduction(found, out / "pair-tolerance.png")
+    records = tuple(
+        Figure(axis, f"allowable deviation, {axis[:2]}", allowed, axis[3:], at_least=allowed >= limit)
+        for (axis, allowed), limit in zip(found.items(), LIMITS, strict=True)
+    )
+    path = out / "tolerance.png"
+    graphs = [_graph(kind, [one for one in records if one.unit == kind], shrink) for kind in ("deg", "mm")]
+    draw_panels(path, "allowable deviations of the infrared projector", [graphs])
+    allowed = ", ".join(f"{one.name[:2]} {one.shown} {one.unit}" for one in records)
+    return Reproduction(records, (path,), f"every order of the plane is right up to: {allowed}")
+
+
+def _graph(kind: str, records: list[Figure], shrink: int) -> Graph:
+    """Draw the share of wrong orders against the deviation, as a multiple of the allowable one."""
+    lines = {}
+    for one in records:
+        reach = LIMITS[AXES.index(one.name)] / one.value
+        times = np.geomspace(0.1, max(1.0, min(TIMES, reach)), POINTS)
+        wrong = np.array([_wrong_percent(_deviated(one.name, t * one.value, shrink)) for t in times])
+        lines[f"{one.name[:2]}: {one.shown} {kind}"] = (times * one.value, wrong)
+    return Graph(f"one parameter at a time, {kind}", f"deviation, {kind}", "wrong orders, %", lines, log_x=True)
 
 
 def tolerances(shrink: int = 4) -> dict[str, float]:

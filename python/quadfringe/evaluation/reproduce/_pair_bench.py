@@ -30,6 +30,7 @@ __all__ = [
     "expose",
     "ideal_pair",
     "infrared_error_rad",
+    "published_camera",
     "real_pair",
     "wrong_percent",
 ]
@@ -102,7 +103,7 @@ def ideal_pair(
     """
     reference = _core.Bench(layout=layout)
     visible = device_from_core(reference.visible)
-    camera = _shrunk(device_from_core(reference.camera), shrink)
+    camera = published_camera(shrink)
     return ProjectorPair(camera, visible, deviated(visible, rotation_deg, translation_mm), layout)
 
 
@@ -119,7 +120,9 @@ def real_pair(
     return replace(pair, **devices, light=DEFECTS)
 
 
-def _shrunk(camera: Device, shrink: int) -> Device:
+def published_camera(shrink: int = 1) -> Device:
+    """Return the camera of the published bench, with 1/`shrink` of the pixels in each direction and the same field."""
+    camera = device_from_core(_core.Bench().camera)
     width, height = camera.width_px // shrink, camera.height_px // shrink
     focal = tuple(f / shrink for f in camera.focal_px)
     centre = ((width - 1) / 2, (height - 1) / 2)
