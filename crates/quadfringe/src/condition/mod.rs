@@ -14,6 +14,7 @@ mod plan;
 mod registered;
 mod response;
 mod sample;
+mod saturated;
 mod shot;
 mod unmix;
 
@@ -22,7 +23,7 @@ pub(crate) use params::{CLIPPED, LIGHT_MAX};
 pub use response::Response;
 pub use sample::Sample;
 pub use shot::Shot;
-pub(crate) use {plan::Plan, shot::checked_full_scale};
+pub(crate) use {plan::Plan, saturated::Saturated, shot::checked_full_scale};
 
 use crate::error::Limit;
 use crate::{Channel, Error, Result};

@@ -4,6 +4,7 @@ use super::linear::{Linear, row_of};
 use super::mosaic::{self, Mosaic};
 use super::params::CLIPPED;
 use super::registered::Registered;
+use super::saturated::Saturated;
 use super::shot::Images;
 use super::unmix::Unmix;
 use super::{Conditioner, Sample, Shot};
@@ -73,36 +74,28 @@ impl Plan {
         }
     }
 
-    /// Marks the pixels of a row that are not saturated in any channel, and the pixels with glare, which are saturated
-    /// in both R and B. Fringes cannot do this, because R and B are a quarter period apart.
+    /// Writes which channels of the pixels of a row are saturated.
     #[inline(always)]
-    pub fn saturation_row<T: Sample>(
-        &self,
-        shot: &Shot<'_, T>,
-        y: usize,
-        unsaturated: &mut [bool],
-        glare: &mut [bool],
-    ) {
+    pub fn saturated_row<T: Sample>(&self, shot: &Shot<'_, T>, y: usize, out: &mut [Saturated]) {
         let limit = CLIPPED * shot.full_scale();
         match &shot.images {
-            Images::Planes { colours: [red, green, blue], .. } => {
-                let rows = [red, green, blue].map(|plane| row_of(plane, y));
-                let [red, green, blue] = rows.each_ref().map(|row| &row[..unsaturated.len()]);
-                for x in 0..unsaturated.len() {
+            Images::Planes { colours, .. } => {
+                let rows = colours.each_ref().map(|plane| row_of(plane, y));
+                let [red, green, blue] = rows.each_ref().map(|row| &row[..out.len()]);
+                for (x, out) in out.iter_mut().enumerate() {
                     let [red, green, blue] = [red, green, blue].map(|row| row[x].intensity() >= limit);
-                    unsaturated[x] = !(red | green | blue);
-                    glare[x] = red & blue;
+                    *out = Saturated::new([red, green, blue, false]);
                 }
             }
-            Images::Bayer { .. } => mosaic::saturation_row(shot, y, limit, unsaturated, glare),
+            Images::Bayer { .. } => mosaic::saturated_row(shot, y, limit, out),
         }
         match (&self.registered, shot.infrared()) {
             (_, None) => {}
-            (Some(registered), Some(image)) => registered.saturation_row(image, y, limit, unsaturated),
+            (Some(registered), Some(image)) => registered.saturated_row(image, y, limit, out),
             (None, Some(image)) => {
                 let row = row_of(image, y);
-                for (unsaturated, raw) in unsaturated.iter_mut().zip(row.iter()) {
-                    *unsaturated &= raw.intensity() < limit;
+                for (out, raw) in out.iter_mut().zip(row.iter()) {
+                    *out |= Saturated::new([false, false, false, raw.intensity() >= limit]);
                 }
             }
         }

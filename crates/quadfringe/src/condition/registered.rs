@@ -2,6 +2,7 @@
 
 use super::Sample;
 use super::linear::{Linear, extend, row_of};
+use super::saturated::Saturated;
 use multiversion::multiversion;
 use ndarray::ArrayView2;
 use rayon::prelude::*;
@@ -139,15 +140,15 @@ impl Registered {
         }
     }
 
-    /// Clears the mark of pixels whose position is next to a saturated infrared pixel.
-    pub fn saturation_row<T: Sample>(
+    /// Marks infrared as saturated at pixels whose position is next to a saturated infrared pixel.
+    pub fn saturated_row<T: Sample>(
         &self,
         infrared: &ArrayView2<'_, T>,
         y: usize,
         limit: f32,
-        unsaturated: &mut [bool],
+        out: &mut [Saturated],
     ) {
-        let seen = self.seen(y, unsaturated.len());
+        let seen = self.seen(y, out.len());
         let mut x = seen.start;
         while x < seen.end {
             let end = self.end_of_run(x, seen.end, y);
@@ -155,8 +156,9 @@ impl Registered {
             for row in [top, bottom] {
                 let row = row_of(infrared, row);
                 for shift in [left, right] {
-                    let pixels = unsaturated[x..end].iter_mut().zip(&row[shift..]);
-                    pixels.for_each(|(unsaturated, raw)| *unsaturated &= raw.intensity() < limit);
+                    for (out, raw) in out[x..end].iter_mut().zip(&row[shift..]) {
+                        *out |= Saturated::new([false, false, false, raw.intensity() >= limit]);
+                    }
                 }
             }
             x = end;
@@ -205,7 +207,7 @@ fn interpolate(rows: [&[f32]; 4], start: [f32; 2], step: [f32; 2], out: &mut [f3
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Conditioner, Shot, linearise};
+    use super::super::{Conditioner, Saturated, Shot, linearise};
     use ndarray::Array2;
     use std::f64::consts::TAU;
 
@@ -275,11 +277,11 @@ mod tests {
             plan.prepare(&shot);
             plan
         });
-        let (mut unsaturated, mut glare) = ([true; 12], [false; 12]);
+        let mut saturated = [Saturated::default(); 12];
         let mut found = Vec::new();
         for y in 0..6 {
-            plan.as_ref().unwrap().saturation_row(&shot, y, &mut unsaturated, &mut glare);
-            found.extend((0..12).filter(|&x| !unsaturated[x]).map(|x| (y, x)));
+            plan.as_ref().unwrap().saturated_row(&shot, y, &mut saturated);
+            found.extend((0..12).filter(|&x| saturated[x].has(3)).map(|x| (y, x)));
         }
         assert_eq!(found, [(2, 3), (2, 4)]);
     }

@@ -3,57 +3,44 @@
 use super::model::has_quadrature;
 use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
 use super::pyramid::Level;
-use crate::condition::{Plan, Sample};
+use crate::condition::{Plan, Sample, Saturated};
 use crate::stages::{difference_carrier, quadrature_carrier};
 use crate::{Reason, Shot};
 use multiversion::multiversion;
 use ndarray::{ArrayView2, s};
 use rayon::prelude::*;
 
-/// Writes the linear light of a shot into the planes of a level. The mask `lit` becomes 0 for glare and for pixels that the
-/// infrared chip does not see; the mask `usable` becomes 0 also for saturated pixels. `reasons` tells one from the other, in
-/// rows as wide as those of the level. B alone takes the place of IR, which is dark.
+/// Writes the linear light of a shot into the planes of a level, which of its channels are saturated, and which pixels the
+/// infrared chip does not see, in rows as wide as those of the level. B alone takes the place of IR, which is dark.
 pub(super) fn linear_light<T: Sample>(
     plan: &Plan,
     shot: &Shot<'_, T>,
-    shape: [usize; 2],
+    [height, width]: [usize; 2],
     ratios: [f32; 4],
     level: &mut Level,
-    reasons: &mut Vec<Reason>,
+    marks: Marks<'_>,
 ) {
-    let [height, width] = shape;
     let stride = level.lit.len() / height;
-    let Level { light, lit, usable, .. } = level;
-    reasons.resize(lit.len(), Reason::Returned);
-    let [red, green, blue, infrared] = light.each_mut().map(|plane| plane.par_chunks_mut(stride));
-    let masks = usable.par_chunks_mut(stride).zip(lit.par_chunks_mut(stride));
-    let masks = masks.zip(reasons.par_chunks_mut(stride));
-    let rows = red.zip(green).zip(blue.zip(infrared)).zip(masks).enumerate();
-    rows.for_each_init(
-        || Saturation { unsaturated: vec![false; width], glare: vec![false; width] },
-        |saturation, (y, (((red, green), (blue, infrared)), ((usable, lit), reasons)))| {
-            let rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
-            let [usable, lit] = [usable, lit].map(|row| &mut row[..width]);
-            let masks = MaskRows { usable, lit, reasons: &mut reasons[..width] };
-            linear_row(plan, shot, y, saturation, rows, masks);
-        },
-    );
+    let Marks { saturated, reasons } = marks;
+    saturated.resize(stride * height, Saturated::default());
+    reasons.resize(stride * height, Reason::Returned);
+    let [red, green, blue, infrared] = level.light.each_mut().map(|plane| plane.par_chunks_mut(stride));
+    let marks = saturated.par_chunks_mut(stride).zip(reasons.par_chunks_mut(stride));
+    let rows = red.zip(green).zip(blue.zip(infrared)).zip(marks).enumerate();
+    rows.for_each(|(y, (((red, green), (blue, infrared)), (saturated, reasons)))| {
+        let rows = [red, green, blue, infrared].map(|row| &mut row[..width]);
+        linear_row(plan, shot, y, rows, &mut saturated[..width], &mut reasons[..width]);
+    });
     if !has_quadrature(ratios) {
-        light.swap(2, 3);
+        level.light.swap(2, 3);
+        saturated.par_iter_mut().for_each(|saturated| *saturated = saturated.blue_as_infrared());
     }
 }
 
-/// Saturation of a row of pixels.
-struct Saturation {
-    unsaturated: Vec<bool>,
-    glare: Vec<bool>,
-}
-
-/// The masks of a row of pixels.
-struct MaskRows<'a> {
-    usable: &'a mut [f32],
-    lit: &'a mut [f32],
-    reasons: &'a mut [Reason],
+/// What is known of the pixels of a shot before any fit.
+pub(super) struct Marks<'a> {
+    pub saturated: &'a mut Vec<Saturated>,
+    pub reasons: &'a mut Vec<Reason>,
 }
 
 #[multiversion(targets("x86_64+avx2"))]
@@ -61,23 +48,16 @@ fn linear_row<T: Sample>(
     plan: &Plan,
     shot: &Shot<'_, T>,
     y: usize,
-    saturation: &mut Saturation,
     mut rows: [&mut [f32]; 4],
-    masks: MaskRows<'_>,
+    saturated: &mut [Saturated],
+    reasons: &mut [Reason],
 ) {
-    let Saturation { unsaturated, glare } = saturation;
-    plan.saturation_row(shot, y, unsaturated, glare);
+    plan.saturated_row(shot, y, saturated);
     plan.row(shot, y, &mut rows);
     let [.., infrared] = rows;
-    let MaskRows { usable, lit, reasons } = masks;
-    let masks = usable.iter_mut().zip(lit).zip(reasons).zip(unsaturated.iter().zip(glare.iter()));
-    for (infrared, (((usable, lit), reason), (unsaturated, glare))) in infrared.iter().zip(masks) {
+    for (reason, infrared) in reasons.iter_mut().zip(infrared.iter()) {
         // A pixel that the infrared chip does not see takes no part in any fit.
-        let seen = infrared.is_finite();
-        *usable = if seen & *unsaturated { 1.0 } else { 0.0 };
-        *lit = if seen & !*glare { 1.0 } else { 0.0 };
-        let blind = if seen { Reason::Saturated } else { Reason::NoImage };
-        *reason = if seen & *unsaturated { Reason::Returned } else { blind };
+        *reason = if infrared.is_finite() { Reason::Returned } else { Reason::NoImage };
     }
     plan.continue_infrared(y, infrared);
 }

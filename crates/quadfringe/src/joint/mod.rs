@@ -7,6 +7,7 @@
 //! 4  fringe orders by semi-global matching                               (S4)  orders
 //! 5  photometry: offset and amplitude of every channel                         photometry
 //! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample
+//!    saturated light from the model, then steps 2 to 6 again                   saturation
 //!    minimum of the energy (J16); shadows of a pair of projectors (J33)         energy; infrared, shadows
 //! 7  motion between the channels (optional)                                    motion
 //! 8  validity: doubtful pixels become no data                                  validity
@@ -19,6 +20,7 @@
 //! The steps share the model of the intensities (`model`), a grid of cells for slowly varying quantities (`cells`), and the tuned
 //! numbers (`params`). `docs/method/joint.md` derives the steps and numbers them in the same way.
 
+mod absolute;
 mod agreement;
 mod albedo;
 mod cells;
@@ -44,6 +46,7 @@ mod pyramid;
 mod reasons;
 mod residuals;
 mod results;
+mod saturation;
 mod scene;
 mod shadows;
 mod slopes;
@@ -65,16 +68,15 @@ use cells::Grid;
 use coarse::CoarseLevel;
 use energy::{Energy, Prior};
 use infrared::PairPhase;
-use light::{fringe_period_px, linear_light};
+use light::{Marks, fringe_period_px, linear_light};
 use memory::OutputMemory;
 use motion::{Motion, Timing};
 use noise::least_modulation;
-use params::motion::ROUNDS;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
-use phase::PhaseModel;
 use propagation::Propagation;
-use pyramid::{Levels, Pyramid, Upsampler};
+use pyramid::{Pyramid, Upsampler};
 use results::Results;
+use saturation::Saturation;
 use scene::{Frame, PhaseMap, Pixels};
 use uncertainty::PhaseNoise;
 use validity::{PixelFit, Validity};
@@ -91,6 +93,7 @@ pub(crate) struct Joint {
     albedo: Albedo,
     pyramid: Pyramid,
     coarse: CoarseLevel,
+    saturation: Saturation,
     upsampler: Upsampler,
     pixels: Pixels,
     motion: Motion,
@@ -114,6 +117,7 @@ impl Joint {
             albedo: Albedo::default(),
             pyramid: Pyramid::new(stride * shape[0]),
             coarse: CoarseLevel::new(code),
+            saturation: Saturation::default(),
             upsampler: Upsampler::default(),
             pixels: Pixels::default(),
             motion: Motion::default(),
@@ -141,7 +145,10 @@ impl Joint {
     ) {
         // 1. Linear light of the four channels (S1).
         let Self { shape, ratios, .. } = *self;
-        linear_light(plan, shot, shape, ratios, &mut self.pyramid.full, &mut self.pixels.reasons);
+        let Self { pyramid, saturation, pixels, .. } = self;
+        let marks = Marks { saturated: &mut saturation.saturated, reasons: &mut pixels.reasons };
+        linear_light(plan, shot, shape, ratios, &mut pyramid.full, marks);
+        saturation.judge(&pyramid.full.light, ratios);
         // 2. The fringe period scales all windows, cells and the coarse level.
         let found = || fringe_period_px(&self.pyramid.full.light, self.shape, self.ratios);
         let period_px = options.period_px.unwrap_or_else(found);
@@ -155,6 +162,7 @@ impl Joint {
         let mut memory = OutputMemory::new(out, &mut spare, grid.pixels());
         let instants = options.channel_instants_us().map(|times| motion::in_places(times, self.ratios));
         self.absolute_phase(&frame, instants.is_some(), &mut memory);
+        self.restore_saturated(&frame, instants.is_some(), &mut memory);
         // 7. Motion between the channels.
         if let Some(instants) = instants {
             self.compensate_motion(&frame, Timing { instants, ratios: self.ratios }, &mut memory);
@@ -170,73 +178,6 @@ impl Joint {
         self.write(&frame, &noise, finish, out);
         // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image. 12. Albedo.
         self.complete(&frame, out);
-    }
-
-    /// Steps 2 to 6.
-    fn absolute_phase(&mut self, frame: &Frame<'_>, moving: bool, memory: &mut OutputMemory<'_>) {
-        let Self { pyramid, coarse, ratios, .. } = self;
-        pyramid.shrink(frame);
-        let level = &mut pyramid.coarse;
-        // 2. Mask of lit pixels.
-        let (reach_px, least) = (frame.coarse_reach_px(), frame.modulation_min);
-        coarse.find_light(level, frame.coarse, reach_px, least, memory.scratch.lend());
-        // 3. Coarse level: wrapped phase of R and B (S2), beats of G and IR (S3).
-        let scene = level.scene(frame.coarse);
-        coarse.fit_fringes(&scene, &level.lit, least);
-        // 4. Fringe orders (S4).
-        coarse.choose_orders(&scene, *ratios);
-        coarse.leave_out_shadows(level, frame.coarse, *ratios);
-        // 5. and 6. Photometry and phase from all four channels, alternating.
-        let scene = level.scene(frame.coarse);
-        coarse.refine(&scene, *ratios, moving, memory.scratch.lend());
-        pyramid.restore(frame);
-        // 6. Phase at full resolution.
-        self.upsample(frame, memory);
-        self.coarse.leave_out_fine_shadows(&mut self.pyramid.full, frame, self.ratios, &mut self.pixels);
-        self.fit_phase(frame, memory);
-    }
-
-    /// Step 6: upsamples phase and modulation from the coarse level to every pixel.
-    fn upsample(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
-        let (grid, coarse) = (frame.full.grid, &mut self.coarse);
-        if frame.coarse.factor == 1 {
-            std::mem::swap(&mut self.pixels.phase, &mut coarse.phase);
-            std::mem::swap(&mut self.pixels.modulation, &mut coarse.modulation);
-            return;
-        }
-        for plane in [&mut self.pixels.phase, &mut self.pixels.modulation] {
-            plane.resize(grid.pixels(), 0.0);
-        }
-        let (scratch, lit) = (&mut *memory.scratch.first, &mut *memory.scratch.second);
-        let light = self.pyramid.full.light.each_ref().map(Vec::as_slice);
-        coarse.lit_mask.find_again(grid, light, lit);
-        coarse.noise = coarse.lit_mask.noise;
-        coarse.lit_mask.erode(grid, frame.reach_px, scratch, lit);
-        self.pyramid.full.restrict(grid, lit);
-        let [coarse_scene, scene] = self.pyramid.scenes(frame);
-        let lit = &self.pyramid.full.lit;
-        let levels = Levels { coarse: &coarse_scene, fine: &scene, found: coarse, ratios: self.ratios, lit };
-        self.upsampler.run(levels, &mut self.pixels.phase, &mut self.pixels.modulation);
-    }
-
-    /// Step 6: fits the phase at full resolution.
-    fn fit_phase(&mut self, frame: &Frame<'_>, memory: &mut OutputMemory<'_>) {
-        let (scene, ratios) = (self.pyramid.full.scene(frame.full), self.ratios);
-        let CoarseLevel { slopes, noise, photometry, phase_fit, .. } = &mut self.coarse;
-        let window = Window::new(&scene, slopes, &self.pixels.modulation, *noise);
-        let OutputMemory { scratch, found } = memory;
-        let model = PhaseModel { scene: &scene, photometry, ratios, window };
-        phase_fit.step(model, &mut self.pixels.phase, scratch.lend(), found);
-    }
-
-    /// Step 7: estimates the motion, brings the light to one instant and repeats steps 2 to 6.
-    fn compensate_motion(&mut self, frame: &Frame<'_>, timing: Timing, memory: &mut OutputMemory<'_>) {
-        self.motion.begin(&self.pyramid.full.scene(frame.full));
-        for _ in 0..ROUNDS {
-            let map = self.pixels.map();
-            self.motion.step(&mut self.pyramid.full, frame.full, timing, &self.coarse.photometry, map);
-            self.absolute_phase(frame, true, memory);
-        }
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.
@@ -259,6 +200,7 @@ impl Joint {
         let (orders, ratios) = (&self.coarse.orders, self.ratios);
         let evidence = validity::Evidence { map, pixel, orders, ratios, limits };
         self.validity.run(&scene, evidence, quality, reasons);
+        self.saturation.invalidate(ratios, &mut self.validity.valid);
         if let Some(instants) = instants {
             self.motion.invalidate_fast(&scene, instants, &mut self.validity.valid, reasons);
         }
@@ -276,9 +218,18 @@ impl Joint {
 
     /// Steps 9 and 10, row by row: the maps of the result.
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let Self { pixels, validity, energy, agreement, wrong_order, coarse, .. } = self;
+        let Self { pixels, validity, saturation, energy, agreement, wrong_order, coarse, .. } = self;
         let lit_mask = &coarse.lit_mask;
-        let found = Results { pixels, validity, lit_mask, energy, agreement, wrong_order };
+        let found = Results {
+            pixels,
+            validity,
+            lit_mask,
+            saturation,
+            energy,
+            agreement,
+            ratios: self.ratios,
+            wrong_order,
+        };
         found.write(&self.pyramid.full.scene(frame.full), noise, finish, out);
     }
 

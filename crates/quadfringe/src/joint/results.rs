@@ -5,6 +5,7 @@ use super::cells::RowMaps;
 use super::energy::{self, Energy};
 use super::illumination::LitMask;
 use super::reasons::Reasons;
+use super::saturation::Saturation;
 use super::scene::{Pixels, Scene};
 use super::uncertainty::PhaseNoise;
 use super::validity::{self, Validity};
@@ -17,8 +18,11 @@ pub(super) struct Results<'a> {
     pub pixels: &'a Pixels,
     pub validity: &'a Validity,
     pub lit_mask: &'a LitMask,
+    pub saturation: &'a Saturation,
     pub energy: &'a Energy,
     pub agreement: &'a Agreement,
+    /// Fringe numbers divided by the first.
+    pub ratios: [f32; 4],
     /// Wrong-order probability of every node.
     pub wrong_order: &'a [f32],
 }
@@ -26,7 +30,7 @@ pub(super) struct Results<'a> {
 impl Results<'_> {
     /// Writes the maps.
     pub fn write(self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let Self { pixels, validity, lit_mask, energy, agreement, wrong_order } = self;
+        let Self { pixels, validity, lit_mask, saturation, energy, agreement, ratios, wrong_order } = self;
         let (grid, reasons) = (scene.grid, Reasons { pixels, validity, lit_mask });
         out.rows().enumerate().for_each_init(
             Default::default,
@@ -36,6 +40,7 @@ impl Results<'_> {
                 reasons.write(scene, y, maps, row.reason);
                 let variance = energy.variance(scene, y, rows);
                 noise.deviations(variance, agreement.row(scene, y, maps), row.sigma);
+                saturation.widen(scene, y, ratios, row.sigma);
                 let nodes = &wrong_order[y / grid.step * grid.columns..];
                 row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
                 finish.row(y, &mut row);

@@ -7,6 +7,7 @@
 //! less than 0.1 %; bilinear interpolation lowers it by 5 %.
 
 use super::linear::{Linear, extend, row_of};
+use super::saturated::Saturated;
 use super::{Sample, Shot};
 use crate::{BayerPattern, Channel};
 use multiversion::multiversion;
@@ -217,37 +218,21 @@ fn green_between(rows: &GreenRows<'_>, start: usize, column: usize, between: &mu
     }
 }
 
-/// Marks two kinds of pixels of row `y`: pixels whose nearest samples are not saturated, and pixels with glare, whose
-/// nearest samples of both R and B are saturated. Samples further away have a weight of at most a tenth in the
-/// interpolation.
-pub(super) fn saturation_row<T: Sample>(
-    shot: &Shot<'_, T>,
-    y: usize,
-    limit: f32,
-    unsaturated: &mut [bool],
-    glare: &mut [bool],
-) {
-    unsaturated.fill(true);
-    glare.fill(false);
+/// Writes which colours of the pixels of row `y` have a saturated sample among the nearest. Samples further away have a
+/// weight of at most a tenth in the interpolation.
+pub(super) fn saturated_row<T: Sample>(shot: &Shot<'_, T>, y: usize, limit: f32, out: &mut [Saturated]) {
+    out.fill(Saturated::default());
     let Some((raw, pattern)) = shot.mosaic() else { return };
-    let mut touched = Vec::new();
     for row in y.saturating_sub(1)..(y + 2).min(raw.nrows()) {
         let samples = row_of(&raw, row);
-        if samples.iter().fold(false, |found, s| found | (s.intensity() >= limit)) {
-            touched.resize(samples.len(), [false; 3]);
-            let saturated = samples.iter().enumerate().filter(|(_, s)| s.intensity() >= limit);
-            for (x, _) in saturated {
-                let channel = pattern.channel(row, x);
-                // A sample of G is next to the pixels of its row and of its column, so in the rows above and below only
-                // its column counts.
-                let reach = usize::from(channel != Channel::G || row == y);
-                let end = (x + reach + 1).min(samples.len());
-                touched[x.saturating_sub(reach)..end].iter_mut().for_each(|t| t[channel.index()] = true);
-            }
+        for (x, _) in samples.iter().enumerate().filter(|(_, s)| s.intensity() >= limit) {
+            let channel = pattern.channel(row, x);
+            // A sample of G is next to the pixels of its row and of its column, so in the rows above and below only
+            // its column counts.
+            let reach = usize::from(channel != Channel::G || row == y);
+            let mark = Saturated::new(std::array::from_fn(|c| c == channel.index()));
+            let end = (x + reach + 1).min(samples.len());
+            out[x.saturating_sub(reach)..end].iter_mut().for_each(|out| *out |= mark);
         }
-    }
-    for ((unsaturated, glare), [red, green, blue]) in unsaturated.iter_mut().zip(glare).zip(touched) {
-        *unsaturated = !(red || green || blue);
-        *glare = red && blue;
     }
 }

@@ -215,7 +215,8 @@ impl Cells {
                 let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
                 *phase += correction;
                 if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
-                    (*modulation, *reason) = (0.0, Reason::Misfit);
+                    *modulation = 0.0;
+                    *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
                 }
             }
         });

@@ -63,7 +63,7 @@ pub(in crate::joint) struct Level {
     pub light: [Vec<f32>; 4],
     /// 1 where light of the projector may fall, 0 for glare.
     pub lit: Vec<f32>,
-    /// 1 for pixels that may take part in a fit: not saturated, seen by both chips.
+    /// 1 for pixels that may take part in a fit: not saturated in all channels, seen by both chips.
     pub usable: Vec<f32>,
     /// The infrared phase of a calibrated pair; `None` for coaxial projectors.
     pub pair: Option<PairPhase>,

@@ -1,0 +1,98 @@
+"""Accuracy of shots that were exposed too long, as one table.
+
+    python evaluation/saturated.py [--half tune|report] [--only SCENE ...]
+
+The intensities of scenes of quadfringe.evaluation.world, and of the real captures, are multiplied by a factor and cut off
+at full scale. `sat 1`, `sat 2` are the shares of the pixels with at least one and two saturated channels. Errors of the
+scenes are those of returned pixels with the right order, in mm, errors of the captures are phases in rad; returned and
+wrong are shares of the lit pixels, of the captures right of object and wrong among returned. Mean of the seeds of a half;
+the numbers of the method were chosen on the other one.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import asdict, replace
+from pathlib import Path
+from statistics import fmean
+
+import numpy as np
+
+import quadfringe as qf
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import world
+from quadfringe.evaluation._saturated import overexposed, saturated_share
+from quadfringe.evaluation._variants import stepped
+
+HALVES = {"tune": world.TUNE, "report": world.REPORT}
+OFFSETS = {"tune": (4, 10), "report": (1, 7)}  # steps of the captures
+SCENES = ("face", "steps", "painted_face", "glossy_face", "peaks_patches_20", "clutter")
+FACTORS = (1.0, 1.15, 1.3, 1.6)
+COLUMNS = f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'RMS':>9}{'median':>9}{'99 %':>8}{'back %':>8}{'wrong %':>9}"
+
+
+def row(name: str, factor: float, shares: list[np.ndarray], figures: list[dict[str, float]]) -> str:
+    """Give one line of the table, the mean of some shots."""
+    one, two, _ = 100 * np.mean(shares, axis=0)
+    mean = {key: fmean(figure[key] for figure in figures) for key in figures[0]}
+    return (
+        f"{name:18}{factor:6.2f}{one:9.1f}{two:9.1f}{mean['rms']:9.4f}{mean['median']:9.4f}{mean['p99']:8.3f}"
+        f"{mean['returned']:8.2f}{mean['wrong']:9.4f}"
+    )
+
+
+def of_world(name: str, factor: float, seeds: tuple[int, ...], calibration: qf.Calibration) -> str:
+    """Measure a scene of the virtual bench."""
+    shares, figures = [], []
+    for seed in seeds:
+        taken = world.take(name, seed)
+        shot = overexposed(taken.shot, factor)
+        plan = qf.Plan(calibration.projector.width_px, calibration=calibration, response="linear")
+        judged = asdict(world.judge(qf.Decoder(shot, plan).decode_without_verdict(shot), taken))
+        shares.append(saturated_share(shot))
+        figures.append({key.removesuffix("_mm").removesuffix("_percent"): value for key, value in judged.items()})
+    return row(name, factor, shares, figures)
+
+
+def of_capture(data: Path, name: str, factor: float, offsets: tuple[int, ...]) -> str:
+    """Measure a real capture, whose response is left as it is."""
+    shares, figures = [], []
+    for offset in offsets:
+        scene = stepped(data, name, offset)
+        shot = overexposed(qf.Shot(scene.red, scene.green, scene.blue, scene.ir), factor)
+        shape = scenes.shape_of(replace(scene, **shot.channels), response="linear")
+        error = np.where(scene.scored, shape.phase_rad - scene.phase_rad, np.nan)
+        returned, right = np.isfinite(error), np.abs(error) < np.pi
+        errors = np.abs(error[right])
+        shares.append(saturated_share(shot))
+        figures.append(
+            {
+                "rms": float(np.sqrt(np.mean(errors**2))),
+                "median": float(np.median(errors)),
+                "p99": float(np.percentile(errors, 99)),
+                "returned": float(100 * right.sum() / scene.scored.sum()),
+                "wrong": float(100 * (1 - right.sum() / returned.sum())),
+            }
+        )
+    return row(name, factor, shares, figures)
+
+
+def main() -> None:
+    """Print errors, returned and wrong pixels of scenes and captures over the exposure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--half", choices=HALVES, default="report")
+    parser.add_argument("--only", nargs="+", metavar="SCENE", default=[*SCENES, *scenes.CAPTURES])
+    options = parser.parse_args()
+    with qf.open(qf.SystemConfig()) as scanner:
+        calibration = scanner.calibration
+    print(COLUMNS)
+    for name in options.only:
+        for factor in FACTORS:
+            if name in scenes.CAPTURES:
+                print(of_capture(scenes.data_folder(), name, factor, OFFSETS[options.half]), flush=True)
+            else:
+                print(of_world(name, factor, HALVES[options.half], calibration), flush=True)
+
+
+if __name__ == "__main__":
+    main()
