@@ -190,6 +190,6 @@ mod tests {
             cells.is_passed_by(&ray, [0.0, f64::INFINITY])
         };
         assert!(passed(30.0, 1.0) && passed(50.0, 1.0) && passed(0.0, -1.0));
-        assert!(!passed(0.0, 1.0) && !passed(3.9, 1.0) && !passed(f64::NAN, 1.0));
+        assert!(!passed(0.0, 1.0) && !passed(3.9, 1.0) && !passed(0.0, f64::NAN));
     }
 }
