@@ -35,7 +35,7 @@ def picture(page: Any) -> np.ndarray:
 
 def painted(image: np.ndarray) -> np.ndarray:
     """Pixels that are not the ground of the page: dark on the live page, white with a grey grid on the others."""
-    if np.median(image[:8]) < DARK:
+    if np.median(image[-8:, -8:]) < DARK:
         return np.asarray(image.max(axis=2) > 3 * DARK)
     return (image.max(axis=2) < 200) | (np.ptp(image, axis=2) > 30)
 
