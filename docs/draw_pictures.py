@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 import quadfringe as qf
 from quadfringe.data import AnyShot
 from quadfringe.evaluation._page import Page
-from quadfringe.evaluation.moving_scene import hand_system
+from quadfringe.evaluation.demo import live_system
 from quadfringe.view.movie import solid_picture
 from quadfringe.view.viewer import Viewer
 
@@ -77,11 +77,11 @@ def solid(shape: qf.Shape) -> NDArray[np.uint8]:
 
 
 def draw_page(path: Path) -> None:
-    """Take a picture of the live page with the hand on it."""
+    """Take a picture of the page of `quadfringe live`, with the hand on it."""
     with (
-        qf.open(hand_system()) as scanner,
-        scanner.stream(2, keep="all") as stream,
-        Viewer(port=8700, colouring="height") as viewer,
+        qf.open(live_system()) as scanner,
+        scanner.stream(4, keep="all") as stream,
+        Viewer(port=8700, stride=1, drawn="surface") as viewer,
         tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder,
         closing(Page(folder)) as page,
     ):

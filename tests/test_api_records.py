@@ -75,15 +75,20 @@ def records() -> dict[str, Any]:
     }
 
 
+def kinds_of(record: Any) -> tuple[type, ...]:
+    """Classes of a record: that of the virtual bench is derived from `Truth`."""
+    return type(record).__mro__[:-1]
+
+
 def test_the_repr_of_every_record_fits_three_lines() -> None:
     for name, record in records().items():
         words = repr(record)
         assert sum(-(-len(line) // LINE) for line in words.splitlines()) <= 3, f"{name}: {words}"
-        assert type(record).__name__ in words
+        assert any(kind.__name__ in words for kind in kinds_of(record))
 
 
 def test_every_record_is_among_them() -> None:
-    tested = {type(record) for record in records().values()}
+    tested = {kind for record in records().values() for kind in kinds_of(record)}
     for module in (data, devices, recording, scanner):
         for name in module.__all__:
             kind = getattr(module, name)

@@ -12,7 +12,7 @@ from support.bars import hold
 from typer.testing import CliRunner
 
 from quadfringe.cli import app
-from quadfringe.evaluation.demo import SCENES
+from quadfringe.evaluation.demo import SCENES, next_steps
 
 Figures = dict[str, float]
 
@@ -45,6 +45,13 @@ def test_demo_names_its_figures(demo: Figures, folder: Path) -> None:
     kinds = ("depth_rms_mm", "wrong_order_percent", "returned_percent")
     assert set(demo) == {f"{scene}_{kind}" for scene in SCENES for kind in kinds} | {"decode_ms"}
     assert json.loads((folder / "figures.json").read_text())["figures"] == demo
+
+
+def test_demo_ends_with_what_to_do_next(tmp_path: Path) -> None:
+    lines = next_steps(tmp_path)
+    assert len(lines) <= 3
+    assert str(tmp_path / "face.png") in lines[0]
+    assert lines[-1].endswith(" live")
 
 
 def test_demo_needs_no_infrared(tmp_path: Path) -> None:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import gzip
 import socket
 from collections import deque
 from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
+from urllib.request import Request, urlopen
 
 import msgspec
 import numpy as np
@@ -18,6 +20,7 @@ from websockets.exceptions import ConnectionClosedError, InvalidStatus
 import quadfringe as qf
 from quadfringe.errors import InputError, MissingExtraError
 from quadfringe.evaluation._live import VIEWPOINT
+from quadfringe.evaluation.demo import live_system
 from quadfringe.scanner.streaming import Measured
 from quadfringe.view import _server
 from quadfringe.view._messages import LARGEST_MESSAGE_BYTES, acceptable
@@ -56,6 +59,23 @@ def scanner(tmp_path_factory: pytest.TempPathFactory) -> Iterator[qf.Scanner]:
 def measured(scanner: qf.Scanner) -> Measured:
     with scanner.stream(1) as stream:
         return next(iter(stream))
+
+
+@pytest.mark.parametrize("packing", ["identity", "gzip"])
+def test_the_tab_of_the_browser_has_a_title_of_its_own(viewer: Viewer, packing: str) -> None:
+    with urlopen(Request(viewer.url, headers={"Accept-Encoding": packing})) as answer:
+        page = answer.read()
+        assert int(answer.headers["Content-Length"]) == len(page)
+    page = gzip.decompress(page) if packing == "gzip" else page
+    assert page.count(b"<title>quadfringe live</title>") == 1
+    assert b"<title>Viser</title>" not in page
+
+
+def test_without_a_system_a_hand_moves() -> None:
+    with qf.open(live_system()) as scanner:
+        scanner.projector.show(scanner.config.fringes)
+        first, later = scanner.camera.stream(2, keep="all")
+    assert np.abs(later.first.astype(float) - first.first).max() > 100
 
 
 def port_of(page: Viewer) -> int:

@@ -247,6 +247,9 @@ class Cast:
     def shadow(self) -> NDArray[np.bool_]:
         """Give the mask of visible surface that at least one projector does not light, (H, W)."""
 
+    def is_near_edge(self, reach_px: float) -> NDArray[np.bool_]:
+        """Give the mask of pixels less than `reach_px` from an edge of depth, light or surface, (H, W)."""
+
     def edge_distance_px(self) -> NDArray[np.float32]:
         """Give the distance to the nearest edge of depth, light or surface, (H, W) pixels."""
 

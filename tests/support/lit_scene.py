@@ -55,7 +55,7 @@ class LitScene:
     @property
     def truth(self) -> Truth:
         """The true points of what is in front of the camera."""
-        return self.bench._truth(self.bench._cast_at())
+        return self.bench._seen_at().truth
 
     def photograph(self, window: NDArray[np.uint8], exposure: float) -> NDArray[np.uint8]:
         """Give what the webcam sees of the scene under this image (rows, columns, RGB): blue, green, red of 8 bit."""
@@ -73,7 +73,7 @@ class LitScene:
         """Give the projector pixel (H, W, 2) that lights each pixel, outside the image in shadow, and its albedo."""
         placed = self.bench._placed
         if self._seen is None or self._seen[0] is not placed:
-            cast = self.bench._cast_at()
+            cast = self.bench._seen_at().cast
             points = cast.xyz_mm().astype(np.float64)
             lost = np.isnan(points).any(axis=2) | cast.shadow()
             matrix = np.array([[PROJECTOR.focal_px[0], 0, PROJECTOR.centre_px[0]], [0, 0, 0], [0, 0, 1.0]])

@@ -14,6 +14,7 @@ from PIL import Image
 __all__ = ["painted", "picture", "shape_on", "still_shape_on", "until"]
 
 PATIENCE_S = 90.0
+DARK = 30  # grey level
 
 
 def until(what: Callable[[], Any], why: str) -> Any:
@@ -33,7 +34,9 @@ def picture(page: Any) -> np.ndarray:
 
 
 def painted(image: np.ndarray) -> np.ndarray:
-    """Pixels that are neither the white of the page nor the grey of its grid."""
+    """Pixels that are not the ground of the page: dark on the live page, white with a grey grid on the others."""
+    if np.median(image[-8:, -8:]) < DARK:
+        return np.asarray(image.max(axis=2) > 3 * DARK)
     return (image.max(axis=2) < 200) | (np.ptp(image, axis=2) > 30)
 
 

@@ -63,7 +63,7 @@ def test_every_module_is_imported(bare: Environment) -> None:
 def test_the_demonstration_leaves_pictures(bare: Environment, encoding: list[str]) -> None:
     name = "_".join(["demo", *encoding])
     said = bare.quadfringe("demo", *encoding, "--out", name)
-    assert said.count('pip install "quadfringe[export,plot]"') == 1
+    assert said.count('pip install "quadfringe[export,plot,view]"') == 1
     figures = json.loads((bare.folder / name / "figures.json").read_text())["figures"]
     for scene in SCENES:
         hold("demo.returned_percent", figures[f"{scene}_returned_percent"])

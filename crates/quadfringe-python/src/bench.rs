@@ -237,6 +237,11 @@ impl Cast {
         Ok(detached(py, || self.0.shadow())?.into_pyarray(py))
     }
 
+    /// Pixels less than `reach_px` from the nearest edge of depth, light or surface, (H, W) bool.
+    fn is_near_edge<'py>(&self, py: Python<'py>, reach_px: f32) -> PyResult<Bound<'py, PyArray2<bool>>> {
+        Ok(detached(py, || self.0.is_near_edge(reach_px))?.into_pyarray(py))
+    }
+
     /// Distance to the nearest edge of depth, light or surface, (H, W) float32 pixels.
     fn edge_distance_px<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f32>>> {
         Ok(detached(py, || self.0.edge_distance_px())?.into_pyarray(py))

@@ -24,7 +24,7 @@ def demo(
 
     Without the extras export and plot it writes GLB files and small reports.
     """
-    from quadfringe.evaluation.demo import SCENES, missing_extras, run_scene
+    from quadfringe.evaluation.demo import SCENES, missing_extras, next_steps, run_scene
     from quadfringe.files import folder_for
 
     folder_for(out)
@@ -41,5 +41,7 @@ def demo(
     say(f"files in {out}: {', '.join(sorted(p.name for p in out.iterdir()))}", json)
     if (left_out := missing_extras()) is not None:
         say(left_out, json)
+    for line in next_steps(out):
+        say(line, json)
     write_figures(figures, out / "figures.json")
     write_figures(figures, json)

@@ -9,6 +9,7 @@ import typer
 
 from quadfringe.cli._options import (
     AllowHostOption,
+    ChannelsOfCode,
     Colouring,
     EncodingOption,
     FileSizeOption,
@@ -16,6 +17,7 @@ from quadfringe.cli._options import (
     HostOption,
     PortOption,
     ShotsOption,
+    SomeNumbers,
     SystemFile,
 )
 from quadfringe.cli._output import caution, say, stoppable
@@ -23,6 +25,7 @@ from quadfringe.cli._system import CameraOption, system_of
 from quadfringe.cli.record import require_all_recorded
 
 if TYPE_CHECKING:
+    from quadfringe.config import SystemConfig
     from quadfringe.recording import Recorder
     from quadfringe.scanner import Scanner
     from quadfringe.scanner.streaming import StreamStatistics
@@ -58,13 +61,14 @@ def live(
     view_stride: StrideOption = 2,
     clouds_per_s: CloudsOption = 4.0,
     colour: ColourOption = Colouring.texture,
-    surface: SurfaceOption = False,
+    surface: SurfaceOption = True,
     shots: ShotsOption = None,
     file_gb: FileSizeOption = None,
     allow_host: AllowHostOption = None,
 ) -> None:
     """Measure continuously and show the shape, the channels and the figures in a browser, until Ctrl-C or --shots.
 
+    Without a system and a camera, the virtual bench measures a moving hand, 512 x 384, by the published method.
     Only this machine can open the page, unless --host says otherwise; then its address contains a token. Shots that
     --record loses on a full or slow disk are counted, and make the exit status 1.
     """
@@ -79,12 +83,24 @@ def live(
         shown: dict[str, Any] = {"stride": view_stride, "colouring": colour.value, "clouds_per_s": clouds_per_s}
         shown["drawn"] = "surface" if surface else "points"
         viewer = stack.enter_context(Viewer(host, port, allow_hosts=allow_host or (), **shown))
-        scanner = stack.enter_context(open_system(system_of(system, camera, encoding, fringes)))
+        scanner = stack.enter_context(open_system(_live_system_of(system, camera, encoding, fringes)))
         recorder = None
         if record is not None:
             recorder = stack.enter_context(Recorder(record, scanner.config, scanner.calibration, file_gb=file_gb))
         measured = _follow(scanner, viewer, recorder, shots)
     _report(viewer, recorder, measured)
+
+
+def _live_system_of(
+    system: Path | None, camera: str | None, encoding: ChannelsOfCode | None, numbers: SomeNumbers | None
+) -> SystemConfig | None:
+    """Give the settings of the options; without a system and a camera, those of the moving hand."""
+    from quadfringe.evaluation.demo import live_system
+
+    config = system_of(system, camera, encoding, numbers)
+    if system is not None or camera is not None:
+        return config
+    return live_system() if config is None else live_system(config.fringes)
 
 
 def _report(viewer: Viewer, recorder: Recorder | None, stream: StreamStatistics) -> None:
@@ -106,7 +122,8 @@ def _follow(scanner: Scanner, viewer: Viewer, recorder: Recorder | None, shots: 
     stream = scanner.stream(shots, taps=taps, resume=True)
     with stoppable():
         with stream:
-            say(f"live at {viewer.url}; stop with Ctrl-C")
+            say("live; stop with Ctrl-C; the page is at")
+            say(viewer.url)
             viewer.follow(stream, recorder.statistics if recorder else None, scanner.projector_width_px)
         if shots is None:
             say("the camera delivers no more shots; the page keeps the last shape until Ctrl-C")

@@ -24,6 +24,7 @@ from quadfringe.config import (
     checked,
     shortened,
 )
+from quadfringe.data.drawing import cards, plots
 from quadfringe.errors import ConfigError
 from quadfringe.files import TEXT_BYTES, atomic, read_bytes, require_suffix
 from quadfringe.io.texts import json_of
@@ -188,6 +189,18 @@ class Calibration(Measured):
         return shortened(f"Calibration({', '.join(words)})")
 
     __str__ = __repr__
+
+    def _repr_html_(self) -> str:
+        return str(cards().calibration_card(self))
+
+    def plot(self) -> Any:
+        """Plot the devices from above, and the responses that are known; give the axes in an array.
+
+        Raises `MissingExtraError` without matplotlib (extra `plot`).
+
+        >>> calibration.plot()[0].set_title("bench 2")                                   # doctest: +SKIP
+        """
+        return plots().plot_calibration(self)
 
 
 def conditioning(calibration: Calibration | None, response: ResponseChoice | None = None) -> dict[str, Any]:

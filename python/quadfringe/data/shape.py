@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from quadfringe.config import brief, checked
 from quadfringe.data._checks import check_maps, check_types
 from quadfringe.data.calibration import Calibration
+from quadfringe.data.drawing import cards, plots
 from quadfringe.data.points import xyz_mm_of
 from quadfringe.data.reason import Reason
 from quadfringe.errors import InputError
@@ -80,6 +81,18 @@ class Shape:
         decode = self.config.get("decode", {})
         words += [f"{name} {decode[name]}" for name in ("method", "method_version") if name in decode]
         return f"Shape({', '.join(words)})"
+
+    def _repr_html_(self) -> str:
+        return str(cards().shape_card(self))
+
+    def plot(self) -> Any:
+        """Plot depth, uncertainty, quality and absolute phase, those that are known; give the axes in an array.
+
+        Raises `MissingExtraError` without matplotlib (extra `plot`).
+
+        >>> shape.plot()[0, 0].set_title("my part")                                      # doctest: +SKIP
+        """
+        return plots().plot_shape(self)
 
     @property
     def maps(self) -> dict[str, NDArray[Any]]:

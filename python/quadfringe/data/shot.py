@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from quadfringe.config import BayerPattern
 from quadfringe.data._checks import check_full_scale, check_images, check_maps, check_stamp
+from quadfringe.data.drawing import cards, plots
 from quadfringe.errors import InputError
 from quadfringe.io.images import full_scale
 
@@ -112,6 +113,23 @@ class _Exposure(Stamped, ABC):
     @abstractmethod
     def images(self) -> dict[str, NDArray[Any]]:
         """The captured images by name."""
+
+    @property
+    @abstractmethod
+    def channels(self) -> dict[str, NDArray[Any]]:
+        """The samples of each channel by name."""
+
+    def _repr_html_(self) -> str:
+        return str(cards().shot_card(self))
+
+    def plot(self) -> Any:
+        """Plot the channels as they were captured; give the axes in an array.
+
+        Raises `MissingExtraError` without matplotlib (extra `plot`).
+
+        >>> shot.plot()[0, 1].figure.savefig("channels.png")                             # doctest: +SKIP
+        """
+        return plots().plot_shot(self)
 
     @property
     def full_scale_value(self) -> float:

@@ -34,7 +34,7 @@ MARK_COLOUR = (224, 49, 49)
 LINE_PX = 3.0
 MARK_SHARE = 0.012  # radius of a mark, of that of the body
 VIEW = np.array([-0.30, -0.22, -0.80])  # from the middle of a body to the eye: nearly where its camera stood
-VIEW_RADII = 1.7  # from the middle to the eye: the body fills most of the picture
+VIEW_RADII = 1.4  # from the middle to the eye: the body fills most of the picture
 INNER = 0.7  # share of the points whose size is taken
 CLOSEST = 0.5  # of the distance to the camera of the scanner
 

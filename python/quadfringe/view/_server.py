@@ -9,12 +9,15 @@ in another way is stopped, and an error says so.
 from __future__ import annotations
 
 import asyncio
+import gzip
 import logging
 import secrets
 import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, redirect_stdout
 from dataclasses import dataclass
+from functools import lru_cache
+from html import escape
 from io import StringIO
 from socket import socket
 from typing import TYPE_CHECKING, Any
@@ -53,8 +56,8 @@ class ServedPage:
     url: str
 
 
-def serve_page(host: str, port: int, allow_hosts: Iterable[str]) -> ServedPage:
-    """Serve an empty page at `host`, to other machines only with a token that is new each time.
+def serve_page(host: str, port: int, allow_hosts: Iterable[str], title: str) -> ServedPage:
+    """Serve an empty page with a title at `host`, to other machines only with a token that is new each time.
 
     Raises `InputError` for a host or port that cannot be served, and `MissingExtraError` without the extra `view` or
     when the installed viser cannot be guarded.
@@ -63,14 +66,14 @@ def serve_page(host: str, port: int, allow_hosts: Iterable[str]) -> ServedPage:
     token = None if address.is_loopback else secrets.token_hex(TOKEN_BYTES)
     guard = Guard(address.names(allow_hosts), token, cookie=f"quadfringe-live-{address.port}")
     try:
-        server = _start(address.listening, guard)
+        server = _start(address.listening, guard, title)
     except BaseException:
         address.listening.close()
         raise
     return ServedPage(server, address.url if token is None else f"{address.url}/?token={token}")
 
 
-def _start(listening: socket, guard: Guard) -> viser.ViserServer:
+def _start(listening: socket, guard: Guard, title: str) -> viser.ViserServer:
     """Start viser on a listening socket, behind a guard."""
     module: Any = require("viser", "view")
     websockets: Any = require("websockets.asyncio.server", "view")
@@ -82,7 +85,8 @@ def _start(listening: socket, guard: Guard) -> viser.ViserServer:
                 return serve(handler, host, port, **options)  # another server of this process
             asyncio.get_running_loop().set_exception_handler(_log)
             started.append(True)
-            return serve(handler, sock=listening, **options | _guarding(websockets, guard, options["process_request"]))
+            page = _titled(options["process_request"], title)
+            return serve(handler, sock=listening, **options | _guarding(websockets, guard, page))
 
         return serve_guarded
 
@@ -115,6 +119,27 @@ def _replaced(module: Any, name: str, change: Callable[[Callable[..., Any]], Cal
 def _log(_loop: object, context: dict[str, Any]) -> None:
     """Keep faults of single requests off the terminal: any client can cause them."""
     logger.debug("%s: %r", context.get("message"), context.get("exception"))
+
+
+def _titled(answer: Callable[[Any, Any], Any], title: str) -> Callable[[Any, Any], Any]:
+    """Give the page of viser a title in the tab of the browser."""
+
+    def answer_titled(connection: Any, request: Any) -> Any:
+        response = answer(connection, request)
+        if response is not None and response.headers.get("Content-Type", "").startswith("text/html"):
+            response.body = _with_title(response.body, title, response.headers.get("Content-Encoding") == "gzip")
+            del response.headers["Content-Length"]
+            response.headers["Content-Length"] = str(len(response.body))
+        return response
+
+    return answer_titled
+
+
+@lru_cache(maxsize=4)
+def _with_title(body: bytes, title: str, packed: bool) -> bytes:
+    text = gzip.decompress(body) if packed else body
+    text = text.replace(b"<title>Viser</title>", f"<title>{escape(title)}</title>".encode("utf-8", "replace"), 1)
+    return gzip.compress(text, mtime=0) if packed else text
 
 
 def _guarding(websockets: Any, guard: Guard, answer: Callable[[Any, Any], Any]) -> dict[str, Any]:

@@ -57,7 +57,7 @@ class SavedViewer:
             raise InputError("paths: expected at least one file")
         self._files = [open_file(Path(path)) for path in paths]
         first = _first_item(self._files[0])
-        page = serve_page(host, port, allow_hosts)
+        page = serve_page(host, port, allow_hosts, f"quadfringe view: {Path(paths[0]).name}")
         self._server, self.url = page.server, page.url
         self._lock = threading.Lock()
         self._closed = False

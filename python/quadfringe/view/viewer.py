@@ -70,7 +70,7 @@ class Viewer:
         allow_hosts: Iterable[str] = (),
     ) -> None:
         check_controls(stride, clouds_per_s, colouring, drawn)
-        page = serve_page(host, port, allow_hosts)
+        page = serve_page(host, port, allow_hosts, "quadfringe live")
         self._server, self.url = page.server, page.url
         self._faults = _Faults()
         self._scene = Scene(self._server)
@@ -90,7 +90,7 @@ class Viewer:
 
     def _build(self, stride: int, clouds_per_s: float, colouring: Colouring, drawn: Drawn) -> None:
         gui = self._server.gui
-        gui.configure_theme(show_logo=False, show_share_button=False, control_width="large")
+        gui.configure_theme(dark_mode=True, show_logo=False, show_share_button=False, control_width="large")
         gui.main_panel.dock_right()
         gui.set_panel_label("quadfringe live")
         self._controls = Controls(gui, stride, clouds_per_s, colouring, drawn)

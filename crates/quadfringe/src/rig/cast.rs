@@ -1,13 +1,13 @@
 //! Ray casting: one ray through each camera pixel, and the projector position that lights the surface point it meets
 //! (S9).
 
-use ndarray::{Array2, Axis};
+use ndarray::Array2;
 use rayon::prelude::*;
 
-use super::params::{SHADOW_GAP_MM, STEP_FOOTPRINTS};
+use super::params::{PIXELS_AT_ONCE, SHADOW_GAP_MM, STEP_FOOTPRINTS};
 use super::{Bench, Projector};
 use crate::optics::{Device, Ray, dot};
-use crate::surface::Surface;
+use crate::surface::{RangedRay, Surface};
 
 /// What one camera pixel sees.
 ///
@@ -86,36 +86,53 @@ impl Bench {
     /// Hits of the pixels (x, y) of a chip; `visible` maps (x, y, 1) to the visible pixel that sees the same point.
     fn hits(&self, surface: &dyn Surface, visible: [[f64; 3]; 2]) -> Array2<Hit> {
         let size = (self.camera.height, self.camera.width);
-        let mut hits = Array2::from_elem(size, Hit::NOTHING);
-        let coaxial = self.visible == self.infrared;
-        let projectors = Projector::ALL.map(|projector| {
-            let device = self.projector(projector);
-            (device, device.centre_mm())
-        });
-        hits.axis_iter_mut(Axis(0)).into_par_iter().enumerate().for_each(|(row, mut line)| {
-            for (column, hit) in line.iter_mut().enumerate() {
-                let pixel = visible.map(|r| r[0] * column as f64 + r[1] * row as f64 + r[2]);
-                let ray = self.camera.ray(pixel);
-                let Some(t) = surface.hit(&ray, [0.0, f64::INFINITY]) else {
-                    continue;
-                };
-                let point = ray.at(t);
-                let normal = surface.normal(point);
-                hit.xyz_mm = point;
-                for (index, (device, centre)) in projectors.iter().enumerate() {
-                    if index == 1 && coaxial {
-                        hit.lit_from_px[1] = hit.lit_from_px[0];
-                        hit.facing[1] = hit.facing[0];
-                        continue;
-                    }
-                    let lit = light_at(surface, device, *centre, point, normal);
-                    hit.facing[index] = lit.facing;
-                    hit.lit_from_px[index] = lit.from_px.unwrap_or([f64::NAN; 2]);
+        let mut hits = vec![Hit::NOTHING; size.0 * size.1];
+        hits.par_chunks_mut(PIXELS_AT_ONCE).enumerate().for_each(|(chunk, line)| {
+            let ray = |index: usize| {
+                let index = chunk * PIXELS_AT_ONCE + index;
+                let (x, y) = ((index % size.1) as f64, (index / size.1) as f64);
+                self.camera.ray(visible.map(|r| r[0] * x + r[1] * y + r[2]))
+            };
+            let ranged = |index| RangedRay { ray: ray(index), range_mm: [0.0, f64::INFINITY] };
+            let rays: Vec<RangedRay> = (0..line.len()).map(ranged).collect();
+            let mut seen: Vec<Seen> = Vec::with_capacity(line.len());
+            for (index, found) in surface.hit_all(&rays).into_iter().enumerate() {
+                if let Some(t) = found {
+                    let point = rays[index].ray.at(t);
+                    line[index].xyz_mm = point;
+                    seen.push(Seen { index, point, normal: surface.normal(point) });
                 }
             }
+            self.light(surface, &seen, line);
         });
-        hits
+        Array2::from_shape_vec(size, hits).expect("one hit for each pixel")
     }
+
+    /// Sets the light of both projectors at the pixels of `line` that see the surface.
+    fn light(&self, surface: &dyn Surface, seen: &[Seen], line: &mut [Hit]) {
+        for projector in Projector::ALL {
+            let side = projector.index();
+            if side == 1 && self.visible == self.infrared {
+                for hit in line {
+                    hit.lit_from_px[1] = hit.lit_from_px[0];
+                    hit.facing[1] = hit.facing[0];
+                }
+                break;
+            }
+            for (Seen { index, .. }, lit) in seen.iter().zip(lit_by(self.projector(projector), surface, seen))
+            {
+                line[*index].facing[side] = lit.facing;
+                line[*index].lit_from_px[side] = lit.from_px.unwrap_or([f64::NAN; 2]);
+            }
+        }
+    }
+}
+
+/// A point of the surface that a pixel of several sees.
+struct Seen {
+    index: usize,
+    point: [f64; 3],
+    normal: [f64; 3],
 }
 
 /// Light of a projector at a point of the surface.
@@ -126,19 +143,28 @@ struct Lit {
     from_px: Option<[f64; 2]>,
 }
 
-/// Light of a projector at a point of the surface with this normal.
-fn light_at(
-    surface: &dyn Surface,
-    projector: &Device,
-    centre: [f64; 3],
-    point: [f64; 3],
-    normal: [f64; 3],
-) -> Lit {
-    let away: [f64; 3] = std::array::from_fn(|i| point[i] - centre[i]);
-    let distance = dot(away, away).sqrt();
-    let ray = Ray { origin_mm: centre, direction: away.map(|c| c / distance) };
-    let facing = -dot(normal, ray.direction);
-    let pixel = projector.project(point).filter(|pixel| facing > 0.0 && projector.contains(*pixel));
-    let lit = pixel.filter(|_| surface.hit(&ray, [0.0, distance - SHADOW_GAP_MM]).is_none());
-    Lit { facing, from_px: lit }
+/// Light of a projector at points of the surface.
+fn lit_by(projector: &Device, surface: &dyn Surface, seen: &[Seen]) -> Vec<Lit> {
+    let centre = projector.centre_mm();
+    // Rays to the points that are lit unless something stands in the way.
+    let (mut rays, mut indices) = (Vec::with_capacity(seen.len()), Vec::with_capacity(seen.len()));
+    let mut lights = Vec::with_capacity(seen.len());
+    for Seen { point, normal, .. } in seen {
+        let away: [f64; 3] = std::array::from_fn(|i| point[i] - centre[i]);
+        let distance = dot(away, away).sqrt();
+        let ray = Ray { origin_mm: centre, direction: away.map(|c| c / distance) };
+        let facing = -dot(*normal, ray.direction);
+        let from_px = projector.project(*point).filter(|pixel| facing > 0.0 && projector.contains(*pixel));
+        if from_px.is_some() {
+            rays.push(RangedRay { ray, range_mm: [0.0, distance - SHADOW_GAP_MM] });
+            indices.push(lights.len());
+        }
+        lights.push(Lit { facing, from_px });
+    }
+    for (index, in_the_way) in indices.into_iter().zip(surface.hit_all(&rays)) {
+        if in_the_way.is_some() {
+            lights[index].from_px = None;
+        }
+    }
+    lights
 }

@@ -14,6 +14,7 @@ mod options;
 mod params;
 mod predeform;
 mod print;
+mod quick;
 mod render;
 mod truth;
 

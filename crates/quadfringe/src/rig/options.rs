@@ -61,6 +61,16 @@ impl Albedo {
         }
     }
 
+    /// The greatest albedo anywhere.
+    pub(super) fn greatest(&self) -> f32 {
+        match self {
+            Self::Uniform(albedo) | Self::Patches { albedo, .. } => {
+                albedo.iter().copied().fold(0.0, f32::max)
+            }
+            Self::Image(image) => image.iter().copied().fold(0.0, f32::max),
+        }
+    }
+
     fn check(&self, shape: (usize, usize)) -> Result<()> {
         let valid = |level: &f32| level.is_finite() && *level >= 0.0;
         let levels_are_valid = match self {

@@ -3,6 +3,7 @@
 use ndarray::{Array2, Axis};
 use rayon::prelude::*;
 
+use super::quick::Quick;
 use super::{Bench, Cast, Hit, Light, Projector, RenderOptions, blur, expose, mosaic};
 use crate::encoding::Channel;
 use crate::error::{Error, Result};
@@ -188,6 +189,7 @@ impl Bench {
         let moving = casts.iter().any(|cast| !std::ptr::eq(*cast, casts[0]));
         let painter = Painter { bench: self, lights, options };
         let infrared_hits = casts[0].infrared_hits.is_some().then(|| casts.map(Cast::infrared_hits));
+        let quick = if moving || infrared_hits.is_some() { None } else { Quick::new(self, lights, options) };
         red.axis_iter_mut(Axis(0))
             .into_par_iter()
             .zip(green.axis_iter_mut(Axis(0)))
@@ -195,17 +197,16 @@ impl Bench {
             .zip(infrared.axis_iter_mut(Axis(0)))
             .enumerate()
             .for_each(|(row, (((mut red, mut green), mut blue), mut infrared))| {
+                let levels = quick.as_ref().map(|quick| quick.levels(casts[0].hits.row(row)));
                 for column in 0..shape.1 {
                     let pixel = [row, column];
                     let hits = casts.map(|cast| &cast.hits[pixel]);
-                    let light = painter.light(Projector::Visible, pixel, hits, moving);
-                    red[column] = painter.captured(Channel::R, light);
-                    green[column] = painter.captured(Channel::G, light);
-                    blue[column] = painter.captured(Channel::B, light);
-                    let hits = infrared_hits.map(|all| all.map(|hits| &hits[pixel]));
-                    let light =
-                        hits.map_or(light, |hits| painter.light(Projector::Infrared, pixel, hits, moving));
-                    infrared[column] = painter.captured(Channel::Ir, light);
+                    let found = levels.as_ref().zip(quick.as_ref()).and_then(|(levels, quick)| {
+                        quick.certain(painter.mixed(painter.light_of(pixel, hits[0], levels.at(column))))
+                    });
+                    let hidden = infrared_hits.map(|all| all.map(|hits| &hits[pixel]));
+                    let captured = found.unwrap_or_else(|| painter.captured(pixel, hits, hidden, moving));
+                    [red[column], green[column], blue[column], infrared[column]] = captured;
                 }
             });
         planes
@@ -225,21 +226,54 @@ impl Painter<'_, '_> {
     fn light(&self, chip: Projector, pixel: [usize; 2], hits: [&Hit; 3], moving: bool) -> [f64; 4] {
         let mut light = [0.0; 4];
         for (channel, hit) in Channel::ALL.into_iter().zip(hits) {
-            light[channel.index()] = self.reflected(channel, chip, pixel, hit);
+            light[channel.index()] = self.reflected(channel, chip, pixel, hit, None);
         }
-        let infrared = |hit: &Hit| self.reflected(Channel::Ir, chip, pixel, hit);
+        let infrared = |hit: &Hit| self.reflected(Channel::Ir, chip, pixel, hit, None);
         light[3] = if moving { hits.into_iter().map(infrared).sum::<f64>() / 3.0 } else { infrared(hits[0]) };
         light
     }
 
-    /// Light that a captured channel receives from all projected channels.
-    fn captured(&self, channel: Channel, light: [f64; 4]) -> f32 {
-        let row = &self.options.crosstalk[channel.index()];
-        let mixed = row.iter().zip(light).map(|(share, light)| share * light).sum::<f64>();
-        (self.options.gain[channel.index()] * mixed) as f32
+    /// Light that each captured channel receives at a pixel. `hits` holds its hit at the instants of R, G and B, `hidden` that
+    /// of the pixel of the infrared chip if it is another one.
+    fn captured(
+        &self,
+        pixel: [usize; 2],
+        hits: [&Hit; 3],
+        hidden: Option<[&Hit; 3]>,
+        moving: bool,
+    ) -> [f32; 4] {
+        let light = self.light(Projector::Visible, pixel, hits, moving);
+        let infrared = hidden.map_or(light, |hits| self.light(Projector::Infrared, pixel, hits, moving));
+        let ([red, green, blue, _], [.., infrared]) = (self.mixed(light), self.mixed(infrared));
+        [red, green, blue, infrared].map(|light| light as f32)
     }
 
-    fn reflected(&self, channel: Channel, chip: Projector, pixel: [usize; 2], hit: &Hit) -> f64 {
+    /// Light of the four projected channels at a pixel at rest, where the levels of the projectors are known.
+    fn light_of(&self, pixel: [usize; 2], hit: &Hit, levels: [f64; 4]) -> [f64; 4] {
+        Channel::ALL.map(|channel| {
+            let level = Some(levels[channel.index()]);
+            self.reflected(channel, Projector::Visible, pixel, hit, level)
+        })
+    }
+
+    /// Light that each captured channel receives from all projected channels.
+    fn mixed(&self, light: [f64; 4]) -> [f64; 4] {
+        std::array::from_fn(|captured| {
+            let row = &self.options.crosstalk[captured];
+            let mixed = row.iter().zip(light).map(|(share, light)| share * light).sum::<f64>();
+            self.options.gain[captured] * mixed
+        })
+    }
+
+    /// Light of one projected channel; `known` is the level that its projector sends there, if it is known.
+    fn reflected(
+        &self,
+        channel: Channel,
+        chip: Projector,
+        pixel: [usize; 2],
+        hit: &Hit,
+        known: Option<f64>,
+    ) -> f64 {
         if !hit.is_surface() {
             return 0.0;
         }
@@ -248,7 +282,7 @@ impl Painter<'_, '_> {
         if hit.is_lit(source) {
             let at = hit.lit_from_px[source.index()];
             let projector = self.bench.projector(source);
-            let level = self.lights[index].level(projector, self.bench.layout, at);
+            let level = known.unwrap_or_else(|| self.lights[index].level(projector, self.bench.layout, at));
             let exponent = self.options.projector_exponent[index];
             let sent = if exponent == 1.0 { level } else { level.max(0.0).powf(exponent) };
             light += if self.options.shading { sent * hit.facing[source.index()] } else { sent };

@@ -2,9 +2,13 @@
 
 use std::f64::consts::TAU;
 
-use super::Surface;
-use super::blend::{Capsule, join};
+use multiversion::multiversion;
+
+use super::blend::{Blend, Capsule, Lanes};
+use super::cells::Cells;
+use super::{RangedRay, Surface, around, march, normal_of};
 use crate::error::{Error, Limit, Result};
+use crate::optics::Ray;
 
 /// A hand in front of the reference plane at one instant. It waves about the wrist with a period of 2 s, its fingers close
 /// and open with a period of 3 s, and it approaches and recedes with a period of 4 s.
@@ -18,7 +22,7 @@ use crate::error::{Error, Limit, Result};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Hand {
     capsules: Vec<Capsule>,
-    bounds_mm: [[f64; 3]; 2],
+    cells: Cells,
 }
 
 const WRIST_MM: [f64; 3] = [0.0, 82.0, 752.0];
@@ -93,7 +97,9 @@ impl Hand {
             std::array::from_fn(|axis| extreme(axis, 0, f64::min) - ROUNDING_MM),
             std::array::from_fn(|axis| extreme(axis, 1, f64::max) + ROUNDING_MM),
         ];
-        Self { capsules, bounds_mm }
+        let blends = vec![Blend::Add(ROUNDING_MM); capsules.len()];
+        let cells = Cells::new(bounds_mm, &blends, |part, p_mm| capsules[part].value(p_mm));
+        Self { capsules, cells }
     }
 }
 
@@ -113,12 +119,40 @@ fn step([x, y, z]: [f64; 3], length_mm: f64, spread_rad: f64, bend_rad: f64) -> 
 
 impl Surface for Hand {
     fn value(&self, p_mm: [f64; 3]) -> f64 {
-        let mut capsules = self.capsules.iter().map(|capsule| capsule.value(p_mm));
-        let first = capsules.next().unwrap_or(f64::INFINITY);
-        capsules.fold(first, |hand, capsule| join(hand, capsule, ROUNDING_MM))
+        self.cells.blended(p_mm, |part| self.capsules[part].value(p_mm))
     }
 
     fn bounds_mm(&self) -> [[f64; 3]; 2] {
-        self.bounds_mm
+        self.cells.bounds_mm()
     }
+
+    fn value_floor(&self, p_mm: [f64; 3]) -> f64 {
+        // The bounds are wider than the capsules by more than blending lowers the value.
+        self.cells.floor_mm(p_mm).unwrap_or_else(|| self.cells.outside_mm(p_mm))
+    }
+
+    fn hit(&self, ray: &Ray, range_mm: [f64; 2]) -> Option<f64> {
+        if self.cells.is_passed_by(ray, range_mm) {
+            return None;
+        }
+        march::first_crossing(self, ray, range_mm)
+    }
+
+    fn hit_all(&self, rays: &[RangedRay]) -> Vec<Option<f64>> {
+        let mut found = vec![None; rays.len()];
+        let is_wanted = |index: &usize| !self.cells.is_passed_by(&rays[*index].ray, rays[*index].range_mm);
+        let wanted = (0..rays.len()).filter(is_wanted);
+        march::first_crossings(self, |points| values(self, points), rays, wanted, &mut found);
+        found
+    }
+
+    fn normal(&self, p_mm: [f64; 3]) -> [f64; 3] {
+        normal_of(values(self, &around(p_mm)))
+    }
+}
+
+/// Values at several points, by coordinate.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
+fn values(hand: &Hand, p_mm: &[Lanes; 3]) -> Lanes {
+    hand.cells.blended_all(hand.cells.parts_at_all(p_mm), |part| hand.capsules[part].values(p_mm))
 }

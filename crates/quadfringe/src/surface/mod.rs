@@ -5,6 +5,7 @@
 //! bracket around the crossing to far below 1e-6 mm. [`scene`] returns ready scenes near z = 800 mm by name.
 
 mod blend;
+mod cells;
 mod face;
 mod hand;
 mod march;
@@ -23,6 +24,7 @@ pub use solids::{Cuboid, Plane, Sphere};
 
 use crate::error::{Error, Result};
 use crate::optics::Ray;
+use blend::{LANES, Lanes};
 use params::NORMAL_STEP_MM;
 
 /// Distance of the reference plane of the ready scenes from the camera, mm.
@@ -30,6 +32,22 @@ pub const REFERENCE_Z_MM: f64 = 800.0;
 
 /// Names that [`scene`] accepts.
 pub const SCENES: [&str; 6] = ["plane", "peaks", "steps", "sphere", "face", "hand"];
+
+/// A ray, and the part of it that counts.
+///
+/// ```
+/// use quadfringe::{optics::Ray, surface::{Plane, RangedRay, Surface}};
+/// let ray = Ray { origin_mm: [0.0; 3], direction: [0.0, 0.0, 1.0] };
+/// let rays = [[0.0, 900.0], [0.0, 700.0]].map(|range_mm| RangedRay { ray, range_mm });
+/// assert_eq!(Plane::at_z(800.0).hit_all(&rays), [Some(800.0), None]);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RangedRay {
+    /// The ray.
+    pub ray: Ray,
+    /// Least and greatest distance from its origin, mm.
+    pub range_mm: [f64; 2],
+}
 
 /// A body bounded by an implicit surface.
 ///
@@ -57,6 +75,11 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     /// Least and greatest corner of a box that contains the surface, mm; infinite where the surface has no end.
     fn bounds_mm(&self) -> [[f64; 3]; 2];
 
+    /// A value that costs less than [`Surface::value`] at a point and is not greater; without one, minus infinity.
+    fn value_floor(&self, _p_mm: [f64; 3]) -> f64 {
+        f64::NEG_INFINITY
+    }
+
     /// Upper bound of the change of [`Surface::value`] per mm along a unit direction; 1 for distance functions.
     fn rate_limit(&self, _direction: [f64; 3]) -> f64 {
         1.0
@@ -65,6 +88,11 @@ pub trait Surface: Send + Sync + std::fmt::Debug {
     /// Distance in mm along the ray, within `[from, to]`, at which it enters the body; `None` when it stays outside.
     fn hit(&self, ray: &Ray, range_mm: [f64; 2]) -> Option<f64> {
         march::first_crossing(self, ray, range_mm)
+    }
+
+    /// [`Surface::hit`] of many rays, with the same results.
+    fn hit_all(&self, rays: &[RangedRay]) -> Vec<Option<f64>> {
+        rays.iter().map(|RangedRay { ray, range_mm }| self.hit(ray, *range_mm)).collect()
     }
 
     /// Unit normal at a point of the surface, into free space.
@@ -117,9 +145,32 @@ impl Surface for Union {
         nearest
     }
 
+    fn hit_all(&self, rays: &[RangedRay]) -> Vec<Option<f64>> {
+        let mut nearest = vec![None; rays.len()];
+        let mut rays = rays.to_vec();
+        for body in &self.0 {
+            let hits = body.hit_all(&rays);
+            for ((nearest, ray), found) in nearest.iter_mut().zip(&mut rays).zip(hits) {
+                if let Some(t) = found {
+                    (*nearest, ray.range_mm[1]) = (found, t);
+                }
+            }
+        }
+        nearest
+    }
+
     fn normal(&self, p_mm: [f64; 3]) -> [f64; 3] {
-        let nearest = self.0.iter().min_by(|a, b| a.value(p_mm).total_cmp(&b.value(p_mm)));
-        nearest.map_or([f64::NAN; 3], |body| body.normal(p_mm))
+        let mut nearest: Option<(f64, &dyn Surface)> = None;
+        for body in &self.0 {
+            if nearest.is_some_and(|(least, _)| body.value_floor(p_mm) > least) {
+                continue;
+            }
+            let value = body.value(p_mm);
+            if nearest.is_none_or(|(least, _)| value.total_cmp(&least).is_lt()) {
+                nearest = Some((value, body.as_ref()));
+            }
+        }
+        nearest.map_or([f64::NAN; 3], |(_, body)| body.normal(p_mm))
     }
 }
 
@@ -155,6 +206,21 @@ pub fn scene(name: &str, time_s: f64) -> Result<Box<dyn Surface>> {
             return Err(Error::value("scene", expected, name));
         }
     })
+}
+
+/// Points next to `p_mm` whose values give the slope along x, y and z: before and after it along each axis, by coordinate.
+fn around(p_mm: [f64; 3]) -> [Lanes; 3] {
+    let mut points = p_mm.map(|c| [c; LANES]);
+    for axis in 0..3 {
+        points[axis][2 * axis] += -NORMAL_STEP_MM;
+        points[axis][2 * axis + 1] += NORMAL_STEP_MM;
+    }
+    points
+}
+
+/// The normal from the values at [`around`].
+fn normal_of(values: Lanes) -> [f64; 3] {
+    unit(std::array::from_fn(|axis| values[2 * axis + 1] - values[2 * axis]))
 }
 
 /// The vector, scaled to unit length.

@@ -22,3 +22,15 @@ pub(super) const REFINEMENTS_MAX: usize = 100;
 /// Step of the finite differences of the default normal, mm. A longer step rounds edges; a shorter one loses digits.
 /// `cargo test -p quadfringe --test forward_random` compares normals with closed forms.
 pub(super) const NORMAL_STEP_MM: f64 = 1e-3;
+
+/// Side of the cells that list which parts of a blend count in them, mm. With smaller cells each lists fewer parts, but to
+/// make them takes longer. Not measured finely: a cast of the hand takes about the same time from 3 mm to 6 mm.
+pub(super) const CELL_MM: f64 = 4.0;
+
+/// What cells leave for rounding, mm. Follows from the rounding of `f64`, which is 1e-13 mm at 1 m; the tests of
+/// `surface::cells` compare values bit by bit.
+pub(super) const CELL_SLACK_MM: f64 = 1e-6;
+
+/// Shortest step from cell to cell of a ray that passes a blend, mm; a ray that needs a shorter one is marched. Steps
+/// shorter than a cell seldom end well, and cost more than they save. Not measured finely.
+pub(super) const CELL_STEP_MIN_MM: f64 = 0.5;

@@ -13,14 +13,12 @@ from quadfringe.config import Fringes, Response, Row4, SystemConfig, Triple
 from quadfringe.config.memory import require_memory
 from quadfringe.data import AnyShot, BayerShot, Calibration, Shot, Truth, core_device, device_from_core
 from quadfringe.devices.light import Levels, Light, Step, eight_bit, predeformation
+from quadfringe.devices.virtual._seen import Seen
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.io.arrays import read_npy
 
 __all__ = ["PrintedBoard", "VirtualBench"]
 
-# Distance to a depth discontinuity, px, below which `Truth.edge` marks a pixel: lens blur and the pixel area mix the
-# light of both sides there, so that neither depth is right.
-EDGE_PX = 2.0
 # Fields of `SceneConfig` that describe the scene and not its light.
 NOT_LIGHT = {"surface", "height_map", "time_s", "infrared_from_visible"}
 
@@ -42,9 +40,9 @@ class PrintedBoard:
 
 
 class _Placed(NamedTuple):
-    """An object that replaces the scene: its ray cast, and the albedo map (H, W, 4) of a printed board."""
+    """An object that replaces the scene, and the albedo map (H, W, 4) of a printed board."""
 
-    cast: _core.Cast
+    seen: Seen
     albedo: NDArray[np.float32] | None
 
 
@@ -68,7 +66,7 @@ class VirtualBench:
             **devices, layout=config.fringes.layout, infrared_from_visible=config.scene.infrared_from_visible
         )
         self._scene = config.scene
-        self._scene_cast: tuple[float, _core.Cast] | None = None  # time in s, and the ray cast at that time
+        self._scene_seen: tuple[float, Seen] | None = None  # time in s, and the scene at that time
         self._placed: _Placed | None = None
         self._exposures = 0
         self._infrared = config.fringes.infrared  # a bench for three colours has no infrared chip
@@ -132,17 +130,17 @@ class VirtualBench:
 
     def place_plane(self, point_mm: Triple, normal: Triple) -> None:
         """Replace the scene by a plane through a point; its normal points to the camera."""
-        self._placed = _Placed(self._bench.cast_plane(point_mm=point_mm, normal=normal), None)
+        self._place(_Placed(Seen(lambda: self._bench.cast_plane(point_mm=point_mm, normal=normal)), None))
 
     def place_scene(self, surface: str) -> None:
         """Replace the scene by a built-in surface; raises ValueError for an unknown name."""
-        self._placed = _Placed(self._bench.cast(surface), None)
+        self._place(_Placed(Seen(lambda: self._bench.cast(surface)), None))
 
     def place(self, board: PrintedBoard, T_camera_board: NDArray[np.float64]) -> None:  # noqa: N803
         """Replace the scene by a board in a pose (4, 4); raises ValueError unless the pose is a rigid motion."""
         pose = {"rotation": T_camera_board[:3, :3].tolist(), "translation_mm": T_camera_board[:3, 3].tolist()}
         (left, top), half = board.corners_mm[0], 0.5 * board.texel_mm
-        cast = self._bench.cast_plate(*board.corners_mm, **pose)
+        seen = Seen(lambda: self._bench.cast_plate(*board.corners_mm, **pose))
         albedo = self._bench.printed(
             board.coverage,
             pitch_mm=board.texel_mm,
@@ -151,7 +149,12 @@ class VirtualBench:
             ink=board.ink,
             **pose,
         )
-        self._placed = _Placed(cast, albedo)
+        self._place(_Placed(seen, albedo))
+
+    def _place(self, placed: _Placed) -> None:
+        if self._placed is not None:
+            self._placed.seen.forget()
+        self._placed = placed
 
     def seed(self, exposure: int) -> int:
         """Return the noise seed of exposure number `exposure`; exposure 0 has the seed of the scene."""
@@ -165,7 +168,7 @@ class VirtualBench:
         light = self._light(self.seed(self._exposures))
         self._exposures += 1
         return self._shot(
-            self._bench.render_step(self._cast_at(), number, shift_rad, axis=axis, beam=beam, **light), None
+            self._bench.render_step(self._seen_at().cast, number, shift_rad, axis=axis, beam=beam, **light), None
         )
 
     def expose(
@@ -178,24 +181,27 @@ class VirtualBench:
         """
         if self.projected is None:
             raise DecodeError("the projector shows nothing; call projector.show(fringes) before camera.snap()")
-        cast, light = self._cast_at(after_s), self._light(seed, 0.0 if capped or self.capped else exposure)
+        seen, light = self._seen_at(after_s), self._light(seed, 0.0 if capped or self.capped else exposure)
+        cast = seen.cast
         if isinstance(self.projected, Fringes):
             light |= {"infrared_image": self._infrared_image, "columns_px": self.projected.columns_px}
-            return self._shot(self._bench.render(cast, self.projected.code, **light), self._truth(cast))
+            return self._shot(self._bench.render(cast, self.projected.code, **light), seen.truth)
         if isinstance(self.projected, Levels):
             return self._shot(self._bench.render_levels(cast, self.projected.levels, **light), None)
         step = self.projected
         images = self._bench.render_step(cast, step.number, step.shift_rad, axis=step.axis, beam=step.beam, **light)
         return self._shot(images, None)
 
-    def _cast_at(self, after_s: float = 0.0) -> _core.Cast:
-        """Return the ray cast of the placed object, or of the scene at its time plus `after_s`."""
+    def _seen_at(self, after_s: float = 0.0) -> Seen:
+        """Return the placed object, or the scene at its time plus `after_s`."""
         if self._placed is not None:
-            return self._placed.cast
+            return self._placed.seen
         time_s = (self._scene.time_s or 0.0) + after_s
-        if self._scene_cast is None or self._scene_cast[0] != time_s:
-            self._scene_cast = time_s, self._cast_scene(time_s)
-        return self._scene_cast[1]
+        if self._scene_seen is None or self._scene_seen[0] != time_s:
+            if self._scene_seen is not None:
+                self._scene_seen[1].forget()
+            self._scene_seen = time_s, Seen(lambda: self._cast_scene(time_s))
+        return self._scene_seen[1]
 
     def _shot(self, images: dict[str, NDArray[Any]], truth: Truth | None) -> AnyShot:
         full_scale, infrared = float(2**self._scene.bit_depth - 1), images["ir"] if self._infrared else None
@@ -222,11 +228,3 @@ class VirtualBench:
             raise InputError(f"{relief.file}: expected a height map (rows, columns) of numbers, got {got}")
         place = relief.model_dump(exclude={"file"})
         return self._bench.cast_height_map(heights_mm.astype("float64"), **place)
-
-    def _truth(self, cast: _core.Cast) -> Truth:
-        return Truth(
-            column_px=cast.column_px(),
-            xyz_mm=cast.xyz_mm(),
-            shadow=cast.shadow(),
-            edge=cast.edge_distance_px() < EDGE_PX,
-        )
