@@ -2,11 +2,11 @@
 
     python evaluation/saturated.py [--half tune|report] [--only SCENE ...]
 
-The intensities of scenes of quadfringe.evaluation.world, and of the real captures, are multiplied by a factor and cut off
-at full scale. `sat 1`, `sat 2` are the shares of the pixels with at least one and two saturated channels. Errors of the
-scenes are those of returned pixels with the right order, in mm, errors of the captures are phases in rad; returned and
-wrong are shares of the lit pixels, of the captures right of object and wrong among returned. Mean of the seeds of a half;
-the numbers of the method were chosen on the other one.
+The intensities of scenes of quadfringe.evaluation.world, and of the real captures, are multiplied by a factor and cut
+off at full scale. `sat 1` and `sat 2` are the shares of the pixels with at least one and two saturated channels. Errors
+of scenes are those of returned pixels with the right order, in mm; those of captures are phases in rad. Returned and
+wrong are shares of the lit pixels; of captures, right of object and wrong among returned. Each row is the mean of the
+seeds of a half; the numbers of the method were chosen on the half `tune`.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ HALVES = {"tune": world.TUNE, "report": world.REPORT}
 OFFSETS = {"tune": (4, 10), "report": (1, 7)}  # steps of the captures
 SCENES = ("face", "steps", "painted_face", "glossy_face", "peaks_patches_20", "clutter")
 FACTORS = (1.0, 1.15, 1.3, 1.6)
-COLUMNS = f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'RMS':>9}{'median':>9}{'99 %':>8}{'back %':>8}{'wrong %':>9}"
+COLUMNS = (
+    f"{'':18}{'times':>6}{'sat 1 %':>9}{'sat 2 %':>9}{'RMS':>9}{'median':>9}{'99 %':>8}{'back %':>8}{'wrong %':>9}"
+)
 
 
 def row(name: str, factor: float, shares: list[np.ndarray], figures: list[dict[str, float]]) -> str:

@@ -13,8 +13,10 @@ __all__ = ["overexposed", "saturated_share"]
 def overexposed(shot: Shot, factor: float) -> Shot:
     """Expose a shot of 8 bit this many times as long; its noise grows by the same factor."""
     assert shot.red.dtype == np.uint8, shot.red.dtype
-    longer = {name: np.minimum(np.round(factor * image), 255).astype(np.uint8) for name, image in shot.channels.items()}
-    return Shot(**longer)
+    red, green, blue, ir = (
+        np.minimum(np.round(factor * image), 255).astype(np.uint8) for image in shot.channels.values()
+    )
+    return Shot(red, green, blue, ir)
 
 
 def saturated_share(shot: Shot) -> NDArray[np.float64]:

@@ -1,8 +1,8 @@
-"""Report of one shot as a PNG: fringes, wrapped phases, absolute phase, depth and error.
+"""Pages of panels and graphs as PNG.
 
 >>> from pathlib import Path
 >>> from tempfile import TemporaryDirectory
->>> from quadfringe.view.report import Graph, Panel, draw_panels, drawn, write_report
+>>> from quadfringe.view.report import Graph, Panel, draw_panels, drawn
 >>> depth_mm = np.linspace(790, 810, 48).reshape(6, 8)
 >>> row = Graph("row", "column, px", "depth, mm", {"row 3": (np.arange(8), depth_mm[3])})
 >>> panels = [Panel("depth", depth_mm, "mm"), row]
@@ -12,7 +12,6 @@ True
 ...     draw_panels(Path(folder) / "page.png", "two panels", [panels])
 ...     (Path(folder) / "page.png").stat().st_size > 1000
 True
->>> write_report(Path("report.png"), "face", shot, shape, wrapped, comparison)  # doctest: +SKIP
 """
 
 from __future__ import annotations
@@ -27,12 +26,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.data import AnyShot, Shape, xyz_mm_of
-from quadfringe.decoding.compare import ShapeComparison
+from quadfringe.data import AnyShot
 from quadfringe.files import atomic
-from quadfringe.view.style import DIVERGING, below, lettered, mark_no_data, no_data_of, styled
+from quadfringe.view.style import below, lettered, mark_no_data, no_data_of, styled
 
-__all__ = ["Drawable", "Graph", "Panel", "draw_panels", "drawn", "write_report"]
+__all__ = ["Drawable", "Graph", "Panel", "draw_panels", "drawn"]
 
 LEGEND_LETTERS, HANDLE_LETTERS = 58, 8  # of a line of a legend below a graph, and of the sign before each name
 TITLE_LETTERS = 11  # of a title, for each inch of a panel
@@ -251,40 +249,3 @@ def fringe_panels(shot: AnyShot) -> list[Panel]:
     """Return panels of the four channels as captured."""
     full = (0.0, shot.full_scale_value)
     return [Panel(f"captured {name}", image, "counts", "gray", full) for name, image in shot.channels.items()]
-
-
-def write_report(
-    path: Path,
-    title: str,
-    shot: AnyShot,
-    shape: Shape,
-    wrapped: Sequence[NDArray[np.float32]],
-    found: ShapeComparison,
-    *,
-    quadrature: bool = True,
-) -> None:
-    """Write the report of a calibrated shape and of its comparison with the truth to a PNG.
-
-    Without `quadrature` each of three colours has a wrapped phase.
-    """
-    first, *others = (
-        ("red and blue, two-step", "green", "infrared") if quadrature else ("red, Fourier", "green", "blue")
-    )
-    names = [first, *(f"{name}, Fourier" for name in others)][: len(wrapped)]
-    turn = (-np.pi, np.pi)
-    rms_mm = found.overall.rms
-    error_mm = 4 * rms_mm if np.isfinite(rms_mm) else 1.0
-    rows = [
-        fringe_panels(shot),
-        [
-            *(Panel(f"wrapped: {n}", w, "rad", "twilight", turn) for n, w in zip(names, wrapped, strict=True)),
-            Panel("modulation", shape.modulation, "fraction of full scale", "magma"),
-        ],
-        [
-            Panel("absolute phase", shape.phase_rad, "rad", "turbo"),
-            Panel("quality", shape.quality, "0 to 1", "viridis"),
-            Panel("depth", xyz_mm_of(shape)[:, :, 2], "mm", "viridis_r"),
-            Panel("depth error", found.difference, "mm", DIVERGING, (-error_mm, error_mm)),
-        ],
-    ]
-    draw_panels(path, f"{title}: depth RMS {rms_mm:.3f} mm", rows)
