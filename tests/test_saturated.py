@@ -21,7 +21,7 @@ def calibration() -> qf.Calibration:
 def test_fringes_that_are_cut_off_are_measured(name: str, calibration: qf.Calibration) -> None:
     taken = world.take(name, world.REPORT[0])
     shot = overexposed(taken.shot, 1.3)
-    assert saturated_share(shot)[0] > 0.4
+    hold("saturated.share", saturated_share(shot)[0])
     plan = qf.Plan(calibration.projector.width_px, calibration=calibration, response="linear")
     shape = qf.Decoder(shot, plan).decode(shot)
     found = world.judge(shape, taken)

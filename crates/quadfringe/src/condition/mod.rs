@@ -25,8 +25,7 @@ pub use sample::Sample;
 pub use shot::Shot;
 pub(crate) use {plan::Plan, saturated::Saturated, shot::checked_full_scale};
 
-use crate::error::Limit;
-use crate::{Channel, Error, Result};
+use crate::{Channel, Error, Result, error::Limit};
 use matrix::invert_4x4;
 use ndarray::Array2;
 

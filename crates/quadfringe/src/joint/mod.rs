@@ -144,11 +144,7 @@ impl Joint {
         out: &mut Decoded,
     ) {
         // 1. Linear light of the four channels (S1).
-        let Self { shape, ratios, .. } = *self;
-        let Self { pyramid, saturation, pixels, .. } = self;
-        let marks = Marks { saturated: &mut saturation.saturated, reasons: &mut pixels.reasons };
-        linear_light(plan, shot, shape, ratios, &mut pyramid.full, marks);
-        saturation.judge(&pyramid.full.light, ratios);
+        self.linearise(plan, shot);
         // 2. The fringe period scales all windows, cells and the coarse level.
         let found = || fringe_period_px(&self.pyramid.full.light, self.shape, self.ratios);
         let period_px = options.period_px.unwrap_or_else(found);
@@ -178,6 +174,14 @@ impl Joint {
         self.write(&frame, &noise, finish, out);
         // 11. Doubtful orders. This follows step 10, which removes pixels outside the projector image. 12. Albedo.
         self.complete(&frame, out);
+    }
+
+    /// Step 1: linear light, and whether the shot was exposed too long.
+    fn linearise<T: Sample>(&mut self, plan: &Plan, shot: &Shot<'_, T>) {
+        let Self { shape, ratios, pyramid, saturation, pixels, .. } = self;
+        let marks = Marks { saturated: &mut saturation.saturated, reasons: &mut pixels.reasons };
+        linear_light(plan, shot, *shape, *ratios, &mut pyramid.full, marks);
+        saturation.judge(&pyramid.full.light, *ratios);
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.

@@ -1,24 +1,30 @@
-//! Step 6: saturated light. Measured by `python evaluation/saturated.py`, which exposes scenes and captures too long.
+//! Step 6: saturated light. Measured by `python evaluation/saturated.py`, which exposes scenes and captures too long; the figures are
+//! those of a face and of steps on the half for tuning.
 
 /// Share of the bright pixels with a saturated channel from which the light of a shot is restored. Larger: the crests of fringes stay
 /// cut off. Smaller: noise, which saturates single pixels of a well exposed shot, and small highlights take three times the time.
+/// Not measured: a face with 3 % noise has 1.4 %, a painted one 4.1 %, and one exposed 1.15 times too long more than 20 %.
 pub const SHARE_MIN: f64 = 0.05;
 
 /// Light of a channel from which a pixel is bright, as a fraction of full scale. Larger: dim objects do not count. Smaller: a black
 /// background hides an object that is exposed too long.
+/// Not measured.
 pub const BRIGHT_MIN: f32 = 0.1;
 
-/// Rounds of restoring and decoding. More: time, each that of a whole shot without validity and energy.
+/// Rounds of restoring and decoding. More: time, each that of a whole shot without validity and energy. Fewer: `python
+/// evaluation/saturated.py` gives at 1.6 times the exposure 0.20 mm with two rounds of the factors 2 and 1, 0.16 mm with three.
 pub const ROUNDS: usize = 3;
 
 /// Factor of a step from the present light to what the model expects. Photometry and phase were fitted to the present light,
-/// and explain about half of what was cut off, so that a step with the factor 1 goes half of the way.
+/// and explain about half of what was cut off, so that a step with the factor 1 goes half of the way. By `python
+/// evaluation/saturated.py`, 2 in place of 1.5 has a median of 0.027 in place of 0.014 mm at 1.15 times the exposure, 1 has 0.098 in
+/// place of 0.054 mm at 1.6 times.
 pub const GAIN: f32 = 1.5;
 
 /// Channels of a pixel that must not be saturated: two determine albedo and phase, given the order. A pixel with fewer has no
-/// phase of its own, and `Reason::Saturated` if it is not returned. Larger or smaller: other reasons.
+/// phase from its light alone, and `Reason::Saturated` if it is not returned. Follows from the model.
 pub const CHANNELS_MIN: f32 = 2.0;
 
 /// Greatest restored light, as a multiple of the captured one. Larger: a wrong phase may lend more light. Smaller: crests of a
-/// longer exposure stay cut off.
+/// longer exposure stay cut off. Not measured: no exposure that still has fringes needs so much.
 pub const RESTORED_MAX: f32 = 4.0;
