@@ -18,13 +18,14 @@ KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
 
-# The kernel's tests and the wheel are compiled at the same time, and the site is built while the projectors are tested: each
-# leaves a core idle now and then.
+# Two parts at a time: the kernel's tests and the wheel are compiled at once, the site fills what the tests of the package leave
+# idle, and browser and projectors mostly wait. The cameras have the machine to themselves, because frames are lost on a busy one.
 test:
 	$(MAKE) --jobs 2 rust $(STAMPS)/built
-	$(MAKE) wheel-test python
-	$(MAKE) --jobs 2 docs test-usb
-	$(MAKE) test-camera test-live
+	$(MAKE) wheel-test
+	$(MAKE) --jobs 2 python docs
+	$(MAKE) --jobs 2 test-usb test-live
+	$(MAKE) test-camera
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
 # only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
