@@ -25,6 +25,7 @@ __all__ = [
     "listed",
     "other_numbers",
     "registration",
+    "too_bright",
     "wrong_bits",
     "wrong_numbers",
 ]
@@ -37,7 +38,7 @@ SMALLEST_PAIR, LARGEST_PAIR = 6, 20  # N, N - 1 without infrared: finer fringes 
 
 def before_order(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
     """Name the likeliest cause that shows without fringe orders; None when no test finds one."""
-    tests = (wrong_bits(shot), _too_dark(shot, params.DARK), _saturated(shot), registration(shot, plan, closure))
+    tests = (wrong_bits(shot), _too_dark(shot, params.DARK), too_bright(shot), registration(shot, plan, closure))
     return next((cause for cause in tests if cause is not None), None)
 
 
@@ -190,7 +191,8 @@ def _too_dark(shot: AnyShot, least: float) -> Cause | None:
     return Cause("brightness", words, "lengthen the exposure, open the aperture, or raise the light")
 
 
-def _saturated(shot: AnyShot) -> Cause | None:
+def too_bright(shot: AnyShot) -> Cause | None:
+    """Find channels with so many saturated pixels that their light is measured from the others, or not at all."""
     shares = {n: share for n, share in symptoms.saturation(shot).items() if share > params.SATURATED}
     if not shares:
         return None

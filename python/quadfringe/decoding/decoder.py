@@ -10,7 +10,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, check_shot, size_of
 from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
-from quadfringe.decoding.causes import wrong_bits
+from quadfringe.decoding.causes import too_bright, wrong_bits
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, response_in_place_of
@@ -128,8 +128,8 @@ def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot, doubt: Cause | N
     doubts = implausible(shape)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
-    found = [cause for cause in (doubt, too_dark(shot, kernel.plan.calibration), wrong_bits(shot)) if cause]
-    doubts = [*doubts, *found, *within_depths(shape, kernel.plan.decode.depth_range_mm)]
+    light = (doubt, too_dark(shot, kernel.plan.calibration), wrong_bits(shot), too_bright(shot))
+    doubts = [*doubts, *filter(None, light), *within_depths(shape, kernel.plan.decode.depth_range_mm)]
     if not doubts:
         return shape
     words = [f"{cause.found}; {cause.fix}" for cause in doubts]
