@@ -22,9 +22,9 @@ def figures_of(command: str, tmp_path: Path, *options: object) -> dict[str, Any]
 
 
 def test_no_mutated_recording_hangs_crashes_or_lies(tmp_path: Path) -> None:
-    figures = figures_of("mutated_recordings.py", tmp_path, "--count", 200)
+    figures = figures_of("mutated_recordings.py", tmp_path, "--count", 120)
     faults = {name: figures[name] for name in ("mutated", "hang", "crash", "traceback", "wrong", "silent")}
-    assert faults == {"mutated": 200, "hang": 0, "crash": 0, "traceback": 0, "wrong": 0, "silent": 0}
+    assert faults == {"mutated": 120, "hang": 0, "crash": 0, "traceback": 0, "wrong": 0, "silent": 0}
 
 
 def test_nothing_is_lost_or_left_when_processes_are_killed(tmp_path: Path) -> None:

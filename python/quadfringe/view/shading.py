@@ -1,7 +1,11 @@
 """Shaded pictures of a surface as its camera sees it, by NumPy and OpenCV alone.
 
->>> from quadfringe.view.shading import shaded                                           # doctest: +SKIP
->>> shaded(shape, 320).shape
+>>> import quadfringe as qf
+>>> from quadfringe.view.shading import shaded
+>>> small = qf.Device(width_px=256, height_px=192, focal_px=(645, 645), centre_px=(127.5, 95.5))
+>>> with qf.open(qf.SystemConfig(camera=small)) as scanner:
+...     picture = shaded(scanner.measure(), 320)
+>>> picture.shape
 (240, 320, 3)
 """
 

@@ -1,13 +1,36 @@
 //! Types of the intensities that a camera delivers.
 
+use super::Shot;
 use crate::{Error, Result};
 use ndarray::ArrayView2;
 
 mod sealed {
-    pub trait Sealed {}
-    impl Sealed for u8 {}
-    impl Sealed for u16 {}
-    impl Sealed for f32 {}
+    use super::{KnownShot, Shot};
+
+    pub trait Sealed: Sized {
+        /// The shot with its type of intensities as a variant.
+        fn known<'s, 'i>(shot: &'s Shot<'i, Self>) -> KnownShot<'s, 'i>;
+    }
+
+    macro_rules! sealed {
+        ($($sample:ty => $variant:ident),*) => {$(
+            impl Sealed for $sample {
+                fn known<'s, 'i>(shot: &'s Shot<'i, Self>) -> KnownShot<'s, 'i> {
+                    KnownShot::$variant(shot)
+                }
+            }
+        )*};
+    }
+    sealed!(u8 => U8, u16 => U16, f32 => F32);
+}
+
+/// A shot of each type of intensities. What takes this in place of a type parameter is compiled once, in this crate, and not
+/// again in every crate that decodes.
+#[derive(Debug, Clone, Copy)]
+pub enum KnownShot<'s, 'i> {
+    U8(&'s Shot<'i, u8>),
+    U16(&'s Shot<'i, u16>),
+    F32(&'s Shot<'i, f32>),
 }
 
 /// An intensity: `u8`, `u16` or `f32`.

@@ -25,7 +25,7 @@ pub use options::Options;
 pub use output::Decoded;
 pub use reason::Reason;
 
-use crate::condition::{Plan, Sample, Shot};
+use crate::condition::{KnownShot, Plan, Sample, Shot};
 use crate::encoding::{Encoding, FourChannel};
 use crate::error::{Error, Result};
 use crate::height::Triangulator;
@@ -111,6 +111,18 @@ impl Decoder {
     /// no infrared image although the encoding has that channel, or the reverse, and when an intensity is more than 10 000
     /// times full scale.
     pub fn decode_into<T: Sample>(&mut self, shot: &Shot<'_, T>, out: &mut Decoded) -> Result<()> {
+        self.decode_known(T::known(shot), out)
+    }
+
+    fn decode_known(&mut self, shot: KnownShot<'_, '_>, out: &mut Decoded) -> Result<()> {
+        match shot {
+            KnownShot::U8(shot) => self.decode_samples(shot, out),
+            KnownShot::U16(shot) => self.decode_samples(shot, out),
+            KnownShot::F32(shot) => self.decode_samples(shot, out),
+        }
+    }
+
+    fn decode_samples<T: Sample>(&mut self, shot: &Shot<'_, T>, out: &mut Decoded) -> Result<()> {
         if shot.shape() != self.shape {
             return Err(Error::shape("shot", &self.shape, &shot.shape()));
         }
