@@ -2,8 +2,8 @@
 Steps without a connecting path
 ===============================
 
-Blocks of different height stand apart. No neighbour tells which fringe a block begins with; the four channels do, at
-each pixel alone. The profile crosses all steps, and its edges keep their place.
+Blocks of different height stand apart. No path over the surface tells which fringe a block begins with; the
+four channels do. The profile crosses all steps, and its edges keep their place.
 """
 
 import matplotlib.pyplot as plt

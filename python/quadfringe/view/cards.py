@@ -51,7 +51,7 @@ def shape_card(shape: Shape) -> str:
         if (sigma := found.get(f"uncertainty_median_{unit}")) is not None:
             rows["uncertainty"] = f"median {sigma:.3g} {unit}"
     if (wrong := found.get("wrong_orders_at_most")) is not None:
-        rows["wrong fringe"] = f"at most {wrong:.0f} px expected"
+        rows["wrong orders"] = f"at most {wrong:.0f} pixels expected"
     method = shape.config.get("decode", {}).get("method")
     rows |= {"method": str(method)} if method else {}
     rows |= {f"warning {number}": words for number, words in enumerate(shape.warnings, 1)}

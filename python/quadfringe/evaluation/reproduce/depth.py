@@ -111,7 +111,7 @@ def _graphs(title: str, depths: NDArray[np.float64], curves: dict[str, NDArray[n
     quantities = (
         ("infrared fringes, error", "rad RMS at 36 fringes", True),
         ("unwrapped phase, error", "rad RMS", True),
-        ("wrong orders", "% of the pixels", False),
+        ("wrong orders", "% of the returned pixels", False),
     )
     return [
         Graph(
