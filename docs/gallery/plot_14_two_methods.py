@@ -3,7 +3,8 @@ Two methods on one shot
 =======================
 
 The published method treats every strip of rows alone and is fast; the joint method uses all channels and the
-neighbourhood of each pixel. Both maps have one scale, linear up to 0.05 mm and then logarithmic; zero is white, and slate is no data.
+neighbourhood of each pixel. Both maps have one scale, linear up to 0.05 mm and then logarithmic; zero is white, and
+slate is no data.
 """
 
 import matplotlib.pyplot as plt
