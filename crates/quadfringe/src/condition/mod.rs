@@ -23,7 +23,7 @@ pub(crate) use params::{CLIPPED, LIGHT_MAX};
 pub use response::Response;
 pub use sample::Sample;
 pub use shot::Shot;
-pub(crate) use {plan::Plan, sample::KnownShot, saturated::Saturated, shot::checked_full_scale};
+pub(crate) use {plan::Plan, sample::Known, sample::Of, saturated::Saturated, shot::checked_full_scale};
 
 use crate::{Channel, Error, Result, error::Limit};
 use matrix::invert_4x4;

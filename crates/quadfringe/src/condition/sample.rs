@@ -1,22 +1,21 @@
 //! Types of the intensities that a camera delivers.
 
-use super::Shot;
 use crate::{Error, Result};
 use ndarray::ArrayView2;
 
 mod sealed {
-    use super::{KnownShot, Shot};
+    use super::{Known, Of};
 
-    pub trait Sealed: Sized {
-        /// The shot with its type of intensities as a variant.
-        fn known<'s, 'i>(shot: &'s Shot<'i, Self>) -> KnownShot<'s, 'i>;
+    pub trait Sealed: Sized + 'static {
+        /// The value with its type of intensities as a variant.
+        fn known<F: Of>(value: F::Type<Self>) -> Known<F>;
     }
 
     macro_rules! sealed {
         ($($sample:ty => $variant:ident),*) => {$(
             impl Sealed for $sample {
-                fn known<'s, 'i>(shot: &'s Shot<'i, Self>) -> KnownShot<'s, 'i> {
-                    KnownShot::$variant(shot)
+                fn known<F: Of>(value: F::Type<Self>) -> Known<F> {
+                    Known::$variant(value)
                 }
             }
         )*};
@@ -24,13 +23,18 @@ mod sealed {
     sealed!(u8 => U8, u16 => U16, f32 => F32);
 }
 
-/// A shot of each type of intensities. What takes this in place of a type parameter is compiled once, in this crate, and not
-/// again in every crate that decodes.
-#[derive(Debug, Clone, Copy)]
-pub enum KnownShot<'s, 'i> {
-    U8(&'s Shot<'i, u8>),
-    U16(&'s Shot<'i, u16>),
-    F32(&'s Shot<'i, f32>),
+/// What exists for each type of intensities, such as a shot.
+pub trait Of {
+    /// That of the intensities `T`.
+    type Type<T: 'static>;
+}
+
+/// That of one of the types. What takes this in place of a type parameter is compiled once, in this crate, and not again in every
+/// crate that uses it.
+pub enum Known<F: Of> {
+    U8(F::Type<u8>),
+    U16(F::Type<u16>),
+    F32(F::Type<f32>),
 }
 
 /// An intensity: `u8`, `u16` or `f32`.

@@ -25,13 +25,14 @@ pub use options::Options;
 pub use output::Decoded;
 pub use reason::Reason;
 
-use crate::condition::{KnownShot, Plan, Sample, Shot};
+use crate::condition::{Known, Of, Plan, Sample, Shot};
 use crate::encoding::{Encoding, FourChannel};
 use crate::error::{Error, Result};
 use crate::height::Triangulator;
 use crate::joint::Joint;
 use crate::published::Published;
 use output::{Finish, Wanted};
+use std::marker::PhantomData;
 
 /// Decodes shots of one size and one encoding. A decoder is planned once and used for many shots. Results are
 /// bit-identical for any number of threads.
@@ -59,6 +60,13 @@ pub struct Decoder {
 enum Engine {
     Joint(Box<Joint>),
     Published(Box<Published>),
+}
+
+/// A borrowed shot of any type of intensities.
+struct OfShot<'shot, 'image>(PhantomData<&'shot &'image ()>);
+
+impl<'shot, 'image> Of for OfShot<'shot, 'image> {
+    type Type<T: 'static> = &'shot Shot<'image, T>;
 }
 
 impl Decoder {
@@ -114,11 +122,11 @@ impl Decoder {
         self.decode_known(T::known(shot), out)
     }
 
-    fn decode_known(&mut self, shot: KnownShot<'_, '_>, out: &mut Decoded) -> Result<()> {
+    fn decode_known(&mut self, shot: Known<OfShot<'_, '_>>, out: &mut Decoded) -> Result<()> {
         match shot {
-            KnownShot::U8(shot) => self.decode_samples(shot, out),
-            KnownShot::U16(shot) => self.decode_samples(shot, out),
-            KnownShot::F32(shot) => self.decode_samples(shot, out),
+            Known::U8(shot) => self.decode_samples(shot, out),
+            Known::U16(shot) => self.decode_samples(shot, out),
+            Known::F32(shot) => self.decode_samples(shot, out),
         }
     }
 
