@@ -282,7 +282,7 @@ def test_info_tells_what_a_file_holds(small_bench: Path, tmp_path: Path) -> None
 
 
 def test_too_little_memory_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def refuse(*_: object) -> None:
+    def refuse(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 9 GiB")
 
     monkeypatch.setattr("quadfringe.recording.inspection.lines_about", refuse)

@@ -157,7 +157,7 @@ def traceback_in(result: Any) -> list[str]:
 
 def info(path: Path, base: Base) -> list[str]:
     """Describe the file; what is printed without a warning or an error must be the calibration recorded."""
-    result = run("info", path)
+    result = run("info", path, "--full")
     faults = traceback_in(result)
     if result.exit_code == 0 and not result.stderr and base.calibration is not None:
         printed = "".join(result.stdout.split())
