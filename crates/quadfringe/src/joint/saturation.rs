@@ -7,7 +7,7 @@
 use super::cells::RowMaps;
 use super::infrared::{Waves, with_waves};
 use super::model::{FringeRows, count};
-use super::params::saturation::{BRIGHT_MIN, CHANNELS_MIN, GAIN, RESTORED_MAX, SHARE_MIN};
+use super::params::saturation::{BRIGHT_MIN, CHANNEL_SHARE_MAX, CHANNELS_MIN, GAIN, RESTORED_MAX, SHARE_MIN};
 use super::photometry::Photometry;
 use super::pyramid::Level;
 use super::scene::{PhaseMap, ScaledGrid, Scene};
@@ -29,22 +29,26 @@ pub(super) struct Saturation {
 }
 
 impl Saturation {
-    /// Decides whether a shot is restored: whether enough of its bright pixels have a saturated channel, and others that are not.
+    /// Decides whether a shot is restored: whether enough of its bright pixels have a saturated channel and others that are not,
+    /// and no channel is saturated nearly everywhere.
     pub fn judge(&mut self, light: &[Vec<f32>; 4], ratios: [f32; 4]) {
         let channels = count(ratios);
         let [red, green, blue, infrared] = light.each_ref().map(|plane| plane.par_iter());
         let pixels = red.zip(green).zip(blue.zip(infrared)).zip(&self.saturated);
-        let (bright, saturated) = pixels
-            .map(|(((red, green), (blue, infrared)), saturated)| {
-                let bright = red.max(*green).max(*blue).max(*infrared) > BRIGHT_MIN;
-                let cut = (saturated.count() > 0) & (channels - saturated.count() as f32 >= CHANNELS_MIN);
-                (u64::from(bright), u64::from(bright & cut))
+        // Bright pixels, those of them that can be restored, and those whose R, G, B, IR is saturated.
+        let [bright, restorable, by_channel @ ..]: [u64; 6] = pixels
+            .filter(|(((red, green), (blue, infrared)), _)| {
+                red.max(**green).max(**blue).max(**infrared) > BRIGHT_MIN
             })
-            .reduce(
-                || (0, 0),
-                |(bright, cut), (more_bright, more_cut)| (bright + more_bright, cut + more_cut),
-            );
-        self.restores = saturated as f64 > SHARE_MIN * bright as f64;
+            .map(|(_, saturated)| {
+                let cut = (saturated.count() > 0) & (channels - saturated.count() as f32 >= CHANNELS_MIN);
+                let [red, green, blue, infrared] = [0, 1, 2, 3].map(|c| u64::from(saturated.has(c)));
+                [1, u64::from(cut), red, green, blue, infrared]
+            })
+            .reduce(|| [0; 6], |sums, more| std::array::from_fn(|k| sums[k] + more[k]));
+        let most = CHANNEL_SHARE_MAX * bright as f64;
+        self.restores = restorable as f64 > SHARE_MIN * bright as f64
+            && by_channel.iter().all(|&saturated| saturated as f64 <= most);
         self.moved.clear();
     }
 
@@ -257,6 +261,10 @@ mod tests {
         saturation.judge(&light, RATIOS);
         assert!(saturation.restores);
         saturation.saturated[..5].fill(Saturated::new([true; 4]));
+        saturation.judge(&light, RATIOS);
+        assert!(!saturation.restores);
+        // A channel without fringes cannot be restored.
+        saturation.saturated.fill(Saturated::new([true, false, false, false]));
         saturation.judge(&light, RATIOS);
         assert!(!saturation.restores);
     }

@@ -6,6 +6,11 @@
 /// Not measured: a face with 3 % noise has 1.4 %, a painted one 4.1 %, and one exposed 1.15 times too long more than 20 %.
 pub const SHARE_MIN: f64 = 0.05;
 
+/// Greatest share of the bright pixels that a channel may have saturated in a shot that is restored. Larger: a blind channel is made up
+/// from the others. Smaller: shots that are exposed far too long are refused. Not measured: at 1.6 times the exposure it is 0.25, at 4
+/// times 0.67.
+pub const CHANNEL_SHARE_MAX: f64 = 0.75;
+
 /// Light of a channel from which a pixel is bright, as a fraction of full scale. Larger: dim objects do not count. Smaller: a black
 /// background hides an object that is exposed too long.
 /// Not measured.
