@@ -22,7 +22,7 @@ demo: $(STAMPS)/built
 # idle, and browser and projectors mostly wait. The cameras have the machine to themselves, because frames are lost on a busy one.
 test:
 	$(MAKE) --jobs 2 rust $(STAMPS)/built
-	$(MAKE) wheel-test
+	$(MAKE) wheel-test $(STAMPS)/docs
 	$(MAKE) --jobs 2 python docs
 	$(MAKE) --jobs 2 test-usb test-live
 	$(MAKE) test-camera
