@@ -28,7 +28,7 @@ ROOT = Path(__file__).resolve().parents[1]
 PICTURES = ROOT / "docs" / "images"
 HALF_PX = (560, 420)  # width and height of each half of the picture of the README
 CLAY, SLATE = (222, 202, 178), (104, 114, 128)  # of the face and of the wall behind it
-WALL_MM = 797.0  # what is further away is the wall
+WALL_MM = 797.0  # points beyond it belong to the wall
 VIEW_DEG = (27.0, -7.0)  # yaw and pitch
 FINER = 2
 PAGE_S = 20.0  # until chromium without a graphics card has drawn the page
@@ -45,7 +45,7 @@ def main() -> None:
 
 
 def draw_shot_and_shape(path: Path, shot: AnyShot, shape: qf.Shape) -> None:
-    """Draw the images of a shot, half of them visible light and half infrared, beside the surface decoded from them."""
+    """Draw a shot, half in visible light and half in infrared, beside the surface decoded from it."""
     joined = cv2.cvtColor(np.hstack([fringes(shot), solid(shape)]), cv2.COLOR_RGB2BGR)
     cv2.imwrite(str(path), joined, [cv2.IMWRITE_JPEG_QUALITY, 88])
 

@@ -2,7 +2,7 @@
 Colours from the same shot
 ==========================
 
-The joint method separates the fringes from the surface. What is left is the albedo of each channel, as if an even light
+The joint method separates the fringes from the surface. The rest is the albedo of each channel, as if an even light
 had shone, together with the infrared.
 """
 

@@ -1,4 +1,4 @@
-"""Light of one channel in another: what it does to a shot, and what is left once it was calibrated and undone."""
+"""Crosstalk between channels: its effect on a shot, and the rest after it is calibrated and removed."""
 
 from __future__ import annotations
 
