@@ -1,6 +1,6 @@
 """Measure depth errors and resolution on scenes that resemble real objects.
 
-    python evaluation/world.py [--half tune|report] [--method joint] [--only WORD ...] [--json FILE]
+    python evaluation/world.py [--half tune|report] [--method joint] [--only WORD ...] [--detail FACTOR] [--json FILE]
 
 The scenes of quadfringe.evaluation.world are rendered at 1024 x 768 with 3 % noise and 8 bit; their response is linear.
 Tune a method on the half `tune`, and report its figures on the half `report`. Every figure is the mean over the two
@@ -27,14 +27,14 @@ NOISES = (0.03, 0.0)
 Decode = Callable[[world.Take], qf.Shape]
 
 
-def decoded(taken: world.Take, *, method: str, calibration: qf.Calibration) -> qf.Shape:
+def decoded(taken: world.Take, *, settings: dict[str, object], calibration: qf.Calibration) -> qf.Shape:
     """Decode without a verdict, because a refused shot would have no figures."""
     plan = qf.Plan(
         calibration.projector.width_px,
         fringes=qf.Fringes(numbers=taken.fringe_numbers),
         calibration=calibration,
         response="linear",
-        decode=qf.DecodeConfig.model_validate({"method": method}),
+        decode=qf.DecodeConfig.model_validate(settings),
     )
     return qf.Decoder(taken.shot, plan).decode_without_verdict(taken.shot)
 
@@ -43,12 +43,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--half", choices=HALVES, default="report")
     parser.add_argument("--method", default="joint")
+    parser.add_argument("--detail", type=float, help="detail against noise, from 0.25 to 4")
     parser.add_argument("--only", nargs="+", metavar="WORD", help="scenes whose name contains one of these words")
     parser.add_argument("--json", type=Path, help="write the figures here")
     options = parser.parse_args()
     with qf.open(qf.SystemConfig()) as scanner:
         assert scanner.calibration is not None
-        decode = partial(decoded, method=options.method, calibration=scanner.calibration)
+        settings = {"method": options.method, "detail": options.detail}
+        decode = partial(decoded, settings=settings, calibration=scanner.calibration)
     figures: dict[str, float] = {}
     seeds = HALVES[options.half]
     names = [n for n in world.SCENES if options.only is None or any(word in n for word in options.only)]

@@ -263,8 +263,8 @@ class Decoder:
     An argument that is absent takes the kernel's default. `method` is "joint" ("best" is read as "joint") or
     "published". With `camera`, `projector` and `infrared` the infrared fringes are known along the camera rays, of an
     image plain or pre-deformed, for a range of depths or all of them; the published method searches orders in it alone;
-    `channel_instants_us` is an option of the joint method. Raises ValueError when the fringe numbers do not cover the
-    projector, a setting is out of range, or an option is not one of the method.
+    `channel_instants_us` and `detail` are options of the joint method. Raises ValueError when the fringe numbers do not
+    cover the projector, a setting is out of range, or an option is not one of the method.
     """
 
     def __new__(
@@ -281,6 +281,7 @@ class Decoder:
         period_px: float | None = None,
         channel_instants_us: Sequence[float] | None = None,
         albedo: bool | None = None,
+        detail: float | None = None,
         threads: int | None = None,
         dark: Sequence[float] | None = None,
         response: Sequence[_Vector3] | None = None,

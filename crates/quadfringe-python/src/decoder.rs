@@ -48,7 +48,7 @@ struct Inner {
 impl Decoder {
     #[new]
     #[pyo3(signature = (shape, fringe_numbers, projector_width, *, columns_px = None, full_scale = None, method = None,
-        modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, albedo = None, threads = None, dark = None, response = None,
+        modulation_min = None, quality_min = None, period_px = None, channel_instants_us = None, albedo = None, detail = None, threads = None, dark = None, response = None,
         crosstalk = None, projector_response = None, ir_registration = None, camera = None, projector = None, infrared = None,
         predeformed_z_mm = None, depth_range_mm = None))]
     #[expect(clippy::too_many_arguments, reason = "keyword arguments of Python")]
@@ -65,6 +65,7 @@ impl Decoder {
         period_px: Option<f64>,
         channel_instants_us: Option<[f32; 4]>,
         albedo: Option<bool>,
+        detail: Option<f32>,
         threads: Option<usize>,
         dark: Option<[f32; 4]>,
         response: Option<[ResponseNumbers; 4]>,
@@ -78,7 +79,8 @@ impl Decoder {
         depth_range_mm: Option<[f64; 2]>,
     ) -> PyResult<Self> {
         let conditioner = conditioner_of(dark, response, crosstalk, projector_response, ir_registration);
-        let choices = Choices { method, modulation_min, quality_min, period_px, channel_instants_us, albedo };
+        let choices =
+            Choices { method, modulation_min, quality_min, period_px, channel_instants_us, albedo, detail };
         let geometry = Geometry { camera, projector, infrared, predeformed_z_mm, depth_range_mm };
         let plan = || {
             let encoding = fringe_numbers.encoding(projector_width, columns_px)?;
@@ -86,9 +88,8 @@ impl Decoder {
             planned(builder, &choices, &geometry)
         };
         let kernel = detached(py, plan)?.map_err(value_error)?;
-        let long = is_long(&kernel.options().method, shape);
-        let (workers, calibrated) = (Workers::start(threads)?, geometry.devices().is_some());
-        let (kernel, memory) = (Mutex::new(kernel), Arc::default());
+        let (long, calibrated) = (is_long(&kernel.options().method, shape), geometry.devices().is_some());
+        let (kernel, workers, memory) = (Mutex::new(kernel), Workers::start(threads)?, Arc::default());
         Ok(Self(Arc::new(Inner { kernel, workers, full_scale, shape, calibrated, long, memory })))
     }
 
@@ -104,6 +105,7 @@ impl Decoder {
         named.set_item("period_px", options.period_px)?;
         named.set_item("channel_instants_us", options.channel_instants_us())?;
         named.set_item("albedo", options.gives_albedo())?;
+        named.set_item("detail", options.detail())?;
         named.set_item("unwrapping", if options.searches_along_rays() { "pair" } else { "coaxial" })?;
         Ok(named)
     }

@@ -13,6 +13,7 @@ pub struct Choices<'a> {
     pub period_px: Option<f64>,
     pub channel_instants_us: Option<[f32; 4]>,
     pub albedo: Option<bool>,
+    pub detail: Option<f32>,
 }
 
 /// Calibrated devices.
@@ -36,6 +37,9 @@ pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geomet
     let mut method = choices.method.map_or(Ok(Method::default()), Method::from_name)?;
     if let Some(instants) = choices.channel_instants_us {
         method = method.with_channel_instants_us(instants)?;
+    }
+    if let Some(detail) = choices.detail {
+        method = method.with_detail(detail)?;
     }
     if let (Some((camera, projector)), Some(infrared)) = (geometry.devices(), &geometry.infrared) {
         let pair = pair_of(projector, infrared, geometry.predeformed_z_mm)?;

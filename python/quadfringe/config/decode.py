@@ -147,11 +147,17 @@ class DecodeConfig(Model):
         description="Whether shapes have the albedo, the light of each channel without fringes. Absent: yes with "
         "method joint; the published method has none.",
     )
+    detail: Finite | None = Field(
+        default=None,
+        description="Detail against noise, from 0.25 to 4, with method joint. Each shot says how finely its surface "
+        "varies; 2 keeps relief half as wide, with more noise, and 0.5 smooths relief twice as wide, with less. "
+        "Absent: 1.",
+    )
     threads: Annotated[int, Field(gt=0, le=_core.THREADS_MAX)] | None = Field(
         default=None, description="Threads of one decoder, at most 1024. Absent: as many as the machine has cores."
     )
 
-    @field_validator("modulation_min", "quality_min", "channel_instants_us")
+    @field_validator("modulation_min", "quality_min", "channel_instants_us", "detail")
     @classmethod
     def _decoder_takes(cls, value: Any, info: ValidationInfo) -> Any:
         if value is not None and info.field_name is not None:
@@ -178,9 +184,10 @@ class DecodeConfig(Model):
             raise ValueError(
                 'albedo needs method = "joint", and the method is published: change the method, or leave albedo out'
             )
-        if self.channel_instants_us is not None and self.method == "published":
-            raise ValueError(
-                'channel_instants_us needs method = "joint", and the method is published: '
-                "change the method, or leave channel_instants_us out"
-            )
+        for name in ("channel_instants_us", "detail"):
+            if getattr(self, name) is not None and self.method == "published":
+                raise ValueError(
+                    f'{name} needs method = "joint", and the method is published: '
+                    f"change the method, or leave {name} out"
+                )
         return self

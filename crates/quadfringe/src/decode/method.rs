@@ -1,5 +1,6 @@
 //! The methods that decode a shot, each with the options that only it has.
 
+use super::params::DETAIL;
 use crate::encoding::Encoding;
 use crate::error::{Error, Limit, Result};
 use crate::height::PairTable;
@@ -79,6 +80,17 @@ impl Method {
         }
     }
 
+    /// This method with this choice between detail and noise; for callers that chose the method by name.
+    ///
+    /// # Errors
+    /// [`Error::NotOfMethod`] for any method but the joint one.
+    pub fn with_detail(self, detail: f32) -> Result<Self> {
+        match self {
+            Self::Joint(joint) => Ok(joint.with_detail(detail).into()),
+            Self::Published(_) => Err(self.lacks("detail", "joint")),
+        }
+    }
+
     /// Checks the options of the method for images of `shape` (rows, columns).
     pub(super) fn check(&self, shape: [usize; 2]) -> Result<()> {
         match self {
@@ -140,7 +152,7 @@ impl From<PublishedOptions> for Method {
 }
 
 /// Options of the joint method.
-#[derive(Clone, Default)]
+#[derive(Clone)]
 #[non_exhaustive]
 pub struct JointOptions {
     /// The middle of the exposure of R, G, B and IR in us, relative to the instant for which the shape is computed;
@@ -150,6 +162,15 @@ pub struct JointOptions {
     /// The infrared phase along the camera rays, if both projectors are calibrated. With `None` the two projectors are assumed
     /// to be coaxial.
     pub along_rays: Option<Arc<PairTable>>,
+    /// Detail against noise, from 0.25 to 4. The shot itself says how finely its surface varies; relief narrower by this factor is
+    /// kept, with more noise, or with a factor below 1 less of both. Default: 1.
+    pub detail: f32,
+}
+
+impl Default for JointOptions {
+    fn default() -> Self {
+        Self { channel_instants_us: None, along_rays: None, detail: 1.0 }
+    }
 }
 
 impl JointOptions {
@@ -167,8 +188,19 @@ impl JointOptions {
         self
     }
 
+    /// These options with this choice between detail and noise.
+    #[must_use]
+    pub const fn with_detail(mut self, detail: f32) -> Self {
+        self.detail = detail;
+        self
+    }
+
     fn check(&self, shape: [usize; 2]) -> Result<()> {
         check_camera(self.along_rays.as_deref(), shape)?;
+        if !DETAIL.contains(&self.detail) {
+            let [from, to] = [*DETAIL.start(), *DETAIL.end()].map(f64::from);
+            return Err(Error::value("detail", Limit::Range { from, to }, self.detail));
+        }
         let Some(instants) = self.channel_instants_us else { return Ok(()) };
         let expected = match instants {
             _ if instants.iter().any(|t| !t.is_finite()) => Limit::Finite,
@@ -218,7 +250,8 @@ impl fmt::Debug for JointOptions {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let size = self.along_rays.as_ref().map(|table| table.shape());
         let mut fields = f.debug_struct("JointOptions");
-        fields.field("channel_instants_us", &self.channel_instants_us).field("along_rays", &size).finish()
+        fields.field("channel_instants_us", &self.channel_instants_us).field("along_rays", &size);
+        fields.field("detail", &self.detail).finish()
     }
 }
 

@@ -102,6 +102,15 @@ impl Options {
         }
     }
 
+    /// The choice between detail and noise; `None` if the method does not have it.
+    #[must_use]
+    pub const fn detail(&self) -> Option<f32> {
+        match &self.method {
+            Method::Joint(joint) => Some(joint.detail),
+            Method::Published(_) => None,
+        }
+    }
+
     /// Whether the infrared phase is that of a calibrated pair along the camera rays.
     #[must_use]
     pub const fn searches_along_rays(&self) -> bool {

@@ -165,8 +165,7 @@ impl Joint {
         }
         self.spare = spare;
         // 6. Minimum of the energy (J16), after step 7, because it would explain a part of the motion.
-        let prior = Prior { ratios: self.ratios, noise: self.coarse.noise };
-        self.energy.minimise(&self.pyramid.full.scene(frame.full), prior, &mut self.pixels);
+        self.minimise(&frame, options.detail().unwrap_or(1.0));
         // 8. Validity.
         self.validate(&frame, instants, options.quality_min, out);
         // 9. Uncertainty and the probability of a wrong order. 10. Heights (S7).
@@ -182,6 +181,12 @@ impl Joint {
         let marks = Marks { saturated: &mut saturation.saturated, reasons: &mut pixels.reasons };
         linear_light(plan, shot, *shape, *ratios, &mut pyramid.full, marks);
         saturation.judge(&pyramid.full.light, *ratios);
+    }
+
+    /// Step 6: the minimum of the energy, with this `detail`.
+    fn minimise(&mut self, frame: &Frame<'_>, detail: f32) {
+        let prior = Prior { ratios: self.ratios, noise: self.coarse.noise, detail };
+        self.energy.minimise(&self.pyramid.full.scene(frame.full), prior, &mut self.pixels);
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +12,7 @@ from quadfringe import _core
 
 PLANE_Z_MM = 800.0
 HALF_WIDTH_MM, HALF_HEIGHT_MM = 175.0, 135.0
+FRINGE_MM = 10.6  # of 36 fringes on the plane, camera and projector of the bench
 WALL_MM = 2.0  # run of a wall: walls of a height map cannot be vertical
 
 Heights = NDArray[np.float64]
@@ -31,10 +33,18 @@ class Relief:
 
     def parts_at(self, points_mm: NDArray[np.float32]) -> NDArray[np.int64]:
         """Give the part at each point, (H, W)."""
+        return np.asarray(self.part[self._places(points_mm)])
+
+    def folds_at(self, points_mm: NDArray[np.float32]) -> Heights:
+        """Give how far each point lies above its surroundings, in standard deviations, (H, W)."""
+        above = self.height_mm - cv2.GaussianBlur(self.height_mm, (0, 0), FRINGE_MM / 2 / self.pitch_mm)
+        return np.asarray((above / above.std())[self._places(points_mm)])
+
+    def _places(self, points_mm: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         rows, columns = self.part.shape
         x = np.clip(np.nan_to_num((points_mm[..., 0] + HALF_WIDTH_MM) / self.pitch_mm).round(), 0, columns - 1)
         y = np.clip(np.nan_to_num((points_mm[..., 1] + HALF_HEIGHT_MM) / self.pitch_mm).round(), 0, rows - 1)
-        return np.asarray(self.part[y.astype(int), x.astype(int)])
+        return y.astype(np.int64), x.astype(np.int64)
 
 
 def grid(pitch_mm: float) -> tuple[Heights, Heights]:
@@ -57,6 +67,29 @@ def coin(random: np.random.Generator) -> Relief:
         size = random.uniform(0.2, 1.0) * random.choice((-1, 1))
         height += size * np.exp(-((u / along) ** 2) - (v / across) ** 2)
     return Relief(height, np.zeros(height.shape, np.int64), 0.2)
+
+
+def cloth(random: np.random.Generator) -> Relief:
+    """Give a draped cloth with folds of 0.3 to 1 fringe of the bench, and hair on it (part 1), 0.6 mm high."""
+    x, y = grid(0.2)
+    height, warp = 8.0 * np.exp(-((x / 120) ** 2) - (y / 90) ** 2), np.zeros(x.shape)
+    for _ in range(6):
+        turn, period = random.uniform(0, 2 * np.pi), random.uniform(60, 140)
+        along = x * np.cos(turn) + y * np.sin(turn)
+        warp += random.uniform(4, 9) * np.sin(2 * np.pi * along / period + random.uniform(0, 2 * np.pi))
+    for _ in range(5):
+        turn, period, slope = random.uniform(0, np.pi), FRINGE_MM * random.uniform(0.3, 1.0), random.uniform(0.15, 0.4)
+        across = np.sin(2 * np.pi * (x * np.cos(turn) + y * np.sin(turn) + warp) / period)
+        near = ((x - random.uniform(-90, 90)) / 60) ** 2 + ((y - random.uniform(-70, 70)) / 50) ** 2
+        height += np.exp(-near) * slope * period / (2 * np.pi) * (1 - 2 * np.abs(across) ** 1.3)
+    hair = np.zeros(x.shape)
+    for _ in range(60):
+        cx, cy, turn = random.uniform(-100, 100), random.uniform(-80, 80), random.uniform(0, np.pi)
+        u = (x - cx) * np.cos(turn) + (y - cy) * np.sin(turn)
+        v = (y - cy) * np.cos(turn) - (x - cx) * np.sin(turn) + 0.002 * u * u * random.choice((-1, 1))
+        radius, long = FRINGE_MM * random.uniform(0.3, 1.0) / 4, random.uniform(15, 40)
+        hair = np.maximum(hair, np.where(np.abs(u) < long, 0.6 * np.clip(1 - (v / radius) ** 2, 0, 1), 0))
+    return Relief(height + hair, (hair > 0).astype(np.int64), 0.2)
 
 
 def rods(random: np.random.Generator) -> Relief:

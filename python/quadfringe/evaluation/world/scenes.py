@@ -53,13 +53,32 @@ class Take:
 
 @dataclass(frozen=True)
 class World:
-    """A scene before the exposure: what the camera sees, its albedo, and how the material spreads light."""
+    """A scene before the exposure: what the camera sees, its albedo, and how the material spreads light.
+
+    `contrast` (H, W) is that of the fringes; light without fringes lowers it, such as that of the folds of a cloth on
+    each other.
+    """
 
     cast: _core.Cast
     albedo: NDArray[np.float32] | None = None
     fringe_numbers: tuple[float, ...] = FRINGES
     options: dict[str, Any] | None = None
     spread_px: tuple[float, float, float, float] | None = None
+    contrast: NDArray[np.float32] | None = None
+
+
+def _with_contrast(bench: _core.Bench, world: World, seed: int, noise: float) -> list[NDArray[np.uint8]]:
+    """Add light without fringes until their contrast is that of the world, and expose the brightest to 95 %."""
+    assert world.albedo is not None
+    assert world.contrast is not None
+    images = bench.render(world.cast, world.fringe_numbers, noise=0.0, bit_depth=16, albedo=world.albedo)
+    # Offset and contrast of the light of the bench; its folds light each other in the colour of the cloth.
+    offset, contrast = 0.4995, 0.901
+    added = offset * world.albedo * (contrast / world.contrast - 1)[..., None]
+    lights = [images[name] / 65535.0 + added[..., c] for c, name in enumerate(("red", "green", "blue", "ir"))]
+    exposure = 0.95 / max(float(np.nanpercentile(light, 99.9)) for light in lights)
+    full = [(np.clip(exposure * np.nan_to_num(light), 0, 1) * 65535).astype(np.uint16) for light in lights]
+    return [noisy_8bit(image, noise, 10 * seed + c) for c, image in enumerate(full)]
 
 
 Draw = Callable[[_core.Bench, np.random.Generator], World]
@@ -79,7 +98,9 @@ def expose(bench: _core.Bench, world: World, seed: int, noise: float = NOISE) ->
     """Take a shot of a scene; light spreads in the material before the sensor adds noise."""
     options: dict[str, Any] = {} if world.albedo is None else {"albedo": world.albedo}
     options |= world.options or {}
-    if world.spread_px is None:
+    if world.contrast is not None:
+        channels = _with_contrast(bench, world, seed, noise)
+    elif world.spread_px is None:
         images = bench.render(world.cast, world.fringe_numbers, noise=noise, seed=seed, **options)
         channels = [images[name] for name in ("red", "green", "blue", "ir")]
     else:
@@ -133,6 +154,18 @@ def _translucent(bench: _core.Bench, random: np.random.Generator) -> World:
     return World(bench.cast("face"), spread_px=(red, green, blue, ir))
 
 
+def _cloth(bench: _core.Bench, random: np.random.Generator) -> World:
+    drape = relief.cloth(random)
+    cast = drape.cast(bench)
+    points_mm = cast.xyz_mm()
+    folds = np.clip(drape.folds_at(points_mm), -1, 1)
+    # A woven colour, darker in the folds and where hair lies on it.
+    bright = (0.475 + 0.125 * folds) * np.where(drape.parts_at(points_mm) == 1, 0.6, 1.0)
+    bright = bright * (1 + 0.06 * random.standard_normal(bright.shape))
+    colour = bright[..., None] * np.array((1.0, 0.8, 0.6, 0.9))
+    return World(cast, colour.astype(np.float32), contrast=(0.45 + 0.15 * folds).astype(np.float32))
+
+
 def _relief(made: Callable[[np.random.Generator], relief.Relief], *, coloured: bool) -> Draw:
     def draw(bench: _core.Bench, random: np.random.Generator) -> World:
         shape = made(random)
@@ -165,6 +198,7 @@ SCENES: dict[str, Draw] = {
     "glossy_face": _glossy("face"),
     "translucent_face": _translucent,
     "coin": _relief(relief.coin, coloured=False),
+    "cloth": _cloth,
     "rods": _relief(relief.rods, coloured=True),
     "clutter": _relief(relief.clutter, coloured=True),
     **{f"fringes_{name}": _fringes(numbers) for name, numbers in OTHER_FRINGES.items()},

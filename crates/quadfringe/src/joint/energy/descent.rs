@@ -10,7 +10,8 @@ use super::start::{self, AlbedoOf, smooth};
 use super::tile::{Found, Tile};
 use crate::joint::model::{absent, count};
 use crate::joint::params::energy::{
-    ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
+    ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD,
+    RESTING_RAD, SIDE,
 };
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
@@ -31,13 +32,30 @@ fn write_light(cells: &Column, inside: Lanes, at: usize, found: &mut Found) {
 }
 
 impl Tile {
-    /// Minimises the energy. The phase and the light must be set; `noise` is the variance of the intensity of a cell.
-    pub fn minimise(&mut self, noise: f32) {
+    /// Minimises the energy. The phase and the light must be set; `noise` is the variance of the intensity of a cell, and `detail` the
+    /// factor by which narrower relief is kept than the shot suggests.
+    pub fn minimise(&mut self, noise: f32, detail: f32) {
         self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
         self.unknown.phase.clone_from(&self.start);
         start::contrast_and_albedo(self, AlbedoOf::Neighbours);
         self.descend(noise);
         self.restart(noise);
+        if detail != 1.0 {
+            self.resolve(detail);
+        }
+    }
+
+    /// Descends once more, with the scales that were found but for that of the surface (J36).
+    fn resolve(&mut self, detail: f32) {
+        self.scales.bend *= detail.powi(4);
+        for _ in 0..DETAIL_STEPS {
+            linearise(self);
+            weigh(self);
+            solve(self, INNER_STEPS);
+            self.advance();
+        }
+        linearise(self);
+        weigh(self);
     }
 
     /// Lowers the energy from the present unknowns, and estimates the scales; `noise` is the least variance of the noise.

@@ -44,6 +44,8 @@ pub(super) struct Prior {
     pub ratios: [f32; 4],
     /// Standard deviation of the intensity of a pixel, in linear light.
     pub noise: f32,
+    /// Relief narrower by this factor is kept than the shot suggests (J36).
+    pub detail: f32,
 }
 
 impl Energy {
@@ -64,7 +66,7 @@ impl Energy {
                 found.inside.clear();
                 if cells.load([rows.origins[n / across], columns.origins[n % across]], tile) {
                     tile.ratios = prior.ratios;
-                    tile.minimise(variance);
+                    tile.minimise(variance, prior.detail);
                     tile.write(found);
                 }
             },

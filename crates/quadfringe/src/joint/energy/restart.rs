@@ -39,7 +39,7 @@ impl Tile {
         solve(self, BRIDGE_STEPS);
         std::mem::swap(&mut self.inside, &mut self.lit);
         if take_step(self) {
-            self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
+            self.scales = Scales { noise, misfit: 1.0, ..scales };
             start::contrast_and_albedo(self, AlbedoOf::Cell);
             self.descend(noise);
             keep_lower(self, &scales);

@@ -57,7 +57,7 @@ fn errors(tile: &Tile, truth: &Plane) -> (f32, f32) {
 #[test]
 fn the_minimum_finds_phase_and_contrast_through_an_edge_of_colour() {
     let (mut tile, truth) = tile(0.0);
-    tile.minimise(1e-8);
+    tile.minimise(1e-8, 1.0);
     let (rms, largest) = errors(&tile, &truth);
     assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
     let contrast = tile.unknown.contrast.row(20)[12].exp();
@@ -92,7 +92,7 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
     tile.descend(noise);
     let (first, _) = errors(&tile, &truth);
     let (mut tile, truth) = printed_tile();
-    tile.minimise(noise);
+    tile.minimise(noise, 1.0);
     let (second, largest) = errors(&tile, &truth);
     assert!(first > 0.02 && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
 }
@@ -144,7 +144,7 @@ fn a_tile_without_texture_has_one_start() {
             }
         }
     }
-    tile.minimise(1e-8);
+    tile.minimise(1e-8, 1.0);
     assert!(tile.first.phase.row(40).iter().all(|&phase| phase == 0.0), "a second start was made");
 }
 
@@ -153,7 +153,7 @@ fn noise_is_estimated_and_averaged() {
     // Uniform noise in [-a, a] has the variance a^2 / 3.
     let (amplitude, least) = (0.03, 1e-8);
     let (mut tile, truth) = tile(amplitude);
-    tile.minimise(least);
+    tile.minimise(least, 1.0);
     let (rms, _) = errors(&tile, &truth);
     // A single cell would have 0.05 rad.
     assert!(rms < 0.02, "{rms}");
@@ -178,7 +178,7 @@ fn scalar(a: &Fields, b: &Fields) -> f64 {
 #[test]
 fn the_preconditioner_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.03);
-    tile.minimise(1e-6);
+    tile.minimise(1e-6, 1.0);
     let Tile { derivatives, weights, preconditioner, .. } = &mut tile;
     prepare(preconditioner, derivatives, weights, RATIOS);
     let (first, second) = (random_fields(1), random_fields(2));
@@ -192,7 +192,7 @@ fn the_preconditioner_is_symmetric_and_positive() {
 #[test]
 fn the_preconditioner_inverts_columns_that_stand_alone() {
     let (mut tile, _) = tile(0.03);
-    tile.minimise(1e-6);
+    tile.minimise(1e-6, 1.0);
     let Tile { derivatives, weights, preconditioner, inside, .. } = &mut tile;
     // Neither columns nor the unknowns of a cell are coupled: R knows the phase, G and B their albedo, IR the contrast.
     let Weights { bend: [along, _, mixed], brightness, colour, contrast } = weights;
@@ -222,7 +222,7 @@ fn the_preconditioner_inverts_columns_that_stand_alone() {
 #[test]
 fn the_matrix_is_symmetric_and_positive() {
     let (mut tile, _) = tile(0.0);
-    tile.minimise(1e-6);
+    tile.minimise(1e-6, 1.0);
     weigh(&mut tile);
     let (first, second) = (random_fields(1), random_fields(2));
     let [mut one, mut two] = [Fields::default(), Fields::default()];
@@ -258,7 +258,7 @@ fn an_absent_channel_takes_no_part() {
     let (mut tile, truth) = tile(0.0);
     tile.ratios[3] = 0.0;
     tile.light[3].clear();
-    tile.minimise(1e-8);
+    tile.minimise(1e-8, 1.0);
     let (rms, largest) = errors(&tile, &truth);
     assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
     assert!(tile.unknown.albedo[3].row(20).iter().all(|&log| log == 0.0));
