@@ -28,7 +28,7 @@ from quadfringe.cli._options import (
     fringes_from,
     method_named,
 )
-from quadfringe.cli._output import caution, say, write_figures
+from quadfringe.cli._output import caution, note, say, write_figures
 from quadfringe.cli._steps import (
     BeamOption,
     NumbersOption,
@@ -272,6 +272,8 @@ def _save(shape: Shape, results: _Results, json: Path | None) -> None:
         write_page(results.page, shape, out.name)
     for text in shape.warnings:
         caution(text)
+    if shape.geometry.startswith("rows not"):
+        note(shape.geometry)
     figures = shape.figures()
     pixels = f"{figures['returned_percent']:.1f} % of {shape.phase_rad.size} pixels returned"
     say(f"{out}: {pixels}{_uncertainty(figures)}", json)
@@ -280,7 +282,7 @@ def _save(shape: Shape, results: _Results, json: Path | None) -> None:
         listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
         say(f"response estimated from the shot, exponents: {listed} (--response linear skips this)", json)
         figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
-    write_figures(figures, json, warnings=list(shape.warnings))
+    write_figures(figures, json, warnings=list(shape.warnings), notes=[shape.geometry] if shape.geometry else [])
 
 
 def _uncertainty(figures: Mapping[str, float]) -> str:

@@ -131,6 +131,16 @@ class Shape:
         """What is doubtful about the shape, and what to do about it, in words; empty when nothing is."""
         return tuple(self.config.get("warnings", ()))
 
+    @property
+    def geometry(self) -> str:
+        """Whether the shot checks its calibration along y, in words that begin "rows checked" or "rows not checked".
+
+        Fringes give projector columns. Images that moved along y, and a projector that was turned, show only where the
+        light ends above or below. Empty without a calibration, and for shapes of earlier versions. No shot checks the
+        distance between the devices, on which the size of everything depends.
+        """
+        return str(self.config.get("geometry", ""))
+
     def figures(self) -> dict[str, float]:
         """Compute figures of the shape, by name with unit.
 
