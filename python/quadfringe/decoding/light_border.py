@@ -131,9 +131,10 @@ def moved_border(shape: Shape) -> Cause | None:
 
 def _beyond(xyz_mm: NDArray[np.float32], known: Calibration) -> float:
     """Give the share of the image columns in which several pixels lie beyond the rows of the projector."""
-    points = xyz_mm[:, :: max(1, min(xyz_mm.shape[:2]) // params.SAMPLES)].astype(np.float64)
+    columns = np.s_[:: max(1, min(xyz_mm.shape[:2]) // params.SAMPLES)]
+    points = xyz_mm[:: params.BEYOND_STRIDE, columns].astype(np.float64)
     met = np.isfinite(points[..., 2])
     rows = pixels_of(points[met], known.projector)[:, 1]
     beyond = np.zeros(met.shape, bool)
     beyond[met] = np.maximum(-0.5 - rows, rows - (known.projector.height_px - 0.5)) > params.ROWS_PX
-    return float(np.mean(beyond.sum(axis=0) >= params.BEYOND_PIXELS))
+    return float(np.mean(beyond.sum(axis=0) >= params.BEYOND_PIXELS / params.BEYOND_STRIDE))

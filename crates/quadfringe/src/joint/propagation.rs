@@ -257,17 +257,17 @@ mod tests {
         let components: Vec<u8> = (0..grid.pixels())
             .map(|i| [1, GROWN, 0][usize::from(i % 32 == 15) + 2 * usize::from(i % 32 >= 28)])
             .collect();
-        // The order of one pixel, which is a cell here, was changed.
+        // The order of the cell of columns 12 to 15 in the last two rows was changed.
         let mut moved = vec![0.0; grid.rows * grid.columns];
-        moved[13] = 0.4;
+        moved[grid.columns + 3] = 0.4;
         let known = Components { grid: &grid, phase: &phase, components: &components, moved: &moved };
         Propagation::default().run(known, &mut wrong_order, &mut quality);
         let row = |map: &[f32]| [11, 14, 15, 16, 30].map(|x| map[3 * 32 + x]);
         let (settled, grown) = (SETTLED_PROBABILITY_MIN, GROWN_PROBABILITY_MIN);
         assert_eq!(row(&wrong_order), [1e-5, settled, grown, settled, 0.4]);
         assert_eq!(row(&quality), [0.9; 5]);
-        assert_eq!([wrong_order[13], quality[13]], [0.4, 0.1]);
-        assert_eq!([wrong_order[32 + 13], quality[32 + 13]], [settled, 0.9]);
+        assert_eq!([4, 3].map(|y| wrong_order[y * 32 + 13]), [0.4, settled]);
+        assert_eq!([4, 3].map(|y| quality[y * 32 + 13]), [0.1, 0.9]);
     }
 
     #[test]
