@@ -56,8 +56,8 @@ BORDER_END_SHARE = 0.03
 # shots have 0.00, by the published method, which keeps wrong orders, up to 0.04. Smaller ones warn of wrong orders,
 # larger ones miss a projector that was turned by 5 degrees, which has 0.13 or more where the border is in view.
 BEYOND_SHARE, BEYOND_PIXELS = 0.08, 8
-# Rows between the pixels that are looked at for this. More pixels cost time in every decode: with 1, 18 ms of 780 ms of a
-# shot of 1024 x 768; fewer would miss a border that is off by ten rows.
+# Rows between the pixels that are looked at for this. More pixels cost time in every decode: with 1, 18 ms of 780 ms of
+# a shot of 1024 x 768; fewer would miss a border that is off by ten rows.
 BEYOND_STRIDE = 4
 
 # --- Numbers of a calibration, without a shape
