@@ -20,8 +20,8 @@ from quadfringe.files import figures_text
 
 
 def first(found: list[Finding]) -> Finding | None:
-    """Give the first finding that is not good."""
-    return next((one for one in found if one.grade != "good"), None)
+    """Give the first finding that is a warning or a fault; notes say what no shot can check."""
+    return next((one for one in found if one.grade in ("warning", "fault")), None)
 
 
 def named(case: broken.Case, plan: qf.Plan) -> tuple[bool, str]:

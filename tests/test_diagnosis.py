@@ -37,7 +37,9 @@ def moved(calibration: Calibration, **fields: Any) -> Calibration:
 
 
 def first(shot: qf.Shot, calibration: Calibration | None) -> str:
-    found = [one for one in examine_shot(shot, qf.Plan(912, calibration=calibration)) if one.grade != "good"]
+    found = [
+        one for one in examine_shot(shot, qf.Plan(912, calibration=calibration)) if one.grade not in ("good", "note")
+    ]
     return found[0].name if found else "nothing"
 
 

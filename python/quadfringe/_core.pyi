@@ -576,8 +576,11 @@ def unwrap(
     """
 
 def estimate_response(stacks: Sequence[NDArray[np.float32]]) -> dict[str, float]:
-    """Give offset, exponent, knee, two_step_rms_before_rad, two_step_rms_after_rad and pixels of N-step stacks.
+    """Give offset, exponent, knee and figures of their quality, from N-step stacks.
 
+    `two_step_rms_before_rad` and `two_step_rms_after_rad` are those of two steps, without and with the correction,
+    `second_harmonic_before` and `second_harmonic_after` the second harmonic over the first one, of the sign of a gamma
+    above 1; `exponent_sd` is the standard error of the exponent, and `pixels` counts the pixels.
     Each stack is (steps, H, W) in fractions of full scale. ValueError when a stack is out of order, too dark,
     saturated or without fringes.
     """
@@ -595,7 +598,7 @@ def estimate_response_of_shot(
 ) -> dict[str, dict[str, float]]:
     """Give the figures of `estimate_response` by channel, from one captured shot and its decoded phase.
 
-    A channel whose response does not differ measurably from a straight line, or with too few fringes, is left out.
+    A channel whose response does not differ from a straight line beyond doubt, or with too few fringes, is left out.
     `pixels` counts tiles.
     """
 

@@ -152,8 +152,12 @@ def test_a_camera_that_is_not_on_a_network() -> None:
 
     Aravis.enable_interface("Fake")
     try:
-        config = AravisConfig(device="Fake_1", features={"Width": 128, "Height": 64}, frame_rate_hz=50.0)
+        region = ChipConfig(offset_px=(16, 8))
+        config = AravisConfig(
+            device="Fake_1", features={"Width": 128, "Height": 64}, frame_rate_hz=50.0, visible=region
+        )
         with ChipCamera(config) as camera:
+            assert camera.config.visible.offset_px == (16, 8)
             images = list(camera.stream(5, keep="all"))
     finally:
         Aravis.disable_interface("Fake")

@@ -247,6 +247,9 @@ fn figures_of<'py>(py: Python<'py>, found: &ResponseEstimate) -> PyResult<Bound<
     named.set_item("two_step_rms_before_rad", found.two_step_rms_before_rad)?;
     named.set_item("two_step_rms_after_rad", found.two_step_rms_after_rad)?;
     named.set_item("pixels", found.pixels)?;
+    named.set_item("exponent_sd", found.exponent_sd)?;
+    named.set_item("second_harmonic_before", found.second_harmonic_before)?;
+    named.set_item("second_harmonic_after", found.second_harmonic_after)?;
     Ok(named)
 }
 

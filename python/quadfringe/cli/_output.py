@@ -19,6 +19,7 @@ __all__ = [
     "caution",
     "cautions",
     "complain",
+    "note",
     "printable",
     "progress",
     "rows",
@@ -42,6 +43,11 @@ def complain(message: str) -> None:
 def caution(message: str) -> None:
     """Print a warning on standard error."""
     typer.echo(printable(f"warning: {message}"), err=True)
+
+
+def note(message: str) -> None:
+    """Print on standard error what a result does not tell, which is no sign of a fault."""
+    typer.echo(printable(f"note: {message}"), err=True)
 
 
 @contextmanager

@@ -28,7 +28,8 @@ from quadfringe.cli._options import (
     fringes_from,
     method_named,
 )
-from quadfringe.cli._output import caution, say, write_figures
+from quadfringe.cli._output import caution, note, say, write_figures
+from quadfringe.cli._results import response_told, uncertainty_told
 from quadfringe.cli._steps import (
     BeamOption,
     NumbersOption,
@@ -279,21 +280,11 @@ def _save(shape: Shape, results: _Results, json: Path | None) -> None:
         write_page(results.page, shape, out.name)
     for text in shape.warnings:
         caution(text)
+    if shape.geometry.startswith("rows not"):
+        note(shape.geometry)
     figures = shape.figures()
     pixels = f"{figures['returned_percent']:.1f} % of {shape.phase_rad.size} pixels returned"
-    say(f"{out}: {pixels}{_uncertainty(figures)}", json)
+    say(f"{out}: {pixels}{uncertainty_told(figures)}", json)
     if shape.config["response"] is not None and shape.config["response_from"] == "shots":
-        exponents = {name: channel["exponent"] for name, channel in shape.config["response"].items()}
-        listed = ", ".join(f"{name} {exponent:.2f}" for name, exponent in exponents.items())
-        say(f"response estimated from the shot, exponents: {listed} (--response linear skips this)", json)
-        figures = {**figures, **{f"response_exponent_{name}": value for name, value in exponents.items()}}
-    write_figures(figures, json, warnings=list(shape.warnings))
-
-
-def _uncertainty(figures: Mapping[str, float]) -> str:
-    """Describe the median uncertainty and how many wrong fringe orders to expect; empty when neither is known."""
-    for unit in ("mm", "rad"):
-        if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
-            wrong = figures.get("wrong_orders_at_most", 0.0)
-            return f", median uncertainty {sigma:.3g} {unit}, at most {wrong:.3g} pixels of wrong fringe order expected"
-    return ""
+        figures = {**figures, **response_told(shape, json)}
+    write_figures(figures, json, warnings=list(shape.warnings), notes=[shape.geometry] if shape.geometry else [])

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 __all__ = ["doctor"]
 
 FAULT = 1
-MARKS = {"good": "ok     ", "warning": "WARNING", "fault": "FAULT  "}
+MARKS = {"good": "ok     ", "note": "note   ", "warning": "WARNING", "fault": "FAULT  "}
 PathsArgument = Annotated[
     list[Path] | None,
     typer.Argument(
@@ -183,7 +183,7 @@ def _report(found: Sequence[Finding], json: Path | None) -> None:
     for one in found:
         say(f"{MARKS[one.grade]} {one.name}: {one.found}", json)
         if one.fix:
-            say(f"        fix: {one.fix}", json)
+            say(f"        {'by hand' if one.grade == 'note' else 'fix'}: {one.fix}", json)
     faults, warnings = (sum(one.grade == grade for one in found) for grade in ("fault", "warning"))
     say(f"{faults} faults, {warnings} warnings", json)
     write_record({"findings": [vars(one) | {"value": _finite(one.value)} for one in found]}, json)

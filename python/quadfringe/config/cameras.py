@@ -155,6 +155,9 @@ PixelFormat = Literal[
 ]
 
 
+NotNegativeInt = Annotated[int, Field(ge=0)]
+
+
 class ChipConfig(Model):
     """One chip of the camera. A setting that is absent stays as it is in the device."""
 
@@ -169,6 +172,10 @@ class ChipConfig(Model):
         default=None, description="Value of the GenICam feature SourceSelector, for devices that have it."
     )
     pixel_format: PixelFormat | None = Field(default=None, description="Pixel format, by its GenICam name.")
+    offset_px: tuple[NotNegativeInt, NotNegativeInt] | None = Field(
+        default=None,
+        description="First column and row of the images on the chip (OffsetX, OffsetY). A calibration holds for one.",
+    )
     exposure_us: Positive | None = Field(default=None, description="Exposure of this chip, in us.")
     gain: NotNegative | None = Field(default=None, description="Gain of this chip, in the device's unit.")
 

@@ -131,11 +131,23 @@ class Shape:
         """What is doubtful about the shape, and what to do about it, in words; empty when nothing is."""
         return tuple(self.config.get("warnings", ()))
 
+    @property
+    def geometry(self) -> str:
+        """Whether the shot checks its calibration along y, in words that begin "rows checked" or "rows not checked".
+
+        Fringes give projector columns. Images that moved along y, and a projector that was turned, show only where the
+        light ends above or below. Empty without a calibration, and for shapes of earlier versions. No shot checks the
+        distance between the devices, on which the size of everything depends.
+        """
+        return str(self.config.get("geometry", ""))
+
     def figures(self) -> dict[str, float]:
         """Compute figures of the shape, by name with unit.
 
         `returned_percent`; if any pixels are returned, also `uncertainty_median_mm` (or `_rad`), one standard
-        deviation, and `wrong_orders_at_most`, the sum of their probabilities of a wrong order, an upper bound.
+        deviation, and `wrong_orders_at_most`, the sum of their probabilities of a wrong order, an upper bound. With a
+        response that was estimated from shots also `response_phase_rad`: the RMS error of the phase that its
+        uncertainty leaves at most, which `uncertainty_rad` and `uncertainty_mm` do not contain.
         """
         returned = self.returned
         found = {"returned_percent": 100.0 * float(returned.mean())}
@@ -146,6 +158,8 @@ class Shape:
                 found[f"uncertainty_median_{name}"] = float(np.nanmedian(sigma))
         if self.wrong_order_probability is not None:
             found["wrong_orders_at_most"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
+        if (evidence := self.config.get("response_evidence")) is not None:
+            found["response_phase_rad"] = float(evidence["phase_rad"])
         return found
 
     def reasons(self) -> dict[Reason, float]:

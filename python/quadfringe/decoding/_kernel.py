@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, Literal
 
 import numpy as np
@@ -36,6 +37,7 @@ class KernelDecoder:
         plan: Plan,
         source: str | None = None,
         idle: list[_core.Decoder] | None = None,
+        evidence: Mapping[str, Any] = MappingProxyType({}),
     ) -> None:
         _check_size(size, plan)
         self._size, self._full_scale, self.plan = size, full_scale, plan
@@ -43,6 +45,7 @@ class KernelDecoder:
         self._described = (
             plan.described
             | self._response_described(source)
+            | dict(evidence)
             | {"decode": rounded(self._idle[0].settings()) | _stated(plan)}
         )
 
@@ -55,15 +58,22 @@ class KernelDecoder:
         return "linear" if calibration is None or calibration.response is None else calibration.response
 
     @property
+    def evidence(self) -> Mapping[str, Any]:
+        """What told a response that was estimated from shots; empty for any other."""
+        return {name: self._described[name] for name in ("response_evidence",) if name in self._described}
+
+    @property
     def settings(self) -> dict[str, Any]:
         """Settings in force, with the defaults of the kernel."""
         return dict(self._described["decode"])
 
-    def with_response(self, response: Response | Literal["linear"]) -> KernelDecoder:
-        """Give a decoder of the same plan with a response that was estimated from shots."""
+    def with_response(
+        self, response: Response | Literal["linear"], evidence: Mapping[str, Any] = MappingProxyType({})
+    ) -> KernelDecoder:
+        """Give a decoder of the same plan with a response that was estimated from shots, and what told it."""
         plan = replace(self.plan, response=response)
         same = conditioning(plan.calibration, response) == conditioning(plan.calibration, self.plan.response)
-        return KernelDecoder(self._size, self._full_scale, plan, "shots", self._idle if same else None)
+        return KernelDecoder(self._size, self._full_scale, plan, "shots", self._idle if same else None, evidence)
 
     def with_plan(self, plan: Plan) -> KernelDecoder:
         """Give a decoder of images of the same size and full scale."""

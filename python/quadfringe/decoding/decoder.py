@@ -11,6 +11,7 @@ from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, che
 from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import too_bright, wrong_bits
+from quadfringe.decoding.light_border import checked_rows
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, response_in_place_of
@@ -130,12 +131,19 @@ def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot, doubt: Cause | N
         raise fatal.error
     light = (doubt, too_dark(shot, kernel.plan.calibration), wrong_bits(shot), too_bright(shot))
     doubts = [*doubts, *filter(None, light), *within_depths(shape, kernel.plan.decode.depth_range_mm)]
+    shape = _with_check(shape)
     if not doubts:
         return shape
     words = [f"{cause.found}; {cause.fix}" for cause in doubts]
     for text in words:
         warnings.warn(text, DecodeWarning, stacklevel=4)
     return replace(shape, config={**shape.config, "warnings": words})
+
+
+def _with_check(shape: Shape) -> Shape:
+    """Note in the shape whether the shot checks the rows of its calibration."""
+    words = checked_rows(shape)
+    return replace(shape, config={**shape.config, "geometry": words}) if words else shape
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:

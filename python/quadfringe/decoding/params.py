@@ -35,9 +35,30 @@ TILT_DEG = 45.0
 # published method, which keeps wrong orders, have a share of 0.01, a projector with half of its focal length has 0.08.
 # A smaller factor counts rooms behind the object.
 FAR_MEDIANS = 3.0
-# Factor by which the median depth may leave the depths of the board in the calibration. Not measured: between them
-# the calibration is tested, and up to half as far again its lens model still holds.
-CALIBRATED_FACTOR = 1.5
+# Factor by which the median depth may leave the depths of the board in the calibration. Between them the calibration is
+# tested. A projector that was turned by 5 degrees moves 800 mm by 140 mm or more, a distance of the devices that is 1.2
+# times too large by 160 mm; boards lie at 730 to 870 mm (`python evaluation/geometry.py --calibrated`). A larger factor
+# misses these, a smaller one warns of objects a little beyond the boards.
+CALIBRATED_FACTOR = 1.1
+
+# --- The upper and the lower border of the light: `python evaluation/geometry.py` prints the figures of sound and
+# --- moved shots. On sound ones the border lies 1.7 rows inside its place; 20 of 384 image rows move it by 63 or more.
+
+# Dark image rows beyond a border, px. A smaller number takes the edge of the image for the border.
+BORDER_DARK_PX = 6
+# Share of the image columns in which the border lies at one projector row, and rows by which it may scatter. A smaller
+# share and more rows take edges of objects for the border, the others miss a border that is in view in part.
+BORDER_SHARE, BORDER_ROWS_PX = 0.3, 4.0
+# Share of the image, and of the projector columns, in which a border reaches the end of the view or of the light. A
+# larger one takes straight edges of objects for the border.
+BORDER_END_SHARE = 0.03
+# Share of the image columns in which some pixels lie more than ROWS_PX beyond the border, and how many pixels. Sound
+# shots have 0.00, by the published method, which keeps wrong orders, up to 0.04. Smaller ones warn of wrong orders,
+# larger ones miss a projector that was turned by 5 degrees, which has 0.13 or more where the border is in view.
+BEYOND_SHARE, BEYOND_PIXELS = 0.08, 8
+# Rows between the pixels that are looked at for this. More pixels cost time in every decode: with 1, 18 ms of 780 ms of
+# a shot of 1024 x 768; fewer would miss a border that is off by ten rows.
+BEYOND_STRIDE = 4
 
 # --- Numbers of a calibration, without a shape
 

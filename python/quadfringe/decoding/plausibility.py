@@ -18,6 +18,7 @@ from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.device_limits import impossible_devices
 from quadfringe.decoding.fringe_fit import pixels_of
+from quadfringe.decoding.light_border import moved_border
 from quadfringe.decoding.pair_numbers import ambiguous_pair
 
 __all__ = ["Geometry", "calibrated_depths_mm", "geometry_of", "implausible", "mirrored", "within_depths"]
@@ -149,7 +150,10 @@ def _contradicted(shape: Shape, calibration: Calibration) -> list[Cause]:
         return []
     if backwards := _backwards(found):
         return [backwards]
-    return [*_impossible(found), *_doubtful(found, calibration)]
+    if impossible := _impossible(found):
+        return [*impossible, *_doubtful(found, calibration)]
+    moved = moved_border(shape)
+    return [*([] if moved is None else [moved]), *_doubtful(found, calibration)]
 
 
 def within_depths(shape: Shape, range_mm: tuple[float, float] | None) -> list[Cause]:

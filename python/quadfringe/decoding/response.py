@@ -9,7 +9,8 @@ from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding._kernel import KernelDecoder, check_shot, size_of
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
-from quadfringe.decoding.stages import response_of_shot
+from quadfringe.decoding.shot_response import ShotResponse, shot_response
+from quadfringe.decoding.stages import linear_light
 from quadfringe.decoding.verdict import order_margin
 from quadfringe.errors import InputError
 
@@ -64,17 +65,17 @@ def decode_straightened(as_captured: KernelDecoder, shot: AnyShot) -> tuple[Kern
     linear = as_captured.with_response("linear")
     first = linear.shape(shot)
     found = _estimate(shot, first, as_captured.plan)
-    if found == "linear":
+    if found.response == "linear":
         return linear, first
     # The joint method also finds a response that is too strong for the published method to decode.
     finder = as_captured.with_method("joint")
     for _ in range(ROUNDS_MAX):
         before = found
-        again = _estimate(shot, finder.with_response(before).shape(shot), as_captured.plan)
-        found = before if again == "linear" else again
+        again = _estimate(shot, finder.with_response(before.response).shape(shot), as_captured.plan)
+        found = before if again.response == "linear" else again
         if _settled(found, before):
             break
-    straight = as_captured.with_response(found)
+    straight = as_captured.with_response(found.response, found.described)
     shape = straight.shape(shot)
     return (straight, shape) if order_margin(shape) > order_margin(first) else (linear, first)
 
@@ -84,16 +85,17 @@ def response_in_place_of(stated: KernelDecoder, shot: AnyShot) -> KernelDecoder:
     plan, calibration = stated.plan, stated.plan.calibration
     if calibration is not None:
         plan = replace(plan, calibration=calibration.model_copy(update={"response": None}))
-    found = decode_straightened(stated.with_plan(replace(plan, response="linear")), shot)[0].response
-    return stated.with_response(found)
+    found = decode_straightened(stated.with_plan(replace(plan, response="linear")), shot)[0]
+    return stated.with_response(found.response, found.evidence)
 
 
-def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> Response | Literal["linear"]:
-    fringes = plan.fringes
-    given = (shot, shape.phase_rad, fringes.code, plan.projector_width_px, plan.calibration)
-    return response_of_shot(*given, columns_px=fringes.columns_px)
+def _estimate(shot: AnyShot, shape: Shape, plan: Plan) -> ShotResponse:
+    light, fringes = linear_light(shot, plan.calibration), plan.fringes
+    return shot_response(light, shape.phase_rad, fringes.code, plan.projector_width_px, fringes.columns_px)
 
 
-def _settled(one: Response, other: Response) -> bool:
-    pairs = zip(one.rows, other.rows, strict=True)
+def _settled(one: ShotResponse, other: ShotResponse) -> bool:
+    assert isinstance(one.response, Response)
+    assert isinstance(other.response, Response)
+    pairs = zip(one.response.rows, other.response.rows, strict=True)
     return all(abs(a[1] - b[1]) <= SETTLED * b[1] for a, b in pairs)

@@ -73,7 +73,7 @@ from quadfringe._core import (
     unwrap,
     wrong_order_probability,
 )
-from quadfringe.config import ChannelResponse, Response, ResponseChoice, brief
+from quadfringe.config import Response, ResponseChoice, brief
 from quadfringe.config.fringes import fringe_numbers as numbers_of
 from quadfringe.config.fringes import is_code
 from quadfringe.data import AnyShot, BayerShot, Calibration, conditioning
@@ -81,6 +81,7 @@ from quadfringe.data._checks import check_maps
 from quadfringe.decoding._kernel import check_shot
 from quadfringe.decoding._wrapped import FringeNumbers, Map, Wrapped, each_alone, with_quadrature, wrap
 from quadfringe.decoding.plan import calibration_of, response_of, stated_response
+from quadfringe.decoding.shot_response import shot_response
 from quadfringe.errors import InputError
 
 __all__ = [
@@ -154,13 +155,7 @@ def response_of_shot(
     differ.
     """
     light = linear_light(shot, calibration)
-    channels = (light["red"], light["green"], light["blue"], light.get("ir"))
-    found = _core.estimate_response_of_shot(
-        *channels, phase_rad, fringe_numbers, projector_width_px, columns_px=columns_px
-    )
-    numbers = ChannelResponse.model_fields
-    responses = {name: ChannelResponse(**{n: figures[n] for n in numbers}) for name, figures in found.items()}
-    return Response(**responses) if responses else "linear"
+    return shot_response(light, phase_rad, fringe_numbers, projector_width_px, columns_px).response
 
 
 def _known(response: object, calibration: Calibration | None) -> ResponseChoice:

@@ -192,11 +192,15 @@ class ExternalLight:
 
 @dataclass(frozen=True)
 class Devices:
-    """The opened devices of a system, and its settings as the devices accepted them."""
+    """The opened devices of a system, and its settings as the devices accepted them.
+
+    `offset_px` is the first column and row of the images on the chip, if the camera or a recording of it tells.
+    """
 
     camera: Camera
     projector: Projector
     config: SystemConfig
+    offset_px: tuple[int, int] | None = None
 
 
 def open_devices(config: SystemConfig) -> Devices:

@@ -9,7 +9,7 @@
 >>> findings = [*examine_shot(shot, plan), *examine_plane(shot, plan), *examine_calibration(plan.calibration)]
 >>> all(isinstance(finding, Finding) for finding in findings)
 True
->>> {finding.grade for finding in findings} <= {"good", "warning", "fault"}
+>>> {finding.grade for finding in findings} <= {"good", "note", "warning", "fault"}
 True
 >>> [finding.name for finding in examine_installation()][:2]  # doctest: +SKIP
 >>> from pathlib import Path

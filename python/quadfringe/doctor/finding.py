@@ -10,12 +10,15 @@ from quadfringe.decoding.cause import Cause
 
 __all__ = ["Finding", "Grade", "graded", "told"]
 
-Grade = Literal["good", "warning", "fault"]
+Grade = Literal["good", "note", "warning", "fault"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """The result of one check: its name, grade, what was found, and the fix, which is empty for a good grade."""
+    """The result of one check: its name, grade, what was found, and the fix, which is empty for a good grade.
+
+    A note says what nothing in the shot can check, and how to check it by hand; it is no sign of a fault.
+    """
 
     name: str
     grade: Grade

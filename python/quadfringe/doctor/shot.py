@@ -12,6 +12,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.causes import blur, registration, wrong_bits
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
+from quadfringe.decoding.light_border import BY_HAND
 from quadfringe.decoding.plan import stated_response
 from quadfringe.decoding.plausibility import geometry_of, implausible
 from quadfringe.decoding.symptoms import brightness, closure_of, saturation
@@ -27,7 +28,7 @@ ROOTS = (
     *("fringe numbers", "infrared registration", "infrared projector", "blur", "calibration", "depth range"),
     *("response", "crosstalk", "coaxial pair", "modulation", "order margin", "returned"),
 )
-GRADES = ("fault", "warning", "good")
+GRADES = ("fault", "warning", "note", "good")
 # Limits for a warning and for a fault; pytest tests/test_doctor.py checks them on shots with known defects.
 # Share of pixels. A smaller share warns of glints, which cost a pixel where they are and nothing else.
 SATURATED = (0.05, 0.2)
@@ -96,18 +97,17 @@ def _geometry(shape: Shape, plan: Plan) -> list[Finding]:
     measured = geometry_of(shape)
     if measured is None:
         return []
-    words = "points lie inside the image of the projector. "
+    words = "points lie inside the image of the projector"
     if plan.fringes.quadrature:
-        words = (
-            f"columns run as the calibration demands, and {words}Fringes along the rows do not show images that are "
-        )
-        words += "flipped up and down or moved along y: check a mark at the upper edge"
+        words = f"columns run as the calibration demands, and {words}"
     else:
         words += (
-            "Three colours of different fringe numbers do not show images that are mirrored, flipped up and down or "
+            ". Three colours of different fringe numbers do not show mirrored images: check a mark at the left edge"
         )
-        words += "moved along y: check marks at the upper and at the left edge"
-    return [Finding("geometry", "good", words, value=measured.backwards)]
+    seen = Finding("geometry", "good", words, value=measured.backwards)
+    if shape.geometry.startswith("rows checked"):
+        return [seen, Finding("geometry along y", "good", shape.geometry)]
+    return [seen, Finding("geometry along y", "note", shape.geometry, BY_HAND)]
 
 
 def _saturation(shot: AnyShot) -> list[Finding]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.config import SystemConfig
-from quadfringe.config.cameras import ReplayConfig
+from quadfringe.config.cameras import AravisConfig, ReplayConfig
 from quadfringe.data import AnyShot, Calibration
 from quadfringe.devices import CameraStatistics, ChipStatistics, Devices, ExternalLight, Keep
 from quadfringe.errors import ConfigError, InputError, RecordingWarning, ShotTimeoutError
@@ -160,4 +160,5 @@ def open_devices(config: SystemConfig) -> Devices:
     elsewhere = {"calibration": None, "projectors": screens}
     said = {name: getattr(config, name) for name in config.model_fields_set}
     merged = recorded.model_copy(update={**elsewhere, **said, "capture": config.capture})
-    return Devices(ReplayCamera(recording, config.capture.speed), ExternalLight(), merged)
+    seen = recorded.capture.visible.offset_px if isinstance(recorded.capture, AravisConfig) else None
+    return Devices(ReplayCamera(recording, config.capture.speed), ExternalLight(), merged, seen)

@@ -30,6 +30,7 @@ from quadfringe.data import AnyShot, Calibration, ResponseCalibration, Shape
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.plan import calibration_of, stated_response
 from quadfringe.devices import Camera, Keep, Projector, open_devices
+from quadfringe.devices.region import check_region
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.io.locks import ForkedLock
 from quadfringe.scanner.reference import REFERENCE_STEPS, Beam, measure_reference
@@ -220,7 +221,8 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
     """Open the system of a TOML file, of a folder with system.toml, or of a config; without any, the virtual bench.
 
     Raises `ConfigError` when the file has unknown keys or wrong values, or names devices that cannot be combined;
-    `InputError` when a file cannot be read; OSError when a device cannot be opened.
+    `InputError` when a file cannot be read, or the camera sends another region of its chip than was calibrated; OSError
+    when a device cannot be opened.
     """
     if system is None:
         config = SystemConfig()
@@ -234,7 +236,9 @@ def open_system(system: Path | str | SystemConfig | None = None) -> Scanner:
     calibration = None if config.calibration is None else Calibration.load(config.calibration)
     devices = open_devices(_with_response_read(config))
     try:
-        return Scanner(devices.config, devices.projector, devices.camera, calibration or devices.camera.calibration)
+        known = calibration or devices.camera.calibration
+        check_region(known, devices.offset_px)
+        return Scanner(devices.config, devices.projector, devices.camera, known)
     except InputError:
         devices.camera.close()
         devices.projector.close()

@@ -54,6 +54,7 @@ def shape_card(shape: Shape) -> str:
         rows["wrong orders"] = f"at most {wrong:.0f} pixels expected"
     method = shape.config.get("decode", {}).get("method")
     rows |= {"method": str(method)} if method else {}
+    rows |= {"geometry": shape.geometry} if shape.geometry else {}
     rows |= {f"warning {number}": words for number, words in enumerate(shape.warnings, 1)}
     picture = shaded(shape, WIDTH_PX) if depth_mm is not None else _phase(shape)
     return _card("Shape", rows, picture)

@@ -172,6 +172,30 @@ pub(super) const MANY_TILES: usize = 100;
 /// evaluation/auto_response.py`).
 pub(super) const GAIN_RAD: f64 = 0.02;
 
+/// Second harmonic over the first, of either sign, that a correction may leave beyond zero. A smaller one follows the
+/// noise of the median, a larger one leaves fringes that are bent the other way (`python evaluation/response_sd.py`).
+pub(super) const HARMONIC_LEFT: f64 = 0.01;
+
+/// Standard errors by which an exponent must differ from 1. With fewer, photographs as albedo count as a response; with
+/// more, weak ones of single objects are missed (`python evaluation/response_sd.py`).
+pub(super) const CERTAIN_SDS: f64 = 4.0;
+
+/// Second harmonic over the first that the captured light must have, of either sign: a gamma of 1.11 makes 0.035.
+/// Photographs as albedo make up to 0.027 in single channels of linear light (`python evaluation/response_sd.py`). A smaller
+/// one corrects these, a larger one leaves weak responses. A channel needs twice as much if all together show no response.
+pub(super) const HARMONIC_LEAST: f64 = 0.035;
+
+/// Standard error that all tiles have in common, as a share of the distance of the exponent from 1. Noise that black
+/// clips, room light and blur move all tiles alike: on painted surfaces with 2 % noise exponents come out too small by 0.05
+/// to 0.15 of that distance. A smaller one states too little (`python evaluation/response_sd.py`).
+pub(super) const EXPONENT_SHARED: f64 = 0.12;
+
+/// Step of the differences from which slopes and curvature of the cost follow, as a share of the exponent. Not measured:
+/// small against what a response changes, large against rounding. A larger one averages over the bend of the cost.
+pub(super) const DIFFERENCE_EXPONENT: f64 = 0.02;
+/// As [`DIFFERENCE_EXPONENT`] for the offset, fraction of full scale. Not measured: one level of 8 bit.
+pub(super) const DIFFERENCE_OFFSET: f64 = 0.004;
+
 /// Step in pixels, along rows and columns, between the pixels at which the slope of the phase is computed. Not
 /// measured: the median of the slopes needs no more pixels.
 pub(super) const SLOPE_STRIDE_PX: usize = 4;

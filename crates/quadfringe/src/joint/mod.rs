@@ -247,7 +247,13 @@ impl Joint {
         let maps = [&mut out.wrong_order_probability, &mut out.quality];
         let [wrong_order, quality] = maps.map(|map| map.as_slice_mut().expect("checked layout"));
         let Self { pixels: Pixels { phase, .. }, validity, ratios, coarse, .. } = self;
-        self.propagation.run(frame.full.grid, phase, &validity.components, wrong_order, quality);
+        let surfaces = propagation::Components {
+            grid: frame.full.grid,
+            phase,
+            components: &validity.components,
+            moved: coarse.orders.moved(),
+        };
+        self.propagation.run(surfaces, wrong_order, quality);
         if let Some(albedo) = &mut out.albedo {
             let known = Known { phase, valid: &validity.valid, ratios: *ratios, noise: coarse.noise };
             let (scene, out) = (self.pyramid.full.scene(frame.full), albedo.as_slice_mut());

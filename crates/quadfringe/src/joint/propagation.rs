@@ -37,16 +37,9 @@ impl Propagation {
     /// Settles the doubtful pixels of the `components`. Four pixels of the same component are candidates: some cells away along
     /// the row and the column, or where the component ends. A doubtful pixel takes wrong-order probability and quality from the
     /// most certain of them. These two maps are without padding.
-    pub fn run(
-        &mut self,
-        grid: &Grid,
-        phase: &[f32],
-        components: &[u8],
-        wrong_order: &mut [f32],
-        quality: &mut [f32],
-    ) {
+    pub fn run(&mut self, known: Components<'_>, wrong_order: &mut [f32], quality: &mut [f32]) {
         let Self { settled, slots } = self;
-        let image = Image { grid, phase, components, wrong_order: &*wrong_order, quality: &*quality };
+        let (grid, image) = (known.grid, Image { known, wrong_order: &*wrong_order, quality: &*quality });
         settled.resize_with(grid.height.div_ceil(PROPAGATION_ROWS), Vec::new);
         settled.par_iter_mut().enumerate().for_each_init(
             || slots.take(),
@@ -64,12 +57,26 @@ impl Propagation {
     }
 }
 
-/// An image. Absolute phase (rad) and components have padded rows; wrong-order probability and quality are without
-/// padding.
+/// The surfaces of a shot. Absolute phase (rad) and components have padded rows.
+#[derive(Clone, Copy)]
+pub(super) struct Components<'a> {
+    pub grid: &'a Grid,
+    pub phase: &'a [f32],
+    pub components: &'a [u8],
+    /// Not 0 for nodes whose order was changed to continue a neighbour; empty for none. That they continue it is no new evidence.
+    pub moved: &'a [f32],
+}
+
+impl Components<'_> {
+    fn is_moved(&self, y: usize, x: usize) -> bool {
+        let Grid { step, columns, .. } = *self.grid;
+        self.moved.get(y / step * columns + x / step).is_some_and(|&moved| moved > 0.0)
+    }
+}
+
+/// An image. Wrong-order probability and quality are without padding.
 struct Image<'a> {
-    grid: &'a Grid,
-    phase: &'a [f32],
-    components: &'a [u8],
+    known: Components<'a>,
     wrong_order: &'a [f32],
     quality: &'a [f32],
 }
@@ -84,7 +91,7 @@ struct Row<'a> {
 impl Image<'_> {
     /// Groups of pixels of row `y` that contain a doubtful pixel.
     fn doubtful(&self, y: usize) -> impl Iterator<Item = Range<usize>> {
-        let wrong_order = &self.wrong_order[y * self.grid.width..][..self.grid.width];
+        let wrong_order = &self.wrong_order[y * self.known.grid.width..][..self.known.grid.width];
         let groups = wrong_order.chunks(GROUP).enumerate();
         // A loop over the group without early exit compiles to a few vector instructions.
         let doubtful = |group: &[f32]| group.iter().fold(false, |any, &wrong| any | (wrong > DOUBTFUL));
@@ -92,8 +99,9 @@ impl Image<'_> {
     }
 
     fn row(&self, y: usize) -> Row<'_> {
-        let row = y * self.grid.stride..y * self.grid.stride + self.grid.width;
-        Row { phase: &self.phase[row.clone()], components: &self.components[row] }
+        let Components { grid, phase, components, .. } = self.known;
+        let row = y * grid.stride..y * grid.stride + grid.width;
+        Row { phase: &phase[row.clone()], components: &components[row] }
     }
 
     /// New values for a doubtful pixel, from the ends of its component in four directions.
@@ -127,8 +135,8 @@ struct Reach {
 
 impl Reach {
     fn settle(&mut self, image: &Image<'_>, rows: Range<usize>, settled: &mut Vec<Settled>) {
-        let Grid { width, .. } = *image.grid;
-        let reach = PROPAGATION_CELLS * image.grid.step;
+        let Grid { width, .. } = *image.known.grid;
+        let reach = PROPAGATION_CELLS * image.known.grid.step;
         let most = u8::try_from(reach).expect("cells are at most sixteen pixels wide");
         for counts in [&mut self.right, &mut self.up, &mut self.below] {
             counts.clear();
@@ -153,7 +161,7 @@ impl Reach {
 
     /// Computes the counts downwards for all rows of a task.
     fn count_down(&mut self, image: &Image<'_>, rows: Range<usize>, most: u8) {
-        let Grid { width, height, .. } = *image.grid;
+        let Grid { width, height, .. } = *image.known.grid;
         self.down.resize(rows.len() * width, 0);
         for y in (rows.start..(rows.end + usize::from(most)).min(height)).rev() {
             if y + 1 < height {
@@ -175,8 +183,8 @@ impl Reach {
         settled: &mut Vec<Settled>,
     ) {
         let Self { apart, right, up, down, .. } = self;
-        let width = image.grid.width;
-        let reach = PROPAGATION_CELLS * image.grid.step;
+        let width = image.known.grid.width;
+        let reach = PROPAGATION_CELLS * image.known.grid.step;
         let most = reach as u8;
         let down = &down[index * width..][..width];
         let components = image.row(y).components;
@@ -190,7 +198,8 @@ impl Reach {
         for x in seen.start..group.end {
             left = if apart[x] == 0 { (left + 1).min(most) } else { 0 };
             let at = y * width + x;
-            if group.contains(&x) && image.wrong_order[at] > DOUBTFUL && components[x] != 0 {
+            let doubtful = image.wrong_order[at] > DOUBTFUL && !image.known.is_moved(y, x);
+            if group.contains(&x) && doubtful && components[x] != 0 {
                 let [left, right, up, down] = [left, right[x], up[x], down[x]].map(usize::from);
                 let ends = [at - left, at + right, at - up * width, at + down * width];
                 settled.extend(image.settle(at, ends, components[x]));
@@ -248,11 +257,17 @@ mod tests {
         let components: Vec<u8> = (0..grid.pixels())
             .map(|i| [1, GROWN, 0][usize::from(i % 32 == 15) + 2 * usize::from(i % 32 >= 28)])
             .collect();
-        Propagation::default().run(&grid, &phase, &components, &mut wrong_order, &mut quality);
+        // The order of the cell of columns 12 to 15 in the last two rows was changed.
+        let mut moved = vec![0.0; grid.rows * grid.columns];
+        moved[grid.columns + 3] = 0.4;
+        let known = Components { grid: &grid, phase: &phase, components: &components, moved: &moved };
+        Propagation::default().run(known, &mut wrong_order, &mut quality);
         let row = |map: &[f32]| [11, 14, 15, 16, 30].map(|x| map[3 * 32 + x]);
         let (settled, grown) = (SETTLED_PROBABILITY_MIN, GROWN_PROBABILITY_MIN);
         assert_eq!(row(&wrong_order), [1e-5, settled, grown, settled, 0.4]);
         assert_eq!(row(&quality), [0.9; 5]);
+        assert_eq!([4, 3].map(|y| wrong_order[y * 32 + 13]), [0.4, settled]);
+        assert_eq!([4, 3].map(|y| quality[y * 32 + 13]), [0.1, 0.9]);
     }
 
     #[test]
@@ -261,7 +276,8 @@ mod tests {
         let (phase, components) = (vec![1.0; grid.pixels()], vec![1; grid.pixels()]);
         let (mut wrong_order, mut quality) = (vec![0.3; 6 * 32], vec![0.2; 6 * 32]);
         wrong_order[40] = f32::NAN;
-        Propagation::default().run(&grid, &phase, &components, &mut wrong_order, &mut quality);
+        let known = Components { grid: &grid, phase: &phase, components: &components, moved: &[] };
+        Propagation::default().run(known, &mut wrong_order, &mut quality);
         assert!(wrong_order[40].is_nan());
         assert_eq!(wrong_order.iter().filter(|wrong| **wrong == 0.3).count(), 6 * 32 - 1);
     }

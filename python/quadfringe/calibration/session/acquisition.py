@@ -18,6 +18,7 @@ from quadfringe.calibration.session.exposures import check_exposures, exposed, s
 from quadfringe.calibration.session.planning import check_session
 from quadfringe.calibration.session.settings import FILE, STEP_NAMES, Session, step_named
 from quadfringe.config import FilesConfig, SystemConfig
+from quadfringe.config.cameras import AravisConfig
 from quadfringe.data import AnyShot, BayerShot
 from quadfringe.data.shot_files import write_shot
 from quadfringe.decoding import stages
@@ -28,7 +29,7 @@ from quadfringe.files import folder_for
 from quadfringe.io.images import write_image
 from quadfringe.scanner import Scanner, open_system
 
-__all__ = ["Exposes", "Hands", "take_captures"]
+__all__ = ["Exposes", "Hands", "keep_region", "take_captures"]
 
 # Called with step, name and camera: puts the object of a capture in place, and returns when it is still.
 Hands = Callable[[str, str, Camera], None]
@@ -75,6 +76,7 @@ def take_captures(
         for share, names in by_share.items():
             taking.set_exposure(share)
             with open_system(exposed(config, share)) as scanner:
+                keep_region(captures, scanner.config)
                 taken += [taking.taken(step, name, scanner) for name in names]
     taking.set_exposure(1.0)
     return taken
@@ -89,6 +91,20 @@ def _check(config: SystemConfig, session: Session, shares: list[float], expose: 
             f"that this program drives, give expose, or set level_exposures = [] in {FILE}"
         )
     check_exposures(config, shares)
+
+
+def keep_region(captures: FolderCaptures, config: SystemConfig) -> None:
+    """Note in the session which region of the chip is sent; raise `InputError` if it has changed since then."""
+    offset_px = config.capture.visible.offset_px if isinstance(config.capture, AravisConfig) else None
+    if offset_px is None or captures.session.offset_px == offset_px:
+        return
+    if captures.session.offset_px is not None:
+        raise InputError(
+            f"camera: its images begin at column and row {list(offset_px)} of the chip, those of the earlier captures "
+            f"at {list(captures.session.offset_px)}; set offset_px under [capture.visible] to that, or use a new folder"
+        )
+    captures.session = captures.session.model_copy(update={"offset_px": offset_px})
+    captures.session.save(captures.folder / FILE)
 
 
 def _lacking(captures: FolderCaptures, step: str) -> list[str]:

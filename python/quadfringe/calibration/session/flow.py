@@ -13,6 +13,7 @@ from quadfringe.calibration.session.captures import Captures
 from quadfringe.calibration.session.outcome import Outcome
 from quadfringe.calibration.session.settings import STEPS, Step
 from quadfringe.data import Calibration, CalibrationRecord
+from quadfringe.devices.region import region_step
 
 __all__ = ["Guided", "guide"]
 
@@ -117,10 +118,12 @@ class _Walk:
         done = {outcome.step.name for outcome in self.outcomes}
         if not {step.name for step in STEPS if step.needed} <= done:
             return None
+        offset_px = self.captures.session.offset_px
+        region = () if offset_px is None else (region_step(offset_px),)
         made = CalibrationRecord(
             made_utc=datetime.now(UTC).isoformat(timespec="seconds"),
             quadfringe_version=_core.__version__,
             rig=self.captures.session.rig,
-            steps=tuple(outcome.step for outcome in self.outcomes),
+            steps=(*(outcome.step for outcome in self.outcomes), *region),
         )
         return Calibration(**self.fields, record=made)

@@ -95,7 +95,8 @@ class Session(Stored):
 
     `rig` is the name of the bench. `distance_mm` is the approximate distance of the first board from the camera, the
     only check of its size. `bits` are the significant bits of 16-bit files. `level_exposures` are the shorter exposures
-    of the brightest level, shares of the full one; without any, the camera is taken as linear.
+    of the brightest level, shares of the full one; without any, the camera is taken as linear. `offset_px`, the first
+    column and row of the images on the chip, is written with the first capture of a camera that tells.
     """
 
     schema_version: Literal[1] = 1
@@ -106,6 +107,7 @@ class Session(Stored):
     infrared: bool = True
     bits: Literal[10, 12, 14, 16] | None = None
     bayer: BayerPattern | None = None
+    offset_px: tuple[int, int] | None = None
     dark_shots: Annotated[int, Field(ge=2, le=100)] = 4
     level_steps: Annotated[int, Field(ge=4, le=32)] = 8
     level_exposures: tuple[Annotated[float, Field(gt=0, lt=1)], ...] = SHORTER_EXPOSURES

@@ -34,6 +34,7 @@ JAI_LEAST_US, JAI_STEP_US, JAI_STEPS = 20.0, 42.07, 792  # exposure is 20 us plu
 JAI_EXPOSURES = ("JAIExposureTimeRaw", "ExposureTimeRaw")
 EXPOSURES = ("ExposureTime", "ExposureTimeAbs")
 GAINS = ("Gain", "GainRaw")
+OFFSETS = ("OffsetX", "OffsetY")  # of the region of the chip that is sent, by the SFNC
 RATES = ("AcquisitionFrameRate", "AcquisitionFrameRateAbs")
 # What changes the colours of an ordinary colour camera by itself, or bends them, and its value when it is off.
 FIXED: dict[str, str | bool] = {
@@ -194,6 +195,7 @@ def set_chip(device: Device, place: Place, chip: ChipConfig, exposure_us: float 
     accepted: dict[str, Any] = {"device": place.where, "stream": place.stream, "source": place.source}
     if chip.pixel_format is not None:
         device.set("PixelFormat", chip.pixel_format)
+    accepted |= _region(device, place, chip)
     wanted_us = chip.exposure_us if chip.exposure_us is not None else exposure_us
     raw = _first(device, JAI_EXPOSURES) if place.jai else None
     if raw is not None:
@@ -215,6 +217,17 @@ def set_chip(device: Device, place: Place, chip: ChipConfig, exposure_us: float 
     elif chip.gain is not None:
         raise CameraError(f"camera at {place.where} has none of {', '.join(GAINS)}; set the gain under `features`")
     return accepted
+
+
+def _region(device: Device, place: Place, chip: ChipConfig) -> dict[str, Any]:
+    """Set the first column and row of the region that is sent; return what the camera has, if it tells."""
+    has = all(device.has(name) for name in OFFSETS)
+    if chip.offset_px is not None:
+        if not has:
+            raise CameraError(f"camera at {place.where} has no {' and '.join(OFFSETS)}; leave offset_px out")
+        for name, value in zip(OFFSETS, chip.offset_px, strict=True):
+            device.set(name, value)
+    return {"offset_px": tuple(int(device.get(name)) for name in OFFSETS)} if has else {}
 
 
 def fix_colours(device: Device, features: Mapping[str, Any]) -> list[str]:

@@ -269,7 +269,8 @@ def open_devices(config: SystemConfig) -> Devices:
     assert isinstance(config.capture, AravisConfig)
     camera = AravisCamera(config.capture)
     try:
-        return Devices(camera, open_projector(config), config.model_copy(update={"capture": camera.config}))
+        found = config.model_copy(update={"capture": camera.config})
+        return Devices(camera, open_projector(config), found, camera.config.visible.offset_px)
     except BaseException:
         camera.close()
         raise

@@ -94,7 +94,8 @@ def about(shape: Shape) -> str:
     decode = shape.config.get("decode", {})
     facts: dict[str, object] = {"method": decode.get("method", "not stated")}
     facts |= {"method version": decode["method_version"]} if "method_version" in decode else {}
-    names = ("quadfringe_version", "projector_width_px", "fringes", "steps", "response_from", "response")
+    made = ("quadfringe_version", "projector_width_px", "fringes", "steps")
+    names = (*made, "response_from", "response", "response_evidence", "geometry")
     facts |= {name.replace("_", " "): shape.config[name] for name in names if shape.config.get(name) is not None}
     settings = json.dumps(dict(shape.config), indent=1, ensure_ascii=False, default=str)
     return (

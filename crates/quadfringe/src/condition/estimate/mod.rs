@@ -11,6 +11,7 @@ mod samples;
 mod select;
 mod shot;
 mod simplex;
+mod uncertainty;
 
 use super::params::{
     EXPONENTS, KNEE_GAIN, KNEE_GAIN_RAD2, KNEE_MAX, OFFSET_MAX, OFFSET_MAX_LEAST, START_EXPONENT, START_KNEE,
@@ -24,6 +25,7 @@ use samples::Samples;
 use select::select;
 pub use shot::estimate_response_of_shot;
 use simplex::minimise;
+use uncertainty::{exponent_sd, second_harmonic};
 
 /// An estimated response and its quality.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +39,13 @@ pub struct ResponseEstimate {
     pub two_step_rms_after_rad: f64,
     /// Number of pixels (or tiles) that the estimate uses.
     pub pixels: usize,
+    /// Standard error of the exponent, from the scatter of the pixels (or tiles).
+    pub exponent_sd: f64,
+    /// Second harmonic of the fringes over the first, from the captured intensities: positive for a gamma above 1.
+    pub second_harmonic_before: f64,
+    /// The same after the response is inverted. The sign of `second_harmonic_before` means too little correction, the
+    /// other one too much.
+    pub second_harmonic_after: f64,
 }
 
 /// Inverse response from stacks of equally spaced phase steps over one period, each `(steps, rows, columns)`, in
@@ -80,6 +89,9 @@ pub fn estimate_response(stacks: &[ArrayView3<'_, f32>]) -> Result<ResponseEstim
         two_step_rms_before_rad: root_mean_square(&before),
         two_step_rms_after_rad: root_mean_square(&after),
         pixels: samples.len(),
+        exponent_sd: exponent_sd(&samples, &response, 1.0),
+        second_harmonic_before: second_harmonic(&traces, &Response::default()),
+        second_harmonic_after: second_harmonic(&traces, &response),
     })
 }
 

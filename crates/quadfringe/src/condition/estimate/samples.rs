@@ -56,6 +56,15 @@ impl Samples {
         sums[0] / (self.len() * self.steps()) as f64
     }
 
+    /// Mean over the steps of the Huber loss of each pixel, in rad^2.
+    pub fn costs(&self, response: &Response) -> Vec<f64> {
+        let steps = self.steps() as f64;
+        let each = |errors: &Array2<f32>| {
+            errors.columns().into_iter().map(|column| huber(column).sum::<f64>() / steps).collect()
+        };
+        self.of_blocks(response, each).concat()
+    }
+
     /// RMS of the two-step error of each step, rad.
     pub fn rms_rad(&self, response: &Response) -> Vec<f64> {
         let square = |row: ArrayView1<'_, f32>| row.iter().map(|e| f64::from(e * e)).sum();
@@ -65,12 +74,18 @@ impl Samples {
     }
 
     fn per_block(&self, response: &Response, sums: impl Fn(&Array2<f32>) -> Vec<f64> + Sync) -> Vec<f64> {
+        let add = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(b).map(|(x, y)| x + y).collect();
+        self.of_blocks(response, sums).into_iter().reduce(add).unwrap_or_default()
+    }
+
+    fn of_blocks(
+        &self,
+        response: &Response,
+        found: impl Fn(&Array2<f32>) -> Vec<f64> + Sync,
+    ) -> Vec<Vec<f64>> {
         let table: Vec<f32> =
             (0..=LEVEL_MAX as usize).map(|level| response.linear(level as f32 / LEVEL_MAX)).collect();
-        let scored = |block: &Block| sums(&block.errors_rad(&table, &self.partner));
-        let parts: Vec<Vec<f64>> = self.blocks.par_iter().map(scored).collect();
-        let add = |a: Vec<f64>, b: Vec<f64>| a.iter().zip(b).map(|(x, y)| x + y).collect();
-        parts.into_iter().reduce(add).unwrap_or_default()
+        self.blocks.par_iter().map(|block| found(&block.errors_rad(&table, &self.partner))).collect()
     }
 }
 
@@ -122,6 +137,14 @@ fn huber_sum(errors_rad: &Array2<f32>) -> f64 {
         }
     }
     sums.into_iter().map(f64::from).sum()
+}
+
+/// Huber loss of the errors of one pixel.
+fn huber(errors_rad: ArrayView1<'_, f32>) -> impl Iterator<Item = f64> {
+    errors_rad.into_iter().map(|e| {
+        let (e, bend) = (f64::from(e.abs()), f64::from(HUBER_RAD));
+        if e < bend { e * e } else { bend * (2.0 * e - bend) }
+    })
 }
 
 /// Weights `(steps, steps)` that give the signal a quarter period after each step, by trigonometric interpolation. If the

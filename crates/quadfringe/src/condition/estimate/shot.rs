@@ -6,11 +6,12 @@
 
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
+use super::uncertainty::{exponent_sd, second_harmonic, without_excess};
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
 use crate::condition::params::{
-    BRIGHT_MAX, CHANNEL_TILES_MIN, EVENNESS_MIN, GAIN_RAD, KNOWN_MIN, MANY_TILES, PHASE_STEPS, SATURATED_MAX,
-    SINGLE_CHANNEL_TILES_MIN, SLOPE_STRIDE_PX, TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX,
-    TILES_MIN,
+    BRIGHT_MAX, CERTAIN_SDS, CHANNEL_TILES_MIN, EVENNESS_MIN, EXPONENT_SHARED, GAIN_RAD, HARMONIC_LEAST,
+    HARMONIC_LEFT, KNOWN_MIN, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN,
+    SLOPE_STRIDE_PX, TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
 };
 use crate::encoding::{Channel, Encoding};
 use crate::{Error, Result};
@@ -55,14 +56,14 @@ pub fn estimate_response_of_shot(
     }
     let four = encoding.four_channel_view()?;
     let Some(slope) = median_slope(phase_rad) else { return Ok([None; 4]) };
-    let mut means = [(); 4].map(|()| Array2::zeros([0, PHASE_STEPS]));
+    let mut means = [(); 4].map(|()| Tiles { means: Array2::zeros([0, PHASE_STEPS]), overlap: false });
     let channels = if four.has_infrared() { 4 } else { 3 };
     means[..channels].par_iter_mut().zip(Channel::ALL).for_each(|(means, channel)| {
         let scale = (four.fringe_number(channel) / four.quadrature) as f32;
         let side = ((TILE_FRINGES * TAU / (slope * scale)).ceil() as usize).max(TILE_SIDE_MIN_PX);
         *means = tiles(light[channel.index()], phase_rad, scale, side);
     });
-    let traces = means.each_ref().map(traces_of);
+    let traces = means.each_ref().map(|tiles| traces_of(&tiles.means));
     let together: Vec<Trace<'_>> = traces.iter().flatten().copied().collect();
     if 4 * together.len() < channels * TILES_MIN {
         return Ok([None; 4]);
@@ -72,33 +73,81 @@ pub fn estimate_response_of_shot(
     if !pays(0.0, before) {
         return Ok([None; 4]);
     }
-    let shared = fit(&all, offset_bound(&together));
-    let shared = if pays(rms_rad(&all, &shared), before) { shared } else { Response::default() };
-    Ok(traces.each_ref().map(|traces| of_channel(traces, shared)))
+    let response = fit(&all, offset_bound(&together));
+    let shared = if pays(rms_rad(&all, &response), before) { response } else { Response::default() };
+    let copies = copies_of(&means);
+    let shared = Shared { response: shared, exponent_sd: exponent_sd(&all, &shared, copies), copies };
+    Ok(traces.each_ref().map(|traces| of_channel(traces, &shared)))
 }
 
 /// Chooses the response shared by all channels, or a separate response for this channel if it fits much better.
 ///
 /// One projector and one camera usually have the same response in all channels, and four times as many tiles make a more
 /// stable estimate.
-fn of_channel(traces: &[Trace<'_>], shared: Response) -> Option<ResponseEstimate> {
+///
+/// A correction that turns the sign of the second harmonic is taken back to where it vanishes. Light stays linear unless the exponent
+/// differs from 1 by several standard errors and the second harmonic shrinks.
+fn of_channel(traces: &[Trace<'_>], shared: &Shared) -> Option<ResponseEstimate> {
     if traces.len() < CHANNEL_TILES_MIN {
         return None;
     }
     let samples = Samples::new(traces);
     let before = rms_rad(&samples, &Response::default());
-    let mut best = Fitted { response: shared, rms_rad: rms_rad(&samples, &shared) };
+    let mut best = Fitted { response: shared.response, rms_rad: rms_rad(&samples, &shared.response) };
+    let mut sd = shared.exponent_sd;
     if traces.len() >= SINGLE_CHANNEL_TILES_MIN && pays(0.0, best.rms_rad) {
         let response = fit(&samples, offset_bound(traces));
         let single = Fitted { response, rms_rad: rms_rad(&samples, &response) };
-        best = if pays(single.rms_rad, best.rms_rad) { single } else { best };
+        if pays(single.rms_rad, best.rms_rad) {
+            sd = exponent_sd(&samples, &response, shared.copies);
+            best = single;
+        }
     }
-    pays(best.rms_rad, before).then_some(ResponseEstimate {
-        response: best.response,
+    let kept = without_excess(traces, best.response, HARMONIC_LEFT);
+    let taken_back = f64::from((kept.exponent - best.response.exponent).abs());
+    let found = ResponseEstimate {
+        response: kept,
         two_step_rms_before_rad: before,
-        two_step_rms_after_rad: best.rms_rad,
+        two_step_rms_after_rad: rms_rad(&samples, &kept),
         pixels: traces.len(),
-    })
+        exponent_sd: total_sd(sd, taken_back, f64::from(kept.exponent)),
+        second_harmonic_before: second_harmonic(traces, &Response::default()),
+        second_harmonic_after: second_harmonic(traces, &kept),
+    };
+    let alone = shared.response == Response::default();
+    let least = if alone { 2.0 * HARMONIC_LEAST } else { HARMONIC_LEAST };
+    (pays(found.two_step_rms_after_rad, before) && is_certain(&found, least)).then_some(found)
+}
+
+/// The response that fits all channels together.
+struct Shared {
+    response: Response,
+    exponent_sd: f64,
+    /// Number of tiles that see the same pixels.
+    copies: f64,
+}
+
+/// Standard error with that part that the scatter of tiles does not show.
+fn total_sd(scatter: f64, taken_back: f64, exponent: f64) -> f64 {
+    scatter.hypot(EXPONENT_SHARED * (1.0 - exponent)).hypot(taken_back / 2.0)
+}
+
+/// Whether a shot shows a response beyond doubt, in a channel whose light must have at least this second harmonic.
+fn is_certain(found: &ResponseEstimate, harmonic_least: f64) -> bool {
+    let differs = (f64::from(found.response.exponent) - 1.0).abs() > CERTAIN_SDS * found.exponent_sd;
+    let [before, after] = [found.second_harmonic_before, found.second_harmonic_after].map(f64::abs);
+    found.response.knee > 0.0 || (differs && after < before && before > harmonic_least)
+}
+
+/// How many tiles see the same pixel: those of a small image overlap by half along both axes.
+fn copies_of(means: &[Tiles; 4]) -> f64 {
+    if means.iter().any(|tiles| tiles.overlap) { 4.0 } else { 1.0 }
+}
+
+/// Mean light in each phase step, `(tiles, steps)`, and whether the tiles overlap by half.
+struct Tiles {
+    means: Array2<f32>,
+    overlap: bool,
 }
 
 /// A response and the remaining two-step error.
@@ -128,17 +177,19 @@ fn traces_of(means: &Array2<f32>) -> Vec<Trace<'_>> {
 }
 
 /// Mean light in each phase step, `(tiles, steps)`, for the tiles that have every step and are not saturated.
-fn tiles(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32, side: usize) -> Array2<f32> {
+fn tiles(light: ArrayView2<'_, f32>, phase: ArrayView2<'_, f32>, scale: f32, side: usize) -> Tiles {
     // The tiles of a small image overlap by half.
     let [rows, columns] = [light.nrows() / side, light.ncols() / side];
-    let step = if rows * columns < MANY_TILES { side / 2 } else { side };
+    let overlap = rows * columns < MANY_TILES;
+    let step = if overlap { side / 2 } else { side };
     let starts = |length: usize| (0..(length + 1).saturating_sub(side)).step_by(step);
     let mut means = Vec::new();
     for (y, x) in starts(light.nrows()).flat_map(|y| starts(light.ncols()).map(move |x| (y, x))) {
         let tile = s![y..y + side, x..x + side];
         means.extend(steps_of(light.slice(tile), phase.slice(tile), scale).into_iter().flatten());
     }
-    Array2::from_shape_vec((means.len() / PHASE_STEPS, PHASE_STEPS), means).expect("whole tiles")
+    let shape = (means.len() / PHASE_STEPS, PHASE_STEPS);
+    Tiles { means: Array2::from_shape_vec(shape, means).expect("whole tiles"), overlap }
 }
 
 fn steps_of(

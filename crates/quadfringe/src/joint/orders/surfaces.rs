@@ -20,6 +20,8 @@ const BORDER_ODDS: f32 = PI / AMBIGUOUS_RAD;
 pub(super) struct Surfaces {
     /// Wrong-order probability of every node.
     pub wrong: Vec<f32>,
+    /// Wrong-order probability of every node whose order was changed, 0 for the others; empty if none was.
+    pub moved: Vec<f32>,
     parents: Vec<u32>,
     /// Sum of the wrong-order probabilities and number of nodes, for the root of every surface.
     sums: Vec<f32>,
@@ -55,13 +57,16 @@ impl Surfaces {
     /// take their evidence from the same window.
     pub fn settle(&mut self, shared: f32, order: &mut [i16]) {
         let shifts = self.shifts(shared);
+        self.moved.clear();
         if shifts.is_empty() {
             return;
         }
+        self.moved.resize(order.len(), 0.0);
         for (node, order) in order.iter_mut().enumerate() {
             let surface = root(&mut self.parents, node as u32);
             if let Ok(found) = shifts.binary_search_by_key(&surface, |shift| shift.surface) {
                 *order += shifts[found].turns;
+                self.moved[node] = self.wrong_after_shift(surface);
             }
         }
     }
@@ -69,7 +74,7 @@ impl Surfaces {
     /// Finds the surfaces of nodes with the wrong-order probabilities `wrong`, and the edges between them. `step` measures the step
     /// from a node, by row and column, to its right or lower neighbour.
     pub fn find(&mut self, grid: &Grid, step: impl Fn([usize; 2], [usize; 2]) -> Step) {
-        let Self { wrong, parents, sums, sizes, edges } = self;
+        let Self { wrong, parents, sums, sizes, edges, .. } = self;
         let nodes = wrong.len() as u32;
         edges.clear();
         parents.clear();
@@ -99,9 +104,21 @@ impl Surfaces {
         }
     }
 
+    /// Mean wrong-order probability of a surface by the evidence of its nodes.
+    fn wrong_before(&self, surface: u32) -> f32 {
+        self.sums[surface as usize] / self.sizes[surface as usize] as f32
+    }
+
+    /// Probability that the order with which a doubtful surface continues its neighbour is wrong: that its former order was
+    /// right, and its border is a step of whole turns by chance.
+    fn wrong_after_shift(&self, surface: u32) -> f32 {
+        let wrong = self.wrong_before(surface);
+        (1.0 - wrong) / (1.0 - wrong + BORDER_ODDS * wrong)
+    }
+
     /// Whether a step of whole turns at the border of a surface means that its order is wrong, rather than another surface.
     fn is_doubtful(&self, surface: u32) -> bool {
-        let wrong = self.sums[surface as usize] / self.sizes[surface as usize] as f32;
+        let wrong = self.wrong_before(surface);
         BORDER_ODDS * wrong > 1.0 - wrong
     }
 
@@ -166,23 +183,35 @@ fn most_frequent(border: &[Border]) -> Option<Lack> {
 mod tests {
     use super::*;
 
-    /// A plane of 12 x 20 nodes with a strip along its left side, whose phase is off by `step` rad and whose orders are wrong with
-    /// the probability `wrong`; `shared` nodes share a window. Gives the turns that the strip and the plane gain.
+    /// Turns that the strip and the plane gain.
     fn gained(step: f32, wrong: f32, shared: f32) -> [i16; 2] {
+        let Shifted { order, in_strip, .. } = shifted(step, wrong, shared);
+        let of = |strip: bool| (0..order.len()).filter(move |&i| in_strip(i) == strip);
+        assert!(of(true).all(|i| order[i] == order[0]));
+        assert!(of(false).all(|i| order[i] == order[order.len() - 1]));
+        [order[0] - 7, order[order.len() - 1] - 7]
+    }
+
+    /// The surfaces and the orders of the plane, and which nodes lie in the strip.
+    struct Shifted {
+        surfaces: Surfaces,
+        order: Vec<i16>,
+        in_strip: fn(usize) -> bool,
+    }
+
+    /// A plane of 12 x 20 nodes with a strip along its left side, whose phase is off by `step` rad and whose orders are wrong with
+    /// the probability `wrong`; `shared` nodes share a window.
+    fn shifted(step: f32, wrong: f32, shared: f32) -> Shifted {
         let grid = Grid::new([12 * 4, 20 * 4], 4.0);
-        let in_strip = |[_, column]: [usize; 2]| column < 4;
+        let in_strip: fn(usize) -> bool = |i| i % 20 < 4;
         let mut surfaces = Surfaces::default();
-        let node = |i: usize| [i / grid.columns, i % grid.columns];
         let nodes = grid.rows * grid.columns;
-        surfaces.wrong = (0..nodes).map(|i| if in_strip(node(i)) { wrong } else { 1e-4 }).collect();
-        let off = |place: [usize; 2]| if in_strip(place) { step } else { 0.0 };
+        surfaces.wrong = (0..nodes).map(|i| if in_strip(i) { wrong } else { 1e-4 }).collect();
+        let off = |[row, column]: [usize; 2]| if in_strip(row * 20 + column) { step } else { 0.0 };
         surfaces.find(&grid, |from, to| Some(off(to) - off(from)));
         let mut order = vec![7; nodes];
         surfaces.settle(shared, &mut order);
-        let strip = (0..nodes).filter(|&i| in_strip(node(i)));
-        assert!(strip.clone().all(|i| order[i] == order[0]));
-        assert!((0..nodes).filter(|&i| !in_strip(node(i))).all(|i| order[i] == order[nodes - 1]));
-        [order[0] - 7, order[nodes - 1] - 7]
+        Shifted { surfaces, order, in_strip }
     }
 
     #[test]
@@ -196,6 +225,16 @@ mod tests {
         assert_eq!(gained(-TAU + 0.1, 0.01, 5.0), [0, 0]);
         assert_eq!(gained(-TAU + 1.0, 0.2, 5.0), [0, 0]);
         assert_eq!(gained(0.1, 0.2, 5.0), [0, 0]);
+    }
+
+    #[test]
+    fn a_strip_that_was_shifted_is_as_uncertain_as_the_evidence_for_its_former_order() {
+        for (wrong, expected) in [(0.1, 0.462), (0.2, 0.276), (0.5, 0.087)] {
+            let moved = shifted(-TAU + 0.1, wrong, 5.0).surfaces.moved;
+            assert!((moved[0] - expected).abs() < 1e-3, "{wrong} {}", moved[0]);
+            assert_eq!(moved[19], 0.0);
+        }
+        assert!(shifted(-TAU + 0.1, 0.01, 5.0).surfaces.moved.is_empty());
     }
 
     #[test]
