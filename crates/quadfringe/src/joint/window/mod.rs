@@ -16,7 +16,7 @@ use super::scene::Scene;
 use super::slopes::Slopes;
 use crate::parallel::slots::Slots;
 use rayon::prelude::*;
-use rows::{average_along, average_down, sharpen};
+use rows::{average_neighbours, sharpen};
 
 /// The window of one shot.
 #[derive(Clone, Copy)]
@@ -60,6 +60,8 @@ pub(super) struct WindowRows {
     sharpness: Vec<f32>,
     residuals: RowMaps,
     weight: Vec<f32>,
+    /// Numerators of pixels whose step is taken already: 0.
+    no_step: Vec<f32>,
     padded: [Vec<f32>; 4],
 }
 
@@ -128,9 +130,11 @@ impl<'a> Window<'a> {
         phases.copy_from_slice(phase);
         slopes.copy_from_slice(slope);
         measure(NormalRows { numerator, denominator });
-        let padded = padded.each_ref().map(Vec::as_slice);
         let taps = self.taps(0..2 * self.radius + 1);
-        average_along((&taps, self.spacing), padded, [phase, slope, sharpness], [out.phase, out.weight]);
+        let padded = padded.each_ref();
+        let there = |k: usize| padded.map(|row| &row[k * self.spacing..][..grid.stride]);
+        let there: Vec<_> = (0..taps.len()).map(there).collect();
+        average_neighbours(&taps, &there, [phase, slope, sharpness], [out.phase, out.weight]);
     }
 
     /// Distance of the furthest neighbour in pixels.
@@ -186,6 +190,7 @@ impl<'a> Window<'a> {
     /// Computes the slopes of all rows that the average of `count` rows from `first` on needs.
     fn slopes_down(&self, first: usize, count: usize, rows: &mut WindowRows) {
         let (stride, reach) = (self.scene.grid.stride, self.reach());
+        rows.no_step.resize(stride, 0.0);
         rows.slopes.resize((ROWS + 2 * reach) * stride, 0.0);
         for (k, line) in rows.slopes.chunks_exact_mut(stride).take(count + 2 * reach).enumerate() {
             let y = (first + k).saturating_sub(reach).min(self.scene.grid.height - 1);
@@ -208,14 +213,14 @@ impl<'a> Window<'a> {
         // Only neighbours inside the image count.
         let [above, below] = [y, grid.height - 1 - y].map(|rows| (rows / self.spacing).min(self.radius));
         let inside = self.radius - above..self.radius + below + 1;
-        let there: Vec<[&[f32]; 3]> = (inside.clone())
-            .map(|k| {
-                let row = y + self.spacing * k - self.reach();
-                [self.scene.row(average.phase, row), self.scene.row(average.weight, row), slope(k)]
-            })
-            .collect();
+        let there = inside.clone().map(|k| {
+            let row = y + self.spacing * k - self.reach();
+            let [phase, weight] = [average.phase, average.weight].map(|plane| self.scene.row(plane, row));
+            [phase, slope(k), &rows.no_step, weight]
+        });
+        let there: Vec<_> = there.collect();
         let here = [self.scene.row(average.phase, y), slope(self.radius), &rows.sharpness];
-        average_down(&self.taps(inside), &there, here, out);
+        average_neighbours(&self.taps(inside), &there, here, out);
     }
 
     /// Sharpness at every pixel of a row: 1 / the square of the greatest phase difference that counts as one surface.
