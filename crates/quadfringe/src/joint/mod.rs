@@ -25,7 +25,6 @@ mod agreement;
 mod albedo;
 mod cells;
 mod coarse;
-mod disjoint;
 mod energy;
 mod illumination;
 mod infrared;
