@@ -58,19 +58,3 @@ pub(super) fn least_of_nine(
     let write = |x: usize, value: f32| out[x] = if value > limit { 1.0 } else { 0.0 };
     nine(rows, width, spare, |a, b, c| least(least(a, b), c), write);
 }
-
-/// 1 where a pixel and its four neighbours in row and column are all above `limit`, 0 elsewhere and in the padding.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn least_of_five(rows: [&[f32]; 3], width: usize, limit: f32, out: &mut [f32]) {
-    let least = |a: f32, b: f32| if a < b { a } else { b };
-    let [above, middle, below] = rows.map(|row| &row[..width]);
-    let (out, padding) = out.split_at_mut(width);
-    padding.fill(0.0);
-    for x in 0..width {
-        out[x] = least(least(above[x], below[x]), middle[x]);
-    }
-    for x in 0..width {
-        let sides = least(middle[x.saturating_sub(1)], middle[(x + 1).min(width - 1)]);
-        out[x] = if least(out[x], sides) > limit { 1.0 } else { 0.0 };
-    }
-}

@@ -134,12 +134,8 @@ impl Validity {
                     lead.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
                 }
                 let near = around(y, grid.height);
-                let residuals = near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]);
-                sums.resize(grid.width, 0.0);
-                sum_of_nine(residuals, grid.width, spare, sums);
                 let known = CheckRow {
-                    squared_residual: residuals[1],
-                    squared_residuals_near: sums,
+                    squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
                     modulation: &scene.row(map.modulation, y)[..grid.width],
                     pixel_modulation: &pixel.modulation[y * grid.width..][..grid.width],
                     noise: &variance[..grid.width],
@@ -147,7 +143,7 @@ impl Validity {
                     support: &support.row(grid, y, maps)[..grid.width],
                 };
                 let out = VerdictRow { quality, passed, consistent, reasons };
-                check_row(&known, limits, out);
+                check_row(&known, limits, [spare, sums], out);
             },
         );
     }
@@ -155,9 +151,8 @@ impl Validity {
 
 /// Input of the check of one row.
 struct CheckRow<'a> {
-    squared_residual: &'a [f32],
-    /// Sum over the pixel and its eight neighbours.
-    squared_residuals_near: &'a [f32],
+    /// Of the rows above, at and below.
+    squared_residual: [&'a [f32]; 3],
     /// Modulation by the albedo of the neighbourhood.
     modulation: &'a [f32],
     /// Modulation by the albedo of the pixel.
@@ -181,9 +176,11 @@ struct VerdictRow<'a> {
 /// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
 /// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn check_row(known: &CheckRow, limits: Limits, out: VerdictRow) {
+fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2], out: VerdictRow) {
     let width = known.modulation.len();
-    let (here, near) = (&known.squared_residual[..width], &known.squared_residuals_near[..width]);
+    sums.resize(width, 0.0);
+    sum_of_nine(known.squared_residual, width, spare, sums);
+    let (here, near) = (&known.squared_residual[1][..width], &sums[..width]);
     let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
     let noise = &known.noise[..width];
     let (lead, support) = (&known.lead[..width], &known.support[..width]);
@@ -233,8 +230,7 @@ mod tests {
         let (mut quality, mut passed, mut consistent) = ([0.0; 16], [0; 16], [0; 16]);
         let mut reasons = [Reason::Returned; 16];
         let known = CheckRow {
-            squared_residual: &squared_residual,
-            squared_residuals_near: &squared_residual,
+            squared_residual: [&[0.0; 16], &squared_residual, &[0.0; 16]],
             modulation: &[0.4; 16],
             pixel_modulation: &pixel_modulation,
             noise: &[1.0; 16],
@@ -247,7 +243,7 @@ mod tests {
             consistent: &mut consistent,
             reasons: &mut reasons,
         };
-        check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, out);
+        check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, [&mut Vec::new(), &mut Vec::new()], out);
         for marks in [passed, consistent] {
             assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
         }

@@ -9,7 +9,7 @@ mod rows;
 mod tests;
 
 use super::cells::RowMaps;
-use super::params::phase::{SIGMA_MAX_PX, SIGMA_MIN_PX, WIDE, WIDTH};
+use super::params::phase::{SIGMA_MAX_PX, WIDE, WIDTH};
 use super::params::tasks::ROWS;
 use super::residuals::Residuals;
 use super::scene::Scene;
@@ -69,7 +69,7 @@ impl<'a> Window<'a> {
     /// A window over a scene whose intensities have `noise` (standard deviation in linear light); `modulation` is 0
     /// where there is no light.
     pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
-        let sigma = (WIDTH * scene.period_px as f32).clamp(SIGMA_MIN_PX, SIGMA_MAX_PX);
+        let sigma = (WIDTH * scene.period_px as f32).min(SIGMA_MAX_PX);
         let radius = (2.0 * sigma).ceil() as usize;
         Self { scene, slopes, modulation, radius, spacing: 1, sigma, noise, residuals: None }
     }
@@ -77,11 +77,6 @@ impl<'a> Window<'a> {
     /// Modulation of row `y`, 0 where there is no light.
     pub fn modulation(&self, y: usize) -> &'a [f32] {
         self.scene.row(self.modulation, y)
-    }
-
-    /// Share of the contrast that is lost in row `y`; see [`Slopes::loss`].
-    pub fn loss<'b>(&self, y: usize, maps: &'b mut RowMaps) -> &'b [f32] {
-        self.slopes.loss(self.scene, y, maps)
     }
 
     /// This window with a reach of two pixels, which is enough for intermediate steps.
