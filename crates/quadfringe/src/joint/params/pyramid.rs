@@ -15,8 +15,8 @@ pub const COARSE_PERIOD_MIN_PX: f64 = 6.0;
 /// level has a sixteenth of the pixels.
 pub const FACTOR_MAX: usize = 4;
 
-/// Number of pixels by which interpolated light of a mosaic reaches into a shadow. Follows from the interpolation: a missing sample is a mean of neighbours
-/// one pixel away (`cargo test --test bayer`).
+/// Number of pixels by which interpolated light of a mosaic reaches into a shadow. Follows from the interpolation: a missing sample is
+/// a mean of neighbours one pixel away (`cargo test --test bayer`).
 pub const MOSAIC_REACH_PX: usize = 1;
 
 /// Least fringe period that is accepted, in pixels. Follows from sampling: a fringe needs four samples for its shape
