@@ -25,6 +25,7 @@ mod agreement;
 mod albedo;
 mod cells;
 mod coarse;
+mod disjoint;
 mod energy;
 mod illumination;
 mod infrared;

@@ -4,6 +4,7 @@
 mod candidates;
 mod evidence;
 mod matching;
+mod surfaces;
 mod wrapped;
 
 pub(in crate::joint) use wrapped::Wrapped;
@@ -11,6 +12,7 @@ pub(in crate::joint) use wrapped::Wrapped;
 use super::params::local_fit;
 use super::params::orders::{JUMP_NODES_MAX, JUMP_NODES_MIN, JUMP_PERIODS};
 use super::scene::Scene;
+use super::slopes::Slopes;
 use super::uncertainty::{NodeVerdict, WrongOrderModel};
 use crate::encoding::FourChannel;
 use crate::parallel::angle::wrap;
@@ -20,12 +22,14 @@ use evidence::{EvidenceRows, Ratios, node_phases, row_evidence};
 use matching::Matching;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
+use surfaces::Surfaces;
 
 /// Evidence and orders of one shot.
 pub(super) struct Orders {
     matching: Matching,
     /// Wrapped phase of every node.
     phase: Vec<f32>,
+    surfaces: Surfaces,
     /// Fringe numbers of G and IR divided by the fringe number of R and B.
     ratios: [f32; 4],
     slots: Slots<EvidenceRows>,
@@ -37,6 +41,7 @@ impl Orders {
         Self {
             matching: Matching::new(code),
             phase: Vec::new(),
+            surfaces: Surfaces::default(),
             ratios: code.ratios(),
             slots: Slots::default(),
             blocks: Slots::default(),
@@ -57,6 +62,7 @@ impl Orders {
             let nodes = &phase[row * grid.columns..][..grid.columns];
             row_evidence(scene, wrapped, ratios, row, nodes, &mut slots.take(), out);
         });
+        self.settle_surfaces(scene, wrapped.slopes);
         let this = &*self;
         absolute.par_chunks_mut(grid.step * grid.stride).enumerate().for_each_init(
             || self.blocks.take(),
@@ -66,6 +72,22 @@ impl Orders {
                 }
             },
         );
+    }
+
+    /// Gives doubtful surfaces the order with which they continue their neighbours.
+    fn settle_surfaces(&mut self, scene: &Scene<'_>, slopes: &Slopes) {
+        let mut surfaces = std::mem::take(&mut self.surfaces);
+        self.wrong_order_probability(scene, &mut surfaces.wrong);
+        let (nodes, columns) = (self.nodes(), scene.grid.columns);
+        surfaces.find(scene.grid, |from, to| {
+            let [one, other] = [from, to].map(|[row, column]| row * columns + column);
+            let axis = usize::from(from[0] != to[0]);
+            let way = || 0.5 * (slopes.at(from[0], from[1])[axis] + slopes.at(to[0], to[1])[axis]);
+            let lit = nodes.matching.is_lit(one) && nodes.matching.is_lit(other);
+            lit.then(|| nodes.absolute(other) - nodes.absolute(one) - way())
+        });
+        surfaces.settle(shared_nodes(scene), &mut self.matching.order);
+        self.surfaces = surfaces;
     }
 
     /// How certain the order of every node of a row is.

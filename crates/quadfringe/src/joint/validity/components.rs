@@ -1,6 +1,7 @@
 //! Step 8: connected components of the valid pixels, and their sizes.
 
 use crate::joint::cells::Grid;
+use crate::joint::disjoint::{root, unite};
 use crate::joint::params::tasks::GROUP;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -123,22 +124,6 @@ fn mark_ends(valid: &[u8], phase: &[f32], ends: &mut [u8]) {
         let changes = valid_before[x] != valid[x];
         *end = u8::from(changes | ((valid[x] != 0) & !joined(phase_before[x], phase[x])));
     }
-}
-
-/// The root of the set of an element, with shorter paths afterwards.
-fn root(parents: &mut [u32], mut i: u32) -> u32 {
-    while parents[i as usize] != i {
-        let next = parents[i as usize];
-        parents[i as usize] = parents[next as usize];
-        i = next;
-    }
-    i
-}
-
-/// Unites the sets of two elements; the smaller root stays.
-fn unite(parents: &mut [u32], a: u32, b: u32) {
-    let (a, b) = (root(parents, a), root(parents, b));
-    parents[a.max(b) as usize] = a.min(b);
 }
 
 /// Unites runs of two rows that touch on one surface.
