@@ -53,6 +53,7 @@ impl Joint {
         coarse.lit_mask.erode(grid, frame.reach_px, scratch, lit);
         self.pyramid.full.restrict(grid, lit);
         let [coarse_scene, scene] = self.pyramid.scenes(frame);
+        coarse.photometry.sharpen(&coarse_scene, self.ratios);
         let lit = &self.pyramid.full.lit;
         let levels = Levels { coarse: &coarse_scene, fine: &scene, found: coarse, ratios: self.ratios, lit };
         self.upsampler.run(levels, &mut self.pixels.phase, &mut self.pixels.modulation);

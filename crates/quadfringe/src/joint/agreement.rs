@@ -128,7 +128,7 @@ fn add_pairs<W: Waves>(
         let vector = waves.vector(i);
         let mut terms = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let carriers = waves.carriers(&vector, x, phase[x], 0.0);
+            let carriers = waves.carriers(&vector, x, phase[x]);
             let (mut mm, mut ms) = (1e-9f32, 0.0f32);
             let (mut ds, mut dd, mut dm) = ([0.0f32; 2], [0.0f32; 2], [0.0f32; 2]);
             for c in 0..4 {

@@ -9,11 +9,11 @@ use super::orders::{Orders, Wrapped};
 use super::params::photometry as params;
 use super::params::shadows::REACH_PX;
 use super::phase::{FitRows, PhaseFit, PhaseModel};
-use super::photometry::{Photometry, PhotometryFit};
+use super::photometry::Photometry;
 use super::pyramid::Level;
 use super::residuals::Residuals;
 use super::scene::{Frame, PhaseMap, Pixels, ScaledGrid, Scene, Scratch};
-use super::shadows::{Search, Shadows, Where, darken};
+use super::shadows::{Search, Shadows, darken};
 use super::slopes::Slopes;
 use super::smooth::mark_discontinuities;
 use super::window::Window;
@@ -35,8 +35,6 @@ pub(super) struct CoarseLevel {
     work: Vec<f32>,
     /// Standard deviation of the intensities in linear light.
     pub noise: f32,
-    /// Noise divided by the mean modulation of lit pixels.
-    relative_noise: f32,
     /// Whether the surface counts as textured, because enough pixels take offsets and amplitudes from another place.
     pub textured: bool,
     pub lit_mask: LitMask,
@@ -58,7 +56,6 @@ impl CoarseLevel {
             smooth_modulation: Vec::new(),
             work: Vec::new(),
             noise: 0.0,
-            relative_noise: 0.0,
             textured: false,
             lit_mask: LitMask::new(absent(code.ratios())),
             fit: LocalFit::new(code.ratios()),
@@ -105,7 +102,6 @@ impl CoarseLevel {
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         // A phase that is fitted in a window does not show the noise of a pixel.
         self.noise = if self.fit.is_of_pixels() { noise_of_phase(scene, map) } else { self.lit_mask.noise };
-        self.relative_noise = relative(self.noise, &self.modulation);
         self.slopes.measure(scene, map);
     }
 
@@ -115,10 +111,9 @@ impl CoarseLevel {
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         let wrapped = Wrapped { map, fit: &self.fit, photometry: None, slopes: &self.slopes };
         self.orders.choose(scene, &wrapped, &mut self.phase);
-        self.photometry.start(scene, &self.fit, &self.slopes, ratios);
-        let fit = PhotometryFit { sampled_rows: params::FIRST_SAMPLED_ROWS, ..self.free_fit() };
+        self.photometry.start(scene, &self.fit);
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
-        self.photometry.fit(scene, ratios, map, &self.slopes, &fit);
+        self.photometry.fit(scene, ratios, map, 0.0);
         let wrapped = Wrapped { photometry: Some(&self.photometry), ..wrapped };
         self.orders.choose(scene, &wrapped, &mut self.phase);
     }
@@ -129,12 +124,11 @@ impl CoarseLevel {
         self.textured = false;
         self.fit_phase(scene, ratios, scratch.lend());
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
-        self.photometry.fit(scene, ratios, map, &self.slopes, &self.free_fit());
+        self.photometry.fit(scene, ratios, map, 0.0);
         if moving {
             // Offsets and amplitudes of another place could seem to explain the effect of motion, so no pixel may
             // choose another place.
-            let fit = PhotometryFit { phase_trust: params::MOVING_PHASE_TRUST, ..self.free_fit() };
-            self.refit(scene, ratios, &fit, scratch.lend());
+            self.refit(scene, ratios, params::MOVING_PHASE_TRUST, scratch.lend());
             self.fit_phase(scene, ratios, scratch);
         } else {
             self.choose_places(scene, ratios);
@@ -142,28 +136,22 @@ impl CoarseLevel {
                 if !self.textured && round >= params::ROUNDS {
                     break;
                 }
-                let lit_share_min = if self.textured { 0.0 } else { params::LIT_SHARE_MIN };
-                let fit =
-                    PhotometryFit { phase_trust: params::PHASE_TRUST, lit_share_min, ..self.free_fit() };
-                self.refit(scene, ratios, &fit, scratch.lend());
+                self.refit(scene, ratios, params::PHASE_TRUST, scratch.lend());
                 if self.textured {
                     self.choose_places(scene, ratios);
                 }
                 self.fit_phase(scene, ratios, scratch.lend());
             }
         }
-        // The phase of a textured surface still has errors from the texture, and refined slopes would have them too.
-        if moving || !self.textured {
-            self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
-        }
+        self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
     }
 
     /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.
     pub fn leave_out_shadows(&mut self, level: &mut Level, scaled: ScaledGrid<'_>, ratios: [f32; 4]) {
         let Self { shadows, phase, modulation, photometry, lit_mask, noise, .. } = self;
-        let (place, map, noise) = (Where::Everywhere, PhaseMap { phase, modulation }, *noise);
+        let (map, noise) = (PhaseMap { phase, modulation }, *noise);
         let scene = level.scene(scaled);
-        let search = Search { place, ratios, photometry, map, noise };
+        let search = Search { ratios, photometry, map, noise };
         if scene.pair.is_none() || !shadows.find(&scene, search) {
             return;
         }
@@ -173,7 +161,7 @@ impl CoarseLevel {
         darken(scaled.grid, &shadows.lit, modulation, |_| ());
     }
 
-    /// The same at full resolution, next to what is dark on the coarse level. Without a coarse level, all is found already.
+    /// The same at full resolution. Without a coarse level, all is found already.
     pub fn leave_out_fine_shadows(
         &mut self,
         level: &mut Level,
@@ -181,10 +169,9 @@ impl CoarseLevel {
         ratios: [f32; 4],
         pixels: &mut Pixels,
     ) {
-        let Self { shadows, modulation, photometry, lit_mask, noise, .. } = self;
+        let Self { shadows, photometry, lit_mask, noise, .. } = self;
         let (scene, grid) = (level.scene(frame.full), frame.full.grid);
-        let (place, noise) = (Where::NearDark(frame.coarse.grid, modulation), *noise);
-        let search = Search { place, ratios, photometry, map: pixels.map(), noise };
+        let search = Search { ratios, photometry, map: pixels.map(), noise: *noise };
         if scene.pair.is_none() || frame.coarse.factor == 1 || !shadows.find(&scene, search) {
             return;
         }
@@ -196,17 +183,6 @@ impl CoarseLevel {
                 reasons[at] = Reason::Shadow;
             }
         });
-    }
-
-    /// A fit of the photometry that does not trust the phase.
-    fn free_fit(&self) -> PhotometryFit {
-        PhotometryFit {
-            misfit_max: params::MISFIT_MAX,
-            relative_noise: self.relative_noise,
-            sampled_rows: params::SAMPLED_ROWS,
-            phase_trust: 0.0,
-            lit_share_min: 0.0,
-        }
     }
 
     /// Step 6 on the coarse level: fits the phase with the present photometry, and computes squared residuals and
@@ -225,8 +201,8 @@ impl CoarseLevel {
     }
 
     /// Step 5: fits the photometry to the phase of a wide window. This phase follows the surface, while errors of the
-    /// previous photometry average out.
-    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 4], fit: &PhotometryFit, scratch: Scratch<'_>) {
+    /// previous photometry average out. `phase_trust` is the weight of this phase.
+    fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 4], phase_trust: f32, scratch: Scratch<'_>) {
         self.residuals.measure(scene, &self.work, &self.modulation);
         self.slopes.measure(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
         let window = Window::new(scene, &self.slopes, &self.modulation, self.noise).wide();
@@ -235,21 +211,14 @@ impl CoarseLevel {
         let model = PhaseModel { scene, photometry: &self.photometry, ratios, window };
         self.phase_fit.step(model, &mut self.work, scratch, &mut FitRows::none(scene.grid.height));
         let map = PhaseMap { phase: &self.work, modulation: &self.smooth_modulation };
-        self.photometry.fit(scene, ratios, map, &self.slopes, fit);
+        self.photometry.fit(scene, ratios, map, phase_trust);
     }
 
     /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains its intensities best. If
     /// enough pixels take them from another place, the surface counts as textured.
     fn choose_places(&mut self, scene: &Scene<'_>, ratios: [f32; 4]) {
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
-        let moved = self.photometry.choose_places(scene, ratios, map, &self.slopes, self.noise);
+        let moved = self.photometry.choose_places(scene, ratios, map, self.noise);
         self.textured = moved > params::TEXTURED_SHARE;
     }
-}
-
-/// Noise divided by the mean modulation of lit pixels.
-fn relative(noise: f32, modulation: &[f32]) -> f32 {
-    let lit = modulation.iter().step_by(31).filter(|&&m| m > 0.0);
-    let (sum, count) = lit.fold((0.0, 0.0), |(sum, count), m| (sum + m, count + 1.0));
-    noise * count / f32::max(sum, 1e-6)
 }

@@ -35,10 +35,10 @@ pub(super) trait Waves: Copy {
     /// outside the field.
     fn origin_rad(self, middle_rad: f32) -> f32;
 
-    /// The carriers of all channels at pixel `x` of a vector; `loss` as in [`carriers`].
+    /// The carriers of all channels at pixel `x` of a vector.
     #[inline(always)]
-    fn carriers(self, vector: &Self::Vector, x: usize, phase: f32, loss: f32) -> Carriers {
-        carriers(phase, self.ratios(), self.infrared(vector, x, phase), loss)
+    fn carriers(self, vector: &Self::Vector, x: usize, phase: f32) -> Carriers {
+        carriers(phase, self.ratios(), self.infrared(vector, x, phase))
     }
 }
 

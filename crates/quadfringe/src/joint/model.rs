@@ -63,7 +63,7 @@ pub(super) struct CellFringes {
 /// Carriers of the four channels at one pixel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Carriers {
-    /// `cos(k_c Phi + delta_c)`, reduced by the contrast that was lost in averaging pixels.
+    /// `cos(k_c Phi + delta_c)`.
     pub cosine: [f32; 4],
     /// Its derivative with respect to `Phi`.
     pub derivative: [f32; 4],
@@ -84,24 +84,11 @@ impl Wave {
     }
 }
 
-/// Carriers at an absolute phase in rad. `ratios` are the fringe numbers divided by the first; `loss` is the share of the
-/// contrast of R and B that was lost in averaging pixels.
+/// Carriers at an absolute phase in rad. `ratios` are the fringe numbers divided by the first.
 #[inline(always)]
-pub(super) fn carriers(phase: f32, [_, second, _, third]: [f32; 4], infrared: Wave, loss: f32) -> Carriers {
+pub(super) fn carriers(phase: f32, [_, second, ..]: [f32; 4], infrared: Wave) -> Carriers {
     let (s, c) = sin_cos(phase);
     let (s_g, c_g) = sin_cos(second * phase);
     let (s_ir, c_ir) = sin_cos(infrared.phase);
-    let kept = [1.0, second * second, 1.0, third * third].map(|square| contrast(loss * square));
-    let scale = |values: [f32; 4]| [0, 1, 2, 3].map(|k| kept[k] * values[k]);
-    Carriers {
-        cosine: scale([c, c_g, -s, c_ir]),
-        derivative: scale([-s, -second * s_g, -c, -infrared.slope * s_ir]),
-    }
-}
-
-/// Share of the contrast that remains after averaging pixels (J1): the expansion to second order in `loss` for a mean over a
-/// linear phase.
-#[inline(always)]
-pub(super) fn contrast(loss: f32) -> f32 {
-    1.0 - loss + 0.3 * loss * loss
+    Carriers { cosine: [c, c_g, -s, c_ir], derivative: [-s, -second * s_g, -c, -infrared.slope * s_ir] }
 }

@@ -10,12 +10,12 @@
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::infrared::{Waves, with_waves};
 use super::model::{FringeRows, has_quadrature};
-use super::params::motion::{GAIN, SAMPLED_ROWS, TURN_MAX, WINDOW};
+use super::params::motion::{GAIN, TURN_MAX, WINDOW};
+use super::params::pyramid::SAMPLED_ROWS;
 use super::photometry::Photometry;
 use super::pyramid::Level;
 use super::scene::{PhaseMap, PixelRow, ScaledGrid, Scene};
 use crate::Reason;
-use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
@@ -199,7 +199,7 @@ fn add_motion<W: Waves>(
         let mut terms = [[0.0; LANES]; 2];
         for x in 0..LANES {
             let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
-            let carriers = waves.carriers(&vector, x, phase[x], 0.0);
+            let carriers = waves.carriers(&vector, x, phase[x]);
             for c in 0..4 {
                 let (a, b) = (offset[c][x], amplitude[c][x]);
                 (m[c], d[c]) = (a + b * carriers.cosine[c], b * carriers.derivative[c]);
@@ -249,18 +249,6 @@ fn motion_terms(m: [f32; 4], d: [f32; 4], light: [f32; 4], instants: [f32; 4], u
     MotionTerms { numerator: weight * numerator, information: weight * albedo * information }
 }
 
-/// The cosine of channel `c` at pixel `x` of a vector.
-#[inline(always)]
-fn cosine<W: Waves>(c: usize, waves: W, vector: &W::Vector, x: usize, phase: f32) -> f32 {
-    let angle = match c {
-        1 => waves.ratios()[1] * phase,
-        3 => waves.infrared(vector, x, phase).phase,
-        _ => phase,
-    };
-    let (sine, cosine) = sin_cos(angle);
-    if c == 2 { -sine } else { cosine }
-}
-
 /// Light of a row less the change by motion.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn compensate_row<W: Waves>(
@@ -282,10 +270,10 @@ fn compensate_row<W: Waves>(
         for x in 0..LANES {
             let mut change = [0.0f32; 4];
             let (mut top, mut bottom) = (0.0f32, 1e-9f32);
+            let still = waves.carriers(&vector, x, phase[x]).cosine;
             for c in 0..4 {
-                let fringe = |phase: f32| cosine(c, waves, &vector, x, phase);
-                let moved = fringe(phase[x] + velocity[x] * instants[c]);
-                change[c] = amplitude[c][x] * (moved - fringe(phase[x]));
+                let moved = waves.carriers(&vector, x, phase[x] + velocity[x] * instants[c]).cosine[c];
+                change[c] = amplitude[c][x] * (moved - still[c]);
                 let model = offset[c][x] + amplitude[c][x] * moved;
                 top += model * found[c][x];
                 bottom += model * model;

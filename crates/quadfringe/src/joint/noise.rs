@@ -3,7 +3,7 @@
 use super::cells::Grid;
 use super::model::{count, weights};
 use super::params::illumination::{
-    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES, NOISE_STEPS, NOISE_STRIDE,
+    MODULATION_FLOOR, MODULATION_NOISES, NOISE_GROUPS, NOISE_LIMITS, NOISE_SAMPLES, NOISE_STEPS,
 };
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
@@ -133,7 +133,7 @@ fn deviation(bends: Vec<f32>) -> f32 {
 pub(super) fn noise_of_phase(scene: &Scene<'_>, PhaseMap { phase, modulation }: PhaseMap<'_>) -> f32 {
     let grid = scene.grid;
     let seen = (0..phase.len())
-        .step_by(NOISE_STRIDE)
+        .step_by((phase.len() / NOISE_SAMPLES) | 1)
         .filter(|i| (1..grid.width - 1).contains(&(i % grid.stride)))
         .filter(|&i| modulation[i - 1].min(modulation[i]).min(modulation[i + 1]) > 0.0)
         .map(|i| {

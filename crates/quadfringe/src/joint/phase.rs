@@ -73,8 +73,6 @@ struct ModelRow {
 #[derive(Clone, Copy)]
 struct PixelRows<'a> {
     phase: &'a [f32],
-    /// Share of the contrast that was lost in averaging pixels.
-    loss: &'a [f32],
     modulation: &'a [f32],
 }
 
@@ -82,7 +80,6 @@ struct PixelRows<'a> {
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
-    losses: RowMaps,
     /// Ring buffer with the models of the rows above, at and below the present row.
     ring: [ModelRow; 3],
     smooth: SmoothAlbedo,
@@ -150,8 +147,7 @@ impl Rows {
     fn model(&mut self, model: PhaseModel<'_>, phase: &[f32], y: usize, at: usize) {
         let PhaseModel { scene, photometry, ratios, window } = model;
         let fringes = photometry.sample(scene, y, &mut self.maps);
-        let loss = window.loss(y, &mut self.losses);
-        let pixels = PixelRows { phase: scene.row(phase, y), loss, modulation: window.modulation(y) };
+        let pixels = PixelRows { phase: scene.row(phase, y), modulation: window.modulation(y) };
         let out = &mut self.ring[at];
         with_waves!(scene, y, ratios, |waves| predict(&fringes, pixels, scene.rows(y), waves, out));
     }
@@ -200,15 +196,15 @@ fn predict<W: Waves>(
     out: &mut ModelRow,
 ) {
     let mut out = out.rows_mut(pixels.phase.len()).map(lanes_mut);
-    let pixels = [pixels.phase, pixels.loss, pixels.modulation].map(lanes);
+    let pixels = [pixels.phase, pixels.modulation].map(lanes);
     let (offset, amplitude, light) =
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     for i in 0..pixels[0].len() {
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
-        let ([phase, loss, lit], vector) = (take(&pixels, i), waves.vector(i));
+        let ([phase, lit], vector) = (take(&pixels, i), waves.vector(i));
         let mut found = [[0.0; LANES]; 9];
         for x in 0..LANES {
-            let carriers = waves.carriers(&vector, x, phase[x], loss[x]);
+            let carriers = waves.carriers(&vector, x, phase[x]);
             let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 0.0f32);
             let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
             for c in 0..4 {

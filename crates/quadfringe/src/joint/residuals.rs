@@ -2,7 +2,8 @@
 //! wrong and the phases of neighbouring pixels differ for the same reason.
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
-use super::params::phase::{RESIDUAL_SAMPLED_ROWS, RESIDUAL_WIDTH};
+use super::params::phase::WIDTH;
+use super::params::pyramid::SAMPLED_ROWS;
 use super::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use crate::parallel::slots::Slots;
@@ -27,7 +28,7 @@ impl Residuals {
     /// light.
     pub fn measure(&mut self, scene: &Scene<'_>, squared_residual: &[f32], modulation: &[f32]) {
         scene.grid.window_sums::<2, ()>(
-            CellWindow { sigma_cells: scene.cells(RESIDUAL_WIDTH), sampled_rows: RESIDUAL_SAMPLED_ROWS },
+            CellWindow { sigma_cells: scene.cells(WIDTH), sampled_rows: SAMPLED_ROWS },
             &self.slots,
             &mut self.sums,
             &mut self.maps,

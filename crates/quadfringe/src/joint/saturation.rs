@@ -160,7 +160,7 @@ impl Row<'_> {
     fn restore<W: Waves>(&self, waves: W, light: [&mut [f32]; 4]) {
         let marked = self.saturated.iter().enumerate().filter(|(_, saturated)| saturated.count() > 0);
         for (x, saturated) in marked {
-            let carriers = waves.carriers(&waves.vector(x / LANES), x % LANES, self.phase[x], 0.0);
+            let carriers = waves.carriers(&waves.vector(x / LANES), x % LANES, self.phase[x]);
             let FringeRows { offset, amplitude } = &self.fringes;
             let model: [f32; 4] =
                 std::array::from_fn(|c| offset[c][x] + amplitude[c][x] * carriers.cosine[c]);

@@ -15,18 +15,9 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Where shadows are searched on a level.
-#[derive(Clone, Copy)]
-pub(super) enum Where<'a> {
-    Everywhere,
-    /// Near pixels of the coarse level, planes of its grid, that are dark.
-    NearDark(&'a Grid, &'a [f32]),
-}
-
 /// What the search goes by.
 #[derive(Clone, Copy)]
 pub(super) struct Search<'a> {
-    pub place: Where<'a>,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 4],
     pub photometry: &'a Photometry,
@@ -55,30 +46,6 @@ struct Rows {
     maps: RowMaps,
     spare: Vec<f32>,
     expected: Vec<f32>,
-    /// The vectors of pixels that are searched.
-    active: Vec<bool>,
-}
-
-impl Where<'_> {
-    /// Marks the vectors of row `y` that are searched; tells whether there are any.
-    fn choose(self, grid: &Grid, y: usize, active: &mut Vec<bool>) -> bool {
-        active.clear();
-        match self {
-            Self::Everywhere => active.resize(grid.stride / LANES, true),
-            Self::NearDark(coarse, modulation) => {
-                let factor = grid.stride / coarse.stride;
-                let rows = around((y / factor).min(coarse.height - 1), coarse.height);
-                let rows = rows.map(|y| &modulation[y * coarse.stride..][..coarse.width]);
-                let side = LANES / factor;
-                active.extend((0..grid.stride / LANES).map(|i| {
-                    let near = (i * side).saturating_sub(1).min(coarse.width)
-                        ..((i + 1) * side + 1).min(coarse.width);
-                    rows.iter().any(|row| row[near.clone()].contains(&0.0))
-                }));
-            }
-        }
-        active.contains(&true)
-    }
 }
 
 impl Shadows {
@@ -115,9 +82,9 @@ impl Shadows {
         lit.par_chunks(grid.stride).any(|row| row[..grid.width].contains(&0.0))
     }
 
-    /// Computes what the model expects at every pixel that is searched, and what is seen of it.
+    /// Computes what the model expects at every pixel, and what is seen of it.
     fn expect_fringes(&mut self, scene: &Scene<'_>, search: Search<'_>) {
-        let Search { place, ratios, photometry, map, .. } = search;
+        let Search { ratios, photometry, map, .. } = search;
         let grid = scene.grid;
         let Self { field_rad, expected, excess, slots, .. } = self;
         let field_rad = *field_rad;
@@ -128,16 +95,10 @@ impl Shadows {
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (expected, excess))| {
-                let Rows { maps, active, .. } = &mut **slot;
-                if !place.choose(grid, y, active) {
-                    expected.fill(0.0);
-                    excess.fill(0.0);
-                    return;
-                }
-                let fringes = photometry.sample_in_place(scene, y, maps);
+                let fringes = photometry.sample_in_place(scene, y, &mut slot.maps);
                 let (pixels, out) = (scene.pixel_row(map, y), [expected, excess]);
                 with_waves!(scene, y, ratios, |waves| {
-                    expect(&fringes, &pixels, scene.rows(y), waves, active, field_rad, out);
+                    expect(&fringes, &pixels, scene.rows(y), waves, field_rad, out);
                 });
             },
         );
@@ -164,7 +125,6 @@ fn expect<W: Waves>(
     pixels: &PixelRow,
     light: [&[f32]; 4],
     waves: W,
-    active: &[bool],
     field_rad: [f32; 2],
     out: [&mut [f32]; 2],
 ) {
@@ -173,16 +133,12 @@ fn expect<W: Waves>(
         (fringes.offset.map(lanes), fringes.amplitude.map(lanes), light.map(lanes));
     let mut out = out.map(lanes_mut);
     for i in 0..pixels[0].len() {
-        if !active[i] {
-            put(&mut out, i, &[[0.0; LANES]; 2]);
-            continue;
-        }
         let (offset, amplitude, light) = (take(&offset, i), take(&amplitude, i), take(&light, i));
         let [phase, modulation, usable] = take(&pixels, i);
         let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 2];
         for x in 0..LANES {
-            let carriers = waves.carriers(&vector, x, phase[x], 0.0);
+            let carriers = waves.carriers(&vector, x, phase[x]);
             let red = offset[0][x] + amplitude[0][x] * carriers.cosine[0];
             let blue = offset[2][x] + amplitude[2][x] * carriers.cosine[2];
             let albedo = (red * light[0][x] + blue * light[2][x]) / (red * red + blue * blue + 1e-9);

@@ -1,7 +1,8 @@
 //! Slopes of the phase on the cells, from a phase that may be wrapped.
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
-use super::params::slopes::{FINE_WIDTH, SAMPLED_ROWS, WIDE_SHARE, WIDTH};
+use super::params::pyramid::SAMPLED_ROWS;
+use super::params::slopes::{FINE_WIDTH, WIDE_SHARE, WIDTH};
 use super::scene::{PhaseMap, Scene};
 use crate::parallel::angle::wrap;
 use crate::parallel::lanes::{LANES, Lanes, lanes, take};
@@ -9,8 +10,8 @@ use crate::parallel::slots::Slots;
 use multiversion::multiversion;
 use std::f32::consts::PI;
 
-/// Number of sums: weight and weighted phase difference along the row, the same two down the column, and lit pixels.
-const TERMS: usize = 5;
+/// Number of sums: weight and weighted phase difference along the row, and the same two down the column.
+const TERMS: usize = 4;
 
 /// A row shifted by one pixel, so that each entry holds the right neighbour.
 #[derive(Debug, Default)]
@@ -32,7 +33,7 @@ pub(super) struct Slopes {
 
 impl Default for Slopes {
     fn default() -> Self {
-        let [maps, wide] = [4, 4].map(CellMaps::new);
+        let [maps, wide] = [2, 2].map(CellMaps::new);
         Self { maps, wide, sums: CellMaps::default(), slots: Slots::default() }
     }
 }
@@ -72,9 +73,8 @@ impl Slopes {
                 let here = [scene.row(phase, y), scene.row(modulation, y)];
                 add_steps(here, [&right.phase, &right.modulation], [0, 1], sums);
                 add_steps(here, [scene.row(phase, below), scene.row(modulation, below)], [2, 3], sums);
-                add_lit(scene.row(modulation, y), sums);
             },
-            |row, [w, along, v, down, lit], out| {
+            |row, [w, along, v, down], out| {
                 let (columns, step) = (w.len(), grid.step as f32);
                 let slope = |i: usize, sum: &[f32], weight: &[f32], map: usize| {
                     let wide = if wide_weight > 0.0 { wide_weight * wide.line(row, map)[i] } else { 0.0 };
@@ -83,45 +83,14 @@ impl Slopes {
                 for i in 0..columns {
                     out[i] = slope(i, along, w, 0);
                     out[columns + i] = slope(i, down, v, 1);
-                    out[3 * columns + i] = lit[i] / whole;
-                    out[2 * columns + i] = (out[i] * out[i] + out[columns + i] * out[columns + i]) / 24.0;
                 }
             },
         );
     }
 
-    /// Slopes of 0.
-    #[cfg(test)]
-    pub fn flat(grid: &super::cells::Grid) -> Self {
-        let mut flat = Self::default();
-        flat.maps.fill::<4>(grid, |_, lines| lines.into_iter().for_each(|line| line.fill(0.0)));
-        flat
-    }
-
     /// Slopes along and down at a cell.
     pub fn at(&self, row: usize, column: usize) -> [f32; 2] {
         [0, 1].map(|k| self.maps.line(row, k)[column])
-    }
-
-    /// Share of the contrast of R and B that is lost in row `y` because each pixel is a mean of camera pixels. For another
-    /// channel, multiply it by the square of the ratio of the fringe numbers. If the phase changes by `s` per pixel, and a
-    /// pixel is the mean of `f` camera pixels along a side, the loss is `(1 - 1 / f^2) s^2 / 24` in each direction (J1).
-    pub fn loss<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
-        let [row] = maps.sample_mut(scene.grid, &self.maps, 2, y);
-        let scale = loss_scale(scene);
-        row.iter_mut().for_each(|loss| *loss *= scale);
-        row
-    }
-
-    /// [`Self::loss`] at a cell.
-    pub fn loss_at(&self, scene: &Scene<'_>, [row, column]: [usize; 2]) -> f32 {
-        self.maps.line(row, 2)[column] * loss_scale(scene)
-    }
-
-    /// Share of the window around the pixels of row `y` that is lit; beyond the borders there is no light.
-    pub fn lit<'a>(&self, scene: &Scene<'_>, y: usize, maps: &'a mut RowMaps) -> &'a [f32] {
-        let [row] = maps.sample(scene.grid, &self.maps, 3, y);
-        row
     }
 
     /// Slopes along row `y`.
@@ -135,10 +104,6 @@ impl Slopes {
         let [row] = maps.sample(scene.grid, &self.maps, 1, y);
         row
     }
-}
-
-fn loss_scale(scene: &Scene<'_>) -> f32 {
-    (1.0 - 1.0 / (scene.factor * scene.factor) as f32) / (scene.grid.step * scene.grid.step) as f32
 }
 
 /// Adds the differences between lit pixels, and their weights. A difference near half a turn has a small weight,
@@ -160,15 +125,6 @@ fn add_steps(here: [&[f32]; 2], there: [&[f32]; 2], to: [usize; 2], sums: &mut [
         for x in 0..LANES {
             sums[to[0]][x] += terms[0][x];
             sums[to[1]][x] += terms[1][x];
-        }
-    }
-}
-
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn add_lit(modulation: &[f32], sums: &mut [[Lanes; TERMS]]) {
-    for (sums, modulation) in sums.iter_mut().zip(lanes(modulation)) {
-        for x in 0..LANES {
-            sums[TERMS - 1][x] += if modulation[x] > 0.0 { 1.0 } else { 0.0 };
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::cells::Grid;
 use super::neighbours::around;
-use super::params::validity::BEND_MAX_RAD;
+use super::params::validity::SAME_SURFACE_RAD;
 use super::scene::PhaseMap;
 use multiversion::multiversion;
 use rayon::prelude::*;
@@ -48,7 +48,7 @@ fn mark_row(near: &NearRows, width: usize, discontinuities: &mut [f32], smooth_m
         let diagonal = upper(bend(a[0][x], c[2][x]), bend(a[2][x], c[0][x]));
         let dark = lit.map(|row| lower(lower(row[0][x], row[1][x]), row[2][x]));
         let least = lower(lower(dark[0], dark[1]), dark[2]);
-        let whole = (upper(straight, diagonal) < BEND_MAX_RAD) & (least > 0.0);
+        let whole = (upper(straight, diagonal) < SAME_SURFACE_RAD) & (least > 0.0);
         (discontinuities[x], smooth[x]) = if whole { (0.0, lit[1][1][x]) } else { (1.0, 0.0) };
     }
 }

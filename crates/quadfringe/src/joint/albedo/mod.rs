@@ -1,9 +1,8 @@
 //! Step 12: the albedo of every pixel, which is its light without fringes.
 //!
 //! The energy gives albedo and contrast of cells of a few pixels. A pixel at an edge takes the albedo of the cells on its side
-//! (J30). What then differs from its light is texture or noise. Texture is a relative change of all channels in common and one of
-//! each channel, with variances that are estimated in blocks of pixels (empirical Bayes); the change of a pixel is its expectation
-//! (J31).
+//! (J30). What then differs from its light is texture or noise. Texture is a relative change of all channels in common, with a
+//! variance that is estimated in blocks of pixels (empirical Bayes); the change of a pixel is its expectation (J31).
 
 mod edges;
 mod texture;
@@ -13,13 +12,12 @@ use super::infrared::{Waves, with_waves};
 use super::model::absent;
 use super::params::albedo::ROWS;
 use super::scene::Scene;
-use crate::parallel::angle::sin_cos;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use crate::parallel::slots::Slots;
 use edges::choose;
 use multiversion::multiversion;
 use rayon::prelude::*;
-use texture::{Row, Texture, add_common, add_single, take_common, take_single};
+use texture::{Row, Texture, add_texture, take_texture};
 
 /// The estimator, with its working memory.
 #[derive(Debug, Default)]
@@ -45,8 +43,7 @@ pub(super) struct Known<'a> {
 struct Work {
     fringes: FringeRows,
     rows: [Row; ROWS],
-    common: Vec<Texture>,
-    single: Vec<Texture>,
+    texture: Vec<Texture>,
 }
 
 impl Albedo {
@@ -77,17 +74,13 @@ impl Albedo {
 impl Work {
     /// Adds the expected texture to the albedo of the cells; `noise` is the variance of the intensity.
     fn refine(&mut self, rows: usize, noise: f32) {
-        let Self { rows: all, common, single, .. } = self;
+        let Self { rows: all, texture, .. } = self;
         let rows = &mut all[..rows];
         let blocks = rows[0].rest[0].len() / LANES;
-        for sums in [&mut *common, &mut *single] {
-            sums.clear();
-            sums.resize(blocks, Texture::default());
-        }
-        rows.iter().for_each(|row| add_common(row, noise, common));
-        rows.iter_mut().for_each(|row| take_common(row, noise, common));
-        rows.iter().for_each(|row| add_single(row, noise, single));
-        rows.iter_mut().for_each(|row| take_single(row, noise, single));
+        texture.clear();
+        texture.resize(blocks, Texture::default());
+        rows.iter().for_each(|row| add_texture(row, noise, texture));
+        rows.iter_mut().for_each(|row| take_texture(row, noise, texture));
     }
 }
 
@@ -103,11 +96,8 @@ impl Row {
         let contrast = fringes.contrast.each_ref().map(Vec::as_slice);
         let pixels =
             Pixels { phase: scene.row(known.phase, y), usable: scene.row(scene.usable, y), contrast };
-        let waves = signal.each_mut().map(Vec::as_mut_slice);
-        let [red, green, blue, infrared] = waves;
-        let [first, second, fourth, _] = known.ratios;
-        modulate(&pixels, [first, second, fourth], [red, green, blue]);
-        with_waves!(scene, y, known.ratios, |waves| modulate_infrared(&pixels, waves, infrared));
+        let out = signal.each_mut().map(Vec::as_mut_slice);
+        with_waves!(scene, y, known.ratios, |waves| modulate(&pixels, waves, out));
         let waves = signal.each_ref().map(Vec::as_slice);
         choose(scene.rows(y), waves, fringes, known.noise * known.noise, albedo);
         for (c, light) in scene.rows(y).into_iter().enumerate() {
@@ -136,33 +126,19 @@ struct Pixels<'a> {
     contrast: [&'a [f32]; 4],
 }
 
-/// Writes the light of albedo 1 in R, G and B; the fringes of B are a quarter period ahead.
+/// Writes the light of albedo 1.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn modulate(pixels: &Pixels, ratios: [f32; 3], out: [&mut [f32]; 3]) {
-    let Pixels { phase, contrast, .. } = pixels;
-    for (c, out) in out.into_iter().enumerate() {
-        let known = [lanes(phase), lanes(contrast[c])];
-        for (at, out) in lanes_mut(out).iter_mut().enumerate() {
-            let [phase, contrast] = take(&known, at);
-            for x in 0..LANES {
-                let (sine, cosine) = sin_cos(ratios[c] * phase[x]);
-                out[x] = 1.0 + contrast[x] * if c == 2 { -sine } else { cosine };
-            }
-        }
-    }
-}
-
-/// The same in IR.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn modulate_infrared<W: Waves>(pixels: &Pixels, waves: W, out: &mut [f32]) {
-    let known = [lanes(pixels.phase), lanes(pixels.contrast[3])];
-    for (at, out) in lanes_mut(out).iter_mut().enumerate() {
-        let [phase, contrast] = take(&known, at);
-        let vector = waves.vector(at);
+fn modulate<W: Waves>(pixels: &Pixels, waves: W, out: [&mut [f32]; 4]) {
+    let (phase, contrast) = (lanes(pixels.phase), pixels.contrast.map(lanes));
+    let mut out = out.map(lanes_mut);
+    for (at, phase) in phase.iter().enumerate() {
+        let (contrast, vector) = (take(&contrast, at), waves.vector(at));
+        let mut light = [[0.0; LANES]; 4];
         for x in 0..LANES {
-            let (_, cosine) = sin_cos(waves.infrared(&vector, x, phase[x]).phase);
-            out[x] = 1.0 + contrast[x] * cosine;
+            let carriers = waves.carriers(&vector, x, phase[x]);
+            (0..4).for_each(|c| light[c][x] = 1.0 + contrast[c][x] * carriers.cosine[c]);
         }
+        put(&mut out, at, &light);
     }
 }
 

@@ -42,9 +42,9 @@ fn correlation(row: &Row, at: usize) -> [Lanes; 2] {
     [cross, power]
 }
 
-/// Adds what a row tells of the texture that the channels have in common.
+/// Adds what a row tells of the texture, which the channels have in common.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn add_common(row: &Row, noise: f32, blocks: &mut [Texture]) {
+pub(super) fn add_texture(row: &Row, noise: f32, blocks: &mut [Texture]) {
     for (at, block) in blocks.iter_mut().enumerate() {
         let [cross, power] = correlation(row, at);
         for x in 0..LANES {
@@ -54,9 +54,9 @@ pub(super) fn add_common(row: &Row, noise: f32, blocks: &mut [Texture]) {
     }
 }
 
-/// Moves the expected common texture of a row from the rest to the albedo.
+/// Adds the expected texture of a row to the albedo.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn take_common(row: &mut Row, noise: f32, blocks: &[Texture]) {
+pub(super) fn take_texture(row: &mut Row, noise: f32, blocks: &[Texture]) {
     for (at, block) in blocks.iter().enumerate() {
         let ([cross, power], variance) = (correlation(row, at), block.variance());
         let mut change = [0.0; LANES];
@@ -64,43 +64,9 @@ pub(super) fn take_common(row: &mut Row, noise: f32, blocks: &[Texture]) {
             change[x] = variance * cross[x] / (noise + variance * power[x]);
         }
         for c in 0..4 {
-            let signal = lanes(&row.signal[c])[at];
-            let (rest, albedo) =
-                (&mut lanes_mut(&mut row.rest[c])[at], &mut lanes_mut(&mut row.albedo[c])[at]);
+            let albedo = &mut lanes_mut(&mut row.albedo[c])[at];
             for x in 0..LANES {
-                rest[x] -= change[x] * signal[x];
                 albedo[x] *= 1.0 + change[x];
-            }
-        }
-    }
-}
-
-/// Adds what a row tells of the texture of single channels.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn add_single(row: &Row, noise: f32, blocks: &mut [Texture]) {
-    for c in 0..4 {
-        let rows = [lanes(&row.signal[c]), lanes(&row.rest[c])];
-        for (at, block) in blocks.iter_mut().enumerate() {
-            let [signal, rest] = take(&rows, at);
-            for x in 0..LANES {
-                let (cross, power) = (signal[x] * rest[x], signal[x] * signal[x]);
-                block.excess += cross * cross - noise * power;
-                block.power += power * power;
-            }
-        }
-    }
-}
-
-/// Adds the expected texture of single channels to the albedo of a row.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-pub(super) fn take_single(row: &mut Row, noise: f32, blocks: &[Texture]) {
-    for c in 0..4 {
-        let rows = [lanes(&row.signal[c]), lanes(&row.rest[c])];
-        for (at, (albedo, block)) in lanes_mut(&mut row.albedo[c]).iter_mut().zip(blocks).enumerate() {
-            let ([signal, rest], variance) = (take(&rows, at), block.variance());
-            for x in 0..LANES {
-                let change = variance * signal[x] * rest[x] / (noise + variance * signal[x] * signal[x]);
-                albedo[x] *= 1.0 + change;
             }
         }
     }

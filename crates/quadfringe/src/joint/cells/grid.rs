@@ -9,7 +9,7 @@ pub(in crate::joint) struct Grid {
     pub width: usize,
     /// Length of a padded row of pixels.
     pub stride: usize,
-    /// Pixels along a side of a cell: 1, 2, 4, 8 or 16; on the finer image of [`Self::over`] 32 or 64 too.
+    /// Pixels along a side of a cell: 1, 2, 4, 8 or 16.
     pub step: usize,
     pub rows: usize,
     pub columns: usize,
@@ -25,11 +25,12 @@ pub(super) struct CellRows {
 
 impl Grid {
     /// Cells of at most `side` pixels.
+    #[cfg(test)]
     pub fn new(shape: [usize; 2], side: f64) -> Self {
         Self::with_stride(shape, shape[1].next_multiple_of(LANES), side)
     }
 
-    /// The same over planes with rows of `stride` pixels, whole vectors.
+    /// Cells of at most `side` pixels over planes with rows of `stride` pixels, whole vectors.
     pub fn with_stride([height, width]: [usize; 2], stride: usize, side: f64) -> Self {
         let step = 1 << (side.clamp(1.0, LANES as f64).log2() as usize);
         Self { height, width, stride, step, rows: height.div_ceil(step), columns: stride / step }
@@ -44,12 +45,6 @@ impl Grid {
             step: self.step / factor,
             ..*self
         }
-    }
-
-    /// The same cells over the pixels of `other`.
-    pub fn over(&self, other: &Self) -> Self {
-        let Self { height, width, stride, .. } = *other;
-        Self { height, width, stride, step: self.step * stride / self.stride, ..*self }
     }
 
     /// Pixels of a padded plane.

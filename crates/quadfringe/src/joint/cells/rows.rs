@@ -33,7 +33,7 @@ fn fold_by<const S: usize>(k: usize, vectors: &[Lanes], count: usize, line: &mut
     }
 }
 
-/// Linear interpolation between centres of cells `step` pixels wide, up to 64; `mix` has one cell more on each side.
+/// Linear interpolation between centres of cells `step` pixels wide, up to 16; `mix` has one cell more on each side.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(in crate::joint) fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
     match step {
@@ -41,9 +41,7 @@ pub(in crate::joint) fn spread(step: usize, mix: &[f32], out: &mut [f32]) {
         2 => spread_by::<2>(mix, out),
         4 => spread_by::<4>(mix, out),
         8 => spread_by::<8>(mix, out),
-        16 => spread_by::<16>(mix, out),
-        32 => spread_by::<32>(mix, out),
-        _ => spread_by::<64>(mix, out),
+        _ => spread_by::<16>(mix, out),
     }
 }
 

@@ -5,7 +5,8 @@
 
 use super::rows::{Rows, add_products, map, solve_row, sum, turn};
 use crate::joint::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
-use crate::joint::params::local_fit::{CARRIER_FITS, CARRIER_WINDOWS, DIRECTION_STRIDE_PX, SAMPLED_ROWS};
+use crate::joint::params::local_fit::CARRIER_WINDOWS;
+use crate::joint::params::pyramid::SAMPLED_ROWS;
 use crate::joint::scene::Scene;
 use crate::parallel::slots::Slots;
 use std::f32::consts::TAU;
@@ -16,7 +17,7 @@ pub(super) struct Carrier {
     /// Change of the phase of the plane wave per pixel along a row and along a column, in rad.
     per_px: [f32; 2],
     /// The fits, each against the phasor of those before.
-    fits: [CellMaps; CARRIER_FITS],
+    fits: [CellMaps; CARRIER_WINDOWS.len()],
 }
 
 impl Default for Carrier {
@@ -31,9 +32,9 @@ impl Carrier {
         let [along, down] = direction(scene);
         let turn = TAU / scene.period_px as f32;
         self.per_px = [turn * along, turn * down];
-        for fit in 0..CARRIER_FITS {
+        for (fit, width) in CARRIER_WINDOWS.into_iter().enumerate() {
             let mut found = std::mem::take(&mut self.fits[fit]);
-            let (before, width) = (&*self, CARRIER_WINDOWS[fit]);
+            let before = &*self;
             scene.grid.window_sums::<{ sum::COUNT }, Rows>(
                 CellWindow { sigma_cells: scene.cells(width), sampled_rows: SAMPLED_ROWS },
                 slots,
@@ -51,7 +52,7 @@ impl Carrier {
 
     /// The phasor of R along row `y`, as cosine and sine of its phase.
     pub fn row(&self, scene: &Scene<'_>, y: usize, maps: &mut RowMaps, phasor: [&mut Vec<f32>; 2]) {
-        self.phasor(scene, y, CARRIER_FITS, maps, phasor);
+        self.phasor(scene, y, self.fits.len(), maps, phasor);
     }
 
     /// The plane wave, turned by the first `fits`.
@@ -81,12 +82,12 @@ fn direction(scene: &Scene<'_>) -> [f32; 2] {
     let grid = scene.grid;
     let [red, green, ..] = scene.light;
     let step = ((scene.period_px / 8.0).round() as usize).max(1);
-    let mean = |plane: &[f32]| plane.iter().step_by(DIRECTION_STRIDE_PX).sum::<f32>();
-    let gain = mean(red) / mean(green).max(f32::MIN_POSITIVE);
+    let sum = |plane: &[f32]| plane.iter().sum::<f32>();
+    let gain = sum(red) / sum(green).max(f32::MIN_POSITIVE);
     let at = |i: usize| red[i] - gain * green[i];
     let [mut xx, mut xy, mut yy] = [0.0f64; 3];
-    for y in (step..grid.height.saturating_sub(step)).step_by(DIRECTION_STRIDE_PX) {
-        for x in (step..grid.width.saturating_sub(step)).step_by(DIRECTION_STRIDE_PX) {
+    for y in step..grid.height.saturating_sub(step) {
+        for x in step..grid.width.saturating_sub(step) {
             let i = y * grid.stride + x;
             let across = f64::from(at(i + step) - at(i - step));
             let down = f64::from(at(i + step * grid.stride) - at(i - step * grid.stride));

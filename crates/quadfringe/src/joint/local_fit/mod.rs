@@ -13,7 +13,8 @@ mod rows;
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{CellFringes, FringeRows, has_quadrature};
 use super::neighbours::{around, binomial};
-use super::params::local_fit::{FIRST_WINDOW, SAMPLED_ROWS, WINDOW};
+use super::params::local_fit::{FIRST_WINDOW, WINDOW};
+use super::params::pyramid::SAMPLED_ROWS;
 use super::scene::Scene;
 use crate::parallel::slots::Slots;
 use carrier::Carrier;
@@ -180,17 +181,8 @@ impl LocalFit {
     /// what was seen.
     fn albedo_row(&self, scene: &Scene<'_>, y: usize, at: usize, rows: &mut Rows) {
         let Rows { maps, cos, sin, albedo, .. } = rows;
-        let grid = scene.grid;
-        if !self.is_of_pixels() {
-            self.carrier.row(scene, y, maps, [&mut *cos, &mut *sin]);
-        }
-        let maps = maps.sample::<14>(grid, &self.maps, map::A_R, y);
-        if self.is_of_pixels() {
-            let [red_offset, red_amplitude, blue_offset, blue_amplitude, ..] = maps;
-            let red_blue = RedBlueRows { red_offset, red_amplitude, blue_offset, blue_amplitude };
-            [&mut *cos, &mut *sin].into_iter().for_each(|row| row.resize(grid.stride, 0.0));
-            two_step(&red_blue, None, scene.rows(y), cos, sin);
-        }
+        Source::of(self.ratios, &self.carrier, &self.maps).row(scene, y, None, maps, [&mut *cos, &mut *sin]);
+        let maps = maps.sample::<14>(scene.grid, &self.maps, map::A_R, y);
         let channel = |a: usize, p: usize| ChannelRows { a: maps[a], p: maps[p], q: maps[p + 1] };
         let model = [
             channel(map::A_R, map::P_R),

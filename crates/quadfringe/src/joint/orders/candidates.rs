@@ -4,11 +4,11 @@ use super::evidence::{albedo, albedo_known, observed_cosine};
 use super::matching::Matching;
 use super::wrapped::Wrapped;
 use crate::joint::model::CellFringes;
-use crate::joint::params::orders::{PIXEL_COST_MAX, SAME_ORDER_RAD};
+use crate::joint::params::orders::PIXEL_COST_MAX;
 use crate::joint::scene::Scene;
 use crate::joint::slopes::Slopes;
 use crate::parallel::angle::{round, sin_cos, wrap};
-use std::f32::consts::TAU;
+use std::f32::consts::{PI, TAU};
 
 /// Greatest number of candidates: the order of the cell and the orders of its eight neighbours.
 const CANDIDATES: usize = 9;
@@ -58,7 +58,7 @@ impl Candidates {
                     continue;
                 }
                 let gap = here - nodes.absolute(other);
-                if gap.abs() < SAME_ORDER_RAD {
+                if gap.abs() < PI {
                     continue;
                 }
                 let [along, down] = slopes.at(other_row, other_column);
@@ -116,7 +116,7 @@ impl Block {
         let (step, side) = (grid.step, grid.step + 2);
         let node = cell.row * grid.columns + cell.column;
         let (phase, whole) = (nodes.phase[node], nodes.absolute(node));
-        let fringes = wrapped.cell(scene, cell.row, cell.column);
+        let fringes = wrapped.cell(cell.row, cell.column);
         let predicted = Predicted { scene, fringes: &fringes, ratios: nodes.ratios };
         self.costs.clear();
         for i in 0..side * side {

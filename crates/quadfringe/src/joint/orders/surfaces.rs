@@ -3,17 +3,17 @@
 //! Near a rim, offsets and amplitudes are wrong in the same way for many nodes, so that the matching may give a whole strip of them
 //! a wrong order. The wrapped phase continues across the border of such a strip, which shows as a step of the same number of whole
 //! turns along all of the border. Between two real surfaces the step has any size, and is a whole number of turns within
-//! [`AMBIGUOUS_RAD`] for one pair of surfaces in ten. If the orders of a surface are less certain than that, it takes the order with
+//! [`SAME_SURFACE_RAD`] for one pair of surfaces in ten. If the orders of a surface are less certain than that, it takes the order with
 //! which it continues its neighbour.
 
 use crate::joint::cells::Grid;
 use crate::joint::disjoint::{root, unite};
-use crate::joint::params::validity::AMBIGUOUS_RAD;
+use crate::joint::params::validity::SAME_SURFACE_RAD;
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// How much more often the border of a wrong order is a step of whole turns than the border of two real surfaces: the former always
 /// is.
-const BORDER_ODDS: f32 = PI / AMBIGUOUS_RAD;
+const BORDER_ODDS: f32 = PI / SAME_SURFACE_RAD;
 
 /// The surfaces of a shot, as sets of nodes.
 #[derive(Debug, Clone, Default)]
@@ -91,7 +91,7 @@ impl Surfaces {
                 if turns == 0.0 && rest < FRAC_PI_2 {
                     unite(parents, from, to);
                 } else {
-                    let whole = turns != 0.0 && rest < AMBIGUOUS_RAD;
+                    let whole = turns != 0.0 && rest < SAME_SURFACE_RAD;
                     edges.push(Edge { from, to, turns: turns as i16, whole });
                 }
             }

@@ -32,11 +32,11 @@ impl Wrapped<'_> {
         }
     }
 
-    /// Offsets and amplitudes in the middle of a cell.
-    pub(super) fn cell(&self, scene: &Scene<'_>, row: usize, column: usize) -> CellFringes {
+    /// Offsets and amplitudes in one cell.
+    pub(super) fn cell(&self, row: usize, column: usize) -> CellFringes {
         match self.photometry {
             None => self.fit.cell(row, column),
-            Some(photometry) => photometry.cell(scene, row, column),
+            Some(photometry) => photometry.cell(row, column),
         }
     }
 }

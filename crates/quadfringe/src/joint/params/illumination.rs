@@ -16,12 +16,12 @@ pub const HEIGHT_MIN: f32 = 0.02;
 /// shadows counts as light (with 0.5, 6 instead of 5 % of what only one projector of a pair lights is no shadow). From 0.33 to 1
 /// nothing else changes by more than 0.2 % of the pixels: `python evaluation/dark.py`, `pytest tests/test_pair_joint.py -rP`.
 pub const MODULATION_NOISES: f32 = 0.67;
-/// Least modulation that counts as light when there is no noise, as a fraction of full scale: half a step of 8 bits, which the
-/// rounding of an image without noise hides. Larger: dark surfaces of cameras with more bits are lost. Smaller: noise that is clipped
-/// at black counts as light (with 0.001 a small object on black loses 9 % of its pixels): `pytest tests/test_real_objects.py -rP`.
-pub const MODULATION_FLOOR: f32 = 0.002;
+/// Least modulation that counts as light when there is no noise, as a fraction of full scale. Follows from the
+/// rounding of 8 bits, which hides half a step. Larger: dark surfaces of cameras with more bits are lost. Smaller: noise that is
+/// clipped at black counts as light (with 0.001 a small object on black loses 9 % of its pixels): `pytest tests/test_real_objects.py -rP`.
+pub const MODULATION_FLOOR: f32 = 0.5 / 255.0;
 
-/// Number of pixels from which the noise of an image is estimated; up to twice as many are used. The median of 16,000 values
+/// Number of pixels from which the noise of an image or of a phase is estimated; up to twice as many are used. The median of 16,000 values
 /// is certain to 1 %. Varied: no effect, but 10 ppm fewer wrong orders of dim steps at x0.7.
 pub const NOISE_SAMPLES: usize = 1 << 14;
 
@@ -34,10 +34,6 @@ pub const NOISE_STEPS: usize = 64;
 /// Bounds of the variance of the noise of a group, relative to that of the whole red image. They matter where light is clipped, at
 /// black or by the response. `python evaluation/captures.py`.
 pub const NOISE_LIMITS: [f32; 2] = [0.25, 25.0];
-
-/// Step between the pixels from which the noise of a phase is estimated. An odd step visits all columns. Varied: no effect, but
-/// 4 % near edges of dim steps at x0.7.
-pub const NOISE_STRIDE: usize = 13;
 
 /// The same for three colours of different fringe numbers, which come closer to their bottoms together: 36, 35 and 30 fringes have a
 /// mean of 0.013 where red and blue are alike and green is 60 degrees off. Varied: 0.02 loses 1.1 % of a plane, in strips

@@ -5,14 +5,11 @@
 /// without noise +19 %, near edges of steps -18 %).
 pub const FIRST_WINDOW: f32 = 0.5;
 
-/// Width (sigma) of the fitting window in fringe periods. Larger: less noise of beats, offsets and amplitudes. Smaller: they
-/// follow edges. Varied x0.7: phase RMS of peaks without noise +42 %, promised wrong orders 15 to 60 % less; x1.4: near edges of
-/// steps +34 %, promised wrong orders of the textured face three times as many.
+/// Width (sigma) of the fitting window in fringe periods. Larger: less noise of beats, offsets and amplitudes. Smaller: they follow
+/// edges. Varied x0.7: phase RMS of peaks without noise +42 %, promised wrong orders 15 to 60 % less; x1.4: near edges of steps +34
+/// %, promised wrong orders of the textured face three times as many. 0.28: painted face +14 %, 0.34 points less of the bottle
+/// (`python evaluation/captures_report.py`).
 pub const WINDOW: f32 = 0.3;
-
-/// Number of pixel rows that are sampled for each row of cells. Neighbouring rows have nearly the same information, and
-/// the window contains hundreds of pixels. Varied: 1 row has 8 % less RMS near edges of steps, 3 rows no effect.
-pub const SAMPLED_ROWS: usize = 2;
 
 /// Ridge of the normal equations relative to the weight in the window. Larger: offsets and amplitudes are pulled towards 0.
 /// Smaller: windows without a whole fringe become singular. Varied: no effect, but 4 % near edges of dim steps at x0.7.
@@ -26,17 +23,9 @@ pub const CONTRAST_MIN: f32 = 0.1;
 /// when B repeats R. Larger: surfaces along the fringes are lost. Smaller: the phase is noise there. Varied: no effect.
 pub const SPREAD_MIN: f32 = 0.02;
 
-/// Number of fits that make the phasor of R in a window, without a channel in quadrature. More follow greater changes of the local
-/// frequency, and each costs a pass over the image. Measured with `python evaluation/rgb.py --only face steps`: one leaves 15 % of wrong
-/// orders on the face, two and three leave none; three have 10 % less error near edges than two.
-pub const CARRIER_FITS: usize = 3;
-
-/// Widths (sigma) of their windows in fringe periods. Larger: the phase near edges is that of both sides. Smaller: a window holds
-/// less than a fringe, and offset and phase are mixed. Varied: 0.25 in the second leaves 0.3 % of wrong orders on the
-/// steps, 0.7 in the first doubles the error of steps.
-pub const CARRIER_WINDOWS: [f32; CARRIER_FITS] = [0.5, 0.35, 0.35];
-
-/// Distance between the rows, and between the pixels of a row, from which the direction of the fringes is measured, in pixels of the
-/// coarse level. A larger one misses small objects; a smaller one takes longer. Not measured: a ninth of the pixels has the same
-/// principal axis.
-pub const DIRECTION_STRIDE_PX: usize = 3;
+/// Widths (sigma) in fringe periods of the windows of the fits that make the phasor of R, without a channel in quadrature. Larger: the
+/// phase near edges is that of both sides. Smaller: a window holds less than a fringe, and offset and phase are mixed. More fits follow
+/// greater changes of the local frequency, and each costs a pass over the image. By `python evaluation/rgb.py --only face steps`, one
+/// fit leaves 15 % of wrong orders on the face, two and three leave none; three have 10 % less error near edges than two. Varied: 0.25
+/// in the second leaves 0.3 % of wrong orders on the steps, 0.7 in the first doubles the error of steps.
+pub const CARRIER_WINDOWS: [f32; 3] = [0.5, 0.35, 0.35];

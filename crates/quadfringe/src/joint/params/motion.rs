@@ -3,14 +3,10 @@
 //! times as fast as the hand of the bench (phase RMS 0.0059, 0.023, -, 0.011 rad; returned 100, 98, 13, 95 %; wrong orders of
 //! the third 0.9 %).
 
-/// Width (sigma) of the window in fringe periods: motion varies slowly over a surface. Larger: less noise of the velocity.
+/// Width (sigma) of the window in fringe periods. Follows from the window that averages whole fringes: motion varies slowly over a surface. Larger: less noise of the velocity.
 /// Smaller: the motion of an object mixes less with the motion of its background. Varied x0.7: RMS of the planes +8 and +11 %,
 /// of the hand -13 %; x1.4: -4, -16 and +22 %.
-pub const WINDOW: f32 = 0.5;
-
-/// Number of pixel rows that are sampled for each row of cells. More: time. Varied: 3 rows +5 % for the first plane, 6 rows -4
-/// % for the hand.
-pub const SAMPLED_ROWS: usize = 4;
+pub const WINDOW: f32 = super::local_fit::FIRST_WINDOW;
 
 /// Factor of a Gauss-Newton step. Photometry and phase were fitted as if the surface stood still, and these fits explain about
 /// half of the motion, so that a step with the factor 1 goes half of the way; any factor below 4 converges. A factor that was

@@ -9,7 +9,7 @@ pub const JUMP_PERIODS: f64 = 1.25;
 /// Bounds of the jump price in nodes. Follows from the arithmetic: at 30 nodes a price is 9990, so four sweeps of at most
 /// `COST_MAX` plus the price sum to less than 65,536.
 pub const JUMP_NODES_MIN: f64 = 1.0;
-/// See [`JUMP_NODES_MIN`].
+/// Follows from the arithmetic, as [`JUMP_NODES_MIN`].
 pub const JUMP_NODES_MAX: f64 = 30.0;
 
 /// Greatest cost of a node, at which costs are truncated. It is reached if both beats are wrong by 0.3 rad, or the cosines by 0.3
@@ -28,27 +28,18 @@ pub const COSINE_UNIT: f32 = 2048.0;
 /// (`python evaluation/rgb.py`).
 pub const COSINE_UNIT_WITHOUT_INFRARED: f32 = 1024.0;
 
-/// Number of pixel rows from which the cosines of a node are taken. More: less noise of the costs, more time. Varied (3
-/// and 6): no effect.
-pub const SAMPLED_ROWS: usize = 4;
-
 /// Weight with which a saturated lit pixel enters the number of pixels of a node, so that a node with only such pixels
 /// counts as lit but has no evidence. Follows from the size of a cell (4 rows of 16 pixels), over which the sum of these
 /// weights must stay below 1.
 pub const LIT_WEIGHT: f32 = 1.0 / 1024.0;
 
-/// Greatest magnitude of an observed cosine. Values beyond 1 come from noise or glare. Not measured: with 2 a deviation of up
-/// to a whole amplitude counts.
+/// Greatest magnitude of an observed cosine. Values beyond 1 come from noise or glare. Not measured: with 2 a deviation of up to a
+/// whole amplitude counts. 1 (with a greatest cost of 4): painted face +8 % (`python evaluation/world.py --half tune`).
 pub const OBSERVED_COSINE_MAX: f32 = 2.0;
 
 /// Limit for the squared difference of a cosine that counts against a candidate order of a pixel: beyond it the candidate is
 /// wrong anyway. Varied: no effect, but 4 % more RMS near edges of dim steps at x1.4.
 pub const PIXEL_COST_MAX: f32 = 1.0;
-
-/// Neighbouring nodes propose the same order if their absolute phases differ by less than this, in rad. Not measured: it lies
-/// between the phase difference of neighbouring cells on a steep surface (2 pi / 3.4 = 1.8) and the least difference that
-/// another order causes there (2 pi - 1.8 = 4.4).
-pub const SAME_ORDER_RAD: f32 = 2.0;
 
 /// Weight of the albedo of the surroundings where R alone shows that of a pixel, relative to the squared offset of R. Larger: a
 /// pixel on a print has the albedo of its surroundings. Smaller: that of a pixel in a dark fringe of R is noise. Not measured: from

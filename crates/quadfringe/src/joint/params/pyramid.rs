@@ -15,8 +15,8 @@ pub const COARSE_PERIOD_MIN_PX: f64 = 6.0;
 /// level has a sixteenth of the pixels.
 pub const FACTOR_MAX: usize = 4;
 
-/// Number of pixels by which interpolated light of a mosaic reaches into a shadow: a missing sample is a mean of neighbours
-/// one pixel away (`cargo test --test bayer`).
+/// Number of pixels by which interpolated light of a mosaic reaches into a shadow. Follows from the interpolation: a missing sample is
+/// a mean of neighbours one pixel away (`cargo test --test bayer`).
 pub const MOSAIC_REACH_PX: usize = 1;
 
 /// Least fringe period that is accepted, in pixels. Follows from sampling: a fringe needs four samples for its shape
@@ -27,14 +27,18 @@ pub const PERIOD_MIN_PX: f64 = 4.0;
 /// no fringes to decode, so any possible period is good enough.
 pub const PERIOD_FALLBACK_SHARE: f64 = 1.0 / 16.0;
 
-/// Surfaces whose phases differ by less than this, in rad, count as one in upsampling. Larger: small steps are smoothed. Smaller:
-/// more candidates for each pixel, more time. Varied: no effect.
-pub const SAME_SURFACE_RAD: f32 = 0.3;
-
-/// Limit for the squared residual that counts against a surface, in units of the squared modulation, so that one pixel with
-/// glare does not decide for its neighbours. Varied: no effect, but 14 ppm fewer wrong orders of dim steps at x0.7.
+/// Limit for the squared residual that counts against a surface, in units of the squared modulation, so that one pixel with glare
+/// does not decide for its neighbours. Varied: no effect, but 14 ppm fewer wrong orders of dim steps at x0.7. Without it: painted
+/// face and bottle +5 % (`python evaluation/world.py --half tune`).
 pub const SQUARED_MISFIT_MAX: f32 = 0.5;
 
 /// Greatest correction of the phase of a pixel relative to its surface, in rad. The linearisation holds for about a sixth of a
-/// turn. Varied: no effect, but 11 ppm fewer wrong orders of dim steps at x1.4.
+/// turn. Varied: no effect, but 11 ppm fewer wrong orders of dim steps at x1.4. 3.1: painted face and photographs +8 %, rods -30 %
+/// (`python evaluation/world.py --half tune`).
 pub const CORRECTION_MAX_RAD: f32 = 1.0;
+
+/// Number of pixel rows that stand for a row of cells in every window of step 3 to 7. Neighbouring rows have nearly the same
+/// information. More: time. Fewer: noise. Cells of the coarse level have up to four rows, of which all count. With 2 in place of 4 rows
+/// in local fit, slopes, residuals and the first photometry no figure moves: `python evaluation/world.py --half tune`. In motion,
+/// 3 rows have +5 % for the first plane, 6 rows -4 % for the hand: `cargo test --test motion -- --nocapture`.
+pub const SAMPLED_ROWS: usize = 4;

@@ -16,9 +16,9 @@ pub const CHANNEL_SHARE_MAX: f64 = 0.75;
 /// Not measured.
 pub const BRIGHT_MIN: f32 = 0.1;
 
-/// Rounds of restoring and decoding. More: time, each that of a whole shot without validity and energy. Fewer: `python
+/// Rounds of restoring and decoding. Follows from those of motion, which end at the same distance from the limit. More: time, each that of a whole shot without validity and energy. Fewer: `python
 /// evaluation/saturated.py` gives at 1.6 times the exposure 0.20 mm with two rounds of the factors 2 and 1, 0.16 mm with three.
-pub const ROUNDS: usize = 3;
+pub const ROUNDS: usize = super::motion::ROUNDS;
 
 /// Factor of a step from the present light to what the model expects. Photometry and phase were fitted to the present light,
 /// and explain about half of what was cut off, so that a step with the factor 1 goes half of the way. By `python

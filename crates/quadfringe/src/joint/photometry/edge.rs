@@ -32,8 +32,7 @@ impl Edge {
         let light = std::array::from_fn(|c| {
             let clean = |i: usize| {
                 let [a, b] = [2 * c, 2 * c + 1].map(|k| textures[usize::from(i % 256 >= EDGE)][k]);
-                ALBEDO
-                    * (a + b * carriers(phase[i], RATIOS, Wave::coaxial(phase[i], RATIOS[3]), 0.0).cosine[c])
+                ALBEDO * (a + b * carriers(phase[i], RATIOS, Wave::coaxial(phase[i], RATIOS[3])).cosine[c])
             };
             let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
             (0..grid.pixels()).map(|i| clean(i) + noise * draw()).collect()

@@ -9,7 +9,7 @@ use multiversion::multiversion;
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 pub(super) fn add_projected<W: Waves>(
     model: [&[f32]; 8],
-    pixels: [&[f32]; 4],
+    pixels: [&[f32]; 3],
     light: [&[f32]; 4],
     waves: W,
     limits: [f32; 2],
@@ -18,13 +18,13 @@ pub(super) fn add_projected<W: Waves>(
     let (model, pixels, light) = (model.map(lanes), pixels.map(lanes), light.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
         let (model, light) = (take(&model, i), take(&light, i));
-        let [phase, modulation, usable, loss] = take(&pixels, i);
+        let [phase, modulation, usable] = take(&pixels, i);
         let (ratios, vector) = (waves.ratios(), waves.vector(i));
         let mut terms = [[0.0; LANES]; SUMS];
         for x in 0..LANES {
             let model: [f32; 8] = std::array::from_fn(|k| model[k][x]);
             let seen: [f32; 4] = std::array::from_fn(|c| light[c][x]);
-            let pixel = [phase[x], modulation[x], usable[x], loss[x]];
+            let pixel = [phase[x], modulation[x], usable[x]];
             let infrared = waves.infrared(&vector, x, phase[x]);
             let pixel_terms = project(model, pixel, seen, (ratios, infrared), limits);
             for k in 0..SUMS {
@@ -40,12 +40,12 @@ pub(super) fn add_projected<W: Waves>(
 #[inline(always)]
 fn project(
     model: [f32; 8],
-    [phase, modulation, usable, loss]: [f32; 4],
+    [phase, modulation, usable]: [f32; 3],
     seen: [f32; 4],
     (ratios, infrared): ([f32; 4], Wave),
     [misfit_max, trust]: [f32; 2],
 ) -> [f32; SUMS] {
-    let (carriers, weights) = (carriers(phase, ratios, infrared, loss), weights(ratios));
+    let (carriers, weights) = (carriers(phase, ratios, infrared), weights(ratios));
     let (mut m, mut d) = ([0.0f32; 4], [0.0f32; 4]);
     let (mut mm, mut md, mut dd, mut ms) = (1e-9f32, 0.0f32, 1e-9f32, 0.0f32);
     for c in 0..4 {

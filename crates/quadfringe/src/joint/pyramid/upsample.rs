@@ -9,7 +9,8 @@ use crate::joint::infrared::{Coaxial, Gathered, Waves};
 use crate::joint::model::{CellFringes, count};
 use crate::joint::neighbours::around;
 use crate::joint::params::phase::ALBEDO_MIN;
-use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SAME_SURFACE_RAD, SQUARED_MISFIT_MAX};
+use crate::joint::params::pyramid::{CORRECTION_MAX_RAD, FACTOR_MAX, SQUARED_MISFIT_MAX};
+use crate::joint::params::validity::SAME_SURFACE_RAD;
 use crate::joint::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, lanes};
 use crate::parallel::slots::Slots;
@@ -157,9 +158,9 @@ impl CoarseRow<'_> {
 
     /// Offsets and amplitudes near a coarse pixel.
     fn fringes(&self, column: usize) -> CellFringes {
-        let coarse = self.levels.coarse;
+        let Levels { coarse, found, .. } = self.levels;
         let [row, column] = [self.row, column].map(|v| v / coarse.grid.step);
-        self.levels.found.photometry.cell(coarse, row, column)
+        found.photometry.cell(row, column)
     }
 
     /// Collects the different surfaces of the pixel and its neighbours, and returns their number.
@@ -267,7 +268,7 @@ fn explain<W: Waves>(
     let most = SQUARED_MISFIT_MAX * (0.25 * count(waves.ratios())) * pixels.modulation * pixels.modulation;
     let vector = waves.vector(0);
     for x in 0..LANES {
-        let carriers = waves.carriers(&vector, x, pixels.phase[x], 0.0);
+        let carriers = waves.carriers(&vector, x, pixels.phase[x]);
         let (mut mm, mut md, mut dd) = (1e-9f32, 0.0f32, 1e-9f32);
         let (mut ms, mut ds, mut ss) = (0.0f32, 0.0f32, 0.0f32);
         for c in 0..4 {

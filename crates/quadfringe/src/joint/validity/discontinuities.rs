@@ -2,7 +2,7 @@
 //! narrow strips.
 
 use crate::joint::cells::Grid;
-use crate::joint::params::validity::{AMBIGUOUS_RAD, AMBIGUOUS_REACH};
+use crate::joint::params::validity::{AMBIGUOUS_REACH, SAME_SURFACE_RAD};
 use crate::joint::scene::PhaseMap;
 use crate::parallel::angle::wrap;
 use multiversion::multiversion;
@@ -128,7 +128,7 @@ fn mark_row(here: Row, there: Row, out: MarkRow) {
         let gap = phase[x] - other[x];
         let apart = (gap.abs() >= PI) & (lit[x] > 0.0) & (other_lit[x] > 0.0);
         at_jump[x] |= u8::from(apart);
-        ambiguous[x] |= u8::from(apart & (wrap(gap).abs() < AMBIGUOUS_RAD));
+        ambiguous[x] |= u8::from(apart & (wrap(gap).abs() < SAME_SURFACE_RAD));
     }
 }
 

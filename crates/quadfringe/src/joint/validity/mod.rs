@@ -6,7 +6,7 @@ mod regrow;
 mod support;
 
 use super::cells::{RowMaps, TaskWork};
-use super::neighbours::around;
+use super::neighbours::{around, sum_of_nine};
 use super::noise::NoiseByLight;
 use super::orders::Orders;
 use super::params::validity::{
@@ -75,6 +75,7 @@ pub(super) struct Validity {
 #[derive(Debug, Default)]
 struct Rows {
     maps: RowMaps,
+    spare: Vec<f32>,
     sums: Vec<f32>,
     lead: Vec<f32>,
     noise: Vec<f32>,
@@ -126,7 +127,7 @@ impl Validity {
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (quality, ((passed, consistent), reasons)))| {
-                let Rows { maps, sums, lead, noise: variance } = &mut slot.rows;
+                let Rows { maps, spare, sums, lead, noise: variance } = &mut slot.rows;
                 noise.row(scene.rows(y), variance);
                 lead.clear();
                 for node in orders.verdicts(scene, y / grid.step) {
@@ -142,7 +143,7 @@ impl Validity {
                     support: &support.row(grid, y, maps)[..grid.width],
                 };
                 let out = VerdictRow { quality, passed, consistent, reasons };
-                check_row(&known, limits, sums, out);
+                check_row(&known, limits, [spare, sums], out);
             },
         );
     }
@@ -175,16 +176,11 @@ struct VerdictRow<'a> {
 /// A pixel passes if its order has enough quality, it lies at no order jump, and the residuals of it and its neighbours are small; a
 /// wrong order leaves residuals in G and IR. It is consistent if its residual alone is small.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: VerdictRow) {
+fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2], out: VerdictRow) {
     let width = known.modulation.len();
-    sums.resize(width + 2, 0.0);
-    let [above, here, below] = known.squared_residual.map(|row| &row[..width]);
-    let middle = &mut sums[1..=width];
-    for x in 0..width {
-        middle[x] = above[x] + here[x] + below[x];
-    }
-    (sums[0], sums[width + 1]) = (sums[1], sums[width]);
-    let [left, middle, right] = [0, 1, 2].map(|k| &sums[k..k + width]);
+    sums.resize(width, 0.0);
+    sum_of_nine(known.squared_residual, width, spare, sums);
+    let (here, near) = (&known.squared_residual[1][..width], &sums[..width]);
     let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
     let noise = &known.noise[..width];
     let (lead, support) = (&known.lead[..width], &known.support[..width]);
@@ -199,7 +195,7 @@ fn check_row(known: &CheckRow, limits: Limits, sums: &mut Vec<f32>, out: Verdict
         let share = MISFIT_MAX * modulation[x];
         let [pixel_share, grown_share] =
             [PIXEL_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * pixel_modulation[x]);
-        let agrees = left[x] + middle[x] + right[x] <= 9.0 * (floors[0] * noise[x] + share * share)
+        let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
             && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
         quality[x] = order_quality + hole_unless(lit);
         let certain = lit & (order_quality >= limits.quality_min);
@@ -247,7 +243,7 @@ mod tests {
             consistent: &mut consistent,
             reasons: &mut reasons,
         };
-        check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, &mut Vec::new(), out);
+        check_row(&known, Limits { noise: 0.01, quality_min: 0.1 }, [&mut Vec::new(), &mut Vec::new()], out);
         for marks in [passed, consistent] {
             assert!((0..16).all(|x| marks[x] == u8::from(x != 12)), "{marks:?}");
         }

@@ -7,7 +7,7 @@
 
 use crate::joint::cells::Grid;
 use crate::joint::params::tasks::GROUP;
-use crate::joint::params::validity::{AMBIGUOUS_REACH, BEND_MAX_RAD, FACING_REACH};
+use crate::joint::params::validity::{AMBIGUOUS_REACH, FACING_REACH, SAME_SURFACE_RAD};
 use std::f32::consts::PI;
 
 /// Mark of a pixel that was added to a component. The other pixels of a component have the mark 1.
@@ -88,7 +88,7 @@ impl Regrow {
 fn continues(grid: &Grid, phase: &[f32], components: &[u8], at: usize) -> bool {
     directions(grid, at, 2).any(|step| {
         let (near, far) = (at.wrapping_add_signed(step), at.wrapping_add_signed(2 * step));
-        let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < BEND_MAX_RAD;
+        let straight = (2.0 * phase[near] - phase[far] - phase[at]).abs() < SAME_SURFACE_RAD;
         (components[near] != 0) & (components[far] != 0) & straight
     })
 }

@@ -3,7 +3,7 @@
 
 use crate::joint::cells::{CellMaps, Grid, RowMaps, TaskWork};
 use crate::joint::orders::Orders;
-use crate::joint::params::validity::SUPPORT_WIDTH;
+use crate::joint::params::photometry::NEIGHBOURHOOD;
 use crate::joint::scene::Scene;
 use crate::parallel::slots::Slots;
 
@@ -29,7 +29,7 @@ impl Support {
         let agreement = &*agreement;
         *support = CellMaps::new(1);
         grid.smooth::<2, ()>(
-            scene.cells(SUPPORT_WIDTH),
+            scene.cells(NEIGHBOURHOOD),
             slots,
             sums,
             support,

@@ -9,14 +9,14 @@ mod rows;
 mod tests;
 
 use super::cells::RowMaps;
-use super::params::phase::{SIGMA_MAX_PX, SIGMA_MIN_PX, WIDE, WIDTH};
+use super::params::phase::{SIGMA_MAX_PX, WIDE, WIDTH};
 use super::params::tasks::ROWS;
 use super::residuals::Residuals;
 use super::scene::Scene;
 use super::slopes::Slopes;
 use crate::parallel::slots::Slots;
 use rayon::prelude::*;
-use rows::{average_along, average_down, sharpen};
+use rows::{average_neighbours, sharpen};
 
 /// The window of one shot.
 #[derive(Clone, Copy)]
@@ -60,6 +60,8 @@ pub(super) struct WindowRows {
     sharpness: Vec<f32>,
     residuals: RowMaps,
     weight: Vec<f32>,
+    /// Numerators of pixels whose step is taken already: 0.
+    no_step: Vec<f32>,
     padded: [Vec<f32>; 4],
 }
 
@@ -67,7 +69,7 @@ impl<'a> Window<'a> {
     /// A window over a scene whose intensities have `noise` (standard deviation in linear light); `modulation` is 0
     /// where there is no light.
     pub fn new(scene: &'a Scene<'a>, slopes: &'a Slopes, modulation: &'a [f32], noise: f32) -> Self {
-        let sigma = (WIDTH * scene.period_px as f32).clamp(SIGMA_MIN_PX, SIGMA_MAX_PX);
+        let sigma = (WIDTH * scene.period_px as f32).min(SIGMA_MAX_PX);
         let radius = (2.0 * sigma).ceil() as usize;
         Self { scene, slopes, modulation, radius, spacing: 1, sigma, noise, residuals: None }
     }
@@ -75,11 +77,6 @@ impl<'a> Window<'a> {
     /// Modulation of row `y`, 0 where there is no light.
     pub fn modulation(&self, y: usize) -> &'a [f32] {
         self.scene.row(self.modulation, y)
-    }
-
-    /// Share of the contrast that is lost in row `y`; see [`Slopes::loss`].
-    pub fn loss<'b>(&self, y: usize, maps: &'b mut RowMaps) -> &'b [f32] {
-        self.slopes.loss(self.scene, y, maps)
     }
 
     /// This window with a reach of two pixels, which is enough for intermediate steps.
@@ -128,9 +125,11 @@ impl<'a> Window<'a> {
         phases.copy_from_slice(phase);
         slopes.copy_from_slice(slope);
         measure(NormalRows { numerator, denominator });
-        let padded = padded.each_ref().map(Vec::as_slice);
         let taps = self.taps(0..2 * self.radius + 1);
-        average_along((&taps, self.spacing), padded, [phase, slope, sharpness], [out.phase, out.weight]);
+        let padded = padded.each_ref();
+        let there = |k: usize| padded.map(|row| &row[k * self.spacing..][..grid.stride]);
+        let there: Vec<_> = (0..taps.len()).map(there).collect();
+        average_neighbours(&taps, &there, [phase, slope, sharpness], [out.phase, out.weight]);
     }
 
     /// Distance of the furthest neighbour in pixels.
@@ -186,6 +185,7 @@ impl<'a> Window<'a> {
     /// Computes the slopes of all rows that the average of `count` rows from `first` on needs.
     fn slopes_down(&self, first: usize, count: usize, rows: &mut WindowRows) {
         let (stride, reach) = (self.scene.grid.stride, self.reach());
+        rows.no_step.resize(stride, 0.0);
         rows.slopes.resize((ROWS + 2 * reach) * stride, 0.0);
         for (k, line) in rows.slopes.chunks_exact_mut(stride).take(count + 2 * reach).enumerate() {
             let y = (first + k).saturating_sub(reach).min(self.scene.grid.height - 1);
@@ -208,14 +208,14 @@ impl<'a> Window<'a> {
         // Only neighbours inside the image count.
         let [above, below] = [y, grid.height - 1 - y].map(|rows| (rows / self.spacing).min(self.radius));
         let inside = self.radius - above..self.radius + below + 1;
-        let there: Vec<[&[f32]; 3]> = (inside.clone())
-            .map(|k| {
-                let row = y + self.spacing * k - self.reach();
-                [self.scene.row(average.phase, row), self.scene.row(average.weight, row), slope(k)]
-            })
-            .collect();
+        let there = inside.clone().map(|k| {
+            let row = y + self.spacing * k - self.reach();
+            let [phase, weight] = [average.phase, average.weight].map(|plane| self.scene.row(plane, row));
+            [phase, slope(k), &rows.no_step, weight]
+        });
+        let there: Vec<_> = there.collect();
         let here = [self.scene.row(average.phase, y), slope(self.radius), &rows.sharpness];
-        average_down(&self.taps(inside), &there, here, out);
+        average_neighbours(&self.taps(inside), &there, here, out);
     }
 
     /// Sharpness at every pixel of a row: 1 / the square of the greatest phase difference that counts as one surface.

@@ -25,45 +25,13 @@ fn fit(d: f32, sharpness: f32) -> f32 {
     fits * fits
 }
 
-/// Averages over neighbours along a row, weighted by how well they fit. The predicted phase difference of two pixels is the
-/// mean of their slopes times their distance, which is exact for a surface of constant curvature.
+/// Averages over neighbours, weighted by how well they fit. `there` holds phase, slope and normal equations at each of them. The
+/// predicted phase difference of two pixels is the mean of their slopes times their distance, which is exact for a surface of
+/// constant curvature.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn average_along(
-    (taps, spacing): (&[[f32; 2]], usize),
-    there: [&[f32]; 4],
-    here: [&[f32]; 3],
-    out: [&mut [f32]; 2],
-) {
-    let here = here.map(lanes);
-    let mut out = out.map(lanes_mut);
-    for i in 0..here[0].len() {
-        let [phase, slope, sharpness] = take(&here, i);
-        let mut sums = [[0.0; LANES]; 2];
-        for (k, &[half, near]) in taps.iter().enumerate() {
-            let from = i * LANES + k * spacing;
-            let [other, other_slope, numerator, denominator]: [&Lanes; 4] =
-                there.map(|row| row[from..].first_chunk().expect("rows are padded"));
-            for x in 0..LANES {
-                let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
-                let weight = near * fit(d, sharpness[x]);
-                let known = weight * denominator[x];
-                sums[0][x] += weight * numerator[x] + known * d;
-                sums[1][x] += known;
-            }
-        }
-        let mut found = [phase, sums[1]];
-        for x in 0..LANES {
-            found[0][x] += sums[0][x] / if sums[1][x] > 1e-20 { sums[1][x] } else { 1e-20 };
-        }
-        put(&mut out, i, &found);
-    }
-}
-
-/// Averages over neighbours along columns. `there` holds phase, weight and slope of every neighbouring row.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn average_down(
+pub(super) fn average_neighbours(
     taps: &[[f32; 2]],
-    there: &[[&[f32]; 3]],
+    there: &[[&[f32]; 4]],
     here: [&[f32]; 3],
     out: [&mut [f32]; 2],
 ) {
@@ -73,11 +41,12 @@ pub(super) fn average_down(
         let [phase, slope, sharpness] = take(&here, i);
         let mut sums = [[0.0; LANES]; 2];
         for (&[half, near], there) in taps.iter().zip(there) {
-            let [other, weight, other_slope]: [&Lanes; 3] = there.map(|row| &lanes(row)[i]);
+            let [other, other_slope, numerator, denominator]: [&Lanes; 4] = there.map(|row| &lanes(row)[i]);
             for x in 0..LANES {
                 let d = other[x] - phase[x] - (slope[x] + other_slope[x]) * half;
-                let known = near * fit(d, sharpness[x]) * weight[x];
-                sums[0][x] += known * d;
+                let weight = near * fit(d, sharpness[x]);
+                let known = weight * denominator[x];
+                sums[0][x] += weight * numerator[x] + known * d;
                 sums[1][x] += known;
             }
         }

@@ -12,7 +12,6 @@ use crate::joint::model::count as intensities;
 use crate::joint::params::photometry::{PLACE_DISTANCE, PLACE_NOISES};
 use crate::joint::params::tasks::PLACE_ROWS;
 use crate::joint::scene::Scene;
-use crate::joint::slopes::Slopes;
 use crate::parallel::lanes::LANES;
 use crate::parallel::slots::Slots;
 use multiversion::multiversion;
@@ -75,19 +74,19 @@ impl Choice {
     /// phase. Returns the share of the lit pixels that take another place.
     pub fn make(
         &mut self,
-        (grid, maps): (&Grid, &CellMaps),
+        maps: &CellMaps,
         scene: &Scene<'_>,
-        how: ([f32; 4], &Slopes),
+        ratios: [f32; 4],
         [phase, modulation]: [&[f32]; 2],
         noise: f32,
     ) -> f32 {
-        let Self { places, stride, aside, slots } = self;
+        let (Self { places, stride, aside, slots }, grid) = (self, scene.grid);
         (*stride, *aside) =
             (grid.stride, (PLACE_DISTANCE * scene.period_px as f32).round().max(1.0) as usize);
         let aside = *aside as isize;
         places.clear();
         places.resize(grid.pixels(), 0);
-        let least = PLACE_NOISES * (intensities(how.0) - UNKNOWNS) * noise * noise;
+        let least = PLACE_NOISES * (intensities(ratios) - UNKNOWNS) * noise * noise;
         places.par_chunks_mut(PLACE_ROWS * *stride).enumerate().for_each_init(
             || slots.take(),
             |rows, (block, places)| {
@@ -95,10 +94,10 @@ impl Choice {
                 let (first, count) = ((block * PLACE_ROWS) as isize, places.len() / grid.stride);
                 let rows = &mut **rows;
                 let lines: Vec<usize> = (first - 1..=first + count as isize).map(inside).collect();
-                rows.prepare(scene, &lines, phase, how);
+                rows.prepare(scene, &lines, phase, ratios);
                 let from = |y: usize, down: isize| inside(y as isize + down * aside);
                 let planes = [modulation, scene.usable];
-                rows.measure((grid, maps), scene, planes, &lines, |y| from(y, 0), &[0]);
+                rows.measure(maps, scene, planes, &lines, |y| from(y, 0), &[0]);
                 let lights = lines[1..=count].iter().map(|&y| scene.row(modulation, y));
                 if !rows.find_active(lights, grid.width, least) {
                     return;
@@ -110,7 +109,7 @@ impl Choice {
                         std::iter::from_fn(|| places_left.next_if(|&place| PLACES[place][0] == down))
                             .map(|place| PLACES[place][1] * aside)
                             .collect();
-                    rows.measure((grid, maps), scene, planes, &lines, |y| from(y, down), &rights);
+                    rows.measure(maps, scene, planes, &lines, |y| from(y, down), &rights);
                     for k in 0..rights.len() {
                         rows.compare((first + k) as u8, k * lines.len(), grid, places);
                     }

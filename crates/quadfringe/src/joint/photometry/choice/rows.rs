@@ -5,7 +5,6 @@ use crate::joint::infrared::{Waves, with_waves};
 use crate::joint::neighbours::binomial;
 use crate::joint::params::photometry::{PLACE_BETTER, PLACE_GAIN_MIN};
 use crate::joint::scene::Scene;
-use crate::joint::slopes::Slopes;
 use crate::parallel::lanes::{LANES, lanes, lanes_mut, put, take};
 use multiversion::multiversion;
 
@@ -28,21 +27,14 @@ pub(super) struct Rows {
 }
 
 impl Rows {
-    pub fn prepare(
-        &mut self,
-        scene: &Scene<'_>,
-        lines: &[usize],
-        phase: &[f32],
-        (ratios, slopes): ([f32; 4], &Slopes),
-    ) {
+    pub fn prepare(&mut self, scene: &Scene<'_>, lines: &[usize], phase: &[f32], ratios: [f32; 4]) {
         let stride = scene.grid.stride;
-        let Self { maps, carriers, best, active, smooth, .. } = self;
+        let Self { carriers, best, active, smooth, .. } = self;
         carriers.resize_with(lines.len(), Default::default);
         for (rows, &y) in carriers.iter_mut().zip(lines) {
             rows.iter_mut().for_each(|row| row.resize(stride, 0.0));
-            let pixels = [scene.row(phase, y), slopes.loss(scene, y, maps)];
             let out = rows.each_mut().map(Vec::as_mut_slice);
-            with_waves!(scene, y, ratios, |waves| carry(pixels, waves, out));
+            with_waves!(scene, y, ratios, |waves| carry(scene.row(phase, y), waves, out));
         }
         best.resize_with(lines.len(), Vec::new);
         best.iter_mut().for_each(|row| row.resize(stride, 0.0));
@@ -55,14 +47,14 @@ impl Rows {
     /// columns to the right.
     pub fn measure(
         &mut self,
-        (grid, maps): (&Grid, &CellMaps),
+        maps: &CellMaps,
         scene: &Scene<'_>,
         planes: [&[f32]; 2],
         lines: &[usize],
         from: impl Fn(usize) -> usize,
         rights: &[isize],
     ) {
-        let Self { maps: rows, wide, carriers, squares, active, .. } = self;
+        let (Self { maps: rows, wide, carriers, squares, active, .. }, grid) = (self, scene.grid);
         let reach = rights.iter().map(|right| right.unsigned_abs()).max().unwrap_or(0);
         squares.resize_with(squares.len().max(rights.len() * lines.len()), Vec::new);
         for (i, &y) in lines.iter().enumerate() {
@@ -142,15 +134,14 @@ fn widen(row: &[f32], reach: usize, stride: usize, out: &mut Vec<f32>) {
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn carry<W: Waves>(pixels: [&[f32]; 2], waves: W, out: [&mut [f32]; 8]) {
-    let pixels = pixels.map(lanes);
+fn carry<W: Waves>(phase: &[f32], waves: W, out: [&mut [f32]; 8]) {
+    let phase = lanes(phase);
     let mut out = out.map(lanes_mut);
-    for i in 0..pixels[0].len() {
-        let [phase, loss] = take(&pixels, i);
+    for (i, phase) in phase.iter().enumerate() {
         let vector = waves.vector(i);
         let mut found = [[0.0; LANES]; 8];
         for x in 0..LANES {
-            let carriers = waves.carriers(&vector, x, phase[x], loss[x]);
+            let carriers = waves.carriers(&vector, x, phase[x]);
             for c in 0..4 {
                 (found[c][x], found[4 + c][x]) = (carriers.cosine[c], carriers.derivative[c]);
             }

@@ -5,10 +5,8 @@ use crate::joint::photometry::edge::{Edge, RATIOS};
 /// The choice of the pixels, and the share of them that take another place.
 fn choose(edge: &Edge, noise: f32) -> (Choice, f32) {
     let (lit, modulation) = (edge.plane(1.0), edge.plane(0.2));
-    let how = (RATIOS, &Slopes::flat(&edge.grid));
     let mut choice = Choice::default();
-    let share =
-        choice.make((&edge.grid, &edge.maps), &edge.scene(&lit), how, [&edge.phase, &modulation], noise);
+    let share = choice.make(&edge.maps, &edge.scene(&lit), RATIOS, [&edge.phase, &modulation], noise);
     (choice, share)
 }
 
