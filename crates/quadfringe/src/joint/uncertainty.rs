@@ -11,38 +11,49 @@
 //! the wrong-order probability. The temperature is estimated from the costs of the chosen orders, and so depends on the
 //! noise, texture and discontinuities of this shot.
 
+use super::energy::Energy;
 use super::params::uncertainty::{
-    ALBEDO_LOSS, DISAGREEMENT_LEFT, EXPONENT_MAX, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN,
+    EVIDENCE, EXPONENT_MAX, FINE_SMOOTHNESS, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN,
 };
 use multiversion::multiversion;
 
-/// Noise of a phase that a window has averaged.
+/// What the cells of the energy leave to the window that found the phase at its start.
 pub(super) struct PhaseNoise {
-    variance: f32,
+    /// Variance by noise of a pixel, times its information.
+    window: f32,
+    /// Share of it that the cells do not smooth.
+    fine: f32,
+    /// Variance of a phase that the energy has not corrected, beyond noise.
+    uncorrected: f32,
 }
 
 impl PhaseNoise {
-    /// Noise of the phase if the intensities have the standard deviation `noise`, and the sum of the squared weights of
-    /// the window is the sum of its weights times `share`.
-    pub fn new(noise: f32, share: f32) -> Self {
-        Self { variance: ALBEDO_LOSS * noise * noise * share }
+    /// Noise of the phase if the intensities have the standard deviation `noise`. The sum of the squared weights of the window is
+    /// the sum of its weights times `share`, and its standard deviation is `sigma_px`.
+    pub fn new(noise: f32, share: f32, sigma_px: f32, energy: &Energy) -> Self {
+        let sigma_cells = sigma_px / energy.cell_px() as f32;
+        let smooth = 1.0 + FINE_SMOOTHNESS * sigma_cells * sigma_cells;
+        Self {
+            window: noise * noise * share,
+            fine: 1.0 / (smooth * smooth),
+            uncorrected: energy.correction() + METHOD_RAD * METHOD_RAD,
+        }
     }
 
     /// Replaces the information of a row, which the window has added up, by the standard deviation of the phase in rad.
-    /// `variance` is that of the energy by noise, in rad^2; where it is 0 the window decides. `disagreement` is the variance by
-    /// which the channels disagree beyond noise.
-    pub fn deviations(&self, variance: &[f32], disagreement: &[f32], row: &mut [f32]) {
-        deviations(self.variance, variance, disagreement, row);
+    /// `variance` is that of the energy, in rad^2; where it is 0 the energy has left the phase alone.
+    pub fn deviations(&self, variance: &[f32], row: &mut [f32]) {
+        deviations(self, variance, row);
     }
 }
 
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn deviations(window: f32, variance: &[f32], disagreement: &[f32], row: &mut [f32]) {
-    for (value, (variance, disagreement)) in row.iter_mut().zip(variance.iter().zip(disagreement)) {
+fn deviations(noise: &PhaseNoise, variance: &[f32], row: &mut [f32]) {
+    let PhaseNoise { window, fine, uncorrected } = *noise;
+    for (value, variance) in row.iter_mut().zip(variance) {
         let by_window = window / if *value > INFORMATION_MIN { *value } else { INFORMATION_MIN };
-        let by_noise = if *variance > 0.0 { *variance } else { by_window };
-        let left = if *variance > 0.0 { DISAGREEMENT_LEFT * disagreement } else { *disagreement };
-        *value = (by_noise + left + METHOD_RAD * METHOD_RAD).sqrt();
+        let corrected = *variance + fine * by_window + METHOD_RAD * METHOD_RAD;
+        *value = if *variance > 0.0 { corrected } else { by_window + uncorrected }.sqrt();
     }
 }
 
@@ -64,7 +75,7 @@ pub(super) struct WrongOrderModel {
     temperature: f32,
     /// Mean cost of the chosen orders, in the same unit.
     mean: f32,
-    /// Number of nodes with independent evidence that a lead of 1 stands for.
+    /// Number of nodes with independent evidence that a lead of 1 stands for, times its measured worth.
     nodes_per_lead: f32,
 }
 
@@ -83,7 +94,7 @@ impl WrongOrderModel {
         }
         let mean = sum / count;
         let temperature = mean.min((squares / count - mean * mean) / mean.max(1e-9)) as f32;
-        let nodes_per_lead = jump_nodes / shared.max(1.0);
+        let nodes_per_lead = EVIDENCE * jump_nodes / shared.max(1.0);
         Self { temperature: temperature.max(TEMPERATURE_MIN), mean: mean as f32, nodes_per_lead }
     }
 
