@@ -219,15 +219,8 @@ impl Joint {
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
         let Self { pixels, validity, saturation, energy, wrong_order, coarse, .. } = self;
         let lit_mask = &coarse.lit_mask;
-        let found = Results {
-            pixels,
-            validity,
-            lit_mask,
-            saturation,
-            energy,
-            ratios: self.ratios,
-            wrong_order,
-        };
+        let found =
+            Results { pixels, validity, lit_mask, saturation, energy, ratios: self.ratios, wrong_order };
         found.write(&self.pyramid.full.scene(frame.full), noise, finish, out);
     }
 

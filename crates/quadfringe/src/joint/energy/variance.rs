@@ -5,12 +5,9 @@ use super::plane::{Fields, Plane, vectors};
 use super::scales::variance_share;
 use super::start::smooth;
 use super::tile::Tile;
-use crate::joint::params::uncertainty::{CORRECTION_LEFT, EXCESS_LEFT};
+use crate::joint::params::uncertainty::{CELL_INFORMATION_MIN, CORRECTION_LEFT, EXCESS_LEFT};
 use crate::parallel::lanes::LANES;
 use multiversion::multiversion;
-
-/// Least information of a cell in linear light squared. It only keeps cells without light finite.
-const INFORMATION_MIN: f32 = 1e-9;
 
 /// Writes the variance of the phase of every cell, rad^2; `noise` is that of the intensity of a cell. Changes the product.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
@@ -34,7 +31,7 @@ pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
         let (known, square, bend) = (information.get(at), corrections.get(at), weights.bend[0].get(at));
         let mut variance = [0.0; LANES];
         for x in 0..LANES {
-            let known = if known[x] > INFORMATION_MIN { known[x] } else { INFORMATION_MIN };
+            let known = if known[x] > CELL_INFORMATION_MIN { known[x] } else { CELL_INFORMATION_MIN };
             let by_noise = scales.misfit * variance_share(known, bend[x]);
             variance[x] = by_noise + excess / known + CORRECTION_LEFT * square[x];
         }

@@ -29,6 +29,9 @@ pub const TEMPERATURE_MIN: f32 = 1.0 / super::orders::COST_MAX as f32;
 /// contains no light. Not measured: such pixels are not valid.
 pub const INFORMATION_MIN: f32 = 1e-12;
 
+/// The same of a cell. Not measured: any small number will do; it keeps cells without light finite.
+pub const CELL_INFORMATION_MIN: f32 = 1e-9;
+
 /// Greatest exponent of a wrong-order probability. Follows from the arithmetic: `f32` overflows beyond exp(88.7), and
 /// exp(-80) is 2e-35.
 pub const EXPONENT_MAX: f32 = 80.0;
@@ -45,5 +48,5 @@ pub const PROPAGATION_CELLS: usize = 3;
 /// what these pixels state.
 pub const SETTLED_PROBABILITY_MIN: f32 = 0.0015;
 /// The same for pixels that were added by region growing, because some of them belong to another surface: observed 0.015 on the half
-/// `tune`, 0.0094 on seeds 5 to 11, 0.043 on the captures.
+/// `tune` of `python evaluation/world.py`, 0.0094 on seeds 5 to 11, 0.043 on the captures.
 pub const GROWN_PROBABILITY_MIN: f32 = 0.02;
