@@ -75,7 +75,7 @@ def test_figures_say_what_came_back_and_how_sure_it_is(shape: Shape) -> None:
     figures = shape.figures()
     assert figures["returned_percent"] == pytest.approx(100 * 47 / 48)
     assert figures["uncertainty_median_mm"] == pytest.approx(np.nanmedian(shape.uncertainty_mm))
-    assert figures["wrong_orders_at_most"] == pytest.approx(np.nansum(shape.wrong_order_probability))
+    assert figures["wrong_orders_expected"] == pytest.approx(np.nansum(shape.wrong_order_probability))
     phase_only = replace(shape, uncertainty_mm=None, uncertainty_rad=shape.uncertainty_mm, xyz_mm=None).figures()
     assert "uncertainty_median_rad" in phase_only
     assert "uncertainty_median_mm" not in phase_only

@@ -37,6 +37,6 @@ def uncertainty_told(figures: Mapping[str, float]) -> str:
     """Describe the median uncertainty and how many wrong fringe orders to expect; empty when neither is known."""
     for unit in ("mm", "rad"):
         if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
-            wrong = figures.get("wrong_orders_at_most", 0.0)
-            return f", median uncertainty {sigma:.3g} {unit}, at most {wrong:.3g} pixels of wrong fringe order expected"
+            wrong = figures.get("wrong_orders_expected", 0.0)
+            return f", median uncertainty {sigma:.3g} {unit}, {wrong:.3g} pixels of wrong fringe order expected"
     return ""

@@ -23,7 +23,7 @@ UNITS = {
     "modulation": ("1", "fringe amplitude, fraction of full scale"),
     "quality": ("1", "trust in the fringe order"),
     "order": ("1", "fringe order"),
-    "wrong_order_probability": ("1", "probability that the fringe order is wrong, an upper bound"),
+    "wrong_order_probability": ("1", "probability that the fringe order is wrong"),
     "uncertainty_rad": ("rad", "standard deviation of the phase"),
     "uncertainty_mm": ("mm", "standard deviation of the depth"),
     "xyz_mm": ("mm", "point in the camera frame: x right, y down, z forward"),

@@ -43,7 +43,7 @@ class Shape:
     modulation: fringe amplitude in linear light, fraction of full scale.
     quality: trust in the fringe order, 0 to 1; known wherever there is light.
     xyz_mm: points in the camera frame, (H, W, 3); None without a calibration.
-    wrong_order_probability: probability that the fringe order is wrong, an upper bound.
+    wrong_order_probability: probability that the fringe order is wrong.
     uncertainty_rad, uncertainty_mm: standard deviation of the phase, or with a calibration of the depth, for the order
     that was chosen; the other one is None.
     albedo: light of R, G, B and IR without fringes, linear, fraction of full scale, (H, W, 4): the albedo of the
@@ -145,7 +145,7 @@ class Shape:
         """Compute figures of the shape, by name with unit.
 
         `returned_percent`; if any pixels are returned, also `uncertainty_median_mm` (or `_rad`), one standard
-        deviation, and `wrong_orders_at_most`, the sum of their probabilities of a wrong order, an upper bound. With a
+        deviation, and `wrong_orders_expected`, the sum of their probabilities of a wrong order. With a
         response that was estimated from shots also `response_phase_rad`: the RMS error of the phase that its
         uncertainty leaves at most, which `uncertainty_rad` and `uncertainty_mm` do not contain.
         """
@@ -157,7 +157,7 @@ class Shape:
             if sigma is not None:
                 found[f"uncertainty_median_{name}"] = float(np.nanmedian(sigma))
         if self.wrong_order_probability is not None:
-            found["wrong_orders_at_most"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
+            found["wrong_orders_expected"] = float(np.nansum(self.wrong_order_probability, dtype=np.float64))
         if (evidence := self.config.get("response_evidence")) is not None:
             found["response_phase_rad"] = float(evidence["phase_rad"])
         return found

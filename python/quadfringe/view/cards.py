@@ -50,8 +50,8 @@ def shape_card(shape: Shape) -> str:
     for unit in ("mm", "rad"):
         if (sigma := found.get(f"uncertainty_median_{unit}")) is not None:
             rows["uncertainty"] = f"median {sigma:.3g} {unit}"
-    if (wrong := found.get("wrong_orders_at_most")) is not None:
-        rows["wrong orders"] = f"at most {wrong:.0f} pixels expected"
+    if (wrong := found.get("wrong_orders_expected")) is not None:
+        rows["wrong orders"] = f"{wrong:.0f} pixels expected"
     method = shape.config.get("decode", {}).get("method")
     rows |= {"method": str(method)} if method else {}
     rows |= {"geometry": shape.geometry} if shape.geometry else {}

@@ -11,7 +11,7 @@
 //!    minimum of the energy (J16); shadows of a pair of projectors (J33)         energy; infrared, shadows
 //! 7  motion between the channels (optional)                                    motion
 //! 8  validity: doubtful pixels become no data                                  validity
-//! 9  uncertainty, and the probability of a wrong order                         uncertainty, agreement
+//! 9  uncertainty, and the probability of a wrong order                         uncertainty; energy::variance
 //! 10 heights                                                             (S7)  decode::output, height
 //! 11 doubtful orders become as certain as their surface                        propagation
 //! 12 albedo of every pixel (optional)                                          albedo
@@ -21,7 +21,6 @@
 //! numbers (`params`). `docs/method/joint.md` derives the steps and numbers them in the same way.
 
 mod absolute;
-mod agreement;
 mod albedo;
 mod cells;
 mod coarse;
@@ -62,7 +61,6 @@ use crate::decode::output::{Decoded, Finish};
 use crate::encoding::FourChannel;
 use crate::height::PairTable;
 use crate::parallel::lanes::LANES;
-use agreement::Agreement;
 use albedo::{Albedo, Known};
 use cells::Grid;
 use coarse::CoarseLevel;
@@ -98,7 +96,6 @@ pub(crate) struct Joint {
     pixels: Pixels,
     motion: Motion,
     validity: Validity,
-    agreement: Agreement,
     propagation: Propagation,
     /// Wrong-order probability of every node.
     wrong_order: Vec<f32>,
@@ -122,7 +119,6 @@ impl Joint {
             pixels: Pixels::default(),
             motion: Motion::default(),
             validity: Validity::default(),
-            agreement: Agreement::default(),
             propagation: Propagation::default(),
             wrong_order: Vec::new(),
             spare: Vec::new(),
@@ -218,27 +214,18 @@ impl Joint {
     /// Step 9: the noise of the phase, the excess of the residuals, and the probability of a wrong order.
     fn uncertainty(&mut self, frame: &Frame<'_>) -> PhaseNoise {
         let scene = self.pyramid.full.scene(frame.full);
-        let CoarseLevel { noise, photometry, orders, slopes, .. } = &self.coarse;
-        let map = self.pixels.map();
-        self.agreement.measure(&scene, self.ratios, *noise, photometry, map);
+        let CoarseLevel { noise, orders, slopes, .. } = &self.coarse;
         orders.wrong_order_probability(&scene, &mut self.wrong_order);
-        PhaseNoise::new(*noise, Window::new(&scene, slopes, &self.pixels.modulation, *noise).share())
+        let window = Window::new(&scene, slopes, &self.pixels.modulation, *noise);
+        PhaseNoise::new(*noise, window.share(), window.sigma_px(), &self.energy)
     }
 
     /// Steps 9 and 10, row by row: the maps of the result.
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let Self { pixels, validity, saturation, energy, agreement, wrong_order, coarse, .. } = self;
+        let Self { pixels, validity, saturation, energy, wrong_order, coarse, .. } = self;
         let lit_mask = &coarse.lit_mask;
-        let found = Results {
-            pixels,
-            validity,
-            lit_mask,
-            saturation,
-            energy,
-            agreement,
-            ratios: self.ratios,
-            wrong_order,
-        };
+        let found =
+            Results { pixels, validity, lit_mask, saturation, energy, ratios: self.ratios, wrong_order };
         found.write(&self.pyramid.full.scene(frame.full), noise, finish, out);
     }
 

@@ -1,6 +1,5 @@
 //! Steps 9 and 10: the maps of the result, row by row.
 
-use super::agreement::Agreement;
 use super::cells::RowMaps;
 use super::energy::{self, Energy};
 use super::illumination::LitMask;
@@ -20,7 +19,6 @@ pub(super) struct Results<'a> {
     pub lit_mask: &'a LitMask,
     pub saturation: &'a Saturation,
     pub energy: &'a Energy,
-    pub agreement: &'a Agreement,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 4],
     /// Wrong-order probability of every node.
@@ -30,7 +28,7 @@ pub(super) struct Results<'a> {
 impl Results<'_> {
     /// Writes the maps.
     pub fn write(self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let Self { pixels, validity, lit_mask, saturation, energy, agreement, ratios, wrong_order } = self;
+        let Self { pixels, validity, lit_mask, saturation, energy, ratios, wrong_order } = self;
         let (grid, reasons) = (scene.grid, Reasons { pixels, validity, lit_mask });
         out.rows().enumerate().for_each_init(
             Default::default,
@@ -39,7 +37,7 @@ impl Results<'_> {
                 validity::copy_valid(&validity.valid[at.clone()], &pixels.phase[at], row.phase);
                 reasons.write(scene, y, maps, row.reason);
                 let variance = energy.variance(scene, y, rows);
-                noise.deviations(variance, agreement.row(scene, y, maps), row.sigma);
+                noise.deviations(variance, row.sigma);
                 saturation.widen(scene, y, ratios, row.sigma);
                 let nodes = &wrong_order[y / grid.step * grid.columns..];
                 row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));

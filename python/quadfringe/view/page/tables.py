@@ -39,8 +39,8 @@ def summary_of(shape: Shape) -> str:
     for unit in ("mm", "rad"):
         if (sigma := figures.get(f"uncertainty_median_{unit}")) is not None:
             tiles.append((f"{sigma:.3g} {unit}", "median uncertainty"))
-    if (wrong := figures.get("wrong_orders_at_most")) is not None:
-        tiles.append((f"{wrong:.3g}", "pixels of wrong order, at most"))
+    if (wrong := figures.get("wrong_orders_expected")) is not None:
+        tiles.append((f"{wrong:.3g}", "pixels of wrong order, expected"))
     depth_mm = shape.depth_mm
     if depth_mm is not None and np.isfinite(depth_mm).any():
         low, high = np.nanquantile(depth_mm, (0.01, 0.99))

@@ -10,5 +10,5 @@ mod sums;
 
 pub(super) use grid::Grid;
 pub(super) use maps::{CellMaps, RowMaps};
-pub(super) use rows::{blend, kernel, spread};
+pub(super) use rows::{blend, spread};
 pub(super) use sums::{CellWindow, TaskWork};

@@ -16,7 +16,7 @@ pub(super) struct Cells {
     pub height: usize,
     pub width: usize,
     /// Pixels along a side of a cell.
-    factor: usize,
+    pub factor: usize,
     stride: usize,
     /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
@@ -38,7 +38,7 @@ pub(super) struct Cells {
 pub(super) struct CellFit {
     /// Change of the phase, rad.
     pub correction: f32,
-    /// Variance of the phase by noise, rad^2.
+    /// Variance of the phase, rad^2.
     pub variance: f32,
     /// Light without fringes, linear.
     pub albedo: [f32; 4],
@@ -220,6 +220,12 @@ impl Cells {
                 }
             }
         });
+    }
+
+    /// Mean square of the correction, rad^2.
+    pub fn correction(&self) -> f32 {
+        let sum = |map: &[f32]| map.iter().map(|value| f64::from(value * value)).sum::<f64>();
+        (sum(&self.phase) / sum(&self.inside).max(1.0)) as f32
     }
 
     /// Variance along row `y` of the scene, 0 where there is no lit cell.

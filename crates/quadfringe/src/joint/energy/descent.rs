@@ -1,13 +1,14 @@
 //! The steps that lower the energy of a tile, and what they have found.
 
-use super::blocks::{information, phase_information};
+use super::blocks::information;
 use super::data::linearise;
-use super::plane::{Column, Fields, vectors};
+use super::plane::{Column, vectors};
 use super::priors::weigh;
-use super::scales::{Determined, Scales, variance_share};
+use super::scales::{Determined, Scales};
 use super::solve::solve;
-use super::start::{self, AlbedoOf, smooth};
+use super::start::{self, AlbedoOf};
 use super::tile::{Found, Tile};
+use super::variance::variance;
 use crate::joint::model::{absent, count};
 use crate::joint::params::energy::{
     ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD,
@@ -79,25 +80,17 @@ impl Tile {
         }
     }
 
-    /// Writes the correction of the phase, its variance, and the albedo and contrast of every channel.
-    pub fn write(&mut self, found: &mut Found) {
-        let Self { start, inside, unknown, scales, derivatives, weights, product, ratios, .. } = self;
-        let Fields { phase: information, contrast: spare, .. } = product;
+    /// Writes the correction of the phase, its variance, and the albedo and contrast of every channel; `noise` as in `minimise`.
+    pub fn write(&mut self, noise: f32, found: &mut Found) {
+        variance(self, noise, &mut found.variance);
+        let Self { start, inside, unknown, scales, ratios, .. } = self;
         for at in vectors() {
-            information.set(at, phase_information(derivatives, weights, *ratios, at));
-        }
-        // A saturated cell has no information by itself; its neighbours determine it.
-        smooth(information, spare);
-        for at in vectors() {
-            let (phase, start, known) = (unknown.phase.get(at), start.get(at), information.get(at));
-            let bend = weights.bend[0].get(at);
-            let (mut correction, mut variance) = ([0.0; LANES], [0.0; LANES]);
+            let (phase, start) = (unknown.phase.get(at), start.get(at));
+            let mut correction = [0.0; LANES];
             for x in 0..LANES {
                 correction[x] = phase[x] - start[x];
-                variance[x] = scales.misfit * variance_share(known[x], bend[x]);
             }
             found.correction.set(at, correction);
-            found.variance.set(at, variance);
             found.inside.set(at, inside.get(at));
             write_light(&Column::of(unknown, at), inside.get(at), at, found);
         }

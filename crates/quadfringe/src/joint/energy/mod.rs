@@ -19,6 +19,7 @@ mod solve;
 mod start;
 mod tile;
 mod value;
+mod variance;
 
 use super::params::energy::{CELL_MAX_PX, CELLS_PER_PERIOD_MIN, SMALL_CELLS_PER_PERIOD_MIN};
 use super::scene::{Pixels, Scene};
@@ -67,7 +68,7 @@ impl Energy {
                 if cells.load([rows.origins[n / across], columns.origins[n % across]], tile) {
                     tile.ratios = prior.ratios;
                     tile.minimise(variance, prior.detail);
-                    tile.write(found);
+                    tile.write(variance, found);
                 }
             },
         );
@@ -82,7 +83,17 @@ impl Energy {
         rows
     }
 
-    /// Variance of the phase by noise along row `y` of the scene, rad^2; 0 where there is no lit cell.
+    /// Pixels along a side of the cells of the last scene.
+    pub fn cell_px(&self) -> usize {
+        self.cells.factor
+    }
+
+    /// Mean square of the correction of the last scene, rad^2.
+    pub fn correction(&self) -> f32 {
+        self.cells.correction()
+    }
+
+    /// Variance of the phase along row `y` of the scene, rad^2; 0 where there is no lit cell.
     pub fn variance<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut cells::Rows) -> &'a [f32] {
         self.cells.variance(scene, y, rows)
     }

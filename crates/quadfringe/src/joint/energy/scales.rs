@@ -177,7 +177,6 @@ fn difference_share(relative: f32) -> f32 {
 /// mean of its square over all frequencies is close to the function below (U13).
 #[inline(always)]
 pub(super) fn variance_share(information: f32, bend: f32) -> f32 {
-    let information = if information > 1e-9 { information } else { 1e-9 };
     let relative = bend / information;
     let smoothing = 1.0 + 50.0 * relative;
     (1.0 + 22.0 * relative) / (information * smoothing * smoothing.sqrt())

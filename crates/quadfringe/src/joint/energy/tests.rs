@@ -263,7 +263,7 @@ fn an_absent_channel_takes_no_part() {
     assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
     assert!(tile.unknown.albedo[3].row(20).iter().all(|&log| log == 0.0));
     let mut found = super::tile::Found::default();
-    tile.write(&mut found);
+    tile.write(1e-6, &mut found);
     assert!(found.albedo[3].row(20).iter().all(|&albedo| albedo == 0.0));
     assert!((found.albedo[0].row(20)[12] - 0.5).abs() < 0.01, "{}", found.albedo[0].row(20)[12]);
 }

@@ -10,7 +10,7 @@ pub(super) struct Found {
     pub inside: Plane,
     /// Change of the phase, rad.
     pub correction: Plane,
-    /// Variance of the phase by noise, rad^2.
+    /// Variance of the phase, rad^2.
     pub variance: Plane,
     /// Light without fringes of R, G, B, IR, linear.
     pub albedo: [Plane; 4],

@@ -1,0 +1,40 @@
+//! Variance of the phase at the minimum (U13), (U14).
+
+use super::blocks::phase_information;
+use super::plane::{Fields, Plane, vectors};
+use super::scales::variance_share;
+use super::start::smooth;
+use super::tile::Tile;
+use crate::joint::params::uncertainty::{CELL_INFORMATION_MIN, CORRECTION_LEFT, EXCESS_LEFT};
+use crate::parallel::lanes::LANES;
+use multiversion::multiversion;
+
+/// Writes the variance of the phase of every cell, rad^2; `noise` is that of the intensity of a cell. Changes the product.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
+    let Tile { start, unknown, scales, derivatives, weights, product, ratios, .. } = tile;
+    let Fields { phase: information, contrast: spare, albedo: [corrections, ..] } = product;
+    for at in vectors() {
+        information.set(at, phase_information(derivatives, weights, *ratios, at));
+        let (phase, start) = (unknown.phase.get(at), start.get(at));
+        let mut square = [0.0; LANES];
+        for x in 0..LANES {
+            square[x] = (phase[x] - start[x]) * (phase[x] - start[x]);
+        }
+        corrections.set(at, square);
+    }
+    // A saturated cell has no information by itself; its neighbours determine it.
+    smooth(information, spare);
+    (0..2).for_each(|_| smooth(corrections, spare));
+    let excess = EXCESS_LEFT * (scales.misfit - noise).max(0.0);
+    for at in vectors() {
+        let (known, square, bend) = (information.get(at), corrections.get(at), weights.bend[0].get(at));
+        let mut variance = [0.0; LANES];
+        for x in 0..LANES {
+            let known = if known[x] > CELL_INFORMATION_MIN { known[x] } else { CELL_INFORMATION_MIN };
+            let by_noise = scales.misfit * variance_share(known, bend[x]);
+            variance[x] = by_noise + excess / known + CORRECTION_LEFT * square[x];
+        }
+        out.set(at, variance);
+    }
+}
