@@ -110,6 +110,20 @@ pub(super) struct Model {
     pub rest: Lanes,
 }
 
+impl Model {
+    /// The predicted light of cell `x`.
+    #[inline(always)]
+    pub fn whole(&self, x: usize) -> f32 {
+        self.offset[x] + self.fringe[x]
+    }
+
+    /// Its derivative with respect to the phase.
+    #[inline(always)]
+    pub fn slope(&self, x: usize) -> f32 {
+        self.slope[x]
+    }
+}
+
 /// Predicts the light of channel `c`. The fringes of B are a quarter period ahead. A channel that is not `present` has the weight 0,
 /// the others 1.
 #[inline(always)]

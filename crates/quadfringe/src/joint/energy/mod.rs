@@ -9,6 +9,7 @@ mod blocks;
 mod cells;
 mod data;
 mod descent;
+mod disagreement;
 mod layout;
 mod plane;
 mod preconditioner;

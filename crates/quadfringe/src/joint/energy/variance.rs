@@ -1,6 +1,7 @@
-//! Variance of the phase at the minimum (U13), (U14).
+//! Variance of the phase at the minimum (U13), (U14), (U17).
 
 use super::blocks::phase_information;
+use super::disagreement::disagreement;
 use super::plane::{Fields, Plane, vectors};
 use super::scales::variance_share;
 use super::start::smooth;
@@ -10,8 +11,14 @@ use crate::parallel::lanes::LANES;
 use multiversion::multiversion;
 
 /// Writes the variance of the phase of every cell, rad^2; `noise` is that of the intensity of a cell. Changes the product.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
+    disagreement(tile, out);
+    add_variance(tile, noise, out);
+}
+
+/// Adds the variance by noise, by the residuals and by the correction.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     let Tile { start, unknown, scales, derivatives, weights, product, ratios, .. } = tile;
     let Fields { phase: information, contrast: spare, albedo: [corrections, ..] } = product;
     for at in vectors() {
@@ -29,11 +36,11 @@ pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     let excess = EXCESS_LEFT * (scales.misfit - noise).max(0.0);
     for at in vectors() {
         let (known, square, bend) = (information.get(at), corrections.get(at), weights.bend[0].get(at));
-        let mut variance = [0.0; LANES];
+        let mut variance = out.get(at);
         for x in 0..LANES {
             let known = if known[x] > CELL_INFORMATION_MIN { known[x] } else { CELL_INFORMATION_MIN };
             let by_noise = scales.misfit * variance_share(known, bend[x]);
-            variance[x] = by_noise + excess / known + CORRECTION_LEFT * square[x];
+            variance[x] += by_noise + excess / known + CORRECTION_LEFT * square[x];
         }
         out.set(at, variance);
     }

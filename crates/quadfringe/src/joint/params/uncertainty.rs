@@ -12,6 +12,12 @@ pub const CORRECTION_LEFT: f32 = 0.06;
 /// uncertainty on photographs is too large. Smaller: that on real captures is too small. `python evaluation/world.py --half tune
 /// --only photographs`; at half and at twice the value: see docs/method/uncertainty.md.
 pub const EXCESS_LEFT: f32 = 0.5;
+/// Side in cells of the blocks whose channels are compared (U17), whole vectors: about two fringes. Larger: materials that change over
+/// a block are missed. Smaller: the errors of one fringe count. Not measured: a tile has five blocks along its side.
+pub const BLOCK_CELLS: usize = 16;
+/// Least number of blocks around one, itself included, that tell a mean from its scatter. Follows from the corner of a tile, which
+/// has four.
+pub const BLOCKS_MIN: usize = 4;
 /// Fall of the noise that the cells do not smooth with the squared width of the window in cells (U15). Follows from the window and
 /// from the interpolation between cells, within a fifth: a unit test compares it with filtered noise.
 pub const FINE_SMOOTHNESS: f32 = 5.0;
