@@ -62,10 +62,12 @@ def _border(shape: Shape, name: str, downwards: slice) -> LightBorder | None:
     """Find the border above the light in an image whose rows are read in this direction."""
     if shape.calibration is None or shape.xyz_mm is None:
         return None
-    returned, wide = shape.returned[downwards], params.BORDER_SHARE * shape.phase_rad.shape[1]
-    first = returned.argmax(axis=0)
-    at = np.flatnonzero(returned.any(axis=0) & (first >= params.BORDER_DARK_PX))
-    ends = shape.xyz_mm[downwards][first[at], at].astype(np.float64)
+    # A few hundred columns tell where the light ends, in a tenth of the time that all of them take.
+    stride = max(1, shape.phase_rad.shape[1] // params.BORDER_COLUMNS)
+    returned = np.ascontiguousarray(np.isfinite(shape.phase_rad[downwards, ::stride]).T)
+    wide, first = params.BORDER_SHARE * len(returned), returned.argmax(axis=1)
+    at = np.flatnonzero(returned[np.arange(len(first)), first] & (first >= params.BORDER_DARK_PX))
+    ends = shape.xyz_mm[downwards][first[at], stride * at].astype(np.float64)
     at, ends = at[np.isfinite(ends[:, 2])], ends[np.isfinite(ends[:, 2])]
     if at.size < wide:
         return None
@@ -76,7 +78,8 @@ def _border(shape: Shape, name: str, downwards: slice) -> LightBorder | None:
     row_px, outermost = float(np.median(rows[near])), at[near][[0, -1]]
     inside_px = min(row_px + 0.5, shape.calibration.projector.height_px - 0.5 - row_px)
     goes_on = all(
-        _ends_there(shape, int(x), int(first[x]), float(shape.column_px[downwards][first[x], x])) for x in outermost
+        _ends_there(shape, stride * int(x), int(first[x]), float(shape.column_px[downwards][first[x], stride * x]))
+        for x in outermost
     )
     return LightBorder(name, row_px, inside_px, goes_on)
 

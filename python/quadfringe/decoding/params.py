@@ -181,3 +181,6 @@ STEP_BYTES_PER_PX = 60
 # 0.6 % of steps get a wrong order, in place of 0.06 % with 24 infrared fringes and 1.1 rad; 50 mm nearer it is 0.8 and
 # 0.1 %, in place of none with 40 (`python evaluation/pair.py --half tune --only steps`, and with `--infrared 30`).
 PAIR_MARGIN_RAD = 0.6
+# Image columns in which the upper and the lower border of the light are looked for, at least. More: time, 10 ms of a
+# decode with all 1024. Fewer: a border in few columns is missed (`python evaluation/geometry.py`).
+BORDER_COLUMNS = 200
