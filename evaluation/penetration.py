@@ -1,4 +1,4 @@
-"""Measure what the decoder says of a material into which green and infrared light penetrate deeper than red and blue.
+"""Measure the stated uncertainty on materials that green and infrared light penetrate deeper than red and blue.
 
     python evaluation/penetration.py [--seed 2] [--json FILE]
 
