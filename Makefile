@@ -244,7 +244,7 @@ figures: $(STAMPS)/built
 	$(BIN)/python evaluation/figures.py
 
 # Accuracy into evaluation/RESULTS.md.
-evaluation: $(STAMPS)/photographs
+evaluation: $(STAMPS)/built
 	$(BIN)/python evaluation/results.py
 
 # Times, memory and other packages into benches/RESULTS.md; run it on an idle machine.
@@ -257,11 +257,6 @@ peers: $(STAMPS)/peers
 $(STAMPS)/peers: $(STAMPS)/built benches/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check -r benches/requirements.txt
 	$(BIN)/pip install --quiet --disable-pip-version-check --no-deps "Fringes>=2.1,<3"
-	touch $@
-
-# The photographs that evaluation/world.py paints on surfaces.
-$(STAMPS)/photographs: $(STAMPS)/built
-	$(BIN)/pip install --quiet --disable-pip-version-check "scikit-image>=0.24"
 	touch $@
 
 format: $(STAMPS)/tools

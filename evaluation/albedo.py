@@ -4,7 +4,7 @@
 
 1024 x 768, 8 bit, 3 % noise; the mean over the two seeds of a half. For each scene: root mean square of the error
 relative to the mean albedo, amplitude of what is left of the fringes, and noise of a pixel relative to the mean light,
-all in %. The photographs need scikit-image, which `make evaluation` installs.
+all in %. The photographs need scikit-image, which the extra `test` installs.
 """
 
 from __future__ import annotations

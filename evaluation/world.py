@@ -5,7 +5,7 @@
 The scenes of quadfringe.evaluation.world are rendered at 1024 x 768 with 3 % noise and 8 bit; their response is linear.
 Tune a method on the half `tune`, and report its figures on the half `report`. Every figure is the mean over the two
 seeds of a half. Depth errors count returned pixels with the right order that are at least 2 px from an edge. The
-photographs need scikit-image, which `make evaluation` installs.
+photographs need scikit-image, which the extra `test` installs.
 """
 
 from __future__ import annotations
