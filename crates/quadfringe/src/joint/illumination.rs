@@ -9,7 +9,7 @@ use super::cells::{CellMaps, CellWindow, Grid, RowMaps, TaskWork};
 use super::levels::{LEVEL_MAPS, LevelRows, heights};
 use super::neighbours::{around, least_of_nine, sum_of_nine};
 use super::noise::noise_of_image;
-use super::params::illumination::{HEIGHT_MIN, HEIGHT_MIN_ALONE, REACH};
+use super::params::illumination::{CORE_SHARE, HEIGHT_MIN, HEIGHT_MIN_ALONE, REACH};
 use super::params::tasks::ROWS;
 use super::scene::ScaledGrid;
 use crate::parallel::lanes::{Lanes, add, lanes, take};
@@ -43,6 +43,8 @@ struct Rows {
     /// Squared heights above the bottom, and their sums over nine pixels, for the rows that a task needs.
     heights: Vec<f32>,
     sums: Vec<f32>,
+    /// The least of nine such sums.
+    least: Vec<f32>,
 }
 
 impl LitMask {
@@ -90,37 +92,53 @@ impl LitMask {
     /// Computes the mask of the rows from `first` on.
     fn find_rows(&self, grid: &Grid, light: [&[f32]; 4], first: usize, rows: &mut Rows, lit: &mut [f32]) {
         let stride = grid.stride;
-        let Rows { maps, spare, heights: above, sums } = rows;
+        let Rows { maps, spare, heights: above, sums, least } = rows;
         let last = first + lit.len() / stride - 1;
         // Beyond the border of the image the rows at the border are used again.
-        let [high, mean] =
-            [2, 1].map(|reach| first.saturating_sub(reach)..=(last + reach).min(grid.height - 1));
-        above.resize((ROWS + 4) * stride, 0.0);
-        sums.resize((ROWS + 2) * stride, 0.0);
+        let [high, mean, lowest] =
+            [3, 2, 1].map(|reach| first.saturating_sub(reach)..=(last + reach).min(grid.height - 1));
+        above.resize((ROWS + 6) * stride, 0.0);
+        sums.resize((ROWS + 4) * stride, 0.0);
+        least.resize((ROWS + 2) * stride, 0.0);
         for (y, out) in high.clone().zip(above.chunks_exact_mut(stride)) {
-            let maps = maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y);
-            let mut light = light.map(|plane| &plane[y * stride..][..stride]);
-            let (mut levels, variance) = (LevelRows::new(maps), self.noise * self.noise);
-            match if self.visible_alone { Some(3) } else { self.absent } {
-                None => heights::<4>(&levels, light, variance, out),
-                Some(absent) => {
-                    for rows in [&mut levels.bottom, &mut levels.precision, &mut light] {
-                        rows.swap(absent, 3);
-                    }
-                    heights::<3>(&levels, light, variance, out);
-                }
-            }
+            self.heights(grid, light, y, maps, out);
         }
-        let least = if self.absent == Some(2) { HEIGHT_MIN_ALONE } else { HEIGHT_MIN };
+        let limit = 9.0 * if self.absent == Some(2) { HEIGHT_MIN_ALONE } else { HEIGHT_MIN };
         let near = |y: usize, first: usize| around(y, grid.height).map(|y| (y - first) * stride);
         for (y, out) in mean.clone().zip(sums.chunks_exact_mut(stride)) {
             let near = near(y, *high.start()).map(|at| &above[at..at + stride]);
             sum_of_nine(near, grid.width, spare, out);
         }
-        for (y, lit) in (first..=last).zip(lit.chunks_exact_mut(stride)) {
-            // A mean over nine pixels carries light one pixel into a shadow; the least of nine such means does not.
+        // A mean over nine pixels carries light one pixel into a shadow; the least of nine such means does not.
+        for (y, out) in lowest.clone().zip(least.chunks_exact_mut(stride)) {
             let near = near(y, *mean.start()).map(|at| &sums[at..at + stride]);
-            least_of_nine(near, grid.width, 9.0 * least, spare, lit);
+            least_of_nine(near, grid.width, spare, out);
+        }
+        for (y, lit) in (first..=last).zip(lit.chunks_exact_mut(stride)) {
+            let near = near(y, *lowest.start()).map(|at| &least[at..at + stride]);
+            least_of_nine(near, grid.width, spare, lit);
+            let [_, here, _] = near;
+            for (lit, here) in lit.iter_mut().zip(here) {
+                // Light that noise alone takes below the limit has no pixel near it that is far below.
+                *lit = f32::from(u8::from((*here > limit) | (*lit > CORE_SHARE * limit)));
+            }
+            lit[grid.width..].fill(0.0);
+        }
+    }
+
+    /// Squared heights of the light above its bottom along row `y` (J2).
+    fn heights(&self, grid: &Grid, light: [&[f32]; 4], y: usize, maps: &mut RowMaps, out: &mut [f32]) {
+        let mut levels = LevelRows::new(maps.sample::<LEVEL_MAPS>(grid, &self.levels, 0, y));
+        let mut light = light.map(|plane| &plane[y * grid.stride..][..grid.stride]);
+        let variance = self.noise * self.noise;
+        match if self.visible_alone { Some(3) } else { self.absent } {
+            None => heights::<4>(&levels, light, variance, out),
+            Some(absent) => {
+                for rows in [&mut levels.bottom, &mut levels.precision, &mut light] {
+                    rows.swap(absent, 3);
+                }
+                heights::<3>(&levels, light, variance, out);
+            }
         }
     }
 
@@ -136,7 +154,8 @@ impl LitMask {
                 || slots.take(),
                 |slot, (y, lit)| {
                     let near = around(y, grid.height).map(|row| &before[row * stride..][..stride]);
-                    least_of_nine(near, grid.width, 0.5, &mut slot.rows.spare, lit);
+                    least_of_nine(near, grid.width, &mut slot.rows.spare, lit);
+                    lit[grid.width..].fill(0.0);
                 },
             );
         }

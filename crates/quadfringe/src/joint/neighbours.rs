@@ -43,18 +43,10 @@ pub(super) fn sum_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>,
     nine(rows, width, spare, |a, b, c| a + b + c, |x, sum| out[x] = sum);
 }
 
-/// 1 where a pixel and its eight neighbours are all above `limit`, 0 elsewhere and in the padding.
+/// Least value of a pixel and its eight neighbours.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-pub(super) fn least_of_nine(
-    rows: [&[f32]; 3],
-    width: usize,
-    limit: f32,
-    spare: &mut Vec<f32>,
-    out: &mut [f32],
-) {
+pub(super) fn least_of_nine(rows: [&[f32]; 3], width: usize, spare: &mut Vec<f32>, out: &mut [f32]) {
     let least = |a: f32, b: f32| if a < b { a } else { b };
-    let (out, padding) = out.split_at_mut(width);
-    padding.fill(0.0);
-    let write = |x: usize, value: f32| out[x] = if value > limit { 1.0 } else { 0.0 };
-    nine(rows, width, spare, |a, b, c| least(least(a, b), c), write);
+    let out = &mut out[..width];
+    nine(rows, width, spare, |a, b, c| least(least(a, b), c), |x, value| out[x] = value);
 }
