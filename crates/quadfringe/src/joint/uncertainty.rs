@@ -12,10 +12,12 @@
 //! noise, texture and discontinuities of this shot.
 
 use super::energy::Energy;
-use super::params::uncertainty::{
-    EVIDENCE, EXPONENT_MAX, FINE_SMOOTHNESS, INFORMATION_MIN, METHOD_RAD, TEMPERATURE_MIN,
-};
+use super::params::uncertainty::{EVIDENCE, EXPONENT_MAX, FINE_SMOOTHNESS, METHOD_RAD, TEMPERATURE_MIN};
 use multiversion::multiversion;
+use std::f32::consts::PI;
+
+/// Variance of a phase of which only the order is known, rad^2.
+const ANY_PHASE: f32 = PI * PI / 3.0;
 
 /// What the cells of the energy leave to the window that found the phase at its start.
 pub(super) struct PhaseNoise {
@@ -51,7 +53,9 @@ impl PhaseNoise {
 fn deviations(noise: &PhaseNoise, variance: &[f32], row: &mut [f32]) {
     let PhaseNoise { window, fine, uncorrected } = *noise;
     for (value, variance) in row.iter_mut().zip(variance) {
-        let by_window = window / if *value > INFORMATION_MIN { *value } else { INFORMATION_MIN };
+        let by_window = window / *value;
+        // A window without information leaves any phase of a turn.
+        let by_window = if by_window < ANY_PHASE { by_window } else { ANY_PHASE };
         let corrected = *variance + fine * by_window + METHOD_RAD * METHOD_RAD;
         *value = if *variance > 0.0 { corrected } else { by_window + uncorrected }.sqrt();
     }
@@ -148,6 +152,13 @@ mod tests {
             let (stated, exact) = (noise.fine, exact_share(sigma, cell));
             assert!((0.8..1.25).contains(&(stated / exact)), "{sigma} {cell}: {stated} {exact}");
         }
+    }
+
+    #[test]
+    fn a_phase_without_information_is_known_to_a_turn() {
+        let mut row = [0.0, 1e-20];
+        PhaseNoise::of_window(0.01, 0.5, 1.0).deviations(&[0.0, 0.0], &mut row);
+        assert!(row.iter().all(|value| (value - PI / f32::sqrt(3.0)).abs() < 1e-5), "{row:?}");
     }
 
     #[test]

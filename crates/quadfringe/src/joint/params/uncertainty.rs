@@ -31,11 +31,7 @@ pub const EVIDENCE: f32 = 1.5;
 /// 333.
 pub const TEMPERATURE_MIN: f32 = 1.0 / super::orders::COST_MAX as f32;
 
-/// Least information of a window in linear light squared. It bounds the quotient of noise and information where a window
-/// contains no light. Not measured: such pixels are not valid.
-pub const INFORMATION_MIN: f32 = 1e-12;
-
-/// The same of a cell. Not measured: any small number will do; it keeps cells without light finite.
+/// Least information of a cell in linear light squared. Not measured: any small number will do; it keeps cells without light finite.
 pub const CELL_INFORMATION_MIN: f32 = 1e-9;
 
 /// Greatest exponent of a wrong-order probability. Follows from the arithmetic: `f32` overflows beyond exp(88.7), and
