@@ -194,9 +194,9 @@ def test_points_of_wrong_orders_far_behind_the_object_are_told(bench: tuple[qf.S
         warnings.simplefilter("ignore", qf.DecodeWarning)
         shape = qf.decode(shot, qf.Plan(912, calibration=calibration, decode={"method": "published"}))
     assert shape.xyz_mm is not None
-    assert implausible(shape) == []
+    assert implausible(shape, []) == []
     shape.xyz_mm[:, :64] *= 4
-    (cause,) = implausible(shape)
+    (cause,) = implausible(shape, [])
     assert (cause.name, cause.fatal) == ("far points", False)
     assert re.match(r"1[234]% of the points are farther than 3 times the median depth of 800 mm", cause.found)
 

@@ -6,6 +6,7 @@ import warnings
 from functools import cache
 from pathlib import Path
 
+import cv2
 import numpy as np
 from support.bars import hold
 from typer.testing import CliRunner
@@ -70,10 +71,30 @@ def test_a_straight_edge_of_an_object_is_not_the_border_of_the_light() -> None:
     cut[:, :130] = cut[:, -130:] = True
     for values in (shape.phase_rad, shape.column_px, shape.xyz_mm):
         values[cut] = np.nan
-    upper = borders_of(shape)[0]
+    borders = borders_of(shape)
+    upper = borders[0]
     assert (upper.name, upper.goes_on) == ("upper", False)
     assert upper.inside_px > params.ROWS_PX
-    assert moved_border(shape) is None
+    assert moved_border(shape, borders) is None
+
+
+def test_points_are_projected_as_by_opencv() -> None:
+    """Among them points behind the device, and one without data."""
+    turn, _ = cv2.Rodrigues(np.array([0.1, -0.2, 0.05]))
+    lens = (-0.1, 0.08, 3e-4, -2e-4, 0.01)
+    pose = {"rotation": turn.tolist(), "translation_mm": (-120.0, 5.0, 30.0)}
+    device = qf.Device(
+        width_px=912, height_px=1140, focal_px=(1200, 2400), centre_px=(450, 900), distortion=lens, **pose
+    )
+    points_mm = np.random.default_rng(1).uniform(-900, 900, (40, 50, 3))
+    points_mm[0, 0] = np.nan
+    matrix = np.array([[1200, 0, 450], [0, 2400, 900], [0, 0, 1.0]])
+    right, _ = cv2.projectPoints(
+        points_mm.reshape(-1, 1, 3), turn, np.array(pose["translation_mm"]), matrix, np.array(lens)
+    )
+    found = pixels_of(points_mm, device)
+    assert np.isnan(found[0, 0]).all()
+    np.testing.assert_allclose(found.reshape(-1, 2)[1:], right[1:, 0], rtol=1e-9)
 
 
 def test_what_no_shot_can_check_is_said_on_the_command_line(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def _share_below(shot: AnyShot, black: Map) -> float:
     """Give the share of the bright places of a shot where a channel is darker than this black of R, G, B, IR."""
     light = np.stack([_squares(image, shot) for image in shot.channels.values()])
     brightest = light.max(axis=0)
-    bright = brightest > params.BRIGHT_SHARE * np.quantile(brightest[::4, ::4], params.BRIGHT_QUANTILE)
+    bright = brightest > params.BRIGHT_SHARE * np.quantile(brightest[:, ::4], params.BRIGHT_QUANTILE)
     black = black[: len(light)]  # no infrared, no black of it
     beyond = np.maximum(params.BELOW_BLACK * black, params.BELOW_NOISES * _noise(shot) / params.SQUARE_PX)
     below = (light < (black - beyond)[:, None, None]).any(axis=0)
@@ -72,11 +72,13 @@ def too_black(share: float) -> Cause | None:
 
 
 def _squares(image: NDArray[Any], shot: AnyShot) -> Map:
-    """Average an image over squares of SQUARE_PX pixels of the shot; shares of full scale."""
+    """Average an image over squares of SQUARE_PX pixels of the shot, in some rows of them; shares of full scale."""
     import cv2
 
     rows, columns = (max(size // params.SQUARE_PX, 1) for size in shot.first.shape)
-    squares = cv2.resize(image, (columns, rows), interpolation=cv2.INTER_AREA)
+    side = image.shape[0] // rows
+    bands = image[: rows * side].reshape(rows, side, -1)[:: params.SQUARE_ROWS].reshape(-1, image.shape[1])
+    squares = cv2.resize(bands, (columns, len(bands) // side), interpolation=cv2.INTER_AREA)
     return np.asarray(squares / shot.full_scale_value, np.float32)
 
 
@@ -86,6 +88,6 @@ def _noise(shot: AnyShot) -> float:
     Without infrared they are those of green.
     """
     image = shot.channels["green"] if shot.ir is None else shot.ir
-    rows = image[:: 2 * params.SQUARE_PX].astype(np.float32) / np.float32(shot.full_scale_value)
+    rows = image[:: 2 * params.SQUARE_ROWS * params.SQUARE_PX].astype(np.float32) / np.float32(shot.full_scale_value)
     bend = np.diff(rows, n=3, axis=1)
     return float(np.median(np.abs(bend)) / (params.MEDIAN_OF_NORMAL * np.sqrt(20.0)))

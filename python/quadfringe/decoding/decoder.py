@@ -11,7 +11,7 @@ from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, che
 from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import too_bright, wrong_bits
-from quadfringe.decoding.light_border import checked_rows
+from quadfringe.decoding.light_border import borders_of, checked_rows
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, response_in_place_of
@@ -20,7 +20,7 @@ from quadfringe.errors import DecodeWarning, InputError
 from quadfringe.io.images import full_scale
 from quadfringe.io.locks import ForkedLock
 
-__all__ = ["Decoder", "decode"]
+__all__ = ["Decoder", "decode", "judged"]
 
 
 class Decoder:
@@ -82,7 +82,7 @@ class Decoder:
                 if not self._known:
                     return self._decode_and_hold(shot)
         kernel, doubt = self._fitting(shot)
-        return _judged(kernel, kernel.shape(shot), shot, doubt)
+        return judged(kernel.shape(shot), shot, kernel.plan, kernel, doubt)
 
     def decode_without_verdict(self, shot: AnyShot) -> Shape:
         """Give the shape, wrong orders and all; a response that is still unknown is estimated and not held."""
@@ -101,7 +101,7 @@ class Decoder:
 
     def _decode_and_hold(self, shot: AnyShot) -> Shape:
         kernel, shape = decode_straightened(self._kernel, shot)
-        shape = _judged(kernel, shape, shot)
+        shape = judged(shape, shot, kernel.plan, kernel)
         self._tried += 1
         if kernel.response != "linear" or self._tried == SHOTS_TRIED:
             self._kernel, self._known = kernel, True
@@ -123,27 +123,26 @@ def _doubt(kernel: KernelDecoder, shot: AnyShot) -> Cause | None:
     return too_black(below_black(shot, kernel.response, kernel.plan.calibration))
 
 
-def _judged(kernel: KernelDecoder, shape: Shape, shot: AnyShot, doubt: Cause | None = None) -> Shape:
-    """Refuse what cannot be trusted, take depths outside the stated range out, and note what is doubtful."""
+def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None, doubt: Cause | None = None) -> Shape:
+    """Refuse what cannot be trusted, take depths outside the stated range out, and note what is doubtful.
+
+    This is all that a decode does besides the kernel. `kernel` decodes a doubtful shot otherwise, None leaves that out.
+    """
     judge(shape, shot, kernel)
-    doubts = implausible(shape)
+    borders = borders_of(shape)
+    doubts = implausible(shape, borders)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
-    light = (doubt, too_dark(shot, kernel.plan.calibration), wrong_bits(shot), too_bright(shot))
-    doubts = [*doubts, *filter(None, light), *within_depths(shape, kernel.plan.decode.depth_range_mm)]
-    shape = _with_check(shape)
+    light = (doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot))
+    doubts = [*doubts, *filter(None, light), *within_depths(shape, plan.decode.depth_range_mm)]
+    if words := checked_rows(shape, borders):
+        shape = replace(shape, config={**shape.config, "geometry": words})
     if not doubts:
         return shape
-    words = [f"{cause.found}; {cause.fix}" for cause in doubts]
-    for text in words:
+    told = [f"{cause.found}; {cause.fix}" for cause in doubts]
+    for text in told:
         warnings.warn(text, DecodeWarning, stacklevel=4)
-    return replace(shape, config={**shape.config, "warnings": words})
-
-
-def _with_check(shape: Shape) -> Shape:
-    """Note in the shape whether the shot checks the rows of its calibration."""
-    words = checked_rows(shape)
-    return replace(shape, config={**shape.config, "geometry": words}) if words else shape
+    return replace(shape, config={**shape.config, "warnings": told})
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:

@@ -7,6 +7,7 @@ is known: fields of view, principal points, lens distortion, and the distance be
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ __all__ = ["PairOffset", "impossible_devices", "pair_offset"]
 CORRECT = "correct the calibration, or calibrate again: quadfringe calibrate"
 MILLIMETRES = "give translation_mm in mm: multiply it by {factor} if it is in {unit}"
 FARTHEST = 1e6  # focal lengths from the principal point; farther ones, of a wrong calibration, would overflow
+DEVICES_KEPT = 64  # whose findings are kept: every decode asks for those of two or three
 RADII = 33  # radii at which a lens model is evaluated: it is a polynomial of degree 7
 
 
@@ -32,6 +34,7 @@ class PairOffset:
     shift_mm: float
 
 
+@lru_cache(maxsize=DEVICES_KEPT)
 def pair_offset(visible: Device, infrared: Device) -> PairOffset:
     """Give the rotation and the translation between two projectors."""
     turn = np.array(infrared.rotation) @ np.array(visible.rotation).T
@@ -51,8 +54,9 @@ def impossible_devices(calibration: Calibration, *, coaxial: bool) -> list[Cause
     return sorted(found, key=lambda cause: not cause.fatal)
 
 
-def _impossible(name: str, device: Device) -> list[Cause]:
-    return [*_focal(name, device), *_centre(name, device), *_lens(name, device)]
+@lru_cache(maxsize=DEVICES_KEPT)
+def _impossible(name: str, device: Device) -> tuple[Cause, ...]:
+    return (*_focal(name, device), *_centre(name, device), *_lens(name, device))
 
 
 def _focal(name: str, device: Device) -> list[Cause]:

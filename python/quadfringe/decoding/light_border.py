@@ -54,29 +54,51 @@ def borders_of(shape: Shape) -> list[LightBorder]:
     >>> [(border.name, abs(border.inside_px) < 8) for border in borders_of(shape)]
     [('upper', True), ('lower', True)]
     """
-    found = [_border(shape, "upper", np.s_[:]), _border(shape, "lower", np.s_[::-1])]
+    if shape.calibration is None or shape.xyz_mm is None:
+        return []
+    phase_rad = shape.phase_rad[:, :: _stride(shape)]
+    ways = {"upper": np.s_[:], "lower": np.s_[::-1]}
+    # Most benches light the whole view, and the first rows tell it: the other ones are not read then.
+    ways = {name: way for name, way in ways.items() if _dark_above(phase_rad[way])}
+    if not ways:
+        return []
+    returned = np.ascontiguousarray(np.isfinite(phase_rad).T)
+    found = [_border(shape, shape.calibration, name, way, returned[:, way]) for name, way in ways.items()]
     return [border for border in found if border is not None]
 
 
-def _border(shape: Shape, name: str, downwards: slice) -> LightBorder | None:
-    """Find the border above the light in an image whose rows are read in this direction."""
-    if shape.calibration is None or shape.xyz_mm is None:
-        return None
-    # A few hundred columns tell where the light ends, in a tenth of the time that all of them take.
-    stride = max(1, shape.phase_rad.shape[1] // params.BORDER_COLUMNS)
-    returned = np.ascontiguousarray(np.isfinite(shape.phase_rad[downwards, ::stride]).T)
-    wide, first = params.BORDER_SHARE * len(returned), returned.argmax(axis=1)
+def _stride(shape: Shape) -> int:
+    """Give the step between columns; a few hundred tell where the light ends, in a tenth of the time of all of them."""
+    columns: int = shape.phase_rad.shape[1]
+    return max(1, columns // params.BORDER_COLUMNS)
+
+
+def _dark_above(phase_rad: NDArray[np.float32]) -> bool:
+    """Say whether enough columns have no light in their first rows."""
+    lit = np.isfinite(phase_rad[: params.BORDER_DARK_PX]).any(axis=0)
+    return bool(np.mean(~lit) >= params.BORDER_SHARE)
+
+
+def _border(
+    shape: Shape, known: Calibration, name: str, downwards: slice, returned: NDArray[np.bool_]
+) -> LightBorder | None:
+    """Find the border above the light in an image whose rows are read in this direction.
+
+    `returned` (columns, rows) are some of the columns, their rows in this direction.
+    """
+    assert shape.xyz_mm is not None
+    stride, wide = _stride(shape), params.BORDER_SHARE * len(returned)
+    first = returned.argmax(axis=1)
     at = np.flatnonzero(returned[np.arange(len(first)), first] & (first >= params.BORDER_DARK_PX))
-    ends = shape.xyz_mm[downwards][first[at], stride * at].astype(np.float64)
-    at, ends = at[np.isfinite(ends[:, 2])], ends[np.isfinite(ends[:, 2])]
+    rows = pixels_of(shape.xyz_mm[downwards][first[at], stride * at], known.projector)[:, 1]
+    at, rows = at[np.isfinite(rows)], rows[np.isfinite(rows)]
     if at.size < wide:
         return None
-    rows = pixels_of(ends, shape.calibration.projector)[:, 1]
     near = np.abs(rows - _densest(rows, params.BORDER_ROWS_PX)) <= params.BORDER_ROWS_PX
     if near.sum() < wide:
         return None
     row_px, outermost = float(np.median(rows[near])), at[near][[0, -1]]
-    inside_px = min(row_px + 0.5, shape.calibration.projector.height_px - 0.5 - row_px)
+    inside_px = min(row_px + 0.5, known.projector.height_px - 0.5 - row_px)
     goes_on = all(
         _ends_there(shape, stride * int(x), int(first[x]), float(shape.column_px[downwards][first[x], stride * x]))
         for x in outermost
@@ -93,7 +115,7 @@ def _ends_there(shape: Shape, x: int, y: int, column_px: float) -> bool:
     return not in_view or not share * columns <= column_px < (1 - share) * columns
 
 
-def _densest(values: NDArray[np.float64], reach: float) -> float:
+def _densest(values: NDArray[np.float32], reach: float) -> float:
     """Give the median of the window of twice `reach` that holds most values."""
     ordered = np.sort(values)
     counts = np.searchsorted(ordered, ordered + 2 * reach, "right") - np.arange(ordered.size)
@@ -101,11 +123,11 @@ def _densest(values: NDArray[np.float64], reach: float) -> float:
     return float(np.median(ordered[start : start + int(counts[start])]))
 
 
-def checked_rows(shape: Shape) -> str:
-    """Say in words whether the shot shows that images and calibration fit along y; empty without a calibration."""
+def checked_rows(shape: Shape, borders: list[LightBorder]) -> str:
+    """Say in words whether the borders show that images and calibration fit along y; empty without a calibration."""
     if shape.calibration is None or shape.xyz_mm is None:
         return ""
-    there = [border for border in borders_of(shape) if abs(border.inside_px) <= params.ROWS_PX]
+    there = [border for border in borders if abs(border.inside_px) <= params.ROWS_PX]
     if not there:
         words = "rows not checked: neither the upper nor the lower border of the projected light is seen at its place, "
         return words + "and nothing else in a shot shows images that moved, or a projector that was turned"
@@ -117,15 +139,18 @@ def checked_rows(shape: Shape) -> str:
     )
 
 
-def moved_border(shape: Shape) -> Cause | None:
-    """Name a calibration whose projector has its upper or lower border elsewhere than the light, if it is in view."""
+def moved_border(shape: Shape, borders: list[LightBorder]) -> Cause | None:
+    """Name a calibration whose projector has its upper or lower border elsewhere than the light, if it is in view.
+
+    `borders` are those of the shape.
+    """
     if shape.calibration is None or shape.xyz_mm is None:
         return None
     beyond = _beyond(shape.xyz_mm, shape.calibration)
     if beyond > params.BEYOND_SHARE:
         words = f"in {beyond:.0%} of the image columns light reaches beyond the upper or the lower border of the image "
         return Cause("calibration or image rows", f"{words}of the projector, as the calibration has it", FIX, False)
-    for border in borders_of(shape):
+    for border in borders:
         if border.goes_on and border.inside_px > params.ROWS_PX:
             words = f"the {border.name} border of the light lies {border.inside_px:.0f} rows inside the image of the "
             return Cause("calibration or image rows", f"{words}projector, as the calibration has it", FIX, False)
@@ -135,9 +160,6 @@ def moved_border(shape: Shape) -> Cause | None:
 def _beyond(xyz_mm: NDArray[np.float32], known: Calibration) -> float:
     """Give the share of the image columns in which several pixels lie beyond the rows of the projector."""
     columns = np.s_[:: max(1, min(xyz_mm.shape[:2]) // params.SAMPLES)]
-    points = xyz_mm[:: params.BEYOND_STRIDE, columns].astype(np.float64)
-    met = np.isfinite(points[..., 2])
-    rows = pixels_of(points[met], known.projector)[:, 1]
-    beyond = np.zeros(met.shape, bool)
-    beyond[met] = np.maximum(-0.5 - rows, rows - (known.projector.height_px - 0.5)) > params.ROWS_PX
+    rows = pixels_of(xyz_mm[:: params.BEYOND_STRIDE, columns], known.projector)[..., 1]
+    beyond = np.maximum(-0.5 - rows, rows - (known.projector.height_px - 0.5)) > params.ROWS_PX
     return float(np.mean(beyond.sum(axis=0) >= params.BEYOND_PIXELS / params.BEYOND_STRIDE))

@@ -56,8 +56,8 @@ BORDER_END_SHARE = 0.03
 # shots have 0.00, by the published method, which keeps wrong orders, up to 0.04. Smaller ones warn of wrong orders,
 # larger ones miss a projector that was turned by 5 degrees, which has 0.13 or more where the border is in view.
 BEYOND_SHARE, BEYOND_PIXELS = 0.08, 8
-# Rows between the pixels that are looked at for this. More pixels cost time in every decode: with 1, 18 ms of 780 ms of
-# a shot of 1024 x 768; fewer would miss a border that is off by ten rows.
+# Rows between the pixels that are looked at for this. More pixels cost time in every decode, 0.6 ms more with 1
+# (`python benches/checks.py`); fewer would miss a border that is off by ten rows.
 BEYOND_STRIDE = 4
 
 # --- Numbers of a calibration, without a shape
@@ -143,6 +143,9 @@ DARK = 0.1
 # Share of saturated pixels from which saturation is the cause of a refusal. A larger number names the harmonics of
 # the clipped crests instead, a smaller one blames a few glints.
 SATURATED = 0.1
+# Rows between those whose saturated pixels are counted. A larger number misses small images, a smaller one costs time
+# in every decode: 0.20 ms with 1, 0.08 ms with 4 (`python benches/checks.py`).
+SATURATED_ROWS = 4
 # Ratio of the second harmonic to the first, from which a refused shot is said to be not linear. Sound shots have
 # 0.007.
 HARMONIC = 0.08
@@ -154,6 +157,10 @@ STRAY = 0.15
 
 # Side of the squares over which pixels are averaged, px. A larger one blurs fine fringes, a smaller one leaves noise.
 SQUARE_PX = 4
+# Rows of squares between those that are looked at. A larger number leaves less than ten thousand squares, too few for
+# small bright places; a smaller one costs time in every decode: 2.6 ms with 1, 0.7 ms with 4 (`python
+# benches/checks.py`).
+SQUARE_ROWS = 4
 # A place is bright from this share of the bright light, which is this quantile of the brightest channels. A larger
 # share leaves dark objects out; a smaller one counts shadows, which may be darker than any fringe.
 BRIGHT_SHARE, BRIGHT_QUANTILE = 0.25, 0.99
@@ -181,6 +188,7 @@ STEP_BYTES_PER_PX = 60
 # 0.6 % of steps get a wrong order, in place of 0.06 % with 24 infrared fringes and 1.1 rad; 50 mm nearer it is 0.8 and
 # 0.1 %, in place of none with 40 (`python evaluation/pair.py --half tune --only steps`, and with `--infrared 30`).
 PAIR_MARGIN_RAD = 0.6
-# Image columns in which the upper and the lower border of the light are looked for, at least. More: time, 10 ms of a
-# decode with all 1024. Fewer: a border in few columns is missed (`python evaluation/geometry.py`).
+# Image columns in which the upper and the lower border of the light are looked for, at least. More: time, 1.5 ms with
+# all 1024 in place of 0.4 (`python benches/checks.py`). Fewer: a border in few columns is missed (`python
+# evaluation/geometry.py`).
 BORDER_COLUMNS = 200

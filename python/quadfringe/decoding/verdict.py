@@ -84,11 +84,11 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
     other Bayer pattern, to name them; with None these and all further tests are left out. A shot with a margin from
     0.3, as of a photograph, is kept if its channels agree on the phase and no exchange comes near to its margin.
     """
-    margin, lit, returned = _margin(shape)
+    margin, lit, returned, share = _margin(shape)
     if decoder is not None and not decoder.plan.fringes.infrared and lit > 0:
         _refuse_green(shape, shot, decoder)
     method = shape.config["decode"]["method"]
-    enough = lit > 0 and returned >= RETURNED_MIN * lit and not _by_chance(shape, shot, margin)
+    enough = lit > 0 and returned >= RETURNED_MIN * lit and not _by_chance(shape, shot, margin, share)
     if enough and margin >= SURE:
         return
     blind = bool(_blind_channels(shot))
@@ -136,13 +136,16 @@ def order_margin(shape: Shape) -> float:
     return _margin(shape)[0]
 
 
-def _margin(shape: Shape) -> tuple[float, int, int]:
-    """Give the median order margin of the lit pixels, their number, and the number of returned pixels."""
+def _margin(shape: Shape) -> tuple[float, int, int, float]:
+    """Give the median order margin of the lit pixels, their number, that of the returned ones, and the lit share.
+
+    They are those of a few thousand samples.
+    """
     stride = max(1, min(shape.quality.shape) // MARGIN_ROWS)
     quality = shape.quality[::stride, ::stride]
     lit = quality[np.isfinite(quality)]
     returned = np.count_nonzero(np.isfinite(shape.phase_rad[::stride, ::stride]))
-    return float(np.median(lit)) if lit.size else 0.0, lit.size, int(returned)
+    return float(np.median(lit)) if lit.size else 0.0, lit.size, int(returned), lit.size / quality.size
 
 
 def _blind_channels(shot: AnyShot) -> list[str]:
@@ -180,9 +183,13 @@ def _lit_share_of_bright(shape: Shape, shot: AnyShot) -> float:
     return float(lit.sum() / np.count_nonzero(light >= 0.5 * np.median(light[lit])))
 
 
-def _by_chance(shape: Shape, shot: AnyShot, margin: float) -> bool:
-    """Say whether so few pixels carry fringes, or so many are saturated, that the margin may be chance."""
-    share = _lit_share(shape)
+def _by_chance(shape: Shape, shot: AnyShot, margin: float, share: float) -> bool:
+    """Say whether so few pixels carry fringes, or so many are saturated, that the margin may be chance.
+
+    `share` is the lit share of a few thousand samples, which is close enough unless it is small.
+    """
+    if share < 2 * CHANCE_MAX:
+        share = _lit_share(shape)
     if share < LIT_MIN or (share < CHANCE_MAX and _lit_share_of_bright(shape, shot) < CHANCE_MAX):
         return True
     doubtful = share < UNSATURATED_MIN or margin < DOUBTFUL

@@ -12,7 +12,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.causes import blur, registration, wrong_bits
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
-from quadfringe.decoding.light_border import BY_HAND
+from quadfringe.decoding.light_border import BY_HAND, borders_of
 from quadfringe.decoding.plan import stated_response
 from quadfringe.decoding.plausibility import geometry_of, implausible
 from quadfringe.decoding.symptoms import brightness, closure_of, saturation
@@ -92,7 +92,7 @@ def _bits(shot: AnyShot) -> list[Finding]:
 
 def _geometry(shape: Shape, plan: Plan) -> list[Finding]:
     """Check a shape against its calibration; say what a calibration cannot show."""
-    if doubts := told(implausible(shape)):
+    if doubts := told(implausible(shape, borders_of(shape))):
         return doubts
     measured = geometry_of(shape)
     if measured is None:

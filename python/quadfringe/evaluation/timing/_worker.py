@@ -17,7 +17,7 @@ import numpy as np
 from quadfringe.config import DecodeConfig
 from quadfringe.data import Calibration, Shot
 from quadfringe.decoding import Decoder, Plan
-from quadfringe.decoding.verdict import judge
+from quadfringe.decoding.decoder import judged
 from quadfringe.errors import DecodeError, InputError
 from quadfringe.evaluation.machine import resident_bytes
 from quadfringe.evaluation.timing.records import Case
@@ -103,11 +103,11 @@ def _timed(decoder: Decoder, shot: Shot) -> dict[str, float]:
     start, processor_start = perf_counter(), process_time()
     shape = decoder.decode(shot)
     decoded, processor_decoded = perf_counter(), process_time()
-    judge(shape, shot, None)
-    judged = perf_counter()
+    judged(shape, shot, decoder.plan, None)
+    checked = perf_counter()
     return {
         "decode_ms": 1e3 * (decoded - start),
-        "verdict_ms": 1e3 * (judged - decoded),
+        "verdict_ms": 1e3 * (checked - decoded),
         "processor_ms": 1e3 * (processor_decoded - processor_start),
         "returned_percent": 100.0 * float(shape.returned.mean()),
     }

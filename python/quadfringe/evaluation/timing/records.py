@@ -32,8 +32,9 @@ class Case:
 class Timing:
     """Times of one case, from four uint8 images to X, Y, Z and the verdict on the shot.
 
-    `median_ms` and `minimum_ms` are wall-clock times; `verdict_ms` is the part of the median that judges the shot.
-    `busy_cores` is the processor time divided by the wall-clock time; it never exceeds the number of threads.
+    `median_ms` and `minimum_ms` are wall-clock times; `verdict_ms` is the part that checks fringe orders, light and
+    calibration in Python. `busy_cores` is the processor time divided by the wall-clock time; it never exceeds the
+    number of threads.
     """
 
     case: Case
