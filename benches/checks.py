@@ -16,8 +16,10 @@ from time import perf_counter
 
 import quadfringe as qf
 from quadfringe.config import ChannelResponse
+from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding.black import below_black, too_dark
 from quadfringe.decoding.causes import too_bright
+from quadfringe.decoding.channel_offsets import contradiction
 from quadfringe.decoding.decoder import judged
 from quadfringe.decoding.light_border import borders_of
 from quadfringe.decoding.plausibility import geometry_of, implausible
@@ -47,6 +49,7 @@ def checks(focal_px: float) -> dict[str, Callable[[], object]]:
         shot = scanner.grab()
         plan = qf.Plan(912, calibration=scanner.calibration, decode=qf.DecodeConfig(method="published"))
     decoder = qf.Decoder(shot, plan)
+    kernel = KernelDecoder(shot.first.shape, None, plan)
     shape, borders = decoder.decode(shot), borders_of(decoder.decode(shot))
     dark = None if plan.calibration is None else plan.calibration.model_copy(update={"dark": (0.01,) * 4})
     return {
@@ -55,10 +58,11 @@ def checks(focal_px: float) -> dict[str, Callable[[], object]]:
         "borders of the light": lambda: borders_of(shape),
         "calibration and its rows": lambda: implausible(shape, borders),
         "calibration only": lambda: geometry_of(shape),
+        "offsets of the channels": lambda: contradiction(shape, shot, plan),
         "saturation": lambda: too_bright(shot),
         "dark level": lambda: too_dark(shot, dark),
         "black of a response": lambda: below_black(shot, RESPONSE, dark),
-        "all without dark level and response": lambda: judged(shape, shot, plan, None),
+        "all without dark level and response": lambda: judged(shape, shot, plan, kernel),
     }
 
 

@@ -18,7 +18,16 @@ from quadfringe.data import AnyShot, BayerShot, Calibration, Shape, Shot, condit
 from quadfringe.decoding.plan import Plan
 from quadfringe.errors import InputError
 
-__all__ = ["KernelDecoder", "Size", "check_channels", "check_shot", "rounded", "size_of"]
+__all__ = [
+    "KernelDecoder",
+    "Size",
+    "check_channels",
+    "check_shot",
+    "rounded",
+    "rows_of",
+    "rows_of_calibration",
+    "size_of",
+]
 
 Size = tuple[int, int]
 # Peak memory of a decoder with two shapes, bytes per pixel, at fringes of 24 px (`pytest tests/test_size_limits.py`
@@ -92,7 +101,7 @@ class KernelDecoder:
     def for_rows(self, first: int, count: int) -> KernelDecoder:
         """Give a decoder of the same plan for some rows of the images."""
         calibration = self.plan.calibration
-        known = calibration if calibration is None else _of_rows(calibration, first, count)
+        known = calibration if calibration is None else rows_of_calibration(calibration, first, count)
         return KernelDecoder((count, self._size[1]), self._full_scale, replace(self.plan, calibration=known))
 
     def shape(self, shot: AnyShot) -> Shape:
@@ -210,7 +219,15 @@ def _check_size(size: Size, plan: Plan) -> None:
         )
 
 
-def _of_rows(calibration: Calibration, first: int, count: int) -> Calibration:
+def rows_of(shot: AnyShot, first: int, count: int) -> AnyShot:
+    """Give a shot of some rows only."""
+    images = {name: image[first : first + count] for name, image in shot.images.items()}
+    if isinstance(shot, BayerShot):
+        return BayerShot(images["raw"], shot.bayer, images.get("ir"), shot.full_scale)
+    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
+
+
+def rows_of_calibration(calibration: Calibration, first: int, count: int) -> Calibration:
     """Give the calibration of a camera that sees some rows only: its rows count from the first of them."""
     column, row = calibration.camera.centre_px
     camera = calibration.camera.model_copy(update={"height_px": count, "centre_px": (column, row - first)})

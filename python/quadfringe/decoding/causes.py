@@ -22,6 +22,7 @@ __all__ = [
     "before_order",
     "blur",
     "channels_fit",
+    "family",
     "listed",
     "other_numbers",
     "registration",
@@ -112,7 +113,7 @@ def wrong_numbers(plan: Plan, closure: Closure | None) -> Cause | None:
     if not others:
         return Cause("fringe numbers", words, NUMBERS_FIX)
     root = _root(plan, closure)
-    fits = f", which fits {listed(_family(round(root)))}" if abs(root - round(root)) < 0.25 else ""
+    fits = f", which fits {listed(family(round(root)))}" if abs(root - round(root)) < 0.25 else ""
     return Cause("fringe numbers", words + fits, NUMBERS_FIX)
 
 
@@ -127,7 +128,7 @@ def other_numbers(plan: Plan, closure: Closure) -> list[FringeNumbers]:
         pairs = [(float(n), float(n - 1)) for n in (whole - 1, whole, whole + 1) if SMALLEST_PAIR <= n <= LARGEST_PAIR]
         return [numbers for numbers in pairs if numbers != plan.fringes.numbers and _covers(numbers, plan)]
     root = _root(plan, closure)
-    families = [_family(whole) for whole in {int(root), int(root) + 1} if SMALLEST_ROOT <= whole <= LARGEST_ROOT]
+    families = [family(whole) for whole in {int(root), int(root) + 1} if SMALLEST_ROOT <= whole <= LARGEST_ROOT]
     return [numbers for numbers in families if numbers != plan.fringes.numbers and _covers(numbers, plan)]
 
 
@@ -136,7 +137,8 @@ def _root(plan: Plan, closure: Closure) -> float:
     return 1 / max(1 - closure.infrared * plan.fringes.numbers[2] / plan.fringes.numbers[0], 1e-3)
 
 
-def _family(root: int) -> FringeNumbers:
+def family(root: int) -> FringeNumbers:
+    """Give the numbers n, n - 1, n - k of k^2 = n."""
     return float(root**2), float(root**2 - 1), float(root**2 - root)
 
 

@@ -11,6 +11,7 @@ from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, che
 from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import too_bright, wrong_bits
+from quadfringe.decoding.channel_offsets import contradiction
 from quadfringe.decoding.light_border import borders_of, checked_rows
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
@@ -131,6 +132,8 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     judge(shape, shot, kernel)
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
+    if kernel is not None and (cause := contradiction(shape, shot, plan)):
+        doubts.append(cause)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
     light = (doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot))

@@ -69,7 +69,7 @@ class Fit:
 class Drift:
     """Offset of the infrared fringes from their expected position, projector px, over tiles of the image.
 
-    `off` is the share of tiles whose orders are all wrong by whole fringes.
+    `off` is the share of tiles whose orders are all wrong by the same number of whole fringes.
     """
 
     median_px: float
@@ -131,8 +131,12 @@ def infrared_drift(shot: AnyShot, shape: Shape, plan: Plan) -> Drift | None:
         shifts.append(shift)
     if len(away) < TILES_MIN:
         return None
-    off = float(np.mean(np.array(shifts) != 0))
-    return Drift(float(np.median(away)), float(np.quantile(np.abs(away), QUANTILE)), off)
+    return Drift(float(np.median(away)), float(np.quantile(np.abs(away), QUANTILE)), _share_off(shifts))
+
+
+def _share_off(shifts: list[int]) -> float:
+    """Give the share of tiles that are off by the same number of fringes; crosstalk and prints push to either side."""
+    return max(shifts.count(shift) - shifts.count(-shift) for shift in range(-SHIFT_MAX, SHIFT_MAX + 1)) / len(shifts)
 
 
 def _tiles(inside: NDArray[np.bool_]) -> list[tuple[slice, slice]]:

@@ -21,9 +21,10 @@ REFUSED_SHARE = 0.5
 # Share from which the shape carries a warning. A smaller share warns of stray pixels, a larger one misses the border
 # of a light field that has moved by a few percent of the image.
 WARNED_SHARE = 0.05
-# Fewest samples from which a share is taken. A larger number leaves small objects unchecked; below about a hundred, a
-# share of WARNED_SHARE is a handful of stray pixels.
-SAMPLES_MIN = 100
+# Fewest samples from which a share is taken, and how many times closer they lie where there are fewer. Below about a
+# hundred samples, a share of WARNED_SHARE is a handful of stray pixels. A smaller factor leaves objects unchecked that
+# fill a hundredth of the frame.
+SAMPLES_MIN, FINER = 100, 4
 # Rows beyond the image of the projector that are still possible, px. Follows from lens distortion, which calibrations
 # know to a few px at the border. A larger number misses small shifts of the rows.
 ROWS_PX = 8.0
@@ -103,12 +104,28 @@ AGREEMENT_MIN = 0.3
 CLOSURE_PX = 31
 # Lag of the local frequency, px, and its window. Longer ones cross more edges, shorter ones are noisier.
 LAG_PX, FREQUENCY_PX = 8, 25
-# Angle of the closure in rad from which infrared counts as shifted: 0.3 is 2 px at a period of 41 px. Sound shots
-# reach 0.03. A smaller angle names misalignments that cost no order, a larger one misses shifts that cost margin.
-CLOSURE_RAD = 0.3
+# Angle of the closure in rad from which infrared counts as shifted: 0.2 is 1.3 px at a period of 41 px. Sound shots
+# reach 0.03, in tiles 0.13 (patches of 12 mm). A smaller angle names misalignments that cost no order, a larger one
+# misses shifts that bend the phase.
+CLOSURE_RAD = 0.2
 # Mean of the closure over its local length, from which the angle counts as one for the whole image. Shifted and sound
 # shots have 0.8 or more, a strong response or crosstalk 0.55 or less. A smaller number calls those shifts.
 STEADY_MIN = 0.7
+# Bands of rows in which the offsets of the channels are measured in every decode, and their rows. More cost time
+# (`python benches/checks.py`), fewer miss small objects: one of 2 % of the frame is a seventh of its height.
+BANDS, BAND_ROWS = 8, 16
+# Rows between those of a band that are looked at. A smaller number costs time, a larger one sees more noise.
+ROW_STRIDE = 4
+# Width of a tile in a band, px, and the share of its pixels that must be returned. Wider tiles miss narrow objects,
+# narrower ones hold less than a fringe.
+OFFSET_TILE_PX, OFFSET_SHARE = 96, 0.3
+# Fewest tiles that tell a fault. Fewer believe single prints.
+OFFSET_TILES_MIN = 4
+# Turns of drift over the field that are told from none, the least mean length, and by how much it must exceed that
+# without drift. Numbers that are farther off leave no margin. Sound shots have no drift that is better than none, and
+# other numbers have 0.82 or more. Smaller numbers believe prints, larger ones miss other numbers on narrow objects:
+# `pytest tests/test_channel_offsets.py`.
+DRIFT_TURNS_MAX, DRIFT_LENGTH, DRIFT_BETTER = 4, 0.75, 0.1
 # Largest shift along y that is searched, px, and the correlation from which it is believed: scenes with detail along
 # y have 0.66 or more, a plane 0.04. A wider search finds chance maxima, a narrower one misses coarse misalignment.
 SHIFT_MAX_PX = 24

@@ -55,6 +55,8 @@ def geometry_of(shape: Shape) -> Geometry | None:
     if shape.calibration is None or shape.xyz_mm is None:
         return None
     stride = max(1, min(shape.phase_rad.shape) // params.SAMPLES)
+    if np.count_nonzero(np.isfinite(shape.column_px[::stride, ::stride])) < params.SAMPLES_MIN:
+        stride = max(1, stride // params.FINER)
     reach = params.REACH_PX
     here, right, below = (
         np.s_[:-reach:stride, :-reach:stride],

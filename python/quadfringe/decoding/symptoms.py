@@ -103,8 +103,8 @@ def sharpness(shot: AnyShot) -> float:
     return float(np.median(found))
 
 
-def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
-    """Measure how the three phases close; None when no fringes cross the rows.
+def closure_of(shot: AnyShot, plan: Plan, lit: NDArray[np.bool_] | None = None) -> Closure | None:
+    """Measure how the three phases close, where it is `lit`; None when no fringes cross the rows.
 
     Two phases close for every surface; without a third one only the frequency of green tells anything.
     """
@@ -114,17 +114,18 @@ def closure_of(shot: AnyShot, plan: Plan) -> Closure | None:
         phases = wrapped_phases(light, plan.fringes.code)
     except DecodeError:
         return None
-    waves = [np.where(np.isfinite(p), np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]
+    known = np.all([np.isfinite(p) for p in phases], axis=0) & (True if lit is None else lit)
+    waves = [np.where(known, np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]
     rates = [_rate(wave) for wave in waves]
-    known = np.abs(rates[0]) > 0.1 / params.LAG_PX
-    if not known.any():
+    fringes = (np.abs(rates[0]) > 0.1 / params.LAG_PX) & known[:, params.LAG_PX :]
+    if not fringes.any():
         return None
-    green, *infrareds = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])
+    green, *infrareds = (float(np.median(rate[fringes] / rates[0][fringes])) for rate in rates[1:])
     if not others:
         return Closure(green * first / second, 1.0, Angle(0.0, 1.0, 0.0), float("nan"))
     third, infrared = others[0], infrareds[0]
-    angle = _closed(waves, (first, second, third))
-    period = 2 * np.pi / max(float(np.median(np.abs(rates[2][known]))), 1e-6)
+    angle = _closed(waves, (first, second, third), known)
+    period = 2 * np.pi / max(float(np.median(np.abs(rates[2][fringes]))), 1e-6)
     return Closure(green * first / second, infrared * first / third, angle, period)
 
 
@@ -166,7 +167,7 @@ def _rate(wave: Complex) -> NDArray[np.float64]:
     return np.angle(turned) / lag
 
 
-def _closed(waves: list[Complex], numbers: tuple[float, float, float]) -> Angle:
+def _closed(waves: list[Complex], numbers: tuple[float, float, float], known: NDArray[np.bool_]) -> Angle:
     """Measure the sum of the three phases that is the same for every surface."""
     first, second, third = numbers
     turns = (first - third) / (first - second)
@@ -174,8 +175,8 @@ def _closed(waves: list[Complex], numbers: tuple[float, float, float]) -> Angle:
         return Angle(float("nan"), float("nan"), float("nan"))
     whole = round(turns)
     closed = waves[2] * waves[0] ** (whole - 1) * np.conj(waves[1]) ** whole
-    local = float(np.abs(_mean(closed, params.CLOSURE_PX)).mean())
-    mean = complex(closed.mean())
+    local = float(np.abs(_mean(closed, params.CLOSURE_PX))[known].mean())
+    mean = complex(closed[known].mean())
     return Angle(float(np.angle(mean)), local, abs(mean) / max(local, 1e-9))
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from quadfringe.config import BayerPattern
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot
 from quadfringe.decoding import params
-from quadfringe.decoding._kernel import KernelDecoder
+from quadfringe.decoding._kernel import KernelDecoder, rows_of
 from quadfringe.decoding._offsets import channels_agree
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import (
@@ -28,7 +28,7 @@ from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
 from quadfringe.decoding.symptoms import Closure, closure_of, saturation
 
-__all__ = ["band_of", "judge", "order_margin", "rows_of"]
+__all__ = ["band_of", "judge", "order_margin"]
 
 ORDERS = "fringe orders"  # the reason of a refusal for exchanged channels, or without a named cause
 STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
@@ -96,7 +96,7 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
         _refuse_numbers(shape, shot, decoder)
     if enough and margin >= DOUBTFUL and not blind:
         return
-    closure = None if decoder is None or blind else closure_of(shot, decoder.plan)
+    closure = None if decoder is None or blind else closure_of(shot, decoder.plan, np.isfinite(shape.quality))
     collapsed = (COLLAPSED if closure is None or channels_fit(closure) else COLLAPSED_UNFIT)[method]
     collapse = not enough or blind or (margin < collapsed and not _agrees(shape, shot, margin, decoder))
     if collapse:
@@ -273,14 +273,6 @@ def band_of(shape: Shape) -> tuple[int, int]:
     lit = np.isfinite(shape.quality).sum(axis=1)
     count = min(lit.size, max(BAND_ROWS_MIN, 2 * round(BAND_SHARE * lit.size / 2)))
     return 2 * (int(np.convolve(lit, np.ones(count), "valid").argmax()) // 2), count
-
-
-def rows_of(shot: AnyShot, first: int, count: int) -> AnyShot:
-    """Give a shot of some rows only."""
-    images = {name: image[first : first + count] for name, image in shot.images.items()}
-    if isinstance(shot, BayerShot):
-        return BayerShot(images["raw"], shot.bayer, images.get("ir"), shot.full_scale)
-    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
 
 
 def _suspects(shot: AnyShot) -> dict[str, AnyShot]:

@@ -1,0 +1,181 @@
+"""What the phases of the channels say to each other on a decoded shot: infrared that is shifted, other fringe numbers.
+
+A decoded phase says where the fringes of green and infrared must lie. Where they lie instead, their offsets tell, in a
+few bands of rows, which takes a millisecond. For fringe numbers N, N - 1 and N - k two sums of the offsets show faults
+that a wrong order hides, because a wrong order leaves them as they are:
+
+- offset of infrared + (k - 1) times that of red - k times that of green: the closure of the three phases. A shift of
+  infrared turns it by its phase; numbers with another k let it drift by a turn over the field for each k.
+- N / k times the offset of infrared: numbers with the same differences, such as 37, 36, 31 in place of 36, 35, 30, let
+  it drift by a turn for each fringe.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding import params
+from quadfringe.decoding._kernel import rows_of, rows_of_calibration
+from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration
+from quadfringe.decoding.fringe_fit import infrared_column
+from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.stages import linear_light
+from quadfringe.decoding.symptoms import closure_of
+
+__all__ = ["Offsets", "contradiction", "offsets_of"]
+
+Real = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """Offsets of the fringes of red, green and the third channel in tiles, (T,) rad, and the mean columns of the tiles.
+
+    `turn_rad` is the column as a share of the field, 0 to 2 pi.
+    """
+
+    red_rad: Real
+    green_rad: Real
+    third_rad: Real
+    turn_rad: Real
+
+    def closure_rad(self, numbers: tuple[float, ...]) -> Real:
+        """Give the closure of the three phases, (T,) rad: 0 for sound shots, whatever the orders."""
+        first, second, third = numbers
+        steps = (first - third) / (first - second)
+        return self.third_rad + (steps - 1) * self.red_rad - steps * self.green_rad
+
+
+def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
+    """Name what the channels contradict in a decoded shot; None if they agree, or are two."""
+    if len(plan.fringes.numbers) < 3:
+        return None
+    offsets = offsets_of(shape, shot, plan)
+    if offsets.turn_rad.size < params.OFFSET_TILES_MIN:
+        return None
+    return _shifted(offsets, shape, shot, plan) or _numbers(offsets, plan)
+
+
+def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
+    """Find a shift of infrared; from half the angle of a wrong order on, the orders cannot be trusted."""
+    first, _, third = plan.fringes.numbers
+    if not (plan.fringes.infrared and _close(plan.fringes.numbers)):
+        return None
+    mean = _mean(offsets.closure_rad(plan.fringes.numbers))
+    if abs(mean) < params.STEADY_MIN or abs(np.angle(mean)) < params.CLOSURE_RAD:
+        return None
+    fatal = bool(abs(np.angle(mean)) > np.pi * (first - third) / first)
+    named = registration(shot, plan, closure_of(shot, plan, np.isfinite(shape.quality)))
+    if named is None:
+        words = f"the infrared fringes lie {np.angle(mean):+.2f} rad beside their place among those of red and green"
+        fix = "register the chips (quadfringe calibrate run, step registration), or calibrate the pair again"
+        return Cause("infrared registration", words, fix, fatal)
+    return replace(named, fatal=fatal)
+
+
+def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:
+    """Find fringe numbers that are not those of the shot, by offsets that drift over the field."""
+    first, second, third = numbers = plan.fringes.numbers
+    infrared = first / (first - third) * offsets.third_rad
+    found: tuple[float, ...] = numbers
+    if drift := _drift(infrared, offsets.turn_rad):
+        found = (first + drift, second + drift, third + drift)
+    # Crosstalk of red and green turns the closure too, but leaves infrared at its place.
+    elif _close(numbers) and abs(_mean(infrared)) < params.STEADY_MIN:
+        drift = _drift(offsets.closure_rad(numbers), offsets.turn_rad)
+        found = family(max(round((first - third) / (first - second)) - drift, 1))
+    if drift == 0:
+        return None
+    words = f"the fringe numbers {listed(numbers)} are not those of this shot: the offsets of the channels drift by "
+    words += f"{abs(drift)} turn{'s' if abs(drift) > 1 else ''} over the field, which fits {listed(found)}"
+    return Cause("fringe numbers", words, NUMBERS_FIX)
+
+
+def _close(numbers: tuple[float, ...]) -> bool:
+    """Say whether the phases of three numbers add up to whole turns."""
+    first, second, third = numbers
+    return ((first - third) / (first - second)).is_integer()
+
+
+def _drift(angle_rad: Real, turn_rad: Real) -> int:
+    """Give the turns by which an angle drifts over the field; 0 unless a drift explains it clearly better than none."""
+    turns = range(-params.DRIFT_TURNS_MAX, params.DRIFT_TURNS_MAX + 1)
+    lengths = {turn: abs(_mean(angle_rad - turn * turn_rad)) for turn in turns}
+    best = max(turns, key=lambda turn: lengths[turn])
+    return best if lengths[best] > max(params.DRIFT_LENGTH, lengths[0] + params.DRIFT_BETTER) else 0
+
+
+def _mean(angle_rad: Real) -> complex:
+    return complex(np.exp(1j * angle_rad).mean())
+
+
+def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
+    """Measure the offsets in bands of rows; B takes the place of IR if it has another fringe number than R."""
+    first, second, third = plan.fringes.numbers
+    count = min(params.BAND_ROWS, len(shape.phase_rad))
+    tops = range(0, len(shape.phase_rad) - count + 1, max(count, len(shape.phase_rad) // params.BANDS // 2 * 2))
+    rows = np.add.outer(np.array(tops), np.arange(0, count, params.ROW_STRIDE))
+    phase_rad = shape.phase_rad[rows]
+    light = _light(shot, plan, tops, count)
+    seen, third_rad = "blue", third / first * phase_rad
+    if plan.fringes.infrared:
+        per_px = np.float32(2 * np.pi * third / plan.projector_width_px)
+        column_px = infrared_column(_rows(shape, rows.ravel()), plan).astype(np.float32)
+        seen, third_rad = "ir", per_px * column_px.reshape(phase_rad.shape)
+    waves = (("red", phase_rad), ("green", second / first * phase_rad), (seen, third_rad))
+    tiles = np.array([*(_offsets_rad(light[name], wave_rad) for name, wave_rad in waves), _means(phase_rad / first)])
+    return Offsets(*tiles[:, np.isfinite(tiles).all(axis=0)])
+
+
+def _light(shot: AnyShot, plan: Plan, tops: range, count: int) -> dict[str, NDArray[np.float32]]:
+    """Give the linear light of some rows of every band by channel, (bands, rows, columns)."""
+    response = "calibration" if plan.response == "auto" else plan.response
+    bands = []
+    for top in tops:
+        calibration = None if plan.calibration is None else rows_of_calibration(plan.calibration, top, count)
+        bands.append(linear_light(rows_of(shot, top, count), calibration, response))
+    return {name: np.stack([band[name][:: params.ROW_STRIDE] for band in bands]) for name in bands[0]}
+
+
+def _rows(shape: Shape, rows: NDArray[np.intp]) -> Shape:
+    xyz_mm = None if shape.xyz_mm is None else shape.xyz_mm[rows]
+    return Shape(shape.phase_rad[rows], shape.column_px[rows], shape.modulation[rows], shape.quality[rows], xyz_mm)
+
+
+def _tiled(bands: NDArray[Any]) -> NDArray[np.float32]:
+    """Cut every second column of bands into tiles, (T, N)."""
+    side = params.OFFSET_TILE_PX
+    count, rows, columns = bands.shape
+    parts = bands[:, :, : columns // side * side : 2].reshape(count, rows, -1, side // 2)
+    return np.asarray(parts.swapaxes(1, 2).reshape(-1, rows * side // 2), np.float32)
+
+
+def _means(bands: NDArray[Any]) -> Real:
+    tiles = _tiled(bands)
+    known = np.isfinite(tiles)
+    sums = np.where(known, tiles, 0).sum(axis=1, dtype=np.float64)
+    return np.asarray(sums / np.maximum(known.sum(axis=1), 1))
+
+
+def _offsets_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> Real:
+    """Give the offset of the fringes of each tile by least squares, (T,) rad; NaN with too few pixels."""
+    light, phase_rad = _tiled(light), _tiled(phase_rad)
+    known = np.isfinite(light) & np.isfinite(phase_rad)
+    enough = np.count_nonzero(known, axis=1) >= params.OFFSET_SHARE * known.shape[1]
+    offsets: Real = np.full(len(enough), np.nan)
+    if not enough.any():
+        return offsets
+    known, phase_rad = known[enough], phase_rad[enough]
+    light = np.where(known, light[enough], np.float32(0))
+    waves = np.stack([np.ones_like(phase_rad), np.cos(phase_rad), -np.sin(phase_rad)], axis=1)
+    waves = np.where(known[:, np.newaxis], waves, np.float32(0))
+    matrix = (waves @ waves.swapaxes(1, 2)).astype(np.float64) + 1e-6 * np.eye(3)
+    found = np.linalg.solve(matrix, (waves @ light[:, :, np.newaxis]).astype(np.float64))[:, :, 0]
+    offsets[enough] = np.arctan2(found[:, 2], found[:, 1])
+    return offsets
