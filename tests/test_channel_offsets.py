@@ -1,4 +1,4 @@
-"""Shifted infrared and other fringe numbers are told though the orders look sure; sound shots are left alone."""
+"""Shifted infrared and other fringe numbers are found though the orders look sure; sound shots are left alone."""
 
 from __future__ import annotations
 

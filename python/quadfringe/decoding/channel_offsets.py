@@ -73,7 +73,7 @@ def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause
     fatal = bool(abs(np.angle(mean)) > np.pi * (first - third) / first)
     named = registration(shot, plan, closure_of(shot, plan, np.isfinite(shape.quality)))
     if named is None:
-        words = f"the infrared fringes lie {np.angle(mean):+.2f} rad beside their place among those of red and green"
+        words = f"the infrared fringes lie {np.angle(mean):+.2f} rad off their place among those of red and green"
         fix = "register the chips (quadfringe calibrate run, step registration), or calibrate the pair again"
         return Cause("infrared registration", words, fix, fatal)
     return replace(named, fatal=fatal)
