@@ -77,21 +77,23 @@ def test_exchanged_channels_are_told() -> None:
 
 
 def test_a_pair_that_has_drifted_is_told() -> None:
-    """Half a millimetre is reported; at one and a half all orders are wrong, and the margin does not show it."""
+    """Half a millimetre is reported; at one and a half all orders are wrong, and the shot is refused."""
     with qf.open(SystemConfig(camera=SMALL, scene=SceneConfig(surface="peaks", noise=0.01))) as scanner:
         config = scanner.config
     assert config.projector is not None
-    for shift_mm, grade, known_grade in ((0.5, "warning", "good"), (1.5, "fault", "fault")):
+    told = {}
+    for shift_mm in (0.5, 1.5):
         shifted = tuple(float(v) for v in np.add(config.projector.translation_mm, (shift_mm, 0, 0)))
         moved = config.projector.model_copy(update={"translation_mm": shifted})
         with qf.open(config.model_copy(update={"infrared": moved})) as scanner:
             shot, calibration = scanner.grab(), scanner.calibration
-        told = [
-            by_name(examine_shot(shot, qf.Plan(912, calibration=calibration.model_copy(update={"infrared": pair}))))
-            for pair in (None, moved)
-        ]
-        assert [one["coaxial pair"].grade for one in told] == [grade, known_grade]
-        assert ("wrong by whole fringes" in told[0]["coaxial pair"].found) == (grade == "fault")
+        plans = [qf.Plan(912, calibration=calibration.model_copy(update={"infrared": pair})) for pair in (None, moved)]
+        told[shift_mm] = [by_name(examine_shot(shot, plan)) for plan in plans]
+    assert [one["coaxial pair"].grade for one in told[0.5]] == ["warning", "good"]
+    assert [one["infrared registration"].grade for one in told[0.5]] == ["warning", "warning"]
+    for one in told[1.5]:
+        assert one["infrared registration"].grade == "fault"
+        assert "the infrared projector has moved" in one["infrared registration"].fix
 
 
 def test_a_calibration_tells_what_is_wrong_with_it() -> None:

@@ -6,6 +6,8 @@ tests the waves of a decoded shot, for which the phase of red and blue suffices 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from quadfringe import _core
@@ -68,16 +70,22 @@ def wrong_bits(shot: AnyShot) -> Cause | None:
 
 
 def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
-    """Find an infrared image that is shifted from the visible one, and the shift that mends it."""
+    """Find an infrared image that is shifted from the visible one, and the shift that mends it.
+
+    It is fatal from half the angle of a wrong order on: then orders are wrong, or nearly so.
+    """
     if closure is None or not plan.fringes.infrared or not channels_fit(closure):
         return None
     turned = abs(closure.angle.rad) > params.CLOSURE_RAD and closure.angle.steady > params.STEADY_MIN
     columns = closure.shift_px if turned else 0.0
     rows = symptoms.rows_match(shot, plan, columns)
+    first, _, third = plan.fringes.numbers
+    fatal = not turned or abs(closure.angle.rad) > np.pi * (first - third) / first
     if turned and rows is not None and rows.still > rows.moved + params.CORRELATION_MORE:
-        return _pair_moved(columns)
+        return replace(_pair_moved(columns), fatal=fatal)
     if turned or (rows is not None and abs(rows.shift_px) > params.SHIFT_MIN_PX):
-        return _shifted(columns, None if rows is None or rows.moved < params.CORRELATION_MIN else rows.shift_px)
+        shift_px = None if rows is None or rows.moved < params.CORRELATION_MIN else rows.shift_px
+        return replace(_shifted(columns, shift_px), fatal=fatal)
     return None
 
 
@@ -88,7 +96,8 @@ def _shifted(columns: float, rows: float | None) -> Cause:
     return Cause(
         "infrared registration",
         words,
-        "register the chips: quadfringe calibrate run with its step registration, and decode with that calibration",
+        "register the chips: quadfringe calibrate run with its step registration, and decode with that calibration; if "
+        "edges lie at the same place in all channels, the infrared projector has moved: calibrate the pair again",
     )
 
 

@@ -12,7 +12,7 @@ that a wrong order hides, because a wrong order leaves them as they are:
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -70,13 +70,11 @@ def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause
     mean = _mean(offsets.closure_rad(plan.fringes.numbers))
     if abs(mean) < params.STEADY_MIN or abs(np.angle(mean)) < params.CLOSURE_RAD:
         return None
-    fatal = bool(abs(np.angle(mean)) > np.pi * (first - third) / first)
-    named = registration(shot, plan, closure_of(shot, plan, np.isfinite(shape.quality)))
-    if named is None:
-        words = f"the infrared fringes lie {np.angle(mean):+.2f} rad off their place among those of red and green"
-        fix = "register the chips (quadfringe calibrate run, step registration), or calibrate the pair again"
-        return Cause("infrared registration", words, fix, fatal)
-    return replace(named, fatal=fatal)
+    if named := registration(shot, plan, closure_of(shot, plan, np.isfinite(shape.quality))):
+        return named
+    words = f"the infrared fringes lie {np.angle(mean):+.2f} rad off their place among those of red and green"
+    fix = "register the chips (quadfringe calibrate run, step registration), or calibrate the pair again"
+    return Cause("infrared registration", words, fix, bool(abs(np.angle(mean)) > np.pi * (first - third) / first))
 
 
 def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:

@@ -123,8 +123,8 @@ OFFSET_TILE_PX, OFFSET_SHARE = 96, 0.3
 OFFSET_TILES_MIN = 4
 # Most turns of drift over the field, the least length of the mean phasor, and by how much it must exceed that without
 # drift. Numbers that are farther off leave no margin. Sound shots have no drift that is better than none, and other
-# numbers have a length of 0.82 or more. Smaller numbers believe prints, larger ones miss other numbers on narrow objects:
-# `pytest tests/test_channel_offsets.py`.
+# numbers have a length of 0.82 or more. Smaller numbers believe prints, larger ones miss other numbers on narrow
+# objects: `pytest tests/test_channel_offsets.py`.
 DRIFT_TURNS_MAX, DRIFT_LENGTH, DRIFT_BETTER = 4, 0.75, 0.1
 # Largest shift along y that is searched, px, and the correlation from which it is believed: scenes with detail along
 # y have 0.66 or more, a plane 0.04. A wider search finds chance maxima, a narrower one misses coarse misalignment.

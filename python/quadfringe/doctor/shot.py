@@ -11,6 +11,7 @@ from quadfringe.config import Response
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import Decoder, Plan
 from quadfringe.decoding.causes import blur, registration, wrong_bits
+from quadfringe.decoding.channel_offsets import contradiction
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes, infrared_drift
 from quadfringe.decoding.light_border import BY_HAND, borders_of
 from quadfringe.decoding.plan import stated_response
@@ -70,7 +71,7 @@ def _rank(one: Finding) -> tuple[int, int]:
 def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     """Check the fringes of a decoded shot, channel by channel and against one another."""
     closure = closure_of(shot, plan)
-    named = [registration(shot, plan, closure)]
+    named = [contradiction(shape, shot, plan) or registration(shot, plan, closure)]
     fit = fit_fringes(shot, shape, plan)
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"
