@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from support.bars import hold
 
 import quadfringe as qf
@@ -25,6 +26,8 @@ OBJECTS = [
     ("right_percent", 110, 0.2, 4),
     ("small_right_percent", 20, 0.02, 2),
     ("small_right_percent", 74, 0.02, 4),
+    ("small_right_percent", 74, 0.02, 16),  # two fringes of low order margin
+    ("small_right_percent", 110, 0.02, 11),  # one and a third
 ]
 WORST = [
     ("plate", "cut out", 4),
@@ -83,6 +86,26 @@ def test_the_fringe_period_can_be_told() -> None:
     shape = qf.decode(shot, plan)
     assert shape.config["decode"]["period_px"] == 18.0
     hold("isolated.right_percent", scoring.score(scene, shape.phase_rad).right_percent)
-    for period_px in (2.0, -5.0, np.nan):
+    for period_px in (2.0, -5.0, np.nan, (2.0, 20.0), (30.0, 20.0), (10.0, 20.0, 30.0)):
         with pytest.raises(qf.ConfigError, match="period_px"):
             qf.DecodeConfig(period_px=period_px)
+
+
+def test_the_fringe_period_can_be_told_as_a_range() -> None:
+    scene = isolated(20, 0.05, 2)
+
+    def phase(period_px: float | tuple[float, float] | None) -> NDArray[np.float32]:
+        shot, plan = scenes.plan_of(scene, response="linear", period_px=period_px)
+        shape = qf.decode(shot, plan)
+        assert shape.config["decode"]["period_px"] == (list(period_px) if isinstance(period_px, tuple) else period_px)
+        return shape.phase_rad
+
+    np.testing.assert_array_equal(phase((12.0, 30.0)), phase(None), "an estimate in the range stands")
+    np.testing.assert_array_equal(phase((25.0, 36.0)), phase(30.0), "one outside gives way to the geometric mean")
+
+
+def test_a_small_object_with_other_fringe_numbers_is_refused() -> None:
+    scene = isolated(110, 0.02, 11)
+    for numbers in ((36.0, 35.0, 30.0), (13.0, 12.0, 10.0), (12.0, 11.0, 10.0)):
+        with pytest.raises(DecodeError, match="period_px"):
+            scenes.shape_of(replace(scene, fringe_numbers=numbers), response="linear")

@@ -216,6 +216,10 @@ DECODE = ("decode", "shot", "--out", "x.npz", "--projector-width", 912, "--fring
             "change the method, or leave --channel-instants-us out",
         ),
         (
+            (*DECODE, 30, "--period-px", 150, 80),
+            "--period-px: expected the shortest period before the longest, got 150 and 80",
+        ),
+        (
             (*DECODE, 30, "--channel-instants-us", 0, 0, 0, 0),
             "--channel-instants-us: expected times that differ, or none, got (0, 0, 0, 0)",
         ),

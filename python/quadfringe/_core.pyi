@@ -278,7 +278,7 @@ class Decoder:
         method: str | None = None,
         modulation_min: float | None = None,
         quality_min: float | None = None,
-        period_px: float | None = None,
+        period_px: float | _Vector2 | None = None,
         channel_instants_us: Sequence[float] | None = None,
         albedo: bool | None = None,
         detail: float | None = None,
@@ -297,7 +297,7 @@ class Decoder:
     def settings(self) -> dict[str, str | float | list[float] | None]:
         """Give every setting in force, defaults included, and `method_version`, for saved results.
 
-        With `period_px` None the fringe period is estimated from every shot.
+        With `period_px` None the fringe period is estimated from every shot. A pair states the shortest and longest.
         """
 
     def decode(

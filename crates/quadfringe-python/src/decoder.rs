@@ -4,7 +4,7 @@ use crate::arrays::{BAYER_IMAGES, CHANNELS, COLOURS, Images, RAW, value_error, v
 use crate::conditioner::{ResponseNumbers, conditioner_of, scaled};
 use crate::device::{Device, FringeNumbers};
 use crate::memory::{Memory, Optional};
-use crate::plan::{Choices, Geometry, planned};
+use crate::plan::{Choices, Geometry, Period, planned};
 use crate::workers::{Workers, detached, interruptible};
 use numpy::ndarray::{ArrayView2, Ix2};
 use numpy::{Element, PyReadonlyArray};
@@ -62,7 +62,7 @@ impl Decoder {
         method: Option<&str>,
         modulation_min: Option<f32>,
         quality_min: Option<f32>,
-        period_px: Option<f64>,
+        period_px: Option<Period>,
         channel_instants_us: Option<[f32; 4]>,
         albedo: Option<bool>,
         detail: Option<f32>,

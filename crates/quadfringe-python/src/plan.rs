@@ -2,15 +2,23 @@
 
 use crate::device::Device;
 use crate::pair::pair_of;
+use pyo3::FromPyObject;
 use quadfringe::height::{PairTable, Triangulator};
 use quadfringe::{Decoder, DecoderBuilder, Method, Options, Result};
+
+/// A fringe period in camera pixels, or the shortest and the longest one.
+#[derive(Clone, Copy, FromPyObject)]
+pub enum Period {
+    Known(f64),
+    Range([f64; 2]),
+}
 
 /// The method and its thresholds.
 pub struct Choices<'a> {
     pub method: Option<&'a str>,
     pub modulation_min: Option<f32>,
     pub quality_min: Option<f32>,
-    pub period_px: Option<f64>,
+    pub period_px: Option<Period>,
     pub channel_instants_us: Option<[f32; 4]>,
     pub albedo: Option<bool>,
     pub detail: Option<f32>,
@@ -49,7 +57,11 @@ pub fn planned(builder: DecoderBuilder, choices: &Choices<'_>, geometry: &Geomet
     let mut options = Options::default().with_method(method);
     options.modulation_min = choices.modulation_min;
     options.quality_min = choices.quality_min.unwrap_or(options.quality_min);
-    options.period_px = choices.period_px;
+    match choices.period_px {
+        Some(Period::Known(period_px)) => options.period_px = Some(period_px),
+        Some(Period::Range(range_px)) => options.period_range_px = Some(range_px),
+        None => {}
+    }
     options.albedo = choices.albedo.unwrap_or(options.albedo);
     let builder = builder.options(options);
     match geometry.devices() {

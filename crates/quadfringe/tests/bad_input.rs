@@ -123,6 +123,8 @@ fn plans_out_of_range_are_refused() {
     assert_says(settings(plain.clone().with_quality_min(1.0)), &["quality_min"]);
     for period_px in [1.0, 64.5, 1e300, f64::NAN] {
         assert_says(settings(plain.clone().with_period_px(period_px)), &["period_px", "from 3 to 64"]);
+        let range = plain.clone().with_period_range_px([3.0, period_px]);
+        assert_says(settings(range), &["period_px", "from 3 to 64"]);
     }
     let instants = |instants| {
         settings(plain.clone().with_method(JointOptions::default().with_channel_instants_us(instants)))

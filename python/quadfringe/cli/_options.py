@@ -33,6 +33,7 @@ __all__ = [
     "InstantsOption",
     "JsonOption",
     "OutFolder",
+    "PeriodOption",
     "PortOption",
     "PredeformedOption",
     "ShotsOption",
@@ -101,11 +102,11 @@ class ChannelsOfCode(StrEnum):
 
 
 class SomeNumbers(tuple[float, ...]):
-    """The numbers of one option, whose count depends on the encoding."""
+    """The numbers of one option, whose count may differ."""
 
 
 def _some_numbers(words: str) -> SomeNumbers:
-    """Read the numbers of one option; their count is checked with the encoding."""
+    """Read the numbers of one option; the settings check their count."""
     try:
         return SomeNumbers(float(word) for word in words.split())
     except ValueError:
@@ -134,7 +135,8 @@ def _is_number(word: str) -> bool:
 
 
 FRINGES_3 = (36.0, 35.0, 30.0)
-SEVERAL_NUMBERS = {"--fringes": 3, "--channel-instants-us": 4}  # options, and how many numbers they have at most
+# Options, and how many numbers they have at most.
+SEVERAL_NUMBERS = {"--fringes": 3, "--channel-instants-us": 4, "--period-px": 2}
 FringesOption = Annotated[
     SomeNumbers | None,
     typer.Option(
@@ -153,6 +155,16 @@ InstantsOption = Annotated[
         parser=_some_numbers,
         help="Time at which each channel is exposed, us, relative to the instant of the result; use it for moving "
         "objects when the projector shows the colours one after another. Default: all at once.",
+    ),
+]
+PeriodOption = Annotated[
+    SomeNumbers | None,
+    typer.Option(
+        "--period-px",
+        metavar="PX [PX]",
+        parser=_some_numbers,
+        help="Fringe period across the fringes, camera pixels, or the shortest and the longest one; default: estimated "
+        "from the shot. Give it if the estimate fails, as on an object narrower than two fringes.",
     ),
 ]
 EncodingOption = Annotated[

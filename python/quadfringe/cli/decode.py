@@ -23,6 +23,7 @@ from quadfringe.cli._options import (
     FringesOption,
     InstantsOption,
     JsonOption,
+    PeriodOption,
     PredeformedOption,
     decode_settings,
     fringes_from,
@@ -111,14 +112,6 @@ DepthRangeOption = Annotated[
         metavar="MM MM", help="Nearest and farthest depth, mm; points outside are no data. Needs --calibration."
     ),
 ]
-PeriodOption = Annotated[
-    float | None,
-    typer.Option(
-        metavar="PX",
-        help="Fringe period across the fringes, camera pixels; default: estimated from the shot. Give it if the "
-        "estimate fails, as on an object narrower than two fringes.",
-    ),
-]
 DetailOption = Annotated[
     float | None,
     typer.Option(
@@ -183,12 +176,13 @@ def _settings(
     method: str | None,
     unwrapping: Unwrapping | None,
     depth_range_mm: tuple[float, float] | None,
-    period_px: float | None,
+    period_px: tuple[float, ...] | None,
     channel_instants_us: tuple[float, ...] | None,
 ) -> dict[str, Any]:
     """Give the options of the method by the names of the settings."""
     given: dict[str, Any] = {"method": method, "unwrapping": unwrapping and unwrapping.value}
-    given |= {"depth_range_mm": depth_range_mm, "period_px": period_px, "channel_instants_us": channel_instants_us}
+    given |= {"depth_range_mm": depth_range_mm, "channel_instants_us": channel_instants_us}
+    given["period_px"] = period_px[0] if period_px and len(period_px) == 1 else period_px
     return given
 
 

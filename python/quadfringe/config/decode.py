@@ -81,6 +81,11 @@ def _kind_of(value: Any) -> str | None:
     return "(file)" if isinstance(value, (str, Path)) and Path(value).suffix == ".json" else None
 
 
+PeriodPx = Annotated[Finite, Field(ge=PERIOD_MIN_PX, le=SIZE_MAX)]
+PeriodSetting = Annotated[
+    Annotated[PeriodPx, Tag("(number)")] | Annotated[tuple[PeriodPx, PeriodPx], Tag("(range)")],
+    Discriminator(lambda value: "(range)" if isinstance(value, (list, tuple)) else "(number)"),
+]
 ResponseSetting = Annotated[
     Annotated[Literal["auto", "linear"], Tag("(word)")]
     | Annotated[Path, Tag("(file)")]
@@ -130,11 +135,11 @@ class DecodeConfig(Model):
         description="Least quality of a valid pixel, from 0 to below 1. Raise it for fewer wrong orders and fewer "
         "pixels.",
     )
-    period_px: Annotated[Finite, Field(ge=PERIOD_MIN_PX, le=SIZE_MAX)] | None = Field(
+    period_px: PeriodSetting | None = Field(
         default=None,
         description="Fringe period across the fringes in camera pixels, from 3 to the longer side of the image, good "
-        "to a third. Absent: estimated from every shot. Give it if the estimate fails, as on an object narrower than "
-        "two fringes.",
+        "to a third; or the shortest and the longest one, between which it is estimated. Absent: estimated from every "
+        "shot. Give it if the estimate fails, as on an object narrower than two fringes.",
     )
     channel_instants_us: tuple[Finite, ...] | None = Field(
         default=None,
@@ -156,6 +161,13 @@ class DecodeConfig(Model):
     threads: Annotated[int, Field(gt=0, le=_core.THREADS_MAX)] | None = Field(
         default=None, description="Threads of one decoder, at most 1024. Absent: as many as the machine has cores."
     )
+
+    @field_validator("period_px")
+    @classmethod
+    def _ascending(cls, value: float | tuple[float, float] | None) -> float | tuple[float, float] | None:
+        if isinstance(value, tuple) and value[0] > value[1]:
+            raise ValueError(f"expected the shortest period before the longest, got {value[0]:g} and {value[1]:g}")
+        return value
 
     @field_validator("modulation_min", "quality_min", "channel_instants_us", "detail")
     @classmethod

@@ -199,10 +199,11 @@ def _check_size(size: Size, plan: Plan) -> None:
     rays = PAIR_BYTES_PER_PX if plan.decode.unwrapping == "pair" else 0
     require_memory("decoding", size, BYTES_PER_PX[plan.decode.method or "joint"] + rays)
     period_px = plan.decode.period_px
-    if period_px is not None and period_px > max(size):
+    longest_px = max(period_px) if isinstance(period_px, tuple) else period_px
+    if longest_px is not None and longest_px > max(size):
         raise InputError(
-            f"period_px: expected at most {max(size)} px, the longer side of the images, got {period_px:g}; the period "
-            "is that of the fringes in the image of the camera"
+            f"period_px: expected at most {max(size)} px, the longer side of the images, got {longest_px:g}; the "
+            "period is that of the fringes in the image of the camera"
         )
     if plan.calibration is None:
         return
@@ -240,8 +241,8 @@ def rows_of_calibration(calibration: Calibration, first: int, count: int) -> Cal
 
 def _stated(plan: Plan) -> dict[str, Any]:
     """Give the settings that stand in a file as they were stated, not as the kernel was given them."""
-    stated = {name: getattr(plan.decode, name) for name in ("depth_range_mm", "channel_instants_us")}
-    return {name: list(value) for name, value in stated.items() if value is not None}
+    stated = {name: getattr(plan.decode, name) for name in ("depth_range_mm", "channel_instants_us", "period_px")}
+    return {name: list(value) for name, value in stated.items() if isinstance(value, tuple)}
 
 
 def _geometry(plan: Plan) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,9 @@ __all__ = ["channels_agree"]
 TILE_PX = 96  # side of a tile: a fringe or more, so that texture averages out
 TILE_SHARE = 0.3  # least share of the pixels of a tile that are returned
 TILES_MIN = 4
+# A smaller object is cut into as many bands of rows, which cross all its fringes, each with this many pixels or more:
+# those of a tile that is just full enough.
+BAND_PIXELS_MIN = TILE_SHARE * TILE_PX**2
 # Three quarters of the tiles are off by at most this. On coloured patches and photographs it is 0.1 rad in sound shots,
 # and 0.2 rad or more with other fringe numbers. `pytest tests/test_real_objects.py` decodes both.
 OFFSET_MAX_RAD = 0.12
@@ -44,12 +48,20 @@ def _offset_rad(image: NDArray[Any], phase_rad: NDArray[Any]) -> float:
     known = np.isfinite(phase_rad) & np.isfinite(image)
     rows, columns = (range(0, size - TILE_PX + 1, TILE_PX) for size in image.shape)
     tiles = [np.s_[y : y + TILE_PX, x : x + TILE_PX] for y in rows for x in columns]
-    offsets = [
-        _tile_offset_rad(image[tile][known[tile]], phase_rad[tile][known[tile]])
-        for tile in tiles
-        if known[tile].mean() >= TILE_SHARE
-    ]
-    return float(np.quantile(np.abs(offsets), QUANTILE)) if len(offsets) >= TILES_MIN else np.inf
+    tiles = [tile for tile in tiles if known[tile].mean() >= TILE_SHARE]
+    if len(tiles) < TILES_MIN:
+        tiles = _bands(known)
+    offsets = [_tile_offset_rad(image[tile][known[tile]], phase_rad[tile][known[tile]]) for tile in tiles]
+    return float(np.quantile(np.abs(offsets), QUANTILE)) if offsets else np.inf
+
+
+def _bands(known: NDArray[np.bool_]) -> list[tuple[slice, slice]]:
+    """Cut a small object into bands of rows with as many pixels each; none if it has too few."""
+    below = np.cumsum(known.sum(axis=1))
+    if below[-1] < TILES_MIN * BAND_PIXELS_MIN:
+        return []
+    ends = [0, *np.searchsorted(below, below[-1] * np.arange(1, TILES_MIN) / TILES_MIN), len(below)]
+    return [np.s_[first:end, :] for first, end in pairwise(ends)]
 
 
 def _tile_offset_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> float:

@@ -27,6 +27,7 @@ __all__ = [
     "family",
     "listed",
     "other_numbers",
+    "period_fix",
     "registration",
     "too_bright",
     "wrong_bits",
@@ -34,9 +35,20 @@ __all__ = [
 ]
 
 FringeNumbers = tuple[float, ...]
+# Lit share below which the object may be narrower than a few fringes, whose period is then worth stating. An object of
+# 0.1 of the frame spans four fringes of a twelfth of its width. Not measured: it only adds a line to the fix.
+FEW_LIT = 0.1
 NUMBERS_FIX = "give the numbers that were projected (--fringes), or project these"
 SMALLEST_ROOT, LARGEST_ROOT = 4, 12  # 16, 15, 12 and 144, 143, 132: coarser or finer fringes measure nothing
 SMALLEST_PAIR, LARGEST_PAIR = 6, 20  # N, N - 1 without infrared: finer fringes look alike after one of them
+
+
+def period_fix(share: float) -> str:
+    """Give what to do if an object that fills this share of the image is narrower than a few fringes; else no words."""
+    words = (
+        "; if the object is narrower than a few fringes, give their period, or the shortest and the longest one, in "
+    )
+    return words + "camera pixels (period_px, --period-px)" if 0 < share < FEW_LIT else ""
 
 
 def before_order(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:

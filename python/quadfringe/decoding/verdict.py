@@ -22,6 +22,7 @@ from quadfringe.decoding.causes import (
     channels_fit,
     listed,
     other_numbers,
+    period_fix,
     wrong_bits,
 )
 from quadfringe.decoding.plan import Plan
@@ -67,7 +68,6 @@ LIT_MIN, UNSATURATED_MIN = 0.005, 0.05
 # Least share of lit pixels among those that are as bright as they. Seven of 1,000 images of noise have 0.006 to 0.045
 # lit pixels by chance (published): `python -m hostile --shots 1000` in the folder tests.
 CHANCE_MAX = 0.1
-
 # A band of rows shows which exchanges can explain a doubtful shot: the share of the rows, and their least number.
 BAND_SHARE, BAND_ROWS_MIN = 1 / 8, 96
 # Margin in the band, as a share of the margin at which channels count as exchanged, from which the whole image is
@@ -105,7 +105,7 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
         _refuse_exchanged(shape, shot, max(collapsed, CLEARLY_BETTER * margin), decoder)
     if collapse:
         cause = None if decoder is None else after_order(shot, shape, decoder.plan, closure) or mirrored(shape)
-        raise (cause or _collapsed(margin)).error
+        raise (cause or _collapsed(margin, _lit_share(shape))).error
 
 
 def _refuse_shown(shot: AnyShot, shape: Shape, plan: Plan | None, closure: Closure | None) -> None:
@@ -118,16 +118,16 @@ def _refuse_shown(shot: AnyShot, shape: Shape, plan: Plan | None, closure: Closu
         raise cause.error
     if (share := _lit_share(shape)) < LIT_MIN:
         words = f"{'hardly a' if share else 'no'} pixel carries fringes in all channels"
-        fix = "check focus and exposure, and that every channel is given once"
+        fix = "check focus and exposure, and that every channel is given once" + period_fix(share)
         raise Cause("no fringes", words, fix).error
 
 
-def _collapsed(margin: float) -> Cause:
+def _collapsed(margin: float, share: float) -> Cause:
     return Cause(
         ORDERS,
         f"the order margin has collapsed: below {margin:.2f} of 1 for half of the lit pixels; no test names the cause",
         "check that the channels are red, green, blue (and ir) in this order, and that the fringe numbers, the "
-        "projector width and the response are those of this shot",
+        "projector width and the response are those of this shot" + period_fix(share),
     )
 
 

@@ -26,6 +26,9 @@ pub struct Options {
     /// estimates it from every shot. Set it if the estimate fails, for example for an object narrower than two fringes.
     /// Default: `None`.
     pub period_px: Option<f64>,
+    /// Shortest and longest fringe period across the fringes in camera pixels, within the limits of [`Self::period_px`], which
+    /// takes its place if both are set. An estimate outside is replaced by the geometric mean of both. Default: `None`.
+    pub period_range_px: Option<[f64; 2]>,
     /// Whether the joint method gives the albedo. Without it, a decode takes less time. Default: true.
     pub albedo: bool,
 }
@@ -37,6 +40,7 @@ impl Default for Options {
             modulation_min: None,
             quality_min: QUALITY_MIN,
             period_px: None,
+            period_range_px: None,
             albedo: true,
         }
     }
@@ -69,6 +73,23 @@ impl Options {
     pub const fn with_period_px(mut self, period_px: f64) -> Self {
         self.period_px = Some(period_px);
         self
+    }
+
+    /// These options with this shortest and longest fringe period in camera pixels.
+    #[must_use]
+    pub const fn with_period_range_px(mut self, period_range_px: [f64; 2]) -> Self {
+        self.period_range_px = Some(period_range_px);
+        self
+    }
+
+    /// The fringe period in camera pixels that the options state, or else the one that is `estimated` within their range.
+    pub(crate) fn period_px_or(&self, estimated: impl FnOnce() -> f64) -> f64 {
+        self.period_px.unwrap_or_else(|| match (estimated(), self.period_range_px) {
+            (outside, Some([shortest, longest])) if !(shortest..=longest).contains(&outside) => {
+                (shortest * longest).sqrt()
+            }
+            (found, _) => found,
+        })
     }
 
     /// These options with or without the albedo.
@@ -129,12 +150,20 @@ impl Options {
             }
         }
         let longest = shape[0].max(shape[1]) as f64;
-        match self.period_px {
-            Some(period) if !(PERIOD_MIN_PX..=longest).contains(&period) => {
+        for period in self.period_px.into_iter().chain(self.period_range_px.into_iter().flatten()) {
+            if !(PERIOD_MIN_PX..=longest).contains(&period) {
                 let expected = Limit::Range { from: PERIOD_MIN_PX, to: longest };
                 return Err(Error::value("period_px (camera pixels)", expected, period));
             }
-            _ => {}
+        }
+        if let Some([shortest, longest]) =
+            self.period_range_px.filter(|[shortest, longest]| shortest > longest)
+        {
+            return Err(Error::value(
+                "longest period_range_px (camera pixels)",
+                Limit::AtLeast(shortest),
+                longest,
+            ));
         }
         self.method.check(shape)
     }

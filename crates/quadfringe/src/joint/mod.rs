@@ -143,7 +143,7 @@ impl Joint {
         self.linearise(plan, shot);
         // 2. The fringe period scales all windows, cells and the coarse level.
         let found = || fringe_period_px(&self.pyramid.full.light, self.shape, self.ratios);
-        let period_px = options.period_px.unwrap_or_else(found);
+        let period_px = options.period_px_or(found);
         let grid = Grid::with_stride(self.shape, self.stride, period_px / CELLS_PER_PERIOD);
         let coarse_grid = grid.shrunk(pyramid::factor(period_px, &grid));
         let least = || least_modulation(&self.pyramid.full.light[0], &grid);

@@ -171,10 +171,7 @@ impl Published {
         out: &mut Decoded,
     ) {
         // 2. The fringe period.
-        let period_px = match options.period_px {
-            Some(period_px) => period_px,
-            None => self.period_px(conditioning, shot),
-        };
+        let period_px = options.period_px_or(|| self.period_px(conditioning, shot));
         let mut plan = self.plan(conditioning, options, period_px);
         let mut rows = out.row_by_row();
         // 7. Uncertainties follow from statistics of the shot, which come from a few strips.

@@ -116,10 +116,20 @@ impl LineTransform {
             let inside = sample.is_finite();
             *value = if inside { (sample - mean) * weight } else { 0.0 };
         }
+        self.transform();
+        mean
+    }
+
+    /// Finds the spectrum of the values of a line as they are.
+    pub fn run_plain(&mut self, line: impl Iterator<Item = f32>) {
+        self.input.iter_mut().zip(line).for_each(|(value, sample)| *value = sample);
+        self.transform();
+    }
+
+    fn transform(&mut self) {
         self.forward
             .process_with_scratch(&mut self.input, &mut self.spectrum, &mut self.work)
             .expect("buffers were made by this plan");
-        mean
     }
 }
 

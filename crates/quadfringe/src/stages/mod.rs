@@ -25,6 +25,7 @@ mod carrier;
 mod columns;
 mod fourier;
 mod ladder;
+mod lit_carrier;
 mod n_step;
 mod params;
 mod phases;

@@ -36,6 +36,33 @@ pub(crate) const QUADRATURE_SHARE_MIN: f32 = 0.3;
 /// quadfringe --lib quadrature` bounds the error; from 0.1 to 0.3 the periods of its scenes hardly change.
 pub(crate) const DIRECTION_SHARE_MIN: f64 = 0.3;
 
+/// Step in pixels, in both directions, of the samples that tell which part of a frame is lit. A smaller step finds smaller
+/// objects; a larger one takes less time. Follows from the least object: 20 px in a direction have five samples.
+pub(crate) const LIT_STEP: usize = 4;
+
+/// Least number of lit samples of a line that takes part. A larger number leaves out the ends of an object; a smaller one takes
+/// in bright pixels of the ground. Follows from the fit: a constant and a wave need a few pixels.
+pub(crate) const LIT_SAMPLES_MIN: usize = 2;
+
+/// Shares of the pixels that are not brighter than the dark ground and than the bright end of the light. A greater upper share
+/// lets highlights darken the object; a smaller one misses objects that fill less of the frame. Not measured.
+pub(crate) const LIT_QUANTILES: [f64; 2] = [0.1, 0.995];
+
+/// Place between the dark ground and the bright end above which a pixel is lit. A larger value leaves out the dark halves of
+/// fringes and dark surfaces; a smaller one takes in stray light. `cargo test -p quadfringe --lib quadrature` bounds the
+/// error; from 0.1 to 0.25 the periods of its scenes hardly change.
+pub(crate) const LIT_SHARE: f32 = 0.15;
+
+/// Largest share of a frame that counts as a small part, whose light is taken by itself. A larger share also treats objects so
+/// whose fringes are many; a smaller one leaves objects of two fringes to the spectra of whole lines. `pytest
+/// tests/test_real_objects.py` decodes objects that fill 2 to 15 %.
+pub(crate) const SMALL_PART: f64 = 0.25;
+
+/// Least energy of a wave on the lit pixels of a line without its mean, divided by its energy with it. A larger value takes
+/// weight from waves longer than the line; a smaller one lets noise pass for them. Follows from a wave: an arc of a seventh of
+/// a period has less. From 0.02 to 0.1 the periods of `cargo test -p quadfringe --lib quadrature` hardly change.
+pub(crate) const WAVE_ENERGY_MIN: f32 = 0.02;
+
 /// Least power of a carrier divided by the power of the mean level. Follows from the rounding of `f32`, which leaves
 /// less than 1e-12 of a flat line; fringes with an amplitude of 0.1 % of the level have 9e-8.
 pub(crate) const CARRIER_POWER_MIN: f32 = 1e-8;
