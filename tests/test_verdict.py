@@ -12,7 +12,8 @@ from support.bars import hold
 
 import quadfringe as qf
 from quadfringe.decoding._kernel import KernelDecoder
-from quadfringe.decoding.verdict import NEAR, band_of, order_margin, rows_of
+from quadfringe.decoding.readings import band_of, rows_of
+from quadfringe.decoding.verdict import NEAR, order_margin
 from quadfringe.errors import DecodeError
 
 METHODS = ("joint", "published")
