@@ -49,7 +49,7 @@ def trusted_part(shape: Shape, shot: AnyShot, plan: Plan) -> Mask | None:
     contradicted = np.zeros(shape.quality.shape, bool)
     closures: list[tuple[Closure, Mask]] = []
     for box, inside in _regions(_sure(shape, params.LOCAL_MARGIN_MIN), _least_pixels(shape)):
-        # Without its surroundings the region has its own fringe period, and not that of a pattern on a wall.
+        # The period is then that of the region, and not that of a pattern on a wall around it.
         waves = waves_of({name: np.ascontiguousarray(image[box]) for name, image in light.items()}, plan)
         if waves is None:
             continue

@@ -36,8 +36,8 @@ CHECK_ALL = (
     "check that the channels are red, green, blue (and ir) in this order, and that the fringe numbers, the projector "
     "width and the response are those of this shot"
 )
-# Reasons that hold for the whole shot whatever a part of it shows.
-WHOLE = ("bits", "blind channel", "fringe numbers", "mirrored or rotated")
+# Reasons that may hold for a part of a shot. Others, as wrong fringe numbers or crosstalk, hold for all of it.
+IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes")
 # Share of the returned pixels from which a trusted part is the object, and the rest are pixels lit by chance around it,
 # which is not told. The wall around an object of 2 % of the frame has a tenth of them (`pytest tests/test_trusted.py`).
 KEPT_MIN = 0.7
@@ -96,14 +96,13 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause |
     try:
         _refuse_whole(shape, shot, decoder)
     except DecodeError as refused:
-        part = None if decoder is None or refused.reason in WHOLE else trusted_part(shape, shot, decoder.plan)
+        part = None if decoder is None or refused.reason not in IN_PART else trusted_part(shape, shot, decoder.plan)
         if part is None:
             raise
         rest, few = shape.returned & ~part, np.count_nonzero(part) < KEPT_MIN * np.count_nonzero(shape.returned)
         take_out(shape, rest)
-        found = str(refused).removeprefix("no shape: ").removesuffix(f"; {refused.fix}")
-        words = f"only {part.mean():.0%} of the image can be trusted, and the rest is no data; of the shot as a whole: "
-        return Cause(refused.reason, words + found, refused.fix, fatal=False) if few else None
+        words = f"only {part.mean():.0%} of the image can be trusted, and the rest is no data; of the shot as a whole"
+        return Cause.doubt(refused, words) if few else None
     return None
 
 
