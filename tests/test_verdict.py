@@ -11,8 +11,9 @@ import pytest
 from support.bars import hold
 
 import quadfringe as qf
-from quadfringe.decoding._kernel import KernelDecoder, rows_of
-from quadfringe.decoding.verdict import NEAR, band_of, order_margin
+from quadfringe.decoding._kernel import KernelDecoder
+from quadfringe.decoding.readings import band_of, rows_of
+from quadfringe.decoding.verdict import NEAR, order_margin
 from quadfringe.errors import DecodeError
 
 METHODS = ("joint", "published")

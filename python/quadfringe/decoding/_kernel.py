@@ -24,7 +24,6 @@ __all__ = [
     "check_channels",
     "check_shot",
     "rounded",
-    "rows_of",
     "rows_of_calibration",
     "size_of",
 ]
@@ -218,14 +217,6 @@ def _check_size(size: Size, plan: Plan) -> None:
             f"the calibration's projector has {projector.width_px} columns, "
             f"projector_width_px is {plan.projector_width_px}; the two must agree"
         )
-
-
-def rows_of(shot: AnyShot, first: int, count: int) -> AnyShot:
-    """Give a shot of some rows only."""
-    images = {name: image[first : first + count] for name, image in shot.images.items()}
-    if isinstance(shot, BayerShot):
-        return BayerShot(images["raw"], shot.bayer, images.get("ir"), shot.full_scale)
-    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
 
 
 def rows_of_calibration(calibration: Calibration, first: int, count: int) -> Calibration:

@@ -18,6 +18,12 @@ class Cause:
     fix: str
     fatal: bool = True
 
+    @classmethod
+    def doubt(cls, refused: DecodeError, words: str) -> Cause:
+        """Make the doubt, introduced by `words`, of a refusal that holds for a part of a shot only."""
+        found = str(refused).removeprefix("no shape: ").removesuffix(f"; {refused.fix}")
+        return cls(refused.reason, f"{words}: {found}", refused.fix, fatal=False)
+
     @property
     def error(self) -> DecodeError:
         """The refusal of the shot for this cause."""

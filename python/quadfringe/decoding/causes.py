@@ -29,6 +29,7 @@ __all__ = [
     "other_numbers",
     "period_fix",
     "registration",
+    "strange",
     "too_bright",
     "wrong_bits",
     "wrong_numbers",
@@ -69,6 +70,11 @@ def after_order(shot: AnyShot, shape: Shape, plan: Plan, closure: Closure | None
 def channels_fit(closure: Closure | None) -> bool:
     """Say whether every channel has the frequency of its fringe number, and red and blue are in order."""
     return closure is not None and closure.angle.agreement > params.AGREEMENT_MIN and _off(closure) < params.RATIO_OFF
+
+
+def strange(closure: Closure | None) -> bool:
+    """Say whether a channel has a frequency that no other fringe numbers explain, as an exchanged one has."""
+    return closure is not None and _off(closure) >= params.RATIO_STRANGE
 
 
 def wrong_bits(shot: AnyShot) -> Cause | None:

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
-from quadfringe.decoding._kernel import rows_of, rows_of_calibration
+from quadfringe.decoding._kernel import rows_of_calibration
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration
 from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.readings import rows_of
 from quadfringe.decoding.stages import linear_light
 from quadfringe.decoding.symptoms import closure_of
 

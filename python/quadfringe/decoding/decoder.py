@@ -129,14 +129,14 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
 
     This is all that a decode does besides the kernel. `kernel` decodes a doubtful shot otherwise, None leaves that out.
     """
-    judge(shape, shot, kernel)
+    rest = judge(shape, shot, kernel)
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
     if kernel is not None and (cause := contradiction(shape, shot, plan)):
         doubts.append(cause)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
-    light = (doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot))
+    light = (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot))
     doubts = [*doubts, *filter(None, light), *within_depths(shape, plan.decode.depth_range_mm)]
     if words := checked_rows(shape, borders):
         shape = replace(shape, config={**shape.config, "geometry": words})

@@ -104,6 +104,9 @@ AGREEMENT_MIN = 0.3
 CLOSURE_PX = 31
 # Lag of the local frequency, px, and its window. Longer ones cross more edges, shorter ones are noisier.
 LAG_PX, FREQUENCY_PX = 8, 25
+# The same lag in periods, at most: half a period is the limit of what a phase tells. A larger share turns fine fringes
+# round, a smaller one is noisier.
+LAG_TURNS = 0.4
 # Angle of the closure in rad from which infrared counts as shifted: 0.2 is 1.3 px at a period of 41 px. Sound shots
 # reach 0.03, in tiles 0.13 (patches of 12 mm). A smaller angle names misalignments that cost no order, a larger one
 # misses shifts that bend the phase.
@@ -136,6 +139,35 @@ SHIFT_MIN_PX = 1.5
 # chip. Not measured: above the scatter of equal correlations, 0.02. A larger number blames the chip for a moved
 # projector.
 CORRELATION_MORE = 0.05
+
+# --- The part of a shot that can be trusted: `pytest tests/test_trusted.py`
+
+# Window in px, and the share of it that must be lit, for a place to count as lit. 300 images of noise have no such
+# place, and clusters of 1 % of the frame with a window of 9 px. A larger window or share loses thin objects.
+LIT_WINDOW_PX, LIT_WINDOW_SHARE = 15, 0.8
+# Mean order margin in the window from which a region is looked at. Objects of 2 % of the frame before an even wall have
+# 0.5, all of it right. A larger number loses them; a smaller one looks at regions that the phases then reject.
+LOCAL_MARGIN_MIN = 0.3
+# The same from which lit places are an object and not chance. In 300 images of noise no place has it, and objects of
+# 2 % of the frame have it in 1.2 % by the published method. A smaller number takes noise for an object.
+OBJECT_MARGIN_MIN = 0.6
+# Deviation of the local frequencies from the fringe numbers, and of the phases of the channels from that of the shape,
+# and of their closure, rad, that end a region. A wrong order puts infrared off by 1 rad. Smaller numbers cut regions at
+# noise; larger ones join regions with shifted infrared to sound ones.
+LOCAL_RATIO_OFF, LOCAL_OFF_RAD, LOCAL_CLOSURE_RAD = 0.1, 0.5, 0.6
+# How far green or infrared may drift across the widest region, rad, and the agreement of the closure. Sound regions
+# drift by at most 0.1; 37, 36, 31 read as 36, 35, 30 by 0.3 over a third of the image. A larger number returns regions
+# of neighbouring fringe numbers.
+REGION_DRIFT_RAD, REGION_AGREEMENT_MIN = 0.15, 0.5
+# Share of the window of the closure that must lie in the region for a place to be rejected. A larger share returns
+# wrong orders next to the border of the sound part, a smaller one loses the rim of small objects.
+INNER_SHARE = 0.9
+# Mean width of such a region in infrared fringes, at least. With exchanged channels the phases agree by chance in
+# strips of less than a fringe. A larger number refuses small objects.
+REGION_PERIODS_MIN = 1.2
+# Share of the frame, and number of pixels, of a region that is trusted. An object of 2 % of the frame has 1.5 % inside
+# its rim. Smaller numbers trust chance, larger ones refuse small objects.
+REGION_SHARE, REGION_PX = 0.01, 1500
 
 # --- Blur
 

@@ -18,7 +18,21 @@ from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.stages import carrier, linear_light, wrapped_phases
 from quadfringe.errors import DecodeError
 
-__all__ = ["Closure", "bits_in_use", "brightness", "closure_of", "rows_match", "saturation", "sharpness"]
+__all__ = [
+    "Closure",
+    "bits_in_use",
+    "brightness",
+    "closed_wave",
+    "closure_of",
+    "closure_of_waves",
+    "linear_light_of",
+    "local_mean",
+    "local_rates",
+    "rows_match",
+    "saturation",
+    "sharpness",
+    "waves_of",
+]
 
 Complex = NDArray[np.complex128]
 Map = NDArray[np.float32]
@@ -108,24 +122,34 @@ def closure_of(shot: AnyShot, plan: Plan, lit: NDArray[np.bool_] | None = None) 
 
     Two phases close for every surface; without a third one only the frequency of green tells anything.
     """
-    light = _light(shot, plan)
-    first, second, *others = plan.fringes.numbers
+    waves = waves_of(linear_light_of(shot, plan), plan)
+    if waves is None:
+        return None
+    return closure_of_waves(waves if lit is None else [wave * lit for wave in waves], plan)
+
+
+def waves_of(light: dict[str, Map], plan: Plan) -> list[Complex] | None:
+    """Give exp(i phase) of each channel with another fringe number, 0 without a phase; None without fringes."""
     try:
         phases = wrapped_phases(light, plan.fringes.code)
     except DecodeError:
         return None
-    known = np.all([np.isfinite(p) for p in phases], axis=0) & (True if lit is None else lit)
-    waves = [np.where(known, np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]
-    rates = [_rate(wave) for wave in waves]
-    fringes = (np.abs(rates[0]) > 0.1 / params.LAG_PX) & known[:, params.LAG_PX :]
-    if not fringes.any():
+    return [np.where(np.isfinite(p), np.exp(1j * np.nan_to_num(p).astype(np.float64)), 0) for p in phases]
+
+
+def closure_of_waves(waves: list[Complex], plan: Plan) -> Closure | None:
+    """Measure how waves close where they are not 0; None when they do not change along the rows."""
+    first, second, *others = plan.fringes.numbers
+    rates = local_rates(waves)
+    known = np.abs(rates[0]) > 0.1 / params.LAG_PX
+    if not known.any():
         return None
-    green, *infrareds = (float(np.median(rate[fringes] / rates[0][fringes])) for rate in rates[1:])
+    green, *infrareds = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])
     if not others:
         return Closure(green * first / second, 1.0, Angle(0.0, 1.0, 0.0), float("nan"))
     third, infrared = others[0], infrareds[0]
-    angle = _closed(waves, (first, second, third), known)
-    period = 2 * np.pi / max(float(np.median(np.abs(rates[2][fringes]))), 1e-6)
+    angle = _closed(waves, (first, second, third))
+    period = 2 * np.pi / max(float(np.median(np.abs(rates[2][known]))), 1e-6)
     return Closure(green * first / second, infrared * first / third, angle, period)
 
 
@@ -136,7 +160,7 @@ def rows_match(shot: AnyShot, plan: Plan, columns_px: float) -> RowsMatch | None
     """
     import cv2
 
-    light = _light(shot, plan)
+    light = linear_light_of(shot, plan)
     period_px, _ = carrier(np.nan_to_num(light["red"]))
     reach = params.SHIFT_MAX_PX
     if not np.isfinite(period_px) or min(light["ir"].shape) <= 4 * reach:
@@ -156,31 +180,44 @@ def rows_match(shot: AnyShot, plan: Plan, columns_px: float) -> RowsMatch | None
     return RowsMatch(best - reach + _peak(moved[best - 1 : best + 2]), float(moved.max()), float(still.max()))
 
 
-def _light(shot: AnyShot, plan: Plan) -> dict[str, Map]:
+def linear_light_of(shot: AnyShot, plan: Plan) -> dict[str, Map]:
+    """Give the linear light of a shot by the response that the plan states; linear where it states none."""
     return linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
 
 
-def _rate(wave: Complex) -> NDArray[np.float64]:
-    """Give the local frequency along the rows, rad / px."""
-    lag = params.LAG_PX
-    turned = _mean(wave[:, lag:] * np.conj(wave[:, :-lag]), params.FREQUENCY_PX)
-    return np.angle(turned) / lag
+def local_rates(waves: list[Complex]) -> list[NDArray[np.float64]]:
+    """Give the local frequencies along the rows, rad / px, all over the same distance: (H, W - lag)."""
+    next_to = np.abs(np.angle(local_mean(waves[0][:, 1:] * np.conj(waves[0][:, :-1]), params.FREQUENCY_PX)))
+    turn = np.median(next_to[next_to > 0]) if next_to.any() else 0.0
+    # Over more than half a period a phase is known up to whole turns only.
+    lag = int(np.clip(params.LAG_TURNS * 2 * np.pi / max(float(turn), 1e-6), 1, params.LAG_PX))
+    return [np.angle(local_mean(wave[:, lag:] * np.conj(wave[:, :-lag]), params.FREQUENCY_PX)) / lag for wave in waves]
 
 
-def _closed(waves: list[Complex], numbers: tuple[float, float, float], known: NDArray[np.bool_]) -> Angle:
+def _closed(waves: list[Complex], numbers: tuple[float, ...]) -> Angle:
     """Measure the sum of the three phases that is the same for every surface."""
-    first, second, third = numbers
-    turns = (first - third) / (first - second)
-    if abs(turns - round(turns)) > 1e-6:
+    closed = closed_wave(waves, numbers)
+    if closed is None:
         return Angle(float("nan"), float("nan"), float("nan"))
-    whole = round(turns)
-    closed = waves[2] * waves[0] ** (whole - 1) * np.conj(waves[1]) ** whole
-    local = float(np.abs(_mean(closed, params.CLOSURE_PX))[known].mean())
-    mean = complex(closed[known].mean())
+    share = np.count_nonzero(closed) / closed.size
+    local = float(np.abs(local_mean(closed, params.CLOSURE_PX)).mean()) / max(share, 1e-9)
+    mean = complex(closed.mean()) / max(share, 1e-9)
     return Angle(float(np.angle(mean)), local, abs(mean) / max(local, 1e-9))
 
 
-def _mean(wave: Complex, side_px: int) -> Complex:
+def closed_wave(waves: list[Complex], numbers: tuple[float, ...]) -> Complex | None:
+    """Give exp(i sum) of the sum of the three phases that is 0 for every surface; None if these do not close."""
+    first, second, third = numbers
+    turns = (first - third) / (first - second)
+    if abs(turns - round(turns)) > 1e-6:
+        return None
+    whole = round(turns)
+    closed: Complex = waves[2] * waves[0] ** (whole - 1) * np.conj(waves[1]) ** whole
+    return closed
+
+
+def local_mean(wave: Complex, side_px: int) -> Complex:
+    """Give the mean of a wave over squares of this side."""
     import cv2
 
     size = (side_px, side_px)

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import combinations
-from typing import Any, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from quadfringe.config import BayerPattern
-from quadfringe.data import AnyShot, BayerShot, Shape, Shot
+from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
-from quadfringe.decoding._kernel import KernelDecoder, rows_of
+from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding._offsets import channels_agree
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import (
@@ -23,15 +20,28 @@ from quadfringe.decoding.causes import (
     listed,
     other_numbers,
     period_fix,
+    strange,
     wrong_bits,
 )
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
+from quadfringe.decoding.readings import band_of, other_readings, rows_of
 from quadfringe.decoding.symptoms import Closure, closure_of, saturation
+from quadfringe.decoding.trusted import is_scattered, take_out, trusted_part
+from quadfringe.errors import DecodeError
 
-__all__ = ["band_of", "judge", "order_margin"]
+__all__ = ["judge", "order_margin"]
 
 ORDERS = "fringe orders"  # the reason of a refusal for exchanged channels, or without a named cause
+CHECK_ALL = (
+    "check that the channels are red, green, blue (and ir) in this order, and that the fringe numbers, the projector "
+    "width and the response are those of this shot"
+)
+# Reasons that may hold for a part of a shot. Others, as wrong fringe numbers or crosstalk, hold for all of it.
+IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", "no fringes")
+# Share of the returned pixels from which a trusted part is the object, and the rest are pixels lit by chance around it,
+# which is not told. The wall around an object of 2 % of the frame has a tenth of them (`pytest tests/test_trusted.py`).
+KEPT_MIN = 0.7
 STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
 MARGIN_ROWS = 48  # least number of rows and columns that the median margin is taken from
 DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
@@ -68,8 +78,7 @@ LIT_MIN, UNSATURATED_MIN = 0.005, 0.05
 # Least share of lit pixels among those that are as bright as they. Seven of 1,000 images of noise have 0.006 to 0.045
 # lit pixels by chance (published): `python -m hostile --shots 1000` in the folder tests.
 CHANCE_MAX = 0.1
-# A band of rows shows which exchanges can explain a doubtful shot: the share of the rows, and their least number.
-BAND_SHARE, BAND_ROWS_MIN = 1 / 8, 96
+
 # Margin in the band, as a share of the margin at which channels count as exchanged, from which the whole image is
 # decoded. The band of the right channels must reach this share of the margin of their whole image: `pytest
 # tests/test_verdict.py -k band -s` prints it for scenes of the virtual bench, at least 0.65 (joint) and 0.93
@@ -77,13 +86,29 @@ BAND_SHARE, BAND_ROWS_MIN = 1 / 8, 96
 NEAR = {"joint": 0.6, "published": 0.85}
 
 
-def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
-    """Raise `DecodeError` that names the likely cause unless the orders of `shape` can be trusted.
+def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause | None:
+    """Raise `DecodeError` that names the likely cause unless orders of `shape` can be trusted.
 
     When the median margin is below 0.6, `decoder` decodes the shot with each pair of channels exchanged, or as each
     other Bayer pattern, to name them; with None these and all further tests are left out. A shot with a margin from
     0.3, as of a photograph, is kept if its channels agree on the phase and no exchange comes near to its margin.
+    If a part can be trusted, the rest becomes no data, in place, and its likely cause is given.
     """
+    try:
+        _refuse_whole(shape, shot, decoder)
+    except DecodeError as refused:
+        part = None if decoder is None or refused.reason not in IN_PART else trusted_part(shape, shot, decoder.plan)
+        if part is None:
+            raise
+        rest, few = shape.returned & ~part, np.count_nonzero(part) < KEPT_MIN * np.count_nonzero(shape.returned)
+        take_out(shape, rest)
+        words = f"only {part.mean():.0%} of the image can be trusted, and the rest is no data; of the shot as a whole"
+        return Cause.doubt(refused, words) if few else None
+    return None
+
+
+def _refuse_whole(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
+    """Raise `DecodeError` unless the orders of most lit pixels can be trusted."""
     margin, lit, returned, share = _margin(shape)
     if decoder is not None and not decoder.plan.fringes.infrared and lit > 0:
         _refuse_green(shape, shot, decoder)
@@ -105,7 +130,7 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> None:
         _refuse_exchanged(shape, shot, max(collapsed, CLEARLY_BETTER * margin), decoder)
     if collapse:
         cause = None if decoder is None else after_order(shot, shape, decoder.plan, closure) or mirrored(shape)
-        raise (cause or _collapsed(margin, _lit_share(shape))).error
+        raise (cause or (_collapsed(margin, _lit_share(shape)) if enough else _too_few(_lit_share(shape)))).error
 
 
 def _refuse_shown(shot: AnyShot, shape: Shape, plan: Plan | None, closure: Closure | None) -> None:
@@ -123,12 +148,13 @@ def _refuse_shown(shot: AnyShot, shape: Shape, plan: Plan | None, closure: Closu
 
 
 def _collapsed(margin: float, share: float) -> Cause:
-    return Cause(
-        ORDERS,
-        f"the order margin has collapsed: below {margin:.2f} of 1 for half of the lit pixels; no test names the cause",
-        "check that the channels are red, green, blue (and ir) in this order, and that the fringe numbers, the "
-        "projector width and the response are those of this shot" + period_fix(share),
-    )
+    words = f"the order margin has collapsed: below {margin:.2f} of 1 for half of the lit pixels"
+    return Cause(ORDERS, f"{words}; no test names the cause", CHECK_ALL + period_fix(share))
+
+
+def _too_few(share: float) -> Cause:
+    words = "pixels with fringes in all channels are scattered as in noise, or hardly any of them could be decoded"
+    return Cause(ORDERS, f"{words}; no test names the cause", CHECK_ALL + period_fix(share))
 
 
 def order_margin(shape: Shape) -> float:
@@ -190,7 +216,8 @@ def _by_chance(shape: Shape, shot: AnyShot, margin: float, share: float) -> bool
     """
     if share < 2 * CHANCE_MAX:
         share = _lit_share(shape)
-    if share < LIT_MIN or (share < CHANCE_MAX and _lit_share_of_bright(shape, shot) < CHANCE_MAX):
+    few = share < CHANCE_MAX and _lit_share_of_bright(shape, shot) < CHANCE_MAX
+    if share < LIT_MIN or (few and is_scattered(shape)):
         return True
     doubtful = share < UNSATURATED_MIN or margin < DOUBTFUL
     return doubtful and max(saturation(shot).values()) > params.REFUSED_SHARE
@@ -237,7 +264,7 @@ def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
 
 def _refuse_exchanged(shape: Shape, shot: AnyShot, least: float, decoder: KernelDecoder) -> None:
     """Raise `DecodeError` if exchanging channels raises the median margin above `least`."""
-    suspects = _plausible(_suspects(shot), shape, least, decoder)
+    suspects = _plausible(other_readings(shot), shape, least, decoder)
     found = {words: _margin(decoder.shape(other))[0] for words, other in suspects.items()}
     best = max(found, key=lambda words: found[words], default="")
     if best and found[best] > least:
@@ -251,40 +278,21 @@ def _agrees(shape: Shape, shot: AnyShot, margin: float, decoder: KernelDecoder |
         return False
     first, count = band_of(shape)
     part = decoder.for_rows(first, count)
-    given, *others = (order_margin(part.shape(rows_of(one, first, count))) for one in (shot, *_suspects(shot).values()))
+    given, *others = (
+        order_margin(part.shape(rows_of(one, first, count))) for one in (shot, *other_readings(shot).values())
+    )
     return given > CLEARLY_BETTER * max(others)
 
 
 def _plausible(suspects: dict[str, AnyShot], shape: Shape, least: float, decoder: KernelDecoder) -> dict[str, AnyShot]:
-    """Give the suspects whose margin comes near to `least` in a band of rows, which takes a fraction of the time."""
+    """Give the suspects that a band of rows allows, which takes a fraction of the time.
+
+    Their margin comes near to `least` there, and their channels have about the frequencies of the fringe numbers.
+    """
     first, count = band_of(shape)
     if 2 * count > len(shape.quality):
         return suspects
     part, near = decoder.for_rows(first, count), NEAR[decoder.settings["method"]] * least
-    return {
-        words: other
-        for words, other in suspects.items()
-        if order_margin(part.shape(rows_of(other, first, count))) >= near
-    }
-
-
-def band_of(shape: Shape) -> tuple[int, int]:
-    """Give the first row, which is even because a mosaic repeats after two, and the number of rows with most light."""
-    lit = np.isfinite(shape.quality).sum(axis=1)
-    count = min(lit.size, max(BAND_ROWS_MIN, 2 * round(BAND_SHARE * lit.size / 2)))
-    return 2 * (int(np.convolve(lit, np.ones(count), "valid").argmax()) // 2), count
-
-
-def _suspects(shot: AnyShot) -> dict[str, AnyShot]:
-    """Give the shot with channels exchanged or another Bayer pattern, by the message for that case."""
-    if isinstance(shot, BayerShot):
-        others = (name for name in get_args(BayerPattern) if name != shot.bayer)
-        return {f"the Bayer pattern seems to be {o}, not {shot.bayer}": replace(shot, bayer=o) for o in others}
-    pairs = combinations(shot.channels, 2)
-    return {f"{a} and {b} seem to be swapped": _exchanged(shot, a, b) for a, b in pairs}
-
-
-def _exchanged(shot: Shot, first: str, second: str) -> Shot:
-    images = shot.channels
-    images[first], images[second] = images[second], images[first]
-    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
+    bands = {words: rows_of(other, first, count) for words, other in suspects.items()}
+    possible = {words for words, band in bands.items() if not strange(closure_of(band, part.plan))}
+    return {words: suspects[words] for words in possible if order_margin(part.shape(bands[words])) >= near}

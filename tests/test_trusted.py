@@ -1,0 +1,151 @@
+"""A shot is refused only when no region of it can be trusted; what is returned of a shot in part is right."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import quadfringe as qf
+from quadfringe.config import Device
+from quadfringe.data import Reason
+from quadfringe.decoding._kernel import KernelDecoder
+from quadfringe.decoding.symptoms import closure_of
+from quadfringe.decoding.trusted import is_scattered, trusted_part
+from quadfringe.errors import DecodeError
+from quadfringe.evaluation import _scenes as scenes
+from quadfringe.evaluation import scoring
+from quadfringe.evaluation._isolated import isolated, outline
+
+NAMES = ("red", "green", "blue", "ir")
+CAMERA = Device(width_px=512, height_px=384, focal_px=(1290.0, 1290.0), centre_px=(255.5, 191.5))
+NUMBERS = (36.0, 35.0, 30.0)
+
+Images = dict[str, NDArray[np.uint8]]
+
+
+def images_of(surface: str, seed: int, numbers: tuple[float, ...] = NUMBERS) -> tuple[Images, NDArray[np.float32]]:
+    """Expose a small frame; give its images and the true columns."""
+    scene = qf.SceneConfig.model_validate({"surface": surface, "noise": 0.01, "seed": seed})
+    config = qf.SystemConfig(camera=CAMERA, scene=scene, fringes=qf.Fringes(numbers=numbers))
+    with qf.open(config) as scanner:
+        shot = scanner.grab()
+    assert isinstance(shot, qf.Shot)
+    assert shot.truth is not None
+    return {name: image.copy() for name, image in shot.channels.items()}, shot.truth.column_px
+
+
+def shot_of(images: Images) -> qf.Shot:
+    return qf.Shot(*(np.ascontiguousarray(images[name]) for name in NAMES))
+
+
+def plan_of(numbers: tuple[float, ...] = NUMBERS) -> qf.Plan:
+    return qf.Plan(912, fringes=numbers, response="linear")
+
+
+@pytest.mark.parametrize(
+    ("fill", "seed", "level", "least"), [(0.02, 31, 0.5, 70), (0.06, 33, 0.5, 95), (0.08, 34, 0.4, 95)]
+)
+def test_an_object_before_an_even_wall_is_decoded(fill: float, seed: int, level: float, least: float) -> None:
+    scene = isolated(33, fill, seed, contrast=0.9)
+    wall = ~outline(scene.red.shape, fill, seed)
+    noise = np.random.default_rng(seed)
+    lit: dict[str, Any] = {
+        name: np.where(wall, np.round(255 * noise.normal(level, 0.01, wall.shape)), image).astype(np.uint8)
+        for name, image in scene.channels.items()
+    }
+    found = scoring.score(scene, scenes.shape_of(replace(scene, **lit), response="linear").phase_rad)
+    assert found.right_percent > least
+    assert found.right_of_returned_percent > 99.9
+
+
+def test_noise_has_no_region_of_fringes() -> None:
+    for seed in range(8):
+        noise = np.random.default_rng(seed)
+        low, high = sorted(noise.integers(0, 256, 2))
+        images = {name: noise.integers(low, high + 1, (144, 192)).astype(np.uint8) for name in NAMES}
+        plan = replace(plan_of(), decode=qf.DecodeConfig(method="published"))
+        shape = KernelDecoder((144, 192), 255.0, plan).shape(shot_of(images))
+        assert is_scattered(shape)
+        assert trusted_part(shape, shot_of(images), plan) is None
+
+
+def shifted(images: Images, columns: int) -> None:
+    images["ir"][:, :columns] = np.roll(images["ir"], 8, axis=1)[:, :columns]
+
+
+def exchanged(images: Images, columns: int) -> None:
+    red = images["red"][:, :columns].copy()
+    images["red"][:, :columns] = images["blue"][:, :columns]
+    images["blue"][:, :columns] = red
+
+
+def saturated(images: Images, columns: int) -> None:
+    for image in images.values():
+        image[:, :columns] = 255
+
+
+@pytest.mark.parametrize(
+    ("spoil", "share", "words"),
+    [
+        (shifted, 0.75, "can be trusted"),
+        (exchanged, 0.75, "red and blue seem to be swapped"),
+        (saturated, 0.8, "too much light"),
+    ],
+)
+@pytest.mark.parametrize(("surface", "seed"), [("face", 41), ("peaks", 42)])
+def test_the_sound_part_of_a_shot_is_returned(
+    spoil: Callable[[Images, int], None], share: float, words: str, surface: str, seed: int
+) -> None:
+    images, column_px = images_of(surface, seed)
+    columns = round(share * CAMERA.width_px)
+    spoil(images, columns)
+    with pytest.warns(qf.DecodeWarning, match=words):
+        shape = qf.decode(shot_of(images), plan_of())
+    right = np.abs(shape.column_px - column_px) < 0.5 * 912 / NUMBERS[0]
+    assert (shape.returned & right)[:, columns:].mean() > 0.8
+    assert (shape.returned & ~right).mean() < 1e-3
+    assert shape.returned[:, : columns - 16].mean() < 1e-3
+    if spoil is not saturated:
+        assert shape.reason is not None
+        assert (shape.reason[:, : columns - 16] == Reason.DOUBTFUL_ORDER).mean() > 0.3
+
+
+@pytest.mark.parametrize("surface", ["face", "steps"])
+def test_no_part_of_a_shot_with_exchanged_channels_is_trusted(surface: str) -> None:
+    images, _ = images_of(surface, 43)
+    for first, second in combinations(NAMES, 2):
+        shot = shot_of(images | {first: images[second], second: images[first]})
+        shape = KernelDecoder(shot.red.shape, 255.0, plan_of()).shape(shot)
+        assert trusted_part(shape, shot, plan_of()) is None
+
+
+@pytest.mark.parametrize("numbers", [(37.0, 36.0, 31.0), (38.0, 37.0, 32.0), (34.0, 33.0, 28.0), (49.0, 48.0, 42.0)])
+def test_no_part_of_a_shot_of_other_fringe_numbers_is_trusted(numbers: tuple[float, ...]) -> None:
+    images, _ = images_of("face", 44)
+    shot = shot_of(images)
+    shape = KernelDecoder(shot.red.shape, 255.0, plan_of(numbers)).shape(shot)
+    assert trusted_part(shape, shot, plan_of(numbers)) is None
+
+
+def test_fine_fringes_of_other_numbers_are_named_without_decoding_often(monkeypatch: pytest.MonkeyPatch) -> None:
+    images, _ = images_of("face", 45, (100.0, 99.0, 90.0))
+    closure = closure_of(shot_of(images), plan_of((100.0, 99.0, 90.0)))
+    assert closure is not None
+    assert max(abs(closure.green - 1), abs(closure.infrared - 1)) < 0.004
+    decoded = []
+    plain = KernelDecoder.shape
+
+    def counted(decoder: KernelDecoder, shot: qf.Shot) -> qf.Shape:
+        decoded.append(shot.red.size)
+        return plain(decoder, shot)
+
+    monkeypatch.setattr(KernelDecoder, "shape", counted)
+    with pytest.raises(DecodeError, match="which fits 100, 99, 90"):
+        qf.decode(shot_of(images), plan_of((64.0, 63.0, 56.0)))
+    assert sum(decoded) < 3 * CAMERA.width_px * CAMERA.height_px
