@@ -155,3 +155,17 @@ def test_the_command_line_says_it(tmp_path: Path) -> None:
     empty.mkdir()
     missing = CliRunner().invoke(app, ["doctor", str(empty)])
     assert (missing.exit_code, "no image of a shot in it; expected red.png" in missing.stderr) == (2, True)
+
+
+def test_the_fault_of_a_shot_comes_before_the_warnings_of_its_calibration(tmp_path: Path) -> None:
+    shot, calibration = shot_of()
+    write_shot(tmp_path, qf.Shot(shot.blue, shot.green, shot.red, shot.ir, shot.full_scale))
+    calibration.model_copy(update={"record": None}).save(tmp_path / "c.json")
+    run = CliRunner().invoke(
+        app, ["doctor", str(tmp_path), str(tmp_path / "c.json"), "--json", str(tmp_path / "d.json")]
+    )
+    assert run.exit_code == 1
+    assert run.stdout.startswith("FAULT   fringe orders")
+    grades = [one["grade"] for one in json.loads((tmp_path / "d.json").read_text())["findings"]]
+    assert "warning" in grades
+    assert grades == sorted(grades, key=["fault", "warning", "note", "good"].index)

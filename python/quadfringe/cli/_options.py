@@ -28,6 +28,7 @@ __all__ = [
     "ColumnsOption",
     "EncodingOption",
     "FileSizeOption",
+    "FringesOfShotOption",
     "FringesOption",
     "HostOption",
     "InstantsOption",
@@ -137,14 +138,22 @@ def _is_number(word: str) -> bool:
 FRINGES_3 = (36.0, 35.0, 30.0)
 # Options, and how many numbers they have at most.
 SEVERAL_NUMBERS = {"--fringes": 3, "--channel-instants-us": 4, "--period-px": 2}
+FRINGES_HELP = (
+    "Number of fringes over the projector width: of red and blue, of green, of infrared; with --encoding rgb "
+    "of red, green, blue, or two: of red and blue in quadrature, and of green."
+)
 FringesOption = Annotated[
+    SomeNumbers | None,
+    typer.Option("--fringes", metavar="N N [N]", parser=_some_numbers, help=f"{FRINGES_HELP} Default: 36 35 30."),
+]
+# Of images that were taken before, nobody but the user knows the numbers: other ones give a wrong shape.
+FringesOfShotOption = Annotated[
     SomeNumbers | None,
     typer.Option(
         "--fringes",
         metavar="N N [N]",
         parser=_some_numbers,
-        help="Number of fringes over the projector width: of red and blue, of green, of infrared; with --encoding rgb "
-        "of red, green, blue, or two: of red and blue in quadrature, and of green. Default: 36 35 30.",
+        help=f"{FRINGES_HELP} Required for a single shot; step images have --numbers instead.",
     ),
 ]
 InstantsOption = Annotated[

@@ -33,7 +33,8 @@ if TYPE_CHECKING:
 __all__ = ["doctor"]
 
 FAULT = 1
-MARKS = {"good": "ok     ", "note": "note   ", "warning": "WARNING", "fault": "FAULT  "}
+MARKS = {"fault": "FAULT  ", "warning": "WARNING", "note": "note   ", "good": "ok     "}
+GRADES = tuple(MARKS)  # in the order in which they are printed
 PathsArgument = Annotated[
     list[Path] | None,
     typer.Argument(
@@ -94,12 +95,12 @@ def doctor(
     given = _sorted_paths(files or [], several=surface is not None)
     calibration = None if given.calibration is None else Calibration.load(given.calibration)
     found: list[Finding] = [] if files else examine_installation()
-    if calibration is not None and given.calibration is not None:
-        found += [examine_digest(given.calibration), *examine_calibration(calibration)]
     plan = Plan(projector_width, fringes_from(encoding, fringes, columns), calibration)
     for folder in given.shots:
         one = _examined(_shot_in(folder, bayer, bits), plan, surface)
         found += [replace(each, name=f"{folder.name} {each.name}") for each in one] if len(given.shots) > 1 else one
+    if calibration is not None and given.calibration is not None:
+        found += [examine_digest(given.calibration), *examine_calibration(calibration)]
     _report(found, json)
 
 
@@ -179,7 +180,8 @@ def _shot_in(folder: Path, bayer: Bayer | None, bits: Bits | None) -> AnyShot:
 
 
 def _report(found: Sequence[Finding], json: Path | None) -> None:
-    """Print the findings with their fixes, and exit with status 1 when one is a fault."""
+    """Print the findings with their fixes, the faults first, and exit with status 1 when there is one."""
+    found = sorted(found, key=lambda one: GRADES.index(one.grade))
     for one in found:
         say(f"{MARKS[one.grade]} {one.name}: {one.found}", json)
         if one.fix:
