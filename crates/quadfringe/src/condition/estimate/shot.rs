@@ -6,7 +6,7 @@
 
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
-use super::tile_phase::{Lit, light_and_phase};
+use super::tile_phase::light_and_phase;
 use super::uncertainty::{exponent_sd, second_harmonic, without_excess};
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
 use crate::condition::params::{
@@ -200,14 +200,14 @@ fn steps_of(
 ) -> Option<[f32; PHASE_STEPS]> {
     let pixels = light_and_phase(light, phase)?;
     let (mut sums, mut counts) = ([0.0f32; PHASE_STEPS], [0.0f32; PHASE_STEPS]);
-    for &Lit { light, phase_rad } in &pixels {
-        let turns = phase_rad * scale / TAU;
+    for &(light, phase) in &pixels {
+        let turns = phase * scale / TAU;
         let step = ((turns - turns.floor()) * PHASE_STEPS as f32) as usize % PHASE_STEPS;
         sums[step] += light;
         counts[step] += 1.0;
     }
     let all = pixels.len() as f32;
-    let saturated = pixels.iter().filter(|pixel| pixel.light >= BRIGHT_MAX).count() as f32;
+    let saturated = pixels.iter().filter(|(light, _)| *light >= BRIGHT_MAX).count() as f32;
     let even = counts.iter().all(|&count| count >= EVENNESS_MIN * all / PHASE_STEPS as f32);
     let told = saturated <= SATURATED_MAX * all && even;
     // After the dark level is subtracted, noise can make light negative.

@@ -10,18 +10,12 @@ use ndarray::ArrayView2;
 /// Number of terms of a polynomial of degree 2 in two coordinates.
 const TERMS: usize = 6;
 
-/// Light of a pixel, fraction of full scale, and its phase, rad of the first fringe number.
-pub(super) struct Lit {
-    pub light: f32,
-    pub phase_rad: f32,
-}
-
-/// The pixels of a tile from the first to the last known one of every
+/// Light and phase, rad of the first fringe number, of the pixels of a tile from the first to the last known one of every
 /// row; `None` with too few known pixels, or where no smooth phase describes them.
 pub(super) fn light_and_phase(
     light: ArrayView2<'_, f32>,
     phase_rad: ArrayView2<'_, f32>,
-) -> Option<Vec<Lit>> {
+) -> Option<Vec<(f32, f32)>> {
     let known = phase_rad.iter().filter(|phase| phase.is_finite()).count();
     if (known as f32) < KNOWN_MIN * phase_rad.len() as f32 {
         return None;
@@ -39,7 +33,7 @@ pub(super) fn light_and_phase(
                 misfit += (f64::from(phase[x]) - fitted).powi(2);
             }
             if light[x].is_finite() {
-                pixels.push(Lit { light: light[x], phase_rad: fitted as f32 });
+                pixels.push((light[x], fitted as f32));
             }
         }
     }
@@ -119,7 +113,7 @@ mod tests {
             );
         let found = light_and_phase(whole.view(), holed.view()).expect("a smooth phase");
         assert!(found.len() > 40 * 43 && found.len() <= 40 * 45, "{}", found.len());
-        assert!(found.iter().all(|pixel| (pixel.light - pixel.phase_rad).abs() < 1e-3));
+        assert!(found.iter().all(|(light, phase)| (light - phase).abs() < 1e-3));
     }
 
     #[test]
