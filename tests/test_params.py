@@ -45,7 +45,6 @@ ALLOWED: dict[tuple[str, str], str] = {
     ),
     **dict.fromkeys(
         [
-            ("condition", "TERMS"),
             ("height", "NODES"),
             ("joint", "CANDIDATES"),
             ("joint", "COUNT"),
