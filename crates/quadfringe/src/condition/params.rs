@@ -143,11 +143,6 @@ pub(super) const TILE_SIDE_MIN_PX: usize = 24;
 /// Least share of a tile with a known phase. With a larger share the tiles at edges are lost. Not measured.
 pub(super) const KNOWN_MIN: f32 = 0.5;
 
-/// Greatest RMS distance of the phase of a tile from a polynomial of degree 2, rad of the first fringe number. A larger
-/// one sorts pixels at depth steps into wrong phase steps, which weakens the harmonics, a smaller one loses relief and
-/// light that is bent much: a gamma of 3 makes 0.3 (`python evaluation/auto_response.py`).
-pub(super) const PHASE_MISFIT_MAX_RAD: f64 = 0.5;
-
 /// Least number of pixels in a phase step, as a share of the mean number. Below it, the steps of a tile have gaps in
 /// their period. Not measured.
 pub(super) const EVENNESS_MIN: f32 = 0.25;

@@ -11,7 +11,6 @@ mod samples;
 mod select;
 mod shot;
 mod simplex;
-mod tile_phase;
 mod uncertainty;
 
 use super::params::{

@@ -6,13 +6,12 @@
 
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
-use super::tile_phase::light_and_phase;
 use super::uncertainty::{exponent_sd, second_harmonic, without_excess};
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
 use crate::condition::params::{
     BRIGHT_MAX, CERTAIN_SDS, CHANNEL_TILES_MIN, EVENNESS_MIN, EXPONENT_SHARED, GAIN_RAD, HARMONIC_LEAST,
-    HARMONIC_LEFT, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN, SLOPE_STRIDE_PX,
-    TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
+    HARMONIC_LEFT, KNOWN_MIN, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN,
+    SLOPE_STRIDE_PX, TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
 };
 use crate::encoding::{Channel, Encoding};
 use crate::{Error, Result};
@@ -198,18 +197,22 @@ fn steps_of(
     phase: ArrayView2<'_, f32>,
     scale: f32,
 ) -> Option<[f32; PHASE_STEPS]> {
-    let pixels = light_and_phase(light, phase)?;
     let (mut sums, mut counts) = ([0.0f32; PHASE_STEPS], [0.0f32; PHASE_STEPS]);
-    for &(light, phase) in &pixels {
+    let (mut known, mut saturated) = (0.0, 0.0);
+    for (&light, &phase) in light.iter().zip(phase) {
+        if !(phase.is_finite() && light.is_finite()) {
+            continue;
+        }
         let turns = phase * scale / TAU;
         let step = ((turns - turns.floor()) * PHASE_STEPS as f32) as usize % PHASE_STEPS;
         sums[step] += light;
         counts[step] += 1.0;
+        known += 1.0;
+        saturated += if light >= BRIGHT_MAX { 1.0 } else { 0.0 };
     }
-    let all = pixels.len() as f32;
-    let saturated = pixels.iter().filter(|(light, _)| *light >= BRIGHT_MAX).count() as f32;
-    let even = counts.iter().all(|&count| count >= EVENNESS_MIN * all / PHASE_STEPS as f32);
-    let told = saturated <= SATURATED_MAX * all && even;
+    let all = light.len() as f32;
+    let even = counts.iter().all(|&count| count >= EVENNESS_MIN * known / PHASE_STEPS as f32);
+    let told = known >= KNOWN_MIN * all && saturated <= SATURATED_MAX * known && even;
     // After the dark level is subtracted, noise can make light negative.
     told.then(|| std::array::from_fn(|i| (sums[i] / counts[i]).clamp(0.0, 1.0)))
 }
