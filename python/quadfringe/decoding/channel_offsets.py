@@ -64,7 +64,7 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
 
 
 def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
-    """Find a shift of infrared; from half the angle of a wrong order on, the orders cannot be trusted."""
+    """Find a shift of infrared that the whole image confirms, or that is half the angle of a wrong order or more."""
     first, _, third = plan.fringes.numbers
     if not (plan.fringes.infrared and _close(plan.fringes.numbers)):
         return None
@@ -73,9 +73,11 @@ def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause
         return None
     if named := registration(shot, plan, closure_of(shot, plan, np.isfinite(shape.quality))):
         return named
+    if abs(np.angle(mean)) < np.pi * (first - third) / first:
+        return None
     words = f"the infrared fringes lie {np.angle(mean):+.2f} rad off their place among those of red and green"
     fix = "register the chips (quadfringe calibrate run, step registration), or calibrate the pair again"
-    return Cause("infrared registration", words, fix, bool(abs(np.angle(mean)) > np.pi * (first - third) / first))
+    return Cause("infrared registration", words, fix)
 
 
 def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:

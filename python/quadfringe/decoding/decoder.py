@@ -132,12 +132,13 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     rest = judge(shape, shot, kernel)
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
-    if kernel is not None and (cause := contradiction(shape, shot, plan)):
+    light = [*filter(None, (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot)))]
+    # Light that is cut off at either end bends the phases of the channels in different ways.
+    if kernel is not None and not light and (cause := contradiction(shape, shot, plan)):
         doubts.append(cause)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
-    light = (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot))
-    doubts = [*doubts, *filter(None, light), *within_depths(shape, plan.decode.depth_range_mm)]
+    doubts = [*doubts, *light, *within_depths(shape, plan.decode.depth_range_mm)]
     if words := checked_rows(shape, borders):
         shape = replace(shape, config={**shape.config, "geometry": words})
     if not doubts:

@@ -141,7 +141,8 @@ def closure_of_waves(waves: list[Complex], plan: Plan) -> Closure | None:
     """Measure how waves close where they are not 0; None when they do not change along the rows."""
     first, second, *others = plan.fringes.numbers
     rates = local_rates(waves)
-    known = np.abs(rates[0]) > 0.1 / params.LAG_PX
+    lag = waves[0].shape[1] - rates[0].shape[1]
+    known = (np.abs(rates[0]) > 0.1 / params.LAG_PX) & np.all([wave[:, lag:] != 0 for wave in waves], axis=0)
     if not known.any():
         return None
     green, *infrareds = (float(np.median(rate[known] / rates[0][known])) for rate in rates[1:])

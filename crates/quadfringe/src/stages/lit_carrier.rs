@@ -5,10 +5,10 @@
 //! by the energy that a wave keeps without its mean over these pixels. With z = R - i B, this is the least-squares fit of a
 //! constant and a wave to z on the lit pixels (J37), and it needs no whole number of fringes.
 
+use super::band::{Waves, strongest_band};
 use super::carrier::LineTransform;
 use super::params::{CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN};
 use super::params::{LIT_QUANTILES, LIT_SAMPLES_MIN, LIT_SHARE, LIT_STEP, SMALL_PART, WAVE_ENERGY_MIN};
-use super::quadrature::{Waves, strongest_band};
 use ndarray::{ArrayView1, ArrayView2};
 
 /// The lit part of a frame that is dark elsewhere.

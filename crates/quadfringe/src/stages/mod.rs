@@ -20,6 +20,7 @@
 mod absolute;
 mod along_ray;
 mod background;
+mod band;
 mod blocks;
 mod carrier;
 mod columns;
