@@ -50,7 +50,7 @@ NOT_BARS = {
     (
         "test_trusted.py",
         "sum(decoded) < 3 * CAMERA.width_px * CAMERA.height_px",
-    ): "pixels that are decoded to name a cause",
+    ): "decodes to name a cause",
     ("test_world.py", "abs=0.02"): "the truth as a shape; checks the measure of heights",
     ("test_world.py", "world.edge_width_px(shape_of, seed=1) < 3"): "the truth as a shape; checks the measure of edges",
     ("test_world.py", "periods_px[0] < 10"): "fringes of a scene",
