@@ -6,6 +6,7 @@ import re
 import warnings
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,7 +16,9 @@ from quadfringe import _core
 from quadfringe.decoding import params
 from quadfringe.decoding.channel_offsets import contradiction, offsets_of
 from quadfringe.decoding.fringe_fit import infrared_drift
+from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import world
+from quadfringe.evaluation._variants import stepped
 
 NUMBERS = (36.0, 35.0, 30.0)
 # Scenes with white and painted surfaces, folds, narrow objects and fringes of 9 px.
@@ -83,6 +86,27 @@ def test_a_sound_shot_has_no_contradiction(scene: str) -> None:
     closure = np.exp(1j * offsets_of(shape, taken.shot, plan).closure_rad(taken.fringe_numbers)).mean()
     print(scene, np.angle(closure), abs(closure))
     assert abs(np.angle(closure)) < 0.75 * params.CLOSURE_RAD
+
+
+@pytest.mark.parametrize("step", [0, 4, 8])
+@pytest.mark.parametrize("name", scenes.CAPTURES)
+def test_a_real_shot_has_no_contradiction(name: str, step: int, data_dir: Path) -> None:
+    scene = stepped(data_dir, name, step)
+    shot = qf.Shot(scene.red, scene.green, scene.blue, scene.ir)
+    plan = qf.Plan(scene.projector_width, fringes=scene.fringe_numbers, response="linear")
+    shape = qf.Decoder(shot, plan).decode_without_verdict(shot)
+    assert offsets_of(shape, shot, plan).turn_rad.size >= params.OFFSET_TILES_MIN
+    assert contradiction(shape, shot, plan) is None
+
+
+def test_saturated_light_is_named_before_shifted_infrared() -> None:
+    shot = moved(face(), 6)
+    bright = qf.Shot(*(np.minimum(1.7 * image, 255).astype(np.uint8) for image in shot.channels.values()))
+    with pytest.warns(qf.DecodeWarning):
+        shape = qf.decode(bright, qf.Plan(912, calibration=calibration(), response="linear"))
+    light, infrared = shape.warnings
+    assert light.startswith("too much light")
+    assert "infrared" in infrared
 
 
 def test_crosstalk_is_taken_for_neither() -> None:

@@ -1,4 +1,4 @@
-"""A shot is refused only when no region of it can be trusted; what is returned of a shot in part is right."""
+"""A shot with a sound region is not refused: the region is returned, and its orders are right."""
 
 from __future__ import annotations
 

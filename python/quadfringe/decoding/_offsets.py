@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
-from quadfringe.decoding.stages import linear_light
+from quadfringe.decoding.symptoms import linear_light_of
 
-__all__ = ["channels_agree"]
+__all__ = ["channels_agree", "fitted_rad"]
 
 TILE_PX = 96  # side of a tile: a fringe or more, so that texture averages out
 TILE_SHARE = 0.3  # least share of the pixels of a tile that are returned
@@ -32,7 +32,7 @@ def channels_agree(shape: Shape, shot: AnyShot, plan: Plan) -> bool:
 
     B takes the place of IR if it has another fringe number than R.
     """
-    light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
+    light = linear_light_of(shot, plan)
     first, second, *third = plan.fringes.numbers
     channels = [(light["green"], second / first * shape.phase_rad)]
     if third and not plan.fringes.quadrature:
@@ -51,7 +51,7 @@ def _offset_rad(image: NDArray[Any], phase_rad: NDArray[Any]) -> float:
     tiles = [tile for tile in tiles if known[tile].mean() >= TILE_SHARE]
     if len(tiles) < TILES_MIN:
         tiles = _bands(known)
-    offsets = [_tile_offset_rad(image[tile][known[tile]], phase_rad[tile][known[tile]]) for tile in tiles]
+    offsets = [fitted_rad(image[tile].reshape(1, -1), phase_rad[tile].reshape(1, -1)) for tile in tiles]
     return float(np.quantile(np.abs(offsets), QUANTILE)) if offsets else np.inf
 
 
@@ -64,7 +64,15 @@ def _bands(known: NDArray[np.bool_]) -> list[tuple[slice, slice]]:
     return [np.s_[first:end, :] for first, end in pairwise(ends)]
 
 
-def _tile_offset_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> float:
+def fitted_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> NDArray[np.float64]:
+    """Give the angle by which fringes lie off their phase, by least squares, (T,) rad, for the pixels of tiles, (T, N).
+
+    A pixel that is NaN in light or phase does not count; a tile without any gives 0.
+    """
+    known = np.isfinite(light) & np.isfinite(phase_rad)
     waves = np.stack([np.ones_like(phase_rad), np.cos(phase_rad), -np.sin(phase_rad)], axis=1)
-    _, cosine, sine = np.linalg.lstsq(waves.astype(np.float64), light, rcond=None)[0]
-    return float(np.arctan2(sine, cosine))
+    waves = np.where(known[:, np.newaxis], waves, np.float32(0))
+    matrix = (waves @ waves.swapaxes(1, 2)).astype(np.float64) + 1e-6 * np.eye(3)
+    lit = np.where(known, light, np.float32(0))[:, :, np.newaxis]
+    _, cosine, sine = np.linalg.solve(matrix, (waves @ lit).astype(np.float64))[:, :, 0].T
+    return np.asarray(np.arctan2(sine, cosine))

@@ -33,6 +33,7 @@ __all__ = [
     "too_bright",
     "wrong_bits",
     "wrong_numbers",
+    "wrong_order_rad",
 ]
 
 FringeNumbers = tuple[float, ...]
@@ -97,14 +98,18 @@ def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | 
     turned = abs(closure.angle.rad) > params.CLOSURE_RAD and closure.angle.steady > params.STEADY_MIN
     columns = closure.shift_px if turned else 0.0
     rows = symptoms.rows_match(shot, plan, columns)
-    first, _, third = plan.fringes.numbers
-    fatal = not turned or abs(closure.angle.rad) > np.pi * (first - third) / first
+    fatal = not turned or abs(closure.angle.rad) > 0.5 * wrong_order_rad(plan.fringes.numbers)
     if turned and rows is not None and rows.still > rows.moved + params.CORRELATION_MORE:
         return replace(_pair_moved(columns), fatal=fatal)
     if turned or (rows is not None and abs(rows.shift_px) > params.SHIFT_MIN_PX):
         shift_px = None if rows is None or rows.moved < params.CORRELATION_MIN else rows.shift_px
         return replace(_shifted(columns, shift_px), fatal=fatal)
     return None
+
+
+def wrong_order_rad(numbers: FringeNumbers) -> float:
+    """Give the angle by which a wrong order puts the fringes of the third channel off."""
+    return 2 * np.pi * (numbers[0] - numbers[2]) / numbers[0]
 
 
 def _shifted(columns: float, rows: float | None) -> Cause:

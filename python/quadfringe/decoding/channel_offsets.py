@@ -12,7 +12,7 @@ that a wrong order hides, because a wrong order leaves them as they are:
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,13 @@ from numpy.typing import NDArray
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import rows_of_calibration
+from quadfringe.decoding._offsets import fitted_rad
 from quadfringe.decoding.cause import Cause
-from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration
+from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration, wrong_order_rad
 from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.readings import rows_of
-from quadfringe.decoding.stages import linear_light
-from quadfringe.decoding.symptoms import closure_of
+from quadfringe.decoding.symptoms import closing_steps, closure_of, linear_light_of
 
 __all__ = ["Offsets", "contradiction", "offsets_of"]
 
@@ -47,9 +47,10 @@ class Offsets:
     turn_rad: Real
 
     def closure_rad(self, numbers: tuple[float, ...]) -> Real:
-        """Give the closure of the three phases, (T,) rad: 0 for sound shots, whatever the orders."""
-        first, second, third = numbers
-        steps = (first - third) / (first - second)
+        """Give the closure of the three phases (E6), (T,) rad; no tiles for numbers whose phases do not close."""
+        steps = closing_steps(numbers)
+        if steps is None:
+            return np.zeros(0)
         return self.third_rad + (steps - 1) * self.red_rad - steps * self.green_rad
 
 
@@ -65,15 +66,14 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
 
 def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
     """Find a shift of infrared that the whole image confirms, or that is half the angle of a wrong order or more."""
-    first, _, third = plan.fringes.numbers
-    if not (plan.fringes.infrared and _close(plan.fringes.numbers)):
+    if not plan.fringes.infrared or closing_steps(plan.fringes.numbers) is None:
         return None
     mean = _mean(offsets.closure_rad(plan.fringes.numbers))
     if abs(mean) < params.STEADY_MIN or abs(np.angle(mean)) < params.CLOSURE_RAD:
         return None
     if named := registration(shot, plan, closure_of(shot, plan, np.isfinite(shape.quality))):
         return named
-    if abs(np.angle(mean)) < np.pi * (first - third) / first:
+    if abs(np.angle(mean)) < 0.5 * wrong_order_rad(plan.fringes.numbers):
         return None
     words = f"the infrared fringes lie {np.angle(mean):+.2f} rad off their place among those of red and green"
     fix = "register the chips (quadfringe calibrate run, step registration), or calibrate the pair again"
@@ -88,20 +88,14 @@ def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:
     if drift := _drift(infrared, offsets.turn_rad):
         found = (first + drift, second + drift, third + drift)
     # Crosstalk of red and green turns the closure too, but leaves infrared at its place.
-    elif _close(numbers) and abs(_mean(infrared)) < params.STEADY_MIN:
+    elif (steps := closing_steps(numbers)) and abs(_mean(infrared)) < params.STEADY_MIN:
         drift = _drift(offsets.closure_rad(numbers), offsets.turn_rad)
-        found = family(max(round((first - third) / (first - second)) - drift, 1))
+        found = family(max(steps - drift, 1))
     if drift == 0:
         return None
     words = f"the fringe numbers {listed(numbers)} are not those of this shot: the offsets of the channels drift by "
     words += f"{abs(drift)} turn{'s' if abs(drift) > 1 else ''} over the field, which fits {listed(found)}"
     return Cause("fringe numbers", words, NUMBERS_FIX)
-
-
-def _close(numbers: tuple[float, ...]) -> bool:
-    """Say whether the phases of three numbers add up to whole turns."""
-    first, second, third = numbers
-    return ((first - third) / (first - second)).is_integer()
 
 
 def _drift(angle_rad: Real, turn_rad: Real) -> int:
@@ -123,7 +117,7 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
     tops = range(0, len(shape.phase_rad) - count + 1, max(count, len(shape.phase_rad) // params.BANDS // 2 * 2))
     rows = np.add.outer(np.array(tops), np.arange(0, count, params.ROW_STRIDE))
     phase_rad = shape.phase_rad[rows]
-    light = _light(shot, plan, tops, count)
+    light = _light_of_bands(shot, plan, tops, count)
     seen, third_rad = "blue", third / first * phase_rad
     if plan.fringes.infrared:
         per_px = np.float32(2 * np.pi * third / plan.projector_width_px)
@@ -134,13 +128,12 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
     return Offsets(*tiles[:, np.isfinite(tiles).all(axis=0)])
 
 
-def _light(shot: AnyShot, plan: Plan, tops: range, count: int) -> dict[str, NDArray[np.float32]]:
+def _light_of_bands(shot: AnyShot, plan: Plan, tops: range, count: int) -> dict[str, NDArray[np.float32]]:
     """Give the linear light of some rows of every band by channel, (bands, rows, columns)."""
-    response = "calibration" if plan.response == "auto" else plan.response
     bands = []
     for top in tops:
         calibration = None if plan.calibration is None else rows_of_calibration(plan.calibration, top, count)
-        bands.append(linear_light(rows_of(shot, top, count), calibration, response))
+        bands.append(linear_light_of(rows_of(shot, top, count), replace(plan, calibration=calibration)))
     return {name: np.stack([band[name][:: params.ROW_STRIDE] for band in bands]) for name in bands[0]}
 
 
@@ -172,11 +165,5 @@ def _offsets_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> Real:
     offsets: Real = np.full(len(enough), np.nan)
     if not enough.any():
         return offsets
-    known, phase_rad = known[enough], phase_rad[enough]
-    light = np.where(known, light[enough], np.float32(0))
-    waves = np.stack([np.ones_like(phase_rad), np.cos(phase_rad), -np.sin(phase_rad)], axis=1)
-    waves = np.where(known[:, np.newaxis], waves, np.float32(0))
-    matrix = (waves @ waves.swapaxes(1, 2)).astype(np.float64) + 1e-6 * np.eye(3)
-    found = np.linalg.solve(matrix, (waves @ light[:, :, np.newaxis]).astype(np.float64))[:, :, 0]
-    offsets[enough] = np.arctan2(found[:, 2], found[:, 1])
+    offsets[enough] = fitted_rad(light[enough], phase_rad[enough])
     return offsets

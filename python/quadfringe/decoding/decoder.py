@@ -133,9 +133,12 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
     light = [*filter(None, (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot)))]
-    # Light that is cut off at either end bends the phases of the channels in different ways.
-    if kernel is not None and not light and (cause := contradiction(shape, shot, plan)):
-        doubts.append(cause)
+    if kernel is not None and (cause := contradiction(shape, shot, plan)):
+        # Light that is cut off at either end is named first, because it moves the phases of the channels too.
+        if light:
+            light.append(replace(cause, fatal=False))
+        else:
+            doubts.append(cause)
     if fatal := next((cause for cause in doubts if cause.fatal), None):
         raise fatal.error
     doubts = [*doubts, *light, *within_depths(shape, plan.decode.depth_range_mm)]

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from quadfringe.config import Device
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding.plan import Plan
-from quadfringe.decoding.stages import carrier, linear_light
+from quadfringe.decoding.stages import carrier
+from quadfringe.decoding.symptoms import linear_light_of
 
 __all__ = ["Drift", "Fit", "fit_fringes", "infrared_column", "infrared_drift", "pixels_of"]
 
@@ -181,7 +182,7 @@ def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> _Waves:
     """Compute the linear light of a shot and its mean over about a fringe."""
     import cv2
 
-    light = linear_light(shot, plan.calibration, "calibration" if plan.response == "auto" else plan.response)
+    light = linear_light_of(shot, plan)
     period_px, _ = carrier(np.nan_to_num(light["red"]))
     period_px = period_px if np.isfinite(period_px) else 20.0
     known = shape.returned & np.all([np.isfinite(image) for image in light.values()], axis=0)

@@ -60,6 +60,10 @@ BEYOND_SHARE, BEYOND_PIXELS = 0.08, 8
 # Rows between the pixels that are looked at for this. More pixels cost time in every decode, 0.6 ms more with 1
 # (`python benches/checks.py`); fewer would miss a border that is off by ten rows.
 BEYOND_STRIDE = 4
+# Image columns in which the upper and the lower border of the light are looked for, at least. More: time, 1.5 ms with
+# all 1024 in place of 0.4 (`python benches/checks.py`). Fewer: a border in few columns is missed (`python
+# evaluation/geometry.py`).
+BORDER_COLUMNS = 200
 
 # --- Numbers of a calibration, without a shape
 
@@ -104,8 +108,8 @@ AGREEMENT_MIN = 0.3
 CLOSURE_PX = 31
 # Lag of the local frequency, px, and its window. Longer ones cross more edges, shorter ones are noisier.
 LAG_PX, FREQUENCY_PX = 8, 25
-# The same lag in periods, at most: half a period is the limit of what a phase tells. A larger share turns fine fringes
-# round, a smaller one is noisier.
+# The same lag in periods, at most: beyond half a period the direction is ambiguous. A larger share reverses fine
+# fringes, a smaller one is noisier.
 LAG_TURNS = 0.4
 # Angle of the closure in rad from which infrared counts as shifted: 0.2 is 1.3 px at a period of 41 px. Sound shots
 # reach 0.03, in tiles 0.13 (patches of 12 mm). A smaller angle names misalignments that cost no order, a larger one
@@ -122,7 +126,7 @@ ROW_STRIDE = 4
 # Width of a tile in a band, px, and the share of its pixels that must be returned. Wider tiles miss narrow objects,
 # narrower ones hold less than a fringe.
 OFFSET_TILE_PX, OFFSET_SHARE = 96, 0.3
-# Fewest tiles that tell a fault. Fewer believe single prints.
+# Fewest tiles from which a fault is named. A smaller number names faults for the print in a single tile.
 OFFSET_TILES_MIN = 4
 # Most turns of drift over the field, the least length of the mean phasor, and by how much it must exceed that without
 # drift. Numbers that are farther off leave no margin. Sound shots have no drift that is better than none, and other
@@ -237,7 +241,3 @@ STEP_BYTES_PER_PX = 60
 # 0.6 % of steps get a wrong order, in place of 0.06 % with 24 infrared fringes and 1.1 rad; 50 mm nearer it is 0.8 and
 # 0.1 %, in place of none with 40 (`python evaluation/pair.py --half tune --only steps`, and with `--infrared 30`).
 PAIR_MARGIN_RAD = 0.6
-# Image columns in which the upper and the lower border of the light are looked for, at least. More: time, 1.5 ms with
-# all 1024 in place of 0.4 (`python benches/checks.py`). Fewer: a border in few columns is missed (`python
-# evaluation/geometry.py`).
-BORDER_COLUMNS = 200

@@ -23,6 +23,7 @@ __all__ = [
     "bits_in_use",
     "brightness",
     "closed_wave",
+    "closing_steps",
     "closure_of",
     "closure_of_waves",
     "linear_light_of",
@@ -208,13 +209,18 @@ def _closed(waves: list[Complex], numbers: tuple[float, ...]) -> Angle:
 
 def closed_wave(waves: list[Complex], numbers: tuple[float, ...]) -> Complex | None:
     """Give exp(i sum) of the sum of the three phases that is 0 for every surface; None if these do not close."""
-    first, second, third = numbers
-    turns = (first - third) / (first - second)
-    if abs(turns - round(turns)) > 1e-6:
+    steps = closing_steps(numbers)
+    if steps is None:
         return None
-    whole = round(turns)
-    closed: Complex = waves[2] * waves[0] ** (whole - 1) * np.conj(waves[1]) ** whole
+    closed: Complex = waves[2] * waves[0] ** (steps - 1) * np.conj(waves[1]) ** steps
     return closed
+
+
+def closing_steps(numbers: tuple[float, ...]) -> int | None:
+    """Give the k of fringe numbers N, M, N - k (N - M), whose three phases add up to whole turns; None for others."""
+    first, second, third = numbers
+    steps = (first - third) / (first - second)
+    return round(steps) if abs(steps - round(steps)) < 1e-6 else None
 
 
 def local_mean(wave: Complex, side_px: int) -> Complex:

@@ -11,9 +11,9 @@ pub const REACH: f32 = 0.75;
 /// more wrong orders here; `cargo test --test round_trip` checks shadows).
 pub const HEIGHT_MIN: f32 = 0.02;
 /// Share of this limit that some pixel of a shadow, or within two pixels of it, must be below. Larger: noise makes holes where
-/// all fringes are dark at once (1: a dotted column on a plane, 0.4 points less of painted faces, `python evaluation/world.py --half
-/// tune`). Smaller: narrow shadows count as lit.
-pub const CORE_SHARE: f32 = 0.5;
+/// all fringes are dark at once (1: a dotted column on a plane, 0.3 points less of painted faces, `python evaluation/world.py --half
+/// tune`). Smaller: narrow shadows count as lit (0.5: 11 pixels in the shadows of steps, 0.6: none, `cargo test --test round_trip`).
+pub const CORE_SHARE: f32 = 0.6;
 
 /// Least modulation of R and B that counts as light, in standard deviations of the noise of a pixel: the window and the energy find
 /// the phase of many pixels together, so single ones may be noisier than a fringe. Larger: dark surfaces are lost. Smaller: noise in
