@@ -1,7 +1,7 @@
 //! The preconditioner: exact solutions along the columns of cells.
 
 use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
-use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, four, place, total};
+use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, place, total};
 use crate::joint::model::count;
 use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
@@ -139,88 +139,118 @@ impl Preconditioner {
 }
 
 /// Solves the columns; returns the scalar product of residual and result.
+///
+/// Each channel has separate passes. In one pass over all of them the compiler gathers the four channels of a cell into
+/// short vectors, which takes more than twice as long.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 pub(super) fn precondition(lines: &Preconditioner, residual: &Fields, out: &mut Fields) -> f64 {
     let mut product = 0.0;
     for x in (0..SIDE).step_by(LANES) {
-        let mut rows = [Column::default(), Column::default()];
         for y in 0..SIDE {
             let at = place(x, y);
-            let row = lines.eliminate(at, &Column::of(residual, at), &rows);
-            row.write(out, at);
-            rows = [rows[1], row];
+            out.phase.set(at, residual.phase.get(at));
+            out.contrast.set(at, residual.contrast.get(at));
         }
-        let mut rows = [Column::default(), Column::default()];
+        for c in 0..4 {
+            lines.eliminate_albedo(c, x, residual, out);
+        }
+        lines.eliminate(x, out);
+        lines.substitute(x, out);
+        for c in 0..4 {
+            lines.substitute_albedo(c, x, out);
+        }
         for y in (0..SIDE).rev() {
             let at = place(x, y);
-            let row = lines.substitute(at, &Column::of(out, at), &rows);
-            let solution = lines.answer(at, &row);
-            product += total(solution.times(&Column::of(residual, at)));
-            solution.write(out, at);
-            rows = [rows[1], row];
+            product += total(Column::of(out, at).times(&Column::of(residual, at)));
         }
     }
     product
 }
 
+/// `value - factor * by` in every cell.
+#[inline(always)]
+fn less(value: Lanes, factor: Lanes, by: Lanes) -> Lanes {
+    let mut out = [0.0; LANES];
+    for x in 0..LANES {
+        out[x] = value[x] - factor[x] * by[x];
+    }
+    out
+}
+
 impl Preconditioner {
-    /// Forward elimination of one row, from the results of the two rows above, the nearer one last.
+    /// Forward elimination of the albedos of channel `c`, which changes phase and contrast too.
     #[inline(always)]
-    fn eliminate(&self, at: usize, residual: &Column, [second, first]: &[Column; 2]) -> Column {
-        let mut out = *residual;
-        let (by_phase, by_contrast) = (four(&self.by_phase, at), four(&self.by_contrast, at));
-        let (above, coupling) = (four(&self.albedo, at - STRIDE), self.coupling.get(at - STRIDE));
-        for c in 0..4 {
-            for x in 0..LANES {
-                let log = residual.albedo[c][x];
-                out.phase[x] -= by_phase[c][x] * log;
-                out.contrast[x] -= by_contrast[c][x] * log;
-                out.albedo[c][x] = log - coupling[x] * above[c][x] * first.albedo[c][x];
+    fn eliminate_albedo(&self, c: usize, x: usize, residual: &Fields, out: &mut Fields) {
+        let mut first = [0.0; LANES];
+        for y in 0..SIDE {
+            let at = place(x, y);
+            let log = residual.albedo[c].get(at);
+            out.phase.set(at, less(out.phase.get(at), self.by_phase[c].get(at), log));
+            out.contrast.set(at, less(out.contrast.get(at), self.by_contrast[c].get(at), log));
+            let (coupling, above) = (self.coupling.get(at - STRIDE), self.albedo[c].get(at - STRIDE));
+            let mut coupled = [0.0; LANES];
+            for i in 0..LANES {
+                coupled[i] = coupling[i] * above[i];
             }
+            first = less(log, coupled, first);
+            out.albedo[c].set(at, first);
         }
-        let (follow, share) = (self.contrast_by_phase.get(at), self.contrast_first.get(at));
-        let (one, two) = (self.phase_first.get(at), self.phase_second.get(at));
-        for x in 0..LANES {
-            out.phase[x] -= follow[x] * out.contrast[x] + one[x] * first.phase[x] + two[x] * second.phase[x];
-            out.contrast[x] -= share[x] * first.contrast[x];
-        }
-        out
     }
 
-    /// Back substitution of one row, from the results of the two rows below, the nearer one last.
+    /// Forward elimination of contrast and phase.
     #[inline(always)]
-    fn substitute(&self, at: usize, row: &Column, [second, first]: &[Column; 2]) -> Column {
-        let mut out = *row;
-        let (pivot, slow) = (self.phase.get(at), self.contrast.get(at));
-        let (one, two) = (self.phase_first.get(at + STRIDE), self.phase_second.get(at + 2 * STRIDE));
-        let share = self.contrast_first.get(at + STRIDE);
-        let (inverse, coupling) = (four(&self.albedo, at), self.coupling.get(at));
-        for x in 0..LANES {
-            out.phase[x] = pivot[x] * row.phase[x] - one[x] * first.phase[x] - two[x] * second.phase[x];
-            out.contrast[x] = slow[x] * row.contrast[x] - share[x] * first.contrast[x];
-        }
-        for c in 0..4 {
-            for x in 0..LANES {
-                out.albedo[c][x] = inverse[c][x] * (row.albedo[c][x] - coupling[x] * first.albedo[c][x]);
+    fn eliminate(&self, x: usize, out: &mut Fields) {
+        let [mut second, mut first, mut slow] = [[0.0; LANES]; 3];
+        for y in 0..SIDE {
+            let at = place(x, y);
+            let (follow, share) = (self.contrast_by_phase.get(at), self.contrast_first.get(at));
+            let (one, two) = (self.phase_first.get(at), self.phase_second.get(at));
+            let (mut phase, contrast) = (out.phase.get(at), out.contrast.get(at));
+            for i in 0..LANES {
+                phase[i] -= follow[i] * contrast[i] + one[i] * first[i] + two[i] * second[i];
             }
+            slow = less(contrast, share, slow);
+            [second, first] = [first, phase];
+            out.phase.set(at, phase);
+            out.contrast.set(at, slow);
         }
-        out
     }
 
-    /// The unknowns of a row: contrast and albedos follow the phase of their cell.
+    /// Back substitution of contrast and phase; then the contrast follows the phase of its cell.
     #[inline(always)]
-    fn answer(&self, at: usize, row: &Column) -> Column {
-        let mut out = *row;
-        let (by_phase, by_contrast) = (four(&self.by_phase, at), four(&self.by_contrast, at));
-        let follow = self.contrast_by_phase.get(at);
-        for x in 0..LANES {
-            out.contrast[x] -= follow[x] * row.phase[x];
-        }
-        for c in 0..4 {
-            for x in 0..LANES {
-                out.albedo[c][x] -= by_phase[c][x] * row.phase[x] + by_contrast[c][x] * out.contrast[x];
+    fn substitute(&self, x: usize, out: &mut Fields) {
+        let [mut second, mut first, mut slow] = [[0.0; LANES]; 3];
+        for y in (0..SIDE).rev() {
+            let at = place(x, y);
+            let (pivot, inverse) = (self.phase.get(at), self.contrast.get(at));
+            let (one, two) = (self.phase_first.get(at + STRIDE), self.phase_second.get(at + 2 * STRIDE));
+            let share = self.contrast_first.get(at + STRIDE);
+            let (mut phase, mut contrast) = (out.phase.get(at), out.contrast.get(at));
+            for i in 0..LANES {
+                phase[i] = pivot[i] * phase[i] - one[i] * first[i] - two[i] * second[i];
+                contrast[i] = inverse[i] * contrast[i] - share[i] * slow[i];
             }
+            [second, first, slow] = [first, phase, contrast];
+            out.phase.set(at, phase);
+            out.contrast.set(at, less(contrast, self.contrast_by_phase.get(at), phase));
         }
-        out
+    }
+
+    /// Back substitution of the albedos of channel `c`; then they follow phase and contrast of their cell.
+    #[inline(always)]
+    fn substitute_albedo(&self, c: usize, x: usize, out: &mut Fields) {
+        let mut first = [0.0; LANES];
+        for y in (0..SIDE).rev() {
+            let at = place(x, y);
+            let (inverse, coupling) = (self.albedo[c].get(at), self.coupling.get(at));
+            let (by_phase, by_contrast) = (self.by_phase[c].get(at), self.by_contrast[c].get(at));
+            let (phase, contrast) = (out.phase.get(at), out.contrast.get(at));
+            let (row, mut answer) = (out.albedo[c].get(at), [0.0; LANES]);
+            for i in 0..LANES {
+                first[i] = inverse[i] * (row[i] - coupling[i] * first[i]);
+                answer[i] = first[i] - (by_phase[i] * phase[i] + by_contrast[i] * contrast[i]);
+            }
+            out.albedo[c].set(at, answer);
+        }
     }
 }
