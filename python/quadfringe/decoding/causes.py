@@ -16,11 +16,13 @@ from quadfringe.decoding import params, symptoms
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.fringe_fit import Fit, fit_fringes
 from quadfringe.decoding.plan import Plan
+from quadfringe.decoding.stages import carrier
 from quadfringe.decoding.symptoms import Closure
 
 __all__ = [
     "NUMBERS_FIX",
     "after_order",
+    "along_rows",
     "before_order",
     "blur",
     "channels_fit",
@@ -41,6 +43,7 @@ FringeNumbers = tuple[float, ...]
 # 0.1 of the frame spans four fringes of a twelfth of its width. Not measured: it only adds a line to the fix.
 FEW_LIT = 0.1
 NUMBERS_FIX = "give the numbers that were projected (--fringes), or project these"
+TURN_FIX = "turn the images, or the camera, by 90 degrees, or decode with the joint method (--method joint)"
 SMALLEST_ROOT, LARGEST_ROOT = 4, 12  # 16, 15, 12 and 144, 143, 132: coarser or finer fringes measure nothing
 SMALLEST_PAIR, LARGEST_PAIR = 6, 20  # N, N - 1 without infrared: finer fringes look alike after one of them
 
@@ -66,6 +69,26 @@ def after_order(shot: AnyShot, shape: Shape, plan: Plan, closure: Closure | None
     fit = fit_fringes(shot, shape, plan)
     waves = () if fit is None else (blur(shot, fit, plan, closure), _not_linear(fit), _crosstalk(fit))
     return next((cause for cause in (*waves, _too_dark(shot, params.DIM)) if cause is not None), None)
+
+
+def along_rows(shot: AnyShot, plan: Plan) -> Cause | None:
+    """Find fringes that run along the rows: each channel has the frequency of its number along the columns.
+
+    The joint method decodes them; the published one looks for fringes along the rows only.
+    """
+    if plan.decode.method != "published":
+        return None
+    light = symptoms.linear_light_of(shot, plan)
+    row_px, column_px = carrier(np.nan_to_num(light["red"]))
+    if row_px < params.ALONG_ROWS * column_px or not np.isfinite(column_px):
+        return None
+    waves = symptoms.waves_of({name: np.ascontiguousarray(image.T) for name, image in light.items()}, plan)
+    closure = None if waves is None else symptoms.closure_of_waves(waves, plan)
+    # Fringes may run up or down, so that the sign tells nothing.
+    if closure is None or max(abs(abs(ratio) - 1) for ratio in (closure.green, closure.infrared)) > params.RATIO_OFF:
+        return None
+    words = "the images seem to be turned by 90 degrees: fringes run along the rows, one every "
+    return Cause("turned images", words + f"{column_px:.1f} px of a column", TURN_FIX)
 
 
 def channels_fit(closure: Closure | None) -> bool:

@@ -173,6 +173,14 @@ REGION_PERIODS_MIN = 1.2
 # its rim. Smaller numbers trust chance, larger ones refuse small objects.
 REGION_SHARE, REGION_PX = 0.01, 1500
 
+# --- Direction of the fringes
+
+# Period along the rows over that along the columns, from which the published method may be refused for fringes along
+# the rows. Of the plate turned by 60 degrees it is 1.5 and most orders are right, by 75 degrees 3 to 5 and half of
+# them, by 90 degrees 5 and none to half (`python evaluation/captures.py --only turned`). A larger number returns wrong
+# orders, a smaller one refuses inclined fringes that can be decoded.
+ALONG_ROWS = 2.0
+
 # --- Blur
 
 # Contrast of the fringes below which blur is considered. Sound shots have 0.88 to 0.9, a blur of 4 px leaves 0.68. A

@@ -15,6 +15,7 @@ from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import (
     NUMBERS_FIX,
     after_order,
+    along_rows,
     before_order,
     channels_fit,
     listed,
@@ -224,7 +225,9 @@ def _by_chance(shape: Shape, shot: AnyShot, margin: float, share: float) -> bool
 
 
 def _refuse_numbers(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
-    """Raise `DecodeError` if fringe numbers with the ratios of this shot raise the margin of a band of rows."""
+    """Raise `DecodeError` if fringes run along the rows, or if other numbers raise the margin of a band of rows."""
+    if cause := along_rows(shot, decoder.plan):
+        raise cause.error
     first, count = band_of(shape)
     part, band = decoder.for_rows(first, count), rows_of(shot, first, count)
     closure = closure_of(band, part.plan)
@@ -235,10 +238,8 @@ def _refuse_numbers(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None
         found = order_margin(part.with_numbers(numbers).shape(band))
         if found > max(CLEARLY_BETTER * given, DOUBTFUL):
             words = f"the fringe numbers {listed(decoder.plan.fringes.numbers)} are not those of this shot: with the "
-            words += (
-                f"ratios of its channels the median order margin is {found:.2f} in place of {given:.2f}, which fits "
-            )
-            words += listed(numbers)
+            words += f"ratios of its channels the median order margin is {found:.2f} in place of {given:.2f}, "
+            words += f"which fits {listed(numbers)}"
             raise Cause("fringe numbers", words, NUMBERS_FIX).error
 
 
