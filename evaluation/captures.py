@@ -3,9 +3,13 @@
     python evaluation/captures.py [--data FOLDER] [--response known|auto|linear] [--offsets even|odd] [--only WORD ...]
                                   [--draw FILE] [--json FILE] [--rings]
 
-Every capture gives shots at 12 offsets of the fringes, and at every fourth offset the variants of
-quadfringe.evaluation._variants. The response is estimated from the 12 images of the first frequency (known), or from
-the shot. A refused shot has no right pixel. Right order: |phase - truth| < pi. Tune on even offsets, report odd ones.
+Every capture gives shots at 12 offsets of the fringes, each of them with green and infrared at other steps too, and in
+the variants of quadfringe.evaluation._variants. The response is estimated from the 12 images of the first frequency
+(known), or from the shot. A refused shot has no right pixel. Right order: |phase - truth| < pi. Tune on even offsets,
+report odd ones. Of all shots with the known response the figures are held against their bars; the exit status is 1 when
+one is missed.
+Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
+with a message that names the turn.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
@@ -14,6 +18,7 @@ those returned: green is right, red is wrong, blue is no data on the object; gre
 from __future__ import annotations
 
 import argparse
+import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -29,16 +34,25 @@ from quadfringe.calibration.response import estimate_from_files
 from quadfringe.errors import DecodeError, DecodeWarning
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
-from quadfringe.evaluation._variants import OFFSETS, VARIANTS, stepped
+from quadfringe.evaluation._ledger import bars
+from quadfringe.evaluation._variants import OFFSETS, VARIANTS, stepped, turned
 from quadfringe.files import figures_text
 
-EVERY = 4  # offsets between the shots of which variants are made
 CHOSEN = {"all": OFFSETS, "even": OFFSETS[::2], "odd": OFFSETS[1::2]}
 WORST = 10
 TILE = (480, 360)
 COLUMNS = 5
 RINGS_PX = (0.0, 1.5, 3.5, 6.5, np.inf)  # distances from an outline: pixels that mix, pixels next to them, the rest
 JUMP_RAD = np.pi / 2  # between neighbours
+TURNED = "turned images"  # the reason of a refusal that names the turn
+HELD = (
+    "refused_percent",
+    "right_mean_percent",
+    "right_worst_percent",
+    "right_of_returned_worst_percent",
+    "turned_joint_right_worst_percent",
+    "turned_published_named_percent",
+)
 
 
 @dataclass(frozen=True)
@@ -46,7 +60,8 @@ class Judged:
     """A decoded shot: its name, the reason of a refusal, the score, and its picture."""
 
     label: str
-    reason: str
+    refused: str  # the message of a refusal
+    reason: str  # its cause in a few words
     score: scoring.Score
     picture: NDArray[np.uint8]
     rings: NDArray[np.float64]  # of each ring, % of the object and % of it without the right order
@@ -55,9 +70,14 @@ class Judged:
 def shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
     for offset in offsets:
         scene = stepped(data, name, offset)
+        yield f"{name}, other G and IR, step {offset}", stepped(data, name, offset, other=1)
         for label, variant in VARIANTS.items():
-            if label == "as captured" or offset % EVERY == 0:
-                yield f"{name}, {label}, step {offset}", variant(scene, offset)
+            yield f"{name}, {label}, step {offset}", variant(scene, offset)
+
+
+def turned_shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
+    for offset in offsets:
+        yield f"{name}, turned, step {offset}", turned(stepped(data, name, offset), offset)
 
 
 def response_of(data: Path, name: str, choice: str) -> Any:
@@ -66,14 +86,16 @@ def response_of(data: Path, name: str, choice: str) -> Any:
     return estimate_from_files(scenes.step_files(data, name), scenes.STEPS).calibration
 
 
-def judged(label: str, scene: scoring.Scene, response: Any) -> Judged:
-    reason = ""
+def judged(label: str, scene: scoring.Scene, **how: Any) -> Judged:
+    """Decode and score a shot and print its line; `how` as in `_scenes.plan_of`."""
+    refused = reason = ""
     try:
-        phase_rad = scenes.shape_of(scene, response=response).phase_rad
+        phase_rad = scenes.shape_of(scene, **how).phase_rad
     except DecodeError as error:
-        reason, phase_rad = str(error), np.full(scene.red.shape, np.nan, np.float32)
+        refused, reason, phase_rad = str(error), error.reason, np.full(scene.red.shape, np.nan, np.float32)
     score = scoring.score(scene, phase_rad)
-    return Judged(label, reason, score, drawn(label, scene, phase_rad), rings_of(scene, phase_rad))
+    print(f"{label:42}{score.right_percent:9.2f}{score.right_of_returned_percent:15.3f}  {refused}", flush=True)
+    return Judged(label, refused, reason, score, drawn(label, scene, phase_rad), rings_of(scene, phase_rad))
 
 
 def rings_of(scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.float64]:
@@ -116,14 +138,43 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
     right = [one.score.right_percent for one in found]
     returned = [one.score.right_of_returned_percent for one in found if one.score.returned_percent > 0]
     figures = {
-        "refused_percent": 100 * sum(bool(one.reason) for one in found) / len(found),
+        "shots": float(len(found)),
+        "refused_percent": share_percent([bool(one.refused) for one in found]),
         "right_mean_percent": float(np.mean(right)),
         "right_worst_percent": min(right),
-        "right_of_returned_mean_percent": float(np.mean(returned)),
-        "right_of_returned_worst_percent": min(returned),
+        "right_of_returned_mean_percent": float(np.mean(returned)) if returned else np.nan,
+        "right_of_returned_worst_percent": min(returned, default=np.nan),
     }
-    print(f"{name}: {len(found)} shots, " + ", ".join(f"{key} {value:.2f}" for key, value in figures.items()))
+    return told(name, figures)
+
+
+def summary_of_turned(name: str, joint: list[Judged], published: list[Judged]) -> dict[str, float]:
+    right = [one.score.right_percent for one in joint]
+    figures = {
+        "turned_shots": float(len(joint)),
+        "turned_joint_refused_percent": share_percent([bool(one.refused) for one in joint]),
+        "turned_joint_right_mean_percent": float(np.mean(right)),
+        "turned_joint_right_worst_percent": min(right),
+        # Refused as it must be: in words that name the turn.
+        "turned_published_named_percent": share_percent([one.reason == TURNED for one in published]),
+    }
+    return told(name, figures)
+
+
+def share_percent(counted: list[bool]) -> float:
+    return 100 * sum(counted) / len(counted)
+
+
+def told(name: str, figures: dict[str, float]) -> dict[str, float]:
+    print(f"{name}: " + ", ".join(f"{key} {value:.4g}" for key, value in figures.items()))
     return {f"{name}_{key}": value for key, value in figures.items()}
+
+
+def missed(figures: dict[str, float]) -> list[str]:
+    """Compare figures of all shots with the ledger."""
+    limits = {f"{name}_{key}": bars()[f"variants.{name}_{key}"] for name in scenes.CAPTURES for key in HELD}
+    missing = {key: bar for key, bar in limits.items() if not bar.holds(figures[key])}
+    return [f"missed: {key} {figures[key]:.4g}, bar {bar.text}" for key, bar in missing.items()]
 
 
 def print_rings(name: str, found: list[Judged]) -> None:
@@ -144,6 +195,28 @@ def options_of() -> argparse.Namespace:
     return parser.parse_args()
 
 
+def measured(options: argparse.Namespace, name: str) -> tuple[dict[str, float], list[Judged]]:
+    """Give the figures of a capture and its shots, without those that are turned."""
+    response, offsets = response_of(options.data, name, options.response), CHOSEN[options.offsets]
+
+    def all_of(made: Iterator[tuple[str, scoring.Scene]], words: str = "", **how: Any) -> list[Judged]:
+        chosen = (
+            (label + words, scene)
+            for label, scene in made
+            if not options.only or any(word in label for word in options.only)
+        )
+        return [judged(label, scene, response=response, **how) for label, scene in chosen]
+
+    found = all_of(shots(options.data, name, offsets))
+    joint = all_of(turned_shots(options.data, name, offsets))
+    published = all_of(turned_shots(options.data, name, offsets), ", published", method="published")
+    figures = summary(name, found) if found else {}
+    figures |= summary_of_turned(name, joint, published) if joint else {}
+    if options.rings and found:
+        print_rings(name, found)
+    return figures, found
+
+
 def main() -> None:
     options = options_of()
     warnings.simplefilter("ignore", DecodeWarning)
@@ -151,22 +224,15 @@ def main() -> None:
     every: list[Judged] = []
     print(f"quadfringe {qf.__version__}\n{'':42}{'right %':>9}{'of returned %':>15}")
     for name in scenes.CAPTURES:
-        response, found = response_of(options.data, name, options.response), []
-        for label, scene in shots(options.data, name, CHOSEN[options.offsets]):
-            if options.only and not any(word in label for word in options.only):
-                continue
-            one = judged(label, scene, response)
-            found.append(one)
-            score = f"{one.score.right_percent:9.2f}{one.score.right_of_returned_percent:15.3f}"
-            print(f"{label:42}{score}  {one.reason}", flush=True)
-        figures |= summary(name, found) if found else {}
+        of_capture, found = measured(options, name)
+        figures |= of_capture
         every += found
-        if options.rings and found:
-            print_rings(name, found)
     if options.draw and every:
         cv2.imwrite(str(options.draw), sheet(every))
     if options.json:
         options.json.write_text(figures_text(figures))
+    if options.offsets == "all" and options.response == "known" and not options.only and (words := missed(figures)):
+        sys.exit("\n".join(words))
 
 
 if __name__ == "__main__":

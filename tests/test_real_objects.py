@@ -16,7 +16,7 @@ from quadfringe.errors import DecodeError
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation._isolated import isolated, patches
-from quadfringe.evaluation._variants import VARIANTS, stepped
+from quadfringe.evaluation._variants import VARIANTS, stepped, turned
 
 # Bar, fringe period in px, share of the frame, seed. Objects of 2 % are narrower than a few fringes.
 OBJECTS = [
@@ -78,6 +78,26 @@ def test_variants_of_captures_are_decoded(data_dir: Path, name: str, variant: st
     score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
     hold("variants.right_percent", score.right_percent)
     hold("variants.right_of_returned_percent", score.right_of_returned_percent)
+
+
+@pytest.mark.parametrize("offset", [0, 1])
+@pytest.mark.parametrize("name", scenes.CAPTURES)
+def test_a_capture_that_is_turned_by_90_degrees_is_decoded_or_refused_as_such(
+    data_dir: Path, name: str, offset: int
+) -> None:
+    response = estimate_from_files(scenes.step_files(data_dir, name), scenes.STEPS).calibration
+    scene = turned(stepped(data_dir, name, offset), offset)
+    score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
+    hold(f"variants.{name}_turned_joint_right_worst_percent", score.right_percent)
+    with pytest.raises(DecodeError, match=r"turned by 90 degrees: fringes run along the rows.*joint") as caught:
+        scenes.shape_of(scene, response=response, method="published")
+    assert caught.value.reason == "turned images"
+
+
+def test_inclined_fringes_are_not_taken_for_turned_ones(data_dir: Path) -> None:
+    response = estimate_from_files(scenes.step_files(data_dir, "plate"), scenes.STEPS).calibration
+    scene = VARIANTS["inclined"](stepped(data_dir, "plate", 4), 4)
+    scenes.shape_of(scene, response=response, method="published")
 
 
 def test_the_fringe_period_can_be_told() -> None:

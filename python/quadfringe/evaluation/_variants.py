@@ -1,4 +1,7 @@
-"""Shots that other benches could have made of the captures: other steps, crops, backgrounds, resolution, light."""
+"""Shots that other benches could have made of the captures: other steps, crops, backgrounds, resolution, light.
+
+Any number that a variant draws follows from the offset of its shot, so that every run makes the same shots.
+"""
 
 from __future__ import annotations
 
@@ -14,25 +17,34 @@ from numpy.typing import NDArray
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation.scoring import Scene
 
-__all__ = ["OFFSETS", "VARIANTS", "stepped"]
+__all__ = ["OFFSETS", "VARIANTS", "stepped", "turned"]
 
 CROP = 0.2  # share of the frame
+CROP_ASIDE = 0.25  # of its sides, by which the middle of a crop is moved from that of the object
 DARKER = 0.1
-READ_NOISE = 0.004  # standard deviation, share of full scale: one level of 8 bit
+# Electrons of a pixel at full scale, and standard deviation of its noise in the dark, electrons, as EMVA 1288 defines
+# them. Industrial cameras have 10,000 to 20,000, and 2 to 7 (CMOS) or 10 to 20 (CCD): this one is a poor one.
+SATURATION_E, DARK_NOISE_E = 10_000, 10
+# Standard deviation of the noise on black around an object that is cut out, share of full scale: one level of 8 bit, as
+# of a camera with gain. Less noise is rounded to black.
+BLACK_NOISE = 0.004
 ROTATION_DEG = 35.0
 OFFSETS = range(scenes.STEPS)
+SEEN_STEPS = 9 * scenes.STEPS  # shifts beyond leave the columns of the projector
 Variant = Callable[[Scene, int], Scene]
 
 
-def stepped(data: Path, name: str, offset: int) -> Scene:
+def stepped(data: Path, name: str, offset: int, other: int = 0) -> Scene:
     """Give the shot of a capture whose red image is this of the 12 steps of the first frequency.
 
     A projector that is shifted by n steps of R shows G and IR shifted by 14 n / 15 and 7 n / 8 steps, because the
     periods are 42, 45 and 48 columns. Of the shifts with this offset, the one that comes nearest to whole steps is
-    taken; it is off by 0.13 rad at most.
+    taken, which is off by 0.13 rad at most. `other` 1 takes the next one, off by 0.14 rad at most: R and B stay, G and
+    IR have other steps.
     """
     scene = scenes.capture(data, name)
-    shift = min(range(offset, 9 * scenes.STEPS, scenes.STEPS), key=lambda n: max(map(_off, _steps(n))))
+    shifts = sorted(range(offset, SEEN_STEPS, scenes.STEPS), key=lambda n: max(map(_off, _steps(n))))
+    shift = shifts[other]
     quarter = scenes.STEPS // 4
     steps = {"red": (0, offset), "blue": (0, offset + quarter)}
     steps |= {key: (f, round(step)) for key, f, step in zip(("green", "ir"), (1, 2), _steps(shift), strict=True)}
@@ -67,27 +79,33 @@ def _changed(scene: Scene, image: Callable[[Any], Any], truth: Callable[[Any], A
     )
 
 
-def _cropped(scene: Scene, _seed: int) -> Scene:
-    """Keep a fifth of the frame around the object."""
-    size = np.round(np.sqrt(CROP) * np.array(scene.red.shape)).astype(int)
-    middle = np.mean(np.nonzero(scene.scored), axis=1).astype(int)
-    first = np.clip(middle - size // 2, 0, np.array(scene.red.shape) - size)
+def _cropped(scene: Scene, offset: int) -> Scene:
+    """Keep a fifth of the frame, at another place of the object for every offset."""
+    frame = np.array(scene.red.shape)
+    size = np.round(np.sqrt(CROP) * frame).astype(int)
+    angle = 2 * np.pi * offset / len(OFFSETS)
+    aside = CROP_ASIDE * size * (np.sin(angle), np.cos(angle))
+    middle = np.mean(np.nonzero(scene.scored), axis=1) + aside
+    first = np.clip(middle.astype(int) - size // 2, 0, frame - size)
     part = np.s_[first[0] : first[0] + size[0], first[1] : first[1] + size[1]]
     return _changed(scene, lambda image: image[part])
 
 
-def _cut_out(scene: Scene, seed: int) -> Scene:
+def _cut_out(scene: Scene, offset: int, black_noise: float = BLACK_NOISE) -> Scene:
     """Put the object onto black."""
-    noise = np.random.default_rng(seed)
+    noise = np.random.default_rng(offset)
 
     def image(channel: Any) -> Any:
-        lit = channel * scene.scored / 255 + READ_NOISE * noise.standard_normal(channel.shape)
-        return np.round(255 * np.clip(lit, 0, 1)).astype(np.uint8)
+        return _levels(channel * scene.scored / 255 + black_noise * noise.standard_normal(channel.shape))
 
     return _changed(scene, image, np.copy)
 
 
-def _binned(scene: Scene, _seed: int) -> Scene:
+def _levels(light: Any) -> Any:
+    return np.round(255 * np.clip(light, 0, 1)).astype(np.uint8)
+
+
+def _binned(scene: Scene, _offset: int) -> Scene:
     """Average 2 x 2 pixels; a pixel counts when all four do."""
 
     def means(image: Any) -> Any:
@@ -98,36 +116,42 @@ def _binned(scene: Scene, _seed: int) -> Scene:
     return replace(binned, scored=means(scene.scored.astype(float)) == 1)
 
 
-def _darkened(scene: Scene, seed: int) -> Scene:
-    """Take a tenth of the light."""
-    noise = np.random.default_rng(seed)
+def _darkened(scene: Scene, offset: int) -> Scene:
+    """Take a tenth of the light, with the noise of photons and of the sensor."""
+    noise = np.random.default_rng(offset)
 
     def image(channel: Any) -> Any:
-        dark = DARKER * channel / 255 + READ_NOISE * noise.standard_normal(channel.shape)
-        return np.round(255 * np.clip(dark, 0, 1)).astype(np.uint8)
+        electrons = noise.poisson(DARKER * SATURATION_E * channel / 255)
+        return _levels((electrons + DARK_NOISE_E * noise.standard_normal(channel.shape)) / SATURATION_E)
 
     return _changed(scene, image, np.copy)
 
 
-def _inclined(scene: Scene, _seed: int) -> Scene:
+def _inclined(scene: Scene, _offset: int) -> Scene:
     """Turn the camera about its axis."""
     rows, columns = scene.red.shape
     turn = cv2.getRotationMatrix2D((columns / 2, rows / 2), ROTATION_DEG, 1.0)
 
-    def turned(how: int) -> Callable[[Any], Any]:
+    def rotated(how: int) -> Callable[[Any], Any]:
         return lambda image: cv2.warpAffine(image, turn, (columns, rows), flags=how)
 
-    return _changed(scene, turned(cv2.INTER_CUBIC), turned(cv2.INTER_NEAREST))
+    return _changed(scene, rotated(cv2.INTER_CUBIC), rotated(cv2.INTER_NEAREST))
+
+
+def turned(scene: Scene, offset: int) -> Scene:
+    """Turn the camera by 90 degrees, to the left or to the right: fringes run along the rows."""
+    return _changed(scene, lambda image: np.rot90(image, 1 if offset % 2 else -1))
 
 
 VARIANTS: dict[str, Variant] = {
-    "as captured": lambda scene, _seed: scene,
+    "as captured": lambda scene, _offset: scene,
     "cropped": _cropped,
     "cut out": _cut_out,
+    "cut out, no noise": lambda scene, offset: _cut_out(scene, offset, black_noise=0.0),
     "binned": _binned,
     "darkened": _darkened,
     "inclined": _inclined,
-    "cropped, cut out": lambda scene, seed: _cropped(_cut_out(scene, seed), seed),
-    "binned, cut out": lambda scene, seed: _binned(_cut_out(scene, seed), seed),
-    "inclined, cut out": lambda scene, seed: _inclined(_cut_out(scene, seed), seed),
+    "cropped, cut out": lambda scene, offset: _cropped(_cut_out(scene, offset), offset),
+    "binned, cut out": lambda scene, offset: _binned(_cut_out(scene, offset), offset),
+    "inclined, cut out": lambda scene, offset: _inclined(_cut_out(scene, offset), offset),
 }
