@@ -200,8 +200,8 @@ MEAN_PX, LIT_SHARE = 24.0, 0.1
 # --- Images as they were given
 
 # Correlation of the second differences along the rows from which two channels are the same image. The same image has 1,
-# even at another brightness; different ones have the figure that `pytest tests/test_given.py -rP` prints. A larger
-# number misses copies that were compressed, a smaller one takes the edges of prints for copies.
+# at another brightness; other images have less on five scenes (`pytest tests/test_given.py`). A larger number misses
+# copies that were compressed, a smaller one takes the edges of prints for copies.
 SAME_MIN = 0.98
 # Rows between those that are compared. A larger number leaves few pixels in small images, a smaller one costs time.
 SAME_ROWS = 8
