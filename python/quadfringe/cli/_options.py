@@ -61,9 +61,13 @@ class Bits(StrEnum):
     """Significant bits of 16-bit files."""
 
     eight = "8"
+    nine = "9"
     ten = "10"
+    eleven = "11"
     twelve = "12"
+    thirteen = "13"
     fourteen = "14"
+    fifteen = "15"
     sixteen = "16"
 
 

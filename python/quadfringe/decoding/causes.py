@@ -33,6 +33,7 @@ __all__ = [
     "registration",
     "strange",
     "too_bright",
+    "vanishing",
     "wrong_bits",
     "wrong_numbers",
     "wrong_order_rad",
@@ -44,6 +45,7 @@ FringeNumbers = tuple[float, ...]
 FEW_LIT = 0.1
 NUMBERS_FIX = "give the numbers that were projected (--fringes), or project these"
 TURN_FIX = "turn the images, or the camera, by 90 degrees, or decode with the joint method (--method joint)"
+FOCUS = "focus the camera and the projectors on the object, close the aperture, and hold the object still"
 SMALLEST_ROOT, LARGEST_ROOT = 4, 12  # 16, 15, 12 and 144, 143, 132: coarser or finer fringes measure nothing
 SMALLEST_PAIR, LARGEST_PAIR = 6, 20  # N, N - 1 without infrared: finer fringes look alike after one of them
 
@@ -58,8 +60,9 @@ def period_fix(share: float) -> str:
 
 def before_order(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
     """Name the likeliest cause that shows without fringe orders; None when no test finds one."""
-    tests = (wrong_bits(shot), _too_dark(shot, params.DARK), too_bright(shot), registration(shot, plan, closure))
-    return next((cause for cause in tests if cause is not None), None)
+    bits = wrong_bits(shot)
+    tests = (_too_dark(shot, params.DARK), too_bright(shot), registration(shot, plan, closure))
+    return next((cause for cause in (bits if bits and bits.fatal else None, *tests) if cause is not None), None)
 
 
 def after_order(shot: AnyShot, shape: Shape, plan: Plan, closure: Closure | None) -> Cause | None:
@@ -67,8 +70,10 @@ def after_order(shot: AnyShot, shape: Shape, plan: Plan, closure: Closure | None
     if numbers := wrong_numbers(plan, closure):
         return numbers
     fit = fit_fringes(shot, shape, plan)
-    waves = () if fit is None else (blur(shot, fit, plan, closure), _not_linear(fit), _crosstalk(fit))
-    return next((cause for cause in (*waves, _too_dark(shot, params.DIM)) if cause is not None), None)
+    if blurred := blur(shot, fit, plan, closure):
+        return blurred
+    waves = () if fit is None else (_not_linear(fit), _crosstalk(fit))
+    return next((cause for cause in (*waves, wrong_bits(shot), _too_dark(shot, params.DIM)) if cause is not None), None)
 
 
 def along_rows(shot: AnyShot, plan: Plan) -> Cause | None:
@@ -102,31 +107,34 @@ def strange(closure: Closure | None) -> bool:
 
 
 def wrong_bits(shot: AnyShot) -> Cause | None:
-    """Find 16-bit data that hold fewer bits of a camera."""
+    """Find 16-bit data that hold fewer bits of a camera; fatal where less light does not explain it as well."""
     bits = symptoms.bits_in_use(shot)
     if bits is None:
         return None
-    top = max(int(image.max()) for image in shot.images.values())
-    words = f"no pixel of the 16-bit images is above {top}: they hold {bits} bits and were read as 16"
-    return Cause("bits", words, f"read them with bits={bits}, on the command line --bits {bits}")
+    words = f"no pixel of the 16-bit images is above {bits.top}: they hold {bits.held} bits and were read as 16"
+    words += "" if bits.sure else ", or have at most a quarter of the light"
+    fix = f"read them with bits={bits.held}, on the command line --bits {bits.held}"
+    fix += "" if bits.sure else "; if the camera delivers 16 bits, lengthen the exposure or open the aperture"
+    return Cause("bits", words, fix, fatal=bits.sure)
 
 
 def registration(shot: AnyShot, plan: Plan, closure: Closure | None) -> Cause | None:
     """Find an infrared image that is shifted from the visible one, and the shift that mends it.
 
-    It is fatal from half the angle of a wrong order on: then orders are wrong, or nearly so.
+    It is fatal from half the angle of a wrong order on: then orders are wrong, or nearly so. A shift along y leaves
+    upright fringes where they are, and does harm at edges only.
     """
     if closure is None or not plan.fringes.infrared or not channels_fit(closure):
         return None
     turned = abs(closure.angle.rad) > params.CLOSURE_RAD and closure.angle.steady > params.STEADY_MIN
     columns = closure.shift_px if turned else 0.0
     rows = symptoms.rows_match(shot, plan, columns)
-    fatal = not turned or abs(closure.angle.rad) > 0.5 * wrong_order_rad(plan.fringes.numbers)
+    fatal = turned and abs(closure.angle.rad) > 0.5 * wrong_order_rad(plan.fringes.numbers)
     if turned and rows is not None and rows.still > rows.moved + params.CORRELATION_MORE:
         return replace(_pair_moved(columns), fatal=fatal)
     if turned or (rows is not None and abs(rows.shift_px) > params.SHIFT_MIN_PX):
         shift_px = None if rows is None or rows.moved < params.CORRELATION_MIN else rows.shift_px
-        return replace(_shifted(columns, shift_px), fatal=fatal)
+        return replace(_shifted(columns if turned else None, shift_px), fatal=fatal)
     return None
 
 
@@ -135,10 +143,12 @@ def wrong_order_rad(numbers: FringeNumbers) -> float:
     return 2 * np.pi * (numbers[0] - numbers[2]) / numbers[0]
 
 
-def _shifted(columns: float, rows: float | None) -> Cause:
-    mend = f"{-columns:+.1f} px along x" + ("" if rows is None else f" and {-rows:+.1f} px along y")
+def _shifted(columns: float | None, rows: float | None) -> Cause:
+    shifts = {"x": columns, "y": rows}
+    mend = " and ".join(f"{-shift:+.1f} px along {axis}" for axis, shift in shifts.items() if shift is not None)
     words = f"the infrared image does not lie on the visible one: a shift of {mend} would mend it"
     words += "" if rows is not None else " (up to whole fringes; the scene has no edges that show a shift along y)"
+    words += "" if columns is not None else "; along y, fringes do not shift, and only edges of the object suffer"
     return Cause(
         "infrared registration",
         words,
@@ -215,16 +225,30 @@ def _off(closure: Closure) -> float:
     return max(abs(closure.green - 1), abs(closure.infrared - 1))
 
 
-def blur(shot: AnyShot, fit: Fit, plan: Plan, closure: Closure | None) -> Cause | None:
-    """Find blur: weak fringes, weaker the finer they are, in images without sharp detail.
+def blur(shot: AnyShot, fit: Fit | None, plan: Plan, closure: Closure | None) -> Cause | None:
+    """Find blur: weak fringes, weaker the finer they are, in images without sharp detail; or fringes that vanish."""
+    return _measured_blur(shot, fit, plan, closure) or vanishing(shot, plan)
+
+
+def vanishing(shot: AnyShot, plan: Plan) -> Cause | None:
+    """Find a blur as wide as the fringes, which leaves little of them and no edge of the object sharp."""
+    contrast = symptoms.coarse_contrast(shot, plan)
+    if contrast > params.VANISHING_CONTRAST or symptoms.fine_over_coarse(shot) > params.UNSHARP:
+        return None
+    words = f"the images are so blurred that the fringes nearly vanish: their contrast is at most {contrast:.0%}, and "
+    return Cause("blur", words + "no edge is sharp", FOCUS)
+
+
+def _measured_blur(shot: AnyShot, fit: Fit | None, plan: Plan, closure: Closure | None) -> Cause | None:
+    """Find the blur that the contrasts of fine and coarse fringes show together.
 
     Without infrared all fringes are about equally fine, and nothing is found.
     """
-    if not plan.fringes.infrared:
+    if fit is None or closure is None or not plan.fringes.infrared or strange(closure):
         return None
     red, _, blue, ir = (float(value) for value in fit.contrast)
     visible = float(np.sqrt(red * blue))
-    if closure is None or visible > params.BLURRED_CONTRAST or symptoms.sharpness(shot) > params.SHARP_MIN:
+    if visible > params.BLURRED_CONTRAST or symptoms.sharpness(shot) > params.SHARP_MIN:
         return None
     coarse_px = closure.infrared_px
     fine_px = coarse_px * plan.fringes.numbers[2] / plan.fringes.numbers[0]
@@ -235,9 +259,7 @@ def blur(shot: AnyShot, fit: Fit, plan: Plan, closure: Closure | None) -> Cause 
     # Full fringes cannot have lost more than this; the ratio is off where wrong orders weaken the infrared waves.
     sigma_px = min(sigma_px, float(np.sqrt(-np.log(max(visible, 1e-3)) / 2)) / np.pi * fine_px)
     words = f"the images are blurred by about {sigma_px:.1f} px: the contrast is {visible:.0%} for the finest fringes "
-    words += f"and {ir:.0%} for the coarsest, and no detail is sharp"
-    fix = "focus the camera and the projectors on the object, close the aperture, and hold the object still"
-    return Cause("blur", words, fix)
+    return Cause("blur", words + f"and {ir:.0%} for the coarsest, and no detail is sharp", FOCUS)
 
 
 def _too_dark(shot: AnyShot, least: float) -> Cause | None:

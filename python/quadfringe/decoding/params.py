@@ -193,7 +193,32 @@ SHARP_MIN = 2.15
 # contrasts reaches 1.7 px. A larger number misses light blur.
 BLUR_PX = 2.2
 
+# Contrast below which fringes nearly vanish, measured without them: everything wider than a pixel counts. Sound shots
+# have 0.89 or more, and a blur by a quarter of the period leaves 0.3 to 0.42 with shading and print. A larger number
+# names room light, a smaller one misses blur of painted objects.
+VANISHING_CONTRAST = 0.45
+# Detail of 1.5 to 3 px over that of 6 to 12 px. Scenes with sharp edges have 0.55 or more, those with a blur of 6 px or
+# more 0.17 to 0.32, noise 3.6. A larger number calls sharp scenes in room light blurred, a smaller one misses blur.
+UNSHARP = 0.42
+# Standard deviation of the mean light that this contrast is relative to, px, and share of the brightest mean light
+# from which a pixel counts. A wider one counts shading as contrast, a narrower one takes the fringes out. A larger
+# share leaves dark objects out, a smaller one measures dark ground.
+MEAN_PX, LIT_SHARE = 24.0, 0.1
+
+# --- Images as they were given
+
+# Correlation of the second differences along the rows from which two channels are the same image. The same image has 1,
+# at another brightness; other images have less on five scenes (`pytest tests/test_given.py`). A larger number misses
+# copies that were compressed, a smaller one takes the edges of prints for copies.
+SAME_MIN = 0.98
+# Rows between those that are compared. A larger number leaves few pixels in small images, a smaller one costs time.
+SAME_ROWS = 8
+
 # --- Light
+
+# Bits up to which 16-bit data that hold no more are surely those of a camera with so many bits: a sixteenth of the
+# light is too dark by any measure. With 14, a quarter of the light explains them as well.
+SURE_BITS = 12
 
 # Brightest pixels, share of full scale, below which the light counts as too dark. Sound shots have 0.6 or more. A
 # larger number names dark paint, a smaller one misses shots whose noise hides the fringes.

@@ -38,12 +38,14 @@ class Geometry:
     """Shares of the samples of a shape that contradict its calibration, and where its points lie.
 
     `backwards`: columns run against the direction that the calibration demands. `nowhere`: rays do not meet before the
-    camera. `outside`: points above or below the image of the projector. `far`: points at several times the median
-    depth. `tilt_deg`: median angle between surface and line of sight. `depth_mm`: median.
+    camera. `across`: columns grow along the other axis of the image. `outside`: points above or below the image of the
+    projector. `far`: points at several times the median depth. `tilt_deg`: median angle between surface and line of
+    sight. `depth_mm`: median.
     """
 
     backwards: float
     nowhere: float
+    across: float
     outside: float
     far: float
     tilt_deg: float
@@ -69,11 +71,14 @@ def geometry_of(shape: Shape) -> Geometry | None:
         return None
     points = shape.xyz_mm[here]
     met = returned & np.isfinite(points[..., 2])
+    along_x, along_y = (shape.column_px[there] - columns for there in (right, below))
+    depth_mm = float(np.median(points[..., 2][met])) if met.sum() >= params.SAMPLES_MIN else float("nan")
+    expected = _growth(np.nan_to_num(depth_mm, nan=FAR_MM), shape.calibration)
+    across = _across(along_x, along_y, expected)
     if met.sum() < params.SAMPLES_MIN:
-        return Geometry(0.0, 1.0, 0.0, 0.0, float("nan"), float("nan"))
-    depth_mm = float(np.median(points[..., 2][met]))
-    direction = _direction(depth_mm, shape.calibration)
-    growth = (shape.column_px[right] - columns)[met] * direction
+        return Geometry(0.0, 1.0, across, 0.0, 0.0, float("nan"), float("nan"))
+    direction = 1.0 if expected[0] >= 0 else -1.0
+    growth = along_x[met] * direction
     turns = _turns(shape.phase_rad, stride)[met] * direction
     rows = pixels_of(points, shape.calibration.projector)[..., 1]
     off = np.maximum(-0.5 - rows, rows - (shape.calibration.projector.height_px - 0.5))
@@ -81,11 +86,18 @@ def geometry_of(shape: Shape) -> Geometry | None:
     return Geometry(
         backwards=_most_backwards(growth, turns),
         nowhere=1 - float(met.sum()) / float(returned.sum()),
+        across=across,
         outside=_share(off > params.ROWS_PX, met),
         far=float(np.mean(points[..., 2][met] > params.FAR_MEDIANS * depth_mm)),
         tilt_deg=tilt,
         depth_mm=depth_mm,
     )
+
+
+def _across(along_x: NDArray[np.float32], along_y: NDArray[np.float32], expected: tuple[float, float]) -> float:
+    """Give the share of columns that grow along the other axis of the image than expected."""
+    other = (np.abs(along_x) < np.abs(along_y)) != (abs(expected[0]) < abs(expected[1]))
+    return _share(other, np.isfinite(along_x) & np.isfinite(along_y))
 
 
 def _most_backwards(growth: NDArray[np.float32], turns: NDArray[np.float32]) -> float:
@@ -137,6 +149,10 @@ def mirrored(shape: Shape) -> Cause | None:
 
 
 def _backwards(found: Geometry) -> Cause | None:
+    if found.across > params.REFUSED_SHARE:
+        words = f"the images are turned by 90 degrees: in {found.across:.0%} of the image the projector columns grow "
+        words += "along the other axis of the image than the calibration says"
+        return Cause("mirrored or rotated", words, FLIP)
     if found.backwards <= params.REFUSED_SHARE:
         return None
     words = f"fringes run backwards in {found.backwards:.0%} of the image: the calibration says that the projector "
@@ -235,11 +251,11 @@ def _doubtful(found: Geometry, calibration: Calibration) -> list[Cause]:
     return [Cause("calibration", words, f"move the object there; or {CALIBRATE}", fatal=False)]
 
 
-def _direction(depth_mm: float, calibration: Calibration) -> float:
-    """Give 1 where columns must grow along the rows of the image, else -1: those of a plane that faces the camera."""
-    along = depth_mm * np.array([[0.0, 0.0, 1.0], [1e-3, 0.0, 1.0]])
-    first, second = pixels_of(along, calibration.projector)[:, 0]
-    return 1.0 if second >= first else -1.0
+def _growth(depth_mm: float, calibration: Calibration) -> tuple[float, float]:
+    """Give by how much columns must grow along the rows and the columns of the image: a plane that faces the camera."""
+    along = depth_mm * np.array([[0.0, 0.0, 1.0], [1e-3, 0.0, 1.0], [0.0, 1e-3, 1.0]])
+    here, right, below = pixels_of(along, calibration.projector)[:, 0]
+    return float(right - here), float(below - here)
 
 
 def _tilt_deg(points: NDArray[np.float32], right: NDArray[np.float32], below: NDArray[np.float32]) -> float:

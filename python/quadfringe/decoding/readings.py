@@ -1,9 +1,9 @@
-"""Other readings of a shot: its channels exchanged, or another Bayer pattern, and bands of its rows to try them on."""
+"""Other readings of a shot: its channels in another order, or another Bayer pattern; bands of rows to try them on."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from itertools import combinations
+from dataclasses import dataclass, replace
+from itertools import permutations
 from typing import get_args
 
 import numpy as np
@@ -11,10 +11,19 @@ import numpy as np
 from quadfringe.config import BayerPattern
 from quadfringe.data import AnyShot, BayerShot, Shape, Shot
 
-__all__ = ["band_of", "other_readings", "rows_of"]
+__all__ = ["Reading", "band_of", "other_readings", "rows_of"]
 
 # A band of rows shows which exchanges can explain a doubtful shot: the share of the rows, and their least number.
 BAND_SHARE, BAND_ROWS_MIN = 1 / 8, 96
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A shot as it may have been meant, in words, and what to do if so."""
+
+    found: str
+    fix: str
+    shot: AnyShot
 
 
 def band_of(shape: Shape) -> tuple[int, int]:
@@ -32,16 +41,28 @@ def rows_of(shot: AnyShot, first: int, count: int) -> AnyShot:
     return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
 
 
-def other_readings(shot: AnyShot) -> dict[str, AnyShot]:
-    """Give the shot with channels exchanged or another Bayer pattern, by the message for that case."""
+def other_readings(shot: AnyShot) -> list[Reading]:
+    """Give the shot with its channels in every other order, or with another Bayer pattern."""
     if isinstance(shot, BayerShot):
-        others = (name for name in get_args(BayerPattern) if name != shot.bayer)
-        return {f"the Bayer pattern seems to be {o}, not {shot.bayer}": replace(shot, bayer=o) for o in others}
-    pairs = combinations(shot.channels, 2)
-    return {f"{a} and {b} seem to be swapped": _exchanged(shot, a, b) for a, b in pairs}
+        return [_pattern(shot, name) for name in get_args(BayerPattern) if name != shot.bayer]
+    names = tuple(shot.channels)
+    return [_ordered(shot, order) for order in permutations(names) if order != names]
 
 
-def _exchanged(shot: Shot, first: str, second: str) -> Shot:
-    images = shot.channels
-    images[first], images[second] = images[second], images[first]
-    return Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
+def _pattern(shot: BayerShot, name: BayerPattern) -> Reading:
+    words = f"the Bayer pattern seems to be {name}, not {shot.bayer}"
+    return Reading(
+        words, f'read the mosaic with bayer="{name}", on the command line --bayer {name}', replace(shot, bayer=name)
+    )
+
+
+def _ordered(shot: Shot, order: tuple[str, ...]) -> Reading:
+    """Read the image given as each channel as that of `order`."""
+    images = dict(zip(order, shot.channels.values(), strict=True))
+    moved = [(given, name) for given, name in zip(shot.channels, order, strict=True) if given != name]
+    read = Shot(images["red"], images["green"], images["blue"], images.get("ir"), shot.full_scale)
+    if len(moved) == 2:
+        words = f"{moved[0][0]} and {moved[1][0]} seem to be swapped"
+        return Reading(words, "give the images of these channels the other way round", read)
+    words = f"the channels seem to be in the order {', '.join(order)}"
+    return Reading(words, "give " + ", ".join(f"the image given as {given} as {name}" for given, name in moved), read)

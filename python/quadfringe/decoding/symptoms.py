@@ -19,6 +19,7 @@ from quadfringe.decoding.stages import carrier, linear_light, wrapped_phases
 from quadfringe.errors import DecodeError
 
 __all__ = [
+    "Bits",
     "Closure",
     "bits_in_use",
     "brightness",
@@ -26,6 +27,8 @@ __all__ = [
     "closing_steps",
     "closure_of",
     "closure_of_waves",
+    "coarse_contrast",
+    "fine_over_coarse",
     "linear_light_of",
     "local_mean",
     "local_rates",
@@ -37,7 +40,16 @@ __all__ = [
 
 Complex = NDArray[np.complex128]
 Map = NDArray[np.float32]
-DEPTHS = (8, 10, 12)  # bits that cameras deliver in 16-bit files; 14 show by clipped pixels only
+DEPTHS = (8, 10, 12, 14)  # bits that cameras deliver in 16-bit files
+
+
+@dataclass(frozen=True)
+class Bits:
+    """The bits that 16-bit data hold, whether less light would not explain it as well, and the largest value."""
+
+    held: int
+    sure: bool
+    top: int
 
 
 @dataclass(frozen=True)
@@ -58,8 +70,8 @@ class Closure:
     """How the phases of red and blue, green and infrared fit together.
 
     If each colour has another fringe number, blue has the place of infrared. `green` and `infrared` are local
-    frequencies over what the fringe numbers say, 1 if they agree, negative where red
-    and blue run backwards. `infrared_px` is the period of the infrared fringes, NaN without a third phase.
+    frequencies over what the fringe numbers say, 1 if they agree, negative where red and blue run backwards.
+    `infrared_px` is the period of the infrared fringes, NaN without a third phase.
     """
 
     green: float
@@ -82,13 +94,20 @@ class RowsMatch:
     still: float
 
 
-def bits_in_use(shot: AnyShot) -> int | None:
-    """Give the bits of the camera when 16-bit data have fewer and count as 16; None when nothing is wrong."""
+def bits_in_use(shot: AnyShot) -> Bits | None:
+    """Give the bits of the camera when 16-bit data have fewer and count as 16; None when nothing is wrong.
+
+    Crests cut off at the largest value of some bits show these. Else it is the fewest bits of a camera that hold all
+    values; 14 are not sure, because a quarter of the light looks the same.
+    """
     if shot.first.dtype != np.uint16 or shot.full_scale_value < np.iinfo(np.uint16).max:
         return None
     top = max(int(image.max()) for image in shot.images.values())
-    clipped = 14 if top == 2**14 - 1 and sum(int((image == top).sum()) for image in shot.images.values()) > 1 else None
-    return next((bits for bits in DEPTHS if 0 < top < 2**bits), clipped)
+    width = top.bit_length()
+    if 8 <= width < 16 and top == 2**width - 1 and sum(np.count_nonzero(i == top) for i in shot.images.values()) > 1:
+        return Bits(width, True, top)
+    held = next((bits for bits in DEPTHS if 0 < top < 2**bits), None)
+    return None if held is None else Bits(held, held <= params.SURE_BITS, top)
 
 
 def brightness(shot: AnyShot) -> dict[str, float]:
@@ -115,6 +134,36 @@ def sharpness(shot: AnyShot) -> float:
         detail = cv2.GaussianBlur(light, (0, 0), 1.5) - cv2.GaussianBlur(light, (0, 0), 3.0)
         noise = 1.4826 * float(np.median(np.abs(detail - np.median(detail))))
         found.append(float(np.quantile(np.abs(detail), 0.995)) / max(noise, 1e-9))
+    return float(np.median(found))
+
+
+def coarse_contrast(shot: AnyShot, plan: Plan) -> float:
+    """Give the contrast of whatever is wider than a pixel, median of the channels: at least that of the fringes.
+
+    The product of neighbours leaves out noise.
+    """
+    import cv2
+
+    found = []
+    for light in linear_light_of(shot, plan).values():
+        light = np.nan_to_num(light)
+        mean = cv2.GaussianBlur(light, (0, 0), params.MEAN_PX)
+        lit = mean > params.LIT_SHARE * float(np.quantile(mean[::4, ::4], 0.99))
+        wave = np.where(lit, light / np.maximum(mean, 1e-6) - 1, 0)
+        both = lit[:, 1:] & lit[:, :-1]
+        found.append(float(np.sqrt(max(2 * np.mean((wave[:, 1:] * wave[:, :-1])[both]), 0.0))) if both.any() else 0.0)
+    return float(np.median(found))
+
+
+def fine_over_coarse(shot: AnyShot) -> float:
+    """Give the strongest detail of a few px over that of four times the size: 1 for sharp edges, less with blur."""
+    import cv2
+
+    found = []
+    for image in shot.channels.values():
+        smooth = [cv2.GaussianBlur(image.astype(np.float32), (0, 0), sigma) for sigma in (1.5, 3.0, 6.0, 12.0)]
+        fine, coarse = (np.quantile(np.abs(smooth[i] - smooth[i + 1]), 0.995) for i in (0, 2))
+        found.append(float(fine) / max(float(coarse), 1e-9))
     return float(np.median(found))
 
 

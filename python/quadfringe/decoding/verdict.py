@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
@@ -22,11 +21,13 @@ from quadfringe.decoding.causes import (
     other_numbers,
     period_fix,
     strange,
+    vanishing,
     wrong_bits,
 )
+from quadfringe.decoding.given import blind_channels, same_images
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
-from quadfringe.decoding.readings import band_of, other_readings, rows_of
+from quadfringe.decoding.readings import Reading, band_of, other_readings, rows_of
 from quadfringe.decoding.symptoms import Closure, closure_of, saturation
 from quadfringe.decoding.trusted import is_scattered, take_out, trusted_part
 from quadfringe.errors import DecodeError
@@ -45,11 +46,6 @@ IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", 
 KEPT_MIN = 0.7
 STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
 MARGIN_ROWS = 48  # least number of rows and columns that the median margin is taken from
-DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
-# Range of the values of a channel, relative to the widest one, below which it is even. Fringes of the weakest light
-# that is decoded have 0.15 of the others and a noise of 3 % of full scale has 0.2: `pytest tests/test_doctor.py`.
-EVEN = 0.12
-NEARLY_NONE = 5e-4  # share of the pixels of a black or saturated channel that may differ
 RETURNED_MIN = 0.05  # least share of the lit pixels that must be returned
 # Median order margin of the lit pixels. Sound shots have more than 0.75, by the published method more than 0.4 when the
 # response is not corrected. Exchanged channels have at most 0.44 (joint) and 0.49 (published), other fringe numbers 0.5
@@ -73,6 +69,8 @@ CLEARLY_BETTER = 1.2  # ratio of margins from which channels count as exchanged,
 # coloured patches, exchanged channels by 0.08 or more (`pytest tests/test_rgb.py`). Neighbouring fringe numbers are off
 # by less than this.
 GREEN_OFF = 0.05
+# The same for another order of the channels to be named. Other orders are off by 0.03 or more.
+GREEN_EXACT = 0.01
 # Least share of lit pixels in an image: objects may fill 0.02 of it, and fewer than this are chance in noise. In an
 # image that is mostly saturated more of them are chance, at the edges of clipped fringes.
 LIT_MIN, UNSATURATED_MIN = 0.005, 0.05
@@ -117,7 +115,9 @@ def _refuse_whole(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) ->
     enough = lit > 0 and returned >= RETURNED_MIN * lit and not _by_chance(shape, shot, margin, share)
     if enough and margin >= SURE:
         return
-    blind = bool(_blind_channels(shot))
+    blind, twice = blind_channels(shot), same_images(shot)
+    if twice:
+        raise twice.error
     if decoder is not None and enough and not blind and margin < NUMBERS_SURE[method]:
         _refuse_numbers(shape, shot, decoder)
     if enough and margin >= DOUBTFUL and not blind:
@@ -136,13 +136,15 @@ def _refuse_whole(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) ->
 
 def _refuse_shown(shot: AnyShot, shape: Shape, plan: Plan | None, closure: Closure | None) -> None:
     """Raise `DecodeError` for a cause that shows without fringe orders."""
-    if bits := wrong_bits(shot):
+    if (bits := wrong_bits(shot)) and bits.fatal:
         raise bits.error
-    if blind := _blind_channels(shot):
-        raise Cause("blind channel", "; ".join(blind), "check exposure, lens cap and light source").error
+    if blind := blind_channels(shot):
+        raise blind.error
     if plan is not None and (cause := before_order(shot, plan, closure)):
         raise cause.error
     if (share := _lit_share(shape)) < LIT_MIN:
+        if plan is not None and (vanished := vanishing(shot, plan)):
+            raise vanished.error
         words = f"{'hardly a' if share else 'no'} pixel carries fringes in all channels"
         fix = "check focus and exposure, and that every channel is given once" + period_fix(share)
         raise Cause("no fringes", words, fix).error
@@ -173,27 +175,6 @@ def _margin(shape: Shape) -> tuple[float, int, int, float]:
     lit = quality[np.isfinite(quality)]
     returned = np.count_nonzero(np.isfinite(shape.phase_rad[::stride, ::stride]))
     return float(np.median(lit)) if lit.size else 0.0, lit.size, int(returned), lit.size / quality.size
-
-
-def _blind_channels(shot: AnyShot) -> list[str]:
-    """Name the channels that are black, saturated or even over nearly the whole image, and so show no fringes."""
-    full, found = shot.full_scale_value, []
-    ranges = {name: _range(image) for name, image in shot.channels.items()}
-    widest = max(high - low for low, high in ranges.values())
-    for name, (low, high) in ranges.items():
-        if high < DARK * full:
-            found.append(f"channel {name} is black (hardly a pixel is above {high:g} of {full:g})")
-        elif low >= full:
-            found.append(f"channel {name} is saturated (hardly a pixel is below {full:g})")
-        elif high - low < EVEN * widest:
-            found.append(f"channel {name} is even (nearly all pixels are from {low:g} to {high:g} of {full:g})")
-    return found
-
-
-def _range(image: NDArray[Any]) -> tuple[float, float]:
-    """Give the values between which nearly all pixels lie."""
-    low, high = np.quantile(image[::STRIDE, ::STRIDE], (NEARLY_NONE, 1 - NEARLY_NONE))
-    return float(low), float(high)
 
 
 def _lit_share(shape: Shape) -> float:
@@ -228,8 +209,7 @@ def _refuse_numbers(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None
     """Raise `DecodeError` if fringes run along the rows, or if other numbers raise the margin of a band of rows."""
     if cause := along_rows(shot, decoder.plan):
         raise cause.error
-    first, count = band_of(shape)
-    part, band = decoder.for_rows(first, count), rows_of(shot, first, count)
+    part, band = _band(shape, shot, decoder)
     closure = closure_of(band, part.plan)
     if closure is None or channels_fit(closure):
         return
@@ -248,11 +228,16 @@ def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
 
     Without infrared every pair of phases has an order, so that exchanged channels leave the margin as it is.
     """
-    first, count = band_of(shape)
-    closure = closure_of(rows_of(shot, first, count), decoder.for_rows(first, count).plan)
+    part, band = _band(shape, shot, decoder)
+    closure = closure_of(band, part.plan)
     if closure is None or abs(closure.green - 1) < GREEN_OFF:
         return
-    if abs(closure.green + 1) < GREEN_OFF:
+    if twice := same_images(shot):
+        raise twice.error
+    orders = [] if abs(closure.green + 1) < GREEN_OFF else _with_green(other_readings(band), part.plan)
+    if orders:
+        words = " or ".join(one.found for one in orders)
+    elif abs(closure.green + 1) < GREEN_OFF:
         words = "red and blue seem to be swapped, or the images mirrored: green runs against them"
     else:
         seen = "red and blue" if decoder.plan.fringes.quadrature else "red"
@@ -263,29 +248,32 @@ def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
     raise Cause(ORDERS, words, fix).error
 
 
+def _with_green(readings: list[Reading], plan: Plan) -> list[Reading]:
+    """Give the readings in which green has its frequency and runs along with the others."""
+    closures = [(one, closure_of(one.shot, plan)) for one in readings]
+    return [one for one, closure in closures if closure is not None and abs(closure.green - 1) < GREEN_EXACT]
+
+
 def _refuse_exchanged(shape: Shape, shot: AnyShot, least: float, decoder: KernelDecoder) -> None:
-    """Raise `DecodeError` if exchanging channels raises the median margin above `least`."""
+    """Raise `DecodeError` if another order of the channels raises the median margin above `least`."""
     suspects = _plausible(other_readings(shot), shape, least, decoder)
-    found = {words: _margin(decoder.shape(other))[0] for words, other in suspects.items()}
-    best = max(found, key=lambda words: found[words], default="")
-    if best and found[best] > least:
-        words = f"{best}: the median order margin is {_margin(shape)[0]:.2f} as given and {found[best]:.2f} if so"
-        raise Cause(ORDERS, words, "give the images of these channels the other way round").error
+    found = [(_margin(decoder.shape(one.shot))[0], one) for one in suspects]
+    margin, best = max(found, key=lambda each: each[0], default=(0.0, None))
+    if best and margin > least:
+        words = f"{best.found}: the median order margin is {_margin(shape)[0]:.2f} as given and {margin:.2f} if so"
+        raise Cause(ORDERS, words, best.fix).error
 
 
 def _agrees(shape: Shape, shot: AnyShot, margin: float, decoder: KernelDecoder | None) -> bool:
-    """Tell whether the channels agree on the phase, and in a band of rows no exchange comes near to the margin."""
+    """Tell whether the channels agree on the phase, and in a band of rows no other order comes near to the margin."""
     if decoder is None or margin < AGREEING_MIN or not channels_agree(shape, shot, decoder.plan):
         return False
-    first, count = band_of(shape)
-    part = decoder.for_rows(first, count)
-    given, *others = (
-        order_margin(part.shape(rows_of(one, first, count))) for one in (shot, *other_readings(shot).values())
-    )
-    return given > CLEARLY_BETTER * max(others)
+    part, band = _band(shape, shot, decoder)
+    others = [order_margin(part.shape(one.shot)) for one in _possible(other_readings(band), part)]
+    return order_margin(part.shape(band)) > CLEARLY_BETTER * max(others, default=0.0)
 
 
-def _plausible(suspects: dict[str, AnyShot], shape: Shape, least: float, decoder: KernelDecoder) -> dict[str, AnyShot]:
+def _plausible(suspects: list[Reading], shape: Shape, least: float, decoder: KernelDecoder) -> list[Reading]:
     """Give the suspects that a band of rows allows, which takes a fraction of the time.
 
     Their margin comes near to `least` there, and their channels have about the frequencies of the fringe numbers.
@@ -294,6 +282,17 @@ def _plausible(suspects: dict[str, AnyShot], shape: Shape, least: float, decoder
     if 2 * count > len(shape.quality):
         return suspects
     part, near = decoder.for_rows(first, count), NEAR[decoder.settings["method"]] * least
-    bands = {words: rows_of(other, first, count) for words, other in suspects.items()}
-    possible = {words for words, band in bands.items() if not strange(closure_of(band, part.plan))}
-    return {words: suspects[words] for words in possible if order_margin(part.shape(bands[words])) >= near}
+    bands = {one.found: replace(one, shot=rows_of(one.shot, first, count)) for one in suspects}
+    found = {one.found for one in _possible([*bands.values()], part) if order_margin(part.shape(one.shot)) >= near}
+    return [one for one in suspects if one.found in found]
+
+
+def _possible(readings: list[Reading], decoder: KernelDecoder) -> list[Reading]:
+    """Give the readings whose channels have about the frequencies of the fringe numbers."""
+    return [one for one in readings if not strange(closure_of(one.shot, decoder.plan))]
+
+
+def _band(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> tuple[KernelDecoder, AnyShot]:
+    """Give the decoder and the shot of the band of rows with most light."""
+    first, count = band_of(shape)
+    return decoder.for_rows(first, count), rows_of(shot, first, count)

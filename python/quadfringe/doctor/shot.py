@@ -25,7 +25,16 @@ __all__ = ["examine_shot"]
 # From cause to effect: what is named earlier brings about what follows. Wrong bits make an image dark, clipped crests
 # have harmonics, and blur lets one channel seem to see another.
 ROOTS = (
-    *("bits", "blind channel", "saturation", "brightness", "calibration units", "mirrored or rotated", "fringe orders"),
+    *(
+        "bits",
+        "same image",
+        "blind channel",
+        "saturation",
+        "brightness",
+        "calibration units",
+        "mirrored or rotated",
+        "fringe orders",
+    ),
     *("fringe numbers", "infrared registration", "infrared projector", "blur", "calibration", "depth range"),
     *("response", "crosstalk", "coaxial pair", "modulation", "order margin", "returned"),
 )
@@ -71,13 +80,12 @@ def _rank(one: Finding) -> tuple[int, int]:
 def _waves(shot: AnyShot, shape: Shape, plan: Plan) -> list[Finding]:
     """Check the fringes of a decoded shot, channel by channel and against one another."""
     closure = closure_of(shot, plan)
-    named = [contradiction(shape, shot, plan) or registration(shot, plan, closure)]
     fit = fit_fringes(shot, shape, plan)
+    named = [contradiction(shape, shot, plan) or registration(shot, plan, closure), blur(shot, fit, plan, closure)]
     if fit is None:
         words = "too few pixels carry fringes to check response and crosstalk"
         few = Finding("fringes", "warning", words, "fill more of the field with the object")
         return [few, *told(named)]
-    named.append(blur(shot, fit, plan, closure))
     return [
         *told(named),
         *_amplitudes(fit, brightness(shot)),
