@@ -208,11 +208,11 @@ pub(super) const HARMONIC_LEAST: f64 = 0.035;
 /// to 0.15 of that distance. A smaller one states too little (`python evaluation/response_sd.py`).
 pub(super) const EXPONENT_SHARED: f64 = 0.12;
 
-/// Second harmonic over the first that texture may pretend, over the mean square of its part out of phase, which no
-/// response has. The phase of a tile follows its texture, which then counts twice: random blocks have 2 to 9 times that
-/// square, 4.5 on average. A smaller one corrects linear light on texture, a larger one leaves weak responses on it
+/// Second harmonic over the first that texture may pretend, over the square of the median of its part out of phase, which
+/// no response has. The phase of a tile follows its texture, which then counts twice: random blocks have up to 34 times
+/// that square, 13 on average. A smaller one corrects linear light on texture, a larger one leaves weak responses on it
 /// (`python evaluation/response_sd.py`).
-pub(super) const HARMONIC_OF_TEXTURE: f64 = 5.0;
+pub(super) const HARMONIC_OF_TEXTURE: f64 = 13.0;
 
 /// Step of the differences from which slopes and curvature of the cost follow, as a share of the exponent. Not measured:
 /// small against what a response changes, large against rounding. A larger one averages over the bend of the cost.

@@ -80,18 +80,21 @@ struct Harmonic {
 /// Median over the traces of the second harmonic over the first, in the phase in which a power of light has it. 0 without
 /// traces.
 pub(super) fn second_harmonic(traces: &[Trace<'_>], response: &Response) -> f64 {
-    let mut found: Vec<f64> = harmonics(traces, response).map(|harmonic| harmonic.aligned).collect();
-    if found.is_empty() {
-        return 0.0;
-    }
-    let middle = found.len() / 2;
-    *found.select_nth_unstable_by(middle, f64::total_cmp).1
+    median(harmonics(traces, response).map(|harmonic| harmonic.aligned).collect())
 }
 
 /// Second harmonic over the first that the texture of these traces may pretend. 0 without traces.
 pub(super) fn harmonic_of_texture(traces: &[Trace<'_>], response: &Response) -> f64 {
-    let squares = harmonics(traces, response).map(|harmonic| harmonic.across.powi(2));
-    HARMONIC_OF_TEXTURE * squares.sum::<f64>() / traces.len().max(1) as f64
+    let across = harmonics(traces, response).map(|harmonic| harmonic.across.abs());
+    HARMONIC_OF_TEXTURE * median(across.collect()).powi(2)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 fn harmonics(traces: &[Trace<'_>], response: &Response) -> impl Iterator<Item = Harmonic> {
