@@ -2,9 +2,10 @@
 
     python evaluation/response_sd.py [--seeds 4] [--first-seed 1] [--json FILE]
 
-Scenes that resemble real objects, with photographs as albedo or printed squares, 2 % noise, 512 x 384, gammas of 1.4
-and 2, and no room light. Inside: share of the shots whose exponent of red lies within one and two stated standard
-errors of the right one (normal: 68 and 95 %). Linear light comes last: how many shots are corrected all the same.
+Scenes that resemble real objects, with photographs, printed squares or random blocks as albedo, 2 % noise, 512 x 384,
+gammas of 1.4 and 2, and no room light. Inside: share of the shots whose exponent of red lies within one and two stated
+standard errors of the right one (normal: 68 and 95 %). Linear light comes last: how many shots are corrected all the
+same.
 Numbers were tuned on seeds 1 and 2; report others.
 """
 

@@ -45,6 +45,7 @@ ALLOWED: dict[tuple[str, str], str] = {
     ),
     **dict.fromkeys(
         [
+            ("condition", "TERMS"),
             ("height", "NODES"),
             ("joint", "CANDIDATES"),
             ("joint", "COUNT"),

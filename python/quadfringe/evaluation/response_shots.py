@@ -21,10 +21,19 @@ from quadfringe.decoding._kernel import KernelDecoder, size_of
 from quadfringe.decoding.response import decode_straightened
 from quadfringe.evaluation import world
 
-__all__ = ["GAMMAS", "SCENES", "Estimate", "estimates"]
+__all__ = ["BLOCKS_PX", "GAMMAS", "SCENES", "Estimate", "estimates"]
 
 CAMERA = Device(width_px=512, height_px=384, focal_px=(1290.325, 1290.325), centre_px=(255.5, 191.5))
-SCENES = ("photographs_face", "photographs_peaks", "photographs_steps", "painted_face", "face", "face_patches_12")
+BLOCKS_PX = {f"blocks_{side_px}": side_px for side_px in (4, 8, 16)}  # sides of the blocks of texture
+SCENES = (
+    "photographs_face",
+    "photographs_peaks",
+    "photographs_steps",
+    "painted_face",
+    "face",
+    "face_patches_12",
+    *BLOCKS_PX,
+)
 GAMMAS = (1.4, 2.0)
 NOISE = 0.02
 
@@ -56,9 +65,19 @@ def estimates(scenes: Iterable[str], gammas: Iterable[float], seeds: Iterable[in
                 yield _estimated(scene, gamma, seed)
 
 
+def _drawn(scene: str, bench: _core.Bench, random: np.random.Generator) -> world.World:
+    if scene not in BLOCKS_PX:
+        return world.SCENES[scene](bench, random)
+    cast, side_px = bench.cast("face"), BLOCKS_PX[scene]
+    rows, columns = cast.shadow().shape
+    cells = random.uniform(0.1, 0.9, (-(-rows // side_px), -(-columns // side_px), 4)).astype(np.float32)
+    albedo = cells.repeat(side_px, 0).repeat(side_px, 1)[:rows, :columns]
+    return world.World(cast, np.ascontiguousarray(albedo))
+
+
 def _estimated(scene: str, gamma: float, seed: int) -> Estimate:
     bench = _core.Bench(camera=core_device(CAMERA))
-    drawn = world.SCENES[scene](bench, np.random.default_rng([seed, 77]))
+    drawn = _drawn(scene, bench, np.random.default_rng([seed, 77]))
     # Room light changes the exponent that makes fringes sinusoidal: without it the right one is 1 / gamma.
     light = {"projector_exponent": (gamma,) * 4, "ambient": (0.0,) * 4}
     bent = replace(drawn, options=(drawn.options or {}) | light)

@@ -140,8 +140,26 @@ pub(super) const TILE_FRINGES: f32 = 2.5;
 /// steps.
 pub(super) const TILE_SIDE_MIN_PX: usize = 24;
 
-/// Least share of a tile with a known phase. With a larger share the tiles at edges are lost. Not measured.
-pub(super) const KNOWN_MIN: f32 = 0.5;
+/// Least share of a tile with a known phase. A larger one keeps the tiles whose texture happens to agree with the
+/// fringes: of random blocks of 4 px the decoder returns a third. With a smaller one few pixels decide on the phase
+/// (`python evaluation/response_sd.py`).
+pub(super) const KNOWN_MIN: f32 = 0.25;
+/// Least share of a tile on the surface, known or between known pixels. With a larger share the tiles at edges are lost,
+/// with a smaller one the rest of a tile spans too few fringes. Not measured.
+pub(super) const COVERED_MIN: f32 = 0.5;
+
+/// Greatest RMS distance of the phase of a tile from a polynomial of degree 2, rad of the first fringe number. A larger
+/// one sorts pixels at depth steps into wrong phase steps, which weakens the harmonics, a smaller one loses relief and
+/// light that is bent much: a gamma of 3 makes 0.3 (`python evaluation/auto_response.py`).
+pub(super) const PHASE_MISFIT_MAX_RAD: f64 = 0.5;
+
+/// Rounds of the fit of that polynomial. The first decides which turn a pixel belongs to; later ones hardly change the
+/// weights. More take longer. Not measured.
+pub(super) const FIT_ROUNDS: usize = 4;
+
+/// Step in pixels, along rows and columns, between the pixels that are fitted. Six weights need no more pixels; a larger
+/// one leaves too few in the smallest tiles. Not measured.
+pub(super) const FIT_STRIDE_PX: usize = 2;
 
 /// Least number of pixels in a phase step, as a share of the mean number. Below it, the steps of a tile have gaps in
 /// their period. Not measured.
@@ -189,6 +207,12 @@ pub(super) const HARMONIC_LEAST: f64 = 0.035;
 /// clips, room light and blur move all tiles alike: on painted surfaces with 2 % noise exponents come out too small by 0.05
 /// to 0.15 of that distance. A smaller one states too little (`python evaluation/response_sd.py`).
 pub(super) const EXPONENT_SHARED: f64 = 0.12;
+
+/// Second harmonic over the first that texture may pretend, over the square of the median of its part out of phase, which
+/// no response has. The phase of a tile follows its texture, which then counts twice: random blocks have up to 34 times
+/// that square, 13 on average. A smaller one corrects linear light on texture, a larger one leaves weak responses on it
+/// (`python evaluation/response_sd.py`).
+pub(super) const HARMONIC_OF_TEXTURE: f64 = 13.0;
 
 /// Step of the differences from which slopes and curvature of the cost follow, as a share of the exponent. Not measured:
 /// small against what a response changes, large against rounding. A larger one averages over the bend of the cost.

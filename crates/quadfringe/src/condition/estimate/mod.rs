@@ -11,6 +11,7 @@ mod samples;
 mod select;
 mod shot;
 mod simplex;
+mod tile_phase;
 mod uncertainty;
 
 use super::params::{

@@ -6,12 +6,13 @@
 
 use super::samples::{Samples, Trace};
 use super::select::{self, Mark};
-use super::uncertainty::{exponent_sd, second_harmonic, without_excess};
+use super::tile_phase::lit_pixels;
+use super::uncertainty::{exponent_sd, harmonic_of_texture, second_harmonic, without_excess};
 use super::{Response, ResponseEstimate, fit, offset_bound, root_mean_square};
 use crate::condition::params::{
     BRIGHT_MAX, CERTAIN_SDS, CHANNEL_TILES_MIN, EVENNESS_MIN, EXPONENT_SHARED, GAIN_RAD, HARMONIC_LEAST,
-    HARMONIC_LEFT, KNOWN_MIN, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN,
-    SLOPE_STRIDE_PX, TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
+    HARMONIC_LEFT, MANY_TILES, PHASE_STEPS, SATURATED_MAX, SINGLE_CHANNEL_TILES_MIN, SLOPE_STRIDE_PX,
+    TILE_FRINGES, TILE_MODULATION_MIN, TILE_SIDE_MIN_PX, TILES_MIN,
 };
 use crate::encoding::{Channel, Encoding};
 use crate::{Error, Result};
@@ -110,7 +111,7 @@ fn of_channel(traces: &[Trace<'_>], shared: &Shared) -> Option<ResponseEstimate>
         two_step_rms_before_rad: before,
         two_step_rms_after_rad: rms_rad(&samples, &kept),
         pixels: traces.len(),
-        exponent_sd: total_sd(sd, taken_back, f64::from(kept.exponent)),
+        exponent_sd: total_sd(sd, taken_back, harmonic_of_texture(traces, &kept), f64::from(kept.exponent)),
         second_harmonic_before: second_harmonic(traces, &Response::default()),
         second_harmonic_after: second_harmonic(traces, &kept),
     };
@@ -127,9 +128,11 @@ struct Shared {
     copies: f64,
 }
 
-/// Standard error with that part that the scatter of tiles does not show.
-fn total_sd(scatter: f64, taken_back: f64, exponent: f64) -> f64 {
-    scatter.hypot(EXPONENT_SHARED * (1.0 - exponent)).hypot(taken_back / 2.0)
+/// Standard error with the parts that the scatter of tiles does not show. A gamma g near 1 has the second harmonic
+/// (g - 1) / 3.
+fn total_sd(scatter: f64, taken_back: f64, harmonic_of_texture: f64, exponent: f64) -> f64 {
+    let texture = 3.0 * exponent * harmonic_of_texture;
+    scatter.hypot(EXPONENT_SHARED * (1.0 - exponent)).hypot(taken_back / 2.0).hypot(texture)
 }
 
 /// Whether a shot shows a response beyond doubt, in a channel whose light must have at least this second harmonic.
@@ -197,22 +200,18 @@ fn steps_of(
     phase: ArrayView2<'_, f32>,
     scale: f32,
 ) -> Option<[f32; PHASE_STEPS]> {
+    let pixels = lit_pixels(light, phase)?;
     let (mut sums, mut counts) = ([0.0f32; PHASE_STEPS], [0.0f32; PHASE_STEPS]);
-    let (mut known, mut saturated) = (0.0, 0.0);
-    for (&light, &phase) in light.iter().zip(phase) {
-        if !(phase.is_finite() && light.is_finite()) {
-            continue;
-        }
-        let turns = phase * scale / TAU;
+    for pixel in &pixels {
+        let turns = pixel.phase_rad * scale / TAU;
         let step = ((turns - turns.floor()) * PHASE_STEPS as f32) as usize % PHASE_STEPS;
-        sums[step] += light;
+        sums[step] += pixel.light;
         counts[step] += 1.0;
-        known += 1.0;
-        saturated += if light >= BRIGHT_MAX { 1.0 } else { 0.0 };
     }
-    let all = light.len() as f32;
-    let even = counts.iter().all(|&count| count >= EVENNESS_MIN * known / PHASE_STEPS as f32);
-    let told = known >= KNOWN_MIN * all && saturated <= SATURATED_MAX * known && even;
+    let all = pixels.len() as f32;
+    let saturated = pixels.iter().filter(|pixel| pixel.light >= BRIGHT_MAX).count() as f32;
+    let even = counts.iter().all(|&count| count >= EVENNESS_MIN * all / PHASE_STEPS as f32);
+    let told = saturated <= SATURATED_MAX * all && even;
     // After the dark level is subtracted, noise can make light negative.
     told.then(|| std::array::from_fn(|i| (sums[i] / counts[i]).clamp(0.0, 1.0)))
 }

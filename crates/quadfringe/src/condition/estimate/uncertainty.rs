@@ -6,7 +6,7 @@
 
 use super::samples::{Samples, Trace};
 use super::{Response, Trial};
-use crate::condition::params::{DIFFERENCE_EXPONENT, DIFFERENCE_OFFSET};
+use crate::condition::params::{DIFFERENCE_EXPONENT, DIFFERENCE_OFFSET, HARMONIC_OF_TEXTURE};
 use std::f64::consts::TAU;
 
 /// Standard error of the exponent of a response that fits these samples; infinite when they do not determine it.
@@ -69,19 +69,39 @@ impl Pull {
     }
 }
 
-/// Median over the traces of the second harmonic over the first, in the phase in which a power of light has it.
-///
-/// A gamma above 1 makes it positive, one below 1 negative; texture has either sign alike. 0 without traces.
-pub(super) fn second_harmonic(traces: &[Trace<'_>], response: &Response) -> f64 {
-    let mut found: Vec<f64> = traces.iter().filter_map(|trace| harmonic_of(trace, response)).collect();
-    if found.is_empty() {
-        return 0.0;
-    }
-    let middle = found.len() / 2;
-    *found.select_nth_unstable_by(middle, f64::total_cmp).1
+/// Second harmonic of a trace over its first, relative to the phase of the first.
+struct Harmonic {
+    /// In the phase in which a power of light has it: positive for a gamma above 1, negative below. Texture has either sign.
+    aligned: f64,
+    /// A quarter period from there, where texture has it and a response has not.
+    across: f64,
 }
 
-fn harmonic_of(trace: &Trace<'_>, response: &Response) -> Option<f64> {
+/// Median over the traces of the second harmonic over the first, in the phase in which a power of light has it. 0 without
+/// traces.
+pub(super) fn second_harmonic(traces: &[Trace<'_>], response: &Response) -> f64 {
+    median(harmonics(traces, response).map(|harmonic| harmonic.aligned).collect())
+}
+
+/// Second harmonic over the first that the texture of these traces may pretend. 0 without traces.
+pub(super) fn harmonic_of_texture(traces: &[Trace<'_>], response: &Response) -> f64 {
+    let across = harmonics(traces, response).map(|harmonic| harmonic.across.abs());
+    HARMONIC_OF_TEXTURE * median(across.collect()).powi(2)
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+fn harmonics(traces: &[Trace<'_>], response: &Response) -> impl Iterator<Item = Harmonic> {
+    traces.iter().filter_map(|trace| harmonic_of(trace, response))
+}
+
+fn harmonic_of(trace: &Trace<'_>, response: &Response) -> Option<Harmonic> {
     let (mut first, mut second) = ([0.0f64; 2], [0.0f64; 2]);
     let steps = trace.steps.len() as f64;
     for (s, &value) in trace.steps.iter().enumerate() {
@@ -92,9 +112,13 @@ fn harmonic_of(trace: &Trace<'_>, response: &Response) -> Option<f64> {
         second = [second[0] + light * cos2, second[1] - light * sin2];
     }
     let power = first[0] * first[0] + first[1] * first[1];
-    // The real part of second conj(first^2), over the cube of the length of first.
+    // second conj(first^2), over the cube of the length of first
     let square = [first[0] * first[0] - first[1] * first[1], 2.0 * first[0] * first[1]];
-    (power > 0.0).then(|| (second[0] * square[0] + second[1] * square[1]) / power.powf(1.5))
+    let over = power.powf(1.5);
+    (power > 0.0).then(|| Harmonic {
+        aligned: (second[0] * square[0] + second[1] * square[1]) / over,
+        across: (second[1] * square[0] - second[0] * square[1]) / over,
+    })
 }
 
 /// The response between linear light and an estimate whose light keeps no second harmonic, if the estimate turns its sign.
@@ -140,6 +164,15 @@ mod tests {
             let straight = Response { exponent: (1.0 / gamma) as f32, ..Response::default() };
             assert!(second_harmonic(&traces(&bent), &straight).abs() < 1e-4);
         }
+    }
+
+    #[test]
+    fn only_texture_has_a_second_harmonic_across() {
+        let bent = stack(1.8, 0.0).insert_axis(ndarray::Axis(0));
+        assert!(harmonic_of_texture(&traces(&bent), &Response::default()) < 1e-6);
+        let across = |s: usize| 0.03 * (0.6 + TAU * s as f64 / 8.0).sin() as f32;
+        let textured = Array2::from_shape_fn((1, 16), |(_, s)| bent[[0, s]] + across(s));
+        assert!(harmonic_of_texture(&traces(&textured), &Response::default()) > 0.01);
     }
 
     #[test]
