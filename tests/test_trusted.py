@@ -118,6 +118,19 @@ def test_the_sound_part_of_a_shot_is_returned(
         assert np.count_nonzero(shape.reason[:, : columns - 16] == Reason.DOUBTFUL_ORDER) > 1000
 
 
+@pytest.mark.parametrize(("shift_px", "lower"), [(6, False), (8, True), (12, False), (12, True), (24, True)])
+def test_half_of_a_frame_with_shifted_infrared_is_no_data(shift_px: int, lower: bool) -> None:
+    """The median order margin of the whole does not collapse; half of the shape was wrong without a word."""
+    images, column_px = images_of("face", 46)
+    half = np.s_[CAMERA.height_px // 2 :, :] if lower else np.s_[:, CAMERA.width_px // 2 :]
+    images["ir"][half] = np.roll(images["ir"], shift_px, axis=1)[half]
+    with pytest.warns(qf.DecodeWarning, match="of the image that fit are returned|of the image can be trusted"):
+        shape = qf.decode(shot_of(images), plan_of())
+    right = np.abs(shape.column_px - column_px) < 0.5 * 912 / NUMBERS[0]
+    hold("part.half_right_percent", 100 * (shape.returned & right).mean())
+    hold("part.half_wrong_percent", 100 * (shape.returned & ~right).mean())
+
+
 @pytest.mark.parametrize("surface", ["face", "steps"])
 def test_no_part_of_a_shot_with_exchanged_channels_is_trusted(surface: str) -> None:
     images, _ = images_of(surface, 43)

@@ -28,6 +28,7 @@ from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.readings import rows_of
 from quadfringe.decoding.symptoms import closing_steps, closure_of, linear_light_of
+from quadfringe.decoding.trusted import take_out, trusted_part
 
 __all__ = ["Offsets", "contradiction", "offsets_of"]
 
@@ -38,13 +39,15 @@ Real = NDArray[np.float64]
 class Offsets:
     """Offsets of the fringes of red, green and the third channel in tiles, (T,) rad, and the mean columns of the tiles.
 
-    `turn_rad` is the column as a share of the field, 0 to 2 pi.
+    `turn_rad` is the column as a share of the field, 0 to 2 pi. `place` is the band and the number of each tile in it,
+    (T, 2).
     """
 
     red_rad: Real
     green_rad: Real
     third_rad: Real
     turn_rad: Real
+    place: NDArray[np.intp]
 
     def closure_rad(self, numbers: tuple[float, ...]) -> Real:
         """Give the closure of the three phases (E6), (T,) rad; no tiles for numbers whose phases do not close."""
@@ -55,13 +58,21 @@ class Offsets:
 
 
 def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
-    """Name what the channels contradict in a decoded shot; None if they agree, or are two."""
+    """Name what the channels contradict in a decoded shot; None if they agree, or are two.
+
+    If they contradict a part of it, what fits is kept and the rest becomes no data, in place.
+    """
     if len(plan.fringes.numbers) < 3:
         return None
     offsets = offsets_of(shape, shot, plan)
     if offsets.turn_rad.size < params.OFFSET_TILES_MIN:
         return None
-    return _shifted(offsets, shape, shot, plan) or _numbers(offsets, plan)
+    shifted = _shifted(offsets, shape, shot, plan)
+    if shifted is None and (numbers := _numbers(offsets, plan)):
+        return numbers
+    if shifted is None or not shifted.fatal:
+        shifted = _in_part(offsets, plan) or shifted
+    return shifted and _where_it_fits(shifted, shape, shot, plan)
 
 
 def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
@@ -98,6 +109,33 @@ def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:
     return Cause("fringe numbers", words, NUMBERS_FIX)
 
 
+def _in_part(offsets: Offsets, plan: Plan) -> Cause | None:
+    """Find a part where the closure is off by half a wrong order, in tiles that agree with those around."""
+    wave, least = np.exp(1j * offsets.closure_rad(plan.fringes.numbers)), 0.5 * wrong_order_rad(plan.fringes.numbers)
+    if not plan.fringes.infrared or wave.size == 0:
+        return None
+    near = np.abs(offsets.place[:, np.newaxis] - offsets.place).max(axis=2) <= 1
+    around = near @ wave / near.sum(axis=1)
+    off = (np.abs(around) > params.STEADY_MIN) & (np.minimum(*np.abs(np.angle([wave, around]))) > least)
+    if np.count_nonzero(off) < params.OFFSET_TILES_MIN or off.mean() > params.OFFSET_PART_MAX:
+        return None
+    words = (
+        f"in {off.mean():.0%} of the shape the infrared fringes lie {np.angle(wave[off].mean()):+.2f} rad off their "
+    )
+    words += "place among those of red and green"
+    return Cause(
+        "infrared registration", words, "keep what covers or moves a part of the infrared image out of its way"
+    )
+
+
+def _where_it_fits(cause: Cause, shape: Shape, shot: AnyShot, plan: Plan) -> Cause:
+    """Take out what a shift of infrared spoils, if a part of the shape fits; else all of it cannot be trusted."""
+    if not cause.fatal or (part := trusted_part(shape, shot, plan)) is None:
+        return cause
+    take_out(shape, shape.returned & ~part)
+    return replace(cause, found=f"{cause.found}; the {part.mean():.0%} of the image that fit are returned", fatal=False)
+
+
 def _drift(angle_rad: Real, turn_rad: Real) -> int:
     """Give the turns by which an angle drifts over the field; 0 unless a drift explains it clearly better than none."""
     turns = range(-params.DRIFT_TURNS_MAX, params.DRIFT_TURNS_MAX + 1)
@@ -125,7 +163,10 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
         seen, third_rad = "ir", per_px * column_px.reshape(phase_rad.shape)
     waves = (("red", phase_rad), ("green", second / first * phase_rad), (seen, third_rad))
     tiles = np.array([*(_offsets_rad(light[name], wave_rad) for name, wave_rad in waves), _means(phase_rad / first)])
-    return Offsets(*tiles[:, np.isfinite(tiles).all(axis=0)])
+    known = np.isfinite(tiles).all(axis=0)
+    place = np.indices((len(tops), known.size // len(tops))).reshape(2, -1).T
+    red_rad, green_rad, other_rad, turn_rad = tiles[:, known]
+    return Offsets(red_rad, green_rad, other_rad, turn_rad, place[known])
 
 
 def _light_of_bands(shot: AnyShot, plan: Plan, tops: range, count: int) -> dict[str, NDArray[np.float32]]:

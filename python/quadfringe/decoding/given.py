@@ -62,7 +62,7 @@ def same_images(shot: AnyShot) -> Cause | None:
     if not words:
         return None
     return Cause(
-        "same image", ", and ".join(words), "check that the image of every channel is given once, under its own name"
+        "same image", ", and ".join(words), "check that the image of every channel is given once, and under its name"
     )
 
 

@@ -128,6 +128,9 @@ ROW_STRIDE = 4
 OFFSET_TILE_PX, OFFSET_SHARE = 96, 0.3
 # Fewest tiles from which a fault is named. A smaller number names faults for the print in a single tile.
 OFFSET_TILES_MIN = 4
+# Largest share of the tiles that is a part. Crosstalk of red and green turns the closure everywhere (0.84 at 0.15:
+# `pytest tests/test_channel_offsets.py`). A smaller number misses broken halves.
+OFFSET_PART_MAX = 0.7
 # Most turns of drift over the field, the least length of the mean phasor, and by how much it must exceed that without
 # drift. Numbers that are farther off leave no margin. Sound shots have no drift that is better than none, and other
 # numbers have a length of 0.82 or more. Smaller numbers believe prints, larger ones miss other numbers on narrow
