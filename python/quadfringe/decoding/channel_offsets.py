@@ -70,8 +70,10 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
     shifted = _shifted(offsets, shape, shot, plan)
     if shifted is None and (numbers := _numbers(offsets, plan)):
         return numbers
-    if shifted is None or not shifted.fatal:
-        shifted = _in_part(offsets, plan) or shifted
+    if (shifted is None or not shifted.fatal) and (found := _in_part(offsets, plan)):
+        part = _where_it_fits(found, shape, shot, plan)
+        # If nothing fits, it is no part, and a response or crosstalk moves the fringes as well.
+        return shifted if part.fatal else part
     return shifted and _where_it_fits(shifted, shape, shot, plan)
 
 
