@@ -11,7 +11,7 @@ from quadfringe import _core
 from quadfringe.evaluation._scenes import noisy_8bit
 from quadfringe.evaluation.scoring import Scene
 
-__all__ = ["FRINGES", "isolated", "patches"]
+__all__ = ["FRINGES", "isolated", "patches", "repeated"]
 
 # Fringe numbers that show the camera this many px a fringe, about.
 FRINGES = {
@@ -77,5 +77,10 @@ def patches(side_px: int, seed: int, shape: tuple[int, int] = (768, 1024)) -> ND
     """Draw an albedo (H, W, 4) of squares, each with a random albedo from 0.15 to 1 in every channel."""
     rows, columns = (size // side_px + 1 for size in shape)
     squares = np.random.default_rng([seed, 9]).uniform(0.15, 1.0, (rows, columns, 4))
-    whole: Any = squares.repeat(side_px, 0).repeat(side_px, 1)[: shape[0], : shape[1]]
+    return repeated(squares, side_px, shape)
+
+
+def repeated(cells: NDArray[Any], side_px: int, shape: tuple[int, int]) -> NDArray[np.float32]:
+    """Draw an albedo (H, W, 4) of squares with the albedo of `cells`, (rows, columns, 4)."""
+    whole: Any = cells.repeat(side_px, 0).repeat(side_px, 1)[: shape[0], : shape[1]]
     return np.ascontiguousarray(whole, np.float32)

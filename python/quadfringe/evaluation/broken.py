@@ -58,8 +58,7 @@ class Case:
 
     def names(self, name: str, words: str) -> bool:
         """Tell whether a finding with this name and these words names the cause."""
-        told = self.cause != "exchanged channels" or "swapped" in words or "in the order" in words
-        return name.startswith(NAMES[self.cause]) and told
+        return name.startswith(NAMES[self.cause]) and (self.cause != "exchanged channels" or "swapped" in words)
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,7 @@ from quadfringe.decoding import Plan
 from quadfringe.decoding._kernel import KernelDecoder, size_of
 from quadfringe.decoding.response import decode_straightened
 from quadfringe.evaluation import world
+from quadfringe.evaluation._isolated import repeated
 
 __all__ = ["BLOCKS_PX", "GAMMAS", "SCENES", "Estimate", "estimates"]
 
@@ -70,9 +71,8 @@ def _drawn(scene: str, bench: _core.Bench, random: np.random.Generator) -> world
         return world.SCENES[scene](bench, random)
     cast, side_px = bench.cast("face"), BLOCKS_PX[scene]
     rows, columns = cast.shadow().shape
-    cells = random.uniform(0.1, 0.9, (-(-rows // side_px), -(-columns // side_px), 4)).astype(np.float32)
-    albedo = cells.repeat(side_px, 0).repeat(side_px, 1)[:rows, :columns]
-    return world.World(cast, np.ascontiguousarray(albedo))
+    cells = random.uniform(0.1, 0.9, (-(-rows // side_px), -(-columns // side_px), 4))
+    return world.World(cast, repeated(cells, side_px, (rows, columns)))
 
 
 def _estimated(scene: str, gamma: float, seed: int) -> Estimate:
