@@ -166,10 +166,12 @@ test-usb: $(STAMPS)/built
 	$(BUILT)/lightcrafter-testbed $(BIN)/pytest tests/usb
 	$(BUILT)/lightcrafter-testbed $(BIN)/python benches/projector.py
 
-# Two cameras over GigE Vision, in a network namespace that has only the loopback interface.
+# Two cameras over GigE Vision, in network namespaces that have only the loopback interface. The tests mostly wait for frames
+# and for time-outs, so that four workers, each in a namespace of its own, do not load two cores.
+CAMERA_WORKERS := 4*popen//python=scripts/loopback $(BIN)/python
 test-camera: $(STAMPS)/camera
 	if scripts/loopback true; then \
-		scripts/loopback $(BIN)/pytest tests/camera && \
+		$(BIN)/pytest tests/camera --tx "$(CAMERA_WORKERS)" --dist worksteal && \
 		scripts/loopback $(BIN)/python benches/camera.py --seconds 3; \
 	elif [ -n "$${CI:-}" ]; then exit 1; else echo "test-camera is skipped"; fi
 

@@ -1,4 +1,4 @@
-"""Tests over GigE Vision: `make test-camera` runs them in a network namespace; plain pytest leaves this folder out."""
+"""Tests over GigE Vision: `make test-camera` runs them in network namespaces; plain pytest leaves this folder out."""
 
 from __future__ import annotations
 

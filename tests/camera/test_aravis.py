@@ -15,6 +15,7 @@ from wire import SECOND, SIZE_PX, TWO_STREAMS, checked_exposure, emulated, patte
 from quadfringe.config.cameras import AravisConfig, ChipConfig
 from quadfringe.data import BayerShot, Shot
 from quadfringe.devices.aravis import AravisCamera, ChipCamera, found
+from quadfringe.devices.aravis._binding import aravis_binding
 from quadfringe.devices.emulator import MODEL, SERIAL, Emulator
 from quadfringe.devices.emulator.frames import TestPattern
 from quadfringe.errors import CameraError, CameraNotFoundError, ShotTimeoutError, WrongFrameError
@@ -148,9 +149,8 @@ def test_the_visible_chip_of_two_makes_shots_alone(emulator: Emulator) -> None:
 
 def test_a_camera_that_is_not_on_a_network() -> None:
     """The simulated device of Aravis represents USB3 Vision: no packets, no addresses, no controller."""
-    from gi.repository import Aravis
-
-    Aravis.enable_interface("Fake")
+    aravis = aravis_binding()
+    aravis.enable_interface("Fake")
     try:
         region = ChipConfig(offset_px=(16, 8))
         config = AravisConfig(
@@ -160,7 +160,7 @@ def test_a_camera_that_is_not_on_a_network() -> None:
             assert camera.config.visible.offset_px == (16, 8)
             images = list(camera.stream(5, keep="all"))
     finally:
-        Aravis.disable_interface("Fake")
+        aravis.disable_interface("Fake")
     assert {image.pixels.shape for image in images} == {(64, 128)}
     assert len({image.id for image in images}) == 5
 
