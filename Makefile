@@ -44,12 +44,13 @@ rust: $(STAMPS)/tools
 	for example in crates/*/examples/*.rs; do $(BUILT)/examples/"$$(basename "$$example" .rs)"; done
 	RUSTDOCFLAGS="-D warnings" cargo doc $(CARGO_ALL) --no-deps --quiet
 
+# Each process gets half of the files and, when it is done, takes tests from the end of the other's.
 python: $(STAMPS)/built stubs
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports
-	$(BIN)/pytest --numprocesses 2 --dist loadfile
+	$(BIN)/pytest --numprocesses 2 --dist worksteal
 
 # The documentation site, into out/docs: every notebook and every picture of the gallery is computed; warnings are errors.
 docs: $(STAMPS)/docs
