@@ -97,12 +97,17 @@ def _known(xyz_mm: Array, within: Mask | None) -> Mask:
 
 def robust_fit(terms: Array, values: Array) -> Array:
     """Fit values (n,) by terms (n, k) with the least sum of absolute deviations, by repeated weighting."""
-    found = np.linalg.lstsq(terms, values, rcond=None)[0]
+    found = _weighted_fit(terms, values, np.ones_like(values))
     for _ in range(ROUNDS):
         off = np.abs(values - terms @ found)
-        weight = 1 / np.sqrt(np.maximum(off, 1e-3 * max(float(np.median(off)), 1e-12)))
-        found = np.linalg.lstsq(terms * weight[:, None], values * weight, rcond=None)[0]
-    return np.asarray(found)
+        found = _weighted_fit(terms, values, 1 / np.maximum(off, 1e-3 * max(float(np.median(off)), 1e-12)))
+    return found
+
+
+def _weighted_fit(terms: Array, values: Array, weight: Array) -> Array:
+    """Fit by the normal equations, which for few terms of similar size take a tenth of the time of the whole system."""
+    weighted = terms * weight[:, None]
+    return np.asarray(np.linalg.lstsq(weighted.T @ terms, weighted.T @ values, rcond=None)[0], np.float64)
 
 
 def _start(xyz_mm: Array, known: Mask) -> Array:
