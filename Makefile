@@ -12,20 +12,27 @@ BIN := $(VENV)/bin
 STAMPS := $(VENV)/stamps
 KERNEL := $(shell find crates/*/src -name '*.rs' 2>/dev/null) $(wildcard crates/*/Cargo.toml) Cargo.toml Cargo.lock
 
-.PHONY: demo test docs test-usb test-camera test-live wheel wheel-test cross publish-check msrv lowest semver workflows audit \
-	release fuzz miri hostile coverage figures evaluation bench rust python stubs format bench peers clean
+.PHONY: demo test installed docs test-usb test-camera test-live wheel wheel-test cross publish-check msrv lowest semver workflows \
+	audit release fuzz miri hostile coverage figures evaluation bench rust python stubs format bench peers clean
 
 demo: $(STAMPS)/built
 	$(BIN)/quadfringe demo --out out/demo
 
-# Two parts at a time: the kernel's tests and the wheel are compiled at once, the site fills what the tests of the package leave
-# idle, and browser and projectors mostly wait. The cameras have the machine to themselves, because frames are lost on a busy one.
+# Two parts at a time: the kernel's tests beside the wheel and what the later parts install, which mostly waits for the network;
+# the site fills what the tests of the package leave idle, and browser and projectors mostly wait. The cameras have the machine
+# to themselves, because frames are lost on a busy one.
 test:
-	$(MAKE) --jobs 2 rust $(STAMPS)/built
-	$(MAKE) wheel-test $(STAMPS)/docs
+	$(MAKE) --jobs 2 rust installed
+	$(MAKE) wheel-test
 	$(MAKE) --jobs 2 python docs
 	$(MAKE) --jobs 2 test-usb test-live
 	$(MAKE) test-camera
+
+# All that the parts of `test` need, one after another: two installations at once disturb each other.
+installed: $(STAMPS)/built
+	$(MAKE) --jobs 1 $(STAMPS)/wheel $(STAMPS)/docs $(STAMPS)/camera
+	scripts/set-up testbed
+	scripts/set-up browser
 
 # One set of features and one profile for all tests, examples and the testbed, so that nothing is compiled twice. Features
 # only add code, so the tests of the largest set run all that a smaller one runs; the smallest one is compiled alone.
@@ -184,7 +191,7 @@ $(STAMPS)/camera: $(STAMPS)/built
 # The live view in headless chromium.
 test-live: $(STAMPS)/built
 	scripts/set-up browser
-	QUADFRINGE_BROWSER=1 $(BIN)/pytest tests/live
+	QUADFRINGE_BROWSER=1 $(BIN)/pytest tests/live --numprocesses 2 --dist worksteal
 
 # Random bytes to the projector driver and its emulator, and as images and numbers of the kernel: libFuzzer on the stable
 # compiler, with LLVM's counters. Changed files to every reader: libFuzzer in Python, by Atheris. Each gets an equal share
