@@ -68,6 +68,7 @@ class VirtualBench:
         self._scene = config.scene
         self._scene_seen: tuple[float, Seen] | None = None  # time in s, and the scene at that time
         self._placed: _Placed | None = None
+        self._plane: tuple[float, ...] | None = None  # point and normal, if that is a plane
         self._exposures = 0
         self._infrared = config.fringes.infrared  # a bench for three colours has no infrared chip
         self.projected: Light | None = None
@@ -130,7 +131,11 @@ class VirtualBench:
 
     def place_plane(self, point_mm: Triple, normal: Triple) -> None:
         """Replace the scene by a plane through a point; its normal points to the camera."""
+        plane = (*map(float, point_mm), *map(float, normal))
+        if plane == self._plane:  # most captures of a calibration session show the same plane
+            return
         self._place(_Placed(Seen(lambda: self._bench.cast_plane(point_mm=point_mm, normal=normal)), None))
+        self._plane = plane
 
     def place_scene(self, surface: str) -> None:
         """Replace the scene by a built-in surface; raises ValueError for an unknown name."""
@@ -155,6 +160,7 @@ class VirtualBench:
         if self._placed is not None:
             self._placed.seen.forget()
         self._placed = placed
+        self._plane = None
 
     def seed(self, exposure: int) -> int:
         """Return the noise seed of exposure number `exposure`; exposure 0 has the seed of the scene."""
