@@ -51,7 +51,7 @@ rust: $(STAMPS)/tools
 	for example in crates/*/examples/*.rs; do $(BUILT)/examples/"$$(basename "$$example" .rs)"; done
 	RUSTDOCFLAGS="-D warnings" cargo doc $(CARGO_ALL) --no-deps --quiet
 
-# Each process gets half of the files and, when it is done, takes tests from the end of the other's.
+# Each process gets half of the tests and, when it is done, takes some from the end of the other's.
 python: $(STAMPS)/built stubs
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .

@@ -229,9 +229,12 @@ DECODE = ("decode", "shot", "--out", "x.npz", "--projector-width", 912, "--fring
         ),
         ((*DECODE, 35), "error: --fringes: 1 problem numbers: expected fringe numbers whose joint range"),
         ((*DECODE, 30, "--method", "cow"), "expected joint or published, got 'cow'"),
-        (
-            (*DECODE, 30, "--bits", 7),
-            "'--bits': expected one of '8', '9', '10', '11', '12', '13', '14', '15', '16', got '7'",
+        *(
+            (
+                (*DECODE, 30, "--bits", bits),
+                f"'--bits': expected one of '8', '9', '10', '11', '12', '13', '14', '15', '16', got '{bits}'",
+            )
+            for bits in (7, 17)
         ),
         (("target", "cow"), "expected one of 'rings', 'circles', 'asymmetric', 'charuco', got 'cow'"),
         (("live", "--port", "x"), "'--port': expected a whole number, got 'x'"),

@@ -105,7 +105,7 @@ def robust_fit(terms: Array, values: Array) -> Array:
 
 
 def _weighted_fit(terms: Array, values: Array, weight: Array) -> Array:
-    """Fit by the normal equations, which for few terms of similar size take a tenth of the time of the whole system."""
+    """Fit by the normal equations, which suit few terms of similar size: the whole system takes more time."""
     weighted = terms * weight[:, None]
     return np.asarray(np.linalg.lstsq(weighted.T @ terms, weighted.T @ values, rcond=None)[0], np.float64)
 

@@ -40,10 +40,11 @@ class PrintedBoard:
 
 
 class _Placed(NamedTuple):
-    """An object that replaces the scene, and the albedo map (H, W, 4) of a printed board."""
+    """An object that replaces the scene: albedo map (H, W, 4) of a printed board, point and normal of a plane."""
 
     seen: Seen
-    albedo: NDArray[np.float32] | None
+    albedo: NDArray[np.float32] | None = None
+    plane: tuple[float, ...] | None = None
 
 
 # Peak memory of a rendered shot, and of a projected pattern, bytes per pixel (`pytest tests/test_size_limits.py`).
@@ -68,7 +69,6 @@ class VirtualBench:
         self._scene = config.scene
         self._scene_seen: tuple[float, Seen] | None = None  # time in s, and the scene at that time
         self._placed: _Placed | None = None
-        self._plane: tuple[float, ...] | None = None  # point and normal, if that is a plane
         self._exposures = 0
         self._infrared = config.fringes.infrared  # a bench for three colours has no infrared chip
         self.projected: Light | None = None
@@ -132,14 +132,14 @@ class VirtualBench:
     def place_plane(self, point_mm: Triple, normal: Triple) -> None:
         """Replace the scene by a plane through a point; its normal points to the camera."""
         plane = (*map(float, point_mm), *map(float, normal))
-        if plane == self._plane:  # most captures of a calibration session show the same plane
-            return
-        self._place(_Placed(Seen(lambda: self._bench.cast_plane(point_mm=point_mm, normal=normal)), None))
-        self._plane = plane
+        # Captures of a calibration session show a plane many times.
+        if self._placed is None or self._placed.plane != plane:
+            seen = Seen(lambda: self._bench.cast_plane(point_mm=point_mm, normal=normal))
+            self._place(_Placed(seen, plane=plane))
 
     def place_scene(self, surface: str) -> None:
         """Replace the scene by a built-in surface; raises ValueError for an unknown name."""
-        self._place(_Placed(Seen(lambda: self._bench.cast(surface)), None))
+        self._place(_Placed(Seen(lambda: self._bench.cast(surface))))
 
     def place(self, board: PrintedBoard, T_camera_board: NDArray[np.float64]) -> None:  # noqa: N803
         """Replace the scene by a board in a pose (4, 4); raises ValueError unless the pose is a rigid motion."""
@@ -160,7 +160,6 @@ class VirtualBench:
         if self._placed is not None:
             self._placed.seen.forget()
         self._placed = placed
-        self._plane = None
 
     def seed(self, exposure: int) -> int:
         """Return the noise seed of exposure number `exposure`; exposure 0 has the seed of the scene."""
