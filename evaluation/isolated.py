@@ -1,8 +1,8 @@
 """Objects on black ground, narrower than a few fringes: refused, right, and right of returned, one line for each kind.
 
-    python evaluation/isolated.py [--seeds 8] [--first-seed 11]
+    python evaluation/isolated.py [--surface face] [--seeds 8] [--first-seed 11]
 
-The objects are faces of 2 and 15 % of the frame, of contrast 0.3, with fringes of 74 and 110 px and 1 % noise.
+The objects are parts of a surface, 2 and 15 % of the frame. Contrast 0.3, fringes of 74 and 110 px, 1 % noise.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ OBJECTS = ((74, 0.02), (110, 0.02), (74, 0.15))
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--surface", choices=("face", "steps", "sphere", "peaks"), default="face")
     parser.add_argument("--seeds", type=int, default=8)
     parser.add_argument("--first-seed", type=int, default=11)
     options = parser.parse_args()
@@ -28,7 +29,7 @@ def main() -> None:
     for period_px, share in OBJECTS:
         scores = []
         for seed in range(options.first_seed, options.first_seed + options.seeds):
-            scene = isolated(period_px, share, seed)
+            scene = isolated(period_px, share, seed, surface=options.surface)
             try:
                 scores.append(scoring.score(scene, scenes.shape_of(scene, response="linear").phase_rad))
             except DecodeError:

@@ -121,9 +121,9 @@ def test_the_sound_part_of_a_shot_is_returned(
 @pytest.mark.parametrize(
     ("shift_px", "lower", "words"),
     [
-        (6, False, "of the image can be trusted"),  # the margin of the whole collapses
+        (6, False, "of the image that fit are returned"),
         (8, True, "of the image that fit are returned"),
-        (12, False, "of the image that fit are returned"),
+        (12, False, "of the image can be trusted"),  # the margin of the whole collapses
         (12, True, "of the image that fit are returned"),
         (24, True, "of the image that fit are returned"),
     ],

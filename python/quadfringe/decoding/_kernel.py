@@ -92,6 +92,10 @@ class KernelDecoder:
         decode = self.plan.decode.model_copy(update={"method": method})
         return self.with_plan(replace(self.plan, decode=decode))
 
+    def keeping_doubtful(self) -> KernelDecoder:
+        """Give a decoder of the same plan that returns doubtful orders too."""
+        return self.with_plan(replace(self.plan, decode=self.plan.decode.model_copy(update={"quality_min": 0.0})))
+
     def with_numbers(self, numbers: tuple[float, ...]) -> KernelDecoder:
         """Give a decoder of the same plan for other fringe numbers."""
         fringes = self.plan.fringes.model_copy(update={"numbers": numbers})

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
-from quadfringe.decoding._kernel import rows_of_calibration
+from quadfringe.decoding._kernel import KernelDecoder, rows_of_calibration
 from quadfringe.decoding._offsets import fitted_rad
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration, wrong_order_rad
@@ -30,7 +30,9 @@ from quadfringe.decoding.readings import rows_of
 from quadfringe.decoding.symptoms import closing_steps, closure_of, linear_light_of
 from quadfringe.decoding.trusted import take_out, trusted_part
 
-__all__ = ["Offsets", "contradiction", "offsets_of"]
+__all__ = ["Offsets", "contradiction", "drifting", "offsets_of", "taken_out"]
+
+UNCOVER_FIX = "keep what covers or moves a part of the infrared image out of its way"
 
 Real = NDArray[np.float64]
 
@@ -75,6 +77,30 @@ def contradiction(shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
         # If nothing fits, it is no part, and a response or crosstalk moves the fringes as well.
         return shifted if part.fatal else part
     return shifted and _where_it_fits(shifted, shape, shot, plan)
+
+
+def taken_out(shape: Shape, shot: AnyShot, plan: Plan, seen: Shape) -> Cause | None:
+    """Name what the channels contradict in the parts that the decoder took out, which are still in `seen`.
+
+    What does not fit of the rest becomes no data, in place.
+    """
+    cause = _in_part(offsets_of(seen, shot, plan), plan)
+    if cause is None:
+        share = np.count_nonzero(shape.quality == 0) / np.count_nonzero(np.isfinite(shape.quality))
+        words = f"in {share:.0%} of the pixels with fringes, green and infrared contradict every fringe order"
+        cause = Cause("infrared registration", words, UNCOVER_FIX)
+    return replace(_where_it_fits(cause, shape, shot, plan), fatal=False)
+
+
+def drifting(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> Cause | None:
+    """Name what the channels contradict in a shot whose orders collapsed, with the pixels that the decoder took out.
+
+    A part that fits speaks against it: other fringe numbers leave none.
+    """
+    if trusted_part(shape, shot, decoder.plan) is not None:
+        return None
+    found = contradiction(decoder.keeping_doubtful().shape(shot), shot, decoder.plan)
+    return found if found and found.fatal else None
 
 
 def _shifted(offsets: Offsets, shape: Shape, shot: AnyShot, plan: Plan) -> Cause | None:
@@ -125,9 +151,7 @@ def _in_part(offsets: Offsets, plan: Plan) -> Cause | None:
         f"in {off.mean():.0%} of the shape the infrared fringes lie {np.angle(wave[off].mean()):+.2f} rad off their "
     )
     words += "place among those of red and green"
-    return Cause(
-        "infrared registration", words, "keep what covers or moves a part of the infrared image out of its way"
-    )
+    return Cause("infrared registration", words, UNCOVER_FIX)
 
 
 def _where_it_fits(cause: Cause, shape: Shape, shot: AnyShot, plan: Plan) -> Cause:

@@ -5,13 +5,16 @@ from __future__ import annotations
 import warnings
 from dataclasses import replace
 
+import numpy as np
+
 from quadfringe.config import ResponseChoice
 from quadfringe.data import AnyShot, Shape
+from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, check_shot, size_of
 from quadfringe.decoding.black import below_black, too_black, too_dark
 from quadfringe.decoding.cause import Cause
 from quadfringe.decoding.causes import too_bright, wrong_bits
-from quadfringe.decoding.channel_offsets import contradiction
+from quadfringe.decoding.channel_offsets import contradiction, taken_out
 from quadfringe.decoding.light_border import borders_of, checked_rows
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
@@ -133,7 +136,9 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
     light = [*filter(None, (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot)))]
-    if kernel is not None and (cause := contradiction(shape, shot, plan)):
+    # What the verdict has taken out is named.
+    looked = None if rest else kernel
+    if kernel is not None and (cause := contradiction(shape, shot, plan) or _taken_out(shape, shot, looked)):
         # Light that is cut off at either end is named first, because it moves the phases of the channels too.
         if light:
             light.append(replace(cause, fatal=False))
@@ -150,6 +155,14 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     for text in told:
         warnings.warn(text, DecodeWarning, stacklevel=4)
     return replace(shape, config={**shape.config, "warnings": told})
+
+
+def _taken_out(shape: Shape, shot: AnyShot, kernel: KernelDecoder | None) -> Cause | None:
+    """Name what the channels contradict in what the kernel took out, if that is much."""
+    lit, out = np.isfinite(shape.quality).sum(), (shape.quality == 0).sum()
+    if kernel is None or out <= params.TAKEN_OUT_SHARE * lit or kernel.settings["method"] == "published":
+        return None
+    return taken_out(shape, shot, kernel.plan, kernel.keeping_doubtful().shape(shot))
 
 
 def decode(shot: AnyShot, plan: Plan) -> Shape:

@@ -24,6 +24,7 @@ from quadfringe.decoding.causes import (
     vanishing,
     wrong_bits,
 )
+from quadfringe.decoding.channel_offsets import drifting
 from quadfringe.decoding.given import blind_channels, same_images
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.plausibility import mirrored
@@ -44,8 +45,7 @@ IN_PART = (ORDERS, "infrared registration", "infrared projector", "saturation", 
 # Share of the returned pixels from which a trusted part is the object, and the rest are pixels lit by chance around it,
 # which is not told. The wall around an object of 2 % of the frame has a tenth of them (`pytest tests/test_trusted.py`).
 KEPT_MIN = 0.7
-STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
-MARGIN_ROWS = 48  # least number of rows and columns that the median margin is taken from
+STRIDE, MARGIN_ROWS = 4, 48  # pixels between samples of the light; least rows and columns of samples of the margin
 RETURNED_MIN = 0.05  # least share of the lit pixels that must be returned
 # Median order margin of the lit pixels. Sound shots have more than 0.75, by the published method more than 0.4 when the
 # response is not corrected. Exchanged channels have at most 0.44 (joint) and 0.49 (published), other fringe numbers 0.5
@@ -99,8 +99,9 @@ def judge(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) -> Cause |
         part = None if decoder is None or refused.reason not in IN_PART else trusted_part(shape, shot, decoder.plan)
         if part is None:
             raise
-        rest, few = shape.returned & ~part, np.count_nonzero(part) < KEPT_MIN * np.count_nonzero(shape.returned)
-        take_out(shape, rest)
+        # Orders of quality 0, which the decoder has taken out, belong to the shot as a whole too.
+        few = np.count_nonzero(part) < KEPT_MIN * np.count_nonzero(shape.returned | (shape.quality == 0))
+        take_out(shape, shape.returned & ~part)
         words = f"only {part.mean():.0%} of the image can be trusted, and the rest is no data; of the shot as a whole"
         return Cause.doubt(refused, words) if few else None
     return None
@@ -130,7 +131,8 @@ def _refuse_whole(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) ->
     if decoder is not None and not channels_fit(closure):
         _refuse_exchanged(shape, shot, max(collapsed, CLEARLY_BETTER * margin), decoder)
     if collapse:
-        cause = None if decoder is None else after_order(shot, shape, decoder.plan, closure) or mirrored(shape)
+        cause = decoder and (after_order(shot, shape, decoder.plan, closure) or mirrored(shape))
+        cause = cause or (decoder and drifting(shape, shot, decoder))
         raise (cause or (_collapsed(margin, _lit_share(shape)) if enough else _too_few(_lit_share(shape)))).error
 
 

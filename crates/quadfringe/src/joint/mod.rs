@@ -10,7 +10,7 @@
 //!    saturated light from the model, then steps 2 to 6 again                   saturation
 //!    minimum of the energy (J16); shadows of a pair of projectors (J33)         energy; infrared, shadows
 //! 7  motion between the channels (optional)                                    motion
-//! 8  validity: doubtful pixels become no data                                  validity
+//! 8  orders of regions (J38); validity: doubtful pixels become no data            regions, validity
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty; energy::variance
 //! 10 heights                                                             (S7)  decode::output, height
 //! 11 doubtful orders become as certain as their surface                        propagation
@@ -24,6 +24,7 @@ mod absolute;
 mod albedo;
 mod cells;
 mod coarse;
+mod connected;
 mod disjoint;
 mod energy;
 mod illumination;
@@ -43,6 +44,7 @@ mod photometry;
 mod propagation;
 mod pyramid;
 mod reasons;
+mod regions;
 mod residuals;
 mod results;
 mod saturation;
@@ -73,6 +75,7 @@ use noise::least_modulation;
 use params::pyramid::{CELLS_PER_PERIOD, FACTOR_MAX};
 use propagation::Propagation;
 use pyramid::{Pyramid, Upsampler};
+use regions::RegionOrders;
 use results::Results;
 use saturation::Saturation;
 use scene::{Frame, PhaseMap, Pixels};
@@ -91,6 +94,7 @@ pub(crate) struct Joint {
     albedo: Albedo,
     pyramid: Pyramid,
     coarse: CoarseLevel,
+    regions: RegionOrders,
     saturation: Saturation,
     upsampler: Upsampler,
     pixels: Pixels,
@@ -114,6 +118,7 @@ impl Joint {
             albedo: Albedo::default(),
             pyramid: Pyramid::new(stride * shape[0]),
             coarse: CoarseLevel::new(code),
+            regions: RegionOrders::new(code),
             saturation: Saturation::default(),
             upsampler: Upsampler::default(),
             pixels: Pixels::default(),
@@ -182,7 +187,11 @@ impl Joint {
     /// Step 6: the minimum of the energy, with this `detail`.
     fn minimise(&mut self, frame: &Frame<'_>, detail: f32) {
         let prior = Prior { ratios: self.ratios, noise: self.coarse.noise, detail };
-        self.energy.minimise(&self.pyramid.full.scene(frame.full), prior, &mut self.pixels);
+        let scene = self.pyramid.full.scene(frame.full);
+        self.energy.minimise(&scene, prior, &mut self.pixels);
+        let Pixels { phase, modulation, .. } = &mut self.pixels;
+        // 8. Orders of regions, by the phase of the energy.
+        self.regions.settle(&scene, prior.noise, modulation, phase);
     }
 
     /// Step 8: the mask of valid pixels, and the quality of the order of every lit pixel.
@@ -202,8 +211,8 @@ impl Joint {
         let map = PhaseMap { phase, modulation };
         let quality = out.quality.as_slice_mut().expect("checked layout");
         let limits = validity::Limits { noise: self.coarse.noise, quality_min };
-        let (orders, ratios) = (&self.coarse.orders, self.ratios);
-        let evidence = validity::Evidence { map, pixel, orders, ratios, limits };
+        let (orders, regions, ratios) = (&self.coarse.orders, &self.regions, self.ratios);
+        let evidence = validity::Evidence { map, pixel, orders, regions, ratios, limits };
         self.validity.run(&scene, evidence, quality, reasons);
         self.saturation.invalidate(ratios, &mut self.validity.valid);
         if let Some(instants) = instants {
@@ -222,10 +231,18 @@ impl Joint {
 
     /// Steps 9 and 10, row by row: the maps of the result.
     fn write(&self, frame: &Frame<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let Self { pixels, validity, saturation, energy, wrong_order, coarse, .. } = self;
+        let Self { pixels, validity, saturation, energy, wrong_order, coarse, regions, .. } = self;
         let lit_mask = &coarse.lit_mask;
-        let found =
-            Results { pixels, validity, lit_mask, saturation, energy, ratios: self.ratios, wrong_order };
+        let found = Results {
+            pixels,
+            validity,
+            lit_mask,
+            saturation,
+            energy,
+            regions,
+            ratios: self.ratios,
+            wrong_order,
+        };
         found.write(&self.pyramid.full.scene(frame.full), noise, finish, out);
     }
 

@@ -4,6 +4,7 @@ use super::cells::RowMaps;
 use super::energy::{self, Energy};
 use super::illumination::LitMask;
 use super::reasons::Reasons;
+use super::regions::RegionOrders;
 use super::saturation::Saturation;
 use super::scene::{Pixels, Scene};
 use super::uncertainty::PhaseNoise;
@@ -19,6 +20,7 @@ pub(super) struct Results<'a> {
     pub lit_mask: &'a LitMask,
     pub saturation: &'a Saturation,
     pub energy: &'a Energy,
+    pub regions: &'a RegionOrders,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 4],
     /// Wrong-order probability of every node.
@@ -28,7 +30,7 @@ pub(super) struct Results<'a> {
 impl Results<'_> {
     /// Writes the maps.
     pub fn write(self, scene: &Scene<'_>, noise: &PhaseNoise, finish: &Finish<'_>, out: &mut Decoded) {
-        let Self { pixels, validity, lit_mask, saturation, energy, ratios, wrong_order } = self;
+        let Self { pixels, validity, lit_mask, saturation, energy, regions, ratios, wrong_order } = self;
         let (grid, reasons) = (scene.grid, Reasons { pixels, validity, lit_mask });
         out.rows().enumerate().for_each_init(
             Default::default,
@@ -41,6 +43,9 @@ impl Results<'_> {
                 saturation.widen(scene, y, ratios, row.sigma);
                 let nodes = &wrong_order[y / grid.step * grid.columns..];
                 row.wrong.chunks_mut(grid.step).zip(nodes).for_each(|(wrong, node)| wrong.fill(*node));
+                regions.parts(y, |pixels, found| {
+                    row.wrong[pixels].iter_mut().for_each(|wrong| *wrong = found.wrong_order(*wrong));
+                });
                 finish.row(y, &mut row);
             },
         );

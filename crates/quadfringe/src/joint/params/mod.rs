@@ -21,6 +21,7 @@ pub mod orders;
 pub mod phase;
 pub mod photometry;
 pub mod pyramid;
+pub mod regions;
 pub mod saturation;
 pub mod shadows;
 pub mod slopes;

@@ -13,6 +13,7 @@ use super::params::validity::{
     COMPONENT_SIDE, GROWN_MISFIT_MAX, MISFIT_MAX, NEIGHBOURS_MIN, PIXEL_MISFIT_MAX,
     PIXEL_RESIDUAL_NOISES_MAX, RESIDUAL_NOISES_MAX, SEED_SIDE,
 };
+use super::regions::RegionOrders;
 use super::scene::{PhaseMap, Scene};
 use crate::Reason;
 use crate::decode::output::hole_unless;
@@ -40,6 +41,7 @@ pub(super) struct Evidence<'a> {
     pub map: PhaseMap<'a>,
     pub pixel: PixelFit<'a>,
     pub orders: &'a Orders,
+    pub regions: &'a RegionOrders,
     /// Fringe numbers divided by the first.
     pub ratios: [f32; 4],
     pub limits: Limits,
@@ -77,7 +79,7 @@ struct Rows {
     maps: RowMaps,
     spare: Vec<f32>,
     sums: Vec<f32>,
-    lead: Vec<f32>,
+    order_quality: Vec<f32>,
     noise: Vec<f32>,
 }
 
@@ -115,7 +117,7 @@ impl Validity {
         quality: &mut [f32],
         reasons: &mut [Reason],
     ) {
-        let Evidence { map, pixel, orders, limits, .. } = evidence;
+        let Evidence { map, pixel, limits, .. } = evidence;
         let grid = scene.grid;
         self.consistent.resize(grid.pixels(), 0);
         let Self { components, consistent, noise, support, slots, .. } = self;
@@ -127,26 +129,42 @@ impl Validity {
         rows.for_each_init(
             || slots.take(),
             |slot, (y, (quality, ((passed, consistent), reasons)))| {
-                let Rows { maps, spare, sums, lead, noise: variance } = &mut slot.rows;
+                let Rows { maps, spare, sums, order_quality, noise: variance } = &mut slot.rows;
                 noise.row(scene.rows(y), variance);
-                lead.clear();
-                for node in orders.verdicts(scene, y / grid.step) {
-                    lead.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
-                }
+                let support = &support.row(grid, y, maps)[..grid.width];
+                quality_of_orders(scene, evidence, y, support, order_quality);
                 let near = around(y, grid.height);
                 let known = CheckRow {
                     squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
                     modulation: &scene.row(map.modulation, y)[..grid.width],
                     pixel_modulation: &pixel.modulation[y * grid.width..][..grid.width],
                     noise: &variance[..grid.width],
-                    lead: &lead[..grid.width],
-                    support: &support.row(grid, y, maps)[..grid.width],
+                    order_quality: &order_quality[..grid.width],
                 };
                 let out = VerdictRow { quality, passed, consistent, reasons };
                 check_row(&known, limits, [spare, sums], out);
             },
         );
     }
+}
+
+/// Writes the quality of the orders of row `y`: by its nodes, whose leads count as much as their `support`, and by its regions.
+fn quality_of_orders(
+    scene: &Scene<'_>,
+    evidence: Evidence<'_>,
+    y: usize,
+    support: &[f32],
+    out: &mut Vec<f32>,
+) {
+    let grid = scene.grid;
+    out.clear();
+    for node in evidence.orders.verdicts(scene, y / grid.step) {
+        out.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
+    }
+    out.iter_mut().zip(support).for_each(|(quality, support)| *quality *= support);
+    evidence.regions.parts(y, |pixels, found| {
+        out[pixels].iter_mut().for_each(|quality| *quality = found.quality(*quality));
+    });
 }
 
 /// Input of the check of one row.
@@ -159,8 +177,7 @@ struct CheckRow<'a> {
     pixel_modulation: &'a [f32],
     /// Variance of the noise relative to that of the shot.
     noise: &'a [f32],
-    lead: &'a [f32],
-    support: &'a [f32],
+    order_quality: &'a [f32],
 }
 
 /// Verdicts on the pixels of a row.
@@ -183,7 +200,7 @@ fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2]
     let (here, near) = (&known.squared_residual[1][..width], &sums[..width]);
     let (modulation, pixel_modulation) = (&known.modulation[..width], &known.pixel_modulation[..width]);
     let noise = &known.noise[..width];
-    let (lead, support) = (&known.lead[..width], &known.support[..width]);
+    let order_quality = &known.order_quality[..width];
     let (quality, passed, consistent) =
         (&mut out.quality[..width], &mut out.passed[..width], &mut out.consistent[..width]);
     let reasons = &mut out.reasons[..width];
@@ -191,14 +208,13 @@ fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2]
         .map(|most| (most * limits.noise) * (most * limits.noise));
     for x in 0..width {
         let lit = modulation[x] > 0.0;
-        let order_quality = lead[x] * support[x];
         let share = MISFIT_MAX * modulation[x];
         let [pixel_share, grown_share] =
             [PIXEL_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * pixel_modulation[x]);
         let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
             && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
-        quality[x] = order_quality + hole_unless(lit);
-        let certain = lit & (order_quality >= limits.quality_min);
+        quality[x] = order_quality[x] + hole_unless(lit);
+        let certain = lit & (order_quality[x] >= limits.quality_min);
         let apart = passed[x] != 0;
         passed[x] = u8::from(certain & agrees & !apart);
         let doubt = if certain { Reason::SmallPiece } else { Reason::DoubtfulOrder };
@@ -234,8 +250,7 @@ mod tests {
             modulation: &[0.4; 16],
             pixel_modulation: &pixel_modulation,
             noise: &[1.0; 16],
-            lead: &[1.0; 16],
-            support: &[1.0; 16],
+            order_quality: &[1.0; 16],
         };
         let out = VerdictRow {
             quality: &mut quality,
