@@ -73,16 +73,18 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// Quality of an order to which the nodes give `by_nodes`.
-    pub fn quality(&self, by_nodes: f32) -> f32 {
-        let by_region = QUALITY * (self.evidence() / CERTAIN_EVIDENCE).clamp(0.0, 1.0);
+    /// Quality of an order to which the nodes give `by_nodes`, with this `support` by the neighbourhood: where that is lower than what
+    /// the region gives, another surface is near.
+    pub fn quality(&self, by_nodes: f32, support: f32) -> f32 {
+        let by_region = support.min(QUALITY * (self.evidence() / CERTAIN_EVIDENCE).clamp(0.0, 1.0));
         if self.is_of_nodes() { by_nodes.max(by_region) } else { by_region }
     }
 
-    /// Probability that the order is wrong, where that of the nodes is wrong with probability `of_nodes`.
+    /// Probability that the order is wrong; that of the nodes is wrong with probability `of_nodes`. A region says nothing of pixels at
+    /// its border, so that it makes no pixel more certain than its nodes do.
     pub fn wrong_order(&self, of_nodes: f32) -> f32 {
         let by_region = (1.0 / (1.0 + self.evidence().exp())).max(SETTLED_PROBABILITY_MIN);
-        if self.is_of_nodes() { of_nodes.min(by_region) } else { by_region }
+        if self.is_of_nodes() { of_nodes } else { of_nodes.max(by_region) }
     }
 
     /// Evidence for its order.

@@ -163,7 +163,8 @@ fn quality_of_orders(
     }
     out.iter_mut().zip(support).for_each(|(quality, support)| *quality *= support);
     evidence.regions.parts(y, |pixels, found| {
-        out[pixels].iter_mut().for_each(|quality| *quality = found.quality(*quality));
+        let nodes = out[pixels.clone()].iter_mut().zip(&support[pixels]);
+        nodes.for_each(|(quality, support)| *quality = found.quality(*quality, *support));
     });
 }
 
