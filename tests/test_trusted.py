@@ -123,7 +123,7 @@ def test_the_sound_part_of_a_shot_is_returned(
     [
         (6, False, "of the image that fit are returned"),
         (8, True, "of the image that fit are returned"),
-        (12, False, "of the image can be trusted"),  # the margin of the whole collapses
+        (12, False, "of the image that fit are returned"),
         (12, True, "of the image that fit are returned"),
         (24, True, "of the image that fit are returned"),
     ],
