@@ -74,6 +74,7 @@ impl Tile {
             }
             solve(self, INNER_STEPS);
             let moved = self.advance();
+            debug_assert!(moved.is_finite(), "a step of a tile is not finite");
             if outer > 1 && moved < RESTING_RAD {
                 break;
             }

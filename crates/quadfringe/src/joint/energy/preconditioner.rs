@@ -3,9 +3,13 @@
 use super::blocks::{Block, bend_diagonal, block, difference_diagonal};
 use super::plane::{Column, Derivatives, Fields, Plane, STRIDE, Weights, place, total};
 use crate::joint::model::count;
-use crate::joint::params::energy::{CONTRAST_RIDGE, RIDGE, SIDE};
+use crate::joint::params::energy::{CONTRAST_RIDGE, PIVOT_RIDGE, RIDGE, SIDE};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
+
+/// Factor of the diagonals. Where only the ridges determine cells, as in a column of cells without data, rounding makes pivots 0 or
+/// negative, and the tile would have no phase. What this adds is larger than any rounding.
+const STABLE: f32 = 1.0 + PIVOT_RIDGE;
 
 /// The factors of the matrix, column by column. Columns follow the fringes. Without them, streaks of phase and colour along a
 /// fringe converge slowly. Within a cell, the albedos answer to phase and contrast, and the contrast to the phase.
@@ -91,7 +95,7 @@ impl Preconditioner {
             let before = self.albedo[c].get(at - STRIDE);
             let mut inverse = [0.0; LANES];
             for x in 0..LANES {
-                inverse[x] = 1.0 / (1.0 / local[c][x] - above[x] * above[x] * before[x]);
+                inverse[x] = 1.0 / (STABLE / local[c][x] - above[x] * above[x] * before[x]);
             }
             self.albedo[c].set(at, inverse);
         }
@@ -108,7 +112,7 @@ impl Preconditioner {
             follow[x] = local.mixed[x] / diagonal;
             coupled[x] = follow[x] * local.mixed[x];
             first[x] = -above[x] * before[x];
-            inverse[x] = 1.0 / (diagonal + first[x] * above[x]);
+            inverse[x] = 1.0 / (STABLE * diagonal + first[x] * above[x]);
         }
         self.contrast_by_phase.set(at, follow);
         self.contrast_first.set(at, first);
@@ -128,8 +132,8 @@ impl Preconditioner {
             second[x] = last[x] * above.inverse[0][x];
             let next = -2.0 * (here[x] + last[x]) - corner[x] - corner_left[x] - last[x] * above.first[x];
             first[x] = next * above.inverse[1][x];
-            let pivot = known[x] - coupled[x] + diagonal[x] + RIDGE - last[x] * second[x] - next * first[x];
-            inverse[x] = 1.0 / if pivot > RIDGE { pivot } else { RIDGE };
+            let own = STABLE * (known[x] + diagonal[x] + RIDGE) - coupled[x];
+            inverse[x] = 1.0 / (own - last[x] * second[x] - next * first[x]);
         }
         self.phase_second.set(at, second);
         self.phase_first.set(at, first);

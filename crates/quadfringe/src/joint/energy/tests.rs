@@ -267,3 +267,20 @@ fn an_absent_channel_takes_no_part() {
     assert!(found.albedo[3].row(20).iter().all(|&albedo| albedo == 0.0));
     assert!((found.albedo[0].row(20)[12] - 0.5).abs() < 0.01, "{}", found.albedo[0].row(20)[12]);
 }
+
+/// Only the ridge determines a column of cells without light that touches no other cell, and rounding takes the ridge away.
+#[test]
+fn a_lone_column_of_cells_without_light_keeps_the_preconditioner_positive() {
+    let (mut tile, _) = tile(0.0);
+    tile.usable.clear();
+    tile.inside.clear();
+    (5..75).for_each(|y| tile.inside.row_mut(y)[40] = 1.0);
+    for n in 1..200 {
+        tile.scales.noise = 1e-4 * n as f32;
+        weigh(&mut tile);
+        tile.residual.planes_mut().into_iter().for_each(|plane| plane.row_mut(40).fill(1.0));
+        prepare(&mut tile.preconditioner, &tile.derivatives, &tile.weights, RATIOS);
+        let size = precondition(&tile.preconditioner, &tile.residual, &mut tile.preconditioned);
+        assert!(size.is_finite() && size > 0.0, "{n}: {size}");
+    }
+}

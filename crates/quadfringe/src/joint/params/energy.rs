@@ -121,6 +121,9 @@ pub const RIDGE: f32 = 1e-6;
 /// Ridge of the contrast, which a cell at the zero of all fringes does not determine.
 /// Not measured: any small number will do.
 pub const CONTRAST_RIDGE: f32 = 1e-4;
+/// Ridge of the preconditioner, as a share of each diagonal. Larger: smooth changes of the surface converge slowly. Smaller: rounding
+/// makes pivots negative where nothing else determines a cell (with 0 `cargo test --package quadfringe --lib lone_column` fails).
+pub const PIVOT_RIDGE: f32 = 1e-6;
 
 /// Greatest correction of the phase of a valid pixel, in rad. Larger: pixels in a wrong minimum stay (with 0.5 rad the painted face
 /// has an RMS of 0.14 instead of 0.12 mm, and rods have 0.15 instead of 0.14 mm). Smaller: right pixels are lost (with 0.3 rad 0.3 %
