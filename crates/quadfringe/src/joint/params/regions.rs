@@ -29,7 +29,7 @@ pub const OWN_LEAD_MIN: f32 = -1.0;
 /// Greatest evidence, as [`LEAD_MIN`], for shifts of G and IR that no order explains. Larger: broken parts of a shot are returned.
 /// Smaller: painted surfaces become no data. Sound scenes of `python evaluation/world.py --half tune` have at most 31, the captures 6;
 /// parts with shifted IR and exchanged channels have 100 to 500 (`pytest tests/test_trusted.py -k half_of`).
-pub const CONTRADICTION_MAX: f32 = 100.0;
+pub const CONTRADICTION_MAX: f32 = 50.0;
 
 /// Shift of G in rad that contradicts no order. Larger: parts with shifted IR are returned. Smaller: crosstalk of 0.15 between R and G,
 /// which turns G by as much, becomes no data (`pytest tests/test_channel_offsets.py -k crosstalk`).

@@ -48,3 +48,13 @@ pub const AMBIGUOUS_REACH: usize = 2;
 /// Where a component grew further than exclusion reaches, no pixel of another surface may be valid within this number of
 /// pixels. Follows from the reach of exclusion: one pixel more.
 pub const FACING_REACH: usize = AMBIGUOUS_REACH + 1;
+
+/// Steps lower than this number of turns leave strips with the order of the wrong side. Larger: regions give no order next to higher
+/// steps, where it would be right. Smaller: strips of a wrong order are returned (`python evaluation/world.py --half tune --only rods
+/// clutter steps`: with 1.25 half a dozen pixels more).
+pub const CLOSE_TURNS_MAX: f32 = 1.5;
+
+/// Cells from such a step within which a region gives no order: the reach of windows across a step, as
+/// [`PROPAGATION_CELLS`](super::uncertainty::PROPAGATION_CELLS). Larger: narrow objects with steps are lost. Smaller: strips of a wrong
+/// order are returned (`python evaluation/world.py --half tune --only rods clutter`).
+pub const CLOSE_CELLS: usize = 3;

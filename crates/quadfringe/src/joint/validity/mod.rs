@@ -1,5 +1,6 @@
 //! Step 8: validity. A hole is better than a wrong point: pixels become no data unless light, model and neighbourhood agree.
 
+mod close_steps;
 mod components;
 mod discontinuities;
 mod regrow;
@@ -18,6 +19,7 @@ use super::scene::{PhaseMap, Scene};
 use crate::Reason;
 use crate::decode::output::hole_unless;
 use crate::parallel::slots::Slots;
+use close_steps::CloseSteps;
 use components::{Components, SizeLimits};
 use discontinuities::{Discontinuities, remove_narrow};
 use multiversion::multiversion;
@@ -62,6 +64,7 @@ pub(super) struct Validity {
     /// 1 for valid pixels, 0 elsewhere.
     pub valid: Vec<u8>,
     discontinuities: Discontinuities,
+    close_steps: CloseSteps,
     /// First not 0 at or next to an order jump, then 1 for pixels that pass the limits; then 1 for pixels of components that may grow, [`GROWN`] for those added.
     pub components: Vec<u8>,
     /// 1 for pixels whose intensities agree with their order.
@@ -95,6 +98,7 @@ impl Validity {
     ) {
         let (grid, map) = (scene.grid, evidence.map);
         self.discontinuities.mark(grid, map, &mut self.components);
+        self.close_steps.mark(grid, map);
         self.support.measure(scene, evidence.orders);
         self.check_pixels(scene, evidence, quality, reasons);
         remove_narrow(grid, NEIGHBOURS_MIN, &self.components, &mut self.valid);
@@ -120,7 +124,8 @@ impl Validity {
         let Evidence { map, pixel, limits, .. } = evidence;
         let grid = scene.grid;
         self.consistent.resize(grid.pixels(), 0);
-        let Self { components, consistent, noise, support, slots, .. } = self;
+        let Self { components, consistent, close_steps, noise, support, slots, .. } = self;
+        let close_steps = &*close_steps;
         noise.measure(scene.light, grid, evidence.ratios);
         let noise = &*noise;
         let masks = components.par_chunks_mut(grid.stride).zip(consistent.par_chunks_mut(grid.stride));
@@ -132,7 +137,8 @@ impl Validity {
                 let Rows { maps, spare, sums, order_quality, noise: variance } = &mut slot.rows;
                 noise.row(scene.rows(y), variance);
                 let support = &support.row(grid, y, maps)[..grid.width];
-                quality_of_orders(scene, evidence, y, support, order_quality);
+                let close = close_steps.row(grid, y);
+                quality_of_orders(scene, evidence, y, Surroundings { support, close }, order_quality);
                 let near = around(y, grid.height);
                 let known = CheckRow {
                     squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
@@ -148,12 +154,21 @@ impl Validity {
     }
 }
 
-/// Writes the quality of the orders of row `y`: by its nodes, whose leads count as much as their `support`, and by its regions.
+/// What surrounds the pixels of a row.
+#[derive(Clone, Copy)]
+struct Surroundings<'a> {
+    /// Support of the orders by the neighbourhood.
+    support: &'a [f32],
+    /// Not 0 for cells close to a step of about one turn.
+    close: &'a [u8],
+}
+
+/// Writes the quality of the orders of row `y`: by its nodes, whose leads count as much as their support, and by its regions.
 fn quality_of_orders(
     scene: &Scene<'_>,
     evidence: Evidence<'_>,
     y: usize,
-    support: &[f32],
+    Surroundings { support, close }: Surroundings<'_>,
     out: &mut Vec<f32>,
 ) {
     let grid = scene.grid;
@@ -162,9 +177,12 @@ fn quality_of_orders(
         out.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
     }
     out.iter_mut().zip(support).for_each(|(quality, support)| *quality *= support);
+    let cell = |x: usize| x >> grid.step.trailing_zeros();
     evidence.regions.parts(y, |pixels, found| {
-        let nodes = out[pixels.clone()].iter_mut().zip(&support[pixels]);
-        nodes.for_each(|(quality, support)| *quality = found.quality(*quality, *support));
+        for x in pixels {
+            let support = if close[cell(x)] == 0 { support[x] } else { 0.0 };
+            out[x] = found.quality(out[x], support);
+        }
     });
 }
 
