@@ -239,17 +239,10 @@ def test_exchanged_channels_are_refused(surface: str, names: str, fringes: qf.Fr
         qf.decode(qf.Shot(*(channels[name] for name in names.split())), qf.Plan(COLUMNS, fringes, response="linear"))
 
 
-@pytest.mark.parametrize(
-    ("numbers", "words"),
-    [
-        ((49, 48, 42), "are not those of this shot: .* which fits 36, 35, 30"),
-        ((25, 24, 20), "are not those of this shot: .* which fits 36, 35, 30"),
-        ((37, 36, 31), "order margin has collapsed"),
-    ],
-)
-def test_other_numbers_of_three_are_refused(numbers: tuple[float, ...], words: str) -> None:
+@pytest.mark.parametrize("numbers", [(49, 48, 42), (25, 24, 20), (37, 36, 31)])
+def test_other_numbers_of_three_are_refused(numbers: tuple[float, ...]) -> None:
     other = qf.Fringes(encoding="rgb", numbers=numbers)
-    with pytest.raises(qf.DecodeError, match=words):
+    with pytest.raises(qf.DecodeError, match=r"are not those of this shot: .* which fits 36, 35, 30"):
         qf.decode(taken(fringes=THREE), qf.Plan(COLUMNS, other, response="linear"))
 
 
