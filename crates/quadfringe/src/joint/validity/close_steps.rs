@@ -92,7 +92,7 @@ fn compare(here: Row, there: Row, at_step: &mut [u8]) {
     for x in 0..n {
         let gap = (phase[x] - other[x]).abs();
         let both = (lit[x] > 0.0) & (other_lit[x] > 0.0);
-        at_step[x] |= u8::from(both & (gap >= PI) & (gap < CLOSE_TURNS_MAX * TAU));
+        at_step[x] |= u8::from(both & (PI..CLOSE_TURNS_MAX * TAU).contains(&gap));
     }
 }
 
