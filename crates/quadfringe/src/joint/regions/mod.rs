@@ -73,11 +73,14 @@ pub(super) struct Verdict {
 }
 
 impl Verdict {
-    /// Quality of an order to which the nodes give `by_nodes`, with this `support` by the neighbourhood: where that is lower than what
-    /// the region gives, another surface is near.
-    pub fn quality(&self, by_nodes: f32, support: f32) -> f32 {
-        let by_region = support.min(QUALITY * (self.evidence() / CERTAIN_EVIDENCE).clamp(0.0, 1.0));
-        if self.is_of_nodes() { by_nodes.max(by_region) } else { by_region }
+    /// Raises the quality of orders, which the nodes have given, to what the region gives with this `support` by the neighbourhood:
+    /// where that is lower, another surface is near. An order that is not that of the nodes has the quality of the region.
+    pub fn raise(&self, support: &[f32], quality: &mut [f32]) {
+        let most = QUALITY * (self.evidence() / CERTAIN_EVIDENCE).clamp(0.0, 1.0);
+        let of_nodes = if self.is_of_nodes() { 1.0 } else { 0.0 };
+        for (quality, support) in quality.iter_mut().zip(support) {
+            *quality = (of_nodes * *quality).max(support.min(most));
+        }
     }
 
     /// Probability that the order is wrong; that of the nodes is wrong with probability `of_nodes`. A region says nothing of pixels at

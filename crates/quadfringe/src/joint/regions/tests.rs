@@ -45,7 +45,7 @@ impl Case {
         let (mut orders, mut phase) = (RegionOrders::new(&code), self.phase.clone());
         orders.settle(&scene, 0.01, &usable, &mut phase);
         let mut certainty = vec![0.0; self.grid.width];
-        orders.parts(50, |pixels, found| certainty[pixels].fill(found.quality(0.0, 1.0)));
+        orders.parts(50, |pixels, found| found.raise(&vec![1.0; pixels.len()], &mut certainty[pixels]));
         let row = 50 * self.grid.stride;
         let gained = [80, 20].map(|x| ((phase[row + x] - self.phase[row + x]) / TAU).round());
         (gained, [80, 20].map(|x| certainty[x]))

@@ -11,6 +11,9 @@ use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
 
+/// Number of rows from one that is compared to the next. No step along a row fits between them.
+const ROW_STEP: usize = 2;
+
 /// The cells close to a step of about one turn.
 #[derive(Debug, Default)]
 pub(super) struct CloseSteps {
@@ -34,7 +37,7 @@ impl CloseSteps {
         close.resize(grid.rows * grid.columns, 0);
         crossed.par_chunks_mut(grid.columns).enumerate().for_each_init(Vec::new, |at_step, (row, cells)| {
             cells.fill(0);
-            for y in row * grid.step..((row + 1) * grid.step).min(grid.height) {
+            for y in (row * grid.step..((row + 1) * grid.step).min(grid.height)).step_by(ROW_STEP) {
                 mark_row(grid, map, y, at_step);
                 for (cell, pixels) in cells.iter_mut().zip(at_step.chunks(grid.step)) {
                     *cell |= pixels.iter().fold(0, |any, pixel| any | pixel);
@@ -68,7 +71,7 @@ fn add(marks: &[u8], out: &mut [u8]) {
     out.iter_mut().zip(marks).for_each(|(out, mark)| *out |= *mark);
 }
 
-/// Marks with 1 the pixels of row `y` that a step parts from the next one of the row or of the column.
+/// Marks with 1 the pixels of row `y` that a step parts from the next one of the row, or from that in the next row to be compared.
 fn mark_row(grid: &Grid, map: PhaseMap<'_>, y: usize, at_step: &mut Vec<u8>) {
     let row = |y: usize| Row {
         phase: &map.phase[y * grid.stride..][..grid.width],
@@ -79,8 +82,8 @@ fn mark_row(grid: &Grid, map: PhaseMap<'_>, y: usize, at_step: &mut Vec<u8>) {
     at_step.resize(grid.width, 0);
     let next = Row { phase: &here.phase[1..], modulation: &here.modulation[1..] };
     compare(here, next, &mut at_step[..n]);
-    if y + 1 < grid.height {
-        compare(here, row(y + 1), at_step);
+    if y + ROW_STEP < grid.height {
+        compare(here, row(y + ROW_STEP), at_step);
     }
 }
 

@@ -138,7 +138,13 @@ impl Validity {
                 noise.row(scene.rows(y), variance);
                 let support = &support.row(grid, y, maps)[..grid.width];
                 let close = close_steps.row(grid, y);
-                quality_of_orders(scene, evidence, y, Surroundings { support, close }, order_quality);
+                quality_of_orders(
+                    scene,
+                    evidence,
+                    y,
+                    Surroundings { support, close, of_region: spare },
+                    order_quality,
+                );
                 let near = around(y, grid.height);
                 let known = CheckRow {
                     squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
@@ -155,12 +161,13 @@ impl Validity {
 }
 
 /// What surrounds the pixels of a row.
-#[derive(Clone, Copy)]
 struct Surroundings<'a> {
     /// Support of the orders by the neighbourhood.
     support: &'a [f32],
     /// Not 0 for cells close to a step of about one turn.
     close: &'a [u8],
+    /// Working row: the support that counts for an order by a region.
+    of_region: &'a mut Vec<f32>,
 }
 
 /// Writes the quality of the orders of row `y`: by its nodes, whose leads count as much as their support, and by its regions.
@@ -168,21 +175,21 @@ fn quality_of_orders(
     scene: &Scene<'_>,
     evidence: Evidence<'_>,
     y: usize,
-    Surroundings { support, close }: Surroundings<'_>,
+    Surroundings { support, close, of_region }: Surroundings<'_>,
     out: &mut Vec<f32>,
 ) {
-    let grid = scene.grid;
+    let step = scene.grid.step;
     out.clear();
-    for node in evidence.orders.verdicts(scene, y / grid.step) {
-        out.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, grid.step));
+    for node in evidence.orders.verdicts(scene, y / step) {
+        out.extend(std::iter::repeat_n(if node.lit { node.lead } else { 0.0 }, step));
     }
     out.iter_mut().zip(support).for_each(|(quality, support)| *quality *= support);
-    let cell = |x: usize| x >> grid.step.trailing_zeros();
+    of_region.clear();
+    of_region.extend_from_slice(support);
+    let cells = of_region.chunks_mut(step).zip(close).filter(|(_, close)| **close != 0);
+    cells.for_each(|(support, _)| support.fill(0.0));
     evidence.regions.parts(y, |pixels, found| {
-        for x in pixels {
-            let support = if close[cell(x)] == 0 { support[x] } else { 0.0 };
-            out[x] = found.quality(out[x], support);
-        }
+        found.raise(&of_region[pixels.clone()], &mut out[pixels]);
     });
 }
 
