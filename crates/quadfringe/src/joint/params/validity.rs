@@ -58,3 +58,7 @@ pub const CLOSE_TURNS_MAX: f32 = 1.5;
 /// [`PROPAGATION_CELLS`](super::uncertainty::PROPAGATION_CELLS). Larger: narrow objects with steps are lost. Smaller: strips of a wrong
 /// order are returned (`python evaluation/world.py --half tune --only rods clutter`).
 pub const CLOSE_CELLS: usize = 3;
+
+/// Number of rows from one that is compared for such steps to the next. Larger: steps of short edges are missed. Smaller: time. Not
+/// measured: no step along a row fits between two of them.
+pub const CLOSE_ROW_STEP: usize = 2;

@@ -5,14 +5,11 @@
 //! radian and IR by one. A region therefore says nothing of the orders there.
 
 use crate::joint::cells::Grid;
-use crate::joint::params::validity::{CLOSE_CELLS, CLOSE_TURNS_MAX};
+use crate::joint::params::validity::{CLOSE_CELLS, CLOSE_ROW_STEP, CLOSE_TURNS_MAX};
 use crate::joint::scene::PhaseMap;
 use multiversion::multiversion;
 use rayon::prelude::*;
 use std::f32::consts::{PI, TAU};
-
-/// Number of rows from one that is compared to the next. No step along a row fits between them.
-const ROW_STEP: usize = 2;
 
 /// The cells close to a step of about one turn.
 #[derive(Debug, Default)]
@@ -37,7 +34,7 @@ impl CloseSteps {
         close.resize(grid.rows * grid.columns, 0);
         crossed.par_chunks_mut(grid.columns).enumerate().for_each_init(Vec::new, |at_step, (row, cells)| {
             cells.fill(0);
-            for y in (row * grid.step..((row + 1) * grid.step).min(grid.height)).step_by(ROW_STEP) {
+            for y in (row * grid.step..((row + 1) * grid.step).min(grid.height)).step_by(CLOSE_ROW_STEP) {
                 mark_row(grid, map, y, at_step);
                 for (cell, pixels) in cells.iter_mut().zip(at_step.chunks(grid.step)) {
                     *cell |= pixels.iter().fold(0, |any, pixel| any | pixel);
@@ -82,8 +79,8 @@ fn mark_row(grid: &Grid, map: PhaseMap<'_>, y: usize, at_step: &mut Vec<u8>) {
     at_step.resize(grid.width, 0);
     let next = Row { phase: &here.phase[1..], modulation: &here.modulation[1..] };
     compare(here, next, &mut at_step[..n]);
-    if y + ROW_STEP < grid.height {
-        compare(here, row(y + ROW_STEP), at_step);
+    if y + CLOSE_ROW_STEP < grid.height {
+        compare(here, row(y + CLOSE_ROW_STEP), at_step);
     }
 }
 

@@ -121,8 +121,7 @@ impl Validity {
         quality: &mut [f32],
         reasons: &mut [Reason],
     ) {
-        let Evidence { map, pixel, limits, .. } = evidence;
-        let grid = scene.grid;
+        let (limits, grid) = (evidence.limits, scene.grid);
         self.consistent.resize(grid.pixels(), 0);
         let Self { components, consistent, close_steps, noise, support, slots, .. } = self;
         let close_steps = &*close_steps;
@@ -145,14 +144,7 @@ impl Validity {
                     Surroundings { support, close, of_region: spare },
                     order_quality,
                 );
-                let near = around(y, grid.height);
-                let known = CheckRow {
-                    squared_residual: near.map(|y| &pixel.squared_residual[y * grid.width..][..grid.width]),
-                    modulation: &scene.row(map.modulation, y)[..grid.width],
-                    pixel_modulation: &pixel.modulation[y * grid.width..][..grid.width],
-                    noise: &variance[..grid.width],
-                    order_quality: &order_quality[..grid.width],
-                };
+                let known = CheckRow::of(scene, evidence, y, [variance, order_quality]);
                 let out = VerdictRow { quality, passed, consistent, reasons };
                 check_row(&known, limits, [spare, sums], out);
             },
@@ -204,6 +196,21 @@ struct CheckRow<'a> {
     /// Variance of the noise relative to that of the shot.
     noise: &'a [f32],
     order_quality: &'a [f32],
+}
+
+impl<'a> CheckRow<'a> {
+    /// Row `y` of a scene, with the variance of the noise and the quality of the orders along it.
+    fn of(scene: &Scene<'_>, evidence: Evidence<'a>, y: usize, [noise, quality]: [&'a [f32]; 2]) -> Self {
+        let Evidence { map, pixel, .. } = evidence;
+        let (height, width) = (scene.grid.height, scene.grid.width);
+        Self {
+            squared_residual: around(y, height).map(|y| &pixel.squared_residual[y * width..][..width]),
+            modulation: &scene.row(map.modulation, y)[..width],
+            pixel_modulation: &pixel.modulation[y * width..][..width],
+            noise: &noise[..width],
+            order_quality: &quality[..width],
+        }
+    }
 }
 
 /// Verdicts on the pixels of a row.
