@@ -24,6 +24,7 @@ NAMING = {"Cause", "Finding", "graded", "TargetNotFoundError", "DegeneratePosesE
 # Names that a call takes from a variable, by the name of the variable and the module.
 VARIABLE = {
     ("ORDERS", "verdict"): ("fringe orders",),
+    ("ORDERS", "channel_offsets"): ("fringe orders",),
     ("what", "calibration"): ("response", "projector response"),
     ("name", "calibration"): ("camera", "projector", "infrared"),
     ("name", "finding"): (),  # in `graded`

@@ -173,3 +173,13 @@ def test_fine_fringes_of_other_numbers_are_named_without_decoding_often(monkeypa
     with pytest.raises(DecodeError, match="which fits 100, 99, 90"):
         qf.decode(shot_of(images), plan_of((64.0, 63.0, 56.0)))
     assert sum(decoded) < 3 * CAMERA.width_px * CAMERA.height_px
+
+
+def test_what_contradicts_every_order_is_no_data_with_a_warning() -> None:
+    # The right part is narrower than a fringe, and half of its light is taken for that of the part in front.
+    scene = isolated(74, 0.02, 14, surface="sphere")
+    with pytest.warns(qf.DecodeWarning, match="of the pixels with fringes, green and infrared contradict .* no data"):
+        shape = scenes.shape_of(scene, response="linear")
+    contradicted = shape.quality == 0
+    assert np.count_nonzero(contradicted) > 0.05 * np.count_nonzero(np.isfinite(shape.quality))
+    assert not (contradicted & shape.returned).any()

@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from quadfringe.errors import DecodeError
 
-__all__ = ["Cause"]
+__all__ = ["ORDERS", "Cause"]
+
+ORDERS = "fringe orders"  # the name of exchanged channels, and of orders that no test explains
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder, rows_of_calibration
 from quadfringe.decoding._offsets import fitted_rad
-from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.cause import ORDERS, Cause
 from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration, wrong_order_rad
 from quadfringe.decoding.fringe_fit import infrared_column
 from quadfringe.decoding.plan import Plan
@@ -33,6 +33,10 @@ from quadfringe.decoding.trusted import take_out, trusted_part
 __all__ = ["Offsets", "contradiction", "drifting", "offsets_of", "taken_out"]
 
 UNCOVER_FIX = "keep what covers or moves a part of the infrared image out of its way"
+CONTRADICTED_FIX = (
+    "look where they are (`reason`): narrow parts of an object with less than a fringe may do this, and so does what "
+    "covers or moves a part of the infrared image"
+)
 
 Real = NDArray[np.float64]
 
@@ -88,7 +92,7 @@ def taken_out(shape: Shape, shot: AnyShot, plan: Plan, seen: Shape) -> Cause | N
     if cause is None:
         share = np.count_nonzero(shape.quality == 0) / np.count_nonzero(np.isfinite(shape.quality))
         words = f"in {share:.0%} of the pixels with fringes, green and infrared contradict every fringe order"
-        cause = Cause("infrared registration", words, UNCOVER_FIX)
+        cause = Cause(ORDERS, f"{words}, and these are no data", CONTRADICTED_FIX)
     return replace(_where_it_fits(cause, shape, shot, plan), fatal=False)
 
 

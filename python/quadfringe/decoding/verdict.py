@@ -10,7 +10,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding._offsets import channels_agree
-from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.cause import ORDERS, Cause
 from quadfringe.decoding.causes import (
     NUMBERS_FIX,
     after_order,
@@ -35,7 +35,6 @@ from quadfringe.errors import DecodeError
 
 __all__ = ["judge", "order_margin"]
 
-ORDERS = "fringe orders"  # the reason of a refusal for exchanged channels, or without a named cause
 CHECK_ALL = (
     "check that the channels are red, green, blue (and ir) in this order, and that the fringe numbers, the projector "
     "width and the response are those of this shot"
