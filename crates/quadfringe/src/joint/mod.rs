@@ -10,7 +10,7 @@
 //!    saturated light from the model, then steps 2 to 6 again                   saturation
 //!    minimum of the energy (J16); shadows of a pair of projectors (J33)         energy; infrared, shadows
 //! 7  motion between the channels (optional)                                    motion
-//! 8  orders of regions (J38); validity: doubtful pixels become no data            regions, validity
+//! 8  orders of regions (J38); validity: doubtful pixels become no data         regions, validity
 //! 9  uncertainty, and the probability of a wrong order                         uncertainty; energy::variance
 //! 10 heights                                                             (S7)  decode::output, height
 //! 11 doubtful orders become as certain as their surface                        propagation

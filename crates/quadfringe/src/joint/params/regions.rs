@@ -1,7 +1,7 @@
 //! Step 8: the orders of regions.
 
 /// Side of a tile in fringe periods. Larger: two surfaces in one tile share an order. Smaller: a part of a fringe fits every order.
-/// Of spheres of 2 % of the frame 98 % are right, with 1: 95 % (`python evaluation/isolated.py --surface sphere`).
+/// When it was set, three points less of spheres of 2 % of the frame were right with 1 (`python evaluation/isolated.py --surface sphere`).
 pub const TILE_SIDE: f64 = 0.5;
 
 /// Least side of a tile in camera pixels. Larger: mistakes of a narrow strip hide in the tiles around it.
@@ -17,8 +17,8 @@ pub const ROW_STEP: usize = 2;
 pub const SHARED_PX: f32 = 4.0;
 
 /// Least evidence for another order, as the logarithm of a ratio of likelihoods, from which a region takes it. Larger: wrong regions
-/// keep their order. Smaller: right ones lose it. Right regions of `python evaluation/world.py --half tune` and of the captures have at
-/// most 2, wrong ones of small objects 7 and more (`python evaluation/isolated.py`).
+/// keep their order. Smaller: right ones lose it (`python evaluation/world.py --half tune`, `python evaluation/isolated.py`). When it was
+/// set, right regions of the half `tune` and of the captures had at most 2, wrong ones of small objects 7 and more.
 pub const LEAD_MIN: f32 = 3.0;
 
 /// Least evidence of a part alone, as [`LEAD_MIN`], for the order that the parts around it choose. Larger: parts of one order lose their
@@ -27,8 +27,8 @@ pub const LEAD_MIN: f32 = 3.0;
 pub const OWN_LEAD_MIN: f32 = -1.0;
 
 /// Greatest evidence, as [`LEAD_MIN`], for shifts of G and IR that no order explains. Larger: broken parts of a shot are returned.
-/// Smaller: painted surfaces become no data. Sound scenes of `python evaluation/world.py --half tune` have at most 31, the captures 6;
-/// parts with shifted IR and exchanged channels have 100 to 500 (`pytest tests/test_trusted.py -k half_of`).
+/// Smaller: painted surfaces become no data (`pytest tests/test_trusted.py -k half_of`, `python evaluation/world.py --half tune`). When
+/// it was set, sound scenes of the half `tune` had at most 31, the captures 6, shifted IR and exchanged channels 100 to 500.
 pub const CONTRADICTION_MAX: f32 = 50.0;
 
 /// Shift of G in rad that contradicts no order. Larger: parts with shifted IR are returned. Smaller: crosstalk of 0.15 between R and G,

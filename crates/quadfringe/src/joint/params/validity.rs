@@ -51,7 +51,7 @@ pub const FACING_REACH: usize = AMBIGUOUS_REACH + 1;
 
 /// Steps lower than this number of turns leave strips with the order of the wrong side. Larger: regions give no order next to higher
 /// steps, where it would be right. Smaller: strips of a wrong order are returned (`python evaluation/world.py --half tune --only rods
-/// clutter steps`: with 1.25 half a dozen pixels more).
+/// clutter steps`).
 pub const CLOSE_TURNS_MAX: f32 = 1.5;
 
 /// Cells from such a step within which a region gives no order: the reach of windows across a step, as
