@@ -129,7 +129,8 @@ OFFSET_TILE_PX, OFFSET_SHARE = 96, 0.3
 # Fewest tiles from which a fault is named. A smaller number names faults for the print in a single tile.
 OFFSET_TILES_MIN = 4
 # Share of the lit pixels with quality 0, because green and infrared contradict every order, from which the shot is
-# decoded once more with them to name the cause. A smaller share costs time, a larger one takes parts out silently.
+# decoded once more with them to name the cause. A smaller share costs time, a larger one takes parts out silently
+# (`pytest tests/test_trusted.py -k contradicts`).
 TAKEN_OUT_SHARE = 0.05
 # Largest share of the tiles that is a part. Crosstalk of red and green turns the closure everywhere (0.84 at 0.15:
 # `pytest tests/test_channel_offsets.py`). A smaller number misses broken halves.

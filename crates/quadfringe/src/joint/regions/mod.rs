@@ -60,7 +60,7 @@ struct Part {
     scores: usize,
 }
 
-/// What the light says of a part of a region. Evidence is the logarithm of a ratio of likelihoods.
+/// The order of a part of a region, and the evidence for and against it. All evidence is a log-likelihood ratio.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Verdict {
     region: u32,

@@ -19,13 +19,6 @@ pub(super) struct CloseSteps {
     close: Vec<u8>,
 }
 
-/// One row of pixels.
-#[derive(Clone, Copy)]
-struct Row<'a> {
-    phase: &'a [f32],
-    modulation: &'a [f32],
-}
-
 impl CloseSteps {
     /// Finds the steps between lit neighbours of an absolute phase in rad, with padded rows.
     pub fn mark(&mut self, grid: &Grid, map: PhaseMap<'_>) {
@@ -70,22 +63,23 @@ fn add(marks: &[u8], out: &mut [u8]) {
 
 /// Marks with 1 the pixels of row `y` that a step parts from the next one of the row, or from that in the next row to be compared.
 fn mark_row(grid: &Grid, map: PhaseMap<'_>, y: usize, at_step: &mut Vec<u8>) {
-    let row = |y: usize| Row {
+    let row = |y: usize| PhaseMap {
         phase: &map.phase[y * grid.stride..][..grid.width],
         modulation: &map.modulation[y * grid.stride..][..grid.width],
     };
     let (here, n) = (row(y), grid.width - 1);
     at_step.clear();
     at_step.resize(grid.width, 0);
-    let next = Row { phase: &here.phase[1..], modulation: &here.modulation[1..] };
+    let next = PhaseMap { phase: &here.phase[1..], modulation: &here.modulation[1..] };
     compare(here, next, &mut at_step[..n]);
     if y + CLOSE_ROW_STEP < grid.height {
         compare(here, row(y + CLOSE_ROW_STEP), at_step);
     }
 }
 
+/// Marks pixels of a row that a step parts from those of another.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
-fn compare(here: Row, there: Row, at_step: &mut [u8]) {
+fn compare(here: PhaseMap, there: PhaseMap, at_step: &mut [u8]) {
     let n = at_step.len();
     let (phase, lit) = (&here.phase[..n], &here.modulation[..n]);
     let (other, other_lit) = (&there.phase[..n], &there.modulation[..n]);

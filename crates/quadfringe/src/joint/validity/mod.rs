@@ -144,7 +144,7 @@ impl Validity {
                     Surroundings { support, close, of_region: spare },
                     order_quality,
                 );
-                let known = CheckRow::of(scene, evidence, y, [variance, order_quality]);
+                let known = CheckRow::of(scene, evidence, y, variance, order_quality);
                 let out = VerdictRow { quality, passed, consistent, reasons };
                 check_row(&known, limits, [spare, sums], out);
             },
@@ -200,7 +200,7 @@ struct CheckRow<'a> {
 
 impl<'a> CheckRow<'a> {
     /// Row `y` of a scene, with the variance of the noise and the quality of the orders along it.
-    fn of(scene: &Scene<'_>, evidence: Evidence<'a>, y: usize, [noise, quality]: [&'a [f32]; 2]) -> Self {
+    fn of(scene: &Scene<'_>, evidence: Evidence<'a>, y: usize, noise: &'a [f32], quality: &'a [f32]) -> Self {
         let Evidence { map, pixel, .. } = evidence;
         let (height, width) = (scene.grid.height, scene.grid.width);
         Self {
