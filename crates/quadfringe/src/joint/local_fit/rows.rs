@@ -172,8 +172,8 @@ pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], ratios: [f32; 4], out: &mut 
         let strength = |[a, _, _, b]: [f32; 4]| if b > CONTRAST_MIN * a { b } else { 0.0 };
         let seen = if spread > SPREAD_MIN * sums[sum::W][i] { 1.0 } else { 0.0 };
         let [_, _, by_b, by_ir] = weights(ratios);
-        let optional = |weight: f32, fit: [f32; 4]| if weight > 0.0 { strength(fit) } else { f32::INFINITY };
-        let weakest = strength(r).min(strength(g)).min(optional(by_b, b)).min(optional(by_ir, ir));
+        let optional = |weight: f32, amplitude: f32| if weight > 0.0 { amplitude } else { f32::INFINITY };
+        let weakest = strength(r).min(g[3]).min(optional(by_b, strength(b))).min(optional(by_ir, ir[3]));
         let mean = if by_b > 0.0 { 0.5 * (r[3] + b[3]) } else { r[3] };
         let pairs = [
             [r[0], r[3]],

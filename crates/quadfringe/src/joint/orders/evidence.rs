@@ -6,7 +6,8 @@ use super::wrapped::Wrapped;
 use crate::joint::cells::RowMaps;
 use crate::joint::infrared::{Waves, with_waves};
 use crate::joint::local_fit::Beats;
-use crate::joint::model::{FringeRows, has_quadrature};
+use crate::joint::model::{CellFringes, FringeRows, has_quadrature};
+use crate::joint::params::local_fit::CONTRAST_MIN;
 use crate::joint::params::orders::{ALBEDO_KNOWN, LIT_WEIGHT, OBSERVED_COSINE_MAX};
 use crate::joint::params::pyramid::SAMPLED_ROWS;
 use crate::joint::scene::{PixelRow, Scene};
@@ -105,7 +106,9 @@ pub(super) fn row_evidence(
     let middle = (row * grid.step + half).min(grid.height - 1) * grid.stride + half;
     out.extend((0..nodes.len()).map(|x| {
         let infrared = scene.pair.map(|pair| pair.at(middle + x * grid.step));
-        NodeEvidence { infrared, ..evidence(nodes[x], &beats, &rows.cells, x) }
+        let weights =
+            Weights { beats: weights(wrapped.fit.cell(row, x)), cosines: weights(wrapped.cell(row, x)) };
+        NodeEvidence { infrared, ..evidence(nodes[x], &beats, &rows.cells, x, weights) }
     }));
 }
 
@@ -181,19 +184,40 @@ fn add_cosines<W: Waves>(
     }
 }
 
+/// Weights of the evidence of G and IR at a node, in [0, 1].
+#[derive(Debug, Clone, Copy)]
+struct Weights {
+    beats: [f32; 2],
+    cosines: [f32; 2],
+}
+
+/// Weights of G and IR with these offsets and amplitudes. Where fringes of two surfaces cancel in a window, or where a channel is in
+/// shadow, its phase is that of the noise.
+fn weights(CellFringes { offset, amplitude }: CellFringes) -> [f32; 2] {
+    [1, 3].map(|c| (amplitude[c] / (CONTRAST_MIN * offset[c]).max(1e-6)).clamp(0.0, 1.0).powi(2))
+}
+
 /// Evidence of node `x` of a row.
-fn evidence(phase: f32, beats: &Beats<'_>, cells: &[Vec<f32>; SUMS], x: usize) -> NodeEvidence {
-    let cosines = |from: usize| CosineSums {
-        square: cells[from][x],
-        first: [cells[from + 1][x], cells[from + 2][x]],
-        second: [cells[from + 3][x], cells[from + 4][x]],
+fn evidence(
+    phase: f32,
+    beats: &Beats<'_>,
+    cells: &[Vec<f32>; SUMS],
+    x: usize,
+    weights: Weights,
+) -> NodeEvidence {
+    let pixels = cells[0][x].floor();
+    let cosines = |beat: usize| {
+        let (weight, from) = (weights.cosines[beat], 1 + 5 * beat);
+        let [square, cos, sin, cos_twice, sin_twice] = [0, 1, 2, 3, 4].map(|k| weight * cells[from + k][x]);
+        CosineSums { pixels: weight * pixels, square, first: [cos, sin], second: [cos_twice, sin_twice] }
     };
     let beat = |c: usize| NodeEvidence::turns(-atan2(beats.sine[c][x], beats.cosine[c][x]));
     NodeEvidence {
         phase: NodeEvidence::turns(phase),
         beats: [beat(0), beat(1)],
-        cosines: [cosines(1), cosines(6)],
-        pixels: cells[0][x].floor(),
+        weights: weights.beats,
+        cosines: [cosines(0), cosines(1)],
+        pixels,
         lit: cells[0][x] > 0.0,
         infrared: None,
     }

@@ -132,11 +132,14 @@ impl CostTable {
         }
         let phase = f64::from(node.phase);
         let predicted = self.beat_ratios.map(|ratio| (ratio * phase).round() as i64 as u16);
-        let beats = [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i]));
         // Without usable pixels, the cost by cosines is 0 for all labels.
         let unit = if self.third { COSINE_UNIT } else { COSINE_UNIT_WITHOUT_INFRARED };
-        let scale = if node.pixels > 0.0 { unit / node.pixels } else { 0.0 };
-        let cosines = Cosines { sums: &node.cosines, pixels: node.pixels, scale };
+        let seen = Seen {
+            beats: [0, 1].map(|i| node.beats[i].wrapping_sub(predicted[i])),
+            weights: node.weights.map(|weight| (f32::from(WEIGHT_ONE) * weight) as i16),
+            cosines: &node.cosines,
+            scale: if node.pixels > 0.0 { unit / node.pixels } else { 0.0 },
+        };
         let [green_beats, infrared_beats] = &self.beats;
         let [green_rotations, infrared_rotations] = &self.rotations;
         let coaxial = ([green_beats, infrared_beats], [green_rotations, infrared_rotations]);
@@ -144,11 +147,12 @@ impl CostTable {
             let wrapped = node.phase as f32 * (std::f32::consts::TAU / 65536.0);
             infrared.predict(terms, wrapped, self.middle_rad(), self.count);
             let rows = [green_rotations, &infrared.rotations];
-            costs::<2>([beats[0], node.beats[1]], cosines, [green_beats, &infrared.beats], rows, out);
+            let seen = Seen { beats: [seen.beats[0], node.beats[1]], ..seen };
+            costs::<2>(seen, [green_beats, &infrared.beats], rows, out);
         } else if self.third {
-            costs::<2>(beats, cosines, coaxial.0, coaxial.1, out);
+            costs::<2>(seen, coaxial.0, coaxial.1, out);
         } else {
-            costs::<1>(beats, cosines, coaxial.0, coaxial.1, out);
+            costs::<1>(seen, coaxial.0, coaxial.1, out);
         }
         let turn = phase / 65536.0;
         let start = self.first_label + usize::from(turn < self.first_turn);
@@ -160,19 +164,25 @@ impl CostTable {
     }
 }
 
-/// Cosines of a node. `scale` converts a sum of squared differences to the unit of the costs.
+/// What a node sees in G and IR.
 #[derive(Clone, Copy)]
-struct Cosines<'a> {
-    sums: &'a [CosineSums; 2],
-    pixels: f32,
+struct Seen<'a> {
+    /// The beats minus those predicted for order 0.
+    beats: [u16; 2],
+    /// Weights of the beats, in units of 1 / [`WEIGHT_ONE`].
+    weights: [i16; 2],
+    cosines: &'a [CosineSums; 2],
+    /// Converts a sum of squared differences of cosines to the unit of the costs.
     scale: f32,
 }
 
-/// Computes the costs of all labels by `CHANNELS` of G and IR. `beats` are the observed beats minus the beats predicted for order 0.
+/// A weight of 1, as a whole number. Squares of beats are divided by 16 first, so that the product stays below 16,384.
+const WEIGHT_ONE: i16 = 16;
+
+/// Computes the costs of all labels by `CHANNELS` of G and IR.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
 fn costs<const CHANNELS: usize>(
-    beats: [u16; 2],
-    cosines: Cosines,
+    seen: Seen,
     predicted: [&Vec<u16>; 2],
     rotations: [&Rotations; 2],
     out: &mut [i16],
@@ -184,8 +194,8 @@ fn costs<const CHANNELS: usize>(
     });
     for (b, out) in out.as_chunks_mut::<LANES>().0.iter_mut().enumerate() {
         let mut square = [0.0f32; LANES];
-        for (sums, [c, s, c2, s2]) in cosines.sums.iter().zip(&rotations).take(CHANNELS) {
-            let still = sums.square + 0.5 * cosines.pixels;
+        for (sums, [c, s, c2, s2]) in seen.cosines.iter().zip(&rotations).take(CHANNELS) {
+            let still = sums.square + 0.5 * sums.pixels;
             for k in 0..LANES {
                 let first = sums.first[0] * c[b][k] - sums.first[1] * s[b][k];
                 let second = sums.second[0] * c2[b][k] - sums.second[1] * s2[b][k];
@@ -193,14 +203,14 @@ fn costs<const CHANNELS: usize>(
             }
         }
         for k in 0..LANES {
-            let scaled = cosines.scale * square[k];
+            let scaled = seen.scale * square[k];
             let by_cosines =
                 (if scaled < f32::from(COST_MAX) { scaled } else { f32::from(COST_MAX) }) as i32 as i16;
             let mut by_beats = 0;
             for c in 0..CHANNELS {
-                by_beats += beat_cost(beats[c], offsets[c][b][k]);
+                let cost = beat_cost(seen.beats[c], offsets[c][b][k]);
+                by_beats += ((cost >> 4) * seen.weights[c]) / WEIGHT_ONE;
             }
-            let by_beats = by_beats >> 4;
             let by_beats = if by_beats < COST_MAX { by_beats } else { COST_MAX };
             out[k] = (by_beats + by_cosines) >> 1;
         }

@@ -11,6 +11,8 @@ pub(in crate::joint) struct NodeEvidence {
     /// Beats of G and IR with the first phase, from the window of the local fit. They have little noise but are blurred
     /// at discontinuities.
     pub beats: [u16; 2],
+    /// Weights of these beats, in [0, 1].
+    pub weights: [f32; 2],
     /// Cosines of G and IR that the pixels of the node observe. They are noisy but sharp.
     pub cosines: [CosineSums; 2],
     /// Number of pixels in these sums.
@@ -22,9 +24,11 @@ pub(in crate::joint) struct NodeEvidence {
 }
 
 /// Sums over the pixels of a node: `s` is the cosine observed in one channel, `f` the phase that order 0 predicts for it;
-/// for IR of a calibrated pair, the phase of the middle order.
+/// for IR of a calibrated pair, the phase of the middle order. All sums have the weight of their channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(in crate::joint) struct CosineSums {
+    /// Number of pixels.
+    pub pixels: f32,
     /// Sum of s^2.
     pub square: f32,
     /// Sums of s cos f and s sin f.

@@ -194,11 +194,12 @@ mod tests {
             let [square, first, second] =
                 [[s * s, 0.0], [s * f.cos(), s * f.sin()], [(2.0 * f).cos(), (2.0 * f).sin()]];
             let round = |pair: [f64; 2]| pair.map(|v| v as f32);
-            CosineSums { square: square[0] as f32, first: round(first), second: round(second) }
+            CosineSums { pixels: 1.0, square: square[0] as f32, first: round(first), second: round(second) }
         };
         NodeEvidence {
             phase: turns(n1),
             beats: [turns(n2 - n1), turns(n3 - n1)],
+            weights: [1.0; 2],
             cosines: [seen(n2), seen(n3)],
             pixels: 1.0,
             lit: true,
@@ -259,6 +260,24 @@ mod tests {
             assert!(!lit || right(&code, column(i % COLUMNS), found.order[i]), "{i}");
             assert!(lit || found.lead[i] == 0.0);
         }
+    }
+
+    #[test]
+    fn a_channel_without_contrast_has_no_say() {
+        let code = FourChannel::of(Encoding::optimum(36, 912));
+        let column = |x: usize| 200.37 + 2.9 * x as f64;
+        let orders_with = |weight: f32| {
+            let found = choose(&code, |x, _| {
+                let mut node = node(&code, column(x));
+                node.weights[1] = weight;
+                node.beats[1] = node.beats[1].wrapping_add(9000);
+                node.cosines[1] = CosineSums::default();
+                node
+            });
+            (0..ROWS * COLUMNS).filter(|&i| right(&code, column(i % COLUMNS), found.order[i])).count()
+        };
+        assert_eq!(orders_with(0.0), ROWS * COLUMNS);
+        assert!(orders_with(1.0) < ROWS * COLUMNS);
     }
 
     #[test]
