@@ -46,6 +46,14 @@ def test_an_object_on_black_is_decoded(bar: str, period_px: int, fill: float, se
     hold("isolated.right_of_returned_percent", score.right_of_returned_percent)
 
 
+def test_a_sphere_whose_fringes_cancel_in_a_window_is_decoded() -> None:
+    """Windows at the rim see sphere and ground, and green and infrared have no contrast in some of them."""
+    scene = isolated(74, 0.15, 18, surface="sphere")
+    score = scoring.score(scene, scenes.shape_of(scene, response="linear").phase_rad)
+    hold("isolated.right_percent", score.right_percent)
+    hold("isolated.right_of_returned_percent", score.right_of_returned_percent)
+
+
 @pytest.fixture(scope="module")
 def coloured() -> scoring.Scene:
     """An object of coloured patches, whose median order margin is below that of shots with other fringe numbers."""

@@ -17,6 +17,10 @@ pub const JUMP_NODES_MAX: f64 = 30.0;
 /// effect on orders; x0.7 promises 20 % more wrong orders (textured: 70 %), x1.4 a third less.
 pub const COST_MAX: i16 = 333;
 
+/// A weight of 1 of a beat, as a whole number. Follows from the arithmetic: a squared beat is at most 1008, and its product with the
+/// weight must stay below 32,768.
+pub const WEIGHT_ONE: i16 = 16;
+
 /// Cost of a squared difference of 1 between observed and predicted cosines, the mean over the pixels of a node. With it an error
 /// of the cosines costs about as much as an equal error of the beats in rad. Larger: noise of single pixels counts more. Varied:
 /// no effect on orders; the promised wrong orders of the textured face move by a third.

@@ -4,7 +4,7 @@ use super::evidence::{CosineSums, NodeEvidence};
 use super::sweep::{IMPOSSIBLE, LANES};
 use crate::encoding::FourChannel;
 use crate::joint::infrared::{TERMS, wave};
-use crate::joint::params::orders::{COSINE_UNIT, COSINE_UNIT_WITHOUT_INFRARED, COST_MAX};
+use crate::joint::params::orders::{COSINE_UNIT, COSINE_UNIT_WITHOUT_INFRARED, COST_MAX, WEIGHT_ONE};
 use crate::parallel::angle::{round, sin_cos};
 use multiversion::multiversion;
 use std::f64::consts::TAU;
@@ -175,9 +175,6 @@ struct Seen<'a> {
     /// Converts a sum of squared differences of cosines to the unit of the costs.
     scale: f32,
 }
-
-/// A weight of 1, as a whole number. Squares of beats are divided by 16 first, so that the product stays below 16,384.
-const WEIGHT_ONE: i16 = 16;
 
 /// Computes the costs of all labels by `CHANNELS` of G and IR.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2"))]
