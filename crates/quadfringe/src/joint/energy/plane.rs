@@ -3,25 +3,44 @@
 use crate::joint::params::energy::SIDE;
 use crate::parallel::lanes::{LANES, Lanes};
 
-/// Zeros around the cells of a tile: the reach of the stencils.
+/// Rows of zeros above and below the cells of a tile: the reach of the stencils.
 const RIM: usize = 2;
+/// Zeros before the cells of a row; they also follow the cells of the row above. A whole vector, so that no vector of cells lies
+/// across two cache lines.
+const GAP: usize = LANES;
 /// Length of a row of a plane.
-pub(super) const STRIDE: usize = SIDE + 2 * RIM;
+pub(super) const STRIDE: usize = SIDE + GAP;
+/// Number of values of a plane.
+const LEN: usize = (SIDE + 2 * RIM) * STRIDE + GAP;
 
 /// One value for every cell of a tile.
-#[derive(Debug, Clone)]
-pub(super) struct Plane(Vec<f32>);
+#[derive(Debug)]
+pub(super) struct Plane {
+    values: Vec<f32>,
+    /// Index of the first value of the plane, which starts a cache line.
+    first: usize,
+}
 
 impl Default for Plane {
     fn default() -> Self {
-        Self(vec![0.0; STRIDE * STRIDE])
+        let values = vec![0.0f32; LEN + LANES];
+        let first = values.as_ptr().align_offset(size_of::<Lanes>());
+        Self { values, first }
+    }
+}
+
+impl Clone for Plane {
+    fn clone(&self) -> Self {
+        let mut new = Self::default();
+        new.copy(self);
+        new
     }
 }
 
 /// Position of the cell (x, y) in a plane.
 #[inline(always)]
 pub(super) fn place(x: usize, y: usize) -> usize {
-    (y + RIM) * STRIDE + x + RIM
+    (y + RIM) * STRIDE + x + GAP
 }
 
 /// Positions of all vectors of cells, row by row.
@@ -34,30 +53,30 @@ impl Plane {
     /// The vector from a position on, by value.
     #[inline(always)]
     pub fn get(&self, at: usize) -> Lanes {
-        *self.0[at..].first_chunk().expect("a vector lies inside its plane")
+        *self.values[self.first + at..].first_chunk().expect("a vector lies inside its plane")
     }
 
     #[inline(always)]
     pub fn set(&mut self, at: usize, values: Lanes) {
-        *self.0[at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
+        *self.values[self.first + at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
     }
 
     pub fn copy(&mut self, from: &Self) {
-        self.0.copy_from_slice(&from.0);
+        self.values[self.first..][..LEN].copy_from_slice(&from.values[from.first..][..LEN]);
     }
 
     pub fn clear(&mut self) {
-        self.0.fill(0.0);
+        self.values.fill(0.0);
     }
 
     /// The cells of row `y`.
     pub fn row(&self, y: usize) -> &[f32] {
-        &self.0[place(0, y)..][..SIDE]
+        &self.values[self.first + place(0, y)..][..SIDE]
     }
 
     /// The cells of row `y`, to be changed.
     pub fn row_mut(&mut self, y: usize) -> &mut [f32] {
-        &mut self.0[place(0, y)..][..SIDE]
+        &mut self.values[self.first + place(0, y)..][..SIDE]
     }
 }
 
