@@ -17,8 +17,8 @@ pub const RIDGE: f32 = 1e-3;
 
 /// Least contrast (amplitude over offset) of R and B in light from the projector. With less, the evidence of G or of IR for an order
 /// loses weight as the square of its contrast. Larger: surfaces under room light are lost. Smaller: room light counts as fringes, and
-/// noise as evidence. Varied: 0.05, no effect but 0.1 points of cloth; 0.2, 3 points less of objects of 2 % with fringes of 110 px, 0.3
-/// points more of cloth (`python evaluation/isolated.py`, `python evaluation/world.py --half tune --only painted_face clutter cloth`).
+/// noise as evidence. Varied: 0.05, no effect; 0.2, 3 points less of objects of 2 % with fringes of 110 px, 0.2 points more of cloth
+/// (`python evaluation/isolated.py`, `python evaluation/world.py --half tune --only painted_face clutter cloth`).
 pub const CONTRAST_MIN: f32 = 0.1;
 
 /// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 if all phasors lie along one line, as
