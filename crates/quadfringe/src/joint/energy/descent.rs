@@ -37,7 +37,7 @@ impl Tile {
     /// factor by which narrower relief is kept than the shot suggests.
     pub fn minimise(&mut self, noise: f32, detail: f32) {
         self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
-        self.unknown.phase.clone_from(&self.start);
+        self.unknown.phase.copy(&self.start);
         start::contrast_and_albedo(self, AlbedoOf::Neighbours);
         self.descend(noise);
         self.restart(noise);

@@ -1,6 +1,7 @@
 //! Planes of a tile: a square of cells with a rim of zeros, so that no stencil needs to know the border.
 
 use crate::joint::params::energy::SIDE;
+use crate::parallel::Aligned;
 use crate::parallel::lanes::{LANES, Lanes};
 
 /// Rows of zeros above and below the cells of a tile: the reach of the stencils.
@@ -15,25 +16,11 @@ const LEN: usize = (SIDE + 2 * RIM) * STRIDE + GAP;
 
 /// One value for every cell of a tile.
 #[derive(Debug)]
-pub(super) struct Plane {
-    values: Vec<f32>,
-    /// Index of the first value of the plane, which starts a cache line.
-    first: usize,
-}
+pub(super) struct Plane(Aligned<f32>);
 
 impl Default for Plane {
     fn default() -> Self {
-        let values = vec![0.0f32; LEN + LANES];
-        let first = values.as_ptr().align_offset(size_of::<Lanes>());
-        Self { values, first }
-    }
-}
-
-impl Clone for Plane {
-    fn clone(&self) -> Self {
-        let mut new = Self::default();
-        new.copy(self);
-        new
+        Self(Aligned::new(LEN))
     }
 }
 
@@ -53,30 +40,30 @@ impl Plane {
     /// The vector from a position on, by value.
     #[inline(always)]
     pub fn get(&self, at: usize) -> Lanes {
-        *self.values[self.first + at..].first_chunk().expect("a vector lies inside its plane")
+        *self.0[at..].first_chunk().expect("a vector lies inside its plane")
     }
 
     #[inline(always)]
     pub fn set(&mut self, at: usize, values: Lanes) {
-        *self.values[self.first + at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
+        *self.0[at..].first_chunk_mut().expect("a vector lies inside its plane") = values;
     }
 
     pub fn copy(&mut self, from: &Self) {
-        self.values[self.first..][..LEN].copy_from_slice(&from.values[from.first..][..LEN]);
+        self.0.copy_from_slice(&from.0);
     }
 
     pub fn clear(&mut self) {
-        self.values.fill(0.0);
+        self.0.fill(0.0);
     }
 
     /// The cells of row `y`.
     pub fn row(&self, y: usize) -> &[f32] {
-        &self.values[self.first + place(0, y)..][..SIDE]
+        &self.0[place(0, y)..][..SIDE]
     }
 
     /// The cells of row `y`, to be changed.
     pub fn row_mut(&mut self, y: usize) -> &mut [f32] {
-        &mut self.values[self.first + place(0, y)..][..SIDE]
+        &mut self.0[place(0, y)..][..SIDE]
     }
 }
 

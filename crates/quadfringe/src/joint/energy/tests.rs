@@ -87,7 +87,7 @@ fn printed_tile() -> (Tile, Plane) {
 fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
     let noise = 1e-6;
     let (mut tile, truth) = printed_tile();
-    tile.unknown.phase.clone_from(&tile.start);
+    tile.unknown.phase.copy(&tile.start);
     contrast_and_albedo(&mut tile, AlbedoOf::Neighbours);
     tile.descend(noise);
     let (first, _) = errors(&tile, &truth);
@@ -101,7 +101,8 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
 /// to one of which a shadow is close if `shadow`; the light says nothing.
 fn cost_of_an_island(shadow: bool) -> f64 {
     let (mut tile, truth) = tile(0.0);
-    let mut island = Fields { phase: truth.clone(), ..Fields::default() };
+    let mut island = Fields::default();
+    island.phase.copy(&truth);
     tile.usable.clear();
     for y in 37..41 {
         for x in 29..47 {
@@ -199,7 +200,7 @@ fn the_preconditioner_inverts_columns_that_stand_alone() {
     for plane in [along, mixed, &mut brightness[0], &mut colour[0], &mut contrast[0]] {
         plane.clear();
     }
-    brightness[1].clone_from(&colour[1]);
+    brightness[1].copy(&colour[1]);
     let Derivatives { phase, albedo, contrast } = derivatives;
     let [red, _, _, infrared] = albedo;
     let unknown = phase[1..].iter_mut().chain(&mut contrast[..3]).chain([red, infrared]);
