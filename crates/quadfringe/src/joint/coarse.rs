@@ -1,6 +1,7 @@
 //! Steps 2 to 6 on the coarse level: mask, beats, orders and photometry, which all need a neighbourhood. The phase at full
 //! resolution starts from their results.
 
+use super::cells::CellMaps;
 use super::illumination::LitMask;
 use super::local_fit::{LocalFit, PixelMaps};
 use super::model::absent;
@@ -33,6 +34,8 @@ pub(super) struct CoarseLevel {
     /// Working plane: first the wrapped phase of R and B; once orders are known, the squared residuals; during a refit, the
     /// phase of the wide window.
     work: Vec<f32>,
+    /// Working memory of all sums over windows of cells.
+    sums: CellMaps,
     /// Standard deviation of the intensities in linear light.
     pub noise: f32,
     /// Whether the surface counts as textured, because enough pixels take offsets and amplitudes from another place.
@@ -55,6 +58,7 @@ impl CoarseLevel {
             discontinuities: Vec::new(),
             smooth_modulation: Vec::new(),
             work: Vec::new(),
+            sums: CellMaps::default(),
             noise: 0.0,
             textured: false,
             lit_mask: LitMask::new(absent(code.ratios())),
@@ -90,7 +94,7 @@ impl CoarseLevel {
         }
         let light = level.light.each_ref().map(Vec::as_slice);
         // The range of a fringe is twice its modulation.
-        self.lit_mask.find(grid, light, 2.0 * modulation_min, &mut self.modulation);
+        self.lit_mask.find(grid, light, 2.0 * modulation_min, &mut self.sums, &mut self.modulation);
         self.lit_mask.erode(grid.grid, reach_px, scratch.first, &mut self.modulation);
         level.restrict(grid.grid, &self.modulation);
     }
@@ -98,11 +102,11 @@ impl CoarseLevel {
     /// Step 3: wrapped phase of R and B (S2), beats of G and IR against it (S3), noise and slopes.
     pub fn fit_fringes(&mut self, scene: &Scene<'_>, lit: &[f32], modulation_min: f32) {
         let maps = PixelMaps { phase: &mut self.work, modulation: &mut self.modulation };
-        self.fit.run(scene, lit, modulation_min, maps);
+        self.fit.run(scene, lit, modulation_min, maps, &mut self.sums);
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         // A phase that is fitted in a window does not show the noise of a pixel.
         self.noise = if self.fit.is_of_pixels() { noise_of_phase(scene, map) } else { self.lit_mask.noise };
-        self.slopes.measure(scene, map);
+        self.slopes.measure(scene, map, &mut self.sums);
     }
 
     /// Step 4: chooses fringe orders (S4) with the offsets and amplitudes of the local fit, then once more with the offsets and
@@ -111,9 +115,9 @@ impl CoarseLevel {
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         let wrapped = Wrapped { map, fit: &self.fit, photometry: None, slopes: &self.slopes };
         self.orders.choose(scene, &wrapped, &mut self.phase);
-        self.photometry.start(scene, &self.fit);
+        self.photometry.start(scene, &self.fit, &mut self.sums);
         let map = PhaseMap { phase: &self.phase, modulation: &self.modulation };
-        self.photometry.fit(scene, ratios, map, 0.0);
+        self.photometry.fit(scene, ratios, map, 0.0, &mut self.sums);
         let wrapped = Wrapped { photometry: Some(&self.photometry), ..wrapped };
         self.orders.choose(scene, &wrapped, &mut self.phase);
     }
@@ -124,7 +128,7 @@ impl CoarseLevel {
         self.textured = false;
         self.fit_phase(scene, ratios, scratch.lend());
         let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
-        self.photometry.fit(scene, ratios, map, 0.0);
+        self.photometry.fit(scene, ratios, map, 0.0, &mut self.sums);
         if moving {
             // Offsets and amplitudes of another place could seem to explain the effect of motion, so no pixel may
             // choose another place.
@@ -143,7 +147,8 @@ impl CoarseLevel {
                 self.fit_phase(scene, ratios, scratch.lend());
             }
         }
-        self.slopes.refine(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
+        let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
+        self.slopes.refine(scene, map, &mut self.sums);
     }
 
     /// Step 6 on the coarse level: removes the shadows of the infrared projector of a pair.
@@ -203,15 +208,16 @@ impl CoarseLevel {
     /// Step 5: fits the photometry to the phase of a wide window. This phase follows the surface, while errors of the
     /// previous photometry average out. `phase_trust` is the weight of this phase.
     fn refit(&mut self, scene: &Scene<'_>, ratios: [f32; 4], phase_trust: f32, scratch: Scratch<'_>) {
-        self.residuals.measure(scene, &self.work, &self.modulation);
-        self.slopes.measure(scene, PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation });
+        self.residuals.measure(scene, &self.work, &self.modulation, &mut self.sums);
+        let map = PhaseMap { phase: &self.phase, modulation: &self.smooth_modulation };
+        self.slopes.measure(scene, map, &mut self.sums);
         let window = Window::new(scene, &self.slopes, &self.modulation, self.noise).wide();
         let window = window.loosened(&self.residuals);
         self.work.copy_from_slice(&self.phase);
         let model = PhaseModel { scene, photometry: &self.photometry, ratios, window };
         self.phase_fit.step(model, &mut self.work, scratch, &mut FitRows::none(scene.grid.height));
         let map = PhaseMap { phase: &self.work, modulation: &self.smooth_modulation };
-        self.photometry.fit(scene, ratios, map, phase_trust);
+        self.photometry.fit(scene, ratios, map, phase_trust, &mut self.sums);
     }
 
     /// Step 5 on textured surfaces: each pixel takes offsets and amplitudes from the place that explains its intensities best. If

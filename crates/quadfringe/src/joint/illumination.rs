@@ -23,7 +23,6 @@ pub(super) struct LitMask {
     means: CellMaps,
     extremes: CellMaps,
     levels: CellMaps,
-    sums: CellMaps,
     slots: Slots<TaskWork<Rows>>,
     /// Standard deviation of the intensities in the last image, in linear light.
     pub noise: f32,
@@ -57,19 +56,20 @@ impl LitMask {
         self.visible_alone = true;
     }
 
-    /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`.
+    /// Writes 1 for every lit pixel, 0 elsewhere. Keeps `range_min`. The content of `sums` is lost.
     pub fn find(
         &mut self,
         ScaledGrid { grid, period_px, .. }: ScaledGrid<'_>,
         light: [&[f32]; 4],
         range_min: f32,
+        sums: &mut CellMaps,
         lit: &mut [f32],
     ) {
         self.range_min = range_min;
         let reach = (REACH * period_px as f32 / grid.step as f32).ceil();
-        self.cell_means(grid, light);
+        self.cell_means(grid, light, sums);
         self.cell_extremes(grid, reach as usize);
-        self.cell_levels(grid, reach / 2.0, range_min);
+        self.cell_levels(grid, reach / 2.0, range_min, sums);
         self.find_again(grid, light, lit);
     }
 
@@ -162,13 +162,13 @@ impl LitMask {
     }
 
     /// Mean light of each channel in every cell.
-    fn cell_means(&mut self, grid: &Grid, light: [&[f32]; 4]) {
+    fn cell_means(&mut self, grid: &Grid, light: [&[f32]; 4], sums: &mut CellMaps) {
         let inside: Vec<f32> = (0..grid.stride).map(|x| f32::from(u8::from(x < grid.width))).collect();
         self.means = CellMaps::new(4);
         grid.window_sums::<5, Rows>(
             CellWindow { sigma_cells: 0.0, sampled_rows: usize::MAX },
             &self.slots,
-            &mut self.sums,
+            sums,
             &mut self.means,
             |_, y, sums| {
                 let rows = light.map(|plane| &plane[y * grid.stride..][..grid.stride]);
@@ -207,9 +207,9 @@ impl LitMask {
     }
 
     /// Bottom and 1 / range^2 of each channel, from extremes averaged over `sigma` cells.
-    fn cell_levels(&mut self, grid: &Grid, sigma: f32, range_min: f32) {
+    fn cell_levels(&mut self, grid: &Grid, sigma: f32, range_min: f32, sums: &mut CellMaps) {
         self.levels = CellMaps::new(LEVEL_MAPS);
-        let Self { slots, extremes, sums, levels, .. } = self;
+        let Self { slots, extremes, levels, .. } = self;
         grid.smooth::<9, Rows>(
             sigma,
             slots,

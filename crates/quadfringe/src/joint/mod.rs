@@ -103,7 +103,7 @@ pub(crate) struct Joint {
     propagation: Propagation,
     /// Wrong-order probability of every node.
     wrong_order: Vec<f32>,
-    /// Working planes, for results that have no map of points to serve as such.
+    /// Working planes, for results that have no map that can serve as such.
     spare: Vec<f32>,
 }
 

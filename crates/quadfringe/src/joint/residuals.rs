@@ -13,24 +13,29 @@ use multiversion::multiversion;
 #[derive(Debug)]
 pub(super) struct Residuals {
     maps: CellMaps,
-    sums: CellMaps,
     slots: Slots<TaskWork<()>>,
 }
 
 impl Default for Residuals {
     fn default() -> Self {
-        Self { maps: CellMaps::new(1), sums: CellMaps::default(), slots: Slots::default() }
+        Self { maps: CellMaps::new(1), slots: Slots::default() }
     }
 }
 
 impl Residuals {
     /// Averages the mean squared residuals of the pixels, in linear light squared. `modulation` is 0 where there is no
-    /// light.
-    pub fn measure(&mut self, scene: &Scene<'_>, squared_residual: &[f32], modulation: &[f32]) {
+    /// light. The content of `sums` is lost.
+    pub fn measure(
+        &mut self,
+        scene: &Scene<'_>,
+        squared_residual: &[f32],
+        modulation: &[f32],
+        sums: &mut CellMaps,
+    ) {
         scene.grid.window_sums::<2, ()>(
             CellWindow { sigma_cells: scene.cells(WIDTH), sampled_rows: SAMPLED_ROWS },
             &self.slots,
-            &mut self.sums,
+            sums,
             &mut self.maps,
             |(), y, sums| add_lit(scene.row(squared_residual, y), scene.row(modulation, y), sums),
             |_, [count, squares], out| {
@@ -88,7 +93,7 @@ mod tests {
         let scene =
             Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1, pair: None };
         let mut residuals = Residuals::default();
-        residuals.measure(&scene, &square, &modulation);
+        residuals.measure(&scene, &square, &modulation, &mut CellMaps::default());
         let mut maps = RowMaps::default();
         let row = residuals.row(&scene, 30, &mut maps);
         for x in 0..128 {

@@ -27,35 +27,48 @@ pub(super) struct Slopes {
     maps: CellMaps,
     /// Slopes of the wide window, which are combined with the slopes of the fine window.
     wide: CellMaps,
-    sums: CellMaps,
     slots: Slots<TaskWork<ShiftedRows>>,
+}
+
+/// A window of the fit.
+#[derive(Clone, Copy)]
+struct SlopeWindow {
+    /// In fringe periods.
+    width: f32,
+    /// Weight of the wide slopes, as a share of the pixels of a whole window.
+    wide_share: f32,
 }
 
 impl Default for Slopes {
     fn default() -> Self {
         let [maps, wide] = [2, 2].map(CellMaps::new);
-        Self { maps, wide, sums: CellMaps::default(), slots: Slots::default() }
+        Self { maps, wide, slots: Slots::default() }
     }
 }
 
 impl Slopes {
-    /// Measures the slopes of a phase in a wide window.
-    pub fn measure(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>) {
-        self.average(scene, map, WIDTH, 0.0);
+    /// Measures the slopes of a phase in a wide window. The content of `sums` is lost.
+    pub fn measure(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, sums: &mut CellMaps) {
+        self.average(scene, map, SlopeWindow { width: WIDTH, wide_share: 0.0 }, sums);
     }
 
     /// Measures the slopes of a phase without wrong orders in a smaller window. Where the window contains few pixels,
-    /// the slopes hardly change.
-    pub fn refine(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>) {
+    /// the slopes hardly change. The content of `sums` is lost.
+    pub fn refine(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, sums: &mut CellMaps) {
         std::mem::swap(&mut self.maps, &mut self.wide);
-        self.average(scene, map, FINE_WIDTH, WIDE_SHARE);
+        self.average(scene, map, SlopeWindow { width: FINE_WIDTH, wide_share: WIDE_SHARE }, sums);
     }
 
-    /// `wide_share` is the weight of the wide slopes, as a share of the pixels of a whole window.
-    fn average(&mut self, scene: &Scene<'_>, map: PhaseMap<'_>, width: f32, wide_share: f32) {
+    fn average(
+        &mut self,
+        scene: &Scene<'_>,
+        map: PhaseMap<'_>,
+        SlopeWindow { width, wide_share }: SlopeWindow,
+        sums: &mut CellMaps,
+    ) {
         let PhaseMap { phase, modulation } = map;
         let grid = scene.grid;
-        let Self { maps, wide, sums, slots } = self;
+        let Self { maps, wide, slots } = self;
         let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
         let wide_weight = wide_share * whole;
         grid.window_sums::<TERMS, ShiftedRows>(
@@ -150,9 +163,9 @@ mod tests {
         let scene =
             Scene { light: [&light; 4], usable: &light, grid: &grid, period_px: 25.0, factor: 1, pair: None };
         let mut slopes = Slopes::default();
-        slopes.measure(&scene, PhaseMap { phase: &phase, modulation: &lit });
+        slopes.measure(&scene, PhaseMap { phase: &phase, modulation: &lit }, &mut CellMaps::default());
         let (before, beyond) = (slopes.maps.line(12, 0).to_vec(), slopes.at(12, 44));
-        slopes.refine(&scene, PhaseMap { phase: &phase, modulation: &lit });
+        slopes.refine(&scene, PhaseMap { phase: &phase, modulation: &lit }, &mut CellMaps::default());
         let after = slopes.maps.line(12, 0);
         let truth = |column: usize| 4.0 * (0.25 + wave * (wave * (4.0 * column as f32 + 2.0)).cos());
         let worst =

@@ -32,7 +32,6 @@ pub(super) struct LocalFit {
     start: CellMaps,
     carrier: Carrier,
     maps: CellMaps,
-    sums: CellMaps,
     slots: Slots<TaskWork<Rows>>,
 }
 
@@ -56,7 +55,6 @@ impl LocalFit {
             start: CellMaps::new(4),
             carrier: Carrier::default(),
             maps: CellMaps::new(map::COUNT),
-            sums: CellMaps::default(),
             slots: Slots::default(),
         }
     }
@@ -67,14 +65,21 @@ impl LocalFit {
     }
 
     /// Fit a scene with fringes in any direction. `lit` is 1 where light of the projector falls; `least` is the least
-    /// modulation that counts.
-    pub fn run(&mut self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
+    /// modulation that counts. The content of `sums` is lost.
+    pub fn run(
+        &mut self,
+        scene: &Scene<'_>,
+        lit: &[f32],
+        least: f32,
+        out: PixelMaps<'_>,
+        sums: &mut CellMaps,
+    ) {
         if self.is_of_pixels() {
-            self.start(scene);
+            self.start(scene, sums);
         } else {
-            self.carrier.find(scene, &self.slots, &mut self.sums);
+            self.carrier.find(scene, &self.slots, sums);
         }
-        self.solve(scene);
+        self.solve(scene, sums);
         self.phase(scene, lit, least, out);
     }
 
@@ -102,11 +107,11 @@ impl LocalFit {
     }
 
     /// Mean and amplitude of R and B in a window that holds whole fringes.
-    fn start(&mut self, scene: &Scene<'_>) {
+    fn start(&mut self, scene: &Scene<'_>, sums: &mut CellMaps) {
         scene.grid.window_sums::<5, Rows>(
             CellWindow { sigma_cells: scene.cells(FIRST_WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
-            &mut self.sums,
+            sums,
             &mut self.start,
             |_, y, sums| add_squares(scene.row(scene.usable, y), scene.rows(y), sums),
             |_, [weight, red, red_2, blue, blue_2], out| {
@@ -124,13 +129,13 @@ impl LocalFit {
     }
 
     /// Normal equations of every cell for `a`, `p`, `q` of the four channels.
-    fn solve(&mut self, scene: &Scene<'_>) {
+    fn solve(&mut self, scene: &Scene<'_>, sums: &mut CellMaps) {
         let ratios = self.ratios;
         let source = Source::of(ratios, &self.carrier, &self.start);
         scene.grid.window_sums::<{ sum::COUNT }, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
             &self.slots,
-            &mut self.sums,
+            sums,
             &mut self.maps,
             |rows, y, sums| {
                 let Rows { maps, cos, sin, .. } = rows;

@@ -33,7 +33,6 @@ use std::f32::consts::TAU;
 pub(in crate::joint) struct Photometry {
     maps: CellMaps,
     next: CellMaps,
-    sums: CellMaps,
     choice: Choice,
     slots: Slots<TaskWork<Rows>>,
 }
@@ -50,15 +49,14 @@ impl Photometry {
         Self {
             maps: CellMaps::new(8),
             next: CellMaps::new(8),
-            sums: CellMaps::default(),
             choice: Choice::default(),
             slots: Slots::default(),
         }
     }
 
     /// Starts from the offsets and amplitudes of the local fit, which needs no orders, averaged over the neighbourhood. Where the
-    /// phase hardly changes in a window, later fits cannot improve them.
-    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit) {
+    /// phase hardly changes in a window, later fits cannot improve them. The content of `sums` is lost.
+    pub fn start(&mut self, scene: &Scene<'_>, fit: &LocalFit, sums: &mut CellMaps) {
         self.choice.forget();
         self.next.fill::<8>(scene.grid, |row, lines| {
             for column in 0..lines[0].len() {
@@ -68,7 +66,7 @@ impl Photometry {
                 }
             }
         });
-        self.draw_together(scene, f32::INFINITY);
+        self.draw_together(scene, f32::INFINITY, sums);
     }
 
     /// From now on, the pixels are those of the full image. A mean over the pixels of `coarse` has lost a share of the contrast (J1).
@@ -117,15 +115,16 @@ impl Photometry {
     }
 
     /// Fits offsets and amplitudes to an absolute phase, whose weight relative to the information about it in the light is
-    /// `phase_trust`. Pixels that have chosen another place take no part.
+    /// `phase_trust`. Pixels that have chosen another place take no part. The content of `sums` is lost.
     pub fn fit(
         &mut self,
         scene: &Scene<'_>,
         ratios: [f32; 4],
         PhaseMap { phase, modulation }: PhaseMap<'_>,
         phase_trust: f32,
+        sums: &mut CellMaps,
     ) {
-        let Self { maps, next, sums, slots, choice } = self;
+        let Self { maps, next, slots, choice } = self;
         let grid = scene.grid;
         grid.window_sums::<SUMS, Rows>(
             CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
@@ -148,12 +147,12 @@ impl Photometry {
                 improve(sums, before, out);
             },
         );
-        self.draw_together(scene, OTHER_TEXTURE);
+        self.draw_together(scene, OTHER_TEXTURE, sums);
     }
 
     /// Draws every cell to the mean of its neighbourhood unless the two differ by more than `threshold`.
-    fn draw_together(&mut self, scene: &Scene<'_>, threshold: f32) {
-        let Self { maps, next, sums, slots, .. } = self;
+    fn draw_together(&mut self, scene: &Scene<'_>, threshold: f32, sums: &mut CellMaps) {
+        let Self { maps, next, slots, .. } = self;
         let fitted = &*next;
         scene.grid.smooth::<8, Rows>(
             scene.cells(NEIGHBOURHOOD),

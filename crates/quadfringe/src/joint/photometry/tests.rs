@@ -11,11 +11,11 @@ fn a_window_on_two_colours_keeps_its_size() {
     let (grid, phase) = (&edge.grid, &edge.phase);
     let (usable, modulation) = (edge.plane(1.0), edge.plane(0.3));
     let scene = edge.scene(&usable);
-    let (mut fit, mut found) = (LocalFit::new(RATIOS), Photometry::new());
+    let (mut fit, mut found, mut sums) = (LocalFit::new(RATIOS), Photometry::new(), CellMaps::default());
     let (mut wrapped, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
     let maps = crate::joint::local_fit::PixelMaps { phase: &mut wrapped, modulation: &mut spare };
-    fit.run(&scene, &usable, 0.02, maps);
-    found.start(&scene, &fit);
+    fit.run(&scene, &usable, 0.02, maps, &mut sums);
+    found.start(&scene, &fit, &mut sums);
     let size_at = |found: &Photometry| {
         let mut maps = RowMaps::default();
         let rows = found.sample_in_place(&scene, 30, &mut maps);
@@ -24,7 +24,7 @@ fn a_window_on_two_colours_keeps_its_size() {
     };
     let before = size_at(&found);
     for _ in 0..6 {
-        found.fit(&scene, RATIOS, PhaseMap { phase, modulation: &modulation }, 0.0);
+        found.fit(&scene, RATIOS, PhaseMap { phase, modulation: &modulation }, 0.0, &mut sums);
     }
     let after = size_at(&found);
     assert!((after / before - 1.0).abs() < 0.15, "{before} {after}");
@@ -48,16 +48,16 @@ fn offsets_and_amplitudes_are_found_under_texture_and_an_error_of_the_phase() {
     let (usable, modulation) = (vec![1.0; grid.pixels()], vec![0.3; grid.pixels()]);
     let light = planes.each_ref().map(Vec::as_slice);
     let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
-    let (mut fit, mut found) = (LocalFit::new(RATIOS), Photometry::new());
+    let (mut fit, mut found, mut sums) = (LocalFit::new(RATIOS), Photometry::new(), CellMaps::default());
     let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
     let maps = crate::joint::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
-    fit.run(&scene, &usable, 0.02, maps);
-    found.start(&scene, &fit);
+    fit.run(&scene, &usable, 0.02, maps, &mut sums);
+    found.start(&scene, &fit, &mut sums);
     // The given phase has an error of 0.05 rad, like a two-step phase with wrong offsets.
     let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
     for _ in 0..3 {
         let map = PhaseMap { phase: &phase, modulation: &modulation };
-        found.fit(&scene, RATIOS, map, 0.0);
+        found.fit(&scene, RATIOS, map, 0.0, &mut sums);
     }
     let mut maps = RowMaps::default();
     let rows = found.sample(&scene, 48, &mut maps);

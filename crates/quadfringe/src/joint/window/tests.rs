@@ -1,5 +1,5 @@
 use super::*;
-use crate::joint::cells::Grid;
+use crate::joint::cells::{CellMaps, Grid};
 use crate::joint::noise::noise_of_phase;
 use crate::joint::scene::PhaseMap;
 
@@ -36,9 +36,10 @@ fn a_wide_window_takes_ripples_out_where_the_model_leaves_as_much() {
     let scene =
         Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
     let mut slopes = Slopes::default();
-    slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
+    slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation }, &mut CellMaps::default());
     let mut residuals = Residuals::default();
-    residuals.measure(&scene, &vec![(0.04f32 * 0.4).powi(2); grid.pixels()], &modulation);
+    let squared_residual = vec![(0.04f32 * 0.4).powi(2); grid.pixels()];
+    residuals.measure(&scene, &squared_residual, &modulation, &mut CellMaps::default());
     let window = || Window::new(&scene, &slopes, &modulation, 1e-4);
     let worst = |phase: &[f32], columns: std::ops::Range<usize>| {
         let inside = |i: &usize| (32..64).contains(&(i / 256)) && columns.contains(&(i % 256));
@@ -74,7 +75,7 @@ fn noise_goes_edges_and_curvature_stay() {
     let scene =
         Scene { light: [&light; 4], usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
     let mut slopes = Slopes::default();
-    slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation });
+    slopes.measure(&scene, PhaseMap { phase: &seen, modulation: &modulation }, &mut CellMaps::default());
     let window = Window::new(
         &scene,
         &slopes,
