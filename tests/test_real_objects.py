@@ -12,7 +12,7 @@ from support.bars import hold
 
 import quadfringe as qf
 from quadfringe.calibration.response import estimate_from_files
-from quadfringe.errors import DecodeError
+from quadfringe.errors import DecodeError, DecodeWarning
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
 from quadfringe.evaluation._isolated import isolated, patches
@@ -95,7 +95,8 @@ def test_a_capture_that_is_turned_by_90_degrees_is_decoded_or_refused_as_such(
 ) -> None:
     response = estimate_from_files(scenes.step_files(data_dir, name), scenes.STEPS).calibration
     scene = turned(stepped(data_dir, name, offset), offset)
-    score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
+    with pytest.warns(DecodeWarning, match="turned by 90 degrees"):
+        score = scoring.score(scene, scenes.shape_of(scene, response=response).phase_rad)
     hold(f"variants.{name}_turned_joint_right_worst_percent", score.right_percent)
     with pytest.raises(DecodeError, match=r"turned by 90 degrees: fringes run along the rows.*joint") as caught:
         scenes.shape_of(scene, response=response, method="published")

@@ -15,6 +15,10 @@ __all__: list[str] = []
 SAMPLES = 48
 # Distance in px over which columns must rise. A longer one crosses more edges, a shorter one is lost in noise.
 REACH_PX = 4
+# Angle between the direction in which columns grow and the rows, deg, up to which images count as upright. A camera may
+# be inclined by 45 degrees. A larger angle misses images that are turned by 90 degrees on a tilted surface.
+# `pytest tests/test_column_direction.py` has shots on both sides.
+UPRIGHT_DEG = 60.0
 # Share of the samples whose columns run backwards, or whose points are impossible, from which the shot is refused:
 # most of it contradicts the calibration. A larger share returns more wrong shapes.
 REFUSED_SHARE = 0.5

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from quadfringe.data import Calibration, Reason, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.column_direction import unusual_direction
 from quadfringe.decoding.device_limits import impossible_devices
 from quadfringe.decoding.fringe_fit import pixels_of
 from quadfringe.decoding.light_border import LightBorder, moved_border
@@ -131,10 +132,12 @@ def _turns(phase_rad: NDArray[np.float32], stride: int) -> NDArray[np.float32]:
 def implausible(shape: Shape, borders: list[LightBorder]) -> list[Cause]:
     """Name what the calibration contradicts in a shape, the likeliest first; empty when nothing does.
 
-    `borders` are those of the light in the shape.
+    Without a calibration an unusual direction of the columns is all that can be named. `borders` are those of the light
+    in the shape.
     """
     if shape.calibration is None or shape.xyz_mm is None:
-        return []
+        unusual = unusual_direction(shape)
+        return [] if unusual is None else [unusual]
     devices = impossible_devices(shape.calibration, coaxial=_coaxial(shape))
     if any(cause.fatal for cause in devices):
         return devices

@@ -66,8 +66,7 @@ impl Slopes {
         SlopeWindow { width, wide_share }: SlopeWindow,
         sums: &mut CellMaps,
     ) {
-        let PhaseMap { phase, modulation } = map;
-        let grid = scene.grid;
+        let (PhaseMap { phase, modulation }, grid) = (map, scene.grid);
         let Self { maps, wide, slots } = self;
         let whole = (grid.step * SAMPLED_ROWS.min(grid.step)) as f32;
         let wide_weight = wide_share * whole;
