@@ -282,7 +282,7 @@ mod tests {
             let mut lit = vec![0.0; grid.pixels()];
             let light = planes.each_ref().map(Vec::as_slice);
             let scaled = ScaledGrid { grid: &grid, period_px: 25.3, factor: 1 };
-            LitMask::new(None).find(scaled, light, 0.04, &mut lit);
+            LitMask::new(None).find(scaled, light, 0.04, &mut CellMaps::default(), &mut lit);
             for (i, lit) in lit.iter().enumerate() {
                 let (x, y) = (i % grid.stride, i / grid.stride);
                 if in_shadow(x, y) {
