@@ -2,7 +2,7 @@
 
 use crate::joint::cells::RowMaps;
 use crate::joint::model::weights;
-use crate::joint::params::local_fit::{AVERAGED_SHARE, CONTRAST_MIN, RIDGE, SPREAD_MIN};
+use crate::joint::params::local_fit::{CONTRAST_MIN, RIDGE, SPREAD_MIN};
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::parallel::angle::atan2;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
@@ -50,7 +50,7 @@ pub(super) struct ChannelRows<'a> {
 
 /// What decides the modulation of the pixels of a row, and whether there is enough of it.
 pub(super) struct StrengthRows<'a> {
-    /// Least amplitude of R and B, and of G and IR over the share of it that they need.
+    /// Least amplitude of the channels.
     pub weakest: &'a [f32],
     /// Mean amplitude of R and B; that of R if there is no B.
     pub mean: &'a [f32],
@@ -60,7 +60,7 @@ pub(super) struct StrengthRows<'a> {
 }
 
 /// Maps of the fit on the cells. Of R and B: offset and amplitude, four maps in a row; then of all channels the coefficients of
-/// `a + p cos + q sin`; then what [`StrengthRows`] names weakest and mean.
+/// `a + p cos + q sin`; then the least amplitude of all channels and the mean amplitude of R and B.
 pub(super) mod map {
     pub const A_R: usize = 0;
     pub const A_B: usize = 2;
@@ -173,8 +173,7 @@ pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], ratios: [f32; 4], out: &mut 
         let seen = if spread > SPREAD_MIN * sums[sum::W][i] { 1.0 } else { 0.0 };
         let [_, _, by_b, by_ir] = weights(ratios);
         let optional = |weight: f32, amplitude: f32| if weight > 0.0 { amplitude } else { f32::INFINITY };
-        let averaged = g[3].min(optional(by_ir, ir[3])) / AVERAGED_SHARE;
-        let weakest = strength(r).min(optional(by_b, strength(b))).min(averaged);
+        let weakest = strength(r).min(g[3]).min(optional(by_b, strength(b))).min(optional(by_ir, ir[3]));
         let mean = if by_b > 0.0 { 0.5 * (r[3] + b[3]) } else { r[3] };
         let pairs = [
             [r[0], r[3]],

@@ -21,11 +21,6 @@ pub const RIDGE: f32 = 1e-3;
 /// (`python evaluation/isolated.py`, `python evaluation/world.py --half tune --only painted_face clutter cloth`).
 pub const CONTRAST_MIN: f32 = 0.1;
 
-/// Least amplitude of G and IR, as a share of the least modulation of R and B. Many pixels of a window share it, so that less of it
-/// stands out of the noise. Larger: surfaces that are dark in one of the two are lost. Smaller: what a blind channel shows by chance
-/// counts as fringes. Varied: 0.5 and 1, painted face +4 %; 0.1, no effect (`python evaluation/world.py --half tune --only painted_face`).
-pub const AVERAGED_SHARE: f32 = 0.25;
-
 /// Least mean square of the phasor of R and B in any direction: 1/2 for whole fringes, 0 if all phasors lie along one line, as
 /// when B repeats R. Larger: surfaces along the fringes are lost. Smaller: the phase is noise there. Varied: no effect.
 pub const SPREAD_MIN: f32 = 0.02;
