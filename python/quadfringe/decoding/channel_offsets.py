@@ -8,6 +8,9 @@ that a wrong order hides, because a wrong order leaves them as they are:
   infrared turns it by its phase; numbers with another k let it drift by a turn over the field for each k.
 - N / k times the offset of infrared: numbers with the same differences, such as 37, 36, 31 in place of 36, 35, 30, let
   it drift by a turn for each fringe.
+
+Where red and blue are a quarter period apart, the phase is theirs, so that red has no offset, and they give the
+brightness of every pixel: texture that all channels share does not move the fringes of the others.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ from numpy.typing import NDArray
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder, rows_of_calibration
-from quadfringe.decoding._offsets import fitted_rad
+from quadfringe.decoding._offsets import fitted_rad, shared_brightness
 from quadfringe.decoding.cause import ORDERS, Cause
 from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration, wrong_order_rad
 from quadfringe.decoding.fringe_fit import infrared_column
@@ -191,8 +194,16 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
         per_px = np.float32(2 * np.pi * third / plan.projector_width_px)
         column_px = infrared_column(_rows(shape, rows.ravel()), plan).astype(np.float32)
         seen, third_rad = "ir", per_px * column_px.reshape(phase_rad.shape)
-    waves = (("red", phase_rad), ("green", second / first * phase_rad), (seen, third_rad))
-    tiles = np.array([*(_offsets_rad(light[name], wave_rad) for name, wave_rad in waves), _means(phase_rad / first)])
+    of_red, of_green, of_third = (_tiled(wave_rad) for wave_rad in (phase_rad, second / first * phase_rad, third_rad))
+    red, green, blue, other = (_tiled(light[name]) for name in ("red", "green", "blue", seen))
+    brightness, red_rad = None, np.zeros(len(red))
+    if plan.fringes.quadrature:
+        brightness = shared_brightness(red, blue, of_red)
+    else:
+        red_rad = fitted_rad(red, of_red)
+    angles_rad = (red_rad, fitted_rad(green, of_green, brightness), fitted_rad(other, of_third, brightness))
+    enough = np.count_nonzero(np.isfinite(of_red), axis=1) >= params.OFFSET_SHARE * of_red.shape[1]
+    tiles = np.where(enough, np.array([*angles_rad, _means(phase_rad / first)]), np.nan)
     known = np.isfinite(tiles).all(axis=0)
     place = np.indices((len(tops), known.size // len(tops))).reshape(2, -1).T
     red_rad, green_rad, other_rad, turn_rad = tiles[:, known]
@@ -226,15 +237,3 @@ def _means(bands: NDArray[Any]) -> Real:
     known = np.isfinite(tiles)
     sums = np.where(known, tiles, 0).sum(axis=1, dtype=np.float64)
     return np.asarray(sums / np.maximum(known.sum(axis=1), 1))
-
-
-def _offsets_rad(light: NDArray[Any], phase_rad: NDArray[Any]) -> Real:
-    """Give the offset of the fringes of each tile by least squares, (T,) rad; NaN with too few pixels."""
-    light, phase_rad = _tiled(light), _tiled(phase_rad)
-    known = np.isfinite(light) & np.isfinite(phase_rad)
-    enough = np.count_nonzero(known, axis=1) >= params.OFFSET_SHARE * known.shape[1]
-    offsets: Real = np.full(len(enough), np.nan)
-    if not enough.any():
-        return offsets
-    offsets[enough] = fitted_rad(light[enough], phase_rad[enough])
-    return offsets
