@@ -15,7 +15,7 @@ from quadfringe.calibration.response import estimate_from_files
 from quadfringe.errors import DecodeError, DecodeWarning
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
-from quadfringe.evaluation._isolated import isolated, patches
+from quadfringe.evaluation._isolated import isolated, patches, tinted
 from quadfringe.evaluation._variants import VARIANTS, stepped, turned
 
 # Bar, fringe period in px, share of the frame, seed. Objects of 2 % are narrower than a few fringes.
@@ -52,6 +52,23 @@ def test_a_sphere_whose_fringes_cancel_in_a_window_is_decoded() -> None:
     score = scoring.score(scene, scenes.shape_of(scene, response="linear").phase_rad)
     hold("isolated.right_percent", score.right_percent)
     hold("isolated.right_of_returned_percent", score.right_of_returned_percent)
+
+
+@pytest.mark.parametrize(
+    ("period_px", "fill", "seed", "surface", "contrast", "side_px", "tint"),
+    [
+        (74, 0.13, 203, "peaks", 0.3, 148, 0.0),
+        (50, 0.4, 541, "steps", 0.3, 150, 0.0),
+        (20, 0.4, 876, "peaks", 0.6, 24, 0.1),
+    ],
+)
+def test_an_object_with_a_texture_that_the_channels_share_is_decoded(
+    period_px: int, fill: float, seed: int, surface: str, contrast: float, side_px: int, tint: float
+) -> None:
+    scene = isolated(period_px, fill, seed, surface=surface, contrast=contrast, albedo=tinted(side_px, seed, tint))
+    score = scoring.score(scene, scenes.shape_of(scene, response="linear").phase_rad)
+    hold("isolated.textured_right_percent", score.right_percent)
+    hold("isolated.textured_right_of_returned_percent", score.right_of_returned_percent)
 
 
 @pytest.fixture(scope="module")

@@ -11,13 +11,14 @@ from quadfringe import _core
 from quadfringe.evaluation._scenes import noisy_8bit
 from quadfringe.evaluation.scoring import Scene
 
-__all__ = ["FRINGES", "isolated", "patches", "repeated"]
+__all__ = ["FRINGES", "isolated", "patches", "repeated", "tinted"]
 
 # Fringe numbers that show the camera this many px a fringe, about.
 FRINGES = {
     9: (144.0, 143.0, 132.0),
     20: (64.0, 63.0, 56.0),
     33: (38.0, 37.0, 32.0),
+    50: (25.0, 24.0, 20.0),
     74: (17.0, 16.0, 13.0),
     110: (12.0, 11.0, 9.0),
 }
@@ -78,6 +79,14 @@ def patches(side_px: int, seed: int, shape: tuple[int, int] = (768, 1024)) -> ND
     rows, columns = (size // side_px + 1 for size in shape)
     squares = np.random.default_rng([seed, 9]).uniform(0.15, 1.0, (rows, columns, 4))
     return repeated(squares, side_px, shape)
+
+
+def tinted(side_px: int, seed: int, tint: float, shape: tuple[int, int] = (768, 1024)) -> NDArray[np.float32]:
+    """Draw an albedo (H, W, 4) of squares from 0.2 to 1; the channels differ by the share `tint` at most."""
+    random = np.random.default_rng([seed, 9])
+    rows, columns = (size // side_px + 1 for size in shape)
+    squares = random.uniform(0.2, 1.0, (rows, columns, 1)) * (1 + tint * random.uniform(-1, 1, (rows, columns, 4)))
+    return repeated(np.clip(squares, 0.05, 1.0), side_px, shape)
 
 
 def repeated(cells: NDArray[Any], side_px: int, shape: tuple[int, int]) -> NDArray[np.float32]:
