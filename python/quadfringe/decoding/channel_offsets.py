@@ -9,8 +9,8 @@ that a wrong order hides, because a wrong order leaves them as they are:
 - N / k times the offset of infrared: numbers with the same differences, such as 37, 36, 31 in place of 36, 35, 30, let
   it drift by a turn for each fringe.
 
-Where red and blue are a quarter period apart, the phase is theirs, so that red has no offset, and they give the
-brightness of every pixel: texture that all channels share does not move the fringes of the others.
+Where red and blue are a quarter period apart, they give the brightness of every pixel, so that texture that all
+channels share does not move the fringes of the others.
 """
 
 from __future__ import annotations
@@ -196,11 +196,8 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
         seen, third_rad = "ir", per_px * column_px.reshape(phase_rad.shape)
     of_red, of_green, of_third = (_tiled(wave_rad) for wave_rad in (phase_rad, second / first * phase_rad, third_rad))
     red, green, blue, other = (_tiled(light[name]) for name in ("red", "green", "blue", seen))
-    brightness, red_rad = None, np.zeros(len(red))
-    if plan.fringes.quadrature:
-        brightness = shared_brightness(red, blue, of_red)
-    else:
-        red_rad = fitted_rad(red, of_red)
+    brightness = shared_brightness(red, blue, of_red) if plan.fringes.quadrature else None
+    red_rad = fitted_rad(red, of_red)
     angles_rad = (red_rad, fitted_rad(green, of_green, brightness), fitted_rad(other, of_third, brightness))
     enough = np.count_nonzero(np.isfinite(of_red), axis=1) >= params.OFFSET_SHARE * of_red.shape[1]
     tiles = np.where(enough, np.array([*angles_rad, _means(phase_rad / first)]), np.nan)
