@@ -25,7 +25,7 @@ BAND_PIXELS_MIN = TILE_SHARE * TILE_PX**2
 # and 0.2 rad or more with other fringe numbers. `pytest tests/test_real_objects.py` decodes both.
 OFFSET_MAX_RAD = 0.12
 QUANTILE = 0.75
-# Share of the squares of the light left by one albedo that the shared brightness may leave to be taken. Texture that the
+# Share of the squares left by one albedo that the shared brightness may leave, to be taken. Texture that the
 # channels share leaves a tenth or less. A larger share lets a wrong response, of which red and blue make a brightness,
 # move the fringes of others (`pytest tests/test_doctor_board.py -k response`); a smaller one takes texture for offsets.
 SHARED_LEFT_MAX = 0.5
