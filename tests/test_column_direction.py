@@ -50,6 +50,16 @@ def test_mirrored_images_and_those_turned_by_180_degrees_have_a_warning(
     assert len(shape.warnings) == 1
 
 
+def test_a_small_mirrored_object_has_a_warning(upright: qf.Shot) -> None:
+    def cut_out(image: Image) -> Image:
+        inside = np.zeros(image.shape, image.dtype)
+        inside[160:220, 200:300] = 1  # 3 % of the frame
+        return np.fliplr(image * inside)
+
+    with pytest.warns(qf.DecodeWarning, match="mirrored"):
+        decoded(upright, cut_out)
+
+
 def test_a_calibration_decides_instead(upright: qf.Shot) -> None:
     with qf.open(qf.SystemConfig(camera=CAMERA)) as scanner:
         plan = qf.Plan(912, calibration=scanner.calibration)

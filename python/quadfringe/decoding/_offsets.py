@@ -25,9 +25,9 @@ BAND_PIXELS_MIN = TILE_SHARE * TILE_PX**2
 # and 0.2 rad or more with other fringe numbers. `pytest tests/test_real_objects.py` decodes both.
 OFFSET_MAX_RAD = 0.12
 QUANTILE = 0.75
-# Share of the squares left by one albedo that the shared brightness may leave, to be taken. Texture that the
-# channels share leaves a tenth or less. A larger share lets a wrong response, of which red and blue make a brightness,
-# move the fringes of others (`pytest tests/test_doctor_board.py -k response`); a smaller one takes texture for offsets.
+# Share of the squares left by one albedo that the shared brightness may leave, to be taken. A larger share lets a wrong
+# response, of which red and blue make a brightness, move the fringes of others: with 1 a sound shot is refused (`pytest
+# tests/test_doctor_board.py -k response`). A smaller one takes texture for offsets. Other shares were not tried.
 SHARED_LEFT_MAX = 0.5
 # Least albedo of red over that of blue, and least square of their light of brightness 1: they keep quotients finite.
 RATIO_MIN, LIGHT_MIN = 1e-3, 1e-3

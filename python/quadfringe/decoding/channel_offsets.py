@@ -1,7 +1,7 @@
 """What the phases of the channels say to each other on a decoded shot: infrared that is shifted, other fringe numbers.
 
 A decoded phase says where the fringes of green and infrared must lie. Where they lie instead, their offsets tell, in a
-few bands of rows, which takes a millisecond. For fringe numbers N, N - 1 and N - k two sums of the offsets show faults
+few bands of rows, to save time. For fringe numbers N, N - 1 and N - k two sums of the offsets show faults
 that a wrong order hides, because a wrong order leaves them as they are:
 
 - offset of infrared + (k - 1) times that of red - k times that of green: the closure of the three phases. A shift of

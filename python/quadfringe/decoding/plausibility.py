@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from quadfringe.data import Calibration, Reason, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
-from quadfringe.decoding.column_direction import unusual_direction
+from quadfringe.decoding.column_direction import samples_of, unusual_direction
 from quadfringe.decoding.device_limits import impossible_devices
 from quadfringe.decoding.fringe_fit import pixels_of
 from quadfringe.decoding.light_border import LightBorder, moved_border
@@ -57,22 +57,13 @@ def geometry_of(shape: Shape) -> Geometry | None:
     """Measure a shape against its calibration; None without one, or with too few samples."""
     if shape.calibration is None or shape.xyz_mm is None:
         return None
-    stride = max(1, min(shape.phase_rad.shape) // params.SAMPLES)
-    if np.count_nonzero(np.isfinite(shape.column_px[::stride, ::stride])) < params.SAMPLES_MIN:
-        stride = max(1, stride // params.FINER)
-    reach = params.REACH_PX
-    here, right, below = (
-        np.s_[:-reach:stride, :-reach:stride],
-        np.s_[:-reach:stride, reach::stride],
-        np.s_[reach::stride, :-reach:stride],
-    )
-    columns = shape.column_px[here]
-    returned = np.isfinite(columns)
-    if returned.sum() < params.SAMPLES_MIN:
+    samples = samples_of(shape.column_px)
+    if samples is None:
         return None
-    points = shape.xyz_mm[here]
+    returned = np.isfinite(shape.column_px[samples.here])
+    points = shape.xyz_mm[samples.here]
     met = returned & np.isfinite(points[..., 2])
-    along_x, along_y = (shape.column_px[there] - columns for there in (right, below))
+    along_x, along_y = samples.growth(shape.column_px)
     depth_mm = float(np.median(points[..., 2][met])) if met.sum() >= params.SAMPLES_MIN else float("nan")
     expected = _growth(np.nan_to_num(depth_mm, nan=FAR_MM), shape.calibration)
     across = _across(along_x, along_y, expected)
@@ -80,10 +71,10 @@ def geometry_of(shape: Shape) -> Geometry | None:
         return Geometry(0.0, 1.0, across, 0.0, 0.0, float("nan"), float("nan"))
     direction = 1.0 if expected[0] >= 0 else -1.0
     growth = along_x[met] * direction
-    turns = _turns(shape.phase_rad, stride)[met] * direction
+    turns = _turns(shape.phase_rad, samples.stride)[met] * direction
     rows = pixels_of(points, shape.calibration.projector)[..., 1]
     off = np.maximum(-0.5 - rows, rows - (shape.calibration.projector.height_px - 0.5))
-    tilt = _tilt_deg(points, shape.xyz_mm[right], shape.xyz_mm[below])
+    tilt = _tilt_deg(points, shape.xyz_mm[samples.right], shape.xyz_mm[samples.below])
     return Geometry(
         backwards=_most_backwards(growth, turns),
         nowhere=1 - float(met.sum()) / float(returned.sum()),
