@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import time
 import warnings
 from dataclasses import replace
 from functools import cache
@@ -138,3 +139,13 @@ def test_a_shape_without_data_has_no_offsets() -> None:
     shape.phase_rad[:] = np.nan
     assert offsets_of(shape, shot, plan).turn_rad.size == 0
     assert contradiction(shape, shot, plan) is None
+
+
+def test_no_thread_goes_on_after_a_decode() -> None:
+    # After some products of matrices, threads of OpenBLAS wait for work in a loop, on the cores of the next decode.
+    decoder = qf.Decoder(face(), qf.Plan(912, calibration=calibration(), decode=qf.DecodeConfig(method="published")))
+    for _ in range(3):
+        decoder.decode(face())
+    before = time.process_time()
+    time.sleep(0.2)
+    assert time.process_time() - before < 0.1

@@ -40,6 +40,7 @@ __all__ = [
     "fill_gaps",
     "fourier",
     "fourier_pair",
+    "fringe_offsets",
     "lightcrafters",
     "linear_light",
     "linear_light_bayer",
@@ -55,6 +56,7 @@ __all__ = [
     "power_on_drive",
     "predeform",
     "row_period",
+    "shared_brightness",
     "step_pattern",
     "two_step",
     "udev_rule",
@@ -557,6 +559,23 @@ def fourier(
     image: NDArray[np.float32], period_px: float, *, band: str | None = None, kind: str | None = None
 ) -> NDArray[np.float32]:
     """Give the wrapped phase in rad of fringes along the rows (S3); `band` is traditional or improved."""
+
+def fringe_offsets(
+    light: NDArray[np.float32], phase_rad: NDArray[np.float32], brightness: NDArray[np.float32] | None = None
+) -> NDArray[np.float64]:
+    """Give the angle in rad, (T,), by which fringes lie off a phase, in linear light and phase of tiles, (T, N).
+
+    A tile has one albedo, or that of `brightness`, (T, N), up to a factor, whichever explains its light better. NaN
+    does not count; a tile without light gives 0. ValueError when the shapes differ.
+    """
+
+def shared_brightness(
+    red: NDArray[np.float32], blue: NDArray[np.float32], phase_rad: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """Give the albedo of the pixels of tiles, (T, N), up to a factor, from R and B in quadrature, linear light.
+
+    0 for a pixel that is NaN in one of them. ValueError when the shapes differ.
+    """
 
 def n_step(
     stack: NDArray[np.float32],

@@ -9,6 +9,7 @@ mod device;
 mod height;
 mod memory;
 mod mesh;
+mod offset;
 mod pair;
 mod plan;
 mod projector;
@@ -49,6 +50,8 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(stages::two_step, module)?)?;
     module.add_function(wrap_pyfunction!(stages::fourier, module)?)?;
     module.add_function(wrap_pyfunction!(stages::n_step, module)?)?;
+    module.add_function(wrap_pyfunction!(offset::fringe_offsets, module)?)?;
+    module.add_function(wrap_pyfunction!(offset::shared_brightness, module)?)?;
     module.add_function(wrap_pyfunction!(stages::unwrap, module)?)?;
     published_stages::register(module)?;
     module.add_function(wrap_pyfunction!(stages::estimate_response, module)?)?;

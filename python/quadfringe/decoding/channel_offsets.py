@@ -21,10 +21,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from quadfringe import _core
 from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder, rows_of_calibration
-from quadfringe.decoding._offsets import fitted_rad, shared_brightness
 from quadfringe.decoding.cause import ORDERS, Cause
 from quadfringe.decoding.causes import NUMBERS_FIX, family, listed, registration, wrong_order_rad
 from quadfringe.decoding.fringe_fit import infrared_column
@@ -147,10 +147,11 @@ def _numbers(offsets: Offsets, plan: Plan) -> Cause | None:
 def _in_part(offsets: Offsets, plan: Plan) -> Cause | None:
     """Find a part where the closure is off by half a wrong order, in tiles that agree with those around."""
     wave, least = np.exp(1j * offsets.closure_rad(plan.fringes.numbers)), 0.5 * wrong_order_rad(plan.fringes.numbers)
-    if not plan.fringes.infrared or wave.size == 0:
+    if not plan.fringes.infrared or np.count_nonzero(np.abs(np.angle(wave)) > least) < params.OFFSET_TILES_MIN:
         return None
     near = np.abs(offsets.place[:, np.newaxis] - offsets.place).max(axis=2) <= 1
-    around = near @ wave / near.sum(axis=1)
+    # A product of matrices wakes threads of OpenBLAS, which go on without work on the cores that the next decode needs.
+    around = np.where(near, wave, 0).mean(axis=1) / near.mean(axis=1)
     off = (np.abs(around) > params.STEADY_MIN) & (np.minimum(*np.abs(np.angle([wave, around]))) > least)
     if np.count_nonzero(off) < params.OFFSET_TILES_MIN or off.mean() > params.OFFSET_PART_MAX:
         return None
@@ -171,10 +172,10 @@ def _where_it_fits(cause: Cause, shape: Shape, shot: AnyShot, plan: Plan) -> Cau
 
 def _drift(angle_rad: Real, turn_rad: Real) -> int:
     """Give the turns by which an angle drifts over the field; 0 unless a drift explains it clearly better than none."""
-    turns = range(-params.DRIFT_TURNS_MAX, params.DRIFT_TURNS_MAX + 1)
-    lengths = {turn: abs(_mean(angle_rad - turn * turn_rad)) for turn in turns}
-    best = max(turns, key=lambda turn: lengths[turn])
-    return best if lengths[best] > max(params.DRIFT_LENGTH, lengths[0] + params.DRIFT_BETTER) else 0
+    turns = np.arange(-params.DRIFT_TURNS_MAX, params.DRIFT_TURNS_MAX + 1)
+    lengths = np.abs(np.exp(1j * (angle_rad - turns[:, np.newaxis] * turn_rad)).mean(axis=1))
+    best, still = int(lengths.argmax()), params.DRIFT_TURNS_MAX
+    return int(turns[best]) if lengths[best] > max(params.DRIFT_LENGTH, lengths[still] + params.DRIFT_BETTER) else 0
 
 
 def _mean(angle_rad: Real) -> complex:
@@ -196,9 +197,11 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
         seen, third_rad = "ir", per_px * column_px.reshape(phase_rad.shape)
     of_red, of_green, of_third = (_tiled(wave_rad) for wave_rad in (phase_rad, second / first * phase_rad, third_rad))
     red, green, blue, other = (_tiled(light[name]) for name in ("red", "green", "blue", seen))
-    brightness = shared_brightness(red, blue, of_red) if plan.fringes.quadrature else None
-    red_rad = fitted_rad(red, of_red)
-    angles_rad = (red_rad, fitted_rad(green, of_green, brightness), fitted_rad(other, of_third, brightness))
+    brightness = _core.shared_brightness(red, blue, of_red) if plan.fringes.quadrature else None
+    angles_rad = (
+        _core.fringe_offsets(red, of_red),
+        *(_core.fringe_offsets(*each, brightness) for each in ((green, of_green), (other, of_third))),
+    )
     enough = np.count_nonzero(np.isfinite(of_red), axis=1) >= params.OFFSET_SHARE * of_red.shape[1]
     tiles = np.where(enough, np.array([*angles_rad, _means(phase_rad / first)]), np.nan)
     known = np.isfinite(tiles).all(axis=0)
@@ -209,10 +212,11 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
 
 def _light_of_bands(shot: AnyShot, plan: Plan, tops: range, count: int) -> dict[str, NDArray[np.float32]]:
     """Give the linear light of some rows of every band by channel, (bands, rows, columns)."""
-    bands = []
+    known, bands = plan.calibration, []
     for top in tops:
-        calibration = None if plan.calibration is None else rows_of_calibration(plan.calibration, top, count)
-        bands.append(linear_light_of(rows_of(shot, top, count), replace(plan, calibration=calibration)))
+        # Only the registration depends on the rows, and plans take longer to make than light.
+        rows = known and known.ir_registration and rows_of_calibration(known, top, count)
+        bands.append(linear_light_of(rows_of(shot, top, count), replace(plan, calibration=rows) if rows else plan))
     return {name: np.stack([band[name][:: params.ROW_STRIDE] for band in bands]) for name in bands[0]}
 
 

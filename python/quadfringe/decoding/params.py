@@ -136,6 +136,9 @@ OFFSET_TILES_MIN = 4
 # decoded once more with them to name the cause. A smaller share costs time, a larger one takes parts out silently
 # (`pytest tests/test_trusted.py -k contradicts`).
 TAKEN_OUT_SHARE = 0.05
+# Pixels between those that are counted for it. A smaller number costs time (`python benches/checks.py`), a larger one
+# counts small objects less exactly: one of 2 % of 1024 x 768 pixels has a thousand of them.
+TAKEN_OUT_STRIDE = 4
 # Largest share of the tiles that is a part. Crosstalk of red and green turns the closure everywhere (0.84 at 0.15:
 # `pytest tests/test_channel_offsets.py`). A smaller number misses broken halves.
 OFFSET_PART_MAX = 0.7

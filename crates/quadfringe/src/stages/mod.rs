@@ -13,6 +13,7 @@
 //! | [`discard_invalid`], [`wrong_order_probability`]: what can be trusted | |
 //! | [`columns_from_phase`]: projector columns | (S1) |
 //! | [`n_step()`]: the reference by N-step phase shifting | |
+//! | [`fringe_offsets`], [`shared_brightness`]: by which angle fringes lie off a known phase | |
 //!
 //! The published decoder calls the same functions row by row. The test `tests/stages.rs` composes the public functions
 //! and gets bit-identical results; the source of `published/mod.rs` holds the recipe.
@@ -28,6 +29,7 @@ mod fourier;
 mod ladder;
 mod lit_carrier;
 mod n_step;
+mod offset;
 mod params;
 mod phases;
 mod quadrature;
@@ -50,6 +52,7 @@ pub use fourier::{Band, Demodulated, Fringes, fourier, fourier_pair};
 pub(crate) use fourier::{Half, Interpolation, RowFilter, RowPair, RowScratch, lesser};
 pub use ladder::{Ladder, Ordered, unwrap};
 pub use n_step::{NStep, n_step};
+pub use offset::{fringe_offsets, shared_brightness};
 pub(crate) use params::SAMPLE_STRIDE;
 pub use phases::Phases;
 pub use quadrature::{difference_carrier, quadrature_carrier};

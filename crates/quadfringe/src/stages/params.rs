@@ -142,3 +142,14 @@ pub(crate) const ROW_MIN: usize = 8;
 /// Distance between the pixels whose mean gives the gain of one image against another. A larger one misses small objects; a smaller
 /// one takes longer. Not measured: a seventh of the pixels of an image has the same mean.
 pub const MEAN_STRIDE: usize = 7;
+
+/// Share of the squares left by one albedo that the shared brightness may leave, to be taken. A larger share lets a wrong response, of
+/// which R and B make a brightness, move the fringes of others: with 1 a sound shot is refused (`pytest tests/test_doctor_board.py -k
+/// response`). A smaller one takes texture for offsets. Other shares were not tried.
+pub(crate) const SHARED_LEFT_MAX: f64 = 0.5;
+/// Least albedo of R over that of B. Not measured: it keeps a quotient finite.
+pub(crate) const BRIGHT_RATIO_MIN: f32 = 1e-3;
+/// Added to the square of the light of a brightness of 1. Not measured: it keeps a quotient finite.
+pub(crate) const BRIGHT_SQUARE_MIN: f32 = 1e-3;
+/// Ridge of the normal equations of a tile, linear light squared. Not measured: it keeps a tile without light finite.
+pub(crate) const OFFSET_RIDGE: f64 = 1e-6;
