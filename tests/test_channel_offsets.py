@@ -15,7 +15,7 @@ import pytest
 import quadfringe as qf
 from quadfringe import _core
 from quadfringe.decoding import params
-from quadfringe.decoding.channel_offsets import contradiction, offsets_of
+from quadfringe.decoding.channel_offsets import Offsets, _in_part, contradiction, offsets_of
 from quadfringe.decoding.fringe_fit import infrared_drift
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import world
@@ -146,6 +146,16 @@ def test_no_thread_goes_on_after_a_decode() -> None:
     decoder = qf.Decoder(face(), qf.Plan(912, calibration=calibration(), decode=qf.DecodeConfig(method="published")))
     for _ in range(3):
         decoder.decode(face())
+    before = time.process_time()
+    time.sleep(0.2)
+    assert time.process_time() - before < 0.1
+
+
+def test_no_thread_goes_on_after_a_shifted_part_is_found() -> None:
+    place = np.indices((8, 10)).reshape(2, -1).T
+    still, shifted = np.zeros(80), np.where(place[:, 0] < 3, 1.2, 0.0)
+    turn = np.linspace(0, 2 * np.pi, 80)
+    assert _in_part(Offsets(still, still, shifted, turn, place), qf.Plan(912)) is not None
     before = time.process_time()
     time.sleep(0.2)
     assert time.process_time() - before < 0.1

@@ -198,12 +198,11 @@ def offsets_of(shape: Shape, shot: AnyShot, plan: Plan) -> Offsets:
     of_red, of_green, of_third = (_tiled(wave_rad) for wave_rad in (phase_rad, second / first * phase_rad, third_rad))
     red, green, blue, other = (_tiled(light[name]) for name in ("red", "green", "blue", seen))
     brightness = _core.shared_brightness(red, blue, of_red) if plan.fringes.quadrature else None
-    angles_rad = (
-        _core.fringe_offsets(red, of_red),
-        *(_core.fringe_offsets(*each, brightness) for each in ((green, of_green), (other, of_third))),
-    )
+    red_rad = _core.fringe_offsets(red, of_red)
+    green_rad = _core.fringe_offsets(green, of_green, brightness)
+    other_rad = _core.fringe_offsets(other, of_third, brightness)
     enough = np.count_nonzero(np.isfinite(of_red), axis=1) >= params.OFFSET_SHARE * of_red.shape[1]
-    tiles = np.where(enough, np.array([*angles_rad, _means(phase_rad / first)]), np.nan)
+    tiles = np.where(enough, np.array([red_rad, green_rad, other_rad, _means(phase_rad / first)]), np.nan)
     known = np.isfinite(tiles).all(axis=0)
     place = np.indices((len(tops), known.size // len(tops))).reshape(2, -1).T
     red_rad, green_rad, other_rad, turn_rad = tiles[:, known]
@@ -215,8 +214,9 @@ def _light_of_bands(shot: AnyShot, plan: Plan, tops: range, count: int) -> dict[
     known, bands = plan.calibration, []
     for top in tops:
         # Only the registration depends on the rows, and plans take longer to make than light.
-        rows = known and known.ir_registration and rows_of_calibration(known, top, count)
-        bands.append(linear_light_of(rows_of(shot, top, count), replace(plan, calibration=rows) if rows else plan))
+        if known is not None and known.ir_registration is not None:
+            plan = replace(plan, calibration=rows_of_calibration(known, top, count))
+        bands.append(linear_light_of(rows_of(shot, top, count), plan))
     return {name: np.stack([band[name][:: params.ROW_STRIDE] for band in bands]) for name in bands[0]}
 
 

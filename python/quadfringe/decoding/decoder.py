@@ -159,9 +159,10 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
 
 def _taken_out(shape: Shape, shot: AnyShot, kernel: KernelDecoder | None) -> Cause | None:
     """Name what the channels contradict in what the kernel took out, if that is much."""
+    if kernel is None or kernel.settings["method"] == "published":
+        return None
     quality = shape.quality[:: params.TAKEN_OUT_STRIDE, :: params.TAKEN_OUT_STRIDE]
-    lit, out = np.count_nonzero(np.isfinite(quality)), np.count_nonzero(quality == 0)
-    if kernel is None or out <= params.TAKEN_OUT_SHARE * lit or kernel.settings["method"] == "published":
+    if np.count_nonzero(quality == 0) <= params.TAKEN_OUT_SHARE * np.count_nonzero(np.isfinite(quality)):
         return None
     return taken_out(shape, shot, kernel.plan, kernel.keeping_doubtful().shape(shot))
 

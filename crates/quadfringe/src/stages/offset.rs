@@ -30,11 +30,25 @@ impl Rows {
         waves(lanes_mut(light_row), lanes(phase_row), terms.each_mut().map(|row| lanes_mut(row)));
     }
 
-    /// Factors of the terms whose sum comes nearest to the light, and the sum of the squares that it leaves.
-    fn fit(&self) -> ([f64; 3], f64) {
+    fn fit(&self) -> Fit {
         let (terms, light) = (self.terms.each_ref().map(|row| lanes(row)), lanes(&self.light));
-        let found = solve(sums(terms, light));
-        (found, squares_left(terms, light, found.map(|factor| factor as f32)))
+        let factors = solve(sums(terms, light));
+        Fit { factors, left: squares_left(terms, light, factors.map(|factor| factor as f32)) }
+    }
+}
+
+/// The sum of terms that comes nearest to the light.
+struct Fit {
+    factors: [f64; 3],
+    /// Sum of the squares that it leaves.
+    left: f64,
+}
+
+impl Fit {
+    /// The angle of fringes off their phase.
+    fn angle_rad(&self) -> f64 {
+        let [_, p, q] = self.factors;
+        q.atan2(p)
     }
 }
 
@@ -90,13 +104,13 @@ pub fn fringe_offsets(
     let mut rows = Rows::default();
     let mut off = |tile: usize| {
         rows.load(light.row(tile).iter().copied(), phase_rad.row(tile));
-        let ([_, p, q], residual) = rows.fit();
-        let Some(brightness) = brightness else { return q.atan2(p) };
+        let alone = rows.fit();
+        let Some(brightness) = brightness else { return alone.angle_rad() };
         for row in &mut rows.terms {
             row.iter_mut().zip(brightness.row(tile)).for_each(|(term, brightness)| *term *= brightness);
         }
-        let ([_, shared_p, shared_q], left) = rows.fit();
-        if left < SHARED_LEFT_MAX * residual { shared_q.atan2(shared_p) } else { q.atan2(p) }
+        let shared = rows.fit();
+        if shared.left < SHARED_LEFT_MAX * alone.left { shared.angle_rad() } else { alone.angle_rad() }
     };
     Ok((0..light.nrows()).map(&mut off).collect())
 }
@@ -109,6 +123,18 @@ pub fn fringe_offsets(
 ///
 /// # Errors
 /// [`Error::Shape`] when the shapes differ.
+///
+/// ```
+/// use ndarray::Array2;
+/// use quadfringe::stages::shared_brightness;
+/// let phase = Array2::from_shape_fn((1, 200), |(_, x)| 0.1 * x as f32);
+/// let albedo = Array2::from_shape_fn((1, 200), |(_, x)| if x < 90 { 0.8 } else { 0.2 });
+/// let red = &albedo * &phase.mapv(|t| 1.0 + 0.3 * t.cos());
+/// let blue = &albedo * &phase.mapv(|t| 1.0 - 0.3 * t.sin());
+/// let found = shared_brightness(red.view(), blue.view(), phase.view())?;
+/// assert!((found[[0, 10]] / found[[0, 150]] - 4.0).abs() < 0.02);
+/// # Ok::<(), quadfringe::Error>(())
+/// ```
 pub fn shared_brightness(
     red: ArrayView2<'_, f32>,
     blue: ArrayView2<'_, f32>,
@@ -116,23 +142,23 @@ pub fn shared_brightness(
 ) -> Result<Array2<f32>> {
     check("blue", blue, red)?;
     check("phase_rad", phase_rad, red)?;
-    let (mut out, mut rows) = (Array2::zeros(red.raw_dim()), Rows::default());
+    let mut out = Array2::zeros(red.raw_dim());
+    let (mut seen, mut fitted) = (Rows::default(), Rows::default());
     let tiles = Zip::from(out.outer_iter_mut()).and(red.outer_iter()).and(blue.outer_iter());
     tiles.and(phase_rad.outer_iter()).for_each(|mut out, red, blue, phase_rad| {
-        let of_both =
-            || red.iter().zip(blue).map(|(red, blue)| if blue.is_finite() { *red } else { f32::NAN });
-        rows.load(of_both(), phase_rad);
-        let Rows { terms: [ones, cosines, sines], light, .. } = &mut rows;
-        for (x, blue) in blue.iter().enumerate() {
-            let blue = if ones[x] > 0.0 { *blue } else { 0.0 };
-            (ones[x], cosines[x], sines[x]) = (blue, blue * cosines[x], -light[x] * sines[x]);
+        let of_both = red.iter().zip(blue).map(|(red, blue)| if blue.is_finite() { *red } else { f32::NAN });
+        seen.load(of_both, phase_rad);
+        let Rows { terms: [known, cosines, sines], light, .. } = &seen;
+        fitted.light.clone_from(light);
+        fitted.terms.iter_mut().for_each(|row| row.clone_from(known));
+        let [ratio_terms, red_terms, blue_terms] = &mut fitted.terms;
+        for (x, &blue) in blue.iter().enumerate().filter(|(x, _)| known[*x] > 0.0) {
+            (ratio_terms[x], red_terms[x], blue_terms[x]) = (blue, blue * cosines[x], -light[x] * sines[x]);
         }
-        let ([ratio, of_red, of_blue], _) = rows.fit();
+        let [ratio, of_red, of_blue] = fitted.fit().factors;
         let ratio = (ratio as f32).max(BRIGHT_RATIO_MIN);
         let (of_red, of_blue) = ((of_red as f32 / ratio).clamp(0.0, 1.0), (of_blue as f32).clamp(0.0, 1.0));
-        rows.load(of_both(), phase_rad);
-        let Rows { terms: [ones, cosines, sines], light, .. } = &rows;
-        for (x, (out, blue)) in out.iter_mut().zip(blue).enumerate().filter(|(x, _)| ones[*x] > 0.0) {
+        for (x, (out, blue)) in out.iter_mut().zip(blue).enumerate().filter(|(x, _)| known[*x] > 0.0) {
             let (by_red, by_blue) = (1.0 + of_red * cosines[x], (1.0 + of_blue * sines[x]) / ratio);
             *out = (light[x] * by_red + blue * by_blue)
                 / (by_red * by_red + by_blue * by_blue + BRIGHT_SQUARE_MIN);
@@ -238,5 +264,15 @@ mod tests {
         let green = &albedo.slice(ndarray::s![.., ..;-1]) * &phase.mapv(|t| 0.6 + 0.2 * (t + 0.3).cos());
         let alone = fringe_offsets(green.view(), phase.view(), None).unwrap();
         assert_eq!(fringe_offsets(green.view(), phase.view(), Some(albedo.view())).unwrap(), alone);
+    }
+
+    #[test]
+    fn arrays_of_other_shapes_are_an_error() {
+        let [phase, albedo] = tiles();
+        let short = albedo.slice(ndarray::s![.., ..200]);
+        let wrong = |found: Option<Error>| assert!(matches!(found, Some(Error::Shape { .. })), "{found:?}");
+        wrong(fringe_offsets(albedo.view(), phase.slice(ndarray::s![..1, ..]), None).err());
+        wrong(fringe_offsets(albedo.view(), phase.view(), Some(short)).err());
+        wrong(shared_brightness(albedo.view(), short, phase.view()).err());
     }
 }
