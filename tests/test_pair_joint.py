@@ -16,12 +16,13 @@ from quadfringe.decoding.pair_numbers import infrared_along_rays, order_margin_r
 from quadfringe.evaluation.world.pairs import PAIRS, PairBench, PairFigures, judge_pair
 
 SEED = 2
+SEEDS = range(1, 9)
 SIDE_BY_SIDE = ("50 mm nearer", "50 mm farther", "50 mm above")
 
 
-def figures(name: str, scene: str | float) -> PairFigures:
+def figures(name: str, scene: str | float, seed: int = SEED) -> PairFigures:
     bench = PairBench.named(name)
-    taken = bench.take(scene, SEED)
+    taken = bench.take(scene, seed)
     return judge_pair(bench.decoder(taken.take.shot).decode_without_verdict(taken.take.shot), taken)
 
 
@@ -35,8 +36,14 @@ def steps() -> PairFigures:
 def test_a_deviated_pair_is_as_good_as_a_coaxial_one(depth_mm: float) -> None:
     alone, found = figures("coaxial", depth_mm), figures("1 degree, 5 mm", depth_mm)
     hold("pair.joint_rms_ratio", found.rms_mm / alone.rms_mm)
-    hold("pair.joint_wrong_order_percent", found.wrong_percent)
     hold("pair.joint_returned_percent", found.returned_percent)
+
+
+@pytest.mark.parametrize("depth_mm", [700.0, 800.0, 900.0])
+def test_a_deviated_pair_has_few_wrong_orders(depth_mm: float) -> None:
+    # Chance decides about a strip where the light of one projector ends, so one seed says little.
+    wrong = [figures("1 degree, 5 mm", depth_mm, seed).wrong_percent for seed in SEEDS]
+    hold("pair.joint_plane_wrong_order_percent", np.mean(wrong))
 
 
 def test_a_deviated_pair_sees_steps_as_a_coaxial_one(steps: PairFigures) -> None:

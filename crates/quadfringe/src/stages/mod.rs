@@ -25,6 +25,7 @@ mod band;
 mod blocks;
 mod carrier;
 mod columns;
+mod even_weights;
 mod fourier;
 mod ladder;
 mod lit_carrier;

@@ -40,6 +40,23 @@ pub(crate) const DIRECTION_SHARE_MIN: f64 = 0.3;
 /// objects; a larger one takes less time. Follows from the least object: 20 px in a direction have five samples.
 pub(crate) const LIT_STEP: usize = 4;
 
+/// Side in pixels of the tiles whose fringes count alike (J39). Larger: a bright object outweighs the dim ground in its tile. Smaller: a
+/// tile holds less of a wide fringe. `cargo test -p quadfringe --lib quadrature` bounds the error.
+pub(crate) const EVEN_TILE_PX: usize = 32;
+
+/// Step in pixels, in both directions, of the samples of a tile. A smaller step tells dimmer fringes from noise; a larger one takes
+/// less time. `cargo test -p quadfringe --lib quadrature` bounds the error.
+pub(crate) const EVEN_TILE_STEP: usize = 2;
+
+/// Least correlation of neighbours in a tile that shows fringes. A larger value misses dim fringes; a smaller one takes noise for
+/// fringes. Follows from the 256 samples of a tile: four standard deviations of what noise has.
+pub(crate) const TILE_CORRELATION_MIN: f32 = 0.25;
+
+/// Share of the mean variance of all tiles that counts as noise, which keeps faint shades of images without noise from counting as
+/// fringes. Larger: the dim ground of bright objects counts less. Smaller: fainter shades count. `cargo test -p quadfringe --lib
+/// quadrature` bounds the error.
+pub(crate) const FAINT_SHARE: f32 = 1e-3;
+
 /// Least number of lit samples of a line that takes part. A larger number leaves out the ends of an object; a smaller one takes
 /// in bright pixels of the ground. Follows from the fit: a constant and a wave need a few pixels.
 pub(crate) const LIT_SAMPLES_MIN: usize = 2;

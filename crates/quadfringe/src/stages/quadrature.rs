@@ -10,13 +10,17 @@
 //! without a fixed phase cancel; its sign tells only in which direction the phase grows. Rows and columns cross the same
 //! fringes, so a direction whose sum is far below that of the other crosses none.
 //!
-//! If light falls on a small part of the frame, the carrier is that of the part.
+//! Each place counts by whether it shows fringes, not by its brightness (`even_weights`). If only a small part of the frame shows any,
+//! the carrier is that of the part.
 
 use super::band::Waves;
 use super::carrier::{Carrier, LineTransform};
+use super::even_weights::EvenWeights;
 use super::lit_carrier::SmallPart;
-use super::params::{CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, DIRECTION_SHARE_MIN, MEAN_STRIDE};
-use ndarray::ArrayView2;
+use super::params::{
+    CARRIER_CYCLES_MIN, CARRIER_LINES, CARRIER_POWER_MIN, DIRECTION_SHARE_MIN, MEAN_STRIDE, SMALL_PART,
+};
+use ndarray::{Array1, ArrayView2};
 
 /// The carrier of the fringes that R and B show a quarter period apart, in linear light of equal shapes.
 ///
@@ -35,10 +39,13 @@ use ndarray::ArrayView2;
 /// ```
 #[must_use]
 pub fn quadrature_carrier(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Carrier {
-    let of_part = SmallPart::of(red, blue).map(|part| stronger(part.waves(red, blue)));
+    let even = EvenWeights::of(red, blue);
+    let part = if even.shown > SMALL_PART { None } else { SmallPart::of(red, blue) };
+    let of_part = part.map(|part| stronger(part.waves(red, blue)));
     of_part.filter(|carrier| carrier.period_px().is_finite()).unwrap_or_else(|| {
-        let along_columns = || line_waves(red.reversed_axes(), blue.reversed_axes());
-        stronger(rayon::join(|| line_waves(red, blue), along_columns).into())
+        let along_rows = || line_waves(red, blue, |y, x| even.at(y, x));
+        let along_columns = || line_waves(red.reversed_axes(), blue.reversed_axes(), |x, y| even.at(y, x));
+        stronger(rayon::join(along_rows, along_columns).into())
     })
 }
 
@@ -76,7 +83,12 @@ pub fn difference_carrier(first: ArrayView2<'_, f32>, others: [ArrayView2<'_, f3
     stronger(rayon::join(|| difference_waves(first, others), along_columns).into())
 }
 
-fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
+/// The strongest waves along the lines of R and B. `weight` is that of a pixel, by its line and its place in the line.
+fn line_waves(
+    red: ArrayView2<'_, f32>,
+    blue: ArrayView2<'_, f32>,
+    weight: impl Fn(usize, usize) -> f32,
+) -> Waves {
     let (lines, length) = red.dim();
     if length < 4 * CARRIER_CYCLES_MIN {
         return Waves::default();
@@ -85,8 +97,14 @@ fn line_waves(red: ArrayView2<'_, f32>, blue: ArrayView2<'_, f32>) -> Waves {
     let (mut quadrature, mut level) = (vec![0.0; length / 2 + 1], 0.0);
     let sampled = (0..lines).step_by(lines.div_ceil(CARRIER_LINES).max(1));
     let count = sampled.len() as f64;
+    let mut weighted = Array1::zeros(length);
+    let mut run = |transform: &mut LineTransform, image: ArrayView2<'_, f32>, line: usize| {
+        let pixels = weighted.iter_mut().zip(image.row(line)).enumerate();
+        pixels.for_each(|(at, (out, light))| *out = weight(line, at) * light);
+        transform.run(weighted.view())
+    };
     for line in sampled {
-        let means = r.run(red.row(line)) * b.run(blue.row(line));
+        let means = run(&mut r, red, line) * run(&mut b, blue, line);
         level += means * (length as f32).powi(2);
         for (sum, (r, b)) in quadrature.iter_mut().zip(r.spectrum.iter().zip(&b.spectrum)) {
             *sum += (r * b.conj()).im;
@@ -175,6 +193,29 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn bright_objects_on_a_dim_ground_do_not_outweigh_it() {
+        // Inclined bars on a ground of a tenth of their albedo, with fringes of two thirds of its period.
+        let on_bar = |x: f32, y: f32| (x + 0.5 * y) % 90.0 < 10.0;
+        let phase = |x: f32, y: f32| TAU * x / if on_bar(x, y) { 20.0 } else { 30.0 };
+        let found = ratio(&shot(phase, |_, x, y| if on_bar(x, y) { 1.0 } else { 0.1 }), 30.0);
+        assert!((found - 1.0).abs() < 0.1, "{found}");
+    }
+
+    #[test]
+    fn shades_of_an_image_without_noise_are_no_fringes() {
+        // A small object before a ground whose light changes a little along the fringes, in red more than in blue.
+        let lit = object(0.05);
+        let light = |channel: usize, y: f32, x: f32| {
+            let fringes = 1.0 + 0.3 * (TAU * x / 20.0 + channel as f32 * TAU / 4.0).cos();
+            let shade = 1e-3 * (1.0 + channel as f32) * (TAU * y / 90.0 + channel as f32).cos();
+            0.002 + shade + 0.7 * lit(channel, x, y) * fringes
+        };
+        let images = [0, 1].map(|c| Array2::from_shape_fn(SHAPE, |(y, x)| light(c, y as f32, x as f32)));
+        let found = ratio(&images, 20.0);
+        assert!((found - 1.0).abs() < 0.1, "{found}");
     }
 
     #[test]
