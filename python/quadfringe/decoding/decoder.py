@@ -12,7 +12,7 @@ from quadfringe.data import AnyShot, Shape
 from quadfringe.decoding import params
 from quadfringe.decoding._kernel import KernelDecoder, Size, check_channels, check_shot, size_of
 from quadfringe.decoding.black import below_black, too_black, too_dark
-from quadfringe.decoding.cause import Cause
+from quadfringe.decoding.cause import ORDERS, Cause
 from quadfringe.decoding.causes import too_bright, wrong_bits
 from quadfringe.decoding.channel_offsets import contradiction, taken_out
 from quadfringe.decoding.light_border import borders_of, checked_rows
@@ -135,10 +135,12 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     rest = judge(shape, shot, kernel)
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
+    # What the verdict has taken out is named, unless no test names its cause.
+    looked = kernel if rest is None or rest.name == ORDERS else None
+    cause = None if kernel is None else contradiction(shape, shot, plan) or _taken_out(shape, shot, looked)
+    rest = None if rest and rest.name == ORDERS and cause and cause.name != ORDERS else rest
     light = [*filter(None, (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot)))]
-    # What the verdict has taken out is named.
-    looked = None if rest else kernel
-    if kernel is not None and (cause := contradiction(shape, shot, plan) or _taken_out(shape, shot, looked)):
+    if cause:
         # Light that is cut off at either end is named first, because it moves the phases of the channels too.
         if light:
             light.append(replace(cause, fatal=False))
