@@ -140,6 +140,16 @@ def test_half_of_a_frame_with_shifted_infrared_is_no_data(shift_px: int, lower: 
     hold("part.half_wrong_percent", 100 * (shape.returned & ~right).mean())
 
 
+def test_a_part_whose_cause_is_named_has_no_second_warning() -> None:
+    images, _ = images_of("face", 41)
+    columns = round(0.75 * CAMERA.width_px)
+    green = images["green"][:, :columns].copy()
+    images["green"][:, :columns], images["ir"][:, :columns] = images["ir"][:, :columns], green
+    with pytest.warns(qf.DecodeWarning, match="green and ir seem to be swapped") as caught:
+        qf.decode(shot_of(images), plan_of())
+    assert len(caught) == 1
+
+
 @pytest.mark.parametrize("surface", ["face", "steps"])
 def test_no_part_of_a_shot_with_exchanged_channels_is_trusted(surface: str) -> None:
     images, _ = images_of(surface, 43)

@@ -19,7 +19,7 @@ from quadfringe.decoding.light_border import borders_of, checked_rows
 from quadfringe.decoding.plan import Plan, check_plan, stated_response
 from quadfringe.decoding.plausibility import implausible, within_depths
 from quadfringe.decoding.response import SHOTS_TRIED, decode_straightened, response_in_place_of
-from quadfringe.decoding.verdict import judge
+from quadfringe.decoding.verdict import CHECK_ALL, judge
 from quadfringe.errors import DecodeWarning, InputError
 from quadfringe.io.images import full_scale
 from quadfringe.io.locks import ForkedLock
@@ -135,10 +135,12 @@ def judged(shape: Shape, shot: AnyShot, plan: Plan, kernel: KernelDecoder | None
     rest = judge(shape, shot, kernel)
     borders = borders_of(shape)
     doubts = implausible(shape, borders)
-    # What the verdict has taken out is named, unless no test names its cause.
-    looked = kernel if rest is None or rest.name == ORDERS else None
+    # The verdict has named what it took out, or only that no test explains it.
+    unexplained = rest is not None and rest.fix.startswith(CHECK_ALL)
+    looked = kernel if rest is None or unexplained else None
     cause = None if kernel is None else contradiction(shape, shot, plan) or _taken_out(shape, shot, looked)
-    rest = None if rest and rest.name == ORDERS and cause and cause.name != ORDERS else rest
+    if unexplained:
+        rest, cause = (None, cause) if cause and cause.name != ORDERS else (rest, None)
     light = [*filter(None, (rest, doubt, too_dark(shot, plan.calibration), wrong_bits(shot), too_bright(shot)))]
     if cause:
         # Light that is cut off at either end is named first, because it moves the phases of the channels too.
