@@ -49,6 +49,7 @@ ALLOWED: dict[tuple[str, str], str] = {
             ("height", "NODES"),
             ("joint", "CANDIDATES"),
             ("joint", "COUNT"),
+            ("joint", "FOLLOWED"),
             ("joint", "FREQUENCIES"),
             ("joint", "LEVEL_MAPS"),
             ("joint", "MATRIX"),
@@ -63,7 +64,8 @@ ALLOWED: dict[tuple[str, str], str] = {
         [
             ("condition", "INFRARED"),
             *(("joint", name) for name in ("A_R", "A_B", "P_R", "P_B", "A_G", "A_IR", "B_G", "B_IR", "WEAKEST")),
-            *(("joint", name) for name in ("W", "C", "S", "CC", "CS", "LIGHT")),
+            *(("joint", name) for name in ("W", "C", "S", "CC", "CS", "LIGHT", "SIGNAL", "TOTAL")),
+            *(("joint", name) for name in ("P", "RATIO", "MODULATION", "FIRST", "WEIGHT")),
             ("joint", "GROWN"),
             ("mesh", "FALLS"),
         ],

@@ -3,7 +3,7 @@
 //! ```text
 //! 1  linear light                                                        (S1)  condition
 //! 2  fringe period; mask of lit pixels; noise                                  stages::quadrature_carrier, illumination, noise
-//! 3  coarse level: wrapped phase, beats of G and IR by a local fit   (S2, S3)  pyramid, local_fit, slopes
+//! 3  coarse level: wrapped phase, beats of G and IR by local fits    (S2, S3)  pyramid, local_fit, slopes
 //! 4  fringe orders by semi-global matching                               (S4)  orders
 //! 5  photometry: offset and amplitude of every channel                         photometry
 //! 6  phase from all four channels, coarse level, then full resolution          phase, window, pyramid::upsample

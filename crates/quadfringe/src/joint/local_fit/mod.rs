@@ -8,7 +8,10 @@
 //! Of three colours with different fringe numbers, R gives `Phi` in a window (`carrier`), and B is the third channel.
 
 mod carrier;
+mod normal;
 mod rows;
+mod signal;
+mod textured;
 
 use super::cells::{CellMaps, CellWindow, RowMaps, TaskWork};
 use super::model::{CellFringes, FringeRows, has_quadrature};
@@ -23,6 +26,7 @@ use rows::{
     ChannelRows, RedBlueRows, Rows, StrengthRows, add_products, add_squares, finish_row, map,
     relative_albedo, solve_row, sum, two_step,
 };
+use signal::Signal;
 
 /// Results of the fit on the cells, and its working maps.
 #[derive(Debug)]
@@ -32,7 +36,22 @@ pub(super) struct LocalFit {
     start: CellMaps,
     carrier: Carrier,
     maps: CellMaps,
+    textured: Textured,
     slots: Slots<TaskWork<Rows>>,
+}
+
+/// The second fit, and where it is kept.
+#[derive(Debug)]
+struct Textured {
+    maps: CellMaps,
+    /// 1 for cells that keep it, 0 for the others.
+    kept: CellMaps,
+}
+
+impl Default for Textured {
+    fn default() -> Self {
+        Self { maps: CellMaps::new(map::COUNT), kept: CellMaps::new(1) }
+    }
 }
 
 /// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, and their modulation in linear light (0 where
@@ -53,8 +72,9 @@ impl LocalFit {
         Self {
             ratios,
             start: CellMaps::new(4),
-            carrier: Carrier::default(),
+            carrier: Carrier::new(if has_quadrature(ratios) { Signal::Ratio } else { Signal::Red }),
             maps: CellMaps::new(map::COUNT),
+            textured: Textured::default(),
             slots: Slots::default(),
         }
     }
@@ -140,7 +160,7 @@ impl LocalFit {
             |rows, y, sums| {
                 let Rows { maps, cos, sin, .. } = rows;
                 source.row(scene, y, None, maps, [cos, sin]);
-                add_products(scene.row(scene.usable, y), [cos, sin], scene.rows(y), sums);
+                add_products(scene.row(scene.usable, y), [cos, sin], None, scene.rows(y), sums);
             },
             |_, sums, out| solve_row(sums, ratios, out),
         );
@@ -167,7 +187,7 @@ impl LocalFit {
                 for (i, (phase, modulation)) in out.into_iter().enumerate() {
                     let y = first + i;
                     self.albedo_row(scene, around(y, grid.height)[2], (i + 2) % 3, rows);
-                    let Rows { maps, cos, sin, albedo: ring, smooth, albedo_smooth } = rows;
+                    let Rows { maps, cos, sin, albedo: ring, smooth, albedo_smooth, .. } = rows;
                     albedo_smooth.resize(grid.stride, 0.0);
                     let near = [0, 1, 2].map(|k| ring[(i + k) % 3].as_slice());
                     binomial(near, grid.width, smooth, albedo_smooth);
@@ -187,14 +207,7 @@ impl LocalFit {
     fn albedo_row(&self, scene: &Scene<'_>, y: usize, at: usize, rows: &mut Rows) {
         let Rows { maps, cos, sin, albedo, .. } = rows;
         Source::of(self.ratios, &self.carrier, &self.maps).row(scene, y, None, maps, [&mut *cos, &mut *sin]);
-        let maps = maps.sample::<14>(scene.grid, &self.maps, map::A_R, y);
-        let channel = |a: usize, p: usize| ChannelRows { a: maps[a], p: maps[p], q: maps[p + 1] };
-        let model = [
-            channel(map::A_R, map::P_R),
-            channel(map::A_G, map::A_G + 1),
-            channel(map::A_B, map::P_B),
-            channel(map::A_IR, map::A_IR + 1),
-        ];
+        let model = ChannelRows::sample(maps, scene, &self.maps, y);
         relative_albedo(model, [cos, sin], scene.rows(y), &mut albedo[at]);
     }
 }
@@ -243,3 +256,20 @@ impl<'a> RedBlueRows<'a> {
         Self { red_offset, red_amplitude, blue_offset, blue_amplitude }
     }
 }
+
+impl<'a> ChannelRows<'a> {
+    /// Row `y` of the coefficients of R, G, B, IR.
+    fn sample(rows: &'a mut RowMaps, scene: &Scene<'_>, maps: &CellMaps, y: usize) -> [Self; 4] {
+        let maps = rows.sample::<14>(scene.grid, maps, map::A_R, y);
+        let channel = |a: usize, p: usize| ChannelRows { a: maps[a], p: maps[p], q: maps[p + 1] };
+        [
+            channel(map::A_R, map::P_R),
+            channel(map::A_G, map::A_G + 1),
+            channel(map::A_B, map::P_B),
+            channel(map::A_IR, map::A_IR + 1),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,8 +1,9 @@
 //! Loops of the fit over one row of pixels or of cells.
 
+use super::normal::Normal;
 use crate::joint::cells::RowMaps;
 use crate::joint::model::weights;
-use crate::joint::params::local_fit::{CONTRAST_MIN, RIDGE, SPREAD_MIN};
+use crate::joint::params::local_fit::{CONTRAST_MIN, SPREAD_MIN};
 use crate::joint::params::phase::ALBEDO_MIN;
 use crate::parallel::angle::atan2;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, lanes_mut, put, take};
@@ -17,9 +18,14 @@ pub(super) struct Rows {
     pub albedo: [Vec<f32>; 3],
     pub smooth: Vec<f32>,
     pub albedo_smooth: Vec<f32>,
+    /// What a carrier is fitted to.
+    pub signal: Vec<f32>,
+    /// The light that this was divided by.
+    pub total: Vec<f32>,
 }
 
-/// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`.
+/// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`. With an albedo, `w`,
+/// `c` and `s` are multiplied by it, and `w` once more where no `I` is.
 pub(super) mod sum {
     pub const W: usize = 0;
     pub const C: usize = 1;
@@ -71,6 +77,7 @@ pub(super) mod map {
     pub const B_G: usize = 14;
     pub const B_IR: usize = 15;
     pub const WEAKEST: usize = 16;
+    pub const MODULATION: usize = 17;
     pub const COUNT: usize = 18;
 }
 
@@ -137,20 +144,24 @@ pub(super) fn turn(beat: [&[f32]; 2], cos: &mut [f32], sin: &mut [f32]) {
 pub(super) fn add_products(
     usable: &[f32],
     phasor: [&[f32]; 2],
+    albedo: Option<&[f32]>,
     light: [&[f32]; 4],
     sums: &mut [[Lanes; sum::COUNT]],
 ) {
     let (rows, light) = ([lanes(usable), lanes(phasor[0]), lanes(phasor[1])], light.map(lanes));
     for (i, sums) in sums.iter_mut().enumerate() {
+        let albedo = albedo.map_or([1.0; LANES], |albedo| lanes(albedo)[i]);
         let ([w, cos, sin], light) = (take(&rows, i), take(&light, i));
         let mut terms = [w; sum::COUNT];
         for x in 0..LANES {
-            let (c, s) = (w[x] * cos[x], w[x] * sin[x]);
-            (terms[sum::C][x], terms[sum::S][x]) = (c, s);
-            (terms[sum::CC][x], terms[sum::CS][x]) = (c * cos[x], c * sin[x]);
+            let w = w[x] * albedo[x];
+            let (c, s) = (w * cos[x], w * sin[x]);
+            terms[sum::W][x] = w * albedo[x];
+            (terms[sum::C][x], terms[sum::S][x]) = (c * albedo[x], s * albedo[x]);
+            (terms[sum::CC][x], terms[sum::CS][x]) = (c * albedo[x] * cos[x], c * albedo[x] * sin[x]);
             for k in 0..4 {
                 let (seen, first) = (light[k][x], sum::LIGHT + 3 * k);
-                terms[first][x] = w[x] * seen;
+                terms[first][x] = w * seen;
                 terms[first + 1][x] = c * seen;
                 terms[first + 2][x] = s * seen;
             }
@@ -200,23 +211,18 @@ struct CellSolution {
     spread: f32,
 }
 
-/// Solve the normal equations of cell `i` by the adjugate of their matrix.
+/// Solve the normal equations of cell `i` for the four channels.
 #[inline(always)]
 fn solve_cell(sums: [&[f32]; sum::COUNT], i: usize) -> CellSolution {
     let [w, wc, ws, wcc, wcs] = [sum::W, sum::C, sum::S, sum::CC, sum::CS].map(|k| sums[k][i]);
     let half = 0.5 * w;
     let skew = wcc - half;
     let spread = half - (skew * skew + wcs * wcs).sqrt();
-    let ridge = RIDGE * w + 1e-12;
-    let (a, b, c, d, e, f) = (w + ridge, wc, ws, wcc + ridge, wcs, w - wcc + ridge);
-    let (xx, xy, xz) = (d * f - e * e, c * e - b * f, b * e - c * d);
-    let (yy, yz, zz) = (a * f - c * c, b * c - a * e, a * d - b * b);
-    let scale = 1.0 / (a * xx + b * xy + c * xz).max(f32::MIN_POSITIVE);
+    let normal = Normal::new([w, wc, ws, wcc, wcs]);
     let mut channels = [[0.0f32; 4]; 4];
     for (k, fit) in channels.iter_mut().enumerate() {
-        let [u, v, t] = [0, 1, 2].map(|m| sums[sum::LIGHT + 3 * k + m][i] * scale);
-        let (p, q) = (xy * u + yy * v + yz * t, xz * u + yz * v + zz * t);
-        *fit = [xx * u + xy * v + xz * t, p, q, (p * p + q * q).sqrt()];
+        let [a, p, q] = normal.solve([0, 1, 2].map(|m| sums[sum::LIGHT + 3 * k + m][i]));
+        *fit = [a, p, q, (p * p + q * q).sqrt()];
     }
     CellSolution { channels, spread }
 }
@@ -231,22 +237,41 @@ pub(super) fn relative_albedo(
     let (model, phasor, light) =
         (model.map(|rows| [rows.a, rows.p, rows.q].map(lanes)), phasor.map(lanes), light.map(lanes));
     for (i, out) in lanes_mut(out).iter_mut().enumerate() {
-        let ([cos, sin], light) = (take(&phasor, i), take(&light, i));
-        let (mut sum, mut norm) = ([0.0; LANES], [1e-9; LANES]);
-        for c in 0..4 {
-            let [a, p, q] = take(&model[c], i);
-            for x in 0..LANES {
-                let model = a[x] + p[x] * cos[x] + q[x] * sin[x];
-                let model = if model > 0.0 { model } else { 0.0 };
-                sum[x] += model * light[c][x];
-                norm[x] += model * model;
-            }
-        }
+        let Products { with_light, squared } = products(&model, take(&phasor, i), take(&light, i), i);
         for x in 0..LANES {
-            let albedo = sum[x] / norm[x];
+            let albedo = with_light[x] / squared[x];
             out[x] = if albedo > ALBEDO_MIN { albedo } else { ALBEDO_MIN };
         }
     }
+}
+
+/// Sums over the channels for a vector of pixels.
+pub(super) struct Products {
+    /// The model times the light.
+    pub with_light: Lanes,
+    /// The model times itself.
+    pub squared: Lanes,
+}
+
+/// The products of the model of the light, which is not negative.
+#[inline(always)]
+pub(super) fn products(
+    model: &[[&[Lanes]; 3]; 4],
+    [cos, sin]: [Lanes; 2],
+    light: [Lanes; 4],
+    i: usize,
+) -> Products {
+    let mut sums = Products { with_light: [0.0; LANES], squared: [1e-9; LANES] };
+    for c in 0..4 {
+        let [a, p, q] = take(&model[c], i);
+        for x in 0..LANES {
+            let model = a[x] + p[x] * cos[x] + q[x] * sin[x];
+            let model = if model > 0.0 { model } else { 0.0 };
+            sums.with_light[x] += model * light[c][x];
+            sums.squared[x] += model * model;
+        }
+    }
+    sums
 }
 
 /// Phase of the phasor, and modulation where it is at least `least`.
