@@ -61,7 +61,8 @@ pub(super) fn ratio(gain: Gain, blue: &[f32], signal: &mut [f32], total: &mut [f
         for x in 0..LANES {
             let blue = gain[x] * blue[x];
             let sum = red[x] + blue;
-            (found[0][x], found[1][x]) = ((red[x] - blue) / if sum > 1e-6 { sum } else { 1e-6 }, sum);
+            (found[0][x], found[1][x]) =
+                (((red[x] - blue) / if sum > 1e-6 { sum } else { 1e-6 }).clamp(-1.0, 1.0), sum);
         }
         put(&mut out, i, &found);
     }
@@ -115,7 +116,8 @@ pub(super) fn albedo(maps: [&[f32]; 3], phasor: [&[f32]; 2], light: [&[f32]; 4],
         for x in 0..LANES {
             let fringe = 1.0 + depth[x] * FRAC_1_SQRT_2 * (cos[x] - sin[x]);
             let albedo = (red[x] + gain[x] * blue[x]) / (mean[x] * fringe + 1e-6);
-            out[x] = if albedo > 1e-3 { albedo } else { 1e-3 };
+            let albedo = if albedo > 1e-3 { albedo } else { 1e-3 };
+            out[x] = if albedo < 1e3 { albedo } else { 1e3 };
         }
     }
 }
