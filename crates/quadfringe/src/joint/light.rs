@@ -3,7 +3,7 @@
 use super::model::has_quadrature;
 use super::params::pyramid::{PERIOD_FALLBACK_SHARE, PERIOD_MIN_PX};
 use super::pyramid::Level;
-use crate::condition::{Plan, Sample, Saturated};
+use crate::condition::{LIGHT_MAX, Plan, Sample, Saturated};
 use crate::stages::{difference_carrier, quadrature_carrier};
 use crate::{Reason, Shot};
 use multiversion::multiversion;
@@ -54,6 +54,10 @@ fn linear_row<T: Sample>(
 ) {
     plan.saturated_row(shot, y, saturated);
     plan.row(shot, y, &mut rows);
+    // The inverse of a response or of crosstalk can raise light without bound.
+    rows.iter_mut()
+        .flat_map(|row| row.iter_mut())
+        .for_each(|light| *light = light.clamp(-LIGHT_MAX, LIGHT_MAX));
     let [.., infrared] = rows;
     for (reason, infrared) in reasons.iter_mut().zip(infrared.iter()) {
         // A pixel that the infrared chip does not see takes no part in any fit.
