@@ -64,8 +64,8 @@ ALLOWED: dict[tuple[str, str], str] = {
         [
             ("condition", "INFRARED"),
             *(("joint", name) for name in ("A_R", "A_B", "P_R", "P_B", "A_G", "A_IR", "B_G", "B_IR", "WEAKEST")),
-            *(("joint", name) for name in ("W", "C", "S", "CC", "CS", "LIGHT", "SIGNAL", "TOTAL")),
-            *(("joint", name) for name in ("P", "RATIO", "MODULATION", "FIRST", "WEIGHT")),
+            *(("joint", name) for name in ("W", "C", "S", "CC", "CS")),
+            *(("joint", name) for name in ("P", "RATIO", "PURITY", "MODULATION", "FIRST", "WEIGHT")),
             ("joint", "GROWN"),
             ("mesh", "FALLS"),
         ],

@@ -4,27 +4,13 @@ from __future__ import annotations
 
 import pytest
 from support.bars import hold
+from support.scenes import figures_of
 
-import quadfringe as qf
 from quadfringe.evaluation import _scenes as scenes
-from quadfringe.evaluation import scoring, world
+from quadfringe.evaluation import scoring
 from quadfringe.evaluation._isolated import isolated, tinted
 
 TINT = 0.1
-
-
-def figures_of(name: str, seed: int) -> world.Figures:
-    take = world.take(name, seed)
-    with qf.open(qf.SystemConfig()) as scanner:
-        calibration = scanner.calibration
-    assert calibration is not None
-    plan = qf.Plan(
-        calibration.projector.width_px,
-        fringes=qf.Fringes(numbers=take.fringe_numbers),
-        calibration=calibration,
-        response="linear",
-    )
-    return world.judge(qf.Decoder(take.shot, plan).decode(take.shot), take)
 
 
 @pytest.mark.parametrize(

@@ -3,7 +3,7 @@
 
 use super::cells::CellMaps;
 use super::illumination::LitMask;
-use super::local_fit::{LocalFit, PixelMaps};
+use super::local_fit::{Lit, LocalFit, PixelMaps};
 use super::model::absent;
 use super::noise::noise_of_phase;
 use super::orders::{Orders, Wrapped};
@@ -101,13 +101,14 @@ impl CoarseLevel {
 
     /// Step 3: wrapped phase of R and B (S2), beats of G and IR against it (S3), noise and slopes.
     pub fn fit_fringes(&mut self, scene: &Scene<'_>, lit: &[f32], modulation_min: f32) {
+        let light = Lit { lit, least: modulation_min };
         let maps = PixelMaps { phase: &mut self.work, modulation: &mut self.modulation };
-        self.fit.run(scene, lit, modulation_min, maps, &mut self.sums);
+        self.fit.run(scene, light, maps, &mut self.sums);
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         // A phase that is fitted in a window does not show the noise of a pixel.
         self.noise = if self.fit.is_of_pixels() { noise_of_phase(scene, map) } else { self.lit_mask.noise };
         let maps = PixelMaps { phase: &mut self.work, modulation: &mut self.modulation };
-        self.fit.divide_albedo_out(scene, lit, modulation_min, maps, &mut self.sums);
+        self.fit.divide_albedo_out(scene, light, self.noise, maps, &mut self.sums);
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         self.slopes.measure(scene, map, &mut self.sums);
     }

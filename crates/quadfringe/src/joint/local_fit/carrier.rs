@@ -92,6 +92,12 @@ impl Carrier {
         signal::albedo(maps.sample(scene.grid, last, fit::RATIO, y), phasor, scene.rows(y), out);
     }
 
+    /// The share of the variance of the ratio in a row of cells that fringes of one surface make: less where a window sees two
+    /// surfaces, or several colours.
+    pub fn purity(&self, row: usize) -> &[f32] {
+        self.fits[self.fits.len() - 1].line(row, fit::PURITY)
+    }
+
     /// The plane wave, turned by the first `fits`.
     fn wave(
         &self,

@@ -54,6 +54,15 @@ impl Default for Textured {
     }
 }
 
+/// Where there is light.
+#[derive(Clone, Copy)]
+pub(super) struct Lit<'a> {
+    /// 1 where light of the projector falls.
+    pub lit: &'a [f32],
+    /// Least modulation that counts, in linear light.
+    pub least: f32,
+}
+
 /// Maps of the pixels that the fit fills: wrapped phase of R and B in rad, and their modulation in linear light (0 where
 /// the pixel takes no part).
 pub(super) struct PixelMaps<'a> {
@@ -84,23 +93,15 @@ impl LocalFit {
         has_quadrature(self.ratios)
     }
 
-    /// Fit a scene with fringes in any direction. `lit` is 1 where light of the projector falls; `least` is the least
-    /// modulation that counts. The content of `sums` is lost.
-    pub fn run(
-        &mut self,
-        scene: &Scene<'_>,
-        lit: &[f32],
-        least: f32,
-        out: PixelMaps<'_>,
-        sums: &mut CellMaps,
-    ) {
+    /// Fit a scene with fringes in any direction. The content of `sums` is lost.
+    pub fn run(&mut self, scene: &Scene<'_>, light: Lit<'_>, out: PixelMaps<'_>, sums: &mut CellMaps) {
         if self.is_of_pixels() {
             self.start(scene, sums);
         } else {
             self.carrier.find(scene, &self.slots, sums);
         }
         self.solve(scene, sums);
-        self.phase(scene, lit, least, out);
+        self.phase(scene, light, out);
     }
 
     /// Offsets and amplitudes at row `y`.
@@ -167,7 +168,7 @@ impl LocalFit {
     }
 
     /// Albedo of every pixel, not sharper than the lens, and the two-step phase with it (S2).
-    fn phase(&self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
+    fn phase(&self, scene: &Scene<'_>, Lit { lit, least }: Lit<'_>, out: PixelMaps<'_>) {
         let grid = scene.grid;
         let out = out.phase.par_chunks_mut(grid.stride).zip(out.modulation.par_chunks_mut(grid.stride));
         let block = grid.step.max(4);

@@ -2,6 +2,17 @@
 
 use crate::joint::params::local_fit::RIDGE;
 
+/// Sums of one cell, of the weight `w` times products of `c` and `s`, cosine and sine of the wave that is fitted.
+pub(super) mod wave_sum {
+    pub const W: usize = 0;
+    pub const C: usize = 1;
+    pub const S: usize = 2;
+    pub const CC: usize = 3;
+    pub const CS: usize = 4;
+    /// The sums of what is fitted follow.
+    pub const COUNT: usize = 5;
+}
+
 /// Inverse of the matrix of the normal equations of a fit by an offset, cosine and sine, by its adjugate.
 pub(super) struct Normal {
     /// The upper triangle, row by row.
@@ -11,9 +22,9 @@ pub(super) struct Normal {
 }
 
 impl Normal {
-    /// From the sums of the weight times 1, `c`, `s`, `c c` and `c s`.
+    /// From the sums of [`wave_sum`].
     #[inline(always)]
-    pub fn new([w, wc, ws, wcc, wcs]: [f32; 5]) -> Self {
+    pub fn new([w, wc, ws, wcc, wcs]: [f32; wave_sum::COUNT]) -> Self {
         let ridge = RIDGE * w + 1e-12;
         let (a, b, c, d, e, f) = (w + ridge, wc, ws, wcc + ridge, wcs, w - wcc + ridge);
         let (xx, xy, xz) = (d * f - e * e, c * e - b * f, b * e - c * d);

@@ -27,13 +27,9 @@ pub(super) struct Rows {
 /// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`. With an albedo, `w`,
 /// `c` and `s` are multiplied by it, and `w` once more where no `I` is.
 pub(super) mod sum {
-    pub const W: usize = 0;
-    pub const C: usize = 1;
-    pub const S: usize = 2;
-    pub const CC: usize = 3;
-    pub const CS: usize = 4;
+    pub use crate::joint::local_fit::normal::wave_sum::{C, CC, CS, S, W};
     /// `I`, `I c` and `I s` of R, then of G, B and IR.
-    pub const LIGHT: usize = 5;
+    pub const LIGHT: usize = crate::joint::local_fit::normal::wave_sum::COUNT;
     pub const COUNT: usize = LIGHT + 3 * 4;
 }
 

@@ -18,26 +18,24 @@ pub(super) enum Signal {
 
 /// Sums of one cell, of the weight `w` times products of `c` and `s`, cosine and sine of the wave, and of the signal.
 pub(super) mod sum {
-    pub const W: usize = 0;
-    pub const C: usize = 1;
-    pub const S: usize = 2;
-    pub const CC: usize = 3;
-    pub const CS: usize = 4;
-    /// The signal, the signal times `c` and times `s`.
-    pub const SIGNAL: usize = 5;
+    pub use crate::joint::local_fit::normal::wave_sum::{C, CC, CS, S, W};
+    /// The signal, the signal times `c` and times `s`, and its square.
+    pub const SIGNAL: usize = crate::joint::local_fit::normal::wave_sum::COUNT;
+    pub const SQUARE: usize = SIGNAL + 3;
     /// `R + g B`.
-    pub const TOTAL: usize = 8;
-    pub const COUNT: usize = 9;
+    pub const TOTAL: usize = SIGNAL + 4;
+    pub const COUNT: usize = SIGNAL + 5;
 }
 
-/// Maps of a fit: the coefficients of cosine and sine; of a ratio also `g`, the contrast over the square root of 2, and the mean
-/// of `R + g B`.
+/// Maps of a fit: the coefficients of cosine and sine; of a ratio also `g`, the contrast over the square root of 2, the mean
+/// of `R + g B`, and the variance of such fringes over that of the ratio.
 pub(super) mod fit {
     pub const P: usize = 0;
     pub const RATIO: usize = 2;
     /// The maps of a fit that others follow.
     pub const FOLLOWED: usize = 3;
-    pub const COUNT: usize = 5;
+    pub const PURITY: usize = 5;
+    pub const COUNT: usize = 6;
 }
 
 /// `g` along a row.
@@ -85,6 +83,7 @@ pub(super) fn add_signal(
             (terms[sum::CC][x], terms[sum::CS][x]) = (c * cos[x], c * sin[x]);
             terms[sum::SIGNAL][x] = w[x] * signal[x];
             (terms[sum::SIGNAL + 1][x], terms[sum::SIGNAL + 2][x]) = (c * signal[x], s * signal[x]);
+            terms[sum::SQUARE][x] = w[x] * signal[x] * signal[x];
             terms[sum::TOTAL][x] = w[x] * total[x];
         }
         add(sums, &terms);
@@ -98,11 +97,14 @@ pub(super) fn solve_row(sums: [&[f32]; sum::COUNT], gain: impl Fn(usize) -> f32,
         let normal = Normal::new([sum::W, sum::C, sum::S, sum::CC, sum::CS].map(|k| sums[k][i]));
         let [offset, p, q] = normal.solve([0, 1, 2].map(|k| sums[sum::SIGNAL + k][i]));
         let offset = offset.clamp(-TINT_STEP_MAX, TINT_STEP_MAX);
-        // The first harmonic of e sin(x) / (1 + e cos(x)) has an amplitude of 2 t, with e = 2 t / (1 + t^2).
-        let half = 0.5 * (p * p + q * q).sqrt();
-        let depth = (2.0 * half / (1.0 + half * half)).min(FRAC_1_SQRT_2);
-        let light = sums[sum::TOTAL][i] / sums[sum::W][i].max(1e-6);
-        let found = [p, q, gain(i) * (1.0 + offset) / (1.0 - offset), depth, light];
+        // The harmonic n of e sin(x) / (1 + e cos(x)) has an amplitude of 2 t^n, with e = 2 t / (1 + t^2).
+        let squared = 0.25 * (p * p + q * q);
+        let depth = (2.0 * squared.sqrt() / (1.0 + squared)).min(FRAC_1_SQRT_2);
+        let [signal, square, total] =
+            [sum::SIGNAL, sum::SQUARE, sum::TOTAL].map(|k| sums[k][i] / sums[sum::W][i].max(1e-6));
+        let variance = (square - signal * signal).max(1e-6);
+        let purity = 2.0 * squared / (1.0 - squared).max(0.1) / variance;
+        let found = [p, q, gain(i) * (1.0 + offset) / (1.0 - offset), depth, total, purity];
         out.chunks_exact_mut(columns).zip(found).for_each(|(line, value)| line[i] = value);
     }
 }

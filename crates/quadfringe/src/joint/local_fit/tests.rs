@@ -43,10 +43,11 @@ impl Print {
         let (mut fit, mut sums) = (LocalFit::new(RATIOS), CellMaps::default());
         let mut run = |again: bool| {
             let out = PixelMaps { phase: &mut phase, modulation: &mut modulation };
+            let light = Lit { lit: &ones, least: 0.0 };
             if again {
-                fit.divide_albedo_out(&scene, &ones, 0.0, out, &mut sums);
+                fit.divide_albedo_out(&scene, light, 0.0, out, &mut sums);
             } else {
-                fit.run(&scene, &ones, 0.0, out, &mut sums);
+                fit.run(&scene, light, out, &mut sums);
             }
         };
         run(false);

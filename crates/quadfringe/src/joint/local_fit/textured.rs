@@ -2,17 +2,18 @@
 //!
 //! The first fit takes the light of a window for fringes. Bars and letters are none, and spoil phase and beats. The ratio of R and
 //! B does not depend on the albedo that they share, so its phasor is that of the fringes, though blurred at edges of the surface.
-//! The light divided by the albedo that follows is fitted against this phasor. Where the first fit leaves more of the light than a
-//! valid pixel may, each cell keeps the fit that leaves less, when every pixel may have an albedo.
+//! The light divided by the albedo that follows is fitted against this phasor. Where the first fit does not explain the light, and
+//! the ratio is that of one surface, each cell keeps the fit that leaves less, when every pixel may have an albedo.
 
 use super::rows::{
     ChannelRows, Products, Rows, StrengthRows, add_products, finish_row, map, products, solve_row, sum,
 };
-use super::{LocalFit, PixelMaps, Source, Textured};
+use super::{Lit, LocalFit, PixelMaps, Source, Textured};
 use crate::joint::cells::{CellMaps, CellWindow};
-use crate::joint::params::local_fit::WINDOW;
+use crate::joint::params::local_fit::{
+    COMPARED_WINDOW, PURITY_MIN, UNEXPLAINED_MIN, UNEXPLAINED_NOISES_MIN, WINDOW,
+};
 use crate::joint::params::pyramid::SAMPLED_ROWS;
-use crate::joint::params::validity::MISFIT_MAX;
 use crate::joint::scene::Scene;
 use crate::parallel::lanes::{LANES, Lanes, add, lanes, take};
 use multiversion::multiversion;
@@ -27,12 +28,13 @@ mod compared {
 
 impl LocalFit {
     /// Fits a scene once more with its albedo divided out, and corrects `out` and all results in the cells where this explains
-    /// more of the light. The arguments are those of [`Self::run`], which must have run; without quadrature nothing changes.
+    /// more of the light. [`Self::run`] must have run with the same scene; without quadrature nothing changes. `noise` is the
+    /// standard deviation of the intensities in linear light.
     pub fn divide_albedo_out(
         &mut self,
         scene: &Scene<'_>,
-        lit: &[f32],
-        least: f32,
+        light: Lit<'_>,
+        noise: f32,
         out: PixelMaps<'_>,
         sums: &mut CellMaps,
     ) {
@@ -41,9 +43,9 @@ impl LocalFit {
         }
         self.carrier.find(scene, &self.slots, sums);
         self.fit_divided(scene, sums);
-        self.compare(scene, sums);
+        self.compare(scene, noise, sums);
         self.keep(scene);
-        self.correct(scene, lit, least, out);
+        self.correct(scene, light, out);
     }
 
     fn fit_divided(&mut self, scene: &Scene<'_>, sums: &mut CellMaps) {
@@ -63,15 +65,15 @@ impl LocalFit {
         );
     }
 
-    /// Finds the cells whose light the first fit does not explain as well as a valid pixel must be (J25), and the second one explains
-    /// better.
-    fn compare(&mut self, scene: &Scene<'_>, sums: &mut CellMaps) {
+    /// Finds the cells of one surface where the first fit leaves more of the light than noise does, and the second one less (J42).
+    fn compare(&mut self, scene: &Scene<'_>, noise: f32, sums: &mut CellMaps) {
         let Self { carrier, textured, slots, maps: first, .. } = self;
         let Textured { maps: second, kept } = textured;
-        let second_maps = &*second;
-        let fits = [(Source::TwoStep(first), &*first), (Source::Window(carrier), &*second)];
+        let (carrier, second_maps) = (&*carrier, &*second);
+        let fits = [(Source::TwoStep(first), &*first), (Source::Window(carrier), second_maps)];
+        let by_noise = (UNEXPLAINED_NOISES_MIN * noise).powi(2);
         scene.grid.window_sums::<{ compared::COUNT }, Rows>(
-            CellWindow { sigma_cells: scene.cells(WINDOW), sampled_rows: SAMPLED_ROWS },
+            CellWindow { sigma_cells: scene.cells(COMPARED_WINDOW), sampled_rows: SAMPLED_ROWS },
             slots,
             sums,
             kept,
@@ -84,9 +86,11 @@ impl LocalFit {
             },
             |row, [first, second, weight], out| {
                 let modulation = second_maps.line(row, map::MODULATION);
+                let purity = carrier.purity(row);
                 for (x, out) in out.iter_mut().enumerate() {
-                    let explained = 4.0 * weight[x] * (MISFIT_MAX * modulation[x]).powi(2);
-                    *out = f32::from(u8::from((first[x] > explained) & (second[x] < first[x])));
+                    let explained = 4.0 * weight[x] * ((UNEXPLAINED_MIN * modulation[x]).powi(2) + by_noise);
+                    let better = (first[x] > explained) & (second[x] < first[x]);
+                    *out = f32::from(u8::from(better & (purity[x] > PURITY_MIN)));
                 }
             },
         );
@@ -106,7 +110,7 @@ impl LocalFit {
     }
 
     /// Phase and modulation of the pixels of cells that keep the second fit.
-    fn correct(&self, scene: &Scene<'_>, lit: &[f32], least: f32, out: PixelMaps<'_>) {
+    fn correct(&self, scene: &Scene<'_>, Lit { lit, least }: Lit<'_>, out: PixelMaps<'_>) {
         let grid = scene.grid;
         let rows = out.phase.par_chunks_mut(grid.stride).zip(out.modulation.par_chunks_mut(grid.stride));
         rows.enumerate().for_each_init(

@@ -36,3 +36,23 @@ pub const CARRIER_WINDOWS: [f32; 3] = [0.5, 0.35, 0.35];
 /// little light the tint grows without bound, at 1. Smaller: strong tints take more fits. Follows from the range of the ratio, -1 to 1,
 /// and the three fits, which reach a factor of 700.
 pub const TINT_STEP_MAX: f32 = 0.8;
+
+/// Width (sigma) in fringe periods of the window in which the two fits are compared. Larger: narrow objects and prints keep the worse fit.
+/// Smaller: in a part of a fringe a wrong phase explains the light, too. Varied: 0.8, 94.2 in place of 99.97 % of a sphere have the right
+/// order, and 90 in place of 98 % of a small object; 1.8, 92.5 % of it (`pytest tests/test_real_objects.py -rP`).
+pub const COMPARED_WINDOW: f32 = 1.2;
+
+/// Least misfit of the first fit from which a cell may keep the second one, in units of the noise. [`UNEXPLAINED_MIN`], in units of the
+/// modulation, is added to it in squares. Larger: photographs keep more of their error (1.5: +18 % on one of two,
+/// `pytest tests/test_texture.py -rP`). Smaller: chance decides between the fits, and a shot with wrong fringe numbers passes (0:
+/// `pytest tests/test_hostile_shots.py`).
+pub const UNEXPLAINED_NOISES_MIN: f32 = 1.2;
+/// See [`UNEXPLAINED_NOISES_MIN`]. Larger: prints and photographs keep more of their error (0.2: albedo of a print +4 %, photographs +12 and
+/// +21 %, `pytest tests/test_albedo.py tests/test_texture.py -rP`). Smaller: windows with two surfaces take the second fit, and a wrong order
+/// with it (0.08: 94.2 in place of 99.97 % of a sphere, `pytest tests/test_real_objects.py -k cancel -rP`).
+pub const UNEXPLAINED_MIN: f32 = 0.12;
+
+/// Least share of the variance of the ratio of R and B that fringes of one surface explain, where a cell may keep the second fit. Larger:
+/// squares of a fringe keep the first one (0.85: 87.9 in place of 90.8 % are right, `pytest tests/test_texture.py -rP`). Smaller: windows
+/// with two surfaces take the second one (0: 95.4 in place of 95.7 % of a captured bottle, `pytest tests/test_captures.py -rP`).
+pub const PURITY_MIN: f32 = 0.6;

@@ -1,6 +1,7 @@
 use super::edge::{EDGE, Edge, RATIOS};
 use super::*;
 use crate::joint::cells::Grid;
+use crate::joint::local_fit::{Lit, PixelMaps};
 use crate::joint::model::{Wave, carriers};
 use std::f32::consts::TAU;
 
@@ -13,8 +14,8 @@ fn a_window_on_two_colours_keeps_its_size() {
     let scene = edge.scene(&usable);
     let (mut fit, mut found, mut sums) = (LocalFit::new(RATIOS), Photometry::new(), CellMaps::default());
     let (mut wrapped, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
-    let maps = crate::joint::local_fit::PixelMaps { phase: &mut wrapped, modulation: &mut spare };
-    fit.run(&scene, &usable, 0.02, maps, &mut sums);
+    let maps = PixelMaps { phase: &mut wrapped, modulation: &mut spare };
+    fit.run(&scene, Lit { lit: &usable, least: 0.02 }, maps, &mut sums);
     found.start(&scene, &fit, &mut sums);
     let size_at = |found: &Photometry| {
         let mut maps = RowMaps::default();
@@ -50,8 +51,8 @@ fn offsets_and_amplitudes_are_found_under_texture_and_an_error_of_the_phase() {
     let scene = Scene { light, usable: &usable, grid: &grid, period_px: 25.0, factor: 1, pair: None };
     let (mut fit, mut found, mut sums) = (LocalFit::new(RATIOS), Photometry::new(), CellMaps::default());
     let (mut phase, mut spare) = (vec![0.0; grid.pixels()], vec![0.0; grid.pixels()]);
-    let maps = crate::joint::local_fit::PixelMaps { phase: &mut phase, modulation: &mut spare };
-    fit.run(&scene, &usable, 0.02, maps, &mut sums);
+    let maps = PixelMaps { phase: &mut phase, modulation: &mut spare };
+    fit.run(&scene, Lit { lit: &usable, least: 0.02 }, maps, &mut sums);
     found.start(&scene, &fit, &mut sums);
     // The given phase has an error of 0.05 rad, like a two-step phase with wrong offsets.
     let phase: Vec<f32> = truth.iter().map(|t| t + 0.05 * (2.0 * t).sin()).collect();
