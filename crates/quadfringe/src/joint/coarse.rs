@@ -108,7 +108,7 @@ impl CoarseLevel {
         // A phase that is fitted in a window does not show the noise of a pixel.
         self.noise = if self.fit.is_of_pixels() { noise_of_phase(scene, map) } else { self.lit_mask.noise };
         let maps = PixelMaps { phase: &mut self.work, modulation: &mut self.modulation };
-        self.fit.divide_albedo_out(scene, light, self.noise, maps, &mut self.sums);
+        self.fit.fit_with_albedo(scene, light, self.noise, maps, &mut self.sums);
         let map = PhaseMap { phase: &self.work, modulation: &self.modulation };
         self.slopes.measure(scene, map, &mut self.sums);
     }

@@ -71,7 +71,7 @@ impl Carrier {
     pub fn row(&self, scene: &Scene<'_>, y: usize, maps: &mut RowMaps, [cos, sin]: [&mut Vec<f32>; 2]) {
         self.wave(scene, y, self.fits.len(), maps, [&mut *cos, &mut *sin]);
         if self.signal == Signal::Ratio {
-            // The ratio is greatest where cos(Phi) + sin(Phi) is, an eighth of a turn after R.
+            // The first harmonic of the ratio is greatest where cos(Phi) + sin(Phi) is, an eighth of a turn after R.
             for (cos, sin) in cos.iter_mut().zip(sin) {
                 (*cos, *sin) = (FRAC_1_SQRT_2 * (*cos - *sin), FRAC_1_SQRT_2 * (*cos + *sin));
             }
@@ -92,8 +92,8 @@ impl Carrier {
         signal::albedo(maps.sample(scene.grid, last, fit::RATIO, y), phasor, scene.rows(y), out);
     }
 
-    /// The share of the variance of the ratio in a row of cells that fringes of one surface make: less where a window sees two
-    /// surfaces, or several colours.
+    /// The share of the variance of the ratio in a row of cells that fringes of one surface explain: less where a window sees two
+    /// surfaces or several colours, or where noise makes most of the variance.
     pub fn purity(&self, row: usize) -> &[f32] {
         self.fits[self.fits.len() - 1].line(row, fit::PURITY)
     }

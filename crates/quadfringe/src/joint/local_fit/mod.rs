@@ -1,11 +1,12 @@
-//! Step 3: local least squares for wrapped phase (S2), offset and amplitude of every channel, and beats (S3), without a carrier.
+//! Step 3: local least squares for wrapped phase (S2), offset and amplitude of every channel, and beats (S3).
 //!
 //! In a window of about a fringe every channel is `I = rho (a + p cos(Phi) + q sin(Phi))`, with `Phi` the phase of R
 //! and B and `rho` the albedo of the pixel. R and B give `Phi` pixel by pixel; G and IR have nearly the same carrier,
 //! so that `p - i q = b exp(i (Phi_c - Phi))` is their *beat* against it, six to thirty times slower than a fringe.
-//! Unlike a Fourier filter along rows, the fit prefers no direction, no band and no slope. Sums are kept once per cell.
+//! Unlike a Fourier filter along rows, this fit prefers no direction, no band and no slope. Sums are kept once per cell.
 //!
-//! Of three colours with different fringe numbers, R gives `Phi` in a window (`carrier`), and B is the third channel.
+//! Where the albedo changes within a fringe, a second fit (`textured`) takes `Phi` from the ratio of R and B in a window (`carrier`).
+//! Of three colours with different fringe numbers, R gives `Phi` in a window, and B is the third channel.
 
 mod carrier;
 mod normal;

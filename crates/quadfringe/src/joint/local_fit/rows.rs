@@ -24,8 +24,8 @@ pub(super) struct Rows {
     pub total: Vec<f32>,
 }
 
-/// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`. With an albedo, `w`,
-/// `c` and `s` are multiplied by it, and `w` once more where no `I` is.
+/// Sums of one cell, of the weight `w` times products of `c = cos Phi`, `s = sin Phi` and the intensities `I`. With an albedo, those
+/// with `I` are multiplied by it, and those without by its square.
 pub(super) mod sum {
     pub use crate::joint::local_fit::normal::wave_sum::{C, CC, CS, S, W};
     /// `I`, `I c` and `I s` of R, then of G, B and IR.

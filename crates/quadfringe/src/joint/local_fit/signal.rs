@@ -133,7 +133,7 @@ pub(super) fn gain(scene: &Scene<'_>) -> f32 {
 }
 
 /// Unit vector across the fringes, along a row and along a column, in the direction in which the phase grows. Of R and B in
-/// quadrature, `B dR - R dB` is the squared albedo times the change of the phase, for any albedo that they share.
+/// quadrature, the sum of `B dR - R dB` over whole fringes goes with the change of the phase, whatever albedo they share.
 pub(super) fn direction_in_quadrature(scene: &Scene<'_>) -> [f32; 2] {
     let (grid, [red, _, blue, _]) = (scene.grid, scene.light);
     let mut sums = [0.0f64; 2];

@@ -1,15 +1,16 @@
 //! Step 3: a second fit, for surfaces whose albedo changes within a fringe (J40, J41).
 //!
-//! The first fit takes the light of a window for fringes. Bars and letters are none, and spoil phase and beats. The ratio of R and
-//! B does not depend on the albedo that they share, so its phasor is that of the fringes, though blurred at edges of the surface.
-//! The light divided by the albedo that follows is fitted against this phasor. Where the first fit does not explain the light, and
-//! the ratio is that of one surface, each cell keeps the fit that leaves less, when every pixel may have an albedo.
+//! The first fit takes every change of the light in a window for fringes, so that bars and letters spoil phase and beats. The ratio of
+//! R and B does not depend on the albedo that they share. Its phasor is that of the fringes, though blurred at edges of the surface, and
+//! gives the albedo of every pixel. With both, the light is fitted again. A cell keeps this fit where the first one does not explain
+//! the light, this one explains more of it, and the ratio is that of one surface.
 
 use super::rows::{
     ChannelRows, Products, Rows, StrengthRows, add_products, finish_row, map, products, solve_row, sum,
 };
 use super::{Lit, LocalFit, PixelMaps, Source, Textured};
 use crate::joint::cells::{CellMaps, CellWindow};
+use crate::joint::model::count;
 use crate::joint::params::local_fit::{
     COMPARED_WINDOW, PURITY_MIN, UNEXPLAINED_MIN, UNEXPLAINED_NOISES_MIN, WINDOW,
 };
@@ -27,10 +28,10 @@ mod compared {
 }
 
 impl LocalFit {
-    /// Fits a scene once more with its albedo divided out, and corrects `out` and all results in the cells where this explains
+    /// Fits a scene once more with the albedo of its pixels, and corrects `out` and all results in the cells where this explains
     /// more of the light. [`Self::run`] must have run with the same scene; without quadrature nothing changes. `noise` is the
     /// standard deviation of the intensities in linear light.
-    pub fn divide_albedo_out(
+    pub fn fit_with_albedo(
         &mut self,
         scene: &Scene<'_>,
         light: Lit<'_>,
@@ -42,13 +43,13 @@ impl LocalFit {
             return;
         }
         self.carrier.find(scene, &self.slots, sums);
-        self.fit_divided(scene, sums);
+        self.fit_again(scene, sums);
         self.compare(scene, noise, sums);
         self.keep(scene);
         self.correct(scene, light, out);
     }
 
-    fn fit_divided(&mut self, scene: &Scene<'_>, sums: &mut CellMaps) {
+    fn fit_again(&mut self, scene: &Scene<'_>, sums: &mut CellMaps) {
         let Self { carrier, textured, slots, ratios, .. } = self;
         let (carrier, ratios) = (&*carrier, *ratios);
         scene.grid.window_sums::<{ sum::COUNT }, Rows>(
@@ -67,10 +68,11 @@ impl LocalFit {
 
     /// Finds the cells of one surface where the first fit leaves more of the light than noise does, and the second one less (J42).
     fn compare(&mut self, scene: &Scene<'_>, noise: f32, sums: &mut CellMaps) {
-        let Self { carrier, textured, slots, maps: first, .. } = self;
+        let Self { carrier, textured, slots, ratios, maps: first, .. } = self;
         let Textured { maps: second, kept } = textured;
         let (carrier, second_maps) = (&*carrier, &*second);
         let fits = [(Source::TwoStep(first), &*first), (Source::Window(carrier), second_maps)];
+        let channels = count(*ratios);
         let by_noise = (UNEXPLAINED_NOISES_MIN * noise).powi(2);
         scene.grid.window_sums::<{ compared::COUNT }, Rows>(
             CellWindow { sigma_cells: scene.cells(COMPARED_WINDOW), sampled_rows: SAMPLED_ROWS },
@@ -88,7 +90,8 @@ impl LocalFit {
                 let modulation = second_maps.line(row, map::MODULATION);
                 let purity = carrier.purity(row);
                 for (x, out) in out.iter_mut().enumerate() {
-                    let explained = 4.0 * weight[x] * ((UNEXPLAINED_MIN * modulation[x]).powi(2) + by_noise);
+                    let explained =
+                        channels * weight[x] * ((UNEXPLAINED_MIN * modulation[x]).powi(2) + by_noise);
                     let better = (first[x] > explained) & (second[x] < first[x]);
                     *out = f32::from(u8::from(better & (purity[x] > PURITY_MIN)));
                 }
