@@ -57,7 +57,7 @@ impl CellMaps {
         spread(grid.step, mix, out);
     }
 
-    /// Fill every map, row of cells by row of cells.
+    /// Fill every map, row of cells by row of cells. Of maps that have this size already, the lines hold what they held.
     pub fn fill<const N: usize>(&mut self, grid: &Grid, fill: impl Fn(usize, [&mut [f32]; N]) + Sync) {
         self.shape(grid, N);
         let columns = self.columns;

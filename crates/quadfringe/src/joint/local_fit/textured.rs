@@ -99,15 +99,13 @@ impl LocalFit {
         );
     }
 
+    /// Overwrites the first fit in the cells that keep the second one.
     fn keep(&mut self, scene: &Scene<'_>) {
         let Textured { maps: second, kept } = &self.textured;
-        let first = std::mem::take(&mut self.maps);
         self.maps.fill::<{ map::COUNT }>(scene.grid, |row, lines| {
             for (k, line) in lines.into_iter().enumerate() {
-                let fits = first.line(row, k).iter().zip(second.line(row, k)).zip(kept.line(row, 0));
-                for (out, ((first, second), kept)) in line.iter_mut().zip(fits) {
-                    *out = if *kept > 0.0 { *second } else { *first };
-                }
+                let fits = line.iter_mut().zip(second.line(row, k)).zip(kept.line(row, 0));
+                fits.filter(|(_, kept)| **kept > 0.0).for_each(|((out, second), _)| *out = *second);
             }
         });
     }

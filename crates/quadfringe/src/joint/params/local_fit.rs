@@ -26,16 +26,15 @@ pub const CONTRAST_MIN: f32 = 0.1;
 pub const SPREAD_MIN: f32 = 0.02;
 
 /// Widths (sigma) in fringe periods of the windows of the fits against a plane wave: of the ratio of R and B, or of R without a channel in
-/// quadrature. Larger: the
-/// phase near edges is that of both sides. Smaller: a window holds less than a fringe, and offset and phase are mixed. More fits follow
-/// greater changes of the local frequency, and each costs a pass over the image. By `python evaluation/rgb.py --only face steps`, one
-/// fit leaves 15 % of wrong orders on the face, two and three leave none; three have 10 % less error near edges than two. Varied: 0.25
-/// in the second leaves 0.3 % of wrong orders on the steps, 0.7 in the first doubles the error of steps.
+/// quadrature. Larger: the phase near edges is that of both sides. Smaller: a window holds less than a fringe, and offset and phase are
+/// mixed. More fits follow greater changes of the local frequency, and each costs a pass over the image. By `python evaluation/rgb.py
+/// --only face steps`, one fit leaves 15 % of wrong orders on the face, two and three leave none; three have 10 % less error near edges
+/// than two. Varied: 0.25 in the second leaves 0.3 % of wrong orders on the steps, 0.7 in the first doubles the error of steps.
 pub const CARRIER_WINDOWS: [f32; 3] = [0.5, 0.35, 0.35];
 
 /// Greatest mean of the ratio of R and B that one of these fits takes for a tint, a factor of nine between both. Larger: in a window with
-/// little light the tint grows without bound (it is infinite at 1). Smaller: strong tints take more fits. Follows from the range of the ratio, -1 to 1,
-/// and the three fits, which reach a factor of 700.
+/// little light the tint grows without bound (it is infinite at 1). Smaller: strong tints take more fits. Follows from the range of the
+/// ratio, -1 to 1, and the three fits, which reach a factor of 700.
 pub const TINT_STEP_MAX: f32 = 0.8;
 
 /// Width (sigma) in fringe periods of the window in which the two fits are compared. Larger: narrow objects and prints keep the worse fit.
