@@ -13,7 +13,8 @@ from support.bars import hold
 import quadfringe as qf
 from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding.readings import band_of, rows_of
-from quadfringe.decoding.verdict import NEAR, order_margin
+from quadfringe.decoding.verdict import order_margin
+from quadfringe.decoding.verdict_params import NEAR
 from quadfringe.errors import DecodeError
 
 METHODS = ("joint", "published")

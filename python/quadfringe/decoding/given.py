@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from quadfringe.data import AnyShot, BayerShot
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
 
-__all__ = ["blind_channels", "same_images"]
+__all__ = ["blind_channels", "copied", "same_images"]
 
 STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
 DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
@@ -40,6 +41,12 @@ def _range(image: NDArray[Any]) -> tuple[float, float]:
     """Give the values between which nearly all pixels lie."""
     low, high = np.quantile(image[::STRIDE, ::STRIDE], (NEARLY_NONE, 1 - NEARLY_NONE))
     return float(low), float(high)
+
+
+def copied(shot: AnyShot) -> bool:
+    """Say whether two channels are equal in some of the rows."""
+    rows = [image[:: params.SAME_ROWS] for image in shot.channels.values()]
+    return not isinstance(shot, BayerShot) and any(np.array_equal(*pair) for pair in combinations(rows, 2))
 
 
 def same_images(shot: AnyShot) -> Cause | None:
