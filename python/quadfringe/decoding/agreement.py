@@ -3,7 +3,8 @@
 Where channels are exchanged or fringe numbers are others, the decoder still takes the orders that fit G and IR best.
 They leave offsets that differ from place to place. In a sound shot there are none, but print and a wrong response move
 single fringes. Offsets are measured in tiles of one surface with half a fringe, of which even small objects have
-several, and on larger objects in tiles of several fringes, in which print averages out.
+several, and on larger objects in tiles of several fringes, in which print averages out. The published method chooses
+the order of every pixel by these offsets, so that its offsets in half a fringe tell nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +14,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtrc
 
 from quadfringe import _core
 from quadfringe.data import AnyShot, Shape, Shot
@@ -48,7 +48,8 @@ class Agreement:
         self._light = linear_light_of(shot, plan)
         self._waves = _waves(shape, plan)
         self._known = _known(shape, shot, self._light)
-        self._tiles = _fine_tiles(shape, self._known)
+        one_order = shape.config["decode"]["method"] == "joint"  # for all pixels of a tile
+        self._tiles = _fine_tiles(shape, self._known) if one_order else Tiles([], 0.0)
         self._offsets_rad = self._offsets_of(self._tiles.pixels)
 
     @property
@@ -71,7 +72,7 @@ class Agreement:
         if not len(self._offsets_rad) or self.beyond_chance or self.in_the_mean:
             return False
         scatter_rad = self._offsets_rad - np.median(self._offsets_rad, axis=0)
-        return _quantile(scatter_rad, limits.SCATTER_QUANTILE) > limits.SCATTER_MAX_RAD
+        return _quantile(scatter_rad) > limits.SCATTER_MAX_RAD
 
     def _offsets_of(self, tiles: list[Flat]) -> NDArray[np.float64]:
         """Give the offsets in rad, (tiles, channels)."""
@@ -107,11 +108,11 @@ def _waves(shape: Shape, plan: Plan) -> list[tuple[str, Map]]:
     return waves
 
 
-def _quantile(offsets_rad: NDArray[np.float64], share: float = limits.OFFSET_QUANTILE) -> float:
-    """Give the size that this share of the tiles does not exceed in any channel; infinity without any."""
+def _quantile(offsets_rad: NDArray[np.float64]) -> float:
+    """Give the size that two thirds of the tiles do not exceed, in the worst channel; infinity without any tile."""
     if not len(offsets_rad):
         return np.inf
-    return float(np.quantile(np.abs(offsets_rad).max(axis=1), share))
+    return float(np.quantile(np.abs(offsets_rad), limits.OFFSET_QUANTILE, axis=0).max())
 
 
 def _chance(offsets_rad: NDArray[np.float64], tiles: float, plan: Plan) -> float:
@@ -120,6 +121,8 @@ def _chance(offsets_rad: NDArray[np.float64], tiles: float, plan: Plan) -> float
     Each tile then has the best of all orders. Its offsets are anywhere, and small with the probability of as many
     small squares in the square of both angles.
     """
+    from scipy.special import bdtrc
+
     small = np.count_nonzero(np.abs(offsets_rad).max(axis=1) <= limits.OFFSET_MAX_RAD)
     one = plan.fringes.numbers[0] * (limits.OFFSET_MAX_RAD / np.pi) ** offsets_rad.shape[1]
     count = max(round(tiles), len(offsets_rad))

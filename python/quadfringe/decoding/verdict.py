@@ -82,7 +82,7 @@ def _refuse_whole(shape: Shape, shot: AnyShot, decoder: KernelDecoder | None) ->
     if decoder is not None and enough and not blind and margin < limits.NUMBERS_SURE[method]:
         _refuse_numbers(shape, shot, decoder)
     agreement = Agreement(shape, shot, decoder.plan) if decoder is not None and enough and not blind else None
-    contradicted = method == "joint" and agreement is not None and agreement.contradicted
+    contradicted = agreement is not None and agreement.contradicted
     if enough and margin >= limits.DOUBTFUL and not blind and not contradicted:
         return
     closure = None if decoder is None or blind else closure_of(shot, decoder.plan, np.isfinite(shape.quality))

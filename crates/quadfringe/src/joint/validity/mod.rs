@@ -11,8 +11,8 @@ use super::neighbours::{around, sum_of_nine};
 use super::noise::NoiseByLight;
 use super::orders::Orders;
 use super::params::validity::{
-    COMPONENT_SIDE, GROWN_MISFIT_MAX, MISFIT_MAX, NEIGHBOURS_MIN, PIXEL_MISFIT_MAX,
-    PIXEL_RESIDUAL_NOISES_MAX, RESIDUAL_NOISES_MAX, SEED_SIDE,
+    COMPONENT_SIDE, MISFIT_MAX, NEIGHBOURS_MIN, PIXEL_MISFIT_MAX, PIXEL_RESIDUAL_NOISES_MAX,
+    RESIDUAL_NOISES_MAX, SEED_SIDE,
 };
 use super::regions::RegionOrders;
 use super::scene::{PhaseMap, Scene};
@@ -242,8 +242,7 @@ fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2]
     for x in 0..width {
         let lit = modulation[x] > 0.0;
         let share = MISFIT_MAX * modulation[x];
-        let [pixel_share, grown_share] =
-            [PIXEL_MISFIT_MAX, GROWN_MISFIT_MAX].map(|most| most * pixel_modulation[x]);
+        let pixel_share = PIXEL_MISFIT_MAX * pixel_modulation[x];
         let agrees = near[x] <= 9.0 * (floors[0] * noise[x] + share * share)
             && here[x] <= floors[1] * noise[x] + pixel_share * pixel_share;
         quality[x] = order_quality[x] + hole_unless(lit);
@@ -255,7 +254,7 @@ fn check_row(known: &CheckRow, limits: Limits, [spare, sums]: [&mut Vec<f32>; 2]
         let doubt = if apart { Reason::Discontinuity } else { doubt };
         let open = lit & (reasons[x] == Reason::Returned);
         reasons[x] = if open { doubt } else { reasons[x] };
-        consistent[x] = u8::from(lit & (here[x] <= floors[0] * noise[x] + grown_share * grown_share));
+        consistent[x] = u8::from(lit & (here[x] <= floors[0] * noise[x] + pixel_share * pixel_share));
     }
 }
 
