@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
-
+import numpy as np
 import pytest
 from support.bars import hold
 
+import quadfringe as qf
+from quadfringe.decoding.agreement import small_by_chance
+from quadfringe.decoding.verdict_params import OFFSET_MAX_RAD
 from quadfringe.errors import DecodeError
 from quadfringe.evaluation import _scenes as scenes
 from quadfringe.evaluation import scoring
-from quadfringe.evaluation._isolated import isolated
-from quadfringe.evaluation.scoring import Scene
+from quadfringe.evaluation._faults import BROKEN
+from quadfringe.evaluation._isolated import FRINGES, isolated
 
 
 # Steps of less than a fringe: their order margins are low, and their channels agree.
@@ -25,35 +26,35 @@ def test_a_narrow_object_of_low_order_margin_is_returned(period_px: int, share: 
     hold("soundness.right_of_returned_percent", found.right_of_returned_percent)
 
 
-def exchanged(scene: Scene) -> Scene:
-    assert scene.ir is not None
-    return replace(scene, green=scene.ir, ir=scene.green)
-
-
-def twice(scene: Scene) -> Scene:
-    return replace(scene, green=scene.red)
-
-
-def numbered(*numbers: float) -> Callable[[Scene], Scene]:
-    return lambda scene: replace(scene, fringe_numbers=numbers)
-
-
-# All of them were returned with orders that were all wrong, with order margins from 0.35 to 0.78.
 @pytest.mark.parametrize(
     ("surface", "period_px", "seed", "fault"),
     [
-        ("face", 33, 43, exchanged),
-        ("sphere", 33, 43, exchanged),
-        ("peaks", 33, 41, twice),
-        ("sphere", 33, 41, twice),
-        ("face", 74, 43, numbered(37, 36, 31)),
-        ("peaks", 33, 41, numbered(64, 63, 56)),
-        ("sphere", 110, 43, numbered(64, 63, 56)),
+        ("face", 33, 43, "green and ir"),
+        ("sphere", 33, 43, "green and ir"),
+        ("peaks", 33, 41, "red twice"),
+        ("sphere", 33, 41, "red twice"),
+        ("face", 74, 43, "37, 36, 31"),
+        ("peaks", 33, 41, "64, 63, 56"),
+        ("sphere", 110, 43, "64, 63, 56"),
     ],
 )
-def test_a_broken_shot_of_a_small_object_is_refused(
-    surface: str, period_px: int, seed: int, fault: Callable[[Scene], Scene]
-) -> None:
-    broken = fault(isolated(period_px, 0.02, seed, surface=surface))
+def test_a_broken_shot_of_a_small_object_is_refused(surface: str, period_px: int, seed: int, fault: str) -> None:
+    """Without a verdict they have a shape, most of whose orders are wrong."""
+    broken = BROKEN[fault](isolated(period_px, 0.02, seed, surface=surface))
+    shot, plan = scenes.plan_of(broken, response="linear")
+    shape = qf.Decoder(shot, plan).decode_without_verdict(shot)
+    hold("soundness.broken_right_percent", scoring.score(broken, shape.phase_rad).right_of_returned_percent)
     with pytest.raises(DecodeError):
-        scenes.shape_of(broken, response="linear")
+        qf.decode(shot, plan)
+
+
+@pytest.mark.parametrize("numbers", [(36.0, 35.0, 30.0), *(FRINGES[period_px] for period_px in (9, 33, 110))])
+def test_chance_makes_offsets_small_as_often_as_stated(numbers: tuple[float, ...]) -> None:
+    """Where G and IR know nothing of the phase, a tile has the offsets of the best of all orders."""
+    first, *others = numbers
+    angles_rad = np.random.default_rng(5).uniform(-np.pi, np.pi, (20000, 1, 2))
+    turns = 2 * np.pi * np.arange(first)[:, np.newaxis] * np.array(others) / first
+    offsets_rad = np.abs(np.angle(np.exp(1j * (angles_rad - turns)))).max(axis=2).min(axis=1)
+    stated = small_by_chance(OFFSET_MAX_RAD, first, len(others))
+    found = (offsets_rad < OFFSET_MAX_RAD).mean()
+    hold("soundness.chance_sigmas", abs(found - stated) / np.sqrt(stated * (1 - stated) / len(offsets_rad)))

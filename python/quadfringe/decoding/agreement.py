@@ -19,22 +19,22 @@ from quadfringe import _core
 from quadfringe.data import AnyShot, Shape, Shot
 from quadfringe.decoding import verdict_params as limits
 from quadfringe.decoding.fringe_fit import infrared_column
+from quadfringe.decoding.given import saturated_from
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.symptoms import linear_light_of
 
-__all__ = ["Agreement"]
-
-SATURATED = 0.998  # of full scale, as in `symptoms.saturation`
+__all__ = ["Agreement", "small_by_chance"]
 
 Flat = NDArray[np.intp]  # indices of pixels in a map that is read row by row
 Map = NDArray[np.float32]
+Square = tuple[slice, slice]  # rows and columns
 
 
 class Tiles(NamedTuple):
-    """Tiles of returned pixels, and how many such tiles the lit pixels would fill."""
+    """Tiles of returned pixels, and the number of tiles that the lit pixels would fill."""
 
     pixels: list[Flat]
-    lit: float
+    lit: float = 0.0
 
 
 class Agreement:
@@ -49,30 +49,42 @@ class Agreement:
         self._waves = _waves(shape, plan)
         self._known = _known(shape, shot, self._light)
         one_order = shape.config["decode"]["method"] == "joint"  # for all pixels of a tile
-        self._tiles = _fine_tiles(shape, self._known) if one_order else Tiles([], 0.0)
+        self._tiles = _fine_tiles(shape, self._known) if one_order else Tiles([])
         self._offsets_rad = self._offsets_of(self._tiles.pixels)
 
     @property
     def beyond_chance(self) -> bool:
         """Whether offsets are small in so many tiles of half a fringe that chance does not explain it."""
         chance = _chance(self._offsets_rad, self._tiles.lit, self._plan)
-        return _quantile(self._offsets_rad) <= limits.OFFSET_MAX_RAD and chance <= limits.AGREED_BY_CHANCE_MAX
+        return self.offset_rad <= limits.OFFSET_MAX_RAD and chance <= limits.AGREED_BY_CHANCE_MAX
+
+    @property
+    def offset_rad(self) -> float:
+        """The offset that two thirds of the tiles of half a fringe do not exceed; infinite without any tile."""
+        return _quantile(self._offsets_rad)
+
+    @property
+    def scatter_rad(self) -> float:
+        """The same of the offsets less their medians, which a shift of all infrared light leaves as it is."""
+        return _quantile(self._offsets_rad - np.median(self._offsets_rad, axis=0)) if self._tiles.pixels else np.inf
 
     @cached_property
     def in_the_mean(self) -> bool:
         """Whether offsets are small in tiles of several fringes; False where there are too few, as on small objects."""
-        tiles = _coarse_tiles(self._known)
-        if len(tiles) < limits.COARSE_TILES_MIN:
+        squares = _squares(self._known, limits.COARSE_TILE_PX)
+        if len(squares) < limits.COARSE_TILES_MIN:
             return False
-        return _quantile(self._offsets_of(tiles)) <= limits.OFFSET_MAX_RAD
+        return (
+            _quantile(self._offsets_of([_pixels_of(self._known, square) for square in squares]))
+            <= limits.OFFSET_MAX_RAD
+        )
 
     @property
     def contradicted(self) -> bool:
         """Whether offsets differ from place to place by more than print or a wrong response explains."""
-        if not len(self._offsets_rad) or self.beyond_chance or self.in_the_mean:
+        if not self._tiles.pixels or self.scatter_rad <= limits.SCATTER_MAX_RAD:
             return False
-        scatter_rad = self._offsets_rad - np.median(self._offsets_rad, axis=0)
-        return _quantile(scatter_rad) > limits.SCATTER_MAX_RAD
+        return not (self.beyond_chance or self.in_the_mean)
 
     def _offsets_of(self, tiles: list[Flat]) -> NDArray[np.float64]:
         """Give the offsets in rad, (tiles, channels)."""
@@ -90,9 +102,8 @@ def _known(shape: Shape, shot: AnyShot, light: dict[str, Map]) -> NDArray[np.boo
     known = np.isfinite(shape.phase_rad)
     for image in light.values():
         known &= np.isfinite(image)
-    if isinstance(shot, Shot):
-        for image in shot.images.values():
-            known &= image < SATURATED * shot.full_scale_value
+    for image in shot.images.values() if isinstance(shot, Shot) else ():
+        known &= image < saturated_from(shot)
     return known
 
 
@@ -116,42 +127,45 @@ def _quantile(offsets_rad: NDArray[np.float64]) -> float:
 
 
 def _chance(offsets_rad: NDArray[np.float64], tiles: float, plan: Plan) -> float:
-    """Give the probability that so many of the tiles have small offsets if G and IR know nothing of the phase.
-
-    Each tile then has the best of all orders. Its offsets are anywhere, and small with the probability of as many
-    small squares in the square of both angles.
-    """
+    """Give the probability that so many of the tiles have small offsets if G and IR know nothing of the phase."""
     from scipy.special import bdtrc
 
     small = np.count_nonzero(np.abs(offsets_rad).max(axis=1) <= limits.OFFSET_MAX_RAD)
-    one = plan.fringes.numbers[0] * (limits.OFFSET_MAX_RAD / np.pi) ** offsets_rad.shape[1]
+    one = small_by_chance(limits.OFFSET_MAX_RAD, plan.fringes.numbers[0], offsets_rad.shape[1])
     count = max(round(tiles), len(offsets_rad))
     return 1.0 if one >= 1 or small == 0 else float(bdtrc(small - 1, count, one))
 
 
+def small_by_chance(offset_rad: float, orders: float, channels: int) -> float:
+    """Give the probability that the offsets of a tile, which may be any, are small with the best of all orders.
+
+    Every order leaves them small in one square of all the angles that two channels may have.
+    """
+    return orders * (offset_rad / np.pi) ** channels
+
+
 def _fine_tiles(shape: Shape, known: NDArray[np.bool_]) -> Tiles:
-    """Cut connected surfaces into squares with half a fringe, of which evenly spread ones are taken."""
+    """Take evenly spread squares with half a fringe, and of each the surfaces that fill enough of it."""
     import cv2
 
     side_px = _half_fringe_px(shape.phase_rad)
-    if side_px is None:
-        return Tiles([], 0.0)
-    _, surfaces = cv2.connectedComponents(known.astype(np.uint8), connectivity=4)
-    pixels = np.flatnonzero(known)
-    y, x = np.divmod(pixels, known.shape[1])
-    tiles_across, tiles_down = (size // side_px + 1 for size in known.shape[::-1])
-    tile_of = (surfaces.ravel()[pixels].astype(np.int64) * tiles_down + y // side_px) * tiles_across + x // side_px
-    order = np.argsort(tile_of, kind="stable")
-    cuts = np.flatnonzero(np.diff(tile_of[order])) + 1
-    tiles = [tile for tile in np.split(pixels[order], cuts) if tile.size >= limits.TILE_SHARE * side_px**2]
+    squares = [] if side_px is None else _squares(known, side_px)
+    if side_px is None or not squares:
+        return Tiles([])
+    taken = squares[:: -(-len(squares) // limits.FINE_TILES_MAX)]
+    tiles = []
+    for square in taken:
+        count, surfaces = cv2.connectedComponents(known[square].astype(np.uint8), connectivity=4)
+        tiles += [_pixels_of(known, square, surfaces == surface) for surface in range(1, count)]
     lit = np.count_nonzero(np.isfinite(shape.quality)) / side_px**2
-    taken = tiles[:: -(-len(tiles) // limits.FINE_TILES_MAX) or 1]
-    return Tiles(taken, lit * len(taken) / max(len(tiles), 1))
+    enough = [tile for tile in tiles if tile.size >= limits.TILE_SHARE * side_px**2]
+    return Tiles(enough, lit * len(taken) / len(squares))
 
 
 def _half_fringe_px(phase_rad: Map) -> int | None:
     """Give half of the median period of the fringes; None without any."""
-    slopes = [np.abs(np.diff(phase_rad, axis=axis)) for axis in (0, 1)]
+    rows = phase_rad[:: limits.PERIOD_STEP]
+    slopes = np.abs(np.diff(rows, axis=1)), np.abs(np.diff(phase_rad[:, :: limits.PERIOD_STEP], axis=0))
     seen = [slope[np.isfinite(slope)] for slope in slopes]
     if not all(slope.size for slope in seen):
         return None
@@ -159,13 +173,20 @@ def _half_fringe_px(phase_rad: Map) -> int | None:
     return max(round(np.pi / slope), limits.FINE_TILE_MIN_PX) if slope > 0 else None
 
 
-def _coarse_tiles(known: NDArray[np.bool_]) -> list[Flat]:
-    """Give the tiles with enough known pixels, of several fringes."""
-    side_px = limits.COARSE_TILE_PX
-    rows, columns = (range(0, size - side_px + 1, side_px) for size in known.shape)
-    at = np.arange(known.size).reshape(known.shape)
-    tiles = [np.s_[y : y + side_px, x : x + side_px] for y in rows for x in columns]
-    return [at[tile][known[tile]] for tile in tiles if known[tile].mean() >= limits.TILE_SHARE]
+def _squares(known: NDArray[np.bool_], side_px: int) -> list[Square]:
+    """Cut an image into squares, and give those with enough known pixels."""
+    rows, columns = (size // side_px for size in known.shape)
+    blocks = known[: rows * side_px, : columns * side_px].reshape(rows, side_px, columns, side_px)
+    full = blocks.sum(axis=(1, 3)) >= limits.TILE_SHARE * side_px**2
+    places = np.argwhere(full) * side_px
+    return [np.s_[y : y + side_px, x : x + side_px] for y, x in places]
+
+
+def _pixels_of(known: NDArray[np.bool_], square: Square, part: NDArray[np.bool_] | None = None) -> Flat:
+    """Give the known pixels of a square, or a part of them."""
+    y, x = np.nonzero(known[square] if part is None else part)
+    pixels: Flat = (y + square[0].start) * known.shape[1] + x + square[1].start
+    return pixels
 
 
 def _padded(tiles: list[Flat]) -> Flat:

@@ -1,7 +1,8 @@
-"""How the images of a shot were given: a channel without fringes, or one image twice."""
+"""How the images of a shot were given: saturated, without fringes, or one image twice."""
 
 from __future__ import annotations
 
+import math
 from itertools import combinations
 from typing import Any
 
@@ -12,7 +13,7 @@ from quadfringe.data import AnyShot, BayerShot
 from quadfringe.decoding import params
 from quadfringe.decoding.cause import Cause
 
-__all__ = ["blind_channels", "copied", "same_images"]
+__all__ = ["blind_channels", "copied", "same_images", "saturated_from"]
 
 STRIDE = 4  # pixels between samples of the light, along rows and columns: enough for quantiles
 DARK = 0.02  # fraction of full scale; a channel whose brightest pixels stay below it is black
@@ -45,8 +46,10 @@ def _range(image: NDArray[Any]) -> tuple[float, float]:
 
 def copied(shot: AnyShot) -> bool:
     """Say whether two channels are equal in some of the rows."""
+    if isinstance(shot, BayerShot):
+        return False
     rows = [image[:: params.SAME_ROWS] for image in shot.channels.values()]
-    return not isinstance(shot, BayerShot) and any(np.array_equal(*pair) for pair in combinations(rows, 2))
+    return any(np.array_equal(*pair) for pair in combinations(rows, 2))
 
 
 def same_images(shot: AnyShot) -> Cause | None:
@@ -77,3 +80,10 @@ def _correlation(first: NDArray[np.float32], second: NDArray[np.float32]) -> flo
     """Give the correlation of two signals without a mean; 0 if one of them is even."""
     scale = float(np.sqrt(np.dot(first, first) * np.dot(second, second)))
     return float(np.dot(first, second)) / scale if scale else 0.0
+
+
+def saturated_from(shot: AnyShot) -> float:
+    """Give the value from which a pixel of a shot counts as saturated."""
+    level = 0.998 * shot.full_scale_value
+    # For whole numbers it is the same, and they are compared without conversion.
+    return math.ceil(level) if shot.first.dtype.kind == "u" else level

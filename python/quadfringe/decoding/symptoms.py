@@ -6,7 +6,6 @@ surface. A shift of the infrared image turns that sum by a constant angle, and o
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from quadfringe.data import AnyShot
 from quadfringe.decoding import params
+from quadfringe.decoding.given import saturated_from
 from quadfringe.decoding.plan import Plan
 from quadfringe.decoding.stages import carrier, linear_light, wrapped_phases
 from quadfringe.errors import DecodeError
@@ -117,9 +117,7 @@ def brightness(shot: AnyShot) -> dict[str, float]:
 
 def saturation(shot: AnyShot) -> dict[str, float]:
     """Give the share of saturated pixels of each channel, in some of the rows."""
-    level = 0.998 * shot.full_scale_value
-    if shot.first.dtype.kind == "u":
-        level = math.ceil(level)  # the same pixels; whole numbers are compared without conversion
+    level = saturated_from(shot)
     rows = {name: image[:: params.SATURATED_ROWS] for name, image in shot.channels.items()}
     return {name: np.count_nonzero(image >= level) / image.size for name, image in rows.items()}
 

@@ -13,12 +13,12 @@ RETURNED_MIN = 0.05  # least share of the lit pixels that must be returned
 # response is not corrected. Exchanged channels have at most 0.44 (joint) and 0.49 (published), other fringe numbers 0.5
 # (joint) and 0.3 (published). `pytest tests/test_verdict.py` tests both limits.
 COLLAPSED = {"joint": 0.55, "published": 0.35}
-# From this margin up to the collapsed one, shots are kept whose channels agree only in the mean of several fringes.
-# Below, other fringe numbers on coloured patches agree by chance. `pytest tests/test_real_objects.py` decodes both.
-AGREEING_MIN = 0.3
 # The same for shots whose channels do not have the ratios of the fringe numbers. Five of 1,000 shots of other numbers
 # have 0.35 to 0.37 by the published method: `python -m hostile --shots 1000` in the folder tests.
 COLLAPSED_UNFIT = {"joint": 0.55, "published": 0.4}
+# From this margin up to the collapsed one, shots are kept whose channels agree only in the mean of several fringes.
+# Below, other fringe numbers on coloured patches agree by chance. `pytest tests/test_real_objects.py` decodes both.
+AGREEING_MIN = 0.3
 DOUBTFUL = 0.6
 # From this margin on, a shot is returned without further tests. Shots without one channel have at most 0.69, shots of
 # other fringe numbers at most 0.70 (joint) and 0.42 (published), in images of a dozen fringes: `python -m hostile
@@ -54,18 +54,23 @@ NEAR = {"joint": 0.6, "published": 0.85}
 # angle or a smaller share lets chance agree. A smaller angle takes print and harmonics for other fringes, and with a
 # larger share a small part of an object that has the order of another surface refuses the whole.
 OFFSET_MAX_RAD, OFFSET_QUANTILE = 0.12, 2 / 3
+# The same for offsets less their medians, from which they contradict the phase. Sound shots have up to 0.065; through a
+# response of exponent 0.7, crosstalk of 0.1 and blur of 3 px they have up to 0.14, 0.10 and 0.23. The median of broken
+# shots is 0.14 with numbers 37, 36, 31, 0.18 with 64, 63, 56, and 0.36 with G and IR exchanged: `python
+# evaluation/soundness.py --seeds 41 42 --offsets`. A larger angle returns more of these, a smaller one refuses benches
+# that are badly calibrated.
+SCATTER_MAX_RAD = 0.165
 # Probability with which chance may make so many tiles agree. A larger one returns broken shots of small objects, a
 # smaller one refuses objects of a fringe.
 AGREED_BY_CHANCE_MAX = 1e-3
-# The same for offsets less their medians, from which they contradict the phase. Sound shots have up to 0.15 through a
-# wrong response, blur or crosstalk, other fringe numbers on small objects 0.15 to 0.42. A larger angle returns those, a
-# smaller one refuses benches that are badly calibrated.
-SCATTER_MAX_RAD = 0.165
 # Least share of a tile that is returned. A larger share leaves narrow surfaces out, a smaller one measures rims.
 TILE_SHARE = 0.3
 # Least side of a tile of half a fringe, px, and how many of them are measured at most. Smaller tiles see more noise,
 # more tiles cost time, and fewer know the quantile less well.
 FINE_TILE_MIN_PX, FINE_TILES_MAX = 16, 64
+# Rows, and columns, of which one is looked at for the period of the fringes. With more, small objects are missed, with
+# fewer it takes time.
+PERIOD_STEP = 4
 # Side of a tile of several fringes, px, in which texture averages out, and the least number of them. Smaller tiles see
 # the texture, larger ones and more of them leave fewer objects that can be tested.
 COARSE_TILE_PX, COARSE_TILES_MIN = 96, 4

@@ -16,7 +16,7 @@ from quadfringe.config import Device
 from quadfringe.data import Calibration, Shot, core_device
 from quadfringe.evaluation import world
 
-__all__ = ["CAUSES", "GOOD", "Case", "broken", "calibrated", "sound"]
+__all__ = ["CAUSES", "GOOD", "Case", "Change", "broken", "calibrated", "exchanged", "shifted", "sound"]
 
 NOISE = 0.02  # standard deviation, share of full scale
 # Sound scenes and their seeds. Reliefs take long to cast, so that they have fewer seeds and a camera of half the size.
@@ -71,11 +71,14 @@ class Fault:
     change: Change | None = None
 
 
-def _exchange(first: str, second: str) -> Change:
+def exchanged(first: str, second: str) -> Change:
+    """Give the change that exchanges two channels."""
     return lambda i: {**i, first: i[second], second: i[first]}
 
 
-def _shifted(columns: float, rows: float) -> Change:
+def shifted(columns: float, rows: float) -> Change:
+    """Give the change that moves infrared, in px; its border is repeated."""
+
     def change(images: Images) -> Images:
         moved = np.array([[1, 0, columns], [0, 1, rows]], np.float64)
         ir = images["ir"]
@@ -99,9 +102,9 @@ def _stray(pairs: dict[tuple[int, int], float]) -> dict[str, Any]:
 
 CAUSES: dict[str, tuple[Fault, Fault, Fault]] = {
     "exchanged channels": (
-        Fault("red, blue", change=_exchange("red", "blue")),
-        Fault("green, ir", change=_exchange("green", "ir")),
-        Fault("red, green", change=_exchange("red", "green")),
+        Fault("red, blue", change=exchanged("red", "blue")),
+        Fault("green, ir", change=exchanged("green", "ir")),
+        Fault("red, green", change=exchanged("red", "green")),
     ),
     "fringe numbers": (
         Fault("49 48 42", numbers=(49.0, 48.0, 42.0)),
@@ -115,9 +118,9 @@ CAUSES: dict[str, tuple[Fault, Fault, Fault]] = {
         Fault("0.3 all visible", _stray({(0, 1): 0.3, (1, 0): 0.3, (1, 2): 0.3, (2, 1): 0.3})),
     ),
     "infrared registration": (
-        Fault("3, 0 px", change=_shifted(3, 0)),
-        Fault("-7, 4 px", change=_shifted(-7, 4)),
-        Fault("12, 6 px", change=_shifted(12, 6)),
+        Fault("3, 0 px", change=shifted(3, 0)),
+        Fault("-7, 4 px", change=shifted(-7, 4)),
+        Fault("12, 6 px", change=shifted(12, 6)),
     ),
     "blur": tuple(Fault(f"{s:g} px", {"blur_px": s}) for s in (4.0, 6.0, 9.0)),  # type: ignore[dict-item]
     "too dark": tuple(Fault(f"gain {g:g}", {"gain": (g,) * 4}) for g in (0.2, 0.1, 0.03)),  # type: ignore[dict-item]
