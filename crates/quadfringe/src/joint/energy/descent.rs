@@ -11,8 +11,8 @@ use super::tile::{Found, Tile};
 use super::variance::variance;
 use crate::joint::model::{absent, count};
 use crate::joint::params::energy::{
-    ALBEDO_STEP_MAX, CONTRAST_STEP_MAX, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS, PHASE_STEP_MAX_RAD,
-    RESTING_RAD, SIDE,
+    ALBEDO_STEP_MAX, BEND_GROWTH, CONTRAST_STEP_MAX, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS,
+    PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
 };
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
@@ -39,7 +39,7 @@ impl Tile {
         self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
         self.unknown.phase.copy(&self.start);
         start::contrast_and_albedo(self, AlbedoOf::Neighbours);
-        self.descend(noise);
+        self.descend(noise, self.scales.bend);
         self.restart(noise);
         if detail != 1.0 {
             self.resolve(detail);
@@ -59,25 +59,31 @@ impl Tile {
         weigh(self);
     }
 
-    /// Lowers the energy from the present unknowns, and estimates the scales; `noise` is the least variance of the noise.
-    pub(super) fn descend(&mut self, noise: f32) {
+    /// Lowers the energy from the present unknowns, and estimates the scales. `noise` is the least variance of the noise, and `bend_max`
+    /// the greatest variance of the bending in the first step; it grows from step to step (J43).
+    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32) {
         let mut determined = Determined::default();
-        for outer in 0..OUTER_STEPS {
+        let (mut outer, mut free) = (0, 0);
+        while free < OUTER_STEPS {
             let sums = linearise(self);
             self.scales.estimate_noise(&sums, determined, self.ratios, noise);
             let sums = weigh(self);
             if outer > 0 {
                 let channels = count(self.ratios);
                 let information = information(&self.derivatives, &self.weights, self.ratios);
-                determined = self.scales.estimate_priors(&sums, information, channels);
+                bend_max *= BEND_GROWTH * BEND_GROWTH;
+                determined = self.scales.estimate_priors(&sums, information, channels, bend_max);
                 weigh(self);
             }
             solve(self, INNER_STEPS);
             let moved = self.advance();
             debug_assert!(moved.is_finite(), "a step of a tile is not finite");
-            if outer > 1 && moved < RESTING_RAD {
+            let limited = self.scales.bend >= bend_max;
+            free += usize::from(!limited);
+            if outer > 1 && !limited && moved < RESTING_RAD {
                 break;
             }
+            outer += 1;
         }
     }
 

@@ -41,7 +41,7 @@ impl Tile {
         if take_step(self) {
             self.scales = Scales { noise, misfit: 1.0, ..scales };
             start::contrast_and_albedo(self, AlbedoOf::Cell);
-            self.descend(noise);
+            self.descend(noise, f32::INFINITY);
             keep_lower(self, &scales);
             self.scales = scales;
         }

@@ -113,12 +113,15 @@ impl Scales {
         self.channel_contrast = change.map(|value| (value / mean.max(1e-6)).clamp(0.5, 1.5));
     }
 
-    /// Estimates the variances of the priors, and gives the numbers of unknowns that the data determine.
+    /// Estimates the variances of the priors, and gives the numbers of unknowns that the data determine. The variance of the bending is
+    /// at most `bend_max`. As long as it is that, the variance of the contrast does not rise, or contrast would explain what the surface
+    /// may not (J43).
     pub fn estimate_priors(
         &mut self,
         sums: &PriorSums,
         information: Information,
         channels: f32,
+        bend_max: f32,
     ) -> Determined {
         let Information { phase, albedo, contrast } = information;
         let noise = self.noise;
@@ -136,12 +139,13 @@ impl Scales {
             let variance = (sums.energy + prior * f64::from(start * start)) / (count + prior);
             (variance as f32).clamp(limits[0] * limits[0], limits[1] * limits[1])
         };
-        self.bend = update(&sums.bend, 1.0, determined.phase, START[0], BEND_LIMITS);
+        self.bend = update(&sums.bend, 1.0, determined.phase, START[0], BEND_LIMITS).min(bend_max);
         let [bright, colour, slow] = unknowns(channels).map(f64::from);
         self.brightness =
             update(&sums.brightness, bright, determined.brightness, START[1], BRIGHTNESS_LIMITS);
         self.colour = update(&sums.colour, colour, determined.colour, START[2], COLOUR_LIMITS);
-        self.contrast = update(&sums.contrast, slow, determined.contrast, START[3], CONTRAST_LIMITS);
+        let contrast = update(&sums.contrast, slow, determined.contrast, START[3], CONTRAST_LIMITS);
+        self.contrast = if self.bend < bend_max { contrast } else { contrast.min(self.contrast) };
         determined
     }
 }

@@ -89,7 +89,7 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
     let (mut tile, truth) = printed_tile();
     tile.unknown.phase.copy(&tile.start);
     contrast_and_albedo(&mut tile, AlbedoOf::Neighbours);
-    tile.descend(noise);
+    tile.descend(noise, tile.scales.bend);
     let (first, _) = errors(&tile, &truth);
     let (mut tile, truth) = printed_tile();
     tile.minimise(noise, 1.0);

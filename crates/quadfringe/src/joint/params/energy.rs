@@ -46,9 +46,13 @@ pub const COLOUR_FREEDOM: f32 = 1.0;
 pub const CONTRAST_FREEDOM: f32 = 2.0;
 
 /// Standard deviations with which the estimate of the priors starts: second differences of the phase in rad, and first differences
-/// of the logarithms of brightness, colour and contrast. The estimate forgets them after a few steps.
-/// Not measured: it was set with the others (see the head of this file).
-pub const START: [f32; 4] = [0.01, 0.04, 0.015, 0.02];
+/// of the logarithms of brightness, colour and contrast. The estimate forgets them after a few steps, but for the first, from which
+/// the surface loosens (J43). Larger: the surface keeps more of the errors of its start. Smaller: time.
+/// `python evaluation/sensitivity.py --only energy::START`.
+pub const START: [f32; 4] = [0.002, 0.04, 0.015, 0.02];
+/// Growth of the greatest standard deviation of the second differences from one step to the next (J43). Larger: the surface keeps
+/// more of the errors of its start. Smaller: time. `python evaluation/sensitivity.py --only BEND_GROWTH`.
+pub const BEND_GROWTH: f32 = 2.0;
 /// Weight of these in the estimate, as a number of cells. It keeps the estimate of a tile with few lit cells finite.
 /// Not measured: it was set with the others (see the head of this file).
 pub const PRIOR_CELLS: f32 = 0.1;
@@ -81,10 +85,10 @@ pub const CONTRAST_START_LIMITS: [f32; 2] = [0.1, 1.05];
 /// Not measured: it was set with the others (see the head of this file).
 pub const ALBEDO_LIMITS: [f32; 2] = [0.004, 4.0];
 
-/// Greatest number of Gauss-Newton steps; a tile that rests takes fewer. More: time on painted surfaces. Fewer: scales stop before
-/// their limit, and fine relief is lost (with five, 0.29 instead of 0.5 of the height of waves of 16 px is left).
-/// `python evaluation/world.py --half tune --only resolution`.
-pub const OUTER_STEPS: usize = 8;
+/// Greatest number of Gauss-Newton steps in which the scale of the surface is free; a tile that rests takes fewer. More: time on
+/// painted surfaces. Fewer: scales stop before their limit, and fine relief is lost (with seven, 0.3 instead of 0.5 of the height of
+/// waves of 16 px is left). `python evaluation/world.py --half tune --only resolution`.
+pub const OUTER_STEPS: usize = 10;
 /// Number of Gauss-Newton steps with another scale of the surface, if `detail` is not 1. Fewer: the surface stops on the way. More:
 /// time. One leaves the median of the coin 14 % larger with half the detail; six change no RMS by more than 4 %.
 /// `python evaluation/world.py --half tune --detail 0.5`.

@@ -7,7 +7,7 @@ pub const METHOD_RAD: f32 = 1.5e-4;
 /// Share of the mean squared correction by which the energy moves the phase of its start that counts as variance (U14). Larger: more
 /// of the errors of relief and translucent light are inside. Smaller: fewer errors on prints are. `python evaluation/world.py --half
 /// tune` at half and at twice the value: see docs/method/uncertainty.md.
-pub const CORRECTION_LEFT: f32 = 0.06;
+pub const CORRECTION_LEFT: f32 = 0.05;
 /// Share of the residuals beyond noise that counts as an error of the model, which neighbouring cells share (U14). Larger: the
 /// uncertainty on photographs is too large. Smaller: that on real captures is too small. `python evaluation/world.py --half tune
 /// --only photographs`; at half and at twice the value: see docs/method/uncertainty.md.
