@@ -115,7 +115,7 @@ def test_a_shape_says_that_the_dark_level_is_wrong(small_bench: Path) -> None:
     with pytest.warns(DecodeWarning, match=level):
         shape = qf.decode(qf.read_shot(small_bench), qf.Plan(912, calibration=known, response="linear"))
     assert "dark level" in shape.warnings[0]
-    # What is left of the fringes is right, and no other fault is named.
+    # The returned pixels have the right order, and the dark level is the only fault that is named.
     truth_px = np.load(small_bench / "truth.npz")["column_px"]
     off_px = np.abs(shape.column_px - truth_px)[shape.returned]
     hold("black.cut_right", np.mean(off_px < 0.5 * 912 / 36))

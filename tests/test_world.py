@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from support.bars import hold
 
+import quadfringe as qf
 from quadfringe.data import Shape
 from quadfringe.evaluation import world
 from quadfringe.evaluation.world import scenes
@@ -78,6 +80,19 @@ def test_the_truth_keeps_all_detail(monkeypatch: pytest.MonkeyPatch) -> None:
         ratios = world.height_ratios(shape_of, along, seed=1)
         assert ratios == pytest.approx({8: 1.0, 26: 1.0}, abs=0.02)
     assert world.edge_width_px(shape_of, seed=1) < 3
+
+
+@pytest.mark.parametrize("along", ["x", "y"])
+def test_the_joint_method_keeps_half_of_fine_waves(monkeypatch: pytest.MonkeyPatch, along: str) -> None:
+    monkeypatch.setattr(world.resolution, "PERIODS_PX", (16,))
+    with qf.open(qf.SystemConfig()) as scanner:
+        known = scanner.calibration
+
+    def decoded(take: world.Take) -> Shape:
+        plan = qf.Plan(known.projector.width_px, take.fringe_numbers, known, response="linear")
+        return qf.Decoder(take.shot, plan).decode_without_verdict(take.shot)
+
+    hold("detail.fine_waves_kept", list(world.height_ratios(decoded, along, seed=1).values()))
 
 
 @pytest.mark.parametrize(

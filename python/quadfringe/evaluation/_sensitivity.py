@@ -8,7 +8,8 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from statistics import fmean
+from statistics import fmean, geometric_mean
+from typing import NamedTuple
 
 import numpy as np
 
@@ -52,6 +53,14 @@ Key = tuple[str, str]  # group, and figure as in LEAST
 Figures = dict[Key, float]
 
 
+class Judged(NamedTuple):
+    """Figures of one shape: RMS phase error of right orders, and shares of pixels."""
+
+    error_rad: float
+    returned_percent: float
+    wrong_percent: float  # of returned
+
+
 @dataclass(frozen=True)
 class Given:
     """A shot, how it is decoded, and its truth: phase in rad and counted pixels, (H, W)."""
@@ -61,13 +70,13 @@ class Given:
     phase_rad: scoring.Map
     counted: scoring.Mask
 
-    def figures(self) -> list[float]:
-        """Give the figures of `LEAST`."""
+    def judged(self) -> Judged:
+        """Decode the shot and compare its phase with the truth."""
         shape = Decoder(self.shot, self.plan).decode_without_verdict(self.shot)
         off_rad = np.abs(shape.phase_rad - self.phase_rad)[shape.returned & self.counted]
         right = off_rad[off_rad < np.pi]
-        count = max(1, off_rad.size)
-        return [scoring.rms(right), 100 * off_rad.size / int(self.counted.sum()), 100 * (1 - right.size / count)]
+        returned, wrong = off_rad.size / int(self.counted.sum()), 1 - right.size / max(1, off_rad.size)
+        return Judged(scoring.rms(right), 100 * returned, 100 * wrong)
 
 
 def of_world(name: str, fringes: Fringes | None = None, exposure: float = 1.0) -> Given:
@@ -111,17 +120,17 @@ def shots() -> Iterator[tuple[str, Given]]:
 
 def figures_of(given: Iterable[tuple[str, Given]]) -> Figures:
     """Decode shots with their groups, and give the means of each group."""
-    found: dict[str, list[list[float]]] = defaultdict(list)
+    found: dict[str, list[Judged]] = defaultdict(list)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for group, one in given:
-            found[group].append(one.figures())
+            found[group].append(one.judged())
     figures: Figures = {}
-    for group, lines in found.items():
-        error, returned, wrong = zip(*lines, strict=True)
+    for group, judged in found.items():
         # A geometric mean, so that each shot counts by its relative change.
-        figures[group, "RMS"] = float(np.exp(fmean(np.log(error))))
-        figures[group, "returned"], figures[group, "wrong"] = fmean(returned), fmean(wrong)
+        figures[group, "RMS"] = geometric_mean(one.error_rad for one in judged)
+        figures[group, "returned"] = fmean(one.returned_percent for one in judged)
+        figures[group, "wrong"] = fmean(one.wrong_percent for one in judged)
     return figures
 
 

@@ -51,7 +51,7 @@ pub const CONTRAST_FREEDOM: f32 = 2.0;
 /// `python evaluation/sensitivity.py --only energy::START`.
 pub const START: [f32; 4] = [0.002, 0.04, 0.015, 0.02];
 /// Growth of the greatest standard deviation of the second differences from one step to the next (J43). Larger: the surface keeps
-/// more of the errors of its start. Smaller: time. `python evaluation/sensitivity.py --only BEND_GROWTH`.
+/// more of the errors of its start. Smaller: time; at 1 it stays stiff. `python evaluation/sensitivity.py --only BEND_GROWTH`.
 pub const BEND_GROWTH: f32 = 2.0;
 /// Weight of these in the estimate, as a number of cells. It keeps the estimate of a tile with few lit cells finite.
 /// Not measured: it was set with the others (see the head of this file).
