@@ -1,7 +1,8 @@
 //! The albedo of pixels at an edge (J30).
 
 use crate::joint::energy::FringeRows;
-use crate::joint::params::albedo::{CANDIDATES, EXPONENT_MAX};
+use crate::joint::params::albedo::CANDIDATES;
+use crate::joint::params::uncertainty::EXPONENT_MAX;
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes, lanes, lanes_mut, take};
 use multiversion::multiversion;

@@ -11,8 +11,7 @@ use super::tile::{Found, Tile};
 use super::variance::variance;
 use crate::joint::model::{absent, count};
 use crate::joint::params::energy::{
-    ALBEDO_STEP_MAX, BEND_GROWTH, CONTRAST_STEP_MAX, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS,
-    PHASE_STEP_MAX_RAD, RESTING_RAD, SIDE,
+    BEND_GROWTH, DETAIL_STEPS, INNER_STEPS, OUTER_STEPS, RESTING_RAD, SIDE, STEP_MAX,
 };
 use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
@@ -44,6 +43,8 @@ impl Tile {
         if detail != 1.0 {
             self.resolve(detail);
         }
+        linearise(self);
+        weigh(self);
     }
 
     /// Descends once more, with the scales that were found but for that of the surface (J36).
@@ -55,18 +56,18 @@ impl Tile {
             solve(self, INNER_STEPS);
             self.advance();
         }
-        linearise(self);
-        weigh(self);
     }
 
     /// Lowers the energy from the present unknowns, and estimates the scales. `noise` is the least variance of the noise, and `bend_max`
-    /// the greatest variance of the bending in the first step; it grows from step to step (J43).
+    /// the greatest variance of the bending in the first step; it grows from step to step (J43). While it limits the surface, the noise
+    /// may not rise, or it would explain what the surface may not.
     pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32) {
         let mut determined = Determined::default();
-        let (mut outer, mut free) = (0, 0);
+        let (mut outer, mut free, mut limited) = (0, 0, false);
         while free < OUTER_STEPS {
             let sums = linearise(self);
-            self.scales.estimate_noise(&sums, determined, self.ratios, noise);
+            let most = if limited { self.scales.misfit } else { f32::INFINITY };
+            self.scales.estimate_noise(&sums, determined, self.ratios, [noise, most]);
             let sums = weigh(self);
             if outer > 0 {
                 let channels = count(self.ratios);
@@ -78,7 +79,7 @@ impl Tile {
             solve(self, INNER_STEPS);
             let moved = self.advance();
             debug_assert!(moved.is_finite(), "a step of a tile is not finite");
-            let limited = self.scales.bend >= bend_max;
+            limited = self.scales.bend >= bend_max;
             free += usize::from(!limited);
             if outer > 1 && !limited && moved < RESTING_RAD {
                 break;
@@ -110,14 +111,12 @@ impl Tile {
 
     /// Adds the step to the unknowns; returns the root mean square of the change of the phase.
     fn advance(&mut self) -> f32 {
-        let [a, c] = [ALBEDO_STEP_MAX, CONTRAST_STEP_MAX];
-        let limits = [PHASE_STEP_MAX_RAD, a, a, a, a, c];
         let (mut squares, mut cells) = (0.0, 1e-9);
-        let planes = self.unknown.planes_mut().into_iter().zip(self.step.planes()).zip(limits);
-        for (n, ((unknown, step), limit)) in planes.enumerate() {
+        let planes = self.unknown.planes_mut().into_iter().zip(self.step.planes());
+        for (n, (unknown, step)) in planes.enumerate() {
             for y in 0..SIDE {
                 for (unknown, step) in unknown.row_mut(y).iter_mut().zip(step.row(y)) {
-                    let step = step.clamp(-limit, limit);
+                    let step = step.clamp(-STEP_MAX, STEP_MAX);
                     *unknown += step;
                     squares += if n == 0 { step * step } else { 0.0 };
                 }

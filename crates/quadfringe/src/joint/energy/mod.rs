@@ -5,6 +5,7 @@
 //! itself, tile by tile. Tiles overlap and are independent of each other, so the result does not depend on the threads.
 
 mod average;
+mod bias;
 mod blocks;
 mod cells;
 mod data;

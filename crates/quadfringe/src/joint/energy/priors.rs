@@ -4,7 +4,7 @@ use super::plane::{Column, Plane, STRIDE, total, vectors};
 use super::scales::{PriorSums, unknowns};
 use super::tile::Tile;
 use crate::joint::model::count;
-use crate::joint::params::energy::{BEND_FREEDOM, BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM};
+use crate::joint::params::energy::{BEND_FREEDOM, DIFFERENCE_FREEDOM};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -81,9 +81,6 @@ fn bend(tile: &mut Tile, at: usize, sums: &mut PriorSums) {
     sums.bend.add(energy, count, mean);
 }
 
-/// Degrees of freedom of the differences in brightness, colour and contrast.
-pub(super) const FREEDOM: [f32; 3] = [BRIGHTNESS_FREEDOM, COLOUR_FREEDOM, CONTRAST_FREEDOM];
-
 /// Squared differences of a vector of cells and their neighbours in brightness, colour and contrast. `share` is that of one channel
 /// in the mean of all.
 #[inline(always)]
@@ -120,7 +117,7 @@ fn differences(tile: &mut Tile, at: usize, k: usize, step: usize, sums: &mut Pri
     for x in 0..LANES {
         both[x] = lit[x] * next_lit[x];
         for n in 0..3 {
-            let student = both[x] * student(FREEDOM[n], unknowns[n], squares[n][x] * inverse[n]);
+            let student = both[x] * student(DIFFERENCE_FREEDOM, unknowns[n], squares[n][x] * inverse[n]);
             energy[n][x] = student * squares[n][x];
             mean[n][x] = student;
             out[n][x] = student * inverse[n] * noise;

@@ -2,16 +2,14 @@
 //! is found from there can be a wrong one. The second start is the surface that bends least through the cells without texture.
 //! Every cell keeps the start around which the energy is lower.
 
-use super::data::linearise;
 use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, total, vectors};
-use super::priors::weigh;
 use super::scales::Scales;
 use super::solve::solve;
 use super::start::{self, AlbedoOf, filter};
 use super::tile::Tile;
 use super::value::{Given, add_energy};
 use crate::joint::model::count;
-use crate::joint::params::energy::{BRIDGE_STEPS, GAIN_MIN, SAME_RAD, SIDE, TEXTURE_MIN, TEXTURE_RAD};
+use crate::joint::params::energy::{GAIN_MIN, INNER_STEPS, SAME_RAD, SIDE, TEXTURE_MIN};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -36,7 +34,7 @@ impl Tile {
         residual.planes_mut().into_iter().for_each(Plane::clear);
         // The surface continues through cells without light.
         vectors().for_each(|at| inside.set(at, [1.0; LANES]));
-        solve(self, BRIDGE_STEPS);
+        solve(self, INNER_STEPS);
         std::mem::swap(&mut self.inside, &mut self.lit);
         if take_step(self) {
             self.scales = Scales { noise, misfit: 1.0, ..scales };
@@ -45,8 +43,6 @@ impl Tile {
             keep_lower(self, &scales);
             self.scales = scales;
         }
-        linearise(self);
-        weigh(self);
     }
 }
 
@@ -98,7 +94,7 @@ fn hold_by_phase(
         let (lit, texture) = (inside.get(at), texture(inside, &first.albedo, share, at));
         let mut out = [0.0; LANES];
         for x in 0..LANES {
-            out[x] = lit[x] * (noise / (SAME_RAD * SAME_RAD + TEXTURE_RAD * TEXTURE_RAD * texture[x])).sqrt();
+            out[x] = lit[x] * (noise / (SAME_RAD * SAME_RAD + texture[x])).sqrt();
         }
         phase[0].set(at, out);
     }

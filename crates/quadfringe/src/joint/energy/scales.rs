@@ -7,8 +7,7 @@
 
 use crate::joint::model::{count, weights};
 use crate::joint::params::energy::{
-    BEND_LIMITS, BRIGHTNESS_LIMITS, COLOUR_LIMITS, CONTRAST_LIMITS, DETERMINED_MIN, MODEL_SHARE, PRIOR_CELLS,
-    START,
+    DETERMINED_MIN, MODEL_SHARE, PRIOR_CELLS, RELAXATION, SCALE_LIMITS, START,
 };
 
 /// Variances of noise and priors in one tile.
@@ -93,13 +92,19 @@ pub(super) struct Determined {
 }
 
 impl Scales {
-    /// Estimates the variance of the noise from the residuals, and the contrasts of the channels.
-    pub fn estimate_noise(&mut self, sums: &DataSums, determined: Determined, ratios: [f32; 4], least: f32) {
+    /// Estimates the variance of the noise from the residuals, between a `least` and a `most`, and the contrasts of the channels.
+    pub fn estimate_noise(
+        &mut self,
+        sums: &DataSums,
+        determined: Determined,
+        ratios: [f32; 4],
+        [least, most]: [f32; 2],
+    ) {
         let channels = count(ratios);
         let Determined { phase, brightness, colour, contrast } = determined;
         let used = phase + brightness + (channels - 1.0) * colour + contrast;
         let free = sums.cells * f64::from((channels - used).max(0.5));
-        self.misfit = ((sums.squares / free.max(1e-9)) as f32).max(least);
+        self.misfit = ((sums.squares / free.max(1e-9)) as f32).min(most).max(least);
         let mean = sums.brightness / (f64::from(channels) * sums.cells).max(1e-9);
         self.noise = self.misfit + MODEL_SHARE * MODEL_SHARE * mean as f32;
         let mut change = [1.0; 4];
@@ -133,18 +138,19 @@ impl Scales {
             colour: difference_share(weight(&sums.colour, self.colour) / albedo.max(1e-12)),
             contrast: difference_share(weight(&sums.contrast, self.contrast) / contrast.max(1e-12)),
         };
-        let update = |sums: &Sums, each: f64, share: f32, start: f32, limits: [f32; 2]| {
-            let count = each * sums.count * f64::from(share.max(DETERMINED_MIN));
+        let update = |sums: &Sums, each: f32, share: f32, start: f32, old: f32| {
+            let count = f64::from(each) * sums.count * f64::from(share.max(DETERMINED_MIN));
             let prior = f64::from(PRIOR_CELLS);
             let variance = (sums.energy + prior * f64::from(start * start)) / (count + prior);
-            (variance as f32).clamp(limits[0] * limits[0], limits[1] * limits[1])
+            let growth = (variance as f32 / old).powf(RELAXATION);
+            (old * growth).clamp(SCALE_LIMITS[0].powi(2), SCALE_LIMITS[1].powi(2))
         };
-        self.bend = update(&sums.bend, 1.0, determined.phase, START[0], BEND_LIMITS).min(bend_max);
-        let [bright, colour, slow] = unknowns(channels).map(f64::from);
-        self.brightness =
-            update(&sums.brightness, bright, determined.brightness, START[1], BRIGHTNESS_LIMITS);
-        self.colour = update(&sums.colour, colour, determined.colour, START[2], COLOUR_LIMITS);
-        let contrast = update(&sums.contrast, slow, determined.contrast, START[3], CONTRAST_LIMITS);
+        let [bright, colour, slow] = unknowns(channels);
+        let Determined { phase, brightness, colour: coloured, contrast } = determined;
+        self.bend = update(&sums.bend, 1.0, phase, START[0], self.bend).min(bend_max);
+        self.brightness = update(&sums.brightness, bright, brightness, START[1], self.brightness);
+        self.colour = update(&sums.colour, colour, coloured, START[2], self.colour);
+        let contrast = update(&sums.contrast, slow, contrast, START[3], self.contrast);
         self.contrast = if self.bend < bend_max { contrast } else { contrast.min(self.contrast) };
         determined
     }

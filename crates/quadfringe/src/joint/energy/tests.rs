@@ -94,7 +94,7 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
     let (mut tile, truth) = printed_tile();
     tile.minimise(noise, 1.0);
     let (second, largest) = errors(&tile, &truth);
-    assert!(first > 0.02 && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
+    assert!(first > 4.0 * second && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
 }
 
 /// What the bending of a surface costs more with an island three radians off than without it. The island is cut off by torn cells,

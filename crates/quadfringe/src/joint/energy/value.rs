@@ -3,10 +3,10 @@
 
 use super::data::{Cells, Line, predict, predicted};
 use super::plane::{Column, Fields, Plane, STRIDE, vectors};
-use super::priors::{FREEDOM, bending, squares};
+use super::priors::{bending, squares};
 use super::scales::{Scales, unknowns};
 use crate::joint::model::{count, weights};
-use crate::joint::params::energy::BEND_FREEDOM;
+use crate::joint::params::energy::{BEND_FREEDOM, DIFFERENCE_FREEDOM};
 use crate::parallel::exp::{exp, ln_1p};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
@@ -99,7 +99,8 @@ fn differences(lit: [Lanes; 2], squares: [Lanes; 3], unknowns: [f32; 3], scales:
     let inverse = [1.0 / scales.brightness, 1.0 / scales.colour, 1.0 / scales.contrast];
     for n in 0..3 {
         for x in 0..LANES {
-            out[x] += lit[0][x] * lit[1][x] * student(FREEDOM[n], unknowns[n], squares[n][x] * inverse[n]);
+            out[x] +=
+                lit[0][x] * lit[1][x] * student(DIFFERENCE_FREEDOM, unknowns[n], squares[n][x] * inverse[n]);
         }
     }
 }

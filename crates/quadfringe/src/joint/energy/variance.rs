@@ -1,5 +1,6 @@
-//! Variance of the phase at the minimum (U13), (U14), (U17).
+//! Variance of the phase at the minimum (U13), (U14), (U17), (U18).
 
+use super::bias::{self, bias};
 use super::blocks::phase_information;
 use super::disagreement::disagreement;
 use super::plane::{Fields, Plane, vectors};
@@ -16,11 +17,11 @@ pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     add_variance(tile, noise, out);
 }
 
-/// Adds the variance by noise, by the residuals and by the correction.
+/// Adds the variance by noise, by the residuals, by the correction and by the bias.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
-    let Tile { start, unknown, scales, derivatives, weights, product, ratios, .. } = tile;
-    let Fields { phase: information, contrast: spare, albedo: [corrections, ..] } = product;
+    let Tile { start, unknown, scales, derivatives, weights, product, residual, ratios, .. } = tile;
+    let Fields { phase: information, contrast: spare, albedo: [corrections, pull, known, biases] } = product;
     for at in vectors() {
         information.set(at, phase_information(derivatives, weights, *ratios, at));
         let (phase, start) = (unknown.phase.get(at), start.get(at));
@@ -30,17 +31,19 @@ fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
         }
         corrections.set(at, square);
     }
+    let work = bias::Work { pull, known, spare: &mut *spare };
+    bias(&residual.phase, information, scales.misfit, work, biases);
     // A saturated cell has no information by itself; its neighbours determine it.
     smooth(information, spare);
     (0..2).for_each(|_| smooth(corrections, spare));
     let excess = EXCESS_LEFT * (scales.misfit - noise).max(0.0);
     for at in vectors() {
         let (known, square, bend) = (information.get(at), corrections.get(at), weights.bend[0].get(at));
-        let mut variance = out.get(at);
+        let (biased, mut variance) = (biases.get(at), out.get(at));
         for x in 0..LANES {
             let known = if known[x] > CELL_INFORMATION_MIN { known[x] } else { CELL_INFORMATION_MIN };
             let by_noise = scales.misfit * variance_share(known, bend[x]);
-            variance[x] += by_noise + excess / known + CORRECTION_LEFT * square[x];
+            variance[x] += by_noise + excess / known + CORRECTION_LEFT * square[x] + biased[x];
         }
         out.set(at, variance);
     }

@@ -6,6 +6,3 @@ pub const ROWS: usize = 8;
 
 /// Cells whose albedo a pixel may have: 3 x 3 around it. Follows from the edge of a print, which one cell mixes.
 pub const CANDIDATES: usize = 9;
-
-/// Greatest exponent of a probability. Follows from the arithmetic: exp(-80) is 2e-35, and `f32` has 1e-38.
-pub const EXPONENT_MAX: f32 = 80.0;

@@ -1,6 +1,7 @@
 //! Every tuned number of the joint method, by the step that uses it.
 //!
-//! The comment of each number states its unit, what a larger or a smaller value trades, and the command that measured it.
+//! The comment of each number states its unit, what a larger or a smaller value trades, and the command that measured it. What half and
+//! twice of each number change is in docs/method/sensitivity.md, by `python evaluation/sensitivity.py`.
 //! Lengths in fringe periods scale with the fringes of the shot.
 //!
 //! "Varied" means that the number was multiplied by 0.7 and by 1.4 (integers were changed by at least 1), everything else was

@@ -12,6 +12,13 @@ pub const CORRECTION_LEFT: f32 = 0.05;
 /// uncertainty on photographs is too large. Smaller: that on real captures is too small. `python evaluation/world.py --half tune
 /// --only photographs`; at half and at twice the value: see docs/method/uncertainty.md.
 pub const EXCESS_LEFT: f32 = 0.5;
+/// Number of times that the squares in (U18) are smoothed. More: fine relief lends its bias to its surroundings. Fewer: chance looks like
+/// a bias (with two, 1 % more of the errors on a plane are inside one standard deviation).
+/// `python evaluation/world.py --half tune --only plane cloth`.
+pub const BIAS_PASSES: usize = 3;
+/// What the mean square by noise alone does not exceed by more than its standard deviation (U18). Follows from the number of cells that
+/// the passes average, 38: 1 + sqrt(2 / 38).
+pub const BIAS_CHANCE: f32 = 1.23;
 /// Side in cells of the blocks whose channels are compared (U17), whole vectors: about two fringes. Larger: materials that change over
 /// a block are missed. Smaller: the errors of one fringe count. Not measured: a tile has five blocks along its side.
 pub const BLOCK_CELLS: usize = 16;
@@ -34,7 +41,7 @@ pub const TEMPERATURE_MIN: f32 = 1.0 / super::orders::COST_MAX as f32;
 /// Least information of a cell in linear light squared. Not measured: any small number will do; it keeps cells without light finite.
 pub const CELL_INFORMATION_MIN: f32 = 1e-9;
 
-/// Greatest exponent of a wrong-order probability. Follows from the arithmetic: `f32` overflows beyond exp(88.7), and
+/// Greatest exponent of a probability. Follows from the arithmetic: `f32` overflows beyond exp(88.7), and
 /// exp(-80) is 2e-35.
 pub const EXPONENT_MAX: f32 = 80.0;
 
