@@ -7,7 +7,7 @@ starts. One process for each number and factor decodes the shots of `quadfringe.
 `quadfringe.evaluation.world` with a seed for tuning, objects on black, and captures. Compared are the means of a group:
 the RMS of the phase errors of right orders, the share of returned pixels, and the share of wrong orders in these. A
 change is listed if it exceeds `LEAST` and what chance makes of that figure. Chance is measured: the greatest change of
-the figure by a factor of `CHANCE` on any of `CHANCES` numbers. It takes half an hour on two cores.
+the figure by a factor of `CHANCE` on any of `CHANCES` numbers. It takes three quarters of an hour on two cores.
 """
 
 from __future__ import annotations
@@ -28,13 +28,14 @@ from quadfringe.evaluation._sensitivity import Figures, figures_of, rows, shots
 
 WORDS = """# Sensitivity of the tuned numbers
 
-`python evaluation/sensitivity.py --markdown FILE` measured and wrote this page. Every tuned number of the joint method
-was multiplied by a half and by two; whole numbers are rounded up. What a larger and a smaller value trade stands in the
-comment of the number. The table lists the changes that chance does not explain, at most three for each factor: of the
-RMS phase error of a group of shots in percent of it, of its returned pixels and of wrong orders among them in
-percentage points. "None" is no such change: the number is not critical in this range. "Fails" means that a shot cannot
-be decoded. "Not varied" is the length of an array. Numbers of step 7 (motion) have no shot here; `cargo test --test
-motion -- --nocapture` measures them. "Small" are white objects of one or two fringes.
+`python evaluation/sensitivity.py --markdown docs/method/sensitivity.md` measured and wrote this page. Every tuned
+number of the joint method was multiplied by a half and by two; whole numbers are rounded up. What a larger and a
+smaller value trade stands in the comment of the number. The table lists the changes that chance does not explain, at
+most three for each factor: of the RMS phase error of a group of shots in percent of it, of its returned pixels and of
+wrong orders among them in percentage points. "None" is no such change: the number is not critical in this range.
+"Fails" means that a shot cannot be decoded. "Not varied" is the length of an array. Numbers of step 7 (motion) have
+no shot here; `cargo test --test motion -- --nocapture` measures them. "Small" are white objects of one or two
+fringes.
 
 """
 MOTION = "motion"  # params file without a shot

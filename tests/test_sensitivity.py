@@ -50,6 +50,13 @@ def test_numbers_that_stay_fixed_exist() -> None:
     assert {one.key for one in tunable.numbers(tunable.PARAMS)} >= tunable.FIXED
 
 
+def test_the_page_has_a_row_for_every_number_with_its_value() -> None:
+    rows = (Path(__file__).parents[1] / "docs/method/sensitivity.md").read_text().splitlines()
+    listed = [tuple(row.strip("| ").split(" | ")[:2]) for row in rows if row.startswith("| ")][2:]
+    numbers = [one for one in tunable.numbers(tunable.PARAMS) if one.file != "motion"]
+    assert listed == [(f"{one.file} {one.name}", one.value) for one in numbers]
+
+
 def test_changes_beyond_chance_are_listed() -> None:
     base = {("white", "RMS"): 0.02, ("white", "returned"): 99.0, ("rods", "wrong"): 0.1}
     chance = {("white", "RMS"): 0.05, ("white", "returned"): 0.1, ("rods", "wrong"): 0.02}

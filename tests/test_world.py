@@ -83,16 +83,23 @@ def test_the_truth_keeps_all_detail(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("along", ["x", "y"])
-def test_the_joint_method_keeps_half_of_fine_waves(monkeypatch: pytest.MonkeyPatch, along: str) -> None:
-    monkeypatch.setattr(world.resolution, "PERIODS_PX", (16,))
+def test_the_joint_method_keeps_half_of_fine_waves_and_states_the_rest(
+    monkeypatch: pytest.MonkeyPatch, along: str
+) -> None:
+    monkeypatch.setattr(world.resolution, "PERIODS_PX", (12, 16))
+    inside_percent: list[float] = []
     with qf.open(qf.SystemConfig()) as scanner:
         known = scanner.calibration
 
     def decoded(take: world.Take) -> Shape:
         plan = qf.Plan(known.projector.width_px, take.fringe_numbers, known, response="linear")
-        return qf.Decoder(take.shot, plan).decode_without_verdict(take.shot)
+        shape = qf.Decoder(take.shot, plan).decode_without_verdict(take.shot)
+        inside_percent.append(world.judge(shape, take).inside_3_percent)
+        return shape
 
-    hold("detail.fine_waves_kept", list(world.height_ratios(decoded, along, seed=1).values()))
+    ratios = world.height_ratios(decoded, along, seed=1)
+    hold("detail.fine_waves_kept", ratios[16])
+    hold("detail.fine_waves_inside", inside_percent)
 
 
 @pytest.mark.parametrize(

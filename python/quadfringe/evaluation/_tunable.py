@@ -86,7 +86,8 @@ def numbers(params: Path) -> list[Number]:
             if line.startswith("///"):
                 comment.append(line.removeprefix("///").strip())
             elif declared := CONSTANT.match(text, text.index(line)) if line.startswith("pub const") else None:
-                meaning = re.split(r"(?<=[.;:]) ", " ".join(comment), maxsplit=1)[0].rstrip(".;:")
+                words = re.sub(r"\[(`\w+`)\]", r"\1", " ".join(comment))
+                meaning = re.split(r"(?<=[.;:]) ", words, maxsplit=1)[0].rstrip(".;:")
                 found.append(Number(file.stem, declared[3], declared[5], meaning))
                 comment = []
     return [number for number in found if number.file != SIZES_OF_TASKS]
@@ -159,4 +160,4 @@ def _with_calls(text: str, names: set[str], qualified: re.Pattern[str]) -> str:
 
 
 # Constants outside of params files that follow from tuned numbers.
-DERIVED = {"BORDER_ODDS", "FREEDOM", "OVERLAP", "STABLE"}
+DERIVED = {"BORDER_ODDS", "OVERLAP", "STABLE"}
