@@ -84,7 +84,7 @@ pub const RESIDUAL_LEFT: f64 = 1e-2;
 /// `python evaluation/world.py --half tune`.
 pub const NEGLIGIBLE: f64 = 1e-3;
 /// Root mean square change of the phase in rad below which a tile rests. Larger: scales stop too early. Smaller: time.
-/// With 0.0003 white surfaces take 5 % longer; cloth has 4 % less error, but 88 in place of 97 % of the errors inside 3 sigma.
+/// With 0.0003 white surfaces take 5 % longer; cloth has 4 % less error, but 88 in place of 96 % of the errors inside 3 sigma.
 /// `python evaluation/world.py --half report`.
 pub const RESTING_RAD: f32 = 0.0005;
 
