@@ -24,7 +24,7 @@ from tempfile import TemporaryDirectory
 
 from quadfringe.evaluation import _tunable as tunable
 from quadfringe.evaluation._report import table
-from quadfringe.evaluation._sensitivity import Figures, figures_of, rows, shots
+from quadfringe.evaluation._sensitivity import MOTION, Figures, figures_of, rows, shots
 
 WORDS = """# Sensitivity of the tuned numbers
 
@@ -38,7 +38,6 @@ no shot here; `cargo test --test motion -- --nocapture` measures them. "Small" a
 fringes.
 
 """
-MOTION = "motion"  # params file without a shot
 TIMEOUT_S = 300.0
 
 

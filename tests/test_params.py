@@ -13,11 +13,7 @@ from typing import NamedTuple
 import pytest
 from support.trees import write_tree
 
-ROOT = Path(__file__).resolve().parents[1]
-KERNEL = ROOT / "crates" / "quadfringe" / "src"
-# A row for each number of the joint method: its params file, its name, and what half and twice of it change.
-SENSITIVITY = ROOT / "docs/method/sensitivity.md"
-ROW = re.compile(r"^\| (\w+) ([A-Z]\w*) \|", re.M)
+KERNEL = Path(__file__).resolve().parents[1] / "crates" / "quadfringe" / "src"
 
 COMMAND = re.compile(r"`(?:cargo|make|pytest|python|quadfringe|scripts/\w+) [^`]+`")
 REASON = re.compile(r"\b(?:Follows from|Not measured)\b")
@@ -166,26 +162,23 @@ def numbers(root: Path) -> Iterator[Number]:
                 comment = []
 
 
-def explained(number: Number, known: dict[str, Number], varied: set[tuple[str, str]]) -> bool:
-    """Say whether the comment of a number, or that of its reference, names a command or a reason, or it was varied."""
-    if Path(number.path).parts[0] == "joint" and (Path(number.path).stem, number.name) in varied:
-        return True
+def explained(number: Number, known: dict[str, Number]) -> bool:
+    """Say whether the comment of a number, or that of the number it refers to, names a command or a reason."""
     if COMMAND.search(number.comment) or REASON.search(number.comment):
         return True
     if Path(number.path).parts[0] == "joint" and VARIED.search(number.comment):
         return True
     reference = REFERENCE.search(number.comment)
-    return bool(reference and reference[1] != number.name and explained(known[reference[1]], known, varied))
+    return bool(reference and reference[1] != number.name and explained(known[reference[1]], known))
 
 
-def unexplained(root: Path, page: str = "") -> list[str]:
-    """Name the numbers without a command, a row of the page, "Varied", "Follows from" or "Not measured"."""
-    varied = set(ROW.findall(page))
+def unexplained(root: Path) -> list[str]:
+    """Name the numbers of params files without a command, "Varied", "Follows from" or "Not measured"."""
     tuned = [number for number in numbers(root) if number.tuned]
     faults = []
     for path in {number.path for number in tuned}:
         known = {number.name: number for number in tuned if number.path == path}
-        faults += [f"{path}: {number.name}" for number in known.values() if not explained(number, known, varied)]
+        faults += [f"{path}: {number.name}" for number in known.values() if not explained(number, known)]
     return sorted(faults)
 
 
@@ -196,7 +189,7 @@ def stray(root: Path) -> list[Number]:
 
 def test_every_tuned_number_names_what_measured_it() -> None:
     assert len([number for number in numbers(KERNEL) if number.tuned]) > 150
-    assert unexplained(KERNEL, SENSITIVITY.read_text()) == []
+    assert unexplained(KERNEL) == []
 
 
 def test_the_meaning_of_varied_names_its_command() -> None:
@@ -242,13 +235,6 @@ def test_a_number_without_a_command_is_found(tmp_path: Path, comment: str) -> No
     files = SOUND | {"stages/params.rs": f"{comment}pub(crate) const ROWS: usize = 16;\n"}
     root = write_tree(tmp_path, files)
     assert unexplained(root) == ["stages/params.rs: ROWS"]
-
-
-def test_a_row_of_the_table_of_sensitivity_explains_a_number(tmp_path: Path) -> None:
-    text = "/// Price in units of a node. Larger: fewer jumps.\npub const PRICE: f64 = 1.25;\n"
-    root = write_tree(tmp_path, SOUND | {"joint/params/orders.rs": text})
-    assert unexplained(root, "| orders PRICE | 1.25 | Price | none | none |\n") == []
-    assert unexplained(root, "| orders OTHER | 1.25 | Price | none | none |\n") == ["joint/params/orders.rs: PRICE"]
 
 
 def test_a_reference_to_a_number_without_a_command_is_found(tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def test_numbers_that_stay_fixed_exist() -> None:
 def test_the_page_has_a_row_for_every_number_with_its_value() -> None:
     rows = (Path(__file__).parents[1] / "docs/method/sensitivity.md").read_text().splitlines()
     listed = [tuple(row.strip("| ").split(" | ")[:2]) for row in rows if row.startswith("| ")][2:]
-    numbers = [one for one in tunable.numbers(tunable.PARAMS) if one.file != "motion"]
+    numbers = [one for one in tunable.numbers(tunable.PARAMS) if one.file != sensitivity.MOTION]
     assert listed == [(f"{one.file} {one.name}", one.value) for one in numbers]
 
 

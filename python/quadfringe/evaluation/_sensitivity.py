@@ -26,13 +26,14 @@ from quadfringe.evaluation._variants import stepped
 from quadfringe.evaluation.world.pairs import PairBench
 from quadfringe.scanner import open_system
 
-__all__ = ["SCENES", "Figures", "Given", "changes", "figures_of", "listed", "rows", "shots"]
+__all__ = ["MOTION", "SCENES", "Figures", "Given", "changes", "figures_of", "listed", "rows", "shots"]
 
 SEED = world.TUNE[0]
 FACTORS = {"half": 0.5, "twice": 2.0}
 CHANCES, CHANCE = 16, 1.001
 # Least change that is listed: share of an RMS, and percentage points.
 LEAST = {"RMS": 0.03, "returned": 0.1, "wrong": 0.02}
+MOTION = "motion"  # params file without a shot
 LISTED = 3  # changes of one number and factor
 SCENES = {
     "white": ("face", "steps", "peaks"),

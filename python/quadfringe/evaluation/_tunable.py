@@ -36,6 +36,7 @@ FIXED = {
 }
 SIZES_OF_TASKS = "tasks"  # params file whose numbers change the time alone
 CONSTANT = re.compile(r"^(\s*)((?:pub(?:\([\w: ]+\))? )?)const ([A-Z][A-Z0-9_]*): ([^=]+?) =\s*([^;]+);", re.M)
+COMMENTED = re.compile(r"((?:^///.*\n)+)^pub const ([A-Z]\w*): [^=]+? =\s*([^;]+);", re.M)
 USE = re.compile(r"^\s*(?:pub(?:\([\w: ]+\))? )?use ([^;]+);", re.M)
 NAME = re.compile(r"\b[A-Z][A-Z0-9_]+\b")
 SCALED = """
@@ -80,16 +81,10 @@ def numbers(params: Path) -> list[Number]:
     """List the numbers of a folder of params files that change results, in the order of the files."""
     found = []
     for file in sorted(params.glob("*.rs")):
-        comment: list[str] = []
-        text = file.read_text()
-        for line in text.splitlines():
-            if line.startswith("///"):
-                comment.append(line.removeprefix("///").strip())
-            elif declared := CONSTANT.match(text, text.index(line)) if line.startswith("pub const") else None:
-                words = re.sub(r"\[(`\w+`)\]", r"\1", " ".join(comment))
-                meaning = re.split(r"(?<=[.;:]) ", words, maxsplit=1)[0].rstrip(".;:")
-                found.append(Number(file.stem, declared[3], declared[5], meaning))
-                comment = []
+        for comment, name, value in COMMENTED.findall(file.read_text()):
+            words = " ".join(line.removeprefix("///").strip() for line in comment.splitlines())
+            meaning = re.split(r"(?<=[.;:]) ", re.sub(r"\[(`\w+`)\]", r"\1", words), maxsplit=1)[0].rstrip(".;:")
+            found.append(Number(file.stem, name, value, meaning))
     return [number for number in found if number.file != SIZES_OF_TASKS]
 
 

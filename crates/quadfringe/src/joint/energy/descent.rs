@@ -67,7 +67,7 @@ impl Tile {
         while free < OUTER_STEPS {
             let sums = linearise(self);
             let most = if limited { self.scales.misfit } else { f32::INFINITY };
-            self.scales.estimate_noise(&sums, determined, self.ratios, [noise, most]);
+            self.scales.estimate_noise(&sums, determined, self.ratios, noise..=most);
             let sums = weigh(self);
             if outer > 0 {
                 let channels = count(self.ratios);

@@ -9,6 +9,7 @@ use crate::joint::model::{count, weights};
 use crate::joint::params::energy::{
     DETERMINED_MIN, MODEL_SHARE, PRIOR_CELLS, RELAXATION, SCALE_LIMITS, START,
 };
+use std::ops::RangeInclusive;
 
 /// Variances of noise and priors in one tile.
 #[derive(Debug, Clone, Copy)]
@@ -92,19 +93,19 @@ pub(super) struct Determined {
 }
 
 impl Scales {
-    /// Estimates the variance of the noise from the residuals, between a `least` and a `most`, and the contrasts of the channels.
+    /// Estimates the variance of the noise from the residuals, within `bounds`, and the contrasts of the channels.
     pub fn estimate_noise(
         &mut self,
         sums: &DataSums,
         determined: Determined,
         ratios: [f32; 4],
-        [least, most]: [f32; 2],
+        bounds: RangeInclusive<f32>,
     ) {
         let channels = count(ratios);
         let Determined { phase, brightness, colour, contrast } = determined;
         let used = phase + brightness + (channels - 1.0) * colour + contrast;
         let free = sums.cells * f64::from((channels - used).max(0.5));
-        self.misfit = ((sums.squares / free.max(1e-9)) as f32).min(most).max(least);
+        self.misfit = ((sums.squares / free.max(1e-9)) as f32).max(*bounds.start()).min(*bounds.end());
         let mean = sums.brightness / (f64::from(channels) * sums.cells).max(1e-9);
         self.noise = self.misfit + MODEL_SHARE * MODEL_SHARE * mean as f32;
         let mut change = [1.0; 4];

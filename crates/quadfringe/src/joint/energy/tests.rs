@@ -64,14 +64,14 @@ fn the_minimum_finds_phase_and_contrast_through_an_edge_of_colour() {
     assert!((contrast - 0.6).abs() < 0.01, "{contrast}");
 }
 
-/// A white tile with a word in dark ink, whose phase at the start is a radian off wherever there is ink.
+/// A white tile with a word in dark ink, whose phase at the start is 1.4 rad off wherever there is ink.
 fn printed_tile() -> (Tile, Plane) {
     let (mut tile, truth) = tile(0.0);
     for y in 0..SIDE {
         for x in 0..SIDE {
             let ink = (30..40).contains(&y) && (30..50).contains(&x) && (x / 3 + y / 4) % 2 == 0;
             let phase = truth.row(y)[x];
-            tile.start.row_mut(y)[x] = phase + if ink { 1.0 } else { 0.0 };
+            tile.start.row_mut(y)[x] = phase + if ink { 1.4 } else { 0.0 };
             let turns = [phase, RATIOS[1] * phase, phase + std::f32::consts::FRAC_PI_2, RATIOS[3] * phase];
             for c in 0..4 {
                 let albedo = if ink { [0.05, 0.06, 0.05, 0.2][c] } else { 0.5 };
@@ -94,7 +94,7 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
     let (mut tile, truth) = printed_tile();
     tile.minimise(noise, 1.0);
     let (second, largest) = errors(&tile, &truth);
-    assert!(first > 4.0 * second && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
+    assert!(first > 0.02 && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
 }
 
 /// What the bending of a surface costs more with an island three radians off than without it. The island is cut off by torn cells,

@@ -8,8 +8,10 @@
 /// have 1.7 times).
 pub const SIDE: usize = 80;
 /// Number of cells at each side of a tile that are discarded, because their neighbours are missing. Fewer: seams. More: time.
+/// `python evaluation/sensitivity.py --only energy::DISCARDED`.
 pub const DISCARDED: usize = 4;
 /// Number of cells at each side over which tiles are blended. Fewer: seams where the scales of two tiles differ. More: time.
+/// `python evaluation/sensitivity.py --only energy::BLENDED`.
 pub const BLENDED: usize = 8;
 
 /// Least number of cells in a fringe period, for cells of more than 2 px. Larger: time. Smaller: detail is lost (with 4.5 the
@@ -19,17 +21,22 @@ pub const CELLS_PER_PERIOD_MIN: f64 = 5.1;
 /// its contrast with 4; cells of 1 px take four times as long.
 pub const SMALL_CELLS_PER_PERIOD_MIN: f64 = 4.0;
 /// Greatest side of a cell in pixels. Larger: detail is lost. Smaller: time, which grows with the number of cells.
+/// `python evaluation/sensitivity.py --only energy::CELL_MAX_PX`.
 pub const CELL_MAX_PX: usize = 4;
 /// Greatest difference of the phase between the pixels of a cell, in rad for each pixel of its side. Larger: cells on two surfaces
 /// take part. Smaller: steep slopes are left out.
+/// `python evaluation/sensitivity.py --only energy::SPREAD_MAX_RAD`.
 pub const SPREAD_MAX_RAD: f32 = 0.5;
 /// Least share of usable pixels of a cell that takes part. Larger: noise that saturates single pixels removes cells. Smaller: cells
 /// are biased by the pixels that are left out.
+/// `python evaluation/sensitivity.py --only energy::USABLE_MIN`.
 pub const USABLE_MIN: f32 = 0.7;
 
 /// Degrees of freedom of Student's t for second differences of the phase. Larger: steps are smoothed. Smaller: noise stays.
+/// `python evaluation/sensitivity.py --only energy::BEND_FREEDOM`.
 pub const BEND_FREEDOM: f32 = 2.0;
 /// The same for first differences of brightness, colour and contrast. Larger: edges of the texture are smoothed.
+/// `python evaluation/sensitivity.py --only energy::DIFFERENCE_FREEDOM`.
 pub const DIFFERENCE_FREEDOM: f32 = 1.0;
 
 /// Standard deviations with which the estimate of the priors starts: second differences of the phase in rad, and first differences
@@ -45,11 +52,13 @@ pub const BEND_GROWTH: f32 = 2.0;
 /// 0.50 in place of 0.57 of the height of waves of 16 px). `python evaluation/world.py --half tune --only resolution`.
 pub const RELAXATION: f32 = 1.5;
 /// Weight of these in the estimate, as a number of cells. It keeps the estimate of a tile with few lit cells finite.
+/// `python evaluation/sensitivity.py --only energy::PRIOR_CELLS`.
 pub const PRIOR_CELLS: f32 = 0.1;
 /// Bounds of the standard deviations, in the same units. They keep the weights within the range of `f32`.
 pub const SCALE_LIMITS: [f32; 2] = [0.0005, 1.0];
 /// Least share of the unknowns that counts as determined by the data. Without it, the scale of a tile without structure is the
 /// quotient of two small numbers.
+/// `python evaluation/sensitivity.py --only energy::DETERMINED_MIN`.
 pub const DETERMINED_MIN: f32 = 0.02;
 
 /// Error of the model as a share of the albedo: response, crosstalk and registration are never known exactly. Larger: less noise,
@@ -58,6 +67,7 @@ pub const DETERMINED_MIN: f32 = 0.02;
 pub const MODEL_SHARE: f32 = 0.0125;
 
 /// Number of rounds of contrast and albedo before the first step. More: time.
+/// `python evaluation/sensitivity.py --only energy::START_ROUNDS`.
 pub const START_ROUNDS: usize = 2;
 /// Bounds of the contrast of the light in these rounds. Light has no more than full contrast, with a margin for noise.
 /// Follows from the model.
@@ -75,8 +85,10 @@ pub const OUTER_STEPS: usize = 8;
 pub const DETAIL_STEPS: usize = 2;
 /// Greatest number of steps of conjugate gradients in each of them, and for the bridging surface of the second start. More: time. Fewer:
 /// painted surfaces are not solved.
+/// `python evaluation/sensitivity.py --only energy::INNER_STEPS`.
 pub const INNER_STEPS: usize = 20;
 /// Share of the squared residual, in the norm of the preconditioner, at which conjugate gradients end. Smaller: time.
+/// `python evaluation/sensitivity.py --only energy::RESIDUAL_LEFT`.
 pub const RESIDUAL_LEFT: f64 = 1e-2;
 /// Mean squared length of the step that is left in a cell, in the same norm and in units of the variance of the noise, at which
 /// they end as well. Larger: white surfaces are less exact (3e-3: faces 8 %, waves of 39 px keep 0.75 instead of 0.83 of their
@@ -90,6 +102,7 @@ pub const RESTING_RAD: f32 = 0.0005;
 
 /// Greatest change of an unknown in one Gauss-Newton step, in rad of the phase, and in the logarithm of albedo and contrast. Larger: steps
 /// leave the range in which the linearisation holds, about a tenth of a turn. Smaller: far minima are not reached.
+/// `python evaluation/sensitivity.py --only energy::STEP_MAX`.
 pub const STEP_MAX: f32 = 0.5;
 
 /// Ridge of the matrix in linear light squared. It only keeps cells without light finite.
