@@ -12,6 +12,7 @@ mod data;
 mod descent;
 mod disagreement;
 mod layout;
+mod pixels;
 mod plane;
 mod preconditioner;
 mod priors;
@@ -52,7 +53,7 @@ pub(super) struct Prior {
 }
 
 impl Energy {
-    /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
+    /// Replaces the absolute phase of the lit pixels of a scene. Where the minimum lies far from the phase at the start,
     /// one of the two is wrong. The modulation becomes 0 there, so that step 8 treats such pixels and their neighbours as it treats
     /// the border of a shadow; their reason is a misfit.
     pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
@@ -83,11 +84,6 @@ impl Energy {
     pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut FringeRows) -> &'a FringeRows {
         self.cells.fringes(scene, y, rows);
         rows
-    }
-
-    /// Pixels along a side of the cells of the last scene.
-    pub fn cell_px(&self) -> usize {
-        self.cells.factor
     }
 
     /// Mean square of the correction of the last scene, rad^2.
@@ -122,6 +118,7 @@ fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Op
             let weight = row.weight * column.weight * value(&found.inside);
             sum += weight;
             fit.correction += weight * value(&found.correction);
+            fit.bend += weight * found.bend;
             fit.variance += weight * value(&found.variance);
             for c in 0..4 {
                 fit.albedo[c] += weight * value(&found.albedo[c]);
@@ -132,5 +129,7 @@ fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Op
     (sum > 0.0).then(|| fit.divided_by(sum))
 }
 
+#[cfg(test)]
+mod start_tests;
 #[cfg(test)]
 mod tests;

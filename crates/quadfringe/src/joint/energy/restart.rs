@@ -1,15 +1,19 @@
-//! A second start (J29). At the edges of a print, texture spoils the phase at the start by up to a radian, and the minimum that
-//! is found from there can be a wrong one. The second start is the surface that bends least through the cells without texture.
-//! Every cell keeps the start around which the energy is lower.
+//! More starts. Texture spoils the phase at the first start, and the minimum that is found from there can be a wrong one.
+//!
+//! The second start is the surface that bends least through the cells without texture (J29): at the edges of a print the phase is
+//! off by up to a radian. The third is the surface found so far, with new albedos; it is stiff again and loosens once more (J43). A tile
+//! keeps the minimum with the lower energy, and a cell the one around which the energy is much lower.
 
 use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, total, vectors};
 use super::scales::Scales;
 use super::solve::solve;
-use super::start::{self, AlbedoOf, filter};
+use super::start::{contrast_and_albedo, filter};
 use super::tile::Tile;
 use super::value::{Given, add_energy};
 use crate::joint::model::count;
-use crate::joint::params::energy::{GAIN_MIN, INNER_STEPS, SAME_RAD, SIDE, TEXTURE_MIN};
+use crate::joint::params::energy::{
+    GAIN_MIN, INNER_STEPS, SAME_RAD, SCALE_LIMITS, SIDE, SURROUNDINGS_SHARE, TEXTURE_MIN,
+};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -18,17 +22,40 @@ const THREE: [f32; 3] = [0.0, 1.0, 1.0];
 const FIVE: [f32; 3] = [1.0; 3];
 
 impl Tile {
-    /// Minimises once more from the second start, if there is texture, and keeps the lower energy; `noise` as in `minimise`.
+    /// Minimises once more from two other starts, if there is texture, and keeps the lowest energy; `noise` as in `minimise`.
     pub(super) fn restart(&mut self, noise: f32) {
         if !has_texture(self) {
             return;
         }
-        let scales = self.scales;
-        let Self { inside, lit, unknown, first, derivatives, weights, residual, ratios, .. } = self;
-        for (to, from) in first.planes_mut().into_iter().zip(unknown.planes()).chain([(&mut *lit, &*inside)])
-        {
+        self.keep_unknowns();
+        if self.bridge() {
+            self.lower(noise);
+        }
+        self.keep_unknowns();
+        self.lower(noise);
+    }
+
+    /// Keeps the unknowns, to compare others with them.
+    fn keep_unknowns(&mut self) {
+        for (to, from) in self.first.planes_mut().into_iter().zip(self.unknown.planes()) {
             to.copy(from);
         }
+    }
+
+    /// Minimises from the present phase, and keeps the lower energy.
+    fn lower(&mut self, noise: f32) {
+        let kept = self.scales;
+        self.scales = Scales { noise, misfit: 1.0, ..kept };
+        contrast_and_albedo(self, SURROUNDINGS_SHARE);
+        self.descend(noise, SCALE_LIMITS[0].powi(2), 1);
+        keep_lower(self, &kept);
+    }
+
+    /// Moves the phase to the surface that bends least through the cells without texture, around the cells where it differs; gives
+    /// whether there are any.
+    fn bridge(&mut self) -> bool {
+        let Self { inside, lit, first, derivatives, weights, residual, ratios, scales, .. } = self;
+        lit.copy(inside);
         hold_by_phase(inside, *ratios, first, scales.noise, derivatives);
         bend_everywhere(scales.noise / scales.bend, weights);
         residual.planes_mut().into_iter().for_each(Plane::clear);
@@ -36,13 +63,7 @@ impl Tile {
         vectors().for_each(|at| inside.set(at, [1.0; LANES]));
         solve(self, INNER_STEPS);
         std::mem::swap(&mut self.inside, &mut self.lit);
-        if take_step(self) {
-            self.scales = Scales { noise, misfit: 1.0, ..scales };
-            start::contrast_and_albedo(self, AlbedoOf::Cell);
-            self.descend(noise, f32::INFINITY);
-            keep_lower(self, &scales);
-            self.scales = scales;
-        }
+        take_step(self)
     }
 }
 
@@ -174,12 +195,19 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
     out
 }
 
-/// Goes back to the first unknowns in all cells but those around which the second ones differ and have the lower energy.
+/// Of the kept unknowns, with the scales `kept`, and the present ones, keeps those with the lower energy in the tile, and their scales;
+/// in cells around which the others differ and have a much lower energy, those.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    compare(tile, scales);
-    let Tile { inside, unknown, first, product, .. } = tile;
+fn keep_lower(tile: &mut Tile, kept: &Scales) {
+    compare(tile, kept);
+    let Tile { inside, unknown, first, product, spread, scales, .. } = tile;
     let [gain, around, spare, ..] = product.planes_mut();
+    if vectors().map(|at| total(gain.get(at))).sum::<f64>() > 0.0 {
+        std::mem::swap(unknown, first);
+        vectors().for_each(|at| gain.set(at, gain.get(at).map(|gain| -gain)));
+    } else {
+        *scales = *kept;
+    }
     for at in vectors() {
         around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
     }
@@ -192,6 +220,7 @@ fn keep_lower(tile: &mut Tile, scales: &Scales) {
         gain.set(at, counted);
     }
     filter(gain, spare, FIVE);
+    add_spread(gain, &first.phase, &unknown.phase, spread);
     for (kept, unknown) in first.planes().into_iter().zip(unknown.planes_mut()) {
         for at in vectors() {
             let (gain, around, kept, mut out) = (gain.get(at), around.get(at), kept.get(at), unknown.get(at));
@@ -203,16 +232,29 @@ fn keep_lower(tile: &mut Tile, scales: &Scales) {
     }
 }
 
-/// Writes the energy of the first unknowns less that of the second ones into the first plane of the product. The energies are sums
-/// over the scales that either start has found, so that neither is preferred.
-fn compare(tile: &mut Tile, scales: &Scales) {
+/// Adds half the squared difference of two phases where neither has a much lower energy (U19).
+#[inline(always)]
+fn add_spread(gain: &Plane, one: &Plane, other: &Plane, spread: &mut Plane) {
+    for at in vectors() {
+        let (gain, one, other, mut out) = (gain.get(at), one.get(at), other.get(at), spread.get(at));
+        for x in 0..LANES {
+            let half = 0.5 * (one[x] - other[x]) * (one[x] - other[x]);
+            out[x] += if gain[x].abs() < GAIN_MIN { half } else { 0.0 };
+        }
+        spread.set(at, out);
+    }
+}
+
+/// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product. The energies are sums
+/// over the scales of either minimum, so that neither is preferred.
+fn compare(tile: &mut Tile, kept: &Scales) {
     let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
     let [gain, near, spare, ..] = tile.product.planes_mut();
     continue_through(inside, torn, &mut tile.lit, [near, spare]);
     let (ratios, pair) = (tile.ratios, *pair);
     let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
     gain.clear();
-    for scales in [scales, &tile.scales] {
+    for scales in [kept, &tile.scales] {
         add_energy(1.0, &given, &tile.first, scales, gain);
         add_energy(-1.0, &given, &tile.unknown, scales, gain);
     }

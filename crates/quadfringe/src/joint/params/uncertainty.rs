@@ -25,9 +25,6 @@ pub const BLOCK_CELLS: usize = 16;
 /// Least number of blocks around one, itself included, that tell a mean from its scatter. Follows from the corner of a tile, which
 /// has four.
 pub const BLOCKS_MIN: usize = 4;
-/// Fall of the noise that the cells do not smooth with the squared width of the window in cells (U15). Follows from the window and
-/// from the interpolation between cells, within a fifth: a unit test compares it with filtered noise.
-pub const FINE_SMOOTHNESS: f32 = 5.0;
 
 /// Worth of a lead relative to (U10). Larger: wrong orders have a smaller probability than their share. Smaller: right ones have a
 /// greater one. With 1, as (U10) has it, pixels with a probability of 0.14 are wrong in 0.034 of all cases, and with 1.5 in 0.088
