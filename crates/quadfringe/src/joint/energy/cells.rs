@@ -2,10 +2,11 @@
 
 use super::average::{Surfaces, mean, surfaces};
 use super::tile::Tile;
+use crate::Reason;
 use crate::joint::cells::{blend, spread};
 use crate::joint::infrared::wave;
-use crate::joint::params::energy::{SIDE, USABLE_MIN};
-use crate::joint::scene::{PhaseMap, Scene};
+use crate::joint::params::energy::{MOVED_MAX_RAD, SIDE, USABLE_MIN};
+use crate::joint::scene::{PhaseMap, Pixels, Scene};
 use crate::parallel::lanes::LANES;
 use rayon::prelude::*;
 
@@ -16,22 +17,18 @@ pub(super) struct Cells {
     pub width: usize,
     /// Pixels along a side of a cell.
     pub factor: usize,
-    pub(super) stride: usize,
+    stride: usize,
     /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
     /// After the fit the contrast times `inside`. Before it, the first is 1 for torn cells, whose pixels are all lit, but whose phases
     /// lie far apart.
     contrast: [Vec<f32>; 4],
-    /// Mean phase at the start in rad.
-    pub(super) start: Vec<f32>,
-    /// Its correction by the fit times `inside`.
-    pub(super) correction: Vec<f32>,
-    /// Variance of the second differences of the phase (J26), rad^2, times `inside`.
-    pub(super) bend: Vec<f32>,
+    /// Mean phase in rad; after the fit the correction times `inside`.
+    phase: Vec<f32>,
     /// 1 for cells that can be used in the fit; after it the variance times `inside`.
     usable: Vec<f32>,
     /// 1 for cells whose pixels are all lit and lie on one surface.
-    pub(super) inside: Vec<f32>,
+    inside: Vec<f32>,
     /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
     infrared: [Vec<f32>; 2],
 }
@@ -43,7 +40,7 @@ pub(super) struct CellFit {
     pub correction: f32,
     /// Variance of the phase, rad^2.
     pub variance: f32,
-    /// Variance of its second differences, rad^2.
+    /// Variance of its second differences (J26), rad^2.
     pub bend: f32,
     /// Light without fringes, linear.
     pub albedo: [f32; 4],
@@ -88,8 +85,8 @@ impl FringeRows {
 #[derive(Debug, Default)]
 pub(in crate::joint) struct Rows {
     mix: Vec<f32>,
-    pub(super) sum: Vec<f32>,
-    pub(super) weight: Vec<f32>,
+    sum: Vec<f32>,
+    weight: Vec<f32>,
 }
 
 impl Cells {
@@ -99,18 +96,18 @@ impl Cells {
         (self.height, self.width, self.factor) = (grid.height / factor, grid.width / factor, factor);
         self.stride = (grid.stride / factor).next_multiple_of(LANES);
         let size = self.stride * self.height;
-        let Self { light: [red, green, blue, infrared], start, usable, inside, stride, width, .. } = self;
+        let Self { light: [red, green, blue, infrared], phase, usable, inside, stride, width, .. } = self;
         let torn = &mut self.contrast[0];
-        let planes = [red, green, blue, infrared, start, usable, inside, torn].map(|plane| {
+        let planes = [red, green, blue, infrared, phase, usable, inside, torn].map(|plane| {
             plane.resize(size, 0.0);
             plane.par_chunks_mut(*stride)
         });
-        let [red, green, blue, infrared, start, usable, inside, torn] = planes;
+        let [red, green, blue, infrared, phase, usable, inside, torn] = planes;
         let rows =
-            red.zip(green).zip(blue.zip(infrared)).zip(start.zip(usable).zip(inside.zip(torn))).enumerate();
-        rows.for_each(|(y, (((red, green), (blue, infrared)), ((start, usable), (inside, torn))))| {
+            red.zip(green).zip(blue.zip(infrared)).zip(phase.zip(usable).zip(inside.zip(torn))).enumerate();
+        rows.for_each(|(y, (((red, green), (blue, infrared)), ((phase, usable), (inside, torn))))| {
             let light = [red, green, blue, infrared].into_iter().zip(scene.light);
-            for (out, plane) in light.chain([(&mut *usable, scene.usable), (start, map.phase)]) {
+            for (out, plane) in light.chain([(&mut *usable, scene.usable), (phase, map.phase)]) {
                 mean((0..factor).map(|i| scene.row(plane, y * factor + i)), factor, out);
             }
             inside.fill(0.0);
@@ -128,31 +125,41 @@ impl Cells {
         self.draw_tangents(scene);
     }
 
+    /// Mean phase of a cell at the start.
+    pub(super) fn start(&self, y: usize, x: usize) -> f32 {
+        self.phase[y * self.stride + x]
+    }
+
+    /// Whether a cell takes part in the fit.
+    pub(super) fn is_inside(&self, y: usize, x: usize) -> bool {
+        self.inside[y * self.stride + x] > 0.0
+    }
+
     /// The tangents of the infrared phase of a pair at the mean phases.
     fn draw_tangents(&mut self, scene: &Scene<'_>) {
-        let (Self { infrared, start, stride, factor, .. }, Some(pair)) = (self, scene.pair) else { return };
+        let (Self { infrared, phase, stride, factor, .. }, Some(pair)) = (self, scene.pair) else { return };
         let [offset, slope] = infrared.each_mut().map(|plane| {
-            plane.resize(start.len(), 0.0);
+            plane.resize(phase.len(), 0.0);
             plane.par_chunks_mut(*stride)
         });
         let (middle, factor) = (*factor / 2, *factor);
-        let rows = offset.zip(slope).zip(start.par_chunks(*stride)).enumerate();
-        rows.for_each(|(y, ((offset, slope), start))| {
+        let rows = offset.zip(slope).zip(phase.par_chunks(*stride)).enumerate();
+        rows.for_each(|(y, ((offset, slope), phase))| {
             let terms = pair.terms(scene.grid, y * factor + middle);
-            let out = offset.iter_mut().zip(slope).zip(start).enumerate();
-            for (x, ((offset, slope), start)) in out.take(scene.grid.stride / factor) {
+            let out = offset.iter_mut().zip(slope).zip(phase).enumerate();
+            for (x, ((offset, slope), phase)) in out.take(scene.grid.stride / factor) {
                 // The middle of a cell with an even side lies between two pixels.
                 let (here, before) = (x * factor + middle, x * factor + (factor - 1) / 2);
                 let mean = terms.map(|line| 0.5 * (line[here] + line[before]));
-                let found = wave(mean, *start);
-                (*offset, *slope) = (found.phase - found.slope * start, found.slope);
+                let found = wave(mean, *phase);
+                (*offset, *slope) = (found.phase - found.slope * phase, found.slope);
             }
         });
     }
 
     /// Fills a tile whose first cell is `[top, left]`; gives whether it has any cell that can be used.
     pub fn load(&self, [top, left]: [usize; 2], tile: &mut Tile) -> bool {
-        let Self { height, width, stride, light, start, usable, inside, .. } = self;
+        let Self { height, width, stride, light, phase, usable, inside, .. } = self;
         let count = SIDE.min(width - left);
         let mut any = false;
         tile.pair = !self.infrared[0].is_empty();
@@ -166,7 +173,7 @@ impl Cells {
             let [red, green, blue, infrared] = &mut tile.light;
             let planes = [red, green, blue, infrared].into_iter().zip(light);
             let planes = planes.chain([
-                (&mut tile.start, start),
+                (&mut tile.start, phase),
                 (&mut tile.usable, usable),
                 (&mut tile.inside, inside),
                 (&mut tile.torn, &self.contrast[0]),
@@ -181,16 +188,16 @@ impl Cells {
         any
     }
 
-    /// Writes correction and bending, and replaces usability and light by variance, albedo and contrast, each times `inside`.
+    /// Replaces phase, usability and light by correction, variance, albedo and contrast, each times `inside`.
     pub fn replace(&mut self, found: impl Fn(usize, usize) -> Option<CellFit> + Sync) {
-        let Self { light, contrast, correction, bend, usable, inside, stride, width, .. } = self;
-        for plane in contrast.iter_mut().chain([&mut *correction, &mut *bend]) {
+        let Self { light, contrast, phase, usable, inside, stride, width, .. } = self;
+        for plane in contrast.iter_mut() {
             plane.resize(inside.len(), 0.0);
         }
-        let mut planes = [correction, bend, usable].into_iter().chain(light).chain(contrast).chain([inside]);
-        let mut planes: [_; 12] =
-            std::array::from_fn(|_| planes.next().expect("twelve planes").chunks_mut(*stride));
-        let rows: Vec<[&mut [f32]; 12]> = (0..self.height)
+        let mut planes = [phase, usable].into_iter().chain(light).chain(contrast).chain([inside]);
+        let mut planes: [_; 11] =
+            std::array::from_fn(|_| planes.next().expect("eleven planes").chunks_mut(*stride));
+        let rows: Vec<[&mut [f32]; 11]> = (0..self.height)
             .map(|_| planes.each_mut().map(|rows| rows.next().expect("as many rows as cells are high")))
             .collect();
         rows.into_par_iter().enumerate().for_each(|(y, mut rows)| {
@@ -200,9 +207,30 @@ impl Cells {
             for x in 0..*width {
                 let fit = found(y, x).filter(|_| inside[x] > 0.0);
                 inside[x] = f32::from(u8::from(fit.is_some()));
-                let CellFit { correction, variance, bend, albedo, contrast } = fit.unwrap_or_default();
-                let fitted = [correction, bend, variance].into_iter().chain(albedo).chain(contrast);
+                let CellFit { correction, variance, albedo, contrast, .. } = fit.unwrap_or_default();
+                let fitted = [correction, variance].into_iter().chain(albedo).chain(contrast);
                 values.iter_mut().zip(fitted).for_each(|(row, value)| row[x] = value);
+            }
+        });
+    }
+
+    /// Adds the interpolated correction to the phase of the pixels. Where it is too large, the modulation becomes 0.
+    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
+        let stride = scene.grid.stride;
+        let Pixels { phase, modulation, reasons } = pixels;
+        let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
+        let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
+        rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
+            self.interpolate(&self.phase, scene, y, rows);
+            let found = rows.sum.iter().zip(&rows.weight);
+            let pixels = phase.iter_mut().zip(modulation).zip(reasons);
+            for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
+                let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
+                *phase += correction;
+                if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
+                    *modulation = 0.0;
+                    *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
+                }
             }
         });
     }
@@ -210,7 +238,7 @@ impl Cells {
     /// Mean square of the correction, rad^2.
     pub fn correction(&self) -> f32 {
         let sum = |map: &[f32]| map.iter().map(|value| f64::from(value * value)).sum::<f64>();
-        (sum(&self.correction) / sum(&self.inside).max(1.0)) as f32
+        (sum(&self.phase) / sum(&self.inside).max(1.0)) as f32
     }
 
     /// Variance along row `y` of the scene, 0 where there is no lit cell.
@@ -247,7 +275,7 @@ impl Cells {
     }
 
     /// Interpolates a map and the weight of its cells bilinearly along row `y` of the scene.
-    pub(super) fn interpolate(&self, map: &[f32], scene: &Scene<'_>, y: usize, rows: &mut Rows) {
+    fn interpolate(&self, map: &[f32], scene: &Scene<'_>, y: usize, rows: &mut Rows) {
         let Rows { mix, sum, weight } = rows;
         self.between(map, scene, y, mix, sum);
         self.between(&self.inside, scene, y, mix, weight);

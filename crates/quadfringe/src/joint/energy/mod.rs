@@ -53,7 +53,7 @@ pub(super) struct Prior {
 }
 
 impl Energy {
-    /// Replaces the absolute phase of the lit pixels of a scene. Where the minimum lies far from the phase at the start,
+    /// Corrects the absolute phase of the lit pixels of a scene, in place. Where the minimum lies far from the phase at the start,
     /// one of the two is wrong. The modulation becomes 0 there, so that step 8 treats such pixels and their neighbours as it treats
     /// the border of a shadow; their reason is a misfit.
     pub fn minimise(&mut self, scene: &Scene<'_>, prior: Prior, pixels: &mut Pixels) {
@@ -76,7 +76,9 @@ impl Energy {
             },
         );
         let tiles = &*tiles;
-        cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
+        let fit = |y, x| blend(tiles, &rows, &columns, [y, x]);
+        cells.smooth_start(scene, fit, &mut pixels.phase);
+        cells.replace(fit);
         cells.correct(scene, pixels);
     }
 

@@ -1,104 +1,100 @@
-//! From the cells back to the pixels (J44).
-//!
-//! Where the cells around a pixel lie on one surface, the pixel takes the phase of this surface: detail of the start that is finer than
-//! the cells would be noise, or texture that the windows of the start have mixed. At the discontinuities of the surface the pixels keep
-//! the detail of the start, and the correction of the cells is added to it.
+//! Detail of the start that is finer than the cells (J44). Where the cells around a pixel lie on one surface, it is noise, or texture
+//! that the windows of the start have mixed, and the pixel takes the surface through the cells. At the discontinuities of the surface
+//! the pixels keep it.
 
-use super::cells::{Cells, Rows};
-use crate::Reason;
-use crate::joint::params::energy::{CURVED_MAX, MOVED_MAX_RAD};
-use crate::joint::scene::{Pixels, Scene};
+use super::cells::{CellFit, Cells};
+use crate::joint::params::energy::CURVED_MAX;
+use crate::joint::scene::Scene;
 use rayon::prelude::*;
 
-/// Working rows.
+/// Working lines, one value for each cell.
 #[derive(Debug, Default)]
 struct Work {
-    rows: Rows,
-    /// For each cell of the row, whether the cells around it lie on one surface.
+    /// Fitted phases of the cells above, at and below; not a number outside the cells of the fit.
+    fitted: [Vec<f32>; 3],
+    /// Variance of the second differences of the phase (J26), rad^2.
+    bend: Vec<f32>,
+    /// Whether the cells around lie on one surface.
     smooth: Vec<bool>,
-    /// Phase of the surface at the present row of pixels, one mean over the columns of each cell.
+    /// Phase of the surface of the start along a row of pixels, its mean over the columns of a cell.
     means: Vec<f32>,
 }
 
 impl Cells {
-    /// Gives the pixels the phase of the fit. Where it is too far from that at the start, the modulation becomes 0.
-    pub fn correct(&self, scene: &Scene<'_>, pixels: &mut Pixels) {
+    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells. `fit` gives what
+    /// the fit has found for a cell.
+    pub fn smooth_start(
+        &self,
+        scene: &Scene<'_>,
+        fit: impl Fn(usize, usize) -> Option<CellFit> + Sync,
+        phase: &mut [f32],
+    ) {
         let stride = scene.grid.stride;
-        let Pixels { phase, modulation, reasons } = pixels;
-        let [phase, modulation] =
-            [phase, modulation].map(|plane| plane.par_chunks_mut(self.factor * stride).enumerate());
-        let rows = phase.zip(modulation).zip(reasons.par_chunks_mut(self.factor * stride));
-        rows.for_each_init(Work::default, |work, (((row, phase), (_, modulation)), reasons)| {
-            self.find_smooth(row, &mut work.smooth);
-            let planes = phase.chunks_mut(stride).zip(modulation.chunks_mut(stride));
-            for (i, ((phase, modulation), reasons)) in planes.zip(reasons.chunks_mut(stride)).enumerate() {
-                self.interpolate(&self.correction, scene, row * self.factor + i, &mut work.rows);
-                let found = work.rows.sum.iter().zip(&work.rows.weight);
-                let pixels = phase.iter_mut().zip(modulation).zip(reasons);
-                for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
-                    let correction = if *weight > 0.0 { sum / weight } else { 0.0 };
-                    *phase += correction;
-                    if correction.abs() > MOVED_MAX_RAD && *modulation > 0.0 {
-                        *modulation = 0.0;
-                        *reason = if *reason == Reason::Returned { Reason::Misfit } else { *reason };
-                    }
-                }
+        let bands = phase.par_chunks_mut(self.factor * stride).enumerate();
+        bands.for_each_init(Work::default, |work, (row, phase)| {
+            if row == 0 || row + 1 >= self.height {
+                return;
+            }
+            self.load_fit(row, &fit, work);
+            work.find_smooth();
+            if !work.smooth.contains(&true) {
+                return;
+            }
+            for (i, phase) in phase.chunks_mut(stride).enumerate() {
                 self.take_surface([row, i], work, phase);
             }
         });
     }
 
-    /// Phase of a cell after the fit.
-    fn fitted(&self, at: usize) -> f32 {
-        self.start[at] + self.correction[at]
-    }
-
-    /// Finds the cells of a row that lie on one surface with the eight around them: all are lit, and no second difference through
-    /// their middle is larger than the bending of the tile explains.
-    fn find_smooth(&self, row: usize, smooth: &mut Vec<bool>) {
-        let Self { height, width, stride, inside, bend, .. } = self;
-        smooth.clear();
-        smooth.resize(*width, false);
-        if row == 0 || row + 1 >= *height {
-            return;
-        }
-        for x in 1..width.saturating_sub(1) {
-            let here = row * stride + x;
-            let lit = [here - stride, here, here + stride]
-                .iter()
-                .all(|at| inside[at - 1..=at + 1].iter().all(|&inside| inside > 0.0));
-            let most = CURVED_MAX * CURVED_MAX * bend[here];
-            let bent = |at: usize, step: usize| {
-                let second = self.fitted(at - step) - 2.0 * self.fitted(at) + self.fitted(at + step);
-                second * second > most
-            };
-            smooth[x] = lit
-                && ![here - stride, here, here + stride].iter().any(|&at| bent(at, 1))
-                && ![here - 1, here, here + 1].iter().any(|&at| bent(at, *stride));
-        }
-    }
-
-    /// Replaces the phase of the pixels of smooth cells, in row `i` of the pixels of a row of cells, by that of the parabola in either
-    /// direction that has the means of the cells.
-    fn take_surface(&self, [row, i]: [usize; 2], work: &mut Work, phase: &mut [f32]) {
-        let Self { width, stride, factor, .. } = self;
-        let Work { smooth, means, .. } = work;
-        let parabolas = || (0..*factor).map(|i| parabola(i, *factor));
-        if !smooth.contains(&true) {
-            return;
-        }
-        let down = parabola(i, *factor);
-        means.clear();
-        means.extend((0..*width).map(|x| {
-            let at = row * stride + x;
-            mix(down, [at - stride, at, at + stride].map(|at| self.fitted(at)))
-        }));
-        for x in (1..*width).filter(|&x| smooth[x]) {
-            let three = [means[x - 1], means[x], means[x + 1]];
-            for (phase, along) in phase[x * factor..].iter_mut().zip(parabolas()) {
-                *phase = mix(along, three);
+    /// Loads the fit of a row of cells, and of those above and below.
+    fn load_fit(&self, row: usize, fit: &impl Fn(usize, usize) -> Option<CellFit>, work: &mut Work) {
+        let Work { fitted, bend, .. } = work;
+        bend.clear();
+        for (k, line) in fitted.iter_mut().enumerate() {
+            let y = row + k - 1;
+            line.clear();
+            for x in 0..self.width {
+                let found = fit(y, x).filter(|_| self.is_inside(y, x));
+                line.push(found.as_ref().map_or(f32::NAN, |fit| self.start(y, x) + fit.correction));
+                if k == 1 {
+                    bend.push(found.map_or(0.0, |fit| fit.bend));
+                }
             }
         }
+    }
+
+    /// Replaces the phase of pixels in row `i` of a row of cells by that of the parabolas along rows and columns that have the means of
+    /// the cells.
+    fn take_surface(&self, [row, i]: [usize; 2], work: &mut Work, phase: &mut [f32]) {
+        let Work { smooth, means, .. } = work;
+        let down = parabola(i, self.factor);
+        means.clear();
+        means.extend((0..self.width).map(|x| mix(down, [row - 1, row, row + 1].map(|y| self.start(y, x)))));
+        for x in (0..self.width).filter(|&x| smooth[x]) {
+            let three = [means[x - 1], means[x], means[x + 1]];
+            for (i, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
+                *phase = mix(parabola(i, self.factor), three);
+            }
+        }
+    }
+}
+
+impl Work {
+    /// Finds the cells through which no second difference is larger than the bending of the tile explains, and whose neighbours have
+    /// a fit.
+    fn find_smooth(&mut self) {
+        let Self { fitted: [above, here, below], bend, smooth, .. } = self;
+        let width = here.len();
+        smooth.clear();
+        smooth.extend((0..width).map(|x| {
+            let most = CURVED_MAX * CURVED_MAX * bend[x];
+            // A comparison with no number is false.
+            let gentle = |three: [f32; 3]| (three[0] - 2.0 * three[1] + three[2]).powi(2) <= most;
+            let inner = x > 0 && x + 1 < width;
+            inner
+                && [&*above, here, below].iter().all(|line| gentle([line[x - 1], line[x], line[x + 1]]))
+                && (x - 1..=x + 1).all(|x| gentle([above[x], here[x], below[x]]))
+        }));
     }
 }
 
@@ -131,5 +127,19 @@ mod tests {
                 assert!((found - truth).abs() < 1e-4, "{pixels} {i}: {found} {truth}");
             }
         }
+    }
+
+    #[test]
+    fn a_step_or_a_missing_cell_ends_the_surface() {
+        let smooth = |change: f32| {
+            let mut work = Work { bend: vec![1e-4; 8], ..Work::default() };
+            work.fitted = [0, 1, 2]
+                .map(|_| (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect());
+            work.find_smooth();
+            work.smooth
+        };
+        assert_eq!(smooth(0.0), [false, true, true, true, true, true, true, false]);
+        assert_eq!(smooth(0.3), [false, true, true, true, false, false, true, false]);
+        assert_eq!(smooth(f32::NAN), [false, true, true, true, false, false, false, false]);
     }
 }
