@@ -186,13 +186,13 @@ def _refuse_numbers(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None
     if closure is None or channels_fit(closure):
         return
     given = order_margin(part.shape(band))
-    for numbers in other_numbers(part.plan, closure):
-        found = order_margin(part.with_numbers(numbers).shape(band))
-        if found > max(limits.CLEARLY_BETTER * given, limits.DOUBTFUL):
-            words = f"the fringe numbers {listed(decoder.plan.fringes.numbers)} are not those of this shot: with the "
-            words += f"ratios of its channels the median order margin is {found:.2f} in place of {given:.2f}, "
-            words += f"which fits {listed(numbers)}"
-            raise Cause("fringe numbers", words, NUMBERS_FIX).error
+    margins = {one: order_margin(part.with_numbers(one).shape(band)) for one in other_numbers(part.plan, closure)}
+    numbers, found = max(margins.items(), key=lambda each: each[1], default=(None, 0.0))
+    if numbers and found > max(limits.CLEARLY_BETTER * given, limits.DOUBTFUL):
+        words = f"the fringe numbers {listed(decoder.plan.fringes.numbers)} are not those of this shot: with the "
+        words += f"ratios of its channels the median order margin is {found:.2f} in place of {given:.2f}, "
+        words += f"which fits {listed(numbers)}"
+        raise Cause("fringe numbers", words, NUMBERS_FIX).error
 
 
 def _refuse_green(shape: Shape, shot: AnyShot, decoder: KernelDecoder) -> None:
