@@ -15,7 +15,7 @@ use crate::joint::params::energy::SIDE;
 const RATIOS: [f32; 4] = [1.0, 35.0 / 36.0, 1.0, 30.0 / 36.0];
 
 /// A number in [-1, 1] for each place and seed.
-fn random(seed: usize, at: usize) -> f32 {
+pub(super) fn random(seed: usize, at: usize) -> f32 {
     let mut state = (seed * 7919 + at).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     state ^= state >> 29;
     state = state.wrapping_mul(0xBF58_476D_1CE4_E5B9);
