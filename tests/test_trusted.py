@@ -15,6 +15,7 @@ from support.bars import hold
 import quadfringe as qf
 from quadfringe.config import Device
 from quadfringe.data import Reason
+from quadfringe.decoding import verdict_params
 from quadfringe.decoding._kernel import KernelDecoder
 from quadfringe.decoding.symptoms import closure_of
 from quadfringe.decoding.trusted import is_scattered, trusted_part
@@ -183,6 +184,14 @@ def test_fine_fringes_of_other_numbers_are_named_without_decoding_often(monkeypa
     with pytest.raises(DecodeError, match="which fits 100, 99, 90"):
         qf.decode(shot_of(images), plan_of((64.0, 63.0, 56.0)))
     assert sum(decoded) < 3 * CAMERA.width_px * CAMERA.height_px
+
+
+def test_the_fringe_numbers_that_fit_best_are_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    # With 81, 80, 72, which are tried first, the margin rises too, but less.
+    monkeypatch.setattr(verdict_params, "CLEARLY_BETTER", 1.0)
+    images, _ = images_of("face", 45, (100.0, 99.0, 90.0))
+    with pytest.raises(DecodeError, match="which fits 100, 99, 90"):
+        qf.decode(shot_of(images), plan_of((64.0, 63.0, 56.0)))
 
 
 def test_what_contradicts_every_order_is_no_data_with_a_warning() -> None:

@@ -8,6 +8,7 @@ use crate::parallel::lanes::LANES;
 
 /// Weights of the outer, the next and the middle one of five cells over which a pull is averaged: a cell alone, and 3 x 3.
 const WINDOWS: [[f32; 3]; 2] = [[0.0, 0.0, 1.0], [0.0, 0.25, 0.5]];
+
 /// Working planes.
 pub(super) struct Work<'a> {
     pub pull: &'a mut Plane,
@@ -56,6 +57,7 @@ fn square(gradient: &mut Plane, information: &Plane, noise: f32) {
 mod tests {
     use super::*;
     use crate::joint::energy::plane::{Fields, total};
+    use crate::joint::energy::tests::random;
     use crate::joint::params::energy::SIDE;
 
     const NOISE: f32 = 1e-4;
@@ -82,11 +84,7 @@ mod tests {
 
     /// Noise of the phase of a cell: uniform, with the variance of its light over its information.
     fn noise(x: usize, y: usize) -> f32 {
-        let mut state = (y * SIDE + x).wrapping_mul(0x9E37_79B9_7F4A_7C15);
-        state ^= state >> 29;
-        state = state.wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let uniform = (state >> 40) as f32 / (1u32 << 23) as f32 - 1.0;
-        uniform * (3.0 * NOISE / INFORMATION).sqrt()
+        random(1, y * SIDE + x) * (3.0 * NOISE / INFORMATION).sqrt()
     }
 
     #[test]

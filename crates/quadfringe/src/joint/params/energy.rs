@@ -55,7 +55,7 @@ pub const RELAXATION: f32 = 1.5;
 /// `python evaluation/sensitivity.py --only energy::PRIOR_CELLS`.
 pub const PRIOR_CELLS: f32 = 0.1;
 /// Bounds of the standard deviations, in the same units. They keep the weights within the range of `f32`; at the lower one the surface of
-/// the second and the third start begins to loosen (J43).
+/// the second and the third start begins to loosen (J43). `python evaluation/sensitivity.py --only energy::SCALE_LIMITS`.
 pub const SCALE_LIMITS: [f32; 2] = [0.0005, 1.0];
 /// Least share of the unknowns that counts as determined by the data. Without it, the scale of a tile without structure is the
 /// quotient of two small numbers.
@@ -74,6 +74,7 @@ pub const START_ROUNDS: usize = 2;
 /// Follows from the model.
 pub const CONTRAST_START_LIMITS: [f32; 2] = [0.1, 1.05];
 /// Bounds of the albedo in these rounds, in linear light. They keep the logarithm finite; 1 is full scale.
+/// `python evaluation/sensitivity.py --only energy::ALBEDO_LIMITS`.
 pub const ALBEDO_LIMITS: [f32; 2] = [0.004, 4.0];
 
 /// Greatest number of Gauss-Newton steps in which the scale of the surface is free; a tile that rests takes fewer. More: time on
