@@ -1,8 +1,8 @@
 //! More starts. Texture spoils the phase at the first start, and the minimum that is found from there can be a wrong one.
 //!
 //! The second start is the surface that bends least through the cells without texture (J29): at the edges of a print the phase is
-//! off by up to a radian. The third is the surface found so far, with new albedos; it is stiff again and loosens once more (J43). A tile
-//! keeps the minimum with the lower energy, and a cell the one around which the energy is much lower.
+//! off by up to a radian. The third is the lower minimum of the two, with cells of the other one where that is better. Both have new
+//! albedos, and a surface that is stiff again and loosens once more (J43). A tile keeps the minimum with the lowest energy.
 
 use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, total, vectors};
 use super::scales::Scales;
@@ -24,31 +24,30 @@ const FIVE: [f32; 3] = [1.0; 3];
 impl Tile {
     /// Minimises once more from two other starts, if there is texture, and keeps the lowest energy; `noise` as in `minimise`.
     pub(super) fn restart(&mut self, noise: f32) {
-        if !has_texture(self) {
+        self.compared = has_texture(self);
+        if !self.compared {
             return;
         }
-        self.keep_unknowns();
-        if self.bridge() {
-            self.lower(noise);
-        }
-        self.keep_unknowns();
-        self.lower(noise);
-    }
-
-    /// Keeps the unknowns, to compare others with them.
-    fn keep_unknowns(&mut self) {
         for (to, from) in self.first.planes_mut().into_iter().zip(self.unknown.planes()) {
             to.copy(from);
         }
+        if self.bridge() {
+            self.start_again(noise);
+        }
+        let mixed = self.start_again(noise);
+        let scales = self.scales;
+        if mixed && excess(self, &scales, &[scales]) < 0.0 {
+            std::mem::swap(&mut self.unknown, &mut self.first);
+        }
     }
 
-    /// Minimises from the present phase, and keeps the lower energy.
-    fn lower(&mut self, noise: f32) {
+    /// Minimises from the present phase, and keeps the lower minimum as in `keep_lower`.
+    fn start_again(&mut self, noise: f32) -> bool {
         let kept = self.scales;
         self.scales = Scales { noise, misfit: 1.0, ..kept };
         contrast_and_albedo(self, SURROUNDINGS_SHARE);
         self.descend(noise, SCALE_LIMITS[0].powi(2), 1);
-        keep_lower(self, &kept);
+        keep_lower(self, &kept)
     }
 
     /// Moves the phase to the surface that bends least through the cells without texture, around the cells where it differs; gives
@@ -195,67 +194,87 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
     out
 }
 
-/// Of the kept unknowns, with the scales `kept`, and the present ones, keeps those with the lower energy in the tile, and their scales;
-/// in cells around which the others differ and have a much lower energy, those.
-#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn keep_lower(tile: &mut Tile, kept: &Scales) {
-    compare(tile, kept);
-    let Tile { inside, unknown, first, product, spread, scales, .. } = tile;
-    let [gain, around, spare, ..] = product.planes_mut();
-    if vectors().map(|at| total(gain.get(at))).sum::<f64>() > 0.0 {
-        std::mem::swap(unknown, first);
-        vectors().for_each(|at| gain.set(at, gain.get(at).map(|gain| -gain)));
+/// Keeps the lower of two minima: the kept one, with the scales `kept`, and the present one. The present unknowns become a mixture: the
+/// lower minimum, with the cells of the other one around which that has a much lower energy. Gives whether there are such cells.
+fn keep_lower(tile: &mut Tile, kept: &Scales) -> bool {
+    let found = tile.scales;
+    let mut sign = 1.0;
+    if excess(tile, kept, &[*kept, found]) > 0.0 {
+        std::mem::swap(&mut tile.unknown, &mut tile.first);
+        sign = -1.0;
     } else {
-        *scales = *kept;
+        tile.scales = *kept;
     }
+    mix(tile, sign)
+}
+
+/// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Either
+/// have their own contrasts of the channels, those of the kept ones in `kept`. The energies are sums over all `scales`.
+fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
+    let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
+    let [excess, near, spare, ..] = tile.product.planes_mut();
+    continue_through(inside, torn, &mut tile.lit, [near, spare]);
+    let (ratios, pair) = (tile.ratios, *pair);
+    let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
+    excess.clear();
+    for scales in scales {
+        let of = |owner: &Scales| Scales { channel_contrast: owner.channel_contrast, ..*scales };
+        add_energy(1.0, &given, &tile.first, &of(kept), excess);
+        add_energy(-1.0, &given, &tile.unknown, &of(&tile.scales), excess);
+    }
+    vectors().map(|at| total(excess.get(at))).sum()
+}
+
+/// Turns the present unknowns into the kept ones, except in cells around which they differ and have a much lower energy; gives whether
+/// there are any. Adds to the spread where neither energy is much lower. The excess of the kept ones stands in the first plane of the
+/// product, times `sign`.
+#[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
+fn mix(tile: &mut Tile, sign: f32) -> bool {
+    let Tile { inside, unknown, first, product, spread, .. } = tile;
+    let [excess, around, spare, ..] = product.planes_mut();
     for at in vectors() {
         around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
     }
     filter(around, spare, THREE);
     for at in vectors() {
-        let (mut counted, around) = (gain.get(at), around.get(at));
+        let (mut counted, around) = (excess.get(at), around.get(at));
         for x in 0..LANES {
-            counted[x] *= if around[x] > 0.5 { 1.0 } else { 0.0 };
+            counted[x] *= if around[x] > 0.5 { sign } else { 0.0 };
         }
-        gain.set(at, counted);
+        excess.set(at, counted);
     }
-    filter(gain, spare, FIVE);
-    add_spread(gain, &first.phase, &unknown.phase, spread);
+    filter(excess, spare, FIVE);
+    add_spread(excess, &first.phase, &unknown.phase, spread);
+    let mut mixed = 0.0;
+    for at in vectors() {
+        let (excess, mut around) = (excess.get(at), around.get(at));
+        for x in 0..LANES {
+            around[x] = if around[x] > 0.5 && excess[x] > GAIN_MIN { 1.0 } else { 0.0 };
+        }
+        mixed += total(around);
+        spare.set(at, around);
+    }
     for (kept, unknown) in first.planes().into_iter().zip(unknown.planes_mut()) {
         for at in vectors() {
-            let (gain, around, kept, mut out) = (gain.get(at), around.get(at), kept.get(at), unknown.get(at));
+            let (other, kept, mut out) = (spare.get(at), kept.get(at), unknown.get(at));
             for x in 0..LANES {
-                out[x] = if around[x] > 0.5 && gain[x] > GAIN_MIN { out[x] } else { kept[x] };
+                out[x] = if other[x] > 0.5 { out[x] } else { kept[x] };
             }
             unknown.set(at, out);
         }
     }
+    mixed > 0.0
 }
 
 /// Adds half the squared difference of two phases where neither has a much lower energy (U19).
 #[inline(always)]
-fn add_spread(gain: &Plane, one: &Plane, other: &Plane, spread: &mut Plane) {
+fn add_spread(excess: &Plane, one: &Plane, other: &Plane, spread: &mut Plane) {
     for at in vectors() {
-        let (gain, one, other, mut out) = (gain.get(at), one.get(at), other.get(at), spread.get(at));
+        let (excess, one, other, mut out) = (excess.get(at), one.get(at), other.get(at), spread.get(at));
         for x in 0..LANES {
             let half = 0.5 * (one[x] - other[x]) * (one[x] - other[x]);
-            out[x] += if gain[x].abs() < GAIN_MIN { half } else { 0.0 };
+            out[x] += if excess[x].abs() < GAIN_MIN { half } else { 0.0 };
         }
         spread.set(at, out);
-    }
-}
-
-/// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product. The energies are sums
-/// over the scales of either minimum, so that neither is preferred.
-fn compare(tile: &mut Tile, kept: &Scales) {
-    let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
-    let [gain, near, spare, ..] = tile.product.planes_mut();
-    continue_through(inside, torn, &mut tile.lit, [near, spare]);
-    let (ratios, pair) = (tile.ratios, *pair);
-    let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
-    gain.clear();
-    for scales in [kept, &tile.scales] {
-        add_energy(1.0, &given, &tile.first, scales, gain);
-        add_energy(-1.0, &given, &tile.unknown, scales, gain);
     }
 }

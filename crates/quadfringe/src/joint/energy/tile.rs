@@ -46,6 +46,8 @@ pub(super) struct Tile {
     /// Unknowns from the starts before, and the lit cells, while there is another start.
     pub first: Fields,
     pub lit: Plane,
+    /// Whether minima have been compared.
+    pub compared: bool,
     /// Half the squared difference of the phases of two minima of which neither has a much lower energy, rad^2 (U19).
     pub spread: Plane,
     pub derivatives: Derivatives,

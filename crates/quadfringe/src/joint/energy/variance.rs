@@ -7,7 +7,9 @@ use super::plane::{Fields, Plane, vectors};
 use super::scales::variance_share;
 use super::start::smooth;
 use super::tile::Tile;
-use crate::joint::params::uncertainty::{CELL_INFORMATION_MIN, CORRECTION_LEFT, EXCESS_LEFT};
+use crate::joint::params::uncertainty::{
+    CELL_INFORMATION_MIN, CORRECTION_LEFT, CORRECTION_LEFT_COMPARED, EXCESS_LEFT,
+};
 use crate::parallel::lanes::LANES;
 use multiversion::multiversion;
 
@@ -20,13 +22,26 @@ pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
 /// Adds the variance by noise, by the residuals, by the correction, by the bias and by other minima.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
-    let Tile { start, unknown, scales, derivatives, weights, product, residual, ratios, spread, .. } = tile;
+    let Tile {
+        start,
+        unknown,
+        scales,
+        derivatives,
+        weights,
+        product,
+        residual,
+        ratios,
+        compared,
+        spread,
+        ..
+    } = tile;
     let Fields { phase: information, contrast: spare, albedo: [corrections, pull, known, biases] } = product;
+    let left = if *compared { CORRECTION_LEFT_COMPARED } else { CORRECTION_LEFT };
     for at in vectors() {
         information.set(at, phase_information(derivatives, weights, *ratios, at));
         let (phase, start, mut square) = (unknown.phase.get(at), start.get(at), spread.get(at));
         for x in 0..LANES {
-            square[x] += CORRECTION_LEFT * (phase[x] - start[x]) * (phase[x] - start[x]);
+            square[x] += left * (phase[x] - start[x]) * (phase[x] - start[x]);
         }
         corrections.set(at, square);
     }
