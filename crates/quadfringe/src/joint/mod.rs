@@ -226,7 +226,7 @@ impl Joint {
         let CoarseLevel { noise, orders, slopes, .. } = &self.coarse;
         orders.wrong_order_probability(&scene, &mut self.wrong_order);
         let window = Window::new(&scene, slopes, &self.pixels.modulation, *noise);
-        PhaseNoise::new(*noise, window.share(), window.sigma_px(), &self.energy)
+        PhaseNoise::new(*noise, window.share(), &self.energy)
     }
 
     /// Steps 9 and 10, row by row: the maps of the result.

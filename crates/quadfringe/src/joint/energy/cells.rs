@@ -40,6 +40,8 @@ pub(super) struct CellFit {
     pub correction: f32,
     /// Variance of the phase, rad^2.
     pub variance: f32,
+    /// Variance of its second differences (J26), rad^2.
+    pub bend: f32,
     /// Light without fringes, linear.
     pub albedo: [f32; 4],
     pub contrast: [f32; 4],
@@ -50,6 +52,7 @@ impl CellFit {
         Self {
             correction: self.correction / sum,
             variance: self.variance / sum,
+            bend: self.bend / sum,
             albedo: self.albedo.map(|albedo| albedo / sum),
             contrast: self.contrast.map(|contrast| contrast / sum),
         }
@@ -120,6 +123,16 @@ impl Cells {
             }
         });
         self.draw_tangents(scene);
+    }
+
+    /// Mean phase of a cell at the start.
+    pub(super) fn start(&self, y: usize, x: usize) -> f32 {
+        self.phase[y * self.stride + x]
+    }
+
+    /// Whether a cell takes part in the fit.
+    pub(super) fn is_inside(&self, y: usize, x: usize) -> bool {
+        self.inside[y * self.stride + x] > 0.0
     }
 
     /// The tangents of the infrared phase of a pair at the mean phases.
@@ -194,7 +207,7 @@ impl Cells {
             for x in 0..*width {
                 let fit = found(y, x).filter(|_| inside[x] > 0.0);
                 inside[x] = f32::from(u8::from(fit.is_some()));
-                let CellFit { correction, variance, albedo, contrast } = fit.unwrap_or_default();
+                let CellFit { correction, variance, albedo, contrast, .. } = fit.unwrap_or_default();
                 let fitted = [correction, variance].into_iter().chain(albedo).chain(contrast);
                 values.iter_mut().zip(fitted).for_each(|(row, value)| row[x] = value);
             }

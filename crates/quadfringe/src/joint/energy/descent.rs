@@ -6,7 +6,7 @@ use super::plane::{Column, vectors};
 use super::priors::weigh;
 use super::scales::{Determined, Scales};
 use super::solve::solve;
-use super::start::{self, AlbedoOf};
+use super::start::contrast_and_albedo;
 use super::tile::{Found, Tile};
 use super::variance::variance;
 use crate::joint::model::{absent, count};
@@ -37,13 +37,15 @@ impl Tile {
     pub fn minimise(&mut self, noise: f32, detail: f32) {
         self.scales = Scales { noise, misfit: 1.0, ..Scales::default() };
         self.unknown.phase.copy(&self.start);
-        start::contrast_and_albedo(self, AlbedoOf::Neighbours);
-        self.descend(noise, self.scales.bend);
+        self.spread.clear();
+        contrast_and_albedo(self, 1.0);
+        self.descend(noise, self.scales.bend, OUTER_STEPS);
         self.restart(noise);
         if detail != 1.0 {
             self.resolve(detail);
         }
-        linearise(self);
+        let sums = linearise(self);
+        self.scales.estimate_noise(&sums, self.ratios, noise..=f32::INFINITY);
         weigh(self);
     }
 
@@ -60,20 +62,20 @@ impl Tile {
 
     /// Lowers the energy from the present unknowns, and estimates the scales. `noise` is the least variance of the noise, and `bend_max`
     /// the greatest variance of the bending in the first step; it grows from step to step (J43). While it limits the surface, the noise
-    /// may not rise, or it would explain what the surface may not.
-    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32) {
-        let mut determined = Determined::default();
+    /// may not rise, or it would explain what the surface may not. At most `steps` follow in which it does not.
+    pub(super) fn descend(&mut self, noise: f32, mut bend_max: f32, steps: usize) {
+        self.scales.determined = Determined::default();
         let (mut outer, mut free, mut limited) = (0, 0, false);
-        while free < OUTER_STEPS {
+        while free < steps {
             let sums = linearise(self);
             let most = if limited { self.scales.misfit } else { f32::INFINITY };
-            self.scales.estimate_noise(&sums, determined, self.ratios, noise..=most);
+            self.scales.estimate_noise(&sums, self.ratios, noise..=most);
             let sums = weigh(self);
             if outer > 0 {
                 let channels = count(self.ratios);
                 let information = information(&self.derivatives, &self.weights, self.ratios);
                 bend_max *= BEND_GROWTH * BEND_GROWTH;
-                determined = self.scales.estimate_priors(&sums, information, channels, bend_max);
+                self.scales.estimate_priors(&sums, information, channels, bend_max);
                 weigh(self);
             }
             solve(self, INNER_STEPS);
@@ -107,6 +109,7 @@ impl Tile {
             found.albedo[absent].clear();
         }
         found.channel_contrast = scales.channel_contrast;
+        found.bend = scales.bend;
     }
 
     /// Adds the step to the unknowns; returns the root mean square of the change of the phase.

@@ -12,6 +12,7 @@ mod data;
 mod descent;
 mod disagreement;
 mod layout;
+mod pixels;
 mod plane;
 mod preconditioner;
 mod priors;
@@ -75,7 +76,9 @@ impl Energy {
             },
         );
         let tiles = &*tiles;
-        cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
+        let fit = |y, x| blend(tiles, &rows, &columns, [y, x]);
+        cells.smooth_start(scene, fit, &mut pixels.phase);
+        cells.replace(fit);
         cells.correct(scene, pixels);
     }
 
@@ -83,11 +86,6 @@ impl Energy {
     pub fn fringes<'a>(&self, scene: &Scene<'_>, y: usize, rows: &'a mut FringeRows) -> &'a FringeRows {
         self.cells.fringes(scene, y, rows);
         rows
-    }
-
-    /// Pixels along a side of the cells of the last scene.
-    pub fn cell_px(&self) -> usize {
-        self.cells.factor
     }
 
     /// Mean square of the correction of the last scene, rad^2.
@@ -122,6 +120,7 @@ fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Op
             let weight = row.weight * column.weight * value(&found.inside);
             sum += weight;
             fit.correction += weight * value(&found.correction);
+            fit.bend += weight * found.bend;
             fit.variance += weight * value(&found.variance);
             for c in 0..4 {
                 fit.albedo[c] += weight * value(&found.albedo[c]);
@@ -132,5 +131,7 @@ fn blend(tiles: &[Found], rows: &Axis, columns: &Axis, [y, x]: [usize; 2]) -> Op
     (sum > 0.0).then(|| fit.divided_by(sum))
 }
 
+#[cfg(test)]
+mod start_tests;
 #[cfg(test)]
 mod tests;

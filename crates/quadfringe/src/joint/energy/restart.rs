@@ -1,15 +1,19 @@
-//! A second start (J29). At the edges of a print, texture spoils the phase at the start by up to a radian, and the minimum that
-//! is found from there can be a wrong one. The second start is the surface that bends least through the cells without texture.
-//! Every cell keeps the start around which the energy is lower.
+//! More starts. Texture spoils the phase at the first start, and the minimum that is found from there can be a wrong one.
+//!
+//! The second start is the surface that bends least through the cells without texture (J29): at the edges of a print the phase is
+//! off by up to a radian. The third is the lower minimum of the two, with cells of the other one where that is better. Both have new
+//! albedos, and a surface that is stiff again and loosens once more (J43). A tile keeps the minimum with the lowest energy.
 
 use super::plane::{Derivatives, Fields, Plane, STRIDE, Weights, total, vectors};
 use super::scales::Scales;
 use super::solve::solve;
-use super::start::{self, AlbedoOf, filter};
+use super::start::{contrast_and_albedo, filter};
 use super::tile::Tile;
 use super::value::{Given, add_energy};
 use crate::joint::model::count;
-use crate::joint::params::energy::{GAIN_MIN, INNER_STEPS, SAME_RAD, SIDE, TEXTURE_MIN};
+use crate::joint::params::energy::{
+    GAIN_MIN, INNER_STEPS, SAME_RAD, SCALE_LIMITS, SIDE, SURROUNDINGS_SHARE, TEXTURE_MIN,
+};
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
@@ -18,17 +22,39 @@ const THREE: [f32; 3] = [0.0, 1.0, 1.0];
 const FIVE: [f32; 3] = [1.0; 3];
 
 impl Tile {
-    /// Minimises once more from the second start, if there is texture, and keeps the lower energy; `noise` as in `minimise`.
+    /// Minimises once more from two other starts, if there is texture, and keeps the lowest energy; `noise` as in `minimise`.
     pub(super) fn restart(&mut self, noise: f32) {
-        if !has_texture(self) {
+        self.compared = has_texture(self);
+        if !self.compared {
             return;
         }
-        let scales = self.scales;
-        let Self { inside, lit, unknown, first, derivatives, weights, residual, ratios, .. } = self;
-        for (to, from) in first.planes_mut().into_iter().zip(unknown.planes()).chain([(&mut *lit, &*inside)])
-        {
+        for (to, from) in self.first.planes_mut().into_iter().zip(self.unknown.planes()) {
             to.copy(from);
         }
+        if self.bridge() {
+            self.start_again(noise);
+        }
+        let mixed = self.start_again(noise);
+        let scales = self.scales;
+        if mixed && excess(self, &scales, &[scales]) < 0.0 {
+            std::mem::swap(&mut self.unknown, &mut self.first);
+        }
+    }
+
+    /// Minimises from the present phase, and keeps the lower minimum as in `keep_lower`.
+    fn start_again(&mut self, noise: f32) -> bool {
+        let kept = self.scales;
+        self.scales = Scales { noise, misfit: 1.0, ..kept };
+        contrast_and_albedo(self, SURROUNDINGS_SHARE);
+        self.descend(noise, SCALE_LIMITS[0].powi(2), 1);
+        keep_lower(self, &kept)
+    }
+
+    /// Moves the phase to the surface that bends least through the cells without texture, around the cells where it differs; gives
+    /// whether there are any.
+    fn bridge(&mut self) -> bool {
+        let Self { inside, lit, first, derivatives, weights, residual, ratios, scales, .. } = self;
+        lit.copy(inside);
         hold_by_phase(inside, *ratios, first, scales.noise, derivatives);
         bend_everywhere(scales.noise / scales.bend, weights);
         residual.planes_mut().into_iter().for_each(Plane::clear);
@@ -36,13 +62,7 @@ impl Tile {
         vectors().for_each(|at| inside.set(at, [1.0; LANES]));
         solve(self, INNER_STEPS);
         std::mem::swap(&mut self.inside, &mut self.lit);
-        if take_step(self) {
-            self.scales = Scales { noise, misfit: 1.0, ..scales };
-            start::contrast_and_albedo(self, AlbedoOf::Cell);
-            self.descend(noise, f32::INFINITY);
-            keep_lower(self, &scales);
-            self.scales = scales;
-        }
+        take_step(self)
     }
 }
 
@@ -174,46 +194,87 @@ fn farther(one: Lanes, other: Lanes, lit: Lanes) -> Lanes {
     out
 }
 
-/// Goes back to the first unknowns in all cells but those around which the second ones differ and have the lower energy.
+/// Keeps the lower of two minima: the kept one, with the scales `kept`, and the present one. The present unknowns become a mixture: the
+/// lower minimum, with the cells of the other one around which that has a much lower energy. Gives whether there are such cells.
+fn keep_lower(tile: &mut Tile, kept: &Scales) -> bool {
+    let found = tile.scales;
+    let mut sign = 1.0;
+    if excess(tile, kept, &[*kept, found]) > 0.0 {
+        std::mem::swap(&mut tile.unknown, &mut tile.first);
+        sign = -1.0;
+    } else {
+        tile.scales = *kept;
+    }
+    mix(tile, sign)
+}
+
+/// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Either
+/// have their own contrasts of the channels, those of the kept ones in `kept`. The energies are sums over all `scales`.
+fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
+    let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
+    let [excess, near, spare, ..] = tile.product.planes_mut();
+    continue_through(inside, torn, &mut tile.lit, [near, spare]);
+    let (ratios, pair) = (tile.ratios, *pair);
+    let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
+    excess.clear();
+    for scales in scales {
+        let of = |owner: &Scales| Scales { channel_contrast: owner.channel_contrast, ..*scales };
+        add_energy(1.0, &given, &tile.first, &of(kept), excess);
+        add_energy(-1.0, &given, &tile.unknown, &of(&tile.scales), excess);
+    }
+    vectors().map(|at| total(excess.get(at))).sum()
+}
+
+/// Turns the present unknowns into the kept ones, except in cells around which they differ and have a much lower energy; gives whether
+/// there are any. Adds to the spread where neither energy is much lower. The excess of the kept ones stands in the first plane of the
+/// product, times `sign`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn keep_lower(tile: &mut Tile, scales: &Scales) {
-    compare(tile, scales);
-    let Tile { inside, unknown, first, product, .. } = tile;
-    let [gain, around, spare, ..] = product.planes_mut();
+fn mix(tile: &mut Tile, sign: f32) -> bool {
+    let Tile { inside, unknown, first, product, spread, .. } = tile;
+    let [excess, around, spare, ..] = product.planes_mut();
     for at in vectors() {
         around.set(at, farther(first.phase.get(at), unknown.phase.get(at), inside.get(at)));
     }
     filter(around, spare, THREE);
     for at in vectors() {
-        let (mut counted, around) = (gain.get(at), around.get(at));
+        let (mut counted, around) = (excess.get(at), around.get(at));
         for x in 0..LANES {
-            counted[x] *= if around[x] > 0.5 { 1.0 } else { 0.0 };
+            counted[x] *= if around[x] > 0.5 { sign } else { 0.0 };
         }
-        gain.set(at, counted);
+        excess.set(at, counted);
     }
-    filter(gain, spare, FIVE);
+    filter(excess, spare, FIVE);
+    add_spread(excess, &first.phase, &unknown.phase, spread);
+    let mut mixed = 0.0;
+    for at in vectors() {
+        let (excess, mut around) = (excess.get(at), around.get(at));
+        for x in 0..LANES {
+            around[x] = if around[x] > 0.5 && excess[x] > GAIN_MIN { 1.0 } else { 0.0 };
+        }
+        mixed += total(around);
+        spare.set(at, around);
+    }
     for (kept, unknown) in first.planes().into_iter().zip(unknown.planes_mut()) {
         for at in vectors() {
-            let (gain, around, kept, mut out) = (gain.get(at), around.get(at), kept.get(at), unknown.get(at));
+            let (other, kept, mut out) = (spare.get(at), kept.get(at), unknown.get(at));
             for x in 0..LANES {
-                out[x] = if around[x] > 0.5 && gain[x] > GAIN_MIN { out[x] } else { kept[x] };
+                out[x] = if other[x] > 0.5 { out[x] } else { kept[x] };
             }
             unknown.set(at, out);
         }
     }
+    mixed > 0.0
 }
 
-/// Writes the energy of the first unknowns less that of the second ones into the first plane of the product. The energies are sums
-/// over the scales that either start has found, so that neither is preferred.
-fn compare(tile: &mut Tile, scales: &Scales) {
-    let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
-    let [gain, near, spare, ..] = tile.product.planes_mut();
-    continue_through(inside, torn, &mut tile.lit, [near, spare]);
-    let (ratios, pair) = (tile.ratios, *pair);
-    let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
-    gain.clear();
-    for scales in [scales, &tile.scales] {
-        add_energy(1.0, &given, &tile.first, scales, gain);
-        add_energy(-1.0, &given, &tile.unknown, scales, gain);
+/// Adds half the squared difference of two phases where neither has a much lower energy (U19).
+#[inline(always)]
+fn add_spread(excess: &Plane, one: &Plane, other: &Plane, spread: &mut Plane) {
+    for at in vectors() {
+        let (excess, one, other, mut out) = (excess.get(at), one.get(at), other.get(at), spread.get(at));
+        for x in 0..LANES {
+            let half = 0.5 * (one[x] - other[x]) * (one[x] - other[x]);
+            out[x] += if excess[x].abs() < GAIN_MIN { half } else { 0.0 };
+        }
+        spread.set(at, out);
     }
 }

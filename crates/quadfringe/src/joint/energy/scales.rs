@@ -26,12 +26,23 @@ pub(super) struct Scales {
     pub contrast: f32,
     /// Contrast of each channel relative to their mean.
     pub channel_contrast: [f32; 4],
+    /// Unknowns that the data determine at these scales; none before the first estimate of the priors.
+    pub determined: Determined,
 }
 
 impl Default for Scales {
     fn default() -> Self {
         let [bend, brightness, colour, contrast] = START.map(|deviation| deviation * deviation);
-        Self { noise: 1.0, misfit: 1.0, bend, brightness, colour, contrast, channel_contrast: [1.0; 4] }
+        Self {
+            noise: 1.0,
+            misfit: 1.0,
+            bend,
+            brightness,
+            colour,
+            contrast,
+            channel_contrast: [1.0; 4],
+            determined: Determined::default(),
+        }
     }
 }
 
@@ -94,15 +105,9 @@ pub(super) struct Determined {
 
 impl Scales {
     /// Estimates the variance of the noise from the residuals, within `bounds`, and the contrasts of the channels.
-    pub fn estimate_noise(
-        &mut self,
-        sums: &DataSums,
-        determined: Determined,
-        ratios: [f32; 4],
-        bounds: RangeInclusive<f32>,
-    ) {
+    pub fn estimate_noise(&mut self, sums: &DataSums, ratios: [f32; 4], bounds: RangeInclusive<f32>) {
         let channels = count(ratios);
-        let Determined { phase, brightness, colour, contrast } = determined;
+        let Determined { phase, brightness, colour, contrast } = self.determined;
         let used = phase + brightness + (channels - 1.0) * colour + contrast;
         let free = sums.cells * f64::from((channels - used).max(0.5));
         self.misfit = ((sums.squares / free.max(1e-9)) as f32).max(*bounds.start()).min(*bounds.end());
@@ -119,7 +124,7 @@ impl Scales {
         self.channel_contrast = change.map(|value| (value / mean.max(1e-6)).clamp(0.5, 1.5));
     }
 
-    /// Estimates the variances of the priors, and gives the numbers of unknowns that the data determine. The variance of the bending is
+    /// Estimates the variances of the priors, and the numbers of unknowns that the data determine. The variance of the bending is
     /// at most `bend_max`. As long as it is that, the variance of the contrast does not rise, or contrast would explain what the surface
     /// may not (J43).
     pub fn estimate_priors(
@@ -128,12 +133,12 @@ impl Scales {
         information: Information,
         channels: f32,
         bend_max: f32,
-    ) -> Determined {
+    ) {
         let Information { phase, albedo, contrast } = information;
         let noise = self.noise;
         let weight =
             |sums: &Sums, variance: f32| (sums.weight / sums.count.max(1e-9)) as f32 * noise / variance;
-        let determined = Determined {
+        self.determined = Determined {
             phase: bend_share(weight(&sums.bend, self.bend) / phase.max(1e-12)),
             brightness: difference_share(weight(&sums.brightness, self.brightness) / albedo.max(1e-12)),
             colour: difference_share(weight(&sums.colour, self.colour) / albedo.max(1e-12)),
@@ -147,13 +152,12 @@ impl Scales {
             (old * growth).clamp(SCALE_LIMITS[0].powi(2), SCALE_LIMITS[1].powi(2))
         };
         let [bright, colour, slow] = unknowns(channels);
-        let Determined { phase, brightness, colour: coloured, contrast } = determined;
+        let Determined { phase, brightness, colour: coloured, contrast } = self.determined;
         self.bend = update(&sums.bend, 1.0, phase, START[0], self.bend).min(bend_max);
         self.brightness = update(&sums.brightness, bright, brightness, START[1], self.brightness);
         self.colour = update(&sums.colour, colour, coloured, START[2], self.colour);
         let contrast = update(&sums.contrast, slow, contrast, START[3], self.contrast);
         self.contrast = if self.bend < bend_max { contrast } else { contrast.min(self.contrast) };
-        determined
     }
 }
 

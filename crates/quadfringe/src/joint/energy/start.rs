@@ -10,17 +10,9 @@ use crate::parallel::exp::exp;
 use crate::parallel::lanes::{LANES, Lanes};
 use multiversion::multiversion;
 
-/// Which cells determine the albedo of a cell at the start.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum AlbedoOf {
-    /// The cells around it: exact where the phase is not.
-    Neighbours,
-    /// The cell alone: sharp where the albedo has edges.
-    Cell,
-}
-
-/// Estimates, for each channel, the contrast of the light in the tile and the albedo of every cell, alternating.
-pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
+/// Estimates, for each channel, the contrast of the light in the tile and the albedo of every cell, alternating. The cells around a
+/// cell determine the `share` of its albedo: the larger, the less errors of the phase matter, and the less sharp the edges are.
+pub(super) fn contrast_and_albedo(tile: &mut Tile, share: f32) {
     tile.scales.channel_contrast = [1.0; 4];
     let mut contrast = [1.0; 4];
     let present = weights(tile.ratios);
@@ -37,7 +29,7 @@ pub(super) fn contrast_and_albedo(tile: &mut Tile, of: AlbedoOf) {
         }
         for round in 0..START_ROUNDS {
             contrast[c] = contrast_of(tile, c, round == 0);
-            albedo(tile, c, contrast[c], of);
+            albedo(tile, c, contrast[c], share);
         }
     }
     // The logarithm of the contrast of a channel that is absent is 0.
@@ -86,11 +78,11 @@ fn contrast_of(tile: &Tile, channel: usize, even: bool) -> f32 {
     (ratio as f32).clamp(CONTRAST_START_LIMITS[0], CONTRAST_START_LIMITS[1])
 }
 
-/// Logarithm of the albedo by least squares.
+/// Logarithm of the albedo by least squares over a cell, and with the weight `share` over the cells around it.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn albedo(tile: &mut Tile, channel: usize, contrast: f32, of: AlbedoOf) {
+fn albedo(tile: &mut Tile, channel: usize, contrast: f32, share: f32) {
     let Tile { light, usable, inside, unknown, product, .. } = tile;
-    let [carrier, numerator, denominator, spare, _, _] = product.planes_mut();
+    let [carrier, numerator, denominator, around, spare, _] = product.planes_mut();
     for at in vectors() {
         let (light, usable, carrier) = (light[channel].get(at), usable.get(at), carrier.get(at));
         let (mut over, mut under) = ([0.0; LANES], [0.0; LANES]);
@@ -101,9 +93,10 @@ fn albedo(tile: &mut Tile, channel: usize, contrast: f32, of: AlbedoOf) {
         numerator.set(at, over);
         denominator.set(at, under);
     }
-    if of == AlbedoOf::Neighbours {
-        smooth(numerator, spare);
-        smooth(denominator, spare);
+    for sums in [&mut *numerator, &mut *denominator] {
+        around.copy(sums);
+        smooth(around, spare);
+        mix(sums, around, share);
     }
     for at in vectors() {
         let (over, under, inside) = (numerator.get(at), denominator.get(at), inside.get(at));
@@ -113,6 +106,18 @@ fn albedo(tile: &mut Tile, channel: usize, contrast: f32, of: AlbedoOf) {
             out[x] = inside[x] * albedo.clamp(ALBEDO_LIMITS[0], ALBEDO_LIMITS[1]).ln();
         }
         unknown.albedo[channel].set(at, out);
+    }
+}
+
+/// Replaces the `share` of a plane by that of another.
+#[inline(always)]
+fn mix(plane: &mut Plane, other: &Plane, share: f32) {
+    for at in vectors() {
+        let (mut out, other) = (plane.get(at), other.get(at));
+        for x in 0..LANES {
+            out[x] += share * (other[x] - out[x]);
+        }
+        plane.set(at, out);
     }
 }
 

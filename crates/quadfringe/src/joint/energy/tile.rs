@@ -17,6 +17,8 @@ pub(super) struct Found {
     /// Mean contrast of the fringes, and that of R, G, B, IR relative to it.
     pub contrast: Plane,
     pub channel_contrast: [f32; 4],
+    /// Variance of the second differences of the phase (J26), rad^2.
+    pub bend: f32,
 }
 
 /// A square of cells and everything that is known about it.
@@ -41,9 +43,13 @@ pub(super) struct Tile {
     pub infrared: [Plane; 2],
     pub scales: Scales,
     pub unknown: Fields,
-    /// Unknowns from the first start, and the lit cells, while there is a second start.
+    /// Unknowns from the starts before, and the lit cells, while there is another start.
     pub first: Fields,
     pub lit: Plane,
+    /// Whether minima have been compared.
+    pub compared: bool,
+    /// Half the squared difference of the phases of two minima of which neither has a much lower energy, rad^2 (U19).
+    pub spread: Plane,
     pub derivatives: Derivatives,
     pub weights: Weights,
     pub preconditioner: Preconditioner,

@@ -1,4 +1,4 @@
-//! Variance of the phase at the minimum (U13), (U14), (U17), (U18).
+//! Variance of the phase at the minimum (U13), (U14), (U17), (U18), (U19).
 
 use super::bias::{self, bias};
 use super::blocks::phase_information;
@@ -7,7 +7,9 @@ use super::plane::{Fields, Plane, vectors};
 use super::scales::variance_share;
 use super::start::smooth;
 use super::tile::Tile;
-use crate::joint::params::uncertainty::{CELL_INFORMATION_MIN, CORRECTION_LEFT, EXCESS_LEFT};
+use crate::joint::params::uncertainty::{
+    CELL_INFORMATION_MIN, CORRECTION_LEFT, CORRECTION_LEFT_COMPARED, EXCESS_LEFT,
+};
 use crate::parallel::lanes::LANES;
 use multiversion::multiversion;
 
@@ -17,17 +19,29 @@ pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     add_variance(tile, noise, out);
 }
 
-/// Adds the variance by noise, by the residuals, by the correction and by the bias.
+/// Adds the variance by noise, by the residuals, by the correction, by the bias and by other minima.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
-    let Tile { start, unknown, scales, derivatives, weights, product, residual, ratios, .. } = tile;
+    let Tile {
+        start,
+        unknown,
+        scales,
+        derivatives,
+        weights,
+        product,
+        residual,
+        ratios,
+        compared,
+        spread,
+        ..
+    } = tile;
     let Fields { phase: information, contrast: spare, albedo: [corrections, pull, known, biases] } = product;
+    let left = if *compared { CORRECTION_LEFT_COMPARED } else { CORRECTION_LEFT };
     for at in vectors() {
         information.set(at, phase_information(derivatives, weights, *ratios, at));
-        let (phase, start) = (unknown.phase.get(at), start.get(at));
-        let mut square = [0.0; LANES];
+        let (phase, start, mut square) = (unknown.phase.get(at), start.get(at), spread.get(at));
         for x in 0..LANES {
-            square[x] = (phase[x] - start[x]) * (phase[x] - start[x]);
+            square[x] += left * (phase[x] - start[x]) * (phase[x] - start[x]);
         }
         corrections.set(at, square);
     }
@@ -43,7 +57,7 @@ fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
         for x in 0..LANES {
             let known = if known[x] > CELL_INFORMATION_MIN { known[x] } else { CELL_INFORMATION_MIN };
             let by_noise = scales.misfit * variance_share(known, bend[x]);
-            variance[x] += by_noise + excess / known + CORRECTION_LEFT * square[x] + biased[x];
+            variance[x] += by_noise + excess / known + square[x] + biased[x];
         }
         out.set(at, variance);
     }

@@ -54,8 +54,8 @@ pub const RELAXATION: f32 = 1.5;
 /// Weight of these in the estimate, as a number of cells. It keeps the estimate of a tile with few lit cells finite.
 /// `python evaluation/sensitivity.py --only energy::PRIOR_CELLS`.
 pub const PRIOR_CELLS: f32 = 0.1;
-/// Bounds of the standard deviations, in the same units. They keep the weights within the range of `f32`.
-/// `python evaluation/sensitivity.py --only energy::SCALE_LIMITS`.
+/// Bounds of the standard deviations, in the same units. They keep the weights within the range of `f32`; at the lower one the surface of
+/// the second and the third start begins to loosen (J43). `python evaluation/sensitivity.py --only energy::SCALE_LIMITS`.
 pub const SCALE_LIMITS: [f32; 2] = [0.0005, 1.0];
 /// Least share of the unknowns that counts as determined by the data. Without it, the scale of a tile without structure is the
 /// quotient of two small numbers.
@@ -117,13 +117,16 @@ pub const CONTRAST_RIDGE: f32 = 1e-4;
 /// makes pivots negative where nothing else determines a cell (with 0 `cargo test --package quadfringe --lib lone_column` fails).
 pub const PIVOT_RIDGE: f32 = 1e-6;
 
-/// Greatest correction of the phase of a valid pixel, in rad. Larger: pixels in a wrong minimum stay (with 0.5 rad the painted face
-/// has an RMS of 0.14 instead of 0.12 mm, and rods have 0.15 instead of 0.14 mm). Smaller: right pixels are lost (with 0.3 rad 0.3 %
-/// of the bottle and 0.7 % of photographs).
-/// `python evaluation/world.py --half tune`, `python evaluation/captures_report.py`.
+/// Greatest second difference of the phase of cells, in standard deviations of the bending of the tile, through which pixels leave
+/// out what is finer than the cells (J44). Larger: steps lower than a radian are rounded (with 15 the error of steps is a tenth larger). Smaller:
+/// texture bends the surface. `python evaluation/sensitivity.py --only energy::CURVED_MAX`.
+pub const CURVED_MAX: f32 = 5.0;
+/// Greatest correction of the phase of a valid pixel, in rad. Larger: pixels in a wrong minimum stay (with 0.42 rad the painted face
+/// has 3 % more error, and a wrong dark level bends the phase by so much that other faults are named: `pytest tests/test_black.py`).
+/// Smaller: pixels whose start is wrong are lost. `python evaluation/sensitivity.py --only energy::MOVED_MAX_RAD`.
 pub const MOVED_MAX_RAD: f32 = 0.35;
 
-/// Difference of the logarithm of the albedo between neighbouring cells from which a tile has a second start. Larger: patches of
+/// Difference of the logarithm of the albedo between neighbouring cells from which a tile has more starts. Larger: patches of
 /// similar colours have one start (with 0.8 they are 0.3 % worse). Smaller: time (with 0.2 white surfaces take 20 % longer).
 /// `python evaluation/world.py --half tune`, `quadfringe bench`.
 pub const TEXTURE_MIN: f32 = 0.4;
@@ -131,9 +134,13 @@ pub const TEXTURE_MIN: f32 = 0.4;
 /// compared. Smaller: more. With 0.05 the painted face is 3 % better and rods are 1 % worse.
 /// `python evaluation/world.py --half tune --only painted photographs rods`.
 pub const SAME_RAD: f32 = 0.02;
-/// Least excess of the energy of the first minimum, summed over 5 x 5 cells and over the scales of either start, at which the
-/// second one is kept; a difference of 1 is a factor of e in probability. Larger: wrong minima stay. Smaller: where the model is
-/// wrong it decides by chance (with 10 the painted face is 2 % better, but the bottle has 0.3 % less right orders with the response
-/// of the shot).
-/// `python evaluation/world.py --half tune --only painted photographs rods`, `python evaluation/captures_report.py`.
+/// Share of the cells around a cell in its albedo at the second and the third start. Larger: edges of the albedo are blurred. Smaller: a
+/// cell in the dark of a fringe does not know its albedo, and the prior, with its long tails, keeps any (with 0 the minimum that
+/// starts at the true phase of the painted face has a higher energy than that of the first start).
+/// `python evaluation/sensitivity.py --only energy::SURROUNDINGS_SHARE`.
+pub const SURROUNDINGS_SHARE: f32 = 0.2;
+/// Least excess of the energy of the minimum of a tile, summed over 5 x 5 cells and over the scales of either start, at which these
+/// cells keep the other minimum; a difference of 1 is a factor of e in probability. Larger: wrong minima stay. Smaller: where the model
+/// is wrong it decides by chance.
+/// `python evaluation/sensitivity.py --only energy::GAIN_MIN`.
 pub const GAIN_MIN: f32 = 30.0;

@@ -8,6 +8,10 @@ pub const METHOD_RAD: f32 = 1.5e-4;
 /// of the errors of relief and translucent light are inside. Smaller: fewer errors on prints are. `python evaluation/world.py --half
 /// tune` at half and at twice the value: see docs/method/uncertainty.md.
 pub const CORRECTION_LEFT: f32 = 0.05;
+/// The same in a tile with more than one start, where the differences of the minima tell a part of this error (U19). Larger: the
+/// uncertainty on prints and patches is too large. Smaller: that on cloth is too small (`pytest tests/test_prints.py`). At half and at
+/// twice the value: see docs/method/uncertainty.md.
+pub const CORRECTION_LEFT_COMPARED: f32 = 0.02;
 /// Share of the residuals beyond noise that counts as an error of the model, which neighbouring cells share (U14). Larger: the
 /// uncertainty on photographs is too large. Smaller: that on real captures is too small. `python evaluation/world.py --half tune
 /// --only photographs`; at half and at twice the value: see docs/method/uncertainty.md.
@@ -25,9 +29,6 @@ pub const BLOCK_CELLS: usize = 16;
 /// Least number of blocks around one, itself included, that tell a mean from its scatter. Follows from the corner of a tile, which
 /// has four.
 pub const BLOCKS_MIN: usize = 4;
-/// Fall of the noise that the cells do not smooth with the squared width of the window in cells (U15). Follows from the window and
-/// from the interpolation between cells, within a fifth: a unit test compares it with filtered noise.
-pub const FINE_SMOOTHNESS: f32 = 5.0;
 
 /// Worth of a lead relative to (U10). Larger: wrong orders have a smaller probability than their share. Smaller: right ones have a
 /// greater one. With 1, as (U10) has it, pixels with a probability of 0.14 are wrong in 0.034 of all cases, and with 1.5 in 0.088

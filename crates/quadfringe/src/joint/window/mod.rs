@@ -74,11 +74,6 @@ impl<'a> Window<'a> {
         Self { scene, slopes, modulation, radius, spacing: 1, sigma, noise, residuals: None }
     }
 
-    /// Standard deviation of the window in pixels.
-    pub fn sigma_px(&self) -> f32 {
-        self.sigma
-    }
-
     /// Modulation of row `y`, 0 where there is no light.
     pub fn modulation(&self, y: usize) -> &'a [f32] {
         self.scene.row(self.modulation, y)
