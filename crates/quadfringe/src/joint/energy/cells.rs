@@ -20,8 +20,7 @@ pub(super) struct Cells {
     stride: usize,
     /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
-    /// After the fit the contrast times `inside`. Before it, the first is 1 for torn cells, whose pixels are all lit, but whose phases
-    /// lie far apart.
+    /// After the fit the contrast times `inside`; before it, the first is 1 for torn cells (`Surfaces::More`).
     contrast: [Vec<f32>; 4],
     /// Mean phase in rad; after the fit the correction times `inside`.
     phase: Vec<f32>,
@@ -125,14 +124,10 @@ impl Cells {
         self.draw_tangents(scene);
     }
 
-    /// Mean phase of a cell at the start.
+    /// Mean phase of a cell at the start; not a number outside the fit.
     pub(super) fn start(&self, y: usize, x: usize) -> f32 {
-        self.phase[y * self.stride + x]
-    }
-
-    /// Whether a cell takes part in the fit.
-    pub(super) fn is_inside(&self, y: usize, x: usize) -> bool {
-        self.inside[y * self.stride + x] > 0.0
+        let at = y * self.stride + x;
+        if self.inside[at] > 0.0 { self.phase[at] } else { f32::NAN }
     }
 
     /// The tangents of the infrared phase of a pair at the mean phases.
@@ -259,8 +254,7 @@ impl Cells {
             let around = [here.saturating_sub(1), here, (here + 1).min(self.height - 1)];
             for (row, out) in around.into_iter().zip(cells) {
                 for (map, out) in self.light.iter().zip(out) {
-                    let row = &map[row * self.stride..][..self.stride];
-                    repeat(row, self.factor, scene.grid.stride, out);
+                    repeat(&map[row * self.stride..][..self.stride], self.factor, scene.grid.stride, out);
                 }
             }
         }

@@ -54,7 +54,7 @@ impl Cells {
             let y = row + k - 1;
             line.clear();
             for x in 0..self.width {
-                let found = fit(y, x).filter(|_| self.is_inside(y, x));
+                let found = fit(y, x);
                 line.push(found.as_ref().map_or(f32::NAN, |fit| self.start(y, x) + fit.correction));
                 if k == 1 {
                     bend.push(found.map_or(0.0, |fit| fit.bend));

@@ -208,8 +208,8 @@ fn keep_lower(tile: &mut Tile, kept: &Scales) -> bool {
     mix(tile, sign)
 }
 
-/// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Either
-/// have their own contrasts of the channels, those of the kept ones in `kept`. The energies are sums over all `scales`.
+/// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Both
+/// have the contrasts of the channels that belong to them, the kept ones those of `kept`. The energies are sums over all `scales`.
 fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
     let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
     let [excess, near, spare, ..] = tile.product.planes_mut();

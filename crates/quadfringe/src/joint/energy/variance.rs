@@ -19,24 +19,17 @@ pub(super) fn variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     add_variance(tile, noise, out);
 }
 
+/// Share of the squared correction that counts as variance.
+fn correction_left(tile: &Tile) -> f32 {
+    if tile.compared { CORRECTION_LEFT_COMPARED } else { CORRECTION_LEFT }
+}
+
 /// Adds the variance by noise, by the residuals, by the correction, by the bias and by other minima.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
-    let Tile {
-        start,
-        unknown,
-        scales,
-        derivatives,
-        weights,
-        product,
-        residual,
-        ratios,
-        compared,
-        spread,
-        ..
-    } = tile;
+    let left = correction_left(tile);
+    let Tile { start, unknown, scales, derivatives, weights, product, residual, ratios, spread, .. } = tile;
     let Fields { phase: information, contrast: spare, albedo: [corrections, pull, known, biases] } = product;
-    let left = if *compared { CORRECTION_LEFT_COMPARED } else { CORRECTION_LEFT };
     for at in vectors() {
         information.set(at, phase_information(derivatives, weights, *ratios, at));
         let (phase, start, mut square) = (unknown.phase.get(at), start.get(at), spread.get(at));
