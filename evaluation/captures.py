@@ -10,6 +10,7 @@ report odd ones. Of all shots with the known response the figures are held again
 one is missed.
 Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
 with a message that names the turn.
+Of right orders the summary gives the mean share of phase errors within one and three stated standard deviations.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
@@ -44,6 +45,7 @@ TILE = (480, 360)
 COLUMNS = 5
 RINGS_PX = (0.0, 1.5, 3.5, 6.5, np.inf)  # distances from an outline: pixels that mix, pixels next to them, the rest
 JUMP_RAD = np.pi / 2  # between neighbours
+DEVIATIONS = (1, 3)  # number of stated standard deviations within which phase errors are counted
 TURNED = "turned images"  # the reason of a refusal that names the turn
 HELD = (
     "refused_percent",
@@ -65,6 +67,7 @@ class Judged:
     score: scoring.Score
     picture: NDArray[np.uint8]
     rings: NDArray[np.float64]  # of each ring, % of the object and % of it without the right order
+    inside: NDArray[np.float64]  # of right orders, % within each of `DEVIATIONS`; not a number without any
 
 
 def shots(data: Path, name: str, offsets: range) -> Iterator[tuple[str, scoring.Scene]]:
@@ -89,13 +92,26 @@ def response_of(data: Path, name: str, choice: str) -> Any:
 def judged(label: str, scene: scoring.Scene, **how: Any) -> Judged:
     """Decode and score a shot and print its line; `how` as in `_scenes.plan_of`."""
     refused = reason = ""
+    sd_rad = None
     try:
-        phase_rad = scenes.shape_of(scene, **how).phase_rad
+        shape = scenes.shape_of(scene, **how)
+        phase_rad, sd_rad = shape.phase_rad, shape.uncertainty_rad
     except DecodeError as error:
         refused, reason, phase_rad = str(error), error.reason, np.full(scene.red.shape, np.nan, np.float32)
     score = scoring.score(scene, phase_rad)
     print(f"{label:42}{score.right_percent:9.2f}{score.right_of_returned_percent:15.3f}  {refused}", flush=True)
-    return Judged(label, refused, reason, score, drawn(label, scene, phase_rad), rings_of(scene, phase_rad))
+    picture, rings = drawn(label, scene, phase_rad), rings_of(scene, phase_rad)
+    return Judged(label, refused, reason, score, picture, rings, inside_of(scene, phase_rad, sd_rad))
+
+
+def inside_of(scene: scoring.Scene, phase_rad: scoring.Map, sd_rad: scoring.Map | None) -> NDArray[np.float64]:
+    """Give the share of phase errors within each of `DEVIATIONS`, in %, of right orders on the object."""
+    error_rad = np.abs(phase_rad - scene.phase_rad)
+    right = scene.scored & (error_rad < np.pi)
+    if sd_rad is None or not right.any():
+        return np.full(len(DEVIATIONS), np.nan)
+    shares = [float(np.mean(error_rad[right] <= limit * sd_rad[right])) for limit in DEVIATIONS]
+    return 100 * np.array(shares)
 
 
 def rings_of(scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.float64]:
@@ -145,6 +161,8 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
         "right_of_returned_mean_percent": float(np.mean(returned)) if returned else np.nan,
         "right_of_returned_worst_percent": min(returned, default=np.nan),
     }
+    inside = np.nanmean([one.inside for one in found], axis=0)
+    figures |= {f"inside_{limit}_sd_percent": float(share) for limit, share in zip(DEVIATIONS, inside, strict=True)}
     return told(name, figures)
 
 

@@ -1,10 +1,10 @@
 //! Step 9: the standard deviation of the phase, and the probability that an order is wrong.
 //!
-//! Where the energy has a minimum, its cells have a variance. Elsewhere the window that found the phase at its start decides: a pixel whose intensities have the standard
-//! deviation `noise` determines its phase with the variance `noise^2 / J`, where `J` is the sum of the squared derivatives of its four
-//! intensities with respect to the phase, after the albedo is eliminated. A mean with weights `w J` has the variance `noise^2 sum(w^2
-//! J) / sum(w J)^2`. The window computes `sum(w J)` anyway. `sum(w^2 J)` is a fixed share of it where `J` varies little in the window,
-//! even if an edge cuts the window in half.
+//! Where the energy has a minimum, its cells have a variance. Elsewhere the window that found the phase at its start decides: a pixel
+//! whose intensities have the standard deviation `noise` determines its phase with the variance `noise^2 / J`, where `J` is the sum of
+//! the squared derivatives of its four intensities with respect to the phase, after the albedo is eliminated. A mean with weights `w J`
+//! has the variance `noise^2 sum(w^2 J) / sum(w J)^2`. The window computes `sum(w J)` anyway. `sum(w^2 J)` is a fixed share of it where
+//! `J` varies little in the window, even if an edge cuts the window in half.
 //!
 //! The second cheapest order is less probable than the cheapest by the factor `exp(-lead / temperature)`, which gives
 //! the wrong-order probability. The temperature is estimated from the costs of the chosen orders, and so depends on the
@@ -18,7 +18,7 @@ use std::f32::consts::PI;
 /// Variance of a phase of which only the order is known, rad^2.
 const ANY_PHASE: f32 = PI * PI / 3.0;
 
-/// The variance of a phase that the cells of the energy leave to the window that found it.
+/// Variance of a phase without a cell of the energy, from the window that found it.
 pub(super) struct PhaseNoise {
     /// Variance by noise of a pixel, times its information.
     window: f32,

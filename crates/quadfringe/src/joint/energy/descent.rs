@@ -41,11 +41,12 @@ impl Tile {
         contrast_and_albedo(self, 1.0);
         self.descend(noise, self.scales.bend, OUTER_STEPS);
         self.restart(noise);
+        let sums = linearise(self);
+        self.scales.estimate_noise(&sums, self.ratios, noise..=f32::INFINITY);
+        self.bend = self.scales.bend;
         if detail != 1.0 {
             self.resolve(detail);
         }
-        let sums = linearise(self);
-        self.scales.estimate_noise(&sums, self.ratios, noise..=f32::INFINITY);
         weigh(self);
     }
 
@@ -53,10 +54,10 @@ impl Tile {
     fn resolve(&mut self, detail: f32) {
         self.scales.bend *= detail.powi(4);
         for _ in 0..DETAIL_STEPS {
-            linearise(self);
             weigh(self);
             solve(self, INNER_STEPS);
             self.advance();
+            linearise(self);
         }
     }
 
@@ -93,7 +94,7 @@ impl Tile {
     /// Writes the correction of the phase, its variance, and the albedo and contrast of every channel; `noise` as in `minimise`.
     pub fn write(&mut self, noise: f32, found: &mut Found) {
         variance(self, noise, &mut found.variance);
-        let Self { start, inside, unknown, scales, ratios, .. } = self;
+        let Self { start, inside, unknown, scales, bend, ratios, .. } = self;
         for at in vectors() {
             let (phase, start) = (unknown.phase.get(at), start.get(at));
             let mut correction = [0.0; LANES];
@@ -109,7 +110,7 @@ impl Tile {
             found.albedo[absent].clear();
         }
         found.channel_contrast = scales.channel_contrast;
-        found.bend = scales.bend;
+        found.bend = *bend;
     }
 
     /// Adds the step to the unknowns; returns the root mean square of the change of the phase.

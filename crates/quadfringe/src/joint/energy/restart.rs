@@ -44,9 +44,9 @@ impl Tile {
     /// Minimises from the present phase, and keeps the lower minimum as in `keep_lower`.
     fn start_again(&mut self, noise: f32) -> bool {
         let kept = self.scales;
-        self.scales = Scales { noise, misfit: 1.0, ..kept };
+        self.scales = Scales { noise, misfit: 1.0, bend: SCALE_LIMITS[0].powi(2), ..kept };
         contrast_and_albedo(self, SURROUNDINGS_SHARE);
-        self.descend(noise, SCALE_LIMITS[0].powi(2), 1);
+        self.descend(noise, self.scales.bend, 1);
         keep_lower(self, &kept)
     }
 
@@ -134,7 +134,7 @@ fn bend_everywhere(weight: f32, weights: &mut Weights) {
     }
 }
 
-/// Moves the phase to the bridging surface around cells where it differs; returns whether there are any.
+/// Moves the phase to the bridging surface in torn cells and around cells where it differs; returns whether there are any.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn take_step(tile: &mut Tile) -> bool {
     let Tile { inside, torn, unknown, step, product, .. } = tile;
@@ -205,7 +205,7 @@ fn keep_lower(tile: &mut Tile, kept: &Scales) -> bool {
     } else {
         tile.scales = *kept;
     }
-    mix(tile, sign)
+    mix_minima(tile, sign)
 }
 
 /// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Both
@@ -229,7 +229,7 @@ fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
 /// there are any. Adds to the spread where neither energy is much lower. The excess of the kept ones stands in the first plane of the
 /// product, times `sign`.
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
-fn mix(tile: &mut Tile, sign: f32) -> bool {
+fn mix_minima(tile: &mut Tile, sign: f32) -> bool {
     let Tile { inside, unknown, first, product, spread, .. } = tile;
     let [excess, around, spare, ..] = product.planes_mut();
     for at in vectors() {
@@ -244,7 +244,7 @@ fn mix(tile: &mut Tile, sign: f32) -> bool {
         excess.set(at, counted);
     }
     filter(excess, spare, FIVE);
-    add_spread(excess, &first.phase, &unknown.phase, spread);
+    add_spread(excess, inside, [&first.phase, &unknown.phase], spread);
     let mut mixed = 0.0;
     for at in vectors() {
         let (excess, mut around) = (excess.get(at), around.get(at));
@@ -266,13 +266,14 @@ fn mix(tile: &mut Tile, sign: f32) -> bool {
     mixed > 0.0
 }
 
-/// Adds half the squared difference of two phases where neither has a much lower energy (U19).
+/// Adds half the squared difference of two phases in lit cells where neither has a much lower energy (U19).
 #[inline(always)]
-fn add_spread(excess: &Plane, one: &Plane, other: &Plane, spread: &mut Plane) {
+fn add_spread(excess: &Plane, inside: &Plane, phases: [&Plane; 2], spread: &mut Plane) {
     for at in vectors() {
-        let (excess, one, other, mut out) = (excess.get(at), one.get(at), other.get(at), spread.get(at));
+        let (excess, inside, mut out) = (excess.get(at), inside.get(at), spread.get(at));
+        let [one, other] = phases.map(|phase| phase.get(at));
         for x in 0..LANES {
-            let half = 0.5 * (one[x] - other[x]) * (one[x] - other[x]);
+            let half = 0.5 * inside[x] * (one[x] - other[x]) * (one[x] - other[x]);
             out[x] += if excess[x].abs() < GAIN_MIN { half } else { 0.0 };
         }
         spread.set(at, out);

@@ -57,7 +57,7 @@ fn first_error(Case { mut tile, truth }: Case) -> f32 {
 }
 
 #[test]
-fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
+fn more_starts_leave_a_wrong_minimum_in_a_print() {
     let first = first_error(printed());
     let Case { mut tile, truth } = printed();
     tile.minimise(NOISE, 1.0);
@@ -66,7 +66,7 @@ fn the_second_start_leaves_a_wrong_minimum_in_a_print() {
 }
 
 #[test]
-fn the_third_start_leaves_ripples_of_a_photograph() {
+fn more_starts_remove_the_ripples_of_a_photograph() {
     let first = first_error(photographed());
     let Case { mut tile, truth } = photographed();
     tile.minimise(NOISE, 1.0);

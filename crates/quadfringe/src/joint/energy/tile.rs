@@ -42,9 +42,12 @@ pub(super) struct Tile {
     pub pair: bool,
     pub infrared: [Plane; 2],
     pub scales: Scales,
+    /// Variance of the second differences of the phase that the shot suggests, whatever `detail` is, rad^2.
+    pub bend: f32,
     pub unknown: Fields,
-    /// Unknowns from the starts before, and the lit cells, while there is another start.
+    /// Unknowns of the lowest minimum so far, while there is another start.
     pub first: Fields,
+    /// Lit cells while the surface is bridged; in a comparison, cells through which the surface continues.
     pub lit: Plane,
     /// Whether minima have been compared.
     pub compared: bool,

@@ -117,9 +117,9 @@ pub const CONTRAST_RIDGE: f32 = 1e-4;
 /// makes pivots negative where nothing else determines a cell (with 0 `cargo test --package quadfringe --lib lone_column` fails).
 pub const PIVOT_RIDGE: f32 = 1e-6;
 
-/// Greatest second difference of the phase of cells, in standard deviations of the bending of the tile, through which pixels leave
-/// out what is finer than the cells (J44). Larger: steps lower than a radian are rounded (with 15 the error of steps is a tenth larger). Smaller:
-/// texture bends the surface. `python evaluation/sensitivity.py --only energy::CURVED_MAX`.
+/// Second difference of the phase of cells, in standard deviations of the bending of the tile, up to which they count as one surface,
+/// on which pixels lose detail finer than a cell (J44). Larger: steps lower than a radian are rounded (with 15 their error is a tenth
+/// larger). Smaller: texture bends the surface. `python evaluation/sensitivity.py --only energy::CURVED_MAX`.
 pub const CURVED_MAX: f32 = 5.0;
 /// Greatest correction of the phase of a valid pixel, in rad. Larger: pixels in a wrong minimum stay (with 0.42 rad the painted face
 /// has 3 % more error, and a wrong dark level bends the phase by so much that other faults are named: `pytest tests/test_black.py`).
@@ -139,8 +139,8 @@ pub const SAME_RAD: f32 = 0.02;
 /// starts at the true phase of the painted face has a higher energy than that of the first start).
 /// `python evaluation/sensitivity.py --only energy::SURROUNDINGS_SHARE`.
 pub const SURROUNDINGS_SHARE: f32 = 0.2;
-/// Least excess of the energy of the minimum of a tile, summed over 5 x 5 cells and over the scales of either start, at which these
-/// cells keep the other minimum; a difference of 1 is a factor of e in probability. Larger: wrong minima stay. Smaller: where the model
-/// is wrong it decides by chance.
+/// Least excess of the energy of the lower minimum of a tile over the other one, summed over 5 x 5 cells and over the scales of both, at
+/// which these cells take the other one in the mixture; a difference of 1 is a factor of e in probability. Below it, in either direction,
+/// the difference of the minima is uncertainty (U19). Larger: wrong minima stay. Smaller: where the model is wrong it decides by chance.
 /// `python evaluation/sensitivity.py --only energy::GAIN_MIN`.
 pub const GAIN_MIN: f32 = 30.0;

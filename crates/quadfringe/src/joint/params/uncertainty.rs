@@ -8,8 +8,8 @@ pub const METHOD_RAD: f32 = 1.5e-4;
 /// of the errors of relief and translucent light are inside. Smaller: fewer errors on prints are. `python evaluation/world.py --half
 /// tune` at half and at twice the value: see docs/method/uncertainty.md.
 pub const CORRECTION_LEFT: f32 = 0.05;
-/// The same in a tile with more than one start, where the differences of the minima tell a part of this error (U19). Larger: the
-/// uncertainty on prints and patches is too large. Smaller: that on cloth is too small (`pytest tests/test_prints.py`). At half and at
+/// The same in a tile with more than one start, where the differences of the minima show a part of this error (U19). Larger: the
+/// uncertainty on prints and patches is too large (`pytest tests/test_prints.py`). Smaller: that on cloth is too small. At half and at
 /// twice the value: see docs/method/uncertainty.md.
 pub const CORRECTION_LEFT_COMPARED: f32 = 0.02;
 /// Share of the residuals beyond noise that counts as an error of the model, which neighbouring cells share (U14). Larger: the
