@@ -31,7 +31,10 @@ impl Tile {
         for (to, from) in self.first.planes_mut().into_iter().zip(self.unknown.planes()) {
             to.copy(from);
         }
-        if self.bridge() {
+        let differs = self.bridge();
+        let Self { inside, torn, lit, product, .. } = self;
+        continue_through(inside, torn, lit, [&mut product.phase, &mut product.contrast]);
+        if differs {
             self.start_again(noise);
         }
         let mixed = self.start_again(noise);
@@ -211,11 +214,9 @@ fn keep_lower(tile: &mut Tile, kept: &Scales) -> bool {
 /// Writes the energy of the kept unknowns less that of the present ones into the first plane of the product, and gives its sum. Both
 /// have the contrasts of the channels that belong to them, the kept ones those of `kept`. The energies are sums over all `scales`.
 fn excess(tile: &mut Tile, kept: &Scales, scales: &[Scales]) -> f64 {
-    let Tile { light, usable, inside, torn, pair, infrared, .. } = tile;
-    let [excess, near, spare, ..] = tile.product.planes_mut();
-    continue_through(inside, torn, &mut tile.lit, [near, spare]);
-    let (ratios, pair) = (tile.ratios, *pair);
-    let given = Given { light, usable, inside, continued: &tile.lit, ratios, pair, infrared };
+    let Tile { light, usable, inside, lit: continued, ratios, pair, infrared, .. } = tile;
+    let given = Given { light, usable, inside, continued, ratios: *ratios, pair: *pair, infrared };
+    let excess = &mut tile.product.phase;
     excess.clear();
     for scales in scales {
         let of = |owner: &Scales| Scales { channel_contrast: owner.channel_contrast, ..*scales };
@@ -244,7 +245,7 @@ fn mix_minima(tile: &mut Tile, sign: f32) -> bool {
         excess.set(at, counted);
     }
     filter(excess, spare, FIVE);
-    add_spread(excess, inside, [&first.phase, &unknown.phase], spread);
+    add_spread(excess, [&first.phase, &unknown.phase], spread);
     let mut mixed = 0.0;
     for at in vectors() {
         let (excess, mut around) = (excess.get(at), around.get(at));
@@ -266,14 +267,14 @@ fn mix_minima(tile: &mut Tile, sign: f32) -> bool {
     mixed > 0.0
 }
 
-/// Adds half the squared difference of two phases in lit cells where neither has a much lower energy (U19).
+/// Adds half the squared difference of two phases where neither has a much lower energy (U19).
 #[inline(always)]
-fn add_spread(excess: &Plane, inside: &Plane, phases: [&Plane; 2], spread: &mut Plane) {
+fn add_spread(excess: &Plane, phases: [&Plane; 2], spread: &mut Plane) {
     for at in vectors() {
-        let (excess, inside, mut out) = (excess.get(at), inside.get(at), spread.get(at));
+        let (excess, mut out) = (excess.get(at), spread.get(at));
         let [one, other] = phases.map(|phase| phase.get(at));
         for x in 0..LANES {
-            let half = 0.5 * inside[x] * (one[x] - other[x]) * (one[x] - other[x]);
+            let half = 0.5 * (one[x] - other[x]) * (one[x] - other[x]);
             out[x] += if excess[x].abs() < GAIN_MIN { half } else { 0.0 };
         }
         spread.set(at, out);

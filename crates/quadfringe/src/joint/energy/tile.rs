@@ -47,7 +47,7 @@ pub(super) struct Tile {
     pub unknown: Fields,
     /// Unknowns of the lowest minimum so far, while there is another start.
     pub first: Fields,
-    /// Lit cells while the surface is bridged; in a comparison, cells through which the surface continues.
+    /// Lit cells while the surface is bridged; then cells through which it continues in a comparison.
     pub lit: Plane,
     /// Whether minima have been compared.
     pub compared: bool,

@@ -28,13 +28,16 @@ fn correction_left(tile: &Tile) -> f32 {
 #[multiversion(targets("x86_64+avx512f+avx512bw+avx512cd+avx512dq+avx512vl", "x86_64+avx2+fma"))]
 fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     let left = correction_left(tile);
-    let Tile { start, unknown, scales, derivatives, weights, product, residual, ratios, spread, .. } = tile;
+    let Tile {
+        inside, start, unknown, scales, derivatives, weights, product, residual, ratios, spread, ..
+    } = tile;
     let Fields { phase: information, contrast: spare, albedo: [corrections, pull, known, biases] } = product;
     for at in vectors() {
         information.set(at, phase_information(derivatives, weights, *ratios, at));
-        let (phase, start, mut square) = (unknown.phase.get(at), start.get(at), spread.get(at));
+        let (phase, start, lit) = (unknown.phase.get(at), start.get(at), inside.get(at));
+        let mut square = spread.get(at);
         for x in 0..LANES {
-            square[x] += left * (phase[x] - start[x]) * (phase[x] - start[x]);
+            square[x] = lit[x] * (square[x] + left * (phase[x] - start[x]) * (phase[x] - start[x]));
         }
         corrections.set(at, square);
     }
@@ -42,7 +45,7 @@ fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
     bias(&residual.phase, information, scales.misfit, work, biases);
     // A saturated cell has no information by itself; its neighbours determine it.
     smooth(information, spare);
-    (0..2).for_each(|_| smooth(corrections, spare));
+    average_lit(corrections, inside, [pull, spare]);
     let excess = EXCESS_LEFT * (scales.misfit - noise).max(0.0);
     for at in vectors() {
         let (known, square, bend) = (information.get(at), corrections.get(at), weights.bend[0].get(at));
@@ -53,5 +56,21 @@ fn add_variance(tile: &mut Tile, noise: f32, out: &mut Plane) {
             variance[x] += by_noise + excess / known + square[x] + biased[x];
         }
         out.set(at, variance);
+    }
+}
+
+/// Averages a plane that is 0 outside the lit cells over the lit cells around each cell.
+#[inline(always)]
+fn average_lit(plane: &mut Plane, inside: &Plane, [lit, spare]: [&mut Plane; 2]) {
+    lit.copy(inside);
+    for plane in [&mut *plane, &mut *lit] {
+        (0..2).for_each(|_| smooth(plane, spare));
+    }
+    for at in vectors() {
+        let (sum, mut mean) = (lit.get(at), plane.get(at));
+        for x in 0..LANES {
+            mean[x] = if sum[x] > 0.0 { mean[x] / sum[x] } else { 0.0 };
+        }
+        plane.set(at, mean);
     }
 }
