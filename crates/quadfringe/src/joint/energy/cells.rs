@@ -17,17 +17,20 @@ pub(super) struct Cells {
     pub width: usize,
     /// Pixels along a side of a cell.
     pub factor: usize,
-    stride: usize,
+    pub(super) stride: usize,
     /// Means of linear light; after the fit the albedo times `inside`.
     light: [Vec<f32>; 4],
     /// After the fit the contrast times `inside`; before it, the first is 1 for torn cells (`Surfaces::More`).
     contrast: [Vec<f32>; 4],
-    /// Mean phase in rad; after the fit the correction times `inside`.
-    phase: Vec<f32>,
+    /// Mean phase at the start, rad.
+    pub(super) phase: Vec<f32>,
+    /// After the fit the correction and the bending times `inside`, as in `CellFit`.
+    pub(super) correction: Vec<f32>,
+    pub(super) bend: Vec<f32>,
     /// 1 for cells that can be used in the fit; after it the variance times `inside`.
     usable: Vec<f32>,
-    /// 1 for cells whose pixels are all lit and lie on one surface.
-    inside: Vec<f32>,
+    /// 1 for cells whose pixels are all lit and lie on one surface; after the fit for those that it reaches.
+    pub(super) inside: Vec<f32>,
     /// Of a calibrated pair, the tangent of the infrared phase at the mean phase: its value at a phase of 0, and its slope.
     infrared: [Vec<f32>; 2],
 }
@@ -124,12 +127,6 @@ impl Cells {
         self.draw_tangents(scene);
     }
 
-    /// Mean phase of a cell at the start; not a number outside the fit.
-    pub(super) fn start(&self, y: usize, x: usize) -> f32 {
-        let at = y * self.stride + x;
-        if self.inside[at] > 0.0 { self.phase[at] } else { f32::NAN }
-    }
-
     /// The tangents of the infrared phase of a pair at the mean phases.
     fn draw_tangents(&mut self, scene: &Scene<'_>) {
         let (Self { infrared, phase, stride, factor, .. }, Some(pair)) = (self, scene.pair) else { return };
@@ -183,16 +180,16 @@ impl Cells {
         any
     }
 
-    /// Replaces phase, usability and light by correction, variance, albedo and contrast, each times `inside`.
+    /// Takes over what the fit has found: correction, bending, variance, albedo and contrast, each times `inside`.
     pub fn replace(&mut self, found: impl Fn(usize, usize) -> Option<CellFit> + Sync) {
-        let Self { light, contrast, phase, usable, inside, stride, width, .. } = self;
-        for plane in contrast.iter_mut() {
+        let Self { light, contrast, correction, bend, usable, inside, stride, width, .. } = self;
+        for plane in contrast.iter_mut().chain([&mut *correction, &mut *bend]) {
             plane.resize(inside.len(), 0.0);
         }
-        let mut planes = [phase, usable].into_iter().chain(light).chain(contrast).chain([inside]);
-        let mut planes: [_; 11] =
-            std::array::from_fn(|_| planes.next().expect("eleven planes").chunks_mut(*stride));
-        let rows: Vec<[&mut [f32]; 11]> = (0..self.height)
+        let mut planes = [correction, bend, usable].into_iter().chain(light).chain(contrast).chain([inside]);
+        let mut planes: [_; 12] =
+            std::array::from_fn(|_| planes.next().expect("twelve planes").chunks_mut(*stride));
+        let rows: Vec<[&mut [f32]; 12]> = (0..self.height)
             .map(|_| planes.each_mut().map(|rows| rows.next().expect("as many rows as cells are high")))
             .collect();
         rows.into_par_iter().enumerate().for_each(|(y, mut rows)| {
@@ -202,8 +199,8 @@ impl Cells {
             for x in 0..*width {
                 let fit = found(y, x).filter(|_| inside[x] > 0.0);
                 inside[x] = f32::from(u8::from(fit.is_some()));
-                let CellFit { correction, variance, albedo, contrast, .. } = fit.unwrap_or_default();
-                let fitted = [correction, variance].into_iter().chain(albedo).chain(contrast);
+                let CellFit { correction, bend, variance, albedo, contrast } = fit.unwrap_or_default();
+                let fitted = [correction, bend, variance].into_iter().chain(albedo).chain(contrast);
                 values.iter_mut().zip(fitted).for_each(|(row, value)| row[x] = value);
             }
         });
@@ -216,7 +213,7 @@ impl Cells {
         let planes = phase.par_chunks_mut(stride).zip(modulation.par_chunks_mut(stride));
         let rows = planes.zip(reasons.par_chunks_mut(stride)).enumerate();
         rows.for_each_init(Rows::default, |rows, (y, ((phase, modulation), reasons))| {
-            self.interpolate(&self.phase, scene, y, rows);
+            self.interpolate(&self.correction, scene, y, rows);
             let found = rows.sum.iter().zip(&rows.weight);
             let pixels = phase.iter_mut().zip(modulation).zip(reasons);
             for (((phase, modulation), reason), (sum, weight)) in pixels.zip(found) {
@@ -233,7 +230,7 @@ impl Cells {
     /// Mean square of the correction, rad^2.
     pub fn correction(&self) -> f32 {
         let sum = |map: &[f32]| map.iter().map(|value| f64::from(value * value)).sum::<f64>();
-        (sum(&self.phase) / sum(&self.inside).max(1.0)) as f32
+        (sum(&self.correction) / sum(&self.inside).max(1.0)) as f32
     }
 
     /// Variance along row `y` of the scene, 0 where there is no lit cell.

@@ -76,9 +76,8 @@ impl Energy {
             },
         );
         let tiles = &*tiles;
-        let fit = |y, x| blend(tiles, &rows, &columns, [y, x]);
-        cells.smooth_start(scene, fit, &mut pixels.phase);
-        cells.replace(fit);
+        cells.replace(|y, x| blend(tiles, &rows, &columns, [y, x]));
+        cells.smooth_start(scene, &mut pixels.phase);
         cells.correct(scene, pixels);
     }
 

@@ -2,7 +2,7 @@
 //! that the windows of the start have mixed, and the pixel takes the surface through the cells. At the discontinuities of the surface
 //! the pixels keep it.
 
-use super::cells::{CellFit, Cells};
+use super::cells::Cells;
 use crate::joint::params::energy::CURVED_MAX;
 use crate::joint::scene::Scene;
 use rayon::prelude::*;
@@ -12,8 +12,6 @@ use rayon::prelude::*;
 struct Work {
     /// Fitted phases of the cells above, at and below; not a number outside the cells of the fit.
     fitted: [Vec<f32>; 3],
-    /// Variance of the second differences of the phase (J26), rad^2.
-    bend: Vec<f32>,
     /// Whether the cells around lie on one surface.
     smooth: Vec<bool>,
     /// Phase of the surface of the start along a row of pixels, its mean over the columns of a cell.
@@ -21,22 +19,19 @@ struct Work {
 }
 
 impl Cells {
-    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells. `fit` gives what
-    /// the fit has found for a cell.
-    pub fn smooth_start(
-        &self,
-        scene: &Scene<'_>,
-        fit: impl Fn(usize, usize) -> Option<CellFit> + Sync,
-        phase: &mut [f32],
-    ) {
+    /// Replaces the phase of the start, in pixels among cells of one surface, by that of the surface through the cells. The cells have
+    /// their fit.
+    pub fn smooth_start(&self, scene: &Scene<'_>, phase: &mut [f32]) {
         let stride = scene.grid.stride;
         let bands = phase.par_chunks_mut(self.factor * stride).enumerate();
         bands.for_each_init(Work::default, |work, (row, phase)| {
             if row == 0 || row + 1 >= self.height {
                 return;
             }
-            self.load_fit(row, &fit, work);
-            work.find_smooth();
+            for (k, line) in work.fitted.iter_mut().enumerate() {
+                self.load_fitted(row + k - 1, line);
+            }
+            work.find_smooth(self.row(&self.bend, row));
             if !work.smooth.contains(&true) {
                 return;
             }
@@ -46,21 +41,20 @@ impl Cells {
         });
     }
 
-    /// Loads the fit of a row of cells, and of those above and below.
-    fn load_fit(&self, row: usize, fit: &impl Fn(usize, usize) -> Option<CellFit>, work: &mut Work) {
-        let Work { fitted, bend, .. } = work;
-        bend.clear();
-        for (k, line) in fitted.iter_mut().enumerate() {
-            let y = row + k - 1;
-            line.clear();
-            for x in 0..self.width {
-                let found = fit(y, x);
-                line.push(found.as_ref().map_or(f32::NAN, |fit| self.start(y, x) + fit.correction));
-                if k == 1 {
-                    bend.push(found.map_or(0.0, |fit| fit.bend));
-                }
-            }
-        }
+    /// One row of a map.
+    fn row<'a>(&self, map: &'a [f32], y: usize) -> &'a [f32] {
+        &map[y * self.stride..][..self.width]
+    }
+
+    /// Loads the fitted phases of a row of cells.
+    fn load_fitted(&self, y: usize, line: &mut Vec<f32>) {
+        let [phase, correction, inside] =
+            [&self.phase, &self.correction, &self.inside].map(|map| self.row(map, y));
+        let cells = phase.iter().zip(correction).zip(inside);
+        line.clear();
+        line.extend(
+            cells.map(|((phase, correction), &lit)| if lit > 0.0 { phase + correction } else { f32::NAN }),
+        );
     }
 
     /// Replaces the phase of pixels in row `i` of a row of cells by that of the parabolas along rows and columns that have the means of
@@ -69,7 +63,8 @@ impl Cells {
         let Work { smooth, means, .. } = work;
         let down = parabola(i, self.factor);
         means.clear();
-        means.extend((0..self.width).map(|x| mix(down, [row - 1, row, row + 1].map(|y| self.start(y, x)))));
+        let three = [row - 1, row, row + 1].map(|y| self.row(&self.phase, y));
+        means.extend((0..self.width).map(|x| mix(down, three.map(|line| line[x]))));
         for x in (0..self.width).filter(|&x| smooth[x]) {
             let three = [means[x - 1], means[x], means[x + 1]];
             for (i, phase) in phase[x * self.factor..][..self.factor].iter_mut().enumerate() {
@@ -81,9 +76,9 @@ impl Cells {
 
 impl Work {
     /// Finds the cells through which no second difference is larger than the bending of the tile explains, and whose neighbours have
-    /// a fit.
-    fn find_smooth(&mut self) {
-        let Self { fitted: [above, here, below], bend, smooth, .. } = self;
+    /// a fit; `bend` is the variance of the second differences of their phases (J26), rad^2.
+    fn find_smooth(&mut self, bend: &[f32]) {
+        let Self { fitted: [above, here, below], smooth, .. } = self;
         let width = here.len();
         smooth.clear();
         smooth.extend((0..width).map(|x| {
@@ -132,10 +127,9 @@ mod tests {
     #[test]
     fn a_step_or_a_missing_cell_ends_the_surface() {
         let smooth = |change: f32| {
-            let mut work = Work { bend: vec![1e-4; 8], ..Work::default() };
-            work.fitted = [0, 1, 2]
-                .map(|_| (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect());
-            work.find_smooth();
+            let line = || (0..8).map(|x| 0.6 * x as f32 + if x > 4 { change } else { 0.0 }).collect();
+            let mut work = Work { fitted: [line(), line(), line()], ..Work::default() };
+            work.find_smooth(&[1e-4; 8]);
             work.smooth
         };
         assert_eq!(smooth(0.0), [false, true, true, true, true, true, true, false]);
