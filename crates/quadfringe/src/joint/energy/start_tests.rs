@@ -2,7 +2,7 @@
 
 use super::plane::{Plane, total, vectors};
 use super::start::contrast_and_albedo;
-use super::tests::{RATIOS, errors, random, tile};
+use super::tests::{Errors, RATIOS, errors, random, tile};
 use super::tile::Tile;
 use crate::joint::params::energy::{OUTER_STEPS, SIDE};
 
@@ -53,24 +53,20 @@ fn first_error(Case { mut tile, truth }: Case) -> f32 {
     tile.unknown.phase.copy(&tile.start);
     contrast_and_albedo(&mut tile, 1.0);
     tile.descend(NOISE, tile.scales.bend, OUTER_STEPS);
-    errors(&tile, &truth).0
+    errors(&tile, &truth).rms
 }
 
 #[test]
-fn more_starts_leave_a_wrong_minimum_in_a_print() {
-    let first = first_error(printed());
-    let Case { mut tile, truth } = printed();
-    tile.minimise(NOISE, 1.0);
-    let (second, largest) = errors(&tile, &truth);
-    assert!(first > 0.02 && second < 0.005 && largest < 0.05, "{first} {second} {largest}");
-}
-
-#[test]
-fn more_starts_remove_the_ripples_of_a_photograph() {
-    let first = first_error(photographed());
-    let Case { mut tile, truth } = photographed();
-    tile.minimise(NOISE, 1.0);
-    let (last, _) = errors(&tile, &truth);
-    let spread = vectors().map(|at| total(tile.spread.get(at))).sum::<f64>();
-    assert!(last < 0.5 * first && spread > 0.0, "{first} {last} {spread}");
+fn more_starts_leave_a_wrong_minimum() {
+    let print = (printed as fn() -> Case, Errors { rms: 0.005, largest: 0.05 });
+    let photograph = (photographed as fn() -> Case, Errors { rms: 0.015, largest: 0.1 });
+    for (made, most) in [print, photograph] {
+        let first = first_error(made());
+        let Case { mut tile, truth } = made();
+        tile.minimise(NOISE, 1.0);
+        let last = errors(&tile, &truth);
+        let spread = vectors().map(|at| total(tile.spread.get(at))).sum::<f64>();
+        let better = first > 0.02 && last.rms < most.rms && last.largest < most.largest;
+        assert!(better && spread > 0.0, "{first} {last:?} {spread}");
+    }
 }

@@ -42,7 +42,14 @@ pub(super) fn tile(noise: f32) -> (Tile, Plane) {
     (tile, truth)
 }
 
-pub(super) fn errors(tile: &Tile, truth: &Plane) -> (f32, f32) {
+/// Errors of the phase of the cells of a tile, rad.
+#[derive(Debug)]
+pub(super) struct Errors {
+    pub rms: f32,
+    pub largest: f32,
+}
+
+pub(super) fn errors(tile: &Tile, truth: &Plane) -> Errors {
     let (mut squares, mut largest) = (0.0f32, 0.0f32);
     for y in 0..SIDE {
         for (found, truth) in tile.unknown.phase.row(y).iter().zip(truth.row(y)) {
@@ -50,14 +57,14 @@ pub(super) fn errors(tile: &Tile, truth: &Plane) -> (f32, f32) {
             largest = largest.max((found - truth).abs());
         }
     }
-    ((squares / (SIDE * SIDE) as f32).sqrt(), largest)
+    Errors { rms: (squares / (SIDE * SIDE) as f32).sqrt(), largest }
 }
 
 #[test]
 fn the_minimum_finds_phase_and_contrast_through_an_edge_of_colour() {
     let (mut tile, truth) = tile(0.0);
     tile.minimise(1e-8, 1.0);
-    let (rms, largest) = errors(&tile, &truth);
+    let Errors { rms, largest } = errors(&tile, &truth);
     assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
     let contrast = tile.unknown.contrast.row(20)[12].exp();
     assert!((contrast - 0.6).abs() < 0.01, "{contrast}");
@@ -121,7 +128,7 @@ fn noise_is_estimated_and_averaged() {
     let (amplitude, least) = (0.03, 1e-8);
     let (mut tile, truth) = tile(amplitude);
     tile.minimise(least, 1.0);
-    let (rms, _) = errors(&tile, &truth);
+    let rms = errors(&tile, &truth).rms;
     // A single cell would have 0.05 rad.
     assert!(rms < 0.02, "{rms}");
     let expected = amplitude * amplitude / 3.0;
@@ -226,7 +233,7 @@ fn an_absent_channel_takes_no_part() {
     tile.ratios[3] = 0.0;
     tile.light[3].clear();
     tile.minimise(1e-8, 1.0);
-    let (rms, largest) = errors(&tile, &truth);
+    let Errors { rms, largest } = errors(&tile, &truth);
     assert!(rms < 4e-3 && largest < 0.03, "{rms} {largest}");
     assert!(tile.unknown.albedo[3].row(20).iter().all(|&log| log == 0.0));
     let mut found = super::tile::Found::default();
