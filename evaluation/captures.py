@@ -10,7 +10,8 @@ report odd ones. Of all shots with the known response the figures are held again
 one is missed.
 Shots that are turned by 90 degrees are counted apart: the joint method decodes them, the published one must refuse them
 with a message that names the turn.
-Of right orders the summary gives the mean share of phase errors within one and three stated standard deviations.
+Of right orders the summary gives the RMS phase error of a shot, its mean and its worst, and the mean share of phase
+errors within one and three stated standard deviations.
 With --rings a table tells how far from the outline of an object, or from a jump of the true phase, its pixels are lost.
 The picture shows the ten shots with the fewest right pixels of the object, then the ten with the fewest right ones of
 those returned: green is right, red is wrong, blue is no data on the object; grey is not scored.
@@ -106,12 +107,11 @@ def judged(label: str, scene: scoring.Scene, **how: Any) -> Judged:
 
 def inside_of(scene: scoring.Scene, phase_rad: scoring.Map, sd_rad: scoring.Map | None) -> NDArray[np.float64]:
     """Give the share of phase errors within each of `DEVIATIONS`, in %, of right orders on the object."""
-    error_rad = np.abs(phase_rad - scene.phase_rad)
-    right = scene.scored & (error_rad < np.pi)
-    if sd_rad is None or not right.any():
+    error_rad = phase_rad - scene.phase_rad
+    right = scene.scored & (np.abs(error_rad) < np.pi)
+    if sd_rad is None:
         return np.full(len(DEVIATIONS), np.nan)
-    shares = [float(np.mean(error_rad[right] <= limit * sd_rad[right])) for limit in DEVIATIONS]
-    return 100 * np.array(shares)
+    return np.array(scoring.within_percent(error_rad[right], sd_rad[right], DEVIATIONS))
 
 
 def rings_of(scene: scoring.Scene, phase_rad: scoring.Map) -> NDArray[np.float64]:
@@ -161,6 +161,9 @@ def summary(name: str, found: list[Judged]) -> dict[str, float]:
         "right_of_returned_mean_percent": float(np.mean(returned)) if returned else np.nan,
         "right_of_returned_worst_percent": min(returned, default=np.nan),
     }
+    error_rad = [one.score.right_phase_rms_rad for one in found if one.score.returned_percent > 0]
+    if error_rad:
+        figures |= {"phase_rms_mean_rad": float(np.mean(error_rad)), "phase_rms_worst_rad": max(error_rad)}
     inside = np.nanmean([one.inside for one in found], axis=0)
     figures |= {f"inside_{limit}_sd_percent": float(share) for limit, share in zip(DEVIATIONS, inside, strict=True)}
     return told(name, figures)

@@ -14,7 +14,19 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Image", "Map", "Mask", "Scene", "Score", "fringe_px", "inside", "phase_errors", "rms", "score"]
+__all__ = [
+    "Image",
+    "Map",
+    "Mask",
+    "Scene",
+    "Score",
+    "fringe_px",
+    "inside",
+    "phase_errors",
+    "rms",
+    "score",
+    "within_percent",
+]
 
 Image = NDArray[Any]
 Map = NDArray[np.floating[Any]]
@@ -65,6 +77,16 @@ def fringe_px(scene: Scene) -> int:
 def rms(values: Map) -> float:
     """Give the root mean square; NaN for an empty map."""
     return float(np.sqrt(np.mean(np.square(values, dtype=np.float64)))) if values.size else np.nan
+
+
+def within_percent(errors: Map, sigma: Map, limits: tuple[int, ...]) -> list[float]:
+    """Give the share of absolute errors within each number of their stated standard deviations; NaN without any.
+
+    >>> within_percent(np.array([0.0, 1.5, -2.5, 9.0]), np.ones(4), (1, 2, 3))
+    [25.0, 50.0, 75.0]
+    """
+    deviations = np.abs(errors) / sigma
+    return [100 * float(np.mean(deviations <= limit)) if deviations.size else np.nan for limit in limits]
 
 
 @dataclass(frozen=True)

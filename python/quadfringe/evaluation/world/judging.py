@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from quadfringe.data import Shape
-from quadfringe.evaluation.scoring import rms
+from quadfringe.evaluation.scoring import rms, within_percent
 from quadfringe.evaluation.world.scenes import Take
 
 Values = NDArray[np.float64]
@@ -40,8 +40,7 @@ def judge(shape: Shape, take: Take) -> Figures:
     right = returned & (np.abs(shape.phase_rad - take.phase_rad) < np.pi)
     absolute_mm = np.abs(error_mm[right])
     rim = returned & (take.edge_distance_px < fringe_px(take))
-    deviations = absolute_mm / shape.uncertainty_mm[right]
-    inside = [100 * float(np.mean(deviations <= limit)) for limit in (1, 2, 3)]
+    inside = within_percent(absolute_mm, shape.uncertainty_mm[right], (1, 2, 3))
     count = max(1, int(returned.sum()))
     return Figures(
         rms_mm=rms(absolute_mm),
